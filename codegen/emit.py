@@ -1,0 +1,212 @@
+"""From equations, an integrator and a list of records to the text of one self-contained kernel module."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+from synchain.models.equations import Equations
+
+from . import elementary, lanes, skeletons
+from .blocks import Names, NodeBlocks, analyse
+from .explicit import write_explicit
+from .integrators import Integrator, integrator
+from .naming import tidy
+from .printer import FUNCTIONS, show
+from .rosenbrock import write_rosenbrock
+from .step import StepWriter, write_function
+
+__all__ = ["RECORDS", "KernelSource", "emit"]
+
+RECORDS = ("sync_error", "section", "trajectory")
+"""What a kernel can record besides the final state."""
+
+LARGEST_UNROLLED = 64
+"""State variables above which an unrolled step is refused: its text would take minutes to compile."""
+
+
+@dataclass(frozen=True, slots=True)
+class KernelSource:
+    """The text of a kernel module and what its arrays mean."""
+
+    text: str
+    equations: Equations
+    integrator: str
+    records: tuple[str, ...]
+    width: int
+
+    @property
+    def digest(self) -> str:
+        """Hexadecimal SHA-256 of the text."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+
+SCALED = '''
+@njit(error_model="numpy", forceinline=True)
+def scaled(error, old, new, rtol, atol):
+    """The error estimate of one state variable in units of its tolerance."""
+    return absolute(error)/(atol + rtol*maximum(absolute(old), absolute(new)))
+'''.strip()
+
+
+def emit(
+    equations: Equations,
+    method: str | Integrator = "rodas5p",
+    records: Sequence[str] = ("sync_error",),
+    section: sp.Expr | None = None,
+    width: int | None = None,
+) -> KernelSource:
+    """Write the kernel of these equations for one integrator, one set of records and one lane width.
+
+    `section` is an expression in the state symbols (x_1 …), the parameters and t whose zeros are recorded; it is needed
+    with the record "section".  Raises ValueError for an unknown record or integrator, a section function that uses other
+    symbols, or a network too large to unroll, and UnprintableError where the equations cannot be printed.
+    """
+    method = integrator(method) if isinstance(method, str) else method
+    unknown = [r for r in records if r not in RECORDS]
+    if unknown:
+        raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(RECORDS)}")
+    if "section" in records and section is None:
+        raise ValueError("the record 'section' needs a section function, for example v_1")
+    if equations.dimension > LARGEST_UNROLLED:
+        raise ValueError(
+            f"{equations.dimension} state variables; unrolled kernels go up to {LARGEST_UNROLLED}. Use a smaller network"
+        )
+    width = lanes.native_width() if width is None else width
+    ordered = tuple(r for r in RECORDS if r in records)
+    text = _module(equations, method, ordered, section if "section" in ordered else None, width)
+    return KernelSource(text, equations, method.name, ordered, width)
+
+
+def _module(
+    equations: Equations, method: Integrator, records: tuple[str, ...], section: sp.Expr | None, width: int
+) -> str:
+    plain = tidy(equations)
+    names = Names([*plain.state, *plain.parameters, *(s.name for s in plain.node.state)])
+    blocks = analyse(plain.node, names)
+    writer = StepWriter(plain, blocks, method)
+    lines = write_rosenbrock(writer) if method.kind == "rosenbrock" else write_explicit(writer)
+    functions = _node_functions(writer, blocks, method)
+    parts = [
+        _header(equations, plain, method, records, lines),
+        _imports(functions, lines, section),
+        _constants(plain, method, records, width),
+        *("\n".join(f) for f in functions),
+        SCALED,
+        _step(lines),
+        _section(equations, plain, section),
+        skeletons.text("sweep"),
+    ]
+    return "\n\n\n".join(part for part in parts if part) + "\n"
+
+
+def _node_functions(writer: StepWriter, blocks: NodeBlocks, method: Integrator) -> list[list[str]]:
+    """The right-hand side of one node, and its linearisation where the method wants one."""
+    made = []
+    for name, doc, body in (
+        ("node", "Right-hand side of one oscillator.", blocks.rhs),
+        ("node_linear", "Right-hand side of one oscillator and the parts of its Jacobian that move.", blocks.linear),
+    ):
+        results = [e for e in body.results if not writer.is_plain(e)]
+        if results and (name == "node" or method.kind == "rosenbrock"):
+            arguments = [s.name for s in writer.arguments(body, results)]
+            made.append(write_function(name, doc, body, arguments, results))
+    return made
+
+
+def _header(
+    equations: Equations, plain: Equations, method: Integrator, records: tuple[str, ...], lines: list[str]
+) -> str:
+    swapped = [f"{a} as {b}" for a, b in zip(equations.parameters, plain.parameters, strict=True) if a != b]
+    rows = [
+        f"Generated kernel: {equations.n} oscillator{'s' * (equations.n > 1)}, {len(equations.links)} links, {method.name}.",
+        "",
+        f"Equations   {equations.digest[:16]}",
+        f"Integrator  {method.name}, order {method.order}: {method.source}",
+        f"State       {', '.join(equations.state)}",
+        f"Parameters  {', '.join(equations.parameters) or 'none'}",
+        f"Records     {', '.join(('final state', *records))}",
+        f"Step        {_operations(lines)} operations outside the node functions",
+    ]
+    if swapped:
+        rows.append(f"Renamed     {', '.join(swapped)}")
+    return '"""' + "\n".join(rows) + '\n"""'
+
+
+def _operations(lines: list[str]) -> int:
+    return sum(line.count(f" {sign} ") for line in lines for sign in "+-") + sum(
+        line.count(sign) for line in lines for sign in "*/"
+    )
+
+
+def _imports(functions: list[list[str]], lines: list[str], section: sp.Expr | None) -> str:
+    text = "\n".join([*(line for f in functions for line in f), *lines, show(section) if section is not None else ""])
+    used = sorted(n for n in {*FUNCTIONS.values(), "sqrt", "exp", "log"} if f"{n}(" in text or n in ("sqrt", "exp", "log"))
+    smooth = [n for n in used if n in elementary.__all__ and n not in lanes.__all__]
+    primitive = {"absolute", "any_lane", "broadcast", "lane_bits", "load", "maximum", "minimum", "select", "store", "sqrt"}
+    primitive |= {n for n in used if n in lanes.__all__}
+    return "\n".join([
+        "import math",
+        "",
+        "import numpy as np",
+        "from numba import njit",
+        "",
+        f"from synchain.codegen.elementary import {', '.join(smooth)}",
+        f"from synchain.codegen.lanes import {', '.join(sorted(primitive))}",
+    ])  # fmt: skip
+
+
+def _constants(equations: Equations, method: Integrator, records: tuple[str, ...], width: int) -> str:
+    flags = {name.upper(): name in records for name in RECORDS}
+    rows = {
+        "WIDTH": width,
+        "NODES": equations.n,
+        "COMPONENTS": len(equations.node.state),
+        "DIMENSION": equations.dimension,
+        "PARAMETERS": len(equations.parameters),
+        "DENSE_ROWS": len(method.dense),
+        "ERROR_ORDER": method.error_order,
+        **flags,
+        "DENSE": any(flags.values()),
+    }
+    return "\n".join(f"{name} = {value!r}" for name, value in rows.items())
+
+
+def _step(lines: list[str]) -> str:
+    head = [
+        "@njit(error_model='numpy')",
+        "def step(t, h, y, p, y_new, dense, rtol, atol):",
+        '    """One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."""',
+    ]
+    return "\n".join([*head, *(f"    {line}" for line in lines)])
+
+
+def _section(equations: Equations, plain: Equations, section: sp.Expr | None) -> str:
+    """The section function at a fraction of the step; a kernel without sections has none."""
+    if section is None:
+        return ""
+    swap = dict(zip(map(_real, (*equations.state, *equations.parameters)), map(_real, (*plain.state, *plain.parameters)),
+                    strict=True))  # fmt: skip
+    used = {s.name for s in section.free_symbols}
+    unknown = sorted(used - set(equations.state) - set(equations.parameters) - {"t"})
+    if unknown:
+        raise ValueError(f"section function {section}: unknown symbol {unknown[0]!r}; use the state, parameters and t")
+    lines = ["@njit(error_model='numpy', forceinline=True)", "def section(theta, t, h, y, p, y_new, dense):",
+             '    """The section function at the fraction theta of the step."""']  # fmt: skip
+    for slot, (name, shown) in enumerate(zip(equations.state, plain.state, strict=True)):
+        if name in used:
+            lines.append(f"    {shown} = inside(theta, {slot}, y, y_new, dense)")
+    for slot, (name, shown) in enumerate(zip(equations.parameters, plain.parameters, strict=True)):
+        if name in used:
+            lines.append(f"    {shown} = load(p, {slot}, WIDTH)")
+    text = show(section.xreplace({_real("t"): sp.Symbol("(t + theta*h)")}).xreplace(swap))
+    return "\n".join([*lines, f"    return {text}"])
+
+
+def _real(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)
+
+

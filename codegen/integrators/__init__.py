@@ -1,0 +1,78 @@
+"""Integrators as data, one file each: exact tableau, orders and the source of the coefficients.
+
+A file holds KIND ("rosenbrock" or "explicit"), ORDER, ERROR_ORDER, DENSE_ORDER, SOURCE and the coefficients; everything
+else (stage count, stiff accuracy, which sums can be reused) is computed from them.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from dataclasses import dataclass
+from types import ModuleType
+
+__all__ = ["Integrator", "integrator", "names"]
+
+Row = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Integrator:
+    """One-step method with an embedded error estimate and dense output.
+
+    Rosenbrock methods stand in the form that needs no product with the Jacobian: with s = 1/(h gamma),
+    (s - J) k_i = f(t + c_i h, y + sum a_ij k_j) + h d_i f_t + sum (C_ij/h) k_j;  y_new = y + sum b_i k_i
+    (Hairer & Wanner, *Solving ODEs II*, 2nd ed. 1996, eq. IV.7.25).  Explicit methods have
+    k_i = f(t + c_i h, y + h sum a_ij k_j) and y_new = y + h sum b_i k_i.
+    The error is sum e_i k_i (times h); two rows of e are combined as |e1|^2 / sqrt(|e1|^2 + 0.01 |e2|^2).
+    Dense output: y(theta) = (1-theta) y + theta (y_new + (1-theta) (D_1 + theta (D_2 + …))), D_j = sum dense_ji k_i
+    (times h).  Stages after the number of `b` serve the dense output alone.
+    """
+
+    name: str
+    kind: str
+    order: int
+    error_order: int
+    dense_order: int
+    source: str
+    a: tuple[Row, ...]
+    b: Row
+    c: Row
+    e: tuple[Row, ...]
+    dense: tuple[Row, ...]
+    gamma: float = 0.0
+    d: Row = ()
+    big_c: tuple[Row, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("rosenbrock", "explicit"):
+            raise ValueError(f"integrator {self.name}: kind {self.kind!r}; expected 'rosenbrock' or 'explicit'")
+        if len(self.a) != len(self.c) or any(len(row) > i for i, row in enumerate(self.a)):
+            raise ValueError(f"integrator {self.name}: the tableau is not strictly lower triangular")
+        if self.kind == "rosenbrock" and not self.gamma > 0:
+            raise ValueError(f"integrator {self.name}: a Rosenbrock method needs gamma > 0")
+
+    @property
+    def stages(self) -> int:
+        """Stages of the step itself, without those that serve the dense output alone."""
+        return len(self.b)
+
+
+def names() -> tuple[str, ...]:
+    """Names of all integrators: the files of this folder."""
+    return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
+
+
+def integrator(name: str) -> Integrator:
+    """Return the integrator of that name; ValueError for an unknown one."""
+    if name not in names():
+        raise ValueError(f"unknown integrator {name!r}; known: {', '.join(names())}")
+    return _read(name, importlib.import_module(f".{name}", __name__))
+
+
+def _read(name: str, data: ModuleType) -> Integrator:
+    return Integrator(
+        name=name, kind=data.KIND, order=data.ORDER, error_order=data.ERROR_ORDER, dense_order=data.DENSE_ORDER,
+        source=data.SOURCE, a=data.A, b=data.B, c=data.C, e=data.E, dense=data.DENSE,
+        gamma=getattr(data, "GAMMA", 0.0), d=getattr(data, "TIME_WEIGHTS", ()), big_c=getattr(data, "BIG_C", ()),
+    )  # fmt: skip

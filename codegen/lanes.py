@@ -1,0 +1,324 @@
+"""A SIMD value for Numba: `Lane(width)` holds one double for each of `width` cells, `Mask(width)` one truth value.
+
+Kernels are written once on lane values.  Width 1 is the scalar kernel, wider ones run several cells of a sweep in
+step with each other in one vector register.  Operators and the functions below are branch-free: both sides of a
+`select` are computed.  Multiplications and additions may be contracted to fused multiply-adds; nothing else about
+the arithmetic is relaxed, so infinities and NaN mean what they mean in IEEE 754.
+"""
+
+from __future__ import annotations
+
+import operator
+import os
+from collections.abc import Callable
+from typing import Any
+
+import llvmlite.binding as llvm
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, register_model
+
+__all__ = [
+    "Lane", "Mask", "absolute", "any_lane", "broadcast", "copysign", "floor", "fma", "lane_bits", "load",
+    "maximum", "minimum", "native_width", "round_even", "scale_binary", "select", "split_binary", "sqrt", "store",
+]  # fmt: skip
+
+DOUBLE, INT32, INT64, BOOL = ir.DoubleType(), ir.IntType(32), ir.IntType(64), ir.IntType(1)
+CONTRACT = ("contract",)
+WIDTHS = (1, 2, 4, 8, 16)
+
+
+class Lane(types.Type):
+    """Numba type of `width` doubles in one vector register."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"Lane({width})")
+
+
+class Mask(types.Type):
+    """Numba type of `width` truth values, the result of comparing lanes."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"Mask({width})")
+
+
+@register_model(Lane)
+class _LaneModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, fe_type: Lane) -> None:
+        super().__init__(manager, fe_type, ir.VectorType(DOUBLE, fe_type.width))
+
+
+@register_model(Mask)
+class _MaskModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, fe_type: Mask) -> None:
+        super().__init__(manager, fe_type, ir.VectorType(BOOL, fe_type.width))
+
+
+def native_width() -> int:
+    """Return the lane width for this CPU: 8 with AVX-512, 4 with AVX, else 2; SYNCHAIN_WIDTH overrides it.
+
+    Raises ValueError where SYNCHAIN_WIDTH is not one of 1, 2, 4, 8, 16.
+    """
+    wish = os.environ.get("SYNCHAIN_WIDTH", "")
+    if wish:
+        if wish not in map(str, WIDTHS):
+            raise ValueError(f"SYNCHAIN_WIDTH is {wish!r}; expected one of {', '.join(map(str, WIDTHS))}")
+        return int(wish)
+    features = llvm.get_host_cpu_features()
+    if features.get("avx512f"):
+        return 8
+    return 4 if features.get("avx") else 2
+
+
+def _splat(builder: ir.IRBuilder, value: ir.Value, width: int) -> ir.Value:
+    vector = ir.VectorType(DOUBLE, width)
+    undefined = ir.Constant(vector, ir.Undefined)
+    first = builder.insert_element(undefined, value, ir.Constant(INT32, 0))
+    zeros = ir.Constant(ir.VectorType(INT32, width), [0] * width)
+    return builder.shuffle_vector(first, undefined, zeros)
+
+
+def _as_lane(context: Any, builder: ir.IRBuilder, value: ir.Value, fe_type: types.Type, width: int) -> ir.Value:
+    if isinstance(fe_type, Lane):
+        return value
+    if fe_type != types.float64:
+        value = context.cast(builder, value, fe_type, types.float64)
+    return _splat(builder, value, width)
+
+
+def _common_width(arguments: Any) -> int | None:
+    """The width shared by the lanes among the arguments, None where they are not lanes and numbers."""
+    widths = {a.width for a in arguments if isinstance(a, Lane)}
+    numbers = all(isinstance(a, Lane | types.Float | types.Integer) for a in arguments)
+    return widths.pop() if len(widths) == 1 and numbers else None
+
+
+PAIRS = [(Lane, Lane), (Lane, types.Float), (types.Float, Lane), (Lane, types.Integer), (types.Integer, Lane)]
+
+
+def _define_operator(function: Callable, emit: Callable, result: type) -> None:
+    """Give a binary operator its meaning on lanes; numbers are broadcast."""
+
+    @infer_global(function)
+    class _Typing(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            width = _common_width(args) if len(args) == 2 else None
+            return signature(result(width), *args) if width else None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        width = sig.return_type.width
+        left, right = (_as_lane(context, builder, v, t, width) for v, t in zip(args, sig.args, strict=True))
+        return emit(builder, left, right)
+
+    for left, right in PAIRS:
+        lower_builtin(function, left, right)(lower)
+
+
+for _function, _name in (
+    (operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"), (operator.truediv, "fdiv"),
+):  # fmt: skip
+    _define_operator(_function, lambda b, x, y, _n=_name: getattr(b, _n)(x, y, flags=CONTRACT), Lane)
+for _function, _name in (
+    (operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="), (operator.eq, "=="),
+):  # fmt: skip
+    _define_operator(_function, lambda b, x, y, _n=_name: b.fcmp_ordered(_n, x, y), Mask)
+
+
+@infer_global(operator.neg)
+class _NegTyping(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        return signature(args[0], *args) if isinstance(args[0], Lane) else None
+
+
+@lower_builtin(operator.neg, Lane)
+def _lower_neg(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.fneg(args[0])
+
+
+def _define_logic(function: Callable, name: str) -> None:
+    @infer_global(function)
+    class _Typing(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            same = len(args) == 2 and isinstance(args[0], Mask) and args[0] == args[1]
+            return signature(args[0], *args) if same else None
+
+    @lower_builtin(function, Mask, Mask)
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return getattr(builder, name)(*args)
+
+
+_define_logic(operator.and_, "and_")
+_define_logic(operator.or_, "or_")
+
+
+@infer_global(operator.invert)
+class _InvertTyping(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        return signature(args[0], *args) if isinstance(args[0], Mask) else None
+
+
+@lower_builtin(operator.invert, Mask)
+def _lower_invert(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.not_(args[0])
+
+
+def _llvm_function(name: str, arity: int) -> Any:
+    """An intrinsic that calls llvm.<name> on lanes; numbers among the arguments are broadcast."""
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        width = sig.return_type.width
+        vector = ir.VectorType(DOUBLE, width)
+        values = [_as_lane(context, builder, v, t, width) for v, t in zip(args, sig.args, strict=True)]
+        kind = ir.FunctionType(vector, [vector] * arity)
+        function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{width}f64")
+        return builder.call(function, values)
+
+    def typed(*arguments: Any) -> Any:
+        width = _common_width(arguments)
+        return (Lane(width)(*arguments), lower) if width else None
+
+    if arity == 1:
+        return intrinsic(lambda typingctx, x: typed(x))
+    if arity == 2:
+        return intrinsic(lambda typingctx, x, y: typed(x, y))
+    return intrinsic(lambda typingctx, x, y, z: typed(x, y, z))
+
+
+absolute = _llvm_function("fabs", 1)
+floor = _llvm_function("floor", 1)
+round_even = _llvm_function("rint", 1)
+sqrt = _llvm_function("sqrt", 1)
+copysign = _llvm_function("copysign", 2)
+minimum = _llvm_function("minnum", 2)
+maximum = _llvm_function("maxnum", 2)
+fma = _llvm_function("fma", 3)
+
+
+@intrinsic
+def select(typingctx: Any, mask: Any, yes: Any, no: Any) -> Any:
+    """Per lane: `yes` where the mask holds, else `no`."""
+    if not isinstance(mask, Mask):
+        return None
+    width = mask.width
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        pair = (_as_lane(context, builder, v, t, width) for v, t in zip(args[1:], sig.args[1:], strict=True))
+        return builder.select(args[0], *pair)
+
+    return Lane(width)(mask, yes, no), lower
+
+
+@intrinsic
+def lane_bits(typingctx: Any, mask: Any) -> Any:
+    """The mask as an integer: bit l is lane l."""
+    if not isinstance(mask, Mask):
+        return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.zext(builder.bitcast(args[0], ir.IntType(mask.width)), INT64)
+
+    return types.int64(mask), lower
+
+
+@intrinsic
+def any_lane(typingctx: Any, mask: Any) -> Any:
+    """True where at least one lane of the mask holds."""
+    if not isinstance(mask, Mask):
+        return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        small = ir.IntType(mask.width)
+        return builder.icmp_unsigned("!=", builder.bitcast(args[0], small), ir.Constant(small, 0))
+
+    return types.boolean(mask), lower
+
+
+def _slot(context: Any, builder: Any, array: Any, array_type: Any, index: Any, width: int) -> Any:
+    data = context.make_array(array_type)(context, builder, array).data
+    offset = builder.mul(index, ir.Constant(index.type, width))
+    return builder.bitcast(builder.gep(data, [offset]), ir.VectorType(DOUBLE, width).as_pointer())
+
+
+def _width_of(literal: Any) -> int | None:
+    return literal.literal_value if isinstance(literal, types.IntegerLiteral) else None
+
+
+@intrinsic(prefer_literal=True)
+def load(typingctx: Any, array: Any, slot: Any, width: Any) -> Any:
+    """Lane number `slot` of a flat float64 array whose entries stand in groups of `width`."""
+    size = _width_of(width)
+    if size is None or not isinstance(slot, types.Integer):
+        return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        index = context.cast(builder, args[1], sig.args[1], types.intp)
+        return builder.load(_slot(context, builder, args[0], sig.args[0], index, size), align=8)
+
+    return Lane(size)(array, slot, width), lower
+
+
+@intrinsic
+def store(typingctx: Any, array: Any, slot: Any, value: Any) -> Any:
+    """Write a lane to a flat float64 array at group number `slot`."""
+    if not isinstance(value, Lane) or not isinstance(slot, types.Integer):
+        return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        index = context.cast(builder, args[1], sig.args[1], types.intp)
+        place = _slot(context, builder, args[0], sig.args[0], index, sig.args[2].width)
+        builder.store(args[2], place, align=8)
+        return context.get_dummy_value()
+
+    return types.void(array, slot, value), lower
+
+
+@intrinsic(prefer_literal=True)
+def broadcast(typingctx: Any, number: Any, width: Any) -> Any:
+    """A lane that holds the same number everywhere."""
+    size = _width_of(width)
+    if size is None or not isinstance(number, types.Float | types.Integer):
+        return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return _as_lane(context, builder, args[0], sig.args[0], size)
+
+    return Lane(size)(number, width), lower
+
+
+@intrinsic
+def scale_binary(typingctx: Any, value: Any, shifted: Any) -> Any:
+    """value * 2**k for k = shifted - 1.5 * 2**52, an integer in -1023 … 1023; one integer addition."""
+    if not isinstance(value, Lane):
+        return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        whole = ir.VectorType(INT64, value.width)
+        shift = ir.Constant(whole, [52] * value.width)
+        exponent = builder.shl(builder.bitcast(args[1], whole), shift)
+        return builder.bitcast(builder.add(builder.bitcast(args[0], whole), exponent), args[0].type)
+
+    return value(value, shifted), lower
+
+
+@intrinsic
+def split_binary(typingctx: Any, value: Any, pivot: Any) -> Any:
+    """For positive normal `value` = m * 2**k with m in [pivot, 2 pivot): the pair (m, k), both lanes."""
+    if not isinstance(value, Lane) or not isinstance(pivot, types.Float):
+        return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        width = value.width
+        whole = ir.VectorType(INT64, width)
+        start = builder.bitcast(_splat(builder, args[1], width), whole)
+        distance = builder.sub(builder.bitcast(args[0], whole), start)
+        exponent = builder.ashr(distance, ir.Constant(whole, [52] * width))
+        back = builder.shl(exponent, ir.Constant(whole, [52] * width))
+        mantissa = builder.bitcast(builder.sub(builder.bitcast(args[0], whole), back), args[0].type)
+        number = builder.sitofp(exponent, args[0].type)
+        return context.make_tuple(builder, sig.return_type, [mantissa, number])
+
+    return types.UniTuple(value, 2)(value, pivot), lower

@@ -1,0 +1,120 @@
+"""The statements of a Rosenbrock step: exact Jacobian, one elimination, and a solve for each stage."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import sympy as sp
+
+from .elimination import Factors, Plan, plan, write_factors, write_solve
+from .printer import show
+from .step import StepWriter, combine, indent_from
+
+__all__ = ["write_rosenbrock"]
+
+Entries = dict[tuple[int, int], sp.Expr]
+
+
+def write_rosenbrock(w: StepWriter) -> list[str]:
+    """Return all statements of a Rosenbrock step."""
+    w.opening()
+    # (shift - J) k = …; reach = 1/shift, rate = 1/h
+    w.put(f"reach = h*{w.method.gamma!r}", "shift = 1.0/reach", f"rate = shift*{w.method.gamma!r}")
+    own = linearise(w)
+    entries = gather(w, own)
+    steps = plan(len(w.state), set(entries))
+    factors = write_factors(steps, entries, tuple(w.state))
+    w.put("# factors of shift - J", *factors.lines)
+    slopes = [show(values[f"ft_{s.name}"]) for s in w.equations.node.state for values in own]
+    for i in range(w.method.stages):
+        stage(w, i, steps, factors, slopes)
+    finish(w)
+    return w.lines
+
+
+def linearise(w: StepWriter) -> list[dict[str, sp.Expr]]:
+    """Write the right-hand side, Jacobian and time derivative at the start; return what stands for each, by node."""
+    eq, body = w.equations, w.blocks.linear
+    state = [s.name for s in eq.node.state]
+    kinds = [f"f_{r}" for r in state] + [f"j_{r}{c}" for r in state for c in state] + [f"ft_{r}" for r in state]
+    coded = [e for e in body.results if not w.is_plain(e)]
+    w.put("# right-hand side, Jacobian and time derivative at the start")
+    w.timed("t", w.wanted(body.results, body))
+    own: list[dict[str, sp.Expr]] = []
+    for i in range(eq.n):
+        at = {s: sp.Symbol(f"{s.name}_{i + 1}", real=True) for s in eq.node.state}
+        named = {kind: sp.Symbol(f"{kind}_{i + 1}", real=True) for kind in kinds}
+        plain = {kind: e.xreplace(at) for kind, e in zip(kinds, body.results, strict=True) if w.is_plain(e)}
+        if coded:
+            left = ", ".join(named[kind].name for kind in kinds if kind not in plain)
+            w.put(f"{left} = {w.call('node_linear', body, coded, i, '')}")
+        w.put(*(f"{named[kind]} = {show(plain[kind])}" for kind in kinds[: len(state)] if kind in plain))
+        own.append({kind: plain.get(kind, named[kind]) for kind in kinds})
+    w.links("", "f_")
+    return own
+
+
+def gather(w: StepWriter, own: list[dict[str, sp.Expr]]) -> Entries:
+    """Entries of the whole Jacobian: those of the nodes by name, plus what the links add."""
+    eq, n = w.equations, w.equations.n
+    entries: Entries = {}
+    for a, r in enumerate(eq.node.state):
+        for b, c in enumerate(eq.node.state):
+            for i in range(n):
+                entries[a * n + i, b * n + i] = own[i][f"j_{r.name}{c.name}"]
+    for key, e in eq.link_jacobian():
+        entries[key] = entries.get(key, sp.S.Zero) + e
+    return {key: e for key, e in entries.items() if e != 0}
+
+
+def stage(w: StepWriter, i: int, steps: Plan, factors: Factors, time_slopes: Sequence[str]) -> None:
+    """Write one stage: state, right-hand side, linear solve."""
+    m = w.method
+    w.put(f"# stage {i + 1}")
+    if i > 0:
+        for name in w.state:
+            w.put(f"u_{name} = {stage_state(m.a[i], m.a[i - 1], name)}")
+        if i == 1 or m.c[i] != m.c[i - 1]:
+            w.put(f"now = {combine((m.c[i],), ['h'], 't')}")
+            w.timed("now", w.wanted(w.blocks.rhs.results, w.blocks.rhs))
+        w.slopes("u_", "f_")
+    rights, results = {}, {}
+    for slot, name in enumerate(w.state):
+        text = f"f_{name}"
+        if i > 0:
+            text += f" + rate*({combine(m.big_c[i], w.stages(name, i))})"
+        if m.d[i] != 0.0 and time_slopes[slot] != "0.0":
+            text += term(m.d[i], time_slopes[slot])
+        w.put(f"r_{name} = {text}")
+        rights[slot], results[slot] = f"r_{name}", f"k{i + 1}_{name}"
+    w.put(*write_solve(steps, factors, rights, results))
+
+
+def term(weight: float, slope: str) -> str:
+    """weight * h * slope with its sign in front."""
+    if slope.startswith("-") and not set("+- ") & set(slope[1:]):
+        weight, slope = -weight, slope[1:]
+    inner = f"({slope})" if set("+- ") & set(slope) else slope
+    return f" {'-' if weight < 0 else '+'} {abs(weight)!r}*h*{inner}"
+
+
+def stage_state(row: Sequence[float], previous: Sequence[float], name: str) -> str:
+    """y + sum a_j k_j, written as the previous stage's state plus its increment where the rows allow that."""
+    names = [f"k{j + 1}_{name}" for j in range(len(row))]
+    if len(previous) > 0 and tuple(row) == (*previous, 1.0):
+        return f"u_{name} + {names[-1]}"
+    return combine(row, names, name)
+
+
+def finish(w: StepWriter) -> None:
+    """Write the new state, the error and the dense output."""
+    m = w.method
+    w.put("# new state and error")
+    errors = []
+    for name in w.state:
+        w.put(f"n_{name} = {stage_state(m.b, m.a[-1], name)}")
+        errors.append(combine(m.e[0], w.stages(name, m.stages)))
+    w.put("if DENSE:")
+    with indent_from(w):
+        w.dense()
+    w.closing(errors)

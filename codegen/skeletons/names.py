@@ -1,0 +1,32 @@
+"""What a skeleton finds in the kernel module it is pasted into; here only so that it can be read and checked.
+
+The values belong to no model: each kernel module defines its own.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+WIDTH = 1
+"""Lanes in one register."""
+NODES = 1
+COMPONENTS = 2
+DIMENSION = 2
+"""State variables: NODES * COMPONENTS, component by component."""
+PARAMETERS = 1
+DENSE_ROWS = 3
+"""Coefficients of the dense output for each state variable."""
+ERROR_ORDER = 4
+DENSE = True
+SYNC_ERROR = False
+SECTION = False
+TRAJECTORY = False
+"""Records of this kernel; what is False costs nothing."""
+
+
+def step(t: Any, h: Any, y: Any, p: Any, y_new: Any, dense: Any, rtol: Any, atol: Any) -> Any:
+    """One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."""
+
+
+def section(theta: Any, t: Any, h: Any, y: Any, p: Any, y_new: Any, dense: Any) -> Any:
+    """The section function at the fraction theta of the step."""

@@ -1,0 +1,28 @@
+"""Derivatives of expressions that contain ``Abs`` and ``sign``, taken on either side of the kink.
+
+``sympy.diff`` turns ``sign(w)`` into ``2*DiracDelta(w)``.  A dry-friction law multiplies its kinks by functions
+that vanish there, or is used away from them; in both cases the one-sided derivative is the right one.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+__all__ = ["derivative"]
+
+
+def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
+    """Return d(expression)/d(symbol) with d|w| = sign(w) dw and d sign(w) = 0, exact wherever w != 0."""
+    expression = sp.sympify(expression)
+    kinks = sorted(expression.atoms(sp.Abs, sp.sign), key=sp.default_sort_key, reverse=True)
+    kinks.sort(key=sp.count_ops, reverse=True)  # outermost first: |a + |b|| before |b|
+    hidden = {kink: sp.Dummy(f"kink{i}", real=True) for i, kink in enumerate(kinks)}
+    smooth = expression.xreplace(hidden)
+    shown = {dummy: kink for kink, dummy in hidden.items()}
+    total = smooth.diff(symbol).xreplace(shown)
+    for kink, dummy in hidden.items():
+        if isinstance(kink, sp.Abs) and kink.has(symbol):
+            inner = kink.args[0]
+            outer = smooth.diff(dummy).xreplace(shown)
+            total += outer * sp.sign(inner) * derivative(inner, symbol)
+    return total
