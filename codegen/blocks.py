@@ -106,7 +106,8 @@ def analyse(node: Node, names: Names) -> NodeBlocks:
     waves = Hoist(moving, names.fresh("hoisted_"))
     outputs = [waves.apply(e) for e in outputs]
     steady = Hoist(moving | {TIME} | set(waves.table.values()), names.fresh("fixed_"))
-    timed, fixed = {}, {}
+    timed: dict[sp.Symbol, sp.Expr] = {}
+    fixed: dict[sp.Symbol, sp.Expr] = {}
     for e, symbol in waves.table.items():
         (timed if e.has(TIME) else fixed)[symbol] = e
     timed = {symbol: steady.apply(e) for symbol, e in timed.items()}

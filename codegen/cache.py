@@ -35,7 +35,9 @@ def open_folder(folder: Path) -> Path:
     status = folder.stat()
     if hasattr(os, "getuid"):
         if status.st_uid != os.getuid():
-            raise PermissionError(f"kernel cache {folder} belongs to another user; set SYNCHAIN_CACHE to a folder of yours")
+            raise PermissionError(
+                f"kernel cache {folder} belongs to another user; set SYNCHAIN_CACHE to a folder of yours"
+            )
         if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
             raise PermissionError(f"kernel cache {folder} can be written by others; run: chmod go-w '{folder}'")
     if not os.access(folder, os.W_OK):

@@ -32,7 +32,7 @@ def lane_function(function: Any) -> Any:
 
 
 @lane_function
-def _exp_tail(r):  # type: ignore[no-untyped-def]
+def _exp_tail(r):
     """exp(r) - 1 - r for |r| <= ln(2)/2, error 3.7e-18 of exp(r)."""
     z = r * r
     even = fma(2.763036861363753e-07, z, 2.480149279994166e-05)
@@ -43,7 +43,7 @@ def _exp_tail(r):  # type: ignore[no-untyped-def]
 
 
 @lane_function
-def exp(x):  # type: ignore[no-untyped-def]
+def exp(x):
     """e**x; 0 below -745.2, inf above 709.8."""
     y = select(x > 710.0, 710.0, select(x < -746.0, -746.0, x))
     shifted = fma(y, LOG2E, MAGIC)
@@ -57,7 +57,7 @@ def exp(x):  # type: ignore[no-untyped-def]
 
 
 @lane_function
-def expm1(x):  # type: ignore[no-untyped-def]
+def expm1(x):
     """e**x - 1 without cancellation, for |x| <= 700 (clamped there)."""
     y = select(x > 700.0, 700.0, select(x < -700.0, -700.0, x))
     shifted = fma(y, LOG2E, MAGIC)
@@ -70,7 +70,7 @@ def expm1(x):  # type: ignore[no-untyped-def]
 
 
 @lane_function
-def log(x):  # type: ignore[no-untyped-def]
+def log(x):
     """Natural logarithm; -inf at 0, NaN below."""
     tiny = x < 2.2250738585072014e-308
     m, k = split_binary(select(tiny, x * 18014398509481984.0, x), 0.7071067811865476)
@@ -90,7 +90,7 @@ def log(x):  # type: ignore[no-untyped-def]
 
 
 @lane_function
-def atan(x):  # type: ignore[no-untyped-def]
+def atan(x):
     """Inverse tangent; polynomial error 2.9e-17 on [0, 1], reciprocal argument above."""
     size = absolute(x)
     big = size > 1.0
@@ -111,7 +111,7 @@ def atan(x):  # type: ignore[no-untyped-def]
 
 
 @lane_function
-def sincos(x):  # type: ignore[no-untyped-def]
+def sincos(x):
     """The pair (sin x, cos x)."""
     k = round_even(x * TWO_OVER_PI)
     r = fma(k, -HALF_PI_REST, fma(k, -HALF_PI_LOW, fma(k, -HALF_PI, x)))
@@ -134,19 +134,19 @@ def sincos(x):  # type: ignore[no-untyped-def]
 
 
 @lane_function
-def sin(x):  # type: ignore[no-untyped-def]
+def sin(x):
     """Sine."""
     return select(x == 0.0, x, sincos(x)[0])
 
 
 @lane_function
-def cos(x):  # type: ignore[no-untyped-def]
+def cos(x):
     """Cosine."""
     return sincos(x)[1]
 
 
 @lane_function
-def tanh(x):  # type: ignore[no-untyped-def]
+def tanh(x):
     """Hyperbolic tangent."""
     size = absolute(x)
     e = expm1(2.0 * select(size > 20.0, 20.0, size))
@@ -154,6 +154,6 @@ def tanh(x):  # type: ignore[no-untyped-def]
 
 
 @lane_function
-def sign(x):  # type: ignore[no-untyped-def]
+def sign(x):
     """-1, 0 or 1; NaN stays NaN."""
     return select(x == 0.0, x, copysign(select(x == x, 1.0, x), x))

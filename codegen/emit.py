@@ -144,9 +144,22 @@ def _operations(lines: list[str]) -> int:
 
 def _imports(functions: list[list[str]], lines: list[str], section: sp.Expr | None) -> str:
     text = "\n".join([*(line for f in functions for line in f), *lines, show(section) if section is not None else ""])
-    used = sorted(n for n in {*FUNCTIONS.values(), "sqrt", "exp", "log"} if f"{n}(" in text or n in ("sqrt", "exp", "log"))
+    used = sorted(
+        n for n in {*FUNCTIONS.values(), "sqrt", "exp", "log"} if f"{n}(" in text or n in ("sqrt", "exp", "log")
+    )
     smooth = [n for n in used if n in elementary.__all__ and n not in lanes.__all__]
-    primitive = {"absolute", "any_lane", "broadcast", "lane_bits", "load", "maximum", "minimum", "select", "store", "sqrt"}
+    primitive = {
+        "absolute",
+        "any_lane",
+        "broadcast",
+        "lane_bits",
+        "load",
+        "maximum",
+        "minimum",
+        "select",
+        "store",
+        "sqrt",
+    }
     primitive |= {n for n in used if n in lanes.__all__}
     return "\n".join([
         "import math",
@@ -208,5 +221,3 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
 
 def _real(name: str) -> sp.Symbol:
     return sp.Symbol(name, real=True)
-
-

@@ -20,7 +20,26 @@ RESERVED = frozenset(
 )  # fmt: skip
 """Words of the generated code; a user's symbol of that name gets an underscore behind it."""
 
-PREFIXES = ("m_", "l_", "inv_", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "u_", "f_", "r_", "at_", "ft_", "n_")
+PREFIXES = (
+    "m_",
+    "l_",
+    "inv_",
+    "k1",
+    "k2",
+    "k3",
+    "k4",
+    "k5",
+    "k6",
+    "k7",
+    "k8",
+    "k9",
+    "u_",
+    "f_",
+    "r_",
+    "at_",
+    "ft_",
+    "n_",
+)
 
 
 def tidy(equations: Equations) -> Equations:

@@ -89,7 +89,8 @@ def _negative(e: sp.Expr) -> bool:
 def _product(e: sp.Expr) -> tuple[str, int]:
     if _negative(e):
         return f"-{_text(-e, TERM)}", SUM
-    numbers, factors = [], []
+    numbers: list[sp.Expr] = []
+    factors: list[sp.Expr] = []
     for factor in e.args:
         (numbers if factor.is_number and _is_constant(factor) else factors).append(factor)
     coefficient = sp.Mul(*numbers)

@@ -15,6 +15,7 @@ from .printer import show
 
 __all__ = ["StepWriter", "combine", "indent_from", "write_function"]
 
+
 def write_function(name: str, doc: str, body: Body, arguments: Sequence[str], results: Sequence[sp.Expr]) -> list[str]:
     """A small inlined function of lanes: statements first, results last."""
     lines = ["@njit(error_model='numpy', forceinline=True)", f"def {name}({', '.join(arguments)}):", f'    """{doc}"""']
@@ -59,7 +60,7 @@ class StepWriter:
     def is_plain(self, e: sp.Expr) -> bool:
         """True where a result needs no function: a number, a parameter term, or one bare state symbol."""
         inner = set(self.equations.node.state) | self.inner
-        return e.is_Symbol and e not in self.inner or not e.free_symbols & inner
+        return (e.is_Symbol and e not in self.inner) or not e.free_symbols & inner
 
     @property
     def inner(self) -> set[sp.Symbol]:
@@ -143,7 +144,11 @@ class StepWriter:
         for j, row in enumerate(self.method.dense):
             for slot, name in enumerate(self.state):
                 text = combine(row, [f"k{i + 1}_{name}" for i in range(len(row))])
-                self.put(f"store(dense, {j * len(self.state) + slot}, {scale}({text}))" if scale else f"store(dense, {j * len(self.state) + slot}, {text})")
+                self.put(
+                    f"store(dense, {j * len(self.state) + slot}, {scale}({text}))"
+                    if scale
+                    else f"store(dense, {j * len(self.state) + slot}, {text})"
+                )
 
 
 @contextmanager

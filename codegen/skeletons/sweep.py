@@ -14,8 +14,18 @@ from numba import njit
 from synchain.codegen.elementary import exp, log
 from synchain.codegen.lanes import absolute, any_lane, broadcast, lane_bits, load, maximum, minimum, select, sqrt, store
 from synchain.codegen.skeletons.names import (
-    COMPONENTS, DENSE, DENSE_ROWS, DIMENSION, ERROR_ORDER, NODES, PARAMETERS, SECTION, SYNC_ERROR, TRAJECTORY, WIDTH,
-    section, step,
+    COMPONENTS,
+    DENSE_ROWS,
+    DIMENSION,
+    ERROR_ORDER,
+    NODES,
+    PARAMETERS,
+    SECTION,
+    SYNC_ERROR,
+    TRAJECTORY,
+    WIDTH,
+    section,
+    step,
 )  # fmt: skip
 
 # --- kernel text below ---
@@ -23,38 +33,38 @@ from synchain.codegen.skeletons.names import (
 TIME, STEP, STOP, START, END, MEMORY, ACCEPTED, REJECTED = 0, 1, 2, 3, 4, 5, 6, 7
 SYNC, SYNC_SUM, SYNC_PEAK, NEXT_SAMPLE, SAMPLE_GAP, GROUPS = 8, 9, 10, 11, 12, 13
 # How a cell ended.
-FINISHED, BUDGET, UNDERFLOW, DIVERGED = 1, 2, 3, 4
+FINISHED, BUDGET, UNDERFLOW, DIVERGED, INTERRUPTED = 1, 2, 3, 4, 5
 # Columns of `control`, of `sums` and of `counts`.
-RTOL, ATOL, FIRST_STEP, MAX_STEP, MAX_STEPS, DIRECTION = 0, 1, 2, 3, 4, 5
+RTOL, ATOL, FIRST_STEP, MAX_STEP, MAX_STEPS, DIRECTION, CANCEL = 0, 1, 2, 3, 4, 5, 6
 MEAN, PEAK, LAST, STOPPED_AT = 0, 1, 2, 3
 STATUS, N_ACCEPTED, N_REJECTED, N_POINTS = 0, 1, 2, 3
 
 
 @njit(error_model="numpy")
-def fill(l, cell, start, numbers, spans, control, y, p, lane, samples):
-    """Put a cell into lane l; a lane without a cell of its own (cell < 0) idles on a copy of the first one."""
+def fill(which, cell, start, numbers, spans, control, y, p, lane, samples):
+    """Put a cell into a lane; a lane without a cell of its own (cell < 0) idles on a copy of the first one."""
     idle, cell = cell < 0, max(cell, 0)
     for c in range(DIMENSION):
-        y[c * WIDTH + l] = start[cell, c]
+        y[c * WIDTH + which] = start[cell, c]
     for c in range(PARAMETERS):
-        p[c * WIDTH + l] = numbers[cell, c]
+        p[c * WIDTH + which] = numbers[cell, c]
     for group in range(GROUPS):
-        lane[group * WIDTH + l] = 0.0
-    lane[STEP * WIDTH + l] = control[FIRST_STEP]
-    lane[START * WIDTH + l] = spans[cell, 0]
-    lane[END * WIDTH + l] = spans[cell, 1]
-    lane[STOP * WIDTH + l] = spans[cell, 0] if spans[cell, 0] > 0.0 else spans[cell, 1]
-    lane[NEXT_SAMPLE * WIDTH + l] = spans[cell, 0]
+        lane[group * WIDTH + which] = 0.0
+    lane[STEP * WIDTH + which] = control[FIRST_STEP]
+    lane[START * WIDTH + which] = spans[cell, 0]
+    lane[END * WIDTH + which] = spans[cell, 1]
+    lane[STOP * WIDTH + which] = spans[cell, 0] if spans[cell, 0] > 0.0 else spans[cell, 1]
+    lane[NEXT_SAMPLE * WIDTH + which] = spans[cell, 0]
     if TRAJECTORY and samples.shape[1] > 1:
-        lane[SAMPLE_GAP * WIDTH + l] = (spans[cell, 1] - spans[cell, 0]) / (samples.shape[1] - 1)
+        lane[SAMPLE_GAP * WIDTH + which] = (spans[cell, 1] - spans[cell, 0]) / (samples.shape[1] - 1)
     if SYNC_ERROR:
         now = np.empty(WIDTH)
         store(now, 0, spread(y))
-        lane[SYNC * WIDTH + l] = now[l]
+        lane[SYNC * WIDTH + which] = now[which]
     if idle:
         for group in (STOP, START, END, NEXT_SAMPLE):
-            lane[group * WIDTH + l] = math.inf
-        lane[ACCEPTED * WIDTH + l] = -math.inf
+            lane[group * WIDTH + which] = math.inf
+        lane[ACCEPTED * WIDTH + which] = -math.inf
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -165,14 +175,14 @@ def keep_points(theta, hits, t, h, y, y_new, dense, cell, counts, points):
     store(when, 0, t + theta * h)
     for c in range(DIMENSION):
         store(where, c, inside(theta, c, y, y_new, dense))
-    for l in range(WIDTH):
-        if (hits >> l) & 1:
-            k = counts[cell[l], N_POINTS]
-            counts[cell[l], N_POINTS] = k + 1
+    for which in range(WIDTH):
+        if (hits >> which) & 1:
+            k = counts[cell[which], N_POINTS]
+            counts[cell[which], N_POINTS] = k + 1
             if k < points.shape[1]:
-                points[cell[l], k, 0] = when[l]
+                points[cell[which], k, 0] = when[which]
                 for c in range(DIMENSION):
-                    points[cell[l], k, c + 1] = where[c * WIDTH + l]
+                    points[cell[which], k, c + 1] = where[c * WIDTH + which]
 
 
 @njit(error_model="numpy")
@@ -198,54 +208,56 @@ def sample(lane, t_new, h, accepted, y, y_new, dense, cell, samples):
     store(ends, 0, t_new)
     store(lengths, 0, h)
     place = np.empty(DIMENSION * WIDTH)
-    for l in range(WIDTH):
-        gap = lane[SAMPLE_GAP * WIDTH + l]
-        while (accepted >> l) & 1 and lane[NEXT_SAMPLE * WIDTH + l] <= ends[l]:
-            begin = lane[START * WIDTH + l]
-            k = int(round((lane[NEXT_SAMPLE * WIDTH + l] - begin) / gap)) if gap > 0.0 else 0
+    for which in range(WIDTH):
+        gap = lane[SAMPLE_GAP * WIDTH + which]
+        while (accepted >> which) & 1 and lane[NEXT_SAMPLE * WIDTH + which] <= ends[which]:
+            begin = lane[START * WIDTH + which]
+            k = round((lane[NEXT_SAMPLE * WIDTH + which] - begin) / gap) if gap > 0.0 else 0
             if k >= samples.shape[1]:
                 break
-            theta = 1.0 - (ends[l] - lane[NEXT_SAMPLE * WIDTH + l]) / lengths[l]
+            theta = 1.0 - (ends[which] - lane[NEXT_SAMPLE * WIDTH + which]) / lengths[which]
             for c in range(DIMENSION):
                 store(place, c, inside(broadcast(theta, WIDTH), c, y, y_new, dense))
-                samples[cell[l], k, c] = place[c * WIDTH + l]
-            lane[NEXT_SAMPLE * WIDTH + l] = begin + (k + 1) * gap
+                samples[cell[which], k, c] = place[c * WIDTH + which]
+            lane[NEXT_SAMPLE * WIDTH + which] = begin + (k + 1) * gap
             if k + 2 == samples.shape[1]:
-                lane[NEXT_SAMPLE * WIDTH + l] = lane[END * WIDTH + l]
+                lane[NEXT_SAMPLE * WIDTH + which] = lane[END * WIDTH + which]
             if k + 2 > samples.shape[1]:
-                lane[NEXT_SAMPLE * WIDTH + l] = math.inf
+                lane[NEXT_SAMPLE * WIDTH + which] = math.inf
 
 
 @njit(error_model="numpy")
-def outcome(l, lane, y, control):
-    """Status of the cell in lane l, 0 while it runs."""
-    t = lane[TIME * WIDTH + l]
-    if t >= lane[END * WIDTH + l]:
+def outcome(which, lane, y, control):
+    """Status of the cell in a lane, 0 while it runs."""
+    t = lane[TIME * WIDTH + which]
+    if t >= lane[END * WIDTH + which]:
         return FINISHED
+    if control[CANCEL] != 0.0:
+        return INTERRUPTED
     for c in range(DIMENSION):
-        if not abs(y[c * WIDTH + l]) < 1e100:
+        if not abs(y[c * WIDTH + which]) < 1e100:
             return DIVERGED
-    if lane[ACCEPTED * WIDTH + l] + lane[REJECTED * WIDTH + l] >= control[MAX_STEPS]:
+    if lane[ACCEPTED * WIDTH + which] + lane[REJECTED * WIDTH + which] >= control[MAX_STEPS]:
         return BUDGET
-    if lane[STEP * WIDTH + l] <= 4e-16 * max(1.0, t):
+    if lane[STEP * WIDTH + which] <= 4e-16 * max(1.0, t):
         return UNDERFLOW
     return 0
 
 
 @njit(error_model="numpy")
-def finish(l, status, lane, y, cell, end, sums, counts):
-    """Write what is known about the cell in lane l."""
-    i = cell[l]
+def finish(which, status, lane, y, cell, end, sums, counts):
+    """Write what is known about the cell in a lane."""
+    i = cell[which]
     for c in range(DIMENSION):
-        end[i, c] = y[c * WIDTH + l]
-    length = lane[END * WIDTH + l] - lane[START * WIDTH + l]
-    sums[i, MEAN] = lane[SYNC_SUM * WIDTH + l] / length if length > 0.0 else lane[SYNC * WIDTH + l]
-    sums[i, PEAK] = lane[SYNC_PEAK * WIDTH + l] if length > 0.0 else lane[SYNC * WIDTH + l]
-    sums[i, LAST] = lane[SYNC * WIDTH + l]
-    sums[i, STOPPED_AT] = lane[TIME * WIDTH + l]
+        end[i, c] = y[c * WIDTH + which]
+    length = lane[END * WIDTH + which] - lane[START * WIDTH + which]
+    sums[i, MEAN] = lane[SYNC_SUM * WIDTH + which] / length if length > 0.0 else lane[SYNC * WIDTH + which]
+    sums[i, PEAK] = lane[SYNC_PEAK * WIDTH + which] if length > 0.0 else lane[SYNC * WIDTH + which]
+    sums[i, LAST] = lane[SYNC * WIDTH + which]
+    sums[i, STOPPED_AT] = lane[TIME * WIDTH + which]
     counts[i, STATUS] = status
-    counts[i, N_ACCEPTED] = int(lane[ACCEPTED * WIDTH + l])
-    counts[i, N_REJECTED] = int(lane[REJECTED * WIDTH + l])
+    counts[i, N_ACCEPTED] = int(lane[ACCEPTED * WIDTH + which])
+    counts[i, N_REJECTED] = int(lane[REJECTED * WIDTH + which])
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -268,14 +280,14 @@ def advance(lane, t, t_new, accept, y, y_new):
 @njit(error_model="numpy")
 def settle(queue, last, lane, y, p, cell, start, numbers, spans, control, end, sums, counts, samples):
     """Take finished cells out of their lanes and put the next ones in; returns the head of the queue."""
-    for l in range(WIDTH):
-        while cell[l] >= 0:
-            status = outcome(l, lane, y, control)
+    for which in range(WIDTH):
+        while cell[which] >= 0:
+            status = outcome(which, lane, y, control)
             if status == 0:
                 break
-            finish(l, status, lane, y, cell, end, sums, counts)
-            cell[l] = queue if queue < last else -1
-            fill(l, cell[l], start, numbers, spans, control, y, p, lane, samples)
+            finish(which, status, lane, y, cell, end, sums, counts)
+            cell[which] = queue if queue < last and control[CANCEL] == 0.0 else -1
+            fill(which, cell[which], start, numbers, spans, control, y, p, lane, samples)
             queue += 1
     return queue
 
@@ -300,9 +312,9 @@ def drive(first, last, start, numbers, spans, control, end, sums, counts, points
     p, dense = np.ones(PARAMETERS * WIDTH), np.zeros(DENSE_ROWS * DIMENSION * WIDTH)
     lane, cell = np.zeros(GROUPS * WIDTH), np.full(WIDTH, -1)
     queue = first
-    for l in range(WIDTH):
-        cell[l] = queue if queue < last else -1
-        fill(l, cell[l], start, numbers, spans, control, y, p, lane, samples)
+    for which in range(WIDTH):
+        cell[which] = queue if queue < last else -1
+        fill(which, cell[which], start, numbers, spans, control, y, p, lane, samples)
         queue += 1
     queue = settle(queue, last, lane, y, p, cell, start, numbers, spans, control, end, sums, counts, samples)
     while cell.max() >= 0:
@@ -318,5 +330,5 @@ def drive(first, last, start, numbers, spans, control, end, sums, counts, points
         if TRAJECTORY and any_lane(accept):
             sample(lane, t_new, h, lane_bits(accept), y, y_new, dense, cell, samples)
         advance(lane, t, t_new, accept, y, y_new)
-        if any_lane(pause(lane, control)):
+        if any_lane(pause(lane, control)) or control[CANCEL] != 0.0:
             queue = settle(queue, last, lane, y, p, cell, start, numbers, spans, control, end, sums, counts, samples)

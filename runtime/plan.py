@@ -1,0 +1,88 @@
+"""From a scene to the arrays that a kernel works on: one row of numbers for each cell of the sweep."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from synchain.models.scene import Scene
+
+__all__ = ["Plan", "plan", "tolerances"]
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Rows of all cells, in C order over the axes (the last one fastest).
+
+    start (cells, dimension), numbers (cells, parameters) in the order of Equations.parameters, spans (cells, 2): start and
+    end of the window in non-dimensional time.
+    """
+
+    start: np.ndarray
+    numbers: np.ndarray
+    spans: np.ndarray
+
+    def __post_init__(self) -> None:
+        for array in (self.start, self.numbers, self.spans):
+            array.flags.writeable = False
+
+
+def plan(scene: Scene) -> Plan:
+    """Lay out the cells of a scene.
+
+    Raises ValueError where a window in drive periods meets a drive of frequency 0, or is too long for double precision.
+    """
+    cells = scene.cells
+    names = scene.equations.parameters
+    numbers = np.empty((cells, len(names)))
+    numbers[:] = [scene.parameters[name] for name in names]
+    start = np.empty((cells, len(scene.y0)))
+    start[:] = scene.y0
+    columns = axis_columns(scene)
+    state = scene.equations.state
+    for name, values in columns.items():
+        if name in names:
+            numbers[:, names.index(name)] = values
+        else:
+            start[:, state.index(name)] = values
+    return Plan(start, numbers, _spans(scene, columns))
+
+
+def axis_columns(scene: Scene) -> dict[str, np.ndarray]:
+    """The value of each axis in each cell."""
+    if scene.zipped:
+        return {axis.name: np.array(axis.values) for axis in scene.axes}
+    grid = np.meshgrid(*(np.array(axis.values) for axis in scene.axes), indexing="ij")
+    return {axis.name: values.reshape(-1) for axis, values in zip(scene.axes, grid, strict=True)}
+
+
+def _spans(scene: Scene, columns: dict[str, np.ndarray]) -> np.ndarray:
+    unit = np.ones(scene.cells)
+    if scene.time_unit == "period":
+        omega = columns.get("omega", np.full(scene.cells, scene.omega or 0.0))
+        if np.any(omega == 0.0):
+            raise ValueError("a window in drive periods needs omega > 0, found 0; set time_unit = 'time'")
+        unit = 2.0 * math.pi / np.abs(omega)
+    spans = np.stack([scene.transient * unit, (scene.transient + scene.window) * unit], axis=1)
+    if not np.all(spans < 1e12):
+        raise ValueError(
+            f"the run ends at t = {spans.max():.3g}; expected less than 1e12, where time has lost 4 digits"
+        )
+    return np.ascontiguousarray(spans)
+
+
+def tolerances(scene: Scene, numbers: np.ndarray) -> tuple[float, float]:
+    """Return (rtol, atol) as integrated with.
+
+    A smoothed jump of friction is 1/kappa wide in velocity; a step control that does not see this width lets oscillators
+    slip through it unnoticed.  With contact "atan" rtol is therefore at most 1/kappa and atol at most 0.1/kappa (not below
+    1e-13), for the largest kappa of the sweep.
+    """
+    rtol, atol = scene.rtol, scene.atol
+    names = scene.equations.parameters
+    if scene.contact == "atan" and "kappa" in names and numbers.size:
+        width = 1.0 / max(float(numbers[:, names.index("kappa")].max()), 1e-300)
+        rtol, atol = min(rtol, max(width, 1e-13)), min(atol, max(0.1 * width, 1e-13))
+    return rtol, atol

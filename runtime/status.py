@@ -1,0 +1,34 @@
+"""How a cell ended: a code in every result, and a sentence for every code."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+__all__ = ["Status"]
+
+
+class Status(IntEnum):
+    """Status of one cell; `FINISHED` alone is success.  The numbers are those of the generated kernels."""
+
+    NOT_RUN = 0
+    FINISHED = 1
+    STEP_BUDGET = 2
+    STEP_UNDERFLOW = 3
+    DIVERGED = 4
+    INTERRUPTED = 5
+
+    @property
+    def message(self) -> str:
+        """What happened and what helps."""
+        return _MESSAGES[self]
+
+
+_MESSAGES = {
+    Status.NOT_RUN: "the cell was not started",
+    Status.FINISHED: "reached the end of the window",
+    Status.STEP_BUDGET: "used up max_steps before the end; raise max_steps or loosen rtol and atol",
+    Status.STEP_UNDERFLOW: "the step size fell below rounding; the equations may be singular here, or the tolerance "
+    "tighter than double precision allows",
+    Status.DIVERGED: "the state grew without bound or became undefined",
+    Status.INTERRUPTED: "stopped by the user before the end; run again with resume",
+}

@@ -1,0 +1,272 @@
+"""Runs a scene: one kernel, chunks of cells on threads, and a result that knows how it came about."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from tqdm import tqdm
+
+from synchain.codegen.emit import emit
+from synchain.codegen.load import Kernel, load
+from synchain.models.scene import Scene
+
+from .plan import Plan, plan, tolerances
+from .result import Result, gather
+from .status import Status
+
+__all__ = ["SweepInterrupted", "kernel", "run"]
+
+CANCEL = 6
+DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
+
+
+class SweepInterrupted(KeyboardInterrupt):
+    """Ctrl-C during a sweep; `result` holds the cells that had finished."""
+
+    def __init__(self, result: Result) -> None:
+        super().__init__(f"interrupted with {int((result.status == Status.FINISHED).sum())} cells finished")
+        self.result = result
+
+
+@dataclass(slots=True)
+class Buffers:
+    """What the kernel fills, one row for each cell; see the docstring of `drive` in any kernel."""
+
+    end: np.ndarray
+    sums: np.ndarray
+    counts: np.ndarray
+    points: np.ndarray
+    samples: np.ndarray
+
+    @classmethod
+    def empty(cls, cells: int, dimension: int, room: int, samples: int) -> Buffers:
+        """Buffers in which nothing has run: numbers NaN, counts zero."""
+        return cls(
+            end=np.full((cells, dimension), np.nan),
+            sums=np.full((cells, 4), np.nan),
+            counts=np.zeros((cells, 4), np.int64),
+            points=np.full((cells, room, dimension + 1), np.nan),
+            samples=np.full((cells, samples, dimension), np.nan),
+        )
+
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """In the order of the kernel's arguments."""
+        return self.end, self.sums, self.counts, self.points, self.samples
+
+
+def kernel(scene: Scene, width: int | None = None) -> Kernel:
+    """Return the compiled kernel of a scene; scenes that differ only in numbers share it."""
+    return load(kernel_source(scene, width))
+
+
+def kernel_source(scene: Scene, width: int | None = None) -> Any:
+    """Return the text of a scene's kernel without compiling it."""
+    section = None
+    if "section" in scene.record:
+        section = sp.Symbol(scene.section.variable, real=True) - sp.Rational(repr(scene.section.level))
+    return emit(scene.equations, scene.integrator, scene.record, section, width)
+
+
+def run(
+    scene: Scene,
+    *,
+    workers: int | None = None,
+    resume: Result | None = None,
+    show_progress: bool | None = None,
+    width: int | None = None,
+    **axes: Any,
+) -> Result:
+    """Run every cell of a scene and return the labelled result.
+
+    `axes` set parameters or initial states: a number fixes one, a sequence makes it an axis of the sweep (after those of
+    the scene, replacing one of the same name).  `workers` is the number of threads (default: all cores), `width` the
+    number of lanes (default: what the CPU has); neither changes a result.  `resume` is an earlier, unfinished result of the
+    same scene, whose finished cells are kept.  `show_progress` None shows a bar on terminals only.
+
+    Raises ValueError for an unknown axis or a result of another scene, SweepInterrupted on Ctrl-C.
+    """
+    scene = with_axes(scene, axes)
+    workers = worker_count(workers)
+    compiled = kernel(scene, width)
+    cells = plan(scene)
+    rtol, atol = tolerances(scene, cells.numbers)
+    control = np.array([rtol, atol, 1e-4, _max_step(scene), scene.max_steps, DIRECTIONS[scene.section.direction], 0.0])
+    buffers = Buffers.empty(
+        scene.cells, len(scene.y0), _room(scene), scene.samples if "trajectory" in scene.record else 0
+    )
+    if resume is not None:
+        resume.restore(scene, buffers)
+    bar = tqdm(total=scene.cells, unit="cell", disable=None if show_progress is None else not show_progress)
+    try:
+        with bar:
+            if scene.continuation == "none":
+                _run_all(compiled, cells, control, buffers, workers, bar.update)
+            else:
+                cells = _run_along(scene, compiled, cells, control, buffers, workers, bar.update)
+            _complete_points(compiled, cells, control, buffers, workers)
+    except KeyboardInterrupt:
+        raise SweepInterrupted(gather(scene, compiled, cells, buffers, (rtol, atol))) from None
+    return gather(scene, compiled, cells, buffers, (rtol, atol))
+
+
+def with_axes(scene: Scene, axes: dict[str, Any]) -> Scene:
+    """The scene with parameters fixed by numbers and axes set by sequences."""
+    fixed: dict[str, Any] = {}
+    swept = {axis.name: axis.values for axis in scene.axes}
+    start = {name: list(values) for name, values in scene.initial.items()}
+    for name, value in axes.items():
+        if np.ndim(value) > 0:
+            swept[name] = tuple(float(v) for v in value)
+        elif name in scene.equations.state:
+            component, number = name.rsplit("_", 1)
+            start[component][int(number) - 1] = float(value)
+            swept.pop(name, None)
+        else:
+            fixed[name] = value
+            swept.pop(name, None)
+    if axes:
+        scene = scene.replace(axes=swept, initial=start, **fixed)
+    return scene
+
+
+def worker_count(workers: int | None) -> int:
+    """Number of threads to use; ValueError for less than one."""
+    if workers is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if workers < 1:
+        raise ValueError(f"workers = {workers}; expected at least 1")
+    return workers
+
+
+def _max_step(scene: Scene) -> float:
+    """Half a drive period at most, so that no step can miss a whole swing of the drive."""
+    if not scene.forced:
+        return math.inf
+    fastest = max((abs(v) for axis in scene.axes if axis.name == "omega" for v in axis.values), default=0.0)
+    fastest = max(fastest, abs(scene.omega or 0.0))
+    return math.pi / fastest if fastest > 0.0 else math.inf
+
+
+def _room(scene: Scene) -> int:
+    """Section points to make room for at first: two a period; cells with more are run again with what they need."""
+    if "section" not in scene.record:
+        return 0
+    periods = scene.window if scene.time_unit == "period" else scene.window / math.pi
+    return int(min(2.0 * periods, 1e6)) + 8
+
+
+def _drive(compiled: Kernel, first: int, last: int, cells: Plan, control: np.ndarray, buffers: Buffers) -> int:
+    compiled.drive(first, last, cells.start, cells.numbers, cells.spans, control, *buffers.arrays())
+    return last - first
+
+
+def _run_all(
+    compiled: Kernel, cells: Plan, control: np.ndarray, buffers: Buffers, workers: int, advance: Callable[[int], Any]
+) -> None:
+    """Run the cells that have not finished, in chunks on threads; on Ctrl-C stop the threads and pass it on."""
+    todo = np.flatnonzero(buffers.counts[:, 0] != Status.FINISHED)
+    advance(len(buffers.counts) - len(todo))
+    if len(todo) == 0:
+        return
+    rows, part = (cells, buffers) if len(todo) == len(buffers.counts) else _select(cells, buffers, todo)
+    part.counts[:] = 0
+    size = _chunk(len(todo), compiled.origin.width, workers)
+    chunks = ((i, min(i + size, len(todo))) for i in range(0, len(todo), size))
+    try:
+        with ThreadPoolExecutor(workers) as pool:
+            _feed(pool, chunks, lambda a, b: _drive(compiled, a, b, rows, control, part), workers, control, advance)
+    finally:
+        if part is not buffers:
+            for whole, piece in zip(buffers.arrays(), part.arrays(), strict=True):
+                whole[todo] = piece
+
+
+def _chunk(cells: int, width: int, workers: int) -> int:
+    """Cells a chunk: a few refills of every lane, and enough chunks to keep all threads busy to the end."""
+    return max(width, min(16 * width, math.ceil(cells / (8 * workers) / width) * width))
+
+
+def _feed(
+    pool: ThreadPoolExecutor,
+    chunks: Iterator[tuple[int, int]],
+    work: Callable[[int, int], int],
+    workers: int,
+    control: np.ndarray,
+    advance: Callable[[int], Any],
+) -> None:
+    """Keep two chunks a thread in flight; an interrupt raises the kernels' cancel flag."""
+    running: set[Future[int]] = set()
+    try:
+        for first, last in chunks:
+            running.add(pool.submit(work, first, last))
+            while len(running) >= 2 * workers:
+                running = _collect(running, advance)
+        while running:
+            running = _collect(running, advance)
+    except BaseException:
+        control[CANCEL] = 1.0
+        raise
+
+
+def _collect(running: set[Future[int]], advance: Callable[[int], Any]) -> set[Future[int]]:
+    done, left = wait(running, timeout=0.2, return_when=FIRST_COMPLETED)
+    for future in done:
+        advance(future.result())
+    return set(left)
+
+
+def _select(cells: Plan, buffers: Buffers, rows: np.ndarray) -> tuple[Plan, Buffers]:
+    """Copies of some rows of a plan and its buffers."""
+    part = Plan(cells.start[rows], cells.numbers[rows], cells.spans[rows])
+    return part, Buffers(*(array[rows] for array in buffers.arrays()))
+
+
+def _run_along(
+    scene: Scene,
+    compiled: Kernel,
+    cells: Plan,
+    control: np.ndarray,
+    buffers: Buffers,
+    workers: int,
+    advance: Callable[[int], Any],
+) -> Plan:
+    """Run the last axis cell by cell, each from the end of the one before; the other axes run side by side.
+
+    Returns the plan with the states that the cells really started from.
+    """
+    columns = scene.shape[-1]
+    order = range(columns) if scene.continuation == "up" else range(columns - 1, -1, -1)
+    table = np.arange(scene.cells).reshape(-1, columns)
+    started = cells.start.copy()
+    start = started[table[:, order[0]]]
+    for column in order:
+        rows = table[:, column]
+        started[rows] = start
+        part, filled = _select(cells, buffers, rows)
+        _run_all(compiled, Plan(start, part.numbers, part.spans), control, filled, workers, advance)
+        for whole, piece in zip(buffers.arrays(), filled.arrays(), strict=True):
+            whole[rows] = piece
+        good = filled.counts[:, 0] == Status.FINISHED
+        start = np.where(good[:, None], filled.end, cells.start[rows])
+    return Plan(started, cells.numbers, cells.spans)
+
+
+def _complete_points(compiled: Kernel, cells: Plan, control: np.ndarray, buffers: Buffers, workers: int) -> None:
+    """Run cells with more section points than there was room for again, with the room they need."""
+    room = buffers.points.shape[1]
+    short = np.flatnonzero(buffers.counts[:, 3] > room)
+    if len(short) == 0:
+        return
+    need = int(buffers.counts[:, 3].max())
+    wide = np.full((len(buffers.counts), need, buffers.points.shape[2]), np.nan)
+    wide[:, :room] = buffers.points
+    buffers.points = wide
+    buffers.counts[short, 0] = Status.NOT_RUN
+    _run_all(compiled, cells, control, buffers, workers, lambda done: None)

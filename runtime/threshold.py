@@ -1,0 +1,223 @@
+"""Where a network synchronises: probe, projection through the spectrum, and the check by direct simulation.
+
+The two-oscillator probe tells for which alpha = sigma |gamma| the mode of a network dies out: in its own network the one
+non-zero eigenvalue is -2.  Any other network synchronises where every non-zero |sigma gamma_k| lies in the probe's ranges
+(Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); Fink et al., Phys. Rev. E 61, 5080 (2000)).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from synchain.models.scene import Scene
+from synchain.models.spectrum import Spectrum
+from synchain.models.topology import Topology, topology
+
+from .intervals import Interval, find, intersect, scale
+from .status import Status
+from .sweep import run
+
+__all__ = ["Criterion", "Thresholds", "critical_ratio", "probe", "project", "simulate", "thresholds", "wu_chua"]
+
+
+@dataclass(frozen=True, slots=True)
+class Criterion:
+    """When a value of sigma counts as synchronous.
+
+    From `starts` different initial states (the scene's own, and copies of it moved as a whole by a random amount of up to
+    `reach` in the position), at least half must end with a mean synchronisation error below `tolerance`, averaged over
+    `window` drive periods after a transient of `transient`.  Near the ends of a range of chaotic motion single starts
+    synchronise or burst by chance; their majority does not depend on one of them.
+    """
+
+    tolerance: float = 1e-3
+    starts: int = 8
+    reach: float = 0.4
+    transient: float = 1000.0
+    window: float = 100.0
+    rtol: float = 1e-8
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("tolerance", "transient", "window", "rtol"):
+            value = getattr(self, name)
+            if not (value > 0 and math.isfinite(value)):
+                raise ValueError(f"criterion: {name} = {value}; expected a positive number")
+        if self.starts < 1:
+            raise ValueError(f"criterion: starts = {self.starts}; expected at least 1")
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """Verdicts of one sweep over sigma (or alpha) and what they rest on.
+
+    x (m,), error (m,): median over the starts of the mean synchronisation error; share (m,): part of the starts that
+    synchronised; intervals: where at least half do, ends refined.
+    """
+
+    x: np.ndarray
+    error: np.ndarray
+    share: np.ndarray
+    intervals: tuple[Interval, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """Synchronous ranges of one network: measured directly and predicted from the probe.
+
+    `direct` is in sigma, `probe` in alpha = sigma |gamma|, `predicted` in sigma.
+    """
+
+    scene: Scene
+    probe: Sweep
+    predicted: tuple[Interval, ...]
+    direct: Sweep
+    criterion: Criterion
+    warnings: tuple[str, ...] = field(default=())
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON-ready: {"intervals", "probe", "predicted"}, sigma for the first and last, alpha for the probe."""
+        return {
+            "intervals": [list(i) for i in self.direct.intervals],
+            "probe": [list(i) for i in self.probe.intervals],
+            "predicted": [list(i) for i in self.predicted],
+            "warnings": list(self.warnings),
+        }
+
+
+def thresholds(
+    scene: Scene,
+    *,
+    sigma: Sequence[float] | None = None,
+    resolution: float = 5e-4,
+    criterion: Criterion | None = None,
+    workers: int | None = None,
+    show_progress: bool | None = None,
+    **parameters: float,
+) -> Thresholds:
+    """Return probe, prediction and direct simulation of a scene's network; `parameters` override the scene's.
+
+    `sigma` is the grid on which ranges are looked for (default: 0 to 0.6 in steps of 0.0025, the probe's in alpha twice as
+    far); narrower ranges are not seen.  Ends are refined to `resolution` in sigma.
+
+    Raises ValueError for a network without links, with one-way links whose eigenvalues are complex, or unconnected.
+    """
+    scene = scene.replace(axes=(), record=("sync_error",), **parameters)
+    criterion = criterion or Criterion()
+    spectrum = scene.topology.spectrum
+    check_probe(scene.topology, spectrum)
+    grid = np.linspace(0.0, 0.6, 241) if sigma is None else np.asarray(sigma, dtype=float)
+    options: dict[str, Any] = {"workers": workers, "show_progress": show_progress}
+    found = probe(scene, 2.0 * grid, resolution=2.0 * resolution, criterion=criterion, **options)
+    direct = simulate(scene, grid, resolution=resolution, criterion=criterion, **options)
+    predicted = project(found.intervals, spectrum, float(grid[-1]))
+    return Thresholds(scene, found, tuple(predicted), direct, criterion, scene.warnings)
+
+
+def check_probe(graph: Topology, spectrum: Spectrum) -> None:
+    """Raise ValueError where the two-oscillator probe says nothing about a network."""
+    if graph.n < 2 or not graph.links:
+        raise ValueError(f"{graph.name}({graph.n}) has no links; thresholds need at least two coupled oscillators")
+    if any(isinstance(value, complex) for value in spectrum.values):
+        raise ValueError(
+            f"{graph.name}({graph.n}) has complex eigenvalues; the two-oscillator probe covers real ones only. "
+            "Use a network with symmetric coupling"
+        )
+    if graph.components > 1:
+        raise ValueError(
+            f"{graph.name}({graph.n}) falls into {graph.components} parts, which never synchronise completely; connect them"
+        )
+
+
+def probe(scene: Scene, alpha: Sequence[float] | np.ndarray, **options: Any) -> Sweep:
+    """Sweep the two-oscillator probe over alpha = 2 sigma; options as for `simulate`."""
+    pair = scene.replace(topology=topology("chain", 2), initial=None, axes=())
+    half = dict(options)
+    if "resolution" in half:
+        half["resolution"] *= 0.5
+    found = simulate(pair, 0.5 * np.asarray(alpha, dtype=float), **half)
+    return Sweep(2.0 * found.x, found.error, found.share, tuple(scale(found.intervals, 2.0)))
+
+
+def simulate(
+    scene: Scene,
+    sigma: Sequence[float] | np.ndarray,
+    *,
+    resolution: float = 5e-4,
+    criterion: Criterion | None = None,
+    workers: int | None = None,
+    show_progress: bool | None = None,
+) -> Sweep:
+    """Sweep sigma by direct simulation and return errors, shares and refined synchronous intervals."""
+    criterion = criterion or Criterion()
+    offsets = _offsets(criterion)
+    seen: dict[str, np.ndarray] = {}
+
+    def judge(points: np.ndarray) -> np.ndarray:
+        errors = _errors(scene, points, offsets, criterion, workers, show_progress)
+        seen.setdefault("error", np.median(errors, axis=1))
+        share = (errors < criterion.tolerance).mean(axis=1)
+        seen.setdefault("share", share)
+        return share >= 0.5
+
+    x = np.asarray(sigma, dtype=float)
+    intervals, _ = find(judge, x, resolution)
+    return Sweep(x, seen["error"], seen["share"], tuple(intervals))
+
+
+def _offsets(criterion: Criterion) -> np.ndarray:
+    """How far the starts are moved: not at all, then at random."""
+    random = np.random.default_rng(criterion.seed)
+    return np.concatenate([[0.0], random.uniform(-criterion.reach, criterion.reach, criterion.starts - 1)])
+
+
+def _errors(
+    scene: Scene,
+    sigma: np.ndarray,
+    offsets: np.ndarray,
+    criterion: Criterion,
+    workers: int | None,
+    show_progress: bool | None,
+) -> np.ndarray:
+    """Mean synchronisation error (points, starts); infinite where a cell did not finish."""
+    position = scene.components[0]
+    axes: dict[str, np.ndarray] = {"sigma": np.repeat(sigma, len(offsets))}
+    for i, x0 in enumerate(scene.initial[position]):
+        axes[f"{position}_{i + 1}"] = np.tile(x0 + offsets, len(sigma))
+    cells = scene.replace(
+        axes={name: tuple(values) for name, values in axes.items()}, zipped=True, record=("sync_error",),
+        transient=criterion.transient, window=criterion.window, rtol=criterion.rtol,
+    )  # fmt: skip
+    result = run(cells, workers=workers, show_progress=show_progress)
+    errors = np.where(result.status == Status.FINISHED, result.sync_error, np.inf)
+    return errors.reshape(len(sigma), len(offsets))
+
+
+def project(ranges: Sequence[Interval], spectrum: Spectrum, highest: float = math.inf) -> list[Interval]:
+    """The sigma for which every non-zero |sigma gamma_k| lies in one of the ranges of alpha, up to `highest`."""
+    allowed: list[Interval] = [(0.0, highest)]
+    for value in spectrum.values:
+        if abs(value) > 0.0:
+            allowed = intersect(allowed, scale(ranges, 1.0 / abs(value)))
+    return allowed
+
+
+def critical_ratio(spectrum: Spectrum) -> float:
+    """Largest over smallest non-zero |gamma|; a bounded range of alpha must be at least this wide (as a ratio)."""
+    sizes = [abs(value) for value in spectrum.values if abs(value) > 0.0]
+    return max(sizes) / min(sizes)
+
+
+def wu_chua(sigma: float, known: Spectrum, wanted: Spectrum) -> float:
+    """Carry the end of a range that starts at zero coupling from one network to another.
+
+    sigma_m gamma_1(m) = sigma_n gamma_1(n), with gamma_1 the eigenvalue of largest modulus where the end is the upper one.
+    Source: Wu & Chua, IEEE Trans. Circuits Syst. I 43, 161 (1996).
+    """
+    largest = [max(abs(value) for value in s.values) for s in (known, wanted)]
+    return sigma * largest[0] / largest[1]
