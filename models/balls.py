@@ -1,0 +1,140 @@
+"""Certified values: SymPy expressions and algebraic numbers in balls of Arb, and their decimals.
+
+Arb: F. Johansson, IEEE Trans. Comput. 66, 1281 (2017).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeAlias
+
+import sympy as sp
+from flint import acb, arb, ctx, fmpq, fmpz
+
+__all__ = ["Ball", "accurate", "decimals", "enclose", "nearest", "precision"]
+
+Ball: TypeAlias = Any
+"""flint.arb where the number is real, flint.acb where it is complex (flint has no types)."""
+
+_MOST = 2**20
+"""Bits at which a number that still cannot be told from zero is given up."""
+
+
+@contextmanager
+def precision(bits: int) -> Iterator[None]:
+    """Run Arb with `bits` bits, then restore its precision."""
+    before = ctx.prec
+    ctx.prec = bits
+    try:
+        yield
+    finally:
+        ctx.prec = before
+
+
+def enclose(expression: sp.Expr, bits: int) -> Ball:
+    """A ball that holds the value of an expression of rationals, roots, pi, I, sin, cos and exp.
+
+    Real arithmetic stays real.  Raises TypeError on any other function or symbol.
+    """
+    with precision(bits):
+        return _ball(expression)
+
+
+def accurate(ball_at: Callable[[int], Ball], bits: int) -> Ball:
+    """A ball of radius below 2**-bits times the modulus, from a function that gives balls at any precision.
+
+    Raises ValueError where the number cannot be told from zero at a million bits.
+    """
+    working = bits + 16
+    while working < _MOST:
+        ball = ball_at(working)
+        with precision(working):
+            radius = _radius(ball)
+            if radius == 0 or radius * arb(2) ** bits < abs(ball).lower():
+                return ball
+        working *= 2
+    raise ValueError(f"a number stays within 2**-{bits} of zero at {_MOST} bits; write it as 0 if it is zero")
+
+
+def nearest(ball_at: Callable[[int], Ball]) -> float | complex:
+    """The value as a float, within 0.5001 units in the last place; complex: relative to its modulus."""
+    ball = accurate(ball_at, 72)
+    if isinstance(ball, arb):
+        return float(ball.mid())
+    return complex(_part(ball.real, ball, 72), _part(ball.imag, ball, 72))
+
+
+def decimals(ball_at: Callable[[int], Ball], digits: int) -> sp.Expr:
+    """The value as a SymPy Float, within one unit of the last of `digits`; complex: real + imaginary * I."""
+    bits = int(3.33 * digits) + 12
+    ball = accurate(ball_at, bits)
+    with precision(2 * bits):
+        if isinstance(ball, arb):
+            return _decimal(ball, digits)
+        real, imaginary = (_decimal(_part(x, ball, bits), digits) for x in (ball.real, ball.imag))
+    return real + imaginary * sp.I
+
+
+def _decimal(x: Ball, digits: int) -> sp.Float:
+    return sp.Float(arb(x).mid().str(digits + 5, radius=False), digits)
+
+
+def _part(part: arb, whole: acb, bits: int) -> arb:
+    """A real or imaginary part, or 0 where it is smaller than 2**-bits of the modulus."""
+    with precision(2 * bits):
+        return arb(0) if abs(part).upper() * arb(2) ** (bits - 4) < abs(whole).lower() else part.mid()
+
+
+def _radius(ball: Ball) -> arb:
+    return ball.rad() if isinstance(ball, arb) else ball.real.rad() + ball.imag.rad()
+
+
+def _ball(e: sp.Expr) -> Ball:
+    if e.is_Rational:
+        return arb(_rational(e))
+    if e is sp.pi:
+        return arb.pi()
+    if e is sp.I:
+        return acb(0, 1)
+    if isinstance(e, (sp.Add, sp.Mul)):
+        total = _ball(e.args[0])
+        for part in e.args[1:]:
+            total = total + _ball(part) if isinstance(e, sp.Add) else total * _ball(part)
+        return total
+    if isinstance(e, sp.exp):
+        return _exponential(e.args[0])
+    if isinstance(e, sp.Pow) and e.exp.is_Rational:
+        return _power(_ball(e.base), _rational(e.exp))
+    if isinstance(e, (sp.sin, sp.cos)):
+        return _circular(e)
+    raise TypeError(f"{e} has no certified value; expected rationals, roots, pi, I, sin, cos and exp only")
+
+
+def _power(base: Ball, exponent: fmpq) -> Ball:
+    if exponent.q == 1:
+        return base ** fmpz(exponent.p)
+    if isinstance(base, arb) and base > 0:
+        return base.sqrt() if exponent == fmpq(1, 2) else base ** arb(exponent)
+    return acb(base) ** acb(exponent)
+
+
+def _circular(e: sp.Expr) -> Ball:
+    turn = e.args[0] / sp.pi
+    if turn.is_Rational:
+        ratio = _rational(turn)
+        return arb.sin_pi_fmpq(ratio) if isinstance(e, sp.sin) else arb.cos_pi_fmpq(ratio)
+    inner = _ball(e.args[0])
+    return inner.sin() if isinstance(e, sp.sin) else inner.cos()
+
+
+def _exponential(exponent: sp.Expr) -> Ball:
+    turn = exponent / (sp.pi * sp.I)
+    if turn.is_Rational:
+        ratio = _rational(turn)
+        return acb(arb.cos_pi_fmpq(ratio), arb.sin_pi_fmpq(ratio))
+    return _ball(exponent).exp()
+
+
+def _rational(e: sp.Rational) -> fmpq:
+    return fmpq(int(e.p), int(e.q))

@@ -1,0 +1,116 @@
+"""The proof of a spectrum: the product of (z - γ) over all eigenvalues is the characteristic polynomial.
+
+Each claimed number has an exact minimal polynomial.  Where the claims that share one are as many distinct
+numbers as its degree, with one multiplicity, their factors (z - γ) multiply to that polynomial: nothing is
+ever compared in floating point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from functools import lru_cache
+from itertools import pairwise
+from typing import Protocol
+
+import sympy as sp
+from flint import acb, fmpq, fmpq_poly, fmpz_poly
+
+from . import angles
+from .algebraic import ComplexRoot, RealRoot
+from .balls import Ball, precision
+
+__all__ = ["ProofError", "check", "distinct", "minimal_polynomial"]
+
+_X = sp.Symbol("x")
+
+
+class ProofError(RuntimeError):
+    """A claimed spectrum is wrong: a mistake in the program or in a topology file, not the user's."""
+
+
+class Claim(Protocol):
+    """An eigenvalue that can be proved."""
+
+    @property
+    def number(self) -> sp.Expr | RealRoot | ComplexRoot: ...
+    @property
+    def multiplicity(self) -> int: ...
+    def enclosure(self, bits: int) -> Ball: ...
+
+
+def check(claims: Iterable[Claim], characteristic: fmpq_poly, name: str) -> None:
+    """Multiply the claims out; ProofError where that is not the exact characteristic polynomial."""
+    groups: dict[tuple[fmpq, ...], list[Claim]] = {}
+    for claim in claims:
+        groups.setdefault(tuple(minimal_polynomial(claim.number).coeffs()), []).append(claim)
+    product = fmpq_poly([1])
+    for coefficients, members in groups.items():
+        factor = fmpq_poly(list(coefficients))
+        counts = {claim.multiplicity for claim in members}
+        if len(members) != factor.degree() or len(counts) != 1 or not distinct(members):
+            shown = ", ".join(str(claim) for claim in members[:4])
+            raise ProofError(
+                f"spectrum of {name}: {len(members)} eigenvalues ({shown}, …) of multiplicities "
+                f"{sorted(counts)} have the minimal polynomial {factor}; expected {factor.degree()} distinct "
+                "ones of one multiplicity: correct the closed form"
+            )
+        product *= factor ** counts.pop()
+    if product != characteristic:
+        raise ProofError(
+            f"spectrum of {name}: the eigenvalues multiply out to a polynomial of degree {product.degree()}; "
+            f"expected the characteristic one, of degree {characteristic.degree()}: correct the closed form"
+        )
+
+
+def distinct(claims: Sequence[Claim]) -> bool:
+    """True once brackets or balls around all claims are disjoint; False where two agree to 4000 bits."""
+    numbers = [claim.number for claim in claims]
+    brackets = sorted((number.low, number.high) for number in numbers if isinstance(number, RealRoot))
+    if len(brackets) == len(numbers):
+        return all(first[1] <= second[0] for first, second in pairwise(brackets))  # no end is a root
+    for bits in (64, 256, 1024, 4096):
+        balls = [acb(claim.enclosure(bits)) for claim in claims]
+        with precision(bits):
+            balls.sort(key=lambda ball: (float(ball.real.mid()), float(ball.imag.mid())))
+            if not any(_touch(balls, i) for i in range(len(balls))):
+                return True
+    return False
+
+
+def _touch(balls: list[acb], i: int) -> bool:
+    """True where ball i overlaps a later one; sorted by real part, so that the search ends soon."""
+    for other in balls[i + 1 :]:
+        if other.overlaps(balls[i]):
+            return True
+        if float((other - balls[i]).real.mid()) > 1e-12 and not other.real.overlaps(balls[i].real):
+            return False
+    return False
+
+
+def minimal_polynomial(number: sp.Expr | RealRoot | ComplexRoot) -> fmpq_poly:
+    """The monic irreducible polynomial over the rationals of which a number is a root."""
+    if isinstance(number, (RealRoot, ComplexRoot)):
+        return fmpq_poly(list(number.polynomial)) / number.polynomial[-1]
+    if number.is_Rational:
+        return fmpq_poly([fmpq(-int(number.p), int(number.q)), 1])
+    form = angles.linear_cosine(number)
+    if form is not None:
+        a, b, _, m = form
+        return fmpq_poly(list(_cosine(a, b, m)))
+    form = angles.linear_exponential(number)
+    if form is not None:
+        a, b, _, m = form
+        return angles.minimal_polynomial(a, b, m, fmpz_poly.cyclotomic(m))
+    return fmpq_poly(list(_radical(number)))
+
+
+@lru_cache(maxsize=256)
+def _cosine(a: Fraction, b: Fraction, m: int) -> tuple[fmpq, ...]:
+    return tuple(angles.minimal_polynomial(a, b, m).coeffs())
+
+
+@lru_cache(maxsize=1024)
+def _radical(number: sp.Expr) -> tuple[fmpq, ...]:
+    polynomial = sp.Poly(sp.minimal_polynomial(number, _X), _X).monic()
+    return tuple(fmpq(int(c.p), int(c.q)) for c in polynomial.all_coeffs()[::-1])

@@ -1,0 +1,91 @@
+"""Rows of exact rational numbers out of whatever a user has: lists, arrays, SymPy matrices, text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from decimal import Decimal
+from fractions import Fraction
+from numbers import Complex, Integral, Rational, Real
+from typing import Any
+
+__all__ = ["FILE_LIMIT", "parse_rows", "rational", "rational_rows"]
+
+FILE_LIMIT = 32 * 2**20
+"""Largest matrix file that is read, in bytes."""
+
+_TEXT = re.compile(r"[+-]?(?:\d+/\d+|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)", re.ASCII)
+_LONGEST = 1000
+_EXPECTED = "expected a rational number such as 1/2, -3 or 0.25"
+
+
+def rational(entry: Any, where: str) -> Fraction:
+    """One exact number; ValueError where it is not finite, real and rational, TypeError for no number."""
+    if isinstance(entry, bool):
+        raise TypeError(f"{where} is {entry}, a bool; {_EXPECTED}")
+    if isinstance(entry, str):
+        return _from_text(entry.strip(), where)
+    if isinstance(entry, Integral):
+        return Fraction(int(entry))
+    if getattr(entry, "is_Rational", False):  # SymPy
+        return Fraction(int(entry.p), int(entry.q))
+    if isinstance(entry, Rational):
+        return Fraction(int(entry.numerator), int(entry.denominator))
+    if isinstance(entry, (Decimal, Real)) or getattr(entry, "is_Float", False):
+        return _from_text(str(entry), where)
+    if isinstance(entry, Complex):
+        raise ValueError(f"{where} is complex: {entry}; {_EXPECTED}: connectivity is real")
+    if hasattr(entry, "free_symbols"):  # another SymPy expression
+        raise ValueError(f"{where} is {entry}, not a rational number; {_EXPECTED}")
+    raise TypeError(f"{where} is {entry!r}, a {type(entry).__name__}; {_EXPECTED}")
+
+
+def _from_text(text: str, where: str) -> Fraction:
+    if len(text) <= _LONGEST and _TEXT.fullmatch(text):
+        try:
+            return Fraction(text)
+        except ZeroDivisionError:
+            raise ValueError(f"{where} is {text}, a division by zero; {_EXPECTED}") from None
+    shown = text if len(text) <= 40 else f"{text[:40]}… ({len(text)} characters)"
+    if text.lstrip("+-").lower() in {"nan", "snan", "inf", "infinity", "oo"}:
+        raise ValueError(f"{where} is {shown}, not finite; {_EXPECTED}")
+    raise ValueError(f"{where} is {shown!r}, not a number; {_EXPECTED}")
+
+
+def rational_rows(rows: Any, name: str) -> list[list[Fraction]]:
+    """A square table of fractions; ValueError where it is empty or not square, TypeError for no table."""
+    symbolic = hasattr(rows, "tolist") and not hasattr(rows, "dtype")  # SymPy lists a matrix entry by entry
+    listed = rows.tolist() if symbolic else rows
+    if isinstance(listed, (str, bytes)) or not isinstance(listed, Iterable):
+        raise TypeError(f"{name} is a {type(rows).__name__}; expected rows of numbers: [[-1, 1], [1, -1]]")
+    lines = []
+    for i, line in enumerate(listed):
+        if isinstance(line, (str, bytes)) or not isinstance(line, Iterable):
+            raise TypeError(f"{name}: row {i + 1} is {line!r}; expected a list of numbers")
+        lines.append(list(line))
+    if not lines:
+        raise ValueError(f"{name} is empty; expected at least one row")
+    for i, line in enumerate(lines):
+        if len(line) != len(lines):
+            raise ValueError(
+                f"{name}: row {i + 1} has {len(line)} entries; expected {len(lines)}, as many as there are "
+                "rows: a connectivity matrix is square"
+            )
+    return [
+        [rational(entry, f"{name}: entry ({i + 1}, {j + 1})") for j, entry in enumerate(line)]
+        for i, line in enumerate(lines)
+    ]
+
+
+def parse_rows(text: str, name: str) -> list[list[str]]:
+    """Split a matrix text into entries: blanks or commas between them, `#` comments, empty lines skipped."""
+    rows = []
+    for number, line in enumerate(text.splitlines(), 1):
+        bare = line.partition("#")[0].strip()
+        if not bare:
+            continue
+        cells = [cell for part in bare.split(",") for cell in (part.split() or [""])]
+        if "" in cells:
+            raise ValueError(f"{name}: line {number} has an empty entry between commas; write 0 for no link")
+        rows.append(cells)
+    return rows

@@ -1,0 +1,25 @@
+"""Open chain: every node is joined to its neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+SUMMARY = "open chain (path graph)"
+MINIMUM = 1
+SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.4"
+
+
+def edges(n: int) -> Iterator[tuple[int, int, int]]:
+    """Node i and node i + 1."""
+    return ((i, i + 1, 1) for i in range(n - 1))
+
+
+def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
+    """-4 sin²(kπ/2n), k = 0 … n - 1, each once."""
+    from ..angles import minus_four_sine_squared
+
+    return [(minus_four_sine_squared(k, 2 * n), 1) for k in range(n)]

@@ -1,0 +1,27 @@
+"""Closed ring: a chain whose ends are joined."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+SUMMARY = "closed ring (cycle graph)"
+MINIMUM = 3
+TOO_SMALL = "a ring of two would join one pair twice; two nodes joined once are chain 2"
+SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.3"
+
+
+def edges(n: int) -> Iterator[tuple[int, int, int]]:
+    """Node i and node i + 1, and the last with the first."""
+    yield from ((i, i + 1, 1) for i in range(n - 1))
+    yield 0, n - 1, 1
+
+
+def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
+    """-4 sin²(kπ/n), k = 0 … n/2: twice each, but once for k = 0 and k = n/2."""
+    from ..angles import minus_four_sine_squared
+
+    return [(minus_four_sine_squared(k, n), 1 if k in (0, n - k) else 2) for k in range(n // 2 + 1)]

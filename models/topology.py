@@ -1,0 +1,219 @@
+"""Who feels whom: a graph with exact weights, by name, from a matrix or from a file.
+
+The connectivity matrix is G = weighted adjacency minus in-degree, so that every row sums to zero and the
+coupling term is sigma * G * x.  Building a graph costs no algebra: only `matrix` and `spectrum` load SymPy.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from importlib import import_module
+from itertools import islice
+from pathlib import Path
+from pkgutil import iter_modules
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from .rationals import FILE_LIMIT, parse_rows, rational_rows
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from .equations import Link
+    from .spectrum import Spectrum
+
+__all__ = ["Topology", "from_matrix", "names", "read_matrix", "topology"]
+
+LINK_LIMIT = 20_000_000
+"""More links than this are refused: they would not fit into the memory of an ordinary machine."""
+
+
+@dataclass(frozen=True, slots=True)
+class Topology:
+    """`n` nodes and their sorted links (target, source, weight); an undirected edge is two links.
+
+    Raises ValueError on a link outside the nodes, from a node to itself, repeated, unsorted or of no weight.
+    """
+
+    name: str
+    n: int
+    links: tuple[Link, ...]
+
+    def __post_init__(self) -> None:
+        if self.n < 1:
+            raise ValueError(f"topology {self.name}: n = {self.n}; expected at least one node")
+        last = (-1, -1)
+        for target, source, weight in self.links:
+            if not (0 <= target < self.n and 0 <= source < self.n) or target == source:
+                raise ValueError(
+                    f"topology {self.name}: link {target} <- {source}; "
+                    f"expected two different nodes of 0 … {self.n - 1}"
+                )
+            if (target, source) <= last:
+                raise ValueError(
+                    f"topology {self.name}: link {target} <- {source} is repeated or out of order; "
+                    "expected each pair once, sorted: add the weights up and sort"
+                )
+            if not isinstance(weight, Fraction) or not weight:
+                raise ValueError(
+                    f"topology {self.name}: link {target} <- {source} has weight {weight!r}; "
+                    "expected a Fraction other than 0: leave the link out or give it a weight"
+                )
+            last = (target, source)
+
+    @property
+    def symmetric(self) -> bool:
+        """True where every link has its mirror image of equal weight, so that G = transpose(G)."""
+        known = {(target, source): weight for target, source, weight in self.links}
+        return all(known.get((source, target)) == weight for (target, source), weight in known.items())
+
+    @property
+    def components(self) -> int:
+        """Number of weakly connected parts; where it is not 1 complete synchronisation is impossible."""
+        parent = list(range(self.n))
+
+        def root(i: int) -> int:
+            while parent[i] != i:
+                parent[i] = parent[parent[i]]
+                i = parent[i]
+            return i
+
+        count = self.n
+        for target, source, _ in self.links:
+            a, b = root(target), root(source)
+            if a != b:
+                parent[max(a, b)] = min(a, b)
+                count -= 1
+        return count
+
+    @property
+    def rows(self) -> tuple[tuple[Fraction, ...], ...]:
+        """G as n rows of n fractions."""
+        zero = Fraction(0)
+        table = [[zero] * self.n for _ in range(self.n)]
+        for target, source, weight in self.links:
+            table[target][source] = weight
+            table[target][target] -= weight
+        return tuple(tuple(row) for row in table)
+
+    @property
+    def matrix(self) -> sp.ImmutableDenseMatrix:
+        """G as an immutable SymPy matrix, n x n."""
+        import sympy as sp
+
+        entries = [[sp.Rational(x.numerator, x.denominator) for x in row] for row in self.rows]
+        return sp.ImmutableDenseMatrix(entries)
+
+    @property
+    def spectrum(self) -> Spectrum:
+        """The exact eigenvalues of G with multiplicities (see `synchain.models.spectrum`)."""
+        from .spectrum import spectrum
+
+        return spectrum(self)
+
+    def __repr__(self) -> str:
+        return f"Topology({self.name!r}, n={self.n}, {len(self.links)} links)"
+
+
+def names() -> tuple[str, ...]:
+    """All topologies that `topology` knows: the files of the folder `topologies`."""
+    from . import topologies
+
+    return tuple(sorted(m.name for m in iter_modules(topologies.__path__) if not m.name.startswith("_")))
+
+
+def family(name: str) -> ModuleType:
+    """The plug-in module of a topology; ValueError on an unknown name.
+
+    A plug-in has SUMMARY, MINIMUM, SOURCE and `edges(n)`, which yields (i, j, weight) once for each edge,
+    i < j; with DIRECTED = True it yields (target, source, weight) once for each link.  It may have
+    `spectrum(n)`, a list of (eigenvalue of G as a SymPy expression, multiplicity) without repetition, and
+    TOO_SMALL, what to do below MINIMUM.
+    """
+    if not isinstance(name, str):
+        raise TypeError(f"topology name {name!r} is no text; expected one of {', '.join(names())}")
+    if name not in names():
+        raise ValueError(f"unknown topology {name!r}; known: {', '.join(names())}")
+    return import_module(f".topologies.{name}", __package__)
+
+
+def topology(name: str, n: int) -> Topology:
+    """The named graph of `n` nodes, all weights as its family gives them.
+
+    Raises ValueError on an unknown name, on n below the family's minimum and on more than LINK_LIMIT links,
+    and TypeError where n is no integer.
+    """
+    module = family(name)
+    size = _size(name, n, module)
+    directed = getattr(module, "DIRECTED", False)
+    limit = LINK_LIMIT if directed else LINK_LIMIT // 2
+    edges = [(i, j, Fraction(weight)) for i, j, weight in islice(module.edges(size), limit + 1)]
+    if len(edges) > limit:
+        raise ValueError(
+            f"topology {name}: n = {size} has too many links; expected at most {LINK_LIMIT}: reduce n"
+        )
+    if not directed:
+        edges += [(j, i, weight) for i, j, weight in edges]
+    edges.sort(key=operator.itemgetter(0, 1))
+    return Topology(name, size, tuple(edges))
+
+
+def _size(name: str, n: Any, module: ModuleType) -> int:
+    if isinstance(n, bool) or not hasattr(n, "__index__"):
+        raise TypeError(f"topology {name}: n = {n!r} is a {type(n).__name__}; expected an integer")
+    size = operator.index(n)
+    if size < module.MINIMUM:
+        advice = getattr(module, "TOO_SMALL", "choose a larger n")
+        raise ValueError(f"topology {name}: n = {size}; expected at least {module.MINIMUM}: {advice}")
+    return size
+
+
+def from_matrix(rows: Iterable[Iterable[Any]] | sp.MatrixBase, name: str = "matrix") -> Topology:
+    """The graph of a connectivity matrix G: square, rational, every row sum zero; one-way links are allowed.
+
+    Entries are integers, fractions, decimals, floats (read through their shortest decimal text: 0.1 is 1/10),
+    texts such as "1/2", or SymPy rationals.  Raises ValueError on a wrong shape, a wrong number or a row sum
+    other than zero, and TypeError on anything that is no number.
+    """
+    table = rational_rows(rows, name)
+    for i, row in enumerate(table):
+        total = sum(row)
+        if total:
+            raise ValueError(
+                f"{name}: row {i + 1} sums to {total}; expected 0, or the synchronous state is no solution: "
+                f"set its diagonal entry {row[i]} to {row[i] - total}"
+            )
+    links = tuple(
+        (i, j, weight) for i, row in enumerate(table) for j, weight in enumerate(row) if weight and i != j
+    )
+    return Topology(name, len(table), links)
+
+
+def read_matrix(path: str | Path) -> Topology:
+    """The graph of a connectivity matrix in a text file: one row a line, entries as 1/2, -3 or 0.25.
+
+    Entries are separated by blanks or commas; `#` starts a comment; empty lines are skipped.  Nothing in the
+    file is evaluated.  Raises FileNotFoundError, and ValueError on a folder, on more than FILE_LIMIT bytes,
+    on text that is no number and on whatever `from_matrix` refuses.
+    """
+    place = Path(path)
+    if not place.exists():
+        raise FileNotFoundError(
+            f"matrix file {str(place)!r} does not exist; expected a text file of rows: check the path"
+        )
+    if not place.is_file():
+        raise ValueError(f"matrix file {str(place)!r} is a folder or device; expected a text file of rows")
+    size = place.stat().st_size
+    if size > FILE_LIMIT:
+        raise ValueError(
+            f"matrix file {str(place)!r} has {size} bytes; expected at most {FILE_LIMIT}: exact spectra of "
+            "dense matrices end near 1000 nodes"
+        )
+    try:
+        text = place.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise ValueError(f"matrix file {str(place)!r} is not UTF-8; expected rows of rationals") from None
+    return from_matrix(parse_rows(text, place.name), place.name)

@@ -1,0 +1,510 @@
+"""Exact spectra: right, proved, evaluated to any accuracy, written so that SymPy reads them back."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from fractions import Fraction
+from itertools import product
+
+import flint
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from synchain.models import topology as graphs
+from synchain.models.algebraic import ComplexRoot, RealRoot, complex_roots, real_roots
+from synchain.models.angles import cosine, linear_cosine, minimal_polynomial
+from synchain.models.spectrum import (
+    Eigenvalue,
+    ProofError,
+    Spectrum,
+    _biquadratic,
+    _ordered,
+    spectrum,
+    table,
+)
+from synchain.models.topology import Topology, from_matrix, names, topology
+
+ONE = Fraction(1)
+fresh: Callable[..., Spectrum] = spectrum.__wrapped__
+
+
+def anonymous(graph: Topology) -> Topology:
+    """The same graph under a name that has no closed form."""
+    return Topology("matrix", graph.n, graph.links)
+
+
+def one_way_ring(n: int) -> Topology:
+    return Topology("one-way ring", n, tuple((i, (i + 1) % n, ONE) for i in range(n)))
+
+
+def floats(graph: Topology) -> np.ndarray:
+    return np.array([[float(x) for x in row] for row in graph.rows])
+
+
+def expanded(found: Spectrum) -> np.ndarray:
+    return np.repeat(found.values, found.multiplicities)
+
+
+PUBLISHED = {2: "0, -2", 3: "0, -1, -3", 4: "0, -2 + sqrt(2), -2, -2 - sqrt(2)"}
+
+
+@pytest.mark.parametrize("disguise", [lambda graph: graph, anonymous])
+@pytest.mark.parametrize("n", PUBLISHED)
+def test_the_published_chains(n: int, disguise: Callable[[Topology], Topology]) -> None:
+    found = disguise(topology("chain", n)).spectrum
+    assert found.exact == tuple(sp.sympify(f"[{PUBLISHED[n]}]"))
+    assert found.multiplicities == (1,) * n
+    assert found.verified
+
+
+def test_the_first_lines_a_user_types() -> None:
+    assert repr(topology("star", 6).spectrum) == "{0: 1, -1: 4, -6: 1}"
+    assert topology("chain", 4).spectrum.largest == -2 - sp.sqrt(2)
+    assert repr(topology("complete", 5).spectrum) == "{0: 1, -5: 4}"
+    assert repr(topology("ring", 6).spectrum) == "{0: 1, -1: 2, -3: 2, -4: 1}"
+    assert repr(topology("chain", 1).spectrum) == "{0: 1}"
+
+
+@pytest.mark.parametrize("name", names())
+def test_closed_forms_agree_with_the_characteristic_polynomial_route(name: str) -> None:
+    for n in range(graphs.family(name).MINIMUM, 31):
+        closed = topology(name, n)
+        other = anonymous(closed).spectrum
+        assert closed.spectrum.verified
+        assert other.verified
+        assert closed.spectrum.multiplicities == other.multiplicities, n
+        assert closed.spectrum.values == pytest.approx(other.values, rel=1e-15, abs=1e-15), n
+        assert closed.spectrum.evaluate(40) == other.evaluate(40), n
+
+
+@pytest.mark.parametrize("name", names())
+def test_closed_forms_agree_with_numpy(name: str) -> None:
+    for n in (5, 40):
+        graph = topology(name, n)
+        assert np.sort(expanded(graph.spectrum)) == pytest.approx(
+            np.linalg.eigvalsh(floats(graph)), rel=1e-12, abs=1e-12
+        )
+
+
+@pytest.mark.parametrize("n", [7, 9])
+@pytest.mark.parametrize("disguise", [lambda graph: graph, anonymous])
+def test_seven_and_nine_oscillators_are_written_without_complex_radicals(
+    n: int, disguise: Callable[[Topology], Topology]
+) -> None:
+    found = disguise(topology("chain", n)).spectrum
+    for eigenvalue in found.eigenvalues:
+        again = sp.sympify(eigenvalue.text)
+        assert not again.has(sp.I)
+        assert abs(sp.N(again, 30) - eigenvalue.evaluate(30)) < sp.Float("1e-28")
+    assert found.eigenvalues[1].text == f"-4*sin(pi/{2 * n})**2"
+
+
+@pytest.mark.parametrize("n", range(2, 26))
+def test_every_text_is_read_back_by_sympy(n: int) -> None:
+    for eigenvalue in topology("chain", n).spectrum.eigenvalues:
+        assert len(eigenvalue.text) < 40
+        assert abs(sp.N(sp.sympify(eigenvalue.text), 20) - eigenvalue.evaluate(20)) < sp.Float("1e-18")
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_algebraic_numbers_are_read_back_by_sympy(seed: int) -> None:
+    found = integer_graph(12, 0.4, seed).spectrum
+    assert any(isinstance(e.number, RealRoot) for e in found.eigenvalues)
+    for eigenvalue in found.eigenvalues:
+        again = sp.sympify(eigenvalue.text)
+        assert again == eigenvalue.exact
+        assert abs(sp.N(again, 30) - eigenvalue.evaluate(30)) < sp.Float("1e-27")
+
+
+# ---- the proof ----
+
+
+def root_two(n: int) -> list[tuple[sp.Expr, int]]:
+    return [(sp.S.Zero, 1), (-2 + sp.sqrt(2), 1), (sp.S(-2), 1), (-2 - sp.sqrt(2), 1)]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda right: right[:-1],
+        lambda right: [*right, (sp.S(-5), 1)],
+        lambda right: [(number, 2) for number, _ in right],
+        lambda right: [right[0], right[1], right[2], right[1]],
+        lambda right: [right[0], (right[1][0], 2), right[2]],
+        lambda right: [right[0], (right[1][0], 2), right[2], right[3]],
+        lambda right: [(number + sp.Rational(1, 10**30), 1) for number, _ in right],
+        lambda right: [(-number, 1) for number, _ in right],
+        lambda right: [(sp.Rational(str(sp.N(number, 50))), 1) for number, _ in right],
+        lambda right: [(-4 * sp.sin(k * sp.pi / 7, evaluate=False) ** 2, 1) for k in range(4)],
+    ],
+)
+def test_a_wrong_closed_form_is_refused(
+    wrong: Callable[[list[tuple[sp.Expr, int]]], list[tuple[sp.Expr, int]]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chain = graphs.family("chain")
+    monkeypatch.setattr(chain, "spectrum", root_two)
+    assert fresh(topology("chain", 4)).verified
+    monkeypatch.setattr(chain, "spectrum", lambda n: wrong(root_two(n)))
+    with pytest.raises(ProofError, match=r"spectrum of chain 4: .* correct the closed form"):
+        fresh(topology("chain", 4))
+
+
+def test_a_wrong_angle_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    chain = graphs.family("chain")
+    right = chain.spectrum(7)
+    for wrong in ([*right[:-1], right[1]], [*right[:-1], (right[1][0] + sp.Rational(1, 10**20), 1)]):
+        monkeypatch.setattr(chain, "spectrum", lambda n, wrong=wrong: wrong)
+        with pytest.raises(ProofError, match="correct the closed form"):
+            fresh(topology("chain", 7))
+
+
+def test_large_closed_forms_say_that_they_are_not_proved(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("synchain.models.spectrum.PROOF_LIMIT", 10)
+    assert fresh(topology("ring", 10)).verified
+    assert not fresh(topology("ring", 11)).verified
+    assert fresh(topology("ring", 11), prove=True).verified
+    assert "not proved" in table(fresh(topology("ring", 11)))
+    assert fresh(anonymous(topology("ring", 11))).verified
+
+
+def test_a_matrix_called_chain_gets_no_closed_form_of_the_chain() -> None:
+    found = Topology("chain", 3, topology("complete", 3).links).spectrum
+    assert repr(found) == "{0: 1, -3: 2}"
+    assert repr(Topology("ring", 2, topology("chain", 2).links).spectrum) == "{0: 1, -2: 1}"
+
+
+def test_large_matrices_without_a_closed_form_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"n = 1001 without a closed form; expected at most 1000"):
+        anonymous(topology("chain", 1001)).spectrum  # noqa: B018
+
+
+# ---- any rational matrix ----
+
+
+def test_all_connected_graphs_up_to_six_nodes_against_numpy() -> None:
+    atlas = pytest.importorskip("networkx.generators.atlas")
+    networkx = pytest.importorskip("networkx")
+    count = 0
+    for graph in atlas.graph_atlas_g():
+        n = graph.number_of_nodes()
+        if not 1 <= n <= 6 or not networkx.is_connected(graph):
+            continue
+        count += 1
+        links = sorted((i, j, ONE) for edge in graph.edges for i, j in (edge, edge[::-1]))
+        found = Topology("atlas", n, tuple(links))
+        assert found.spectrum.verified
+        assert found.spectrum.n == n
+        assert found.spectrum.eigenvalues[0] == Eigenvalue(sp.S.Zero, 1)
+        assert np.sort(expanded(found.spectrum)) == pytest.approx(
+            np.linalg.eigvalsh(floats(found)), rel=1e-12, abs=1e-12
+        )
+    assert count == 1 + 1 + 2 + 6 + 21 + 112
+
+
+weights = st.fractions(min_value=-3, max_value=3, max_denominator=12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(2, 7), st.data())
+def test_random_rational_symmetric_matrices(n: int, data: st.DataObject) -> None:
+    links = []
+    for i, j in product(range(n), repeat=2):
+        if i < j and (weight := data.draw(weights)):
+            links += [(i, j, weight), (j, i, weight)]
+    graph = Topology("random", n, tuple(sorted(links)))
+    found = graph.spectrum
+    assert found.verified
+    assert list(found.values) == sorted(found.values, reverse=True)
+    assert np.sort(expanded(found)) == pytest.approx(np.linalg.eigvalsh(floats(graph)), rel=1e-9, abs=1e-9)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(2, 6), st.data())
+def test_random_one_way_graphs(n: int, data: st.DataObject) -> None:
+    pairs = [(i, j) for i, j in product(range(n), repeat=2) if i != j]
+    chosen = data.draw(st.lists(st.sampled_from(pairs), unique=True))
+    graph = Topology("random", n, tuple((i, j, ONE) for i, j in sorted(chosen)))
+    found = graph.spectrum
+    assert found.verified
+    assert found.n == n
+    power = np.array([np.sum(expanded(found) ** k) for k in range(1, n + 1)])  # safe for Jordan blocks
+    traces = [np.trace(np.linalg.matrix_power(floats(graph), k)) for k in range(1, n + 1)]
+    assert power == pytest.approx(np.array(traces), rel=1e-10, abs=1e-10)
+
+
+def test_disconnected_graphs_have_a_multiple_zero() -> None:
+    graph = Topology("two pairs", 5, ((0, 1, ONE), (1, 0, ONE), (2, 3, ONE), (3, 2, ONE)))
+    assert repr(graph.spectrum) == "{0: 3, -2: 2}"
+    assert graph.spectrum.nonzero == (Eigenvalue(sp.S(-2), 2),)
+
+
+def test_a_feed_forward_chain_counts_its_jordan_block() -> None:
+    graph = Topology("feed forward", 6, tuple((i, i - 1, ONE) for i in range(1, 6)))
+    assert repr(graph.spectrum) == "{0: 1, -1: 5}"
+
+
+@pytest.mark.parametrize("n", [3, 5, 7, 8, 12, 30])
+def test_one_way_rings_have_the_textbook_spectrum(n: int) -> None:
+    found = one_way_ring(n).spectrum
+    expected = np.exp(2j * np.pi * np.arange(n) / n) - 1
+    assert found.verified
+    assert np.sort_complex(np.round(expanded(found), 12)) == pytest.approx(
+        np.sort_complex(np.round(expected, 12)), abs=1e-11
+    )
+    pairs = [e.value for e in found.eigenvalues if isinstance(e.value, complex)]
+    assert all(a == b.conjugate() for a, b in zip(pairs[::2], pairs[1::2], strict=True))
+    for eigenvalue in found.eigenvalues:
+        again = complex(sp.sympify(eigenvalue.text).evalf())
+        assert again == pytest.approx(complex(eigenvalue.value), abs=1e-14)
+
+
+def test_complex_eigenvalues_without_a_closed_form() -> None:
+    rows = [[-2, 1, 0, 1, 0], [0, -1, 1, 0, 0], [0, 0, -1, 0, 1], [1, 0, 1, -2, 0], [1, 1, 0, 0, -2]]
+    found = from_matrix(rows).spectrum
+    assert any(isinstance(e.number, ComplexRoot) for e in found.eigenvalues)
+    expected = np.sort_complex(np.linalg.eigvals(np.array(rows, float)))
+    assert np.sort_complex(np.array(found.values, complex)) == pytest.approx(expected, abs=1e-12)
+    for eigenvalue in found.eigenvalues:
+        assert complex(sp.sympify(eigenvalue.text).evalf(15)) == pytest.approx(complex(eigenvalue.value))
+        distance = abs(complex(eigenvalue.evaluate(30)) - complex(eigenvalue.value))
+        assert distance < 1e-14
+
+
+@pytest.mark.parametrize(
+    "coefficients",
+    [
+        (8, -7, 9, 6, 1, 1),  # SymPy's order is not that of the real parts
+        (2, 0, 2, 0, 1),  # roots on the border of SymPy's boxes
+        (-972, 486, 135, 72, 12, 1),  # SymPy rescales this one
+        (-7, -30, 21, 6, 27, 1),
+    ],
+)
+def test_the_index_of_a_complex_root_is_that_of_sympy(coefficients: tuple[int, ...]) -> None:
+    roots = complex_roots(coefficients)
+    assert sorted(root.index for root in roots) == list(range(len(coefficients) - 1))
+    for root in roots:
+        ball = root.enclosure(60)
+        here = complex(float(ball.real.mid()), float(ball.imag.mid()))
+        assert complex(root.expression.evalf(15)) == pytest.approx(here, rel=1e-12)
+
+
+def test_short_nested_radicals_are_found() -> None:
+    edges = [(0, 1), (0, 3), (0, 4), (1, 2), (1, 4), (2, 5), (2, 6)]
+    links = sorted((i, j, ONE) for edge in edges for i, j in (edge, edge[::-1]))
+    graph = Topology("seven nodes", 7, tuple(links))
+    assert repr(graph.spectrum) == (
+        "{0: 1, -5/2 + sqrt(sqrt(2) + 13/4): 1, -1: 1, -5/2 + sqrt(13/4 - sqrt(2)): 1, -3: 1, "
+        "-5/2 - sqrt(13/4 - sqrt(2)): 1, -5/2 - sqrt(sqrt(2) + 13/4): 1}"
+    )
+    assert np.sort(graph.spectrum.values) == pytest.approx(np.linalg.eigvalsh(floats(graph)), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "roots"),
+    [
+        ((9, 0, -14, 0, 1), {s * sp.sqrt(2) + t * sp.sqrt(5) for s in (1, -1) for t in (1, -1)}),
+        ((1, 0, -5, 0, 1), {s * sp.sqrt(3) / 2 + t * sp.sqrt(7) / 2 for s in (1, -1) for t in (1, -1)}),
+        ((7, 0, -6, 0, 1), {s * sp.sqrt(3 + t * sp.sqrt(2)) for s in (1, -1) for t in (1, -1)}),
+        ((3, 0, 1, 0, 1), None),
+        ((3, 0, -2, 0, 1), None),
+        ((-7, 0, -6, 0, 1), None),
+        ((3, 1, -6, 0, 1), None),
+    ],
+)
+def test_biquadratics(coefficients: tuple[int, ...], roots: set[sp.Expr] | None) -> None:
+    found = _biquadratic(flint.fmpq_poly(list(coefficients)))
+    assert (None if found is None else set(found)) == roots
+
+
+# ---- values ----
+
+
+def integer_graph(n: int, share: float, seed: int) -> Topology:
+    chance = np.random.default_rng(seed)
+    edges = [(i, j) for i in range(n) for j in range(i) if chance.random() < share]
+    links = sorted((i, j, ONE) for edge in edges for i, j in (edge, edge[::-1]))
+    return Topology("random", n, tuple(links))
+
+
+@pytest.mark.parametrize("graph", [topology("chain", 13), integer_graph(12, 0.4, 1), one_way_ring(9)])
+def test_fifty_digits_agree_with_mpmath(graph: Topology) -> None:
+    with mpmath.workdps(80):
+        matrix = mpmath.matrix([[mpmath.mpf(x.numerator) / x.denominator for x in row] for row in graph.rows])
+        expected = mpmath.eig(matrix, left=False, right=False)
+        for value in graph.spectrum.evaluate(50):
+            here = mpmath.mpc(*(mpmath.mpf(str(part)) for part in value.as_real_imag()))
+            gap = min(abs(here - other) for other in expected)
+            assert gap <= mpmath.mpf(10) ** -49 * max(abs(here), mpmath.mpf(10) ** -10)
+
+
+@pytest.mark.parametrize("digits", [1, 15, 100, 1000])
+def test_any_number_of_digits(digits: int) -> None:
+    value = topology("chain", 4).spectrum.evaluate(digits)[1]
+    expected = sp.N(-2 + sp.sqrt(2), digits + 10)
+    assert abs(value - expected) <= sp.Float(10, digits) ** -digits
+    assert value.is_Float
+
+
+@pytest.mark.parametrize("digits", [0, -3, 2.5, True])
+def test_wrong_numbers_of_digits(digits: int) -> None:
+    with pytest.raises(ValueError, match=f"digits = {digits}; expected a positive integer"):
+        topology("chain", 3).spectrum.evaluate(digits)
+
+
+def test_floats_are_the_nearest_ones() -> None:
+    for graph in (integer_graph(14, 0.4, 2), topology("chain", 14)):
+        assert all(e.value == float(e.evaluate(40)) for e in graph.spectrum.eigenvalues)
+    assert topology("chain", 3000).spectrum.values[1] == pytest.approx(-((np.pi / 3000) ** 2), rel=1e-6)
+
+
+def test_brackets_hold_one_sign_change() -> None:
+    assert RealRoot((-2, 0, 1), 1, Fraction(1), Fraction(2)).text == "CRootOf(x**2 - 2, 1)"
+    with pytest.raises(ValueError, match="no sign change from 2 to 3; expected a bracket"):
+        RealRoot((-2, 0, 1), 1, Fraction(2), Fraction(3))
+
+
+def test_a_bracket_far_off_is_refined_as_well() -> None:
+    ball = RealRoot((-2, 0, 1), 1, Fraction(-1), Fraction(10**6)).enclosure(200)
+    assert abs(ball * ball - 2).upper() < 2**-50
+    root = Eigenvalue(RealRoot((-2, 0, 1), 1, Fraction(-1), Fraction(9)), 1)
+    assert abs(root.evaluate(40) ** 2 - 2) < 1e-38
+
+
+def test_hints_may_be_bad_but_never_lead_astray() -> None:
+    near, far = flint.fmpq(7, 5), flint.fmpq(-13, 10)
+    found = real_roots((-2, 0, 1), [far, near])
+    assert found is not None
+    assert all(root.low < s * Fraction(99, 70) < root.high for root, s in zip(found, (-1, 1), strict=True))
+    assert real_roots((-2, 0, 1), [near, near]) is None
+    assert real_roots((-2, 0, 0, 1), [flint.fmpq(5, 4)]) is None
+
+
+def test_cancellation_costs_no_digits() -> None:
+    number = sp.sqrt(10**60 + 1) - 10**30
+    assert Eigenvalue(number, 1).value == 5e-31
+    zero = sp.Add((1 + sp.sqrt(2)) ** 2, -3, -2 * sp.sqrt(2), evaluate=False)
+    with pytest.raises(ValueError, match="write it as 0 if it is zero"):
+        Eigenvalue(zero, 1)
+    with pytest.raises(TypeError, match=r"gamma\(1/3\) has no certified value; expected rationals"):
+        Eigenvalue(sp.gamma(sp.Rational(1, 3)), 1)
+
+
+def test_conjugates_stay_together_where_real_parts_agree() -> None:
+    numbers = [-1 + 2 * sp.I, sp.S(-3), -1 - sp.I, sp.S.Zero, -1 - 2 * sp.I, -1 + sp.I]
+    found = _ordered([Eigenvalue(number, 1) for number in numbers])
+    assert [e.value for e in found] == [0, -1 - 1j, -1 + 1j, -1 - 2j, -1 + 2j, -3]
+
+
+def test_numbers_closer_than_floats_are_ordered_and_told_apart() -> None:
+    tiny = sp.Rational(1, 10**40)
+    numbers = [-sp.sqrt(2) - tiny, -sp.sqrt(2) + tiny, -sp.sqrt(2)]
+    found = _ordered([Eigenvalue(number, 1) for number in numbers])
+    assert [e.number for e in found] == [numbers[1], numbers[2], numbers[0]]
+    assert Spectrum(found).largest == numbers[0]
+    with pytest.raises(ProofError, match="two of 2 eigenvalues coincide"):
+        _ordered([Eigenvalue(sp.S(-2), 1), Eigenvalue(sp.S(-2), 1)])
+
+
+def test_cosines_are_recognised_in_every_spelling() -> None:
+    for m, k in product(range(1, 31), range(31)):
+        number = cosine(Fraction(-3, 2), Fraction(2, 3), k, m)
+        value = -1.5 + 4 / 3 * np.cos(2 * np.pi * k / m)
+        assert float(sp.N(number)) == pytest.approx(value, abs=1e-12)
+        form = linear_cosine(number)
+        if form is not None:
+            a, b, turn, modulus = form
+            assert a + 2 * b * np.cos(2 * np.pi * turn / modulus) == pytest.approx(value)
+            coefficients = [int(c.p) / int(c.q) for c in minimal_polynomial(a, b, modulus).coeffs()]
+            assert np.polyval(coefficients[::-1], value) == pytest.approx(0, abs=1e-6)
+    assert linear_cosine(sp.sqrt(2) + 1) is None
+    assert linear_cosine(2 * sp.sin(sp.pi / 7)) is None
+
+
+# ---- the object ----
+
+
+def test_as_dict_is_what_the_command_line_prints() -> None:
+    found = topology("chain", 4).spectrum.as_dict()
+    assert json.loads(json.dumps(found)) == {
+        "n": 4,
+        "eigenvalues": [
+            {"exact": "0", "value": 0.0, "multiplicity": 1},
+            {"exact": "-2 + sqrt(2)", "value": -0.585786437626905, "multiplicity": 1},
+            {"exact": "-2", "value": -2.0, "multiplicity": 1},
+            {"exact": "-2 - sqrt(2)", "value": -3.414213562373095, "multiplicity": 1},
+        ],
+        "verified": True,
+    }
+    spiral = one_way_ring(3).spectrum.as_dict()["eigenvalues"][1]
+    assert spiral["exact"] == "-3/2 - sqrt(3)*I/2"
+    assert spiral["value"] == pytest.approx([-1.5, -(3**0.5) / 2])
+
+
+def test_the_table() -> None:
+    lines = table(topology("star", 4).spectrum).splitlines()
+    assert lines[0].split() == ["exact", "decimal", "multiplicity"]
+    assert [line.split() for line in lines[1:4]] == [["0", "0", "1"], ["-1", "-1", "2"], ["-4", "-4", "1"]]
+    assert lines[4] == "4 eigenvalues, 3 distinct; characteristic polynomial: proved"
+    long = table(integer_graph(12, 0.4, 1).spectrum)
+    assert "root 0 of a polynomial of degree 11" in long
+    assert max(map(len, long.splitlines())) < 100
+
+
+@pytest.mark.parametrize("count", [0, -1, 1.0, True])
+def test_wrong_multiplicities_are_refused(count: int) -> None:
+    with pytest.raises(ValueError, match=r"eigenvalue -2: multiplicity .*; expected an integer >= 1"):
+        Eigenvalue(sp.S(-2), count)
+    with pytest.raises(ValueError, match="a spectrum without eigenvalues"):
+        Spectrum(())
+
+
+def test_the_largest_of_equal_size_is_the_first() -> None:
+    assert one_way_ring(3).spectrum.largest == sp.Rational(-3, 2) - sp.sqrt(3) * sp.I / 2
+    assert topology("chain", 1).spectrum.largest == 0
+    mixed = from_matrix([[5, -5, 0], [-5, 5, 0], [0, 0, 0]])
+    assert mixed.spectrum.largest == 10
+    assert mixed.spectrum.values == (10.0, 0.0)
+
+
+def test_a_hundred_nodes_take_seconds() -> None:
+    graph = integer_graph(100, 0.1, 3)
+    start = time.perf_counter()
+    found = fresh(graph)
+    assert time.perf_counter() - start < 4
+    assert found.verified
+    expected = np.linalg.eigvalsh(floats(graph))
+    assert np.sort(expanded(found)) == pytest.approx(expected, rel=1e-12, abs=1e-11)
+
+
+@pytest.mark.parametrize("name", ["chain", "ring"])
+def test_two_hundred_nodes_of_a_family_are_proved_in_a_second_or_so(name: str) -> None:
+    graph = topology(name, 200)
+    start = time.perf_counter()
+    assert fresh(graph).verified
+    assert time.perf_counter() - start < 4
+
+
+def test_the_precision_of_arb_is_left_as_it_was() -> None:
+    before = flint.ctx.prec
+    topology("chain", 5).spectrum.evaluate(60)
+    assert flint.ctx.prec == before
+
+
+def test_spectra_need_neither_numpy_nor_numba_nor_matplotlib() -> None:
+    code = (
+        "import sys; from synchain.models.topology import from_matrix, topology;"
+        "print(topology('chain', 7).spectrum, from_matrix([[-1, 1], [1, -1]]).spectrum);"
+        "print([m for m in ('numpy', 'numba', 'matplotlib', 'scipy') if m in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout.splitlines()[-1] == "[]"

@@ -1,0 +1,245 @@
+"""Graphs by name, from matrices and from files; wrong input is refused in plain words."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given
+from hypothesis import strategies as st
+
+from synchain.models.rationals import FILE_LIMIT
+from synchain.models.topology import Topology, family, from_matrix, names, read_matrix, topology
+
+ONE = Fraction(1)
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_family_says_what_it_is_and_where_it_comes_from(name: str) -> None:
+    module = family(name)
+    assert module.SUMMARY
+    assert module.SOURCE
+    assert module.MINIMUM >= 1
+    graph = topology(name, module.MINIMUM)
+    assert graph.n == module.MINIMUM
+    with pytest.raises(ValueError, match=f"topology {name}: n = {module.MINIMUM - 1}; expected at least"):
+        topology(name, module.MINIMUM - 1)
+
+
+@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("n", [3, 4, 9])
+def test_every_family_gives_a_connected_graph_with_zero_row_sums(name: str, n: int) -> None:
+    graph = topology(name, n)
+    assert graph.components == 1
+    assert all(sum(row) == 0 for row in graph.rows)
+    assert graph.symmetric == (graph.matrix == graph.matrix.T)
+    assert from_matrix(graph.matrix).links == graph.links
+    assert graph.matrix == sp.ImmutableDenseMatrix(
+        n, n, lambda i, j: sp.Rational(graph.rows[i][j].numerator, graph.rows[i][j].denominator)
+    )
+
+
+def test_the_four_families_by_hand() -> None:
+    def neighbours(name: str) -> set[tuple[int, int]]:
+        return {(i, j) for i, j, weight in topology(name, 4).links if weight == 1}
+
+    both = {(0, 1), (1, 0), (1, 2), (2, 1), (2, 3), (3, 2)}
+    assert neighbours("chain") == both
+    assert neighbours("ring") == both | {(0, 3), (3, 0)}
+    assert neighbours("star") == {(0, 1), (0, 2), (0, 3), (1, 0), (2, 0), (3, 0)}
+    assert neighbours("complete") == {(i, j) for i in range(4) for j in range(4) if i != j}
+
+
+def test_the_connectivity_matrix_of_the_chain_is_the_published_one() -> None:
+    assert topology("chain", 4).matrix == sp.Matrix(
+        [[-1, 1, 0, 0], [1, -2, 1, 0], [0, 1, -2, 1], [0, 0, 1, -1]]
+    )
+
+
+def test_a_long_chain_is_built_at_once() -> None:
+    topology("chain", 10)
+    start = time.perf_counter()
+    graph = topology("chain", 10_000)
+    assert time.perf_counter() - start < 0.5
+    assert len(graph.links) == 19_998
+
+
+def test_too_many_links_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("synchain.models.topology.LINK_LIMIT", 100)
+    assert len(topology("complete", 10).links) == 90
+    with pytest.raises(ValueError, match="complete: n = 11 has too many links; expected at most 100"):
+        topology("complete", 11)
+
+
+@pytest.mark.parametrize(
+    ("name", "n", "error", "words"),
+    [
+        ("rnig", 3, ValueError, "unknown topology 'rnig'; known: chain, complete, ring, star"),
+        ("", 3, ValueError, "unknown topology ''; known: "),
+        ("../scene", 3, ValueError, "unknown topology '../scene'; known: "),
+        (7, 3, TypeError, "topology name 7 is no text"),
+        ("ring", 2, ValueError, "ring: n = 2; expected at least 3: a ring of two would join one pair twice"),
+        ("chain", -1, ValueError, "n = -1; expected at least 1"),
+        ("chain", 2.0, TypeError, "n = 2.0 is a float; expected an integer"),
+        ("chain", True, TypeError, "n = True is a bool; expected an integer"),
+        ("chain", "4", TypeError, "n = '4' is a str; expected an integer"),
+    ],
+)
+def test_wrong_names_and_sizes(name: str, n: int, error: type[Exception], words: str) -> None:
+    with pytest.raises(error) as caught:
+        topology(name, n)
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("n", "links", "words"),
+    [
+        (0, (), "n = 0; expected at least one node"),
+        (2, ((0, 2, ONE),), "link 0 <- 2; expected two different nodes of 0 … 1"),
+        (2, ((1, 1, ONE),), "link 1 <- 1; expected two different nodes"),
+        (2, ((0, 1, ONE), (0, 1, ONE)), "link 0 <- 1 is repeated"),
+        (2, ((1, 0, ONE), (0, 1, ONE)), "link 0 <- 1 is repeated or out of order"),
+        (2, ((0, 1, Fraction(0)),), "has weight Fraction(0, 1); expected a Fraction other than 0"),
+        (2, ((0, 1, 0.5),), "has weight 0.5; expected a Fraction"),
+    ],
+)
+def test_a_topology_checks_itself(n: int, links: tuple, words: str) -> None:
+    with pytest.raises(ValueError, match="topology x") as caught:
+        Topology("x", n, links)
+    assert words in str(caught.value)
+
+
+def test_components_and_symmetry() -> None:
+    one_way = Topology("x", 5, ((1, 0, ONE), (4, 3, ONE)))
+    assert one_way.components == 3
+    assert not one_way.symmetric
+    uneven = Topology("x", 2, ((0, 1, ONE), (1, 0, Fraction(2))))
+    assert not uneven.symmetric
+    assert Topology("x", 3, ()).components == 3
+    assert Topology("x", 3, ()).symmetric
+
+
+@pytest.mark.parametrize(
+    "half",
+    ["1/2", " 0.5 ", "5e-1", ".5", 0.5, Decimal("0.5"), Fraction(1, 2), sp.Rational(1, 2), sp.Float("0.5"),
+     np.float64(0.5), np.float32(0.5)],
+)  # fmt: skip
+def test_every_kind_of_number_is_read_exactly(half: object) -> None:
+    graph = from_matrix([["-1/2", half], [1, -1]])
+    assert graph.links == ((0, 1, Fraction(1, 2)), (1, 0, ONE))
+
+
+def test_floats_mean_their_shortest_decimal() -> None:
+    assert from_matrix([[-0.1, 0.1], [0.3, -0.3]]).links[0][2] == Fraction(1, 10)
+    assert from_matrix(np.array([[-0.1, 0.1], [0.3, -0.3]], dtype=np.float32)).links[1][2] == Fraction(3, 10)
+    assert from_matrix(np.array([[-2, 2], [2, -2]], dtype=np.int8)).links[0][2] == 2
+
+
+@pytest.mark.parametrize(
+    ("rows", "error", "words"),
+    [
+        ([], ValueError, "matrix is empty"),
+        ([[]], ValueError, "row 1 has 0 entries; expected 1"),
+        ([[0, 0]], ValueError, "row 1 has 2 entries; expected 1"),
+        ([[0, 0], [0]], ValueError, "row 2 has 1 entries; expected 2"),
+        (sp.zeros(2, 3), ValueError, "row 1 has 3 entries; expected 2"),
+        ([[-1, 1], [1, 0]], ValueError, "row 2 sums to 1; expected 0, or the synchronous state"),
+        ([[-1, 1], [1, 0]], ValueError, "set its diagonal entry 0 to -1"),
+        ([[-1, "1/3"], [1, -1]], ValueError, "row 1 sums to -2/3"),
+        ([[0, float("nan")], [0, 0]], ValueError, "entry (1, 2) is nan, not finite"),
+        ([[0, 0], [float("-inf"), 0]], ValueError, "entry (2, 1) is -inf, not finite"),
+        ([[np.float64("nan")]], ValueError, "is nan, not finite"),
+        ([[sp.nan]], ValueError, "nan"),
+        ([[sp.oo]], ValueError, "oo"),
+        ([[Decimal("NaN")]], ValueError, "not finite"),
+        ([["inf"]], ValueError, "is inf, not finite"),
+        ([[1j]], ValueError, "is complex: 1j"),
+        ([[sp.I]], ValueError, "is I, not a rational number"),
+        ([[sp.sqrt(2)]], ValueError, "is sqrt(2), not a rational number"),
+        ([[sp.Symbol("x")]], ValueError, "is x, not a rational number"),
+        ([["1/0"]], ValueError, "a division by zero"),
+        ([["1e999999999"]], ValueError, "not a number"),
+        ([["1" * 5000]], ValueError, "(5000 characters)"),
+        ([["1_000"]], ValueError, "'1_000', not a number"),
+        ([["__import__('os')"]], ValueError, "not a number"),
+        ([["2-2"]], ValueError, "'2-2', not a number"),
+        ([[None]], TypeError, "is None, a NoneType"),
+        ([[True]], TypeError, "is True, a bool"),
+        (["01", "10"], TypeError, "row 1 is '01'; expected a list of numbers"),
+        ([1, 2], TypeError, "row 1 is 1; expected a list of numbers"),
+        ("chain", TypeError, "matrix is a str; expected rows of numbers"),
+        (5, TypeError, "matrix is a int; expected rows of numbers"),
+    ],
+)
+def test_wrong_matrices(rows: object, error: type[Exception], words: str) -> None:
+    with pytest.raises(error) as caught:
+        from_matrix(rows)  # type: ignore[arg-type]
+    assert words in str(caught.value)
+
+
+@given(st.lists(st.tuples(st.integers(0, 4), st.integers(0, 4), st.fractions()), max_size=12))
+def test_links_become_rows_and_rows_become_links(found: list[tuple[int, int, Fraction]]) -> None:
+    weights = {(i, j): weight for i, j, weight in found if i != j and weight}
+    links = tuple((i, j, weights[i, j]) for i, j in sorted(weights))
+    assert from_matrix(Topology("x", 5, links).rows).links == links
+
+
+def test_a_matrix_file_is_read_exactly(tmp_path: Path) -> None:
+    path = tmp_path / "graph.txt"
+    path.write_text("\ufeff# three nodes\n-1/2, 0.5 0\n\n1  -1,0   # second\n 0, 3,-3\n", encoding="utf-8")
+    graph = read_matrix(path)
+    assert graph.name == "graph.txt"
+    assert graph.links == ((0, 1, Fraction(1, 2)), (1, 0, ONE), (2, 1, Fraction(3)))
+    assert read_matrix(str(path)) == graph
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (b"", "graph.txt is empty"),
+        (b"# nothing\n", "graph.txt is empty"),
+        (b"hello world\n", "row 1 has 2 entries; expected 1"),
+        (b"hello\n", "entry (1, 1) is 'hello', not a number"),
+        (b"-1,,1\n", "line 1 has an empty entry between commas"),
+        (b"nan\n", "entry (1, 1) is nan, not finite"),
+        (b"1\n", "row 1 sums to 1"),
+        (b"\xff\xfe\x00", "is not UTF-8"),
+        (b"(1).__class__\n", "not a number"),
+    ],
+)
+def test_wrong_matrix_files(tmp_path: Path, text: bytes, words: str) -> None:
+    path = tmp_path / "graph.txt"
+    path.write_bytes(text)
+    with pytest.raises(ValueError, match=r"graph\.txt") as caught:
+        read_matrix(path)
+    assert words in str(caught.value)
+
+
+def test_missing_folders_and_huge_files(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="does not exist; expected a text file of rows"):
+        read_matrix(tmp_path / "absent.txt")
+    with pytest.raises(ValueError, match="is a folder or device"):
+        read_matrix(tmp_path)
+    huge = tmp_path / "huge.txt"
+    with huge.open("wb") as stream:
+        stream.truncate(FILE_LIMIT + 1)
+    with pytest.raises(ValueError, match=f"has {FILE_LIMIT + 1} bytes; expected at most {FILE_LIMIT}"):
+        read_matrix(huge)
+
+
+def test_a_graph_is_built_without_sympy() -> None:
+    code = (
+        "import sys; from synchain.models.topology import topology; topology('ring', 5);"
+        "print([m for m in ('sympy', 'flint', 'numpy') if m in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout == "[]\n"
