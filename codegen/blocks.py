@@ -43,8 +43,10 @@ class Hoist:
 
     def apply(self, e: sp.Expr) -> sp.Expr:
         """Return the expression with its fixed parts named."""
-        if not e.free_symbols or e.is_Symbol:
+        if not e.free_symbols:
             return e
+        if e.is_Symbol:
+            return e if e in self.moving else self.name(e)
         if not e.free_symbols & self.moving:
             return self.name(e)
         if e.is_Add or e.is_Mul:
@@ -57,8 +59,8 @@ class Hoist:
         return e.func(*(self.apply(a) for a in e.args))
 
     def name(self, e: sp.Expr) -> sp.Expr:
-        """The symbol that stands for a fixed expression."""
-        if e.is_Symbol:
+        """The symbol that stands for a fixed expression; time itself gets one, since it differs from stage to stage."""
+        if e.is_Symbol and e != TIME:
             return e
         if e.could_extract_minus_sign() and e.is_Mul:
             return -self.name(-e)

@@ -203,6 +203,7 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
         return ""
     swap = dict(zip(map(_real, (*equations.state, *equations.parameters)), map(_real, (*plain.state, *plain.parameters)),
                     strict=True))  # fmt: skip
+    section = section.xreplace({s: _real(s.name) for s in section.free_symbols})
     used = {s.name for s in section.free_symbols}
     unknown = sorted(used - set(equations.state) - set(equations.parameters) - {"t"})
     if unknown:

@@ -9,93 +9,23 @@ the arithmetic is relaxed, so infinities and NaN mean what they mean in IEEE 754
 from __future__ import annotations
 
 import operator
-import os
 from collections.abc import Callable
 from typing import Any
 
-import llvmlite.binding as llvm
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, models, register_model
+from numba.extending import intrinsic, lower_builtin
+
+from .lane_types import DOUBLE, INT64, Lane, Mask, as_lane, common_width, native_width, splat
 
 __all__ = [
     "Lane", "Mask", "absolute", "any_lane", "broadcast", "copysign", "floor", "fma", "lane_bits", "load",
     "maximum", "minimum", "native_width", "round_even", "scale_binary", "select", "split_binary", "sqrt", "store",
 ]  # fmt: skip
 
-DOUBLE, INT32, INT64, BOOL = ir.DoubleType(), ir.IntType(32), ir.IntType(64), ir.IntType(1)
 CONTRACT = ("contract",)
-WIDTHS = (1, 2, 4, 8, 16)
-
-
-class Lane(types.Type):
-    """Numba type of `width` doubles in one vector register."""
-
-    def __init__(self, width: int) -> None:
-        self.width = width
-        super().__init__(name=f"Lane({width})")
-
-
-class Mask(types.Type):
-    """Numba type of `width` truth values, the result of comparing lanes."""
-
-    def __init__(self, width: int) -> None:
-        self.width = width
-        super().__init__(name=f"Mask({width})")
-
-
-@register_model(Lane)
-class _LaneModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, fe_type: Lane) -> None:
-        super().__init__(manager, fe_type, ir.VectorType(DOUBLE, fe_type.width))
-
-
-@register_model(Mask)
-class _MaskModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, fe_type: Mask) -> None:
-        super().__init__(manager, fe_type, ir.VectorType(BOOL, fe_type.width))
-
-
-def native_width() -> int:
-    """Return the lane width for this CPU: 8 with AVX-512, 4 with AVX, else 2; SYNCHAIN_WIDTH overrides it.
-
-    Raises ValueError where SYNCHAIN_WIDTH is not one of 1, 2, 4, 8, 16.
-    """
-    wish = os.environ.get("SYNCHAIN_WIDTH", "")
-    if wish:
-        if wish not in map(str, WIDTHS):
-            raise ValueError(f"SYNCHAIN_WIDTH is {wish!r}; expected one of {', '.join(map(str, WIDTHS))}")
-        return int(wish)
-    features = llvm.get_host_cpu_features()
-    if features.get("avx512f"):
-        return 8
-    return 4 if features.get("avx") else 2
-
-
-def _splat(builder: ir.IRBuilder, value: ir.Value, width: int) -> ir.Value:
-    vector = ir.VectorType(DOUBLE, width)
-    undefined = ir.Constant(vector, ir.Undefined)
-    first = builder.insert_element(undefined, value, ir.Constant(INT32, 0))
-    zeros = ir.Constant(ir.VectorType(INT32, width), [0] * width)
-    return builder.shuffle_vector(first, undefined, zeros)
-
-
-def _as_lane(context: Any, builder: ir.IRBuilder, value: ir.Value, fe_type: types.Type, width: int) -> ir.Value:
-    if isinstance(fe_type, Lane):
-        return value
-    if fe_type != types.float64:
-        value = context.cast(builder, value, fe_type, types.float64)
-    return _splat(builder, value, width)
-
-
-def _common_width(arguments: Any) -> int | None:
-    """The width shared by the lanes among the arguments, None where they are not lanes and numbers."""
-    widths = {a.width for a in arguments if isinstance(a, Lane)}
-    numbers = all(isinstance(a, Lane | types.Float | types.Integer) for a in arguments)
-    return widths.pop() if len(widths) == 1 and numbers else None
-
 
 PAIRS = [(Lane, Lane), (Lane, types.Float), (types.Float, Lane), (Lane, types.Integer), (types.Integer, Lane)]
 
@@ -106,12 +36,12 @@ def _define_operator(function: Callable, emit: Callable, result: type) -> None:
     @infer_global(function)
     class _Typing(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
-            width = _common_width(args) if len(args) == 2 else None
+            width = common_width(args) if len(args) == 2 else None
             return signature(result(width), *args) if width else None
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         width = sig.return_type.width
-        left, right = (_as_lane(context, builder, v, t, width) for v, t in zip(args, sig.args, strict=True))
+        left, right = (as_lane(context, builder, v, t, width) for v, t in zip(args, sig.args, strict=True))
         return emit(builder, left, right)
 
     for left, right in PAIRS:
@@ -172,13 +102,13 @@ def _llvm_function(name: str, arity: int) -> Any:
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         width = sig.return_type.width
         vector = ir.VectorType(DOUBLE, width)
-        values = [_as_lane(context, builder, v, t, width) for v, t in zip(args, sig.args, strict=True)]
+        values = [as_lane(context, builder, v, t, width) for v, t in zip(args, sig.args, strict=True)]
         kind = ir.FunctionType(vector, [vector] * arity)
         function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{width}f64")
         return builder.call(function, values)
 
     def typed(*arguments: Any) -> Any:
-        width = _common_width(arguments)
+        width = common_width(arguments)
         return (Lane(width)(*arguments), lower) if width else None
 
     if arity == 1:
@@ -206,7 +136,7 @@ def select(typingctx: Any, mask: Any, yes: Any, no: Any) -> Any:
     width = mask.width
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        pair = (_as_lane(context, builder, v, t, width) for v, t in zip(args[1:], sig.args[1:], strict=True))
+        pair = (as_lane(context, builder, v, t, width) for v, t in zip(args[1:], sig.args[1:], strict=True))
         return builder.select(args[0], *pair)
 
     return Lane(width)(mask, yes, no), lower
@@ -284,7 +214,7 @@ def broadcast(typingctx: Any, number: Any, width: Any) -> Any:
         return None
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return _as_lane(context, builder, args[0], sig.args[0], size)
+        return as_lane(context, builder, args[0], sig.args[0], size)
 
     return Lane(size)(number, width), lower
 
@@ -313,7 +243,7 @@ def split_binary(typingctx: Any, value: Any, pivot: Any) -> Any:
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         width = value.width
         whole = ir.VectorType(INT64, width)
-        start = builder.bitcast(_splat(builder, args[1], width), whole)
+        start = builder.bitcast(splat(builder, args[1], width), whole)
         distance = builder.sub(builder.bitcast(args[0], whole), start)
         exponent = builder.ashr(distance, ir.Constant(whole, [52] * width))
         back = builder.shl(exponent, ir.Constant(whole, [52] * width))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import builtins
 import keyword
+import re
+import unicodedata
 
 import sympy as sp
 
-from synchain.models.equations import TIME, Edge, Equations, Node
+from synchain.models.equations import Edge, Equations, Node
 
 from . import elementary, lanes
 
@@ -15,31 +17,18 @@ __all__ = ["RESERVED", "tidy"]
 
 RESERVED = frozenset(
     {"t", "h", "y", "y_new", "dense", "shift", "reach", "rate", "error", "size", "rtol", "atol", "node", "node_linear",
-     "step", "section", "theta", "now", "njit", "p", "drive"}
+     "step", "section", "theta", "now", "njit", "p", "drive", "scaled", "inside", "total", "e3", "e5", "np", "math",
+     "WIDTH", "DENSE"}
     | set(keyword.kwlist) | set(dir(builtins)) | set(elementary.__all__) | set(lanes.__all__)
 )  # fmt: skip
 """Words of the generated code; a user's symbol of that name gets an underscore behind it."""
 
 PREFIXES = (
-    "m_",
-    "l_",
-    "inv_",
-    "k1",
-    "k2",
-    "k3",
-    "k4",
-    "k5",
-    "k6",
-    "k7",
-    "k8",
-    "k9",
-    "u_",
-    "f_",
-    "r_",
-    "at_",
-    "ft_",
-    "n_",
-)
+    "m_", "l_", "inv_", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "u_", "f_", "r_", "at_", "ft_", "n_", "j_",
+    "e_", "_",
+)  # fmt: skip
+NUMBERED = re.compile(r"_\d+$")
+"""The end of a name that numbers a node: x_1 is x of the first one."""
 
 
 def tidy(equations: Equations) -> Equations:
@@ -49,8 +38,12 @@ def tidy(equations: Equations) -> Equations:
     if edge is not None:
         symbols |= {*edge.here, *edge.there, *edge.parameters, edge.weight}
     taken = {s.name for s in symbols}
-    swap = {s: sp.Symbol(_free(s.name, taken), real=True) for s in sorted(symbols, key=str) if _clashes(s.name)}
-    swap = {s: new for s, new in swap.items() if s != TIME}
+    swap = {}
+    for s in sorted(symbols, key=str):
+        if _clashes(s.name) or (s in node.state and NUMBERED.search(s.name)):
+            name = _free(s.name, taken)
+            taken.add(name)
+            swap[s] = sp.Symbol(name, real=True)
     if not swap:
         return equations
     node = Node(_all(node.state, swap), _all(node.rhs, swap), _all(node.parameters, swap))
@@ -67,14 +60,17 @@ def _all(expressions: tuple, swap: dict) -> tuple:
 
 
 def _clashes(name: str) -> bool:
-    return name in RESERVED or not name.isidentifier() or name.startswith(PREFIXES) or name.startswith("__")
+    """True for words of the generated code and for names that Python would not read as they are written."""
+    written = name.isidentifier() and unicodedata.normalize("NFKC", name) == name
+    return name in RESERVED or not written or name.startswith(PREFIXES)
 
 
 def _free(name: str, taken: set[str]) -> str:
-    plain = "".join(c if c.isalnum() or c == "_" else "_" for c in name) or "symbol"
-    plain = f"s_{plain}" if plain[0].isdigit() or plain[0] == "_" else plain
-    while plain in taken or _clashes(plain):
+    plain = "".join(c if f"a{c}".isidentifier() else "_" for c in unicodedata.normalize("NFKC", name)) or "symbol"
+    if not plain.isidentifier() or plain.startswith("_"):
+        plain = f"s_{plain}"
+    elif plain.startswith(PREFIXES):
+        plain = f"user_{plain}"
+    while plain in taken or _clashes(plain) or NUMBERED.search(plain):
         plain += "_"
-        if plain.startswith(PREFIXES):
-            plain = f"user_{plain}"
     return plain

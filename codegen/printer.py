@@ -44,7 +44,7 @@ def _piece(e: sp.Expr) -> tuple[str, int]:
         return e.name, ATOM
     if e.is_Float:
         raise UnprintableError(f"floating-point number {e} in an expression; make it a parameter or a Rational")
-    if e.is_Rational or e.is_NumberSymbol:
+    if e.is_number and _is_constant(e):
         return _number(e)
     if e.is_Add:
         return _sum(e), SUM
@@ -100,14 +100,13 @@ def _product(e: sp.Expr) -> tuple[str, int]:
     top = "*".join(above) or "1.0"
     if not below:
         return top, TERM
-    bottom = "*".join(below)
-    simple = len(below) == 1 and "*" not in bottom and "/" not in bottom
-    return f"{top}/{bottom}" if simple else f"{top}/({bottom})", TERM
+    bottom = "*".join(below)  # each of them holds together as one factor
+    return f"{top}/{bottom}" if len(below) == 1 else f"{top}/({bottom})", TERM
 
 
 def _is_constant(e: sp.Expr) -> bool:
-    """A real number that can be folded into one double: rationals, pi, e, and products and powers of them."""
-    return not e.atoms(sp.Float, sp.Function) and e.is_real is True
+    """A real number that can be folded into one double: rationals, pi, e, and whatever is made of them."""
+    return not e.atoms(sp.Float) and e.is_real is True
 
 
 def _is_divisor(e: sp.Expr) -> bool:

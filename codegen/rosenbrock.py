@@ -36,7 +36,8 @@ def linearise(w: StepWriter) -> list[dict[str, sp.Expr]]:
     """Write the right-hand side, Jacobian and time derivative at the start; return what stands for each, by node."""
     eq, body = w.equations, w.blocks.linear
     state = [s.name for s in eq.node.state]
-    kinds = [f"f_{r}" for r in state] + [f"j_{r}{c}" for r in state for c in state] + [f"ft_{r}" for r in state]
+    kinds = [f"f_{r}" for r in state] + [entry(r, c) for r in eq.node.state for c in eq.node.state]
+    kinds += [f"ft_{r}" for r in state]
     coded = [e for e in body.results if not w.is_plain(e)]
     w.put("# right-hand side, Jacobian and time derivative at the start")
     w.timed("t", w.wanted(body.results, body))
@@ -54,6 +55,11 @@ def linearise(w: StepWriter) -> list[dict[str, sp.Expr]]:
     return own
 
 
+def entry(r: sp.Symbol, c: sp.Symbol) -> str:
+    """The name of d(rhs of r)/dc: j_vx, and j_speed_by_place where letters run together."""
+    return f"j_{r.name}{c.name}" if len(r.name) == len(c.name) == 1 else f"j_{r.name}_by_{c.name}"
+
+
 def gather(w: StepWriter, own: list[dict[str, sp.Expr]]) -> Entries:
     """Entries of the whole Jacobian: those of the nodes by name, plus what the links add."""
     eq, n = w.equations, w.equations.n
@@ -61,7 +67,7 @@ def gather(w: StepWriter, own: list[dict[str, sp.Expr]]) -> Entries:
     for a, r in enumerate(eq.node.state):
         for b, c in enumerate(eq.node.state):
             for i in range(n):
-                entries[a * n + i, b * n + i] = own[i][f"j_{r.name}{c.name}"]
+                entries[a * n + i, b * n + i] = own[i][entry(r, c)]
     for key, e in eq.link_jacobian():
         entries[key] = entries.get(key, sp.S.Zero) + e
     return {key: e for key, e in entries.items() if e != 0}

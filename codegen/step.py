@@ -100,7 +100,8 @@ class StepWriter:
                 self.put(f"{', '.join(left)} = {self.call('node', body, coded, i, prefix)}")
             for target, e in zip(targets, body.results, strict=True):
                 if self.is_plain(e):
-                    self.put(f"{target} = {show(e.xreplace({s: sp.Symbol(n) for s, n in names.items()}))}")
+                    text = show(e.xreplace({s: sp.Symbol(n) for s, n in names.items()}))
+                    self.put(f"{target} = broadcast({text}, WIDTH)" if e.is_number else f"{target} = {text}")
         self.links(prefix, out)
 
     def links(self, prefix: str, out: str) -> None:

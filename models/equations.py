@@ -28,8 +28,8 @@ Link = tuple[int, int, Fraction]
 class Node:
     """One uncoupled oscillator: d(state)/dt = rhs(state, t; parameters).
 
-    Raises ValueError where the right-hand side uses a symbol that is not declared, contains a floating-point
-    number (numbers are parameters or rationals), or has not one entry for each state symbol.
+    Raises ValueError where the right-hand side uses a symbol that is not declared, contains a floating-point number
+    (numbers are parameters or rationals), has not one entry for each state symbol, or where two names are the same.
     """
 
     state: tuple[sp.Symbol, ...]
@@ -37,6 +37,7 @@ class Node:
     parameters: tuple[sp.Symbol, ...]
 
     def __post_init__(self) -> None:
+        _differ("node", (TIME, *self.state, *self.parameters))
         _check("node", self.rhs, len(self.state), {TIME, *self.state, *self.parameters})
 
     @property
@@ -69,6 +70,7 @@ class Edge:
     def __post_init__(self) -> None:
         if len(self.here) != len(self.there):
             raise ValueError(f"edge: {len(self.here)} symbols at the target but {len(self.there)} at the source")
+        _differ("edge", (TIME, self.weight, *self.here, *self.there, *self.parameters))
         known = {self.weight, *self.here, *self.there, *self.parameters}
         _check("edge", self.rhs, len(self.here), known)
 
@@ -92,7 +94,7 @@ class Equations:
     """The equations of motion of `n` equal nodes joined by `links`.
 
     State order is component by component: x_1 … x_n, v_1 … v_n.  Raises ValueError on a link outside the nodes,
-    a link from a node to itself, a repeated link, or links without an edge.
+    a link from a node to itself, a repeated link, links without an edge, or a parameter named like a state variable.
     """
 
     node: Node
@@ -116,6 +118,9 @@ class Equations:
             if (target, source) in seen:
                 raise ValueError(f"link {target} <- {source} occurs twice; add the weights up")
             seen.add((target, source))
+        for name in self.parameters:
+            if name in self.state:
+                raise ValueError(f"the parameter {name!r} has the name of a state variable; rename it")
 
     @property
     def dimension(self) -> int:
@@ -205,6 +210,14 @@ def _block(
         for c, entry in enumerate(line):
             if entry != 0:
                 yield (r * n + row, c * n + column), entry.xreplace(dict(values))
+
+
+def _differ(what: str, symbols: tuple[sp.Symbol, ...]) -> None:
+    names = [s.name for s in symbols]
+    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
+    if twice is not None:
+        meaning = "is the time" if twice == TIME.name else "stands for two things"
+        raise ValueError(f"{what}: the name {twice!r} {meaning}; rename that state or parameter")
 
 
 def _check(what: str, rhs: tuple[sp.Expr, ...], size: int, known: set[sp.Symbol]) -> None:

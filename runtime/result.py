@@ -155,7 +155,7 @@ def _provenance(scene: Scene, kernel: Kernel, tolerances: tuple[float, float]) -
     versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in packages)
     return {
         "title": scene.title or repr(scene),
-        "scene": json.dumps(scene.as_dict(), sort_keys=True),
+        "scene": json.dumps(scene.as_dict()),
         "equations": kernel.equations.digest,
         "kernel": kernel.digest,
         "lanes": kernel.origin.width,

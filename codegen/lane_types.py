@@ -1,0 +1,95 @@
+"""The Numba types behind lanes: `Lane(width)` for doubles, `Mask(width)` for truth values, and their LLVM vectors."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import llvmlite.binding as llvm
+from llvmlite import ir
+from numba import types
+from numba.extending import models, register_model
+
+__all__ = [
+    "BOOL",
+    "DOUBLE",
+    "INT32",
+    "INT64",
+    "WIDTHS",
+    "Lane",
+    "Mask",
+    "as_lane",
+    "common_width",
+    "native_width",
+    "splat",
+]
+
+DOUBLE, INT32, INT64, BOOL = ir.DoubleType(), ir.IntType(32), ir.IntType(64), ir.IntType(1)
+WIDTHS = (1, 2, 4, 8, 16)
+
+
+class Lane(types.Type):
+    """Numba type of `width` doubles in one vector register."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"Lane({width})")
+
+
+class Mask(types.Type):
+    """Numba type of `width` truth values, the result of comparing lanes."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"Mask({width})")
+
+
+@register_model(Lane)
+class _LaneModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, fe_type: Lane) -> None:
+        super().__init__(manager, fe_type, ir.VectorType(DOUBLE, fe_type.width))
+
+
+@register_model(Mask)
+class _MaskModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, fe_type: Mask) -> None:
+        super().__init__(manager, fe_type, ir.VectorType(BOOL, fe_type.width))
+
+
+def native_width() -> int:
+    """Return the lane width for this CPU: 8 with AVX-512, 4 with AVX, else 2; SYNCHAIN_WIDTH overrides it.
+
+    Raises ValueError where SYNCHAIN_WIDTH is not one of 1, 2, 4, 8, 16.
+    """
+    wish = os.environ.get("SYNCHAIN_WIDTH", "")
+    if wish:
+        if wish not in map(str, WIDTHS):
+            raise ValueError(f"SYNCHAIN_WIDTH is {wish!r}; expected one of {', '.join(map(str, WIDTHS))}")
+        return int(wish)
+    features = llvm.get_host_cpu_features()
+    if features.get("avx512f"):
+        return 8
+    return 4 if features.get("avx") else 2
+
+
+def splat(builder: ir.IRBuilder, value: ir.Value, width: int) -> ir.Value:
+    vector = ir.VectorType(DOUBLE, width)
+    undefined = ir.Constant(vector, ir.Undefined)
+    first = builder.insert_element(undefined, value, ir.Constant(INT32, 0))
+    zeros = ir.Constant(ir.VectorType(INT32, width), [0] * width)
+    return builder.shuffle_vector(first, undefined, zeros)
+
+
+def as_lane(context: Any, builder: ir.IRBuilder, value: ir.Value, fe_type: types.Type, width: int) -> ir.Value:
+    if isinstance(fe_type, Lane):
+        return value
+    if fe_type != types.float64:
+        value = context.cast(builder, value, fe_type, types.float64)
+    return splat(builder, value, width)
+
+
+def common_width(arguments: Any) -> int | None:
+    """The width shared by the lanes among the arguments, None where they are not lanes and numbers."""
+    widths = {a.width for a in arguments if isinstance(a, Lane)}
+    numbers = all(isinstance(a, Lane | types.Float | types.Integer) for a in arguments)
+    return widths.pop() if len(widths) == 1 and numbers else None

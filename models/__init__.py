@@ -1,0 +1,76 @@
+"""From a Lagrangian and a graph to exact equations and exact spectra.
+
+Names are loaded on first use, so that importing this package costs next to nothing.  Every file of the folder
+`topologies` is offered as a function of the number of nodes: ``chain(4)`` is ``topology("chain", 4)``.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .axis import Axis
+    from .scene import Scene
+    from .scene_file import load_scene, scene_names
+    from .scene_section import Section
+    from .spectrum import Spectrum
+    from .topology import Topology, from_matrix, read_matrix
+
+_HOMES = {
+    "Axis": "axis",
+    "Scene": "scene",
+    "Section": "scene_section",
+    "Spectrum": "spectrum",
+    "Topology": "topology",
+    "from_matrix": "topology",
+    "load_scene": "scene_file",
+    "read_matrix": "topology",
+    "scene_names": "scene_file",
+}
+
+__all__ = [
+    "Axis",
+    "Scene",
+    "Section",
+    "Spectrum",
+    "Topology",
+    "from_matrix",
+    "load_scene",
+    "read_matrix",
+    "scene_names",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    elif name.startswith("_") or name not in _families():
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    else:
+        value = _family(name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*(name for name in globals() if name.startswith("__")), *__all__, *_families()})
+
+
+def _families() -> set[str]:
+    from pkgutil import iter_modules
+
+    found = iter_modules(import_module(".topologies", __name__).__path__)
+    return {module.name for module in found if not module.name.startswith("_")}
+
+
+def _family(name: str) -> Any:
+    from .topology import topology
+
+    def family(n: int) -> Topology:
+        return topology(name, n)
+
+    family.__name__ = family.__qualname__ = name
+    family.__module__ = __name__
+    family.__doc__ = f"Return the {name} of `n` nodes; ValueError where n is too small for it."
+    return family

@@ -1,0 +1,7 @@
+"""Couplings between two oscillators, one file each.
+
+A coupling is a module with SUMMARY, SOURCE, PARAMETERS (its strength is always called ``sigma``) and at least one of
+``potential(q_i, q_j, weight, sigma, …)``, the energy stored between two coordinates, and
+``dissipation(v_i, v_j, weight, sigma, …)``, a Rayleigh function whose negative velocity gradient is the force.
+Both are symmetric: exchanging i and j changes nothing (tested).
+"""

@@ -1,0 +1,30 @@
+"""Friction laws, one file each, and the regularisation that they share.
+
+A law is a module with SUMMARY, SOURCE (journal, volume, page), PARAMETERS (name -> Parameter, unit of the physical
+quantity), ODD (True where f(-w) = -f(w); tested) and ``force(w, <names of its parameters>)``.  `force` returns the
+friction coefficient, the friction force divided by the normal load (unit 1), on the sliding body for the velocity
+w of the ground relative to the body (unit m/s), so that w f(w) >= 0: the body is dragged along.  Write the jump
+with ``sympy.sign`` and ``sympy.Abs`` of w and no floating-point numbers.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from ..parameter import Parameter
+
+__all__ = ["CONTACTS", "KAPPA", "regularise"]
+
+CONTACTS = ("atan", "sign")
+"""How a jump is treated: smoothed by the arcus tangent, or left as it is with sign(0) = 0."""
+
+KAPPA = Parameter(1e5, "s/m", "steepness of the regularised jump, sgn w = (2/pi) atan(kappa w)", positive=True)
+
+
+def regularise(expression: sp.Expr, kappa: sp.Symbol) -> sp.Expr:
+    """Replace every sign(w) by (2/pi) atan(kappa w).
+
+    The slope at w = 0 becomes 2 kappa/pi, and for |w| >> 1/kappa the error is 2/(pi kappa |w|).
+    Source: Marszal et al., Eur. Phys. J. Special Topics (2016), eq. 5.
+    """
+    return expression.replace(sp.sign, lambda w: 2 * sp.atan(kappa * w) / sp.pi)

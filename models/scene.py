@@ -1,0 +1,214 @@
+"""What to simulate and what to record: the frozen description that everything else starts from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from .axis import Axis
+from .scene_checks import Frozen
+from .scene_complete import complete
+from .scene_model import derived, known_parameters, node
+from .scene_section import Section
+from .topology import Topology
+
+if TYPE_CHECKING:
+    from .equations import Equations
+    from .spectrum import Spectrum
+
+__all__ = ["Axis", "Scene", "Section"]
+
+_MODEL = ("oscillator", "friction", "contact", "coupling")
+
+
+@dataclass(frozen=True, slots=True, init=False, repr=False)
+class Scene:
+    """A network of oscillators, its numbers, its start, what to record and what to sweep.
+
+    Every keyword has a default; the same names are the keys of a scene file (see docs/scenes.md).  States,
+    parameters and times are non-dimensional; `transient` and `window` count periods of the drive 2 pi/omega
+    where `time_unit` is "period", the default where there is a drive.  `friction` "default" is "exponential"
+    where the oscillator takes a friction law, else None.  Raises ValueError or TypeError on anything that the
+    model does not know or cannot be given.
+    """
+
+    title: str
+    oscillator: str
+    friction: str | None
+    contact: str
+    coupling: str | None
+    topology: Topology
+    parameters: Frozen[float]
+    initial: Frozen[tuple[float, ...]]
+    record: tuple[str, ...]
+    section: Section
+    transient: float
+    window: float
+    time_unit: str
+    samples: int
+    integrator: str
+    rtol: float
+    atol: float
+    max_steps: int
+    axes: tuple[Axis, ...]
+    zipped: bool
+    continuation: str
+    seed: int
+
+    def __init__(
+        self,
+        *,
+        title: str = "",
+        oscillator: str = "friction",
+        friction: str | None = "default",
+        contact: str = "atan",
+        coupling: str | None = "spring",
+        topology: Topology | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        initial: Mapping[str, Any] | None = None,
+        record: Iterable[str] | None = None,
+        section: Section | str | None = None,
+        transient: float = 300.0,
+        window: float = 100.0,
+        time_unit: str | None = None,
+        samples: int = 0,
+        integrator: str = "rodas5p",
+        rtol: float = 1e-8,
+        atol: float = 1e-10,
+        max_steps: int = 10_000_000,
+        axes: Iterable[Axis] | Mapping[str, Any] = (),
+        zipped: bool = False,
+        continuation: str = "none",
+        seed: int = 0,
+    ) -> None:
+        given = dict(locals())
+        del given["self"]
+        for name, value in complete(given).items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def n(self) -> int:
+        """Number of oscillators."""
+        return self.topology.n
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the states of one oscillator, such as ("x", "v")."""
+        return tuple(self.initial)
+
+    @property
+    def equations(self) -> Equations:
+        """The derived equations of motion of the network."""
+        return derived(self.oscillator, self.friction, self.contact, self.coupling, self.topology)
+
+    @property
+    def spectrum(self) -> Spectrum:
+        """The exact eigenvalues of the connectivity matrix."""
+        return _spectrum(self.topology)
+
+    @property
+    def forced(self) -> bool:
+        """True where time occurs explicitly in the equations."""
+        return node(self.oscillator, self.friction, self.contact).forced
+
+    @property
+    def omega(self) -> float | None:
+        """Frequency of the drive (an axis may sweep it), None where the oscillator is not driven."""
+        return self.parameters.get("omega") if self.forced else None
+
+    @property
+    def period(self) -> float | None:
+        """Period of the drive in non-dimensional time, None where there is no drive or its frequency is 0."""
+        omega = self.omega
+        return 2 * math.pi / abs(omega) if omega else None
+
+    @property
+    def y0(self) -> tuple[float, ...]:
+        """The initial states in state order: x_1 … x_n, v_1 … v_n."""
+        return tuple(value for values in self.initial.values() for value in values)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of cells along each dimension of the sweep; zipped axes are one dimension, no axes none."""
+        lengths = tuple(len(axis) for axis in self.axes)
+        return lengths[:1] if self.zipped else lengths
+
+    @property
+    def cells(self) -> int:
+        """Number of simulations."""
+        return math.prod(self.shape)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences about what is allowed but probably not meant."""
+        from .scene_warnings import warnings
+
+        return warnings(self)
+
+    def replace(self, **changes: Any) -> Scene:
+        """Return a scene with some keywords changed, checked anew: replace(rtol=1e-6, sigma=0.2).
+
+        `parameters` replaces them all, a parameter's own name (sigma above) that one alone.  What stood at
+        its default goes to the new default; another number or kind of oscillators starts from the default
+        initial states unless `initial` is given.
+        """
+        given = {field.name: getattr(self, field.name) for field in fields(self)}
+        given.update(_defaulted(self))
+        single = {
+            name: changes.pop(name)
+            for name in tuple(changes)
+            if name not in given and name in self.parameters
+        }
+        given.update(changes)
+        given["parameters"] = {**(given["parameters"] or {}), **single}
+        if "initial" not in changes and (
+            given["oscillator"] != self.oscillator or getattr(given["topology"], "n", None) != self.n
+        ):
+            given["initial"] = None
+        return Scene(**given)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the whole scene in JSON types; `Scene.from_dict` makes an equal scene of it."""
+        from .scene_file import as_dict
+
+        return as_dict(self)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Scene:
+        """Return the scene of a scene file's names and values; ValueError or TypeError on anything else."""
+        from .scene_file import from_dict
+
+        return from_dict(values)
+
+    def __repr__(self) -> str:
+        names = [self.oscillator, self.friction, self.coupling if self.topology.links else None]
+        words = [repr(self.title)] if self.title else []
+        words += [
+            "/".join(name for name in names if name),
+            f"{self.topology.name}({self.n})",
+            *map(repr, self.axes),
+        ]
+        return f"Scene({', '.join(words)})"
+
+
+@lru_cache(maxsize=64)
+def _spectrum(graph: Topology) -> Spectrum:
+    return graph.spectrum
+
+
+def _defaulted(scene: Scene) -> dict[str, Any]:
+    coupling = scene.coupling if scene.topology.links else None
+    known = known_parameters(scene.oscillator, scene.friction, scene.contact, coupling)
+    changed: dict[str, Any] = {
+        "parameters": {
+            name: value for name, value in scene.parameters.items() if value != known[name].default
+        }
+    }
+    default = Scene(**{name: getattr(scene, name) for name in _MODEL}, topology=scene.topology)
+    for name in ("record", "section", "time_unit"):
+        if getattr(scene, name) == getattr(default, name):
+            changed[name] = None
+    return changed

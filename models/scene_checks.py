@@ -1,0 +1,149 @@
+"""Checks of what a user wrote; errors name the thing, what was found, what was expected, what to do."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import numbers
+import operator
+import reprlib
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Generic, TypeVar
+
+from .expressions import constant
+
+__all__ = ["Frozen", "choice", "integer", "known_keys", "number", "shown", "suggestion", "table", "text"]
+
+T = TypeVar("T")
+
+
+class Frozen(Mapping[str, T], Generic[T]):
+    """A mapping that cannot change: reads like a dict and can be hashed, compared and pickled."""
+
+    __slots__ = ("_items",)
+    _items: dict[str, T]
+
+    def __init__(self, items: Mapping[str, T] | Iterable[tuple[str, T]] = ()) -> None:
+        object.__setattr__(self, "_items", dict(items))
+
+    def __getitem__(self, key: str) -> T:
+        return self._items[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._items.items()))
+
+    def __repr__(self) -> str:
+        return repr(self._items)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError("this mapping is frozen; build a new one with {**old, name: value}")
+
+    def __reduce__(self) -> tuple[type[Frozen[T]], tuple[dict[str, T]]]:
+        return type(self), (self._items,)
+
+
+def shown(value: object) -> str:
+    """Return a short one-line text of any value, for an error message."""
+    short = reprlib.Repr()
+    short.maxstring = short.maxother = 60
+    short.maxlevel = 2
+    try:
+        words = " ".join(short.repr(value).split())
+    except (
+        Exception
+    ):  # a broken __repr__ or an integer beyond Python's limit of digits must not hide the message
+        words = f"<{type(value).__name__}>"
+    return words if len(words) <= 120 else words[:117] + "..."
+
+
+def suggestion(found: object, known: Iterable[str]) -> str:
+    """Return "; did you mean 'x'?" where a known name is close to the one found, else nothing."""
+    close = difflib.get_close_matches(found, sorted(known), 1) if isinstance(found, str) else []
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def known_keys(what: str, given: Mapping[object, object], known: Iterable[str]) -> None:
+    """Raise where a mapping has a key that is not text or not known."""
+    known = tuple(known)
+    for key in given:
+        if not isinstance(key, str):
+            raise TypeError(f"{what}: key {shown(key)} is a {type(key).__name__}; expected text")
+        if key not in known:
+            close = suggestion(key, known)
+            raise ValueError(f"{what}: unknown key {shown(key)}; known: {', '.join(known) or 'none'}{close}")
+
+
+def table(what: str, value: object) -> Mapping[object, object]:
+    """Return the value where it is a mapping, else raise TypeError."""
+    if not isinstance(value, Mapping):
+        raise TypeError(f"{what}: found {_typed(value)}; expected a table of names and values")
+    return value
+
+
+def text(what: str, value: object, limit: int = 200) -> str:
+    """Return the value where it is text of at most `limit` characters."""
+    if not isinstance(value, str):
+        raise TypeError(f"{what}: found {_typed(value)}; expected text in quotation marks")
+    if len(value) > limit:
+        raise ValueError(f"{what}: found {len(value)} characters; expected at most {limit}; shorten it")
+    return str(value)
+
+
+def choice(what: str, value: object, known: tuple[str, ...]) -> str:
+    """Return the value where it is one of the known names."""
+    name = text(what, value)
+    if name not in known:
+        raise ValueError(f"unknown {what} {shown(name)}; known: {', '.join(known)}{suggestion(name, known)}")
+    return name
+
+
+def number(what: str, value: object, low: float | None = None, high: float | None = None) -> float:
+    """Return a finite float within [low, high] from a real number or the text of a constant expression."""
+    if isinstance(value, str):
+        try:
+            result = constant(value)
+        except ValueError as error:
+            raise ValueError(f"{what}: {error}") from None
+    elif isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise TypeError(f'{what}: found {_typed(value)}; expected a number, e.g. 0.1 or "2*pi/1.15"')
+    else:
+        try:
+            result = float(value)
+        except OverflowError:
+            result = math.inf
+    if not math.isfinite(result):
+        raise ValueError(f"{what}: found {shown(value)}; expected a finite number; correct the value")
+    if (low is not None and result < low) or (high is not None and result > high):
+        raise ValueError(f"{what}: found {result!r}; expected {span(low, high)}; correct the value")
+    return result
+
+
+def integer(what: str, value: object, low: int, high: int) -> int:
+    """Return an int within [low, high]; a float is refused even where it is whole."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
+        raise TypeError(f"{what}: found {_typed(value)}; expected a whole number, e.g. {low}")
+    result = operator.index(value)
+    if not low <= result <= high:
+        raise ValueError(
+            f"{what}: found {shown(result)}; expected a whole number from {low} to {high}; correct it"
+        )
+    return result
+
+
+def span(low: float | None, high: float | None) -> str:
+    """Return the words for a closed range with optional ends."""
+    if high is None:
+        return "a number" if low is None else f"a number of at least {low:g}"
+    return f"a number of at most {high:g}" if low is None else f"a number from {low:g} to {high:g}"
+
+
+def _typed(value: object) -> str:
+    name = type(value).__name__
+    words = shown(value)
+    return words if name in words or value is None else f"{words} ({name})"

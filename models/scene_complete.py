@@ -1,0 +1,123 @@
+"""From what a user gave to a complete scene: defaults filled in, every value checked against the model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from .plugins import load
+from .scene_checks import Frozen, choice, integer, number, shown, table, text
+from .scene_model import check_state, components, in_range, model_parameters, node, unknown
+from .scene_section import Section
+from .scene_start import SEED_LIMIT, start
+from .scene_sweep import check_sweep
+from .topology import Topology, topology
+
+__all__ = ["complete"]
+
+RECORDS = ("sync_error", "section", "trajectory")
+TIME_UNITS = ("period", "time")
+TIME_LIMIT, STEP_LIMIT, SAMPLE_LIMIT = 1e9, 10**12, 10**8
+
+
+def complete(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the same names with defaults filled in and values checked; ValueError or TypeError else."""
+    made = dict(given)
+    made["title"] = text("title", made["title"])
+    made["seed"] = integer("seed", made["seed"], 0, SEED_LIMIT)
+    _model(made)
+    made["parameters"] = _parameters(made)
+    made["initial"] = start(made["initial"], components(made), made["topology"].n, made["seed"])
+    _records(made)
+    _times(made)
+    _numerics(made)
+    check_sweep(made)
+    return made
+
+
+def _model(made: dict[str, Any]) -> None:
+    made["oscillator"] = text("oscillator", made["oscillator"])
+    made["contact"] = text("contact", made["contact"])
+    if made["friction"] == "default":
+        made["friction"] = "exponential" if load("oscillator", made["oscillator"]).FRICTION else None
+    for name in ("friction", "coupling"):
+        if made[name] is not None:
+            made[name] = None if text(name, made[name]) == "none" else str(made[name])
+        if made[name] is not None:
+            load(name, made[name])  # an unknown name is refused even where nothing uses it
+    graph = made["topology"] = topology("chain", 1) if made["topology"] is None else made["topology"]
+    if not isinstance(graph, Topology):
+        raise TypeError(f"topology: found {shown(graph)} ({type(graph).__name__}); expected a graph, e.g. chain(4)")
+    if graph.links and made["coupling"] is None:
+        raise ValueError(
+            f"coupling: found none for {graph.name}({graph.n}), which has links; "
+            "expected the name of a coupling, e.g. 'spring'"
+        )
+
+
+def _parameters(made: Mapping[str, Any]) -> Frozen[float]:
+    known = model_parameters(made)
+    given = table("parameters", {} if made["parameters"] is None else made["parameters"])
+    for name in given:
+        if not isinstance(name, str):
+            raise TypeError(f"parameters: key {shown(name)} is a {type(name).__name__}; expected text")
+        if name not in known:
+            raise ValueError(unknown(made, name, "parameter", known))
+    values = {name: in_range(name, given[name], known[name]) for name in known if name in given}
+    return Frozen({name: values.get(name, float(known[name].default)) for name in known})
+
+
+def _records(made: dict[str, Any]) -> None:
+    n = made["topology"].n
+    found = made["record"]
+    if found is None:
+        found = ("sync_error",) if n > 1 else ()
+    if not isinstance(found, (list, tuple)):
+        raise TypeError(f"record: found {shown(found)}; expected a list out of {', '.join(RECORDS)}")
+    names = [choice("record", name, RECORDS) for name in found]
+    if len(set(names)) < len(names):
+        raise ValueError(f"record: found {shown(names)}; expected each record once; remove the repetition")
+    if n == 1 and "sync_error" in names:
+        raise ValueError(
+            "record: found 'sync_error' for one oscillator; expected at least two to compare; take it out of record"
+        )
+    made["record"] = tuple(name for name in RECORDS if name in names)
+    own = components(made)
+    default = f"{'v' if 'v' in own else own[-1]}_1 falling"
+    made["section"] = Section.parse(default if made["section"] is None else made["section"])
+    check_state(made["section"].variable, own, n, "section variable")
+
+
+def _times(made: dict[str, Any]) -> None:
+    forced = node(made["oscillator"], made["friction"], made["contact"]).forced and "omega" in made["parameters"]
+    if made["time_unit"] is None:
+        made["time_unit"] = "period" if forced else "time"
+    made["time_unit"] = choice("time_unit", made["time_unit"], TIME_UNITS)
+    if made["time_unit"] == "period" and not forced:
+        raise ValueError(
+            f"time_unit: found 'period', but the oscillator {made['oscillator']!r} is not driven; "
+            "expected 'time'; change it or leave it out"
+        )
+    for name in ("transient", "window"):
+        made[name] = number(name, made[name], 0.0, TIME_LIMIT)
+    if made["record"] and made["window"] == 0.0:
+        raise ValueError(f"window: found 0, in which {made['record'][0]!r} has nothing to record; give a window > 0")
+
+
+def _numerics(made: dict[str, Any]) -> None:
+    made["integrator"] = text("integrator", made["integrator"])
+    if not made["integrator"].isidentifier():
+        raise ValueError(f"integrator: found {shown(made['integrator'])}; expected a name such as 'rodas5p'")
+    made["rtol"] = number("rtol", made["rtol"], 1e-15, 0.1)
+    made["atol"] = number("atol", made["atol"], 0.0, 0.1)
+    if made["atol"] < 1e-300:
+        raise ValueError(
+            f"atol: found {made['atol']!r}; expected a number above 0, since states pass through 0; take e.g. 1e-10"
+        )
+    made["max_steps"] = integer("max_steps", made["max_steps"], 1, STEP_LIMIT)
+    made["samples"] = integer("samples", made["samples"], 0, SAMPLE_LIMIT)
+    if "trajectory" in made["record"] and made["samples"] < 2:
+        raise ValueError(
+            f"samples: found {made['samples']} for the trajectory; expected at least 2, "
+            "since both ends of the window are included; raise samples"
+        )

@@ -1,0 +1,96 @@
+"""The axes of a scene, checked against its model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from itertools import pairwise
+from typing import Any
+
+from .axis import Axis
+from .scene_checks import choice, shown
+from .scene_model import check_state, components, in_range, model_parameters, unknown
+
+__all__ = ["check_sweep"]
+
+CONTINUATIONS = ("none", "up", "down")
+CELL_LIMIT = 10**9
+
+
+def check_sweep(made: dict[str, Any]) -> None:
+    """Check `axes`, `zipped` and `continuation`, and store the axes as a tuple."""
+    if not isinstance(made["zipped"], bool):
+        raise TypeError(f"zipped: found {shown(made['zipped'])}; expected true or false")
+    axes = made["axes"] = _axes(made["axes"])
+    names = [axis.name for axis in axes]
+    for i, axis in enumerate(axes):
+        _axis(made, axis)
+        if axis.name in names[:i]:
+            raise ValueError(f"axis {axis.name!r} occurs twice; expected each axis once; merge their values")
+    cells = math.prod(len(axis) for axis in axes)
+    if made["zipped"] and axes:
+        cells = len(axes[0])
+        if any(len(axis) != cells for axis in axes):
+            lengths = ", ".join(f"{axis.name}: {len(axis)}" for axis in axes)
+            raise ValueError(f"zipped axes have different lengths ({lengths}); expected one length for all")
+    if cells > CELL_LIMIT:
+        raise ValueError(
+            f"sweep: found {cells} cells; expected at most {CELL_LIMIT}, the results must fit into memory; "
+            "use fewer values or split the sweep"
+        )
+    _continuation(made)
+
+
+def _axes(given: object) -> tuple[Axis, ...]:
+    if isinstance(given, Mapping):
+        return tuple(Axis.from_table(name, values) for name, values in given.items())
+    if isinstance(given, (str, bytes)) or not isinstance(given, Iterable):
+        raise TypeError(
+            f"axes: found {shown(given)}; expected Axis objects, e.g. [Axis('sigma', [0.1, 0.2])]"
+        )
+    axes = []
+    for axis in given:
+        if not isinstance(axis, Axis):
+            raise TypeError(f"axes: found {shown(axis)}; expected an Axis, e.g. Axis('sigma', [0.1, 0.2])")
+        axes.append(axis)
+    return tuple(axes)
+
+
+def _axis(made: Mapping[str, Any], axis: Axis) -> None:
+    known = model_parameters(made)
+    if axis.name in known:
+        for value in (min(axis.values), max(axis.values)):
+            in_range(f"axis {axis.name}", value, known[axis.name])
+    else:
+        own = components(made)
+        if axis.name.rpartition("_")[0] not in own:
+            states = tuple(f"{c}_1" for c in own)
+            raise ValueError(unknown(made, axis.name, "axis", (*known, *states)))
+        check_state(axis.name, own, made["topology"].n, "axis")
+    if axis.name == "omega" and made["time_unit"] == "period" and 0.0 in axis.values:
+        raise ValueError(
+            'axis omega: found 0, which has no period; expected other values or time_unit = "time"'
+        )
+
+
+def _continuation(made: dict[str, Any]) -> None:
+    made["continuation"] = choice("continuation", made["continuation"], CONTINUATIONS)
+    if made["continuation"] == "none":
+        return
+    axes, known = made["axes"], model_parameters(made)
+    if not axes:
+        raise ValueError(
+            f"continuation: found {made['continuation']!r} without axes; expected a sweep; add an axis"
+        )
+    for axis in axes if made["zipped"] else axes[-1:]:
+        if axis.name not in known:
+            raise ValueError(
+                f"continuation along the initial state {axis.name!r}: a continued cell starts where its "
+                "neighbour ended; expected a parameter as the last axis; reorder the axes"
+            )
+    values = axes[-1].values
+    if any(b <= a for a, b in pairwise(values)):
+        raise ValueError(
+            f"continuation along axis {axes[-1].name!r}: its values do not rise; "
+            "expected rising values; sort them"
+        )

@@ -1,0 +1,177 @@
+"""The command `synchain`: finds the command, runs it, and turns every error into a sentence and an exit code."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from types import ModuleType
+from typing import Any, NoReturn
+
+from .commands import command, names
+from .commands._outcome import FAILED, FINE, WRONG_USE, Failed, WrongUse, sentence
+
+__all__ = ["main"]
+
+ABOUT = "Networks of coupled oscillators: exact equations and spectra, generated kernels, sweeps, thresholds, figures."
+EXAMPLES = ("synchain figures --quick --out figures", "synchain spectrum chain 4", "synchain run figure_4a --out results")
+CODES = "exit codes: 0 fine, 1 failed run, 2 wrong use; SYNCHAIN_DEBUG=1 shows tracebacks"
+
+
+class Parser(ArgumentParser):
+    """An argument parser that raises WrongUse in place of printing its usage.
+
+    Options may stand anywhere, also between positional arguments that may be left out.
+    """
+
+    optional_positionals = False
+
+    def add_argument(self, *names: Any, **options: Any) -> Any:
+        """Add an argument and remember whether it is a positional one that may be left out."""
+        if names and not names[0].startswith("-") and options.get("nargs") in ("?", "*"):
+            self.optional_positionals = True
+        return super().add_argument(*names, **options)
+
+    def read(self, words: Sequence[str]) -> Namespace:
+        """Parse the words after the command."""
+        return self.parse_intermixed_args(words) if self.optional_positionals else self.parse_args(words)
+
+    def error(self, message: str) -> NoReturn:
+        """Raise with a hint where the help is."""
+        raise WrongUse(f"{' '.join(message.split())}\nsee: {self.prog} --help")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run `synchain` with these words (default: the command line's) and return its exit code, 0, 1 or 2."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    name = f"synchain {words[0]}" if words and words[0] in names() else "synchain"
+    _readable(sys.stdout)
+    try:
+        with _short_warnings():
+            code = _dispatch(words)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        return code
+    except BrokenPipeError:  # whoever reads the output has seen enough
+        _silence()
+        return FINE
+    except (Exception, KeyboardInterrupt) as problem:
+        return _report(name, problem)
+
+
+def _dispatch(words: list[str]) -> int:
+    if not words:
+        raise WrongUse(f"expected a command: {', '.join(names())}\nsee: synchain --help")
+    first, rest = words[0], words[1:]
+    if first in ("-h", "--help"):
+        print(_help())
+        return FINE
+    if first == "--version":
+        from importlib.metadata import version
+
+        print(f"synchain {version('synchain')}")
+        return FINE
+    if first.startswith("-"):
+        raise WrongUse(f"unknown option {first}; known: --help, --version; other options follow a command")
+    try:
+        module = command(first)
+    except ValueError as problem:
+        raise WrongUse(f"{problem}\nsee: synchain --help") from None
+    parser = _parser(first, module)
+    try:
+        arguments = parser.read(rest)
+    except SystemExit:  # --help has been printed
+        return FINE
+    arguments.command_line = ("synchain", *words)
+    return int(module.execute(arguments))
+
+
+def _parser(name: str, module: ModuleType) -> Parser:
+    parser = Parser(
+        prog=f"synchain {name}",
+        description=f"{module.SUMMARY[0].upper()}{module.SUMMARY[1:]}.",
+        epilog=_examples(module.EXAMPLES),
+        formatter_class=RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    module.configure(parser)
+    return parser
+
+
+def _help() -> str:
+    rows = [(name, command(name).SUMMARY) for name in names()]
+    wide = max(len(name) for name, _ in rows)
+    listed = "\n".join(f"  {name:<{wide}}  {summary}" for name, summary in rows)
+    return (
+        f"usage: synchain COMMAND ... | --version | --help\n\n{ABOUT}\n\ncommands:\n{listed}\n\n"
+        f"{_examples(EXAMPLES)}\n\nsynchain COMMAND --help describes a command\n{CODES}"
+    )
+
+
+def _examples(lines: Sequence[str]) -> str:
+    return "\n".join([f"example{'s' * (len(lines) > 1)}:", *(f"  {line}" for line in lines)])
+
+
+def _report(name: str, problem: BaseException) -> int:
+    """Write one or two lines about an error to stderr and return the exit code."""
+    if os.environ.get("SYNCHAIN_DEBUG", "") not in ("", "0"):
+        import traceback
+
+        traceback.print_exception(problem, file=sys.stderr)
+    code = FAILED
+    if isinstance(problem, WrongUse):
+        words, code = str(problem), WRONG_USE
+    elif isinstance(problem, Failed):
+        words = str(problem)
+    elif isinstance(problem, KeyboardInterrupt):
+        words = "interrupted"
+    elif isinstance(problem, MemoryError):
+        words = "not enough memory; use a smaller network, fewer cells or a shorter record"
+    elif isinstance(problem, ModuleNotFoundError) and not str(problem.name).startswith("synchain"):
+        words = f"the package {problem.name} is missing; install it: python -m pip install {str(problem.name).partition('.')[0]}"
+    elif isinstance(problem, OSError):
+        words = sentence(problem)
+    else:
+        words = (
+            f"internal error, a bug in synchain: {type(problem).__name__}: {sentence(problem)}\n"
+            "please report it with this command line; SYNCHAIN_DEBUG=1 shows where it happened"
+        )
+    if sys.stderr is not None:
+        with suppress(OSError):
+            print(f"{name}: {words}", file=sys.stderr)
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:
+        _silence()
+    return code
+
+
+@contextmanager
+def _short_warnings() -> Iterator[None]:
+    """Python's warnings as one line without file and line number."""
+
+    def show(message: Warning | str, *rest: Any, **more: Any) -> None:
+        print(f"warning: {' '.join(str(message).split())}", file=sys.stderr)
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show
+        yield
+
+
+def _readable(stream: Any) -> None:
+    """Write characters that the stream's encoding lacks as escapes instead of failing."""
+    if getattr(stream, "errors", None) == "strict" and hasattr(stream, "reconfigure"):
+        stream.reconfigure(errors="backslashreplace")
+
+
+def _silence() -> None:
+    """Let what is left in stdout's buffer go nowhere, so that the interpreter ends without a complaint."""
+    with suppress(OSError, ValueError, AttributeError):
+        descriptor = sys.stdout.fileno()
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, descriptor)
+        os.close(nowhere)
