@@ -3,65 +3,96 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import sympy as sp
 
 from .calculus import derivative
 from .equations import TIME
 
-__all__ = ["accelerations", "energy_rate", "mass_matrix", "total_derivative"]
+__all__ = ["Mechanics", "energy_rate", "equations_of_motion", "mass_matrix", "total_derivative"]
 
 Symbols = Sequence[sp.Symbol]
 
 
-def total_derivative(f: sp.Expr, q: Symbols, v: Symbols, a: Symbols) -> sp.Expr:
-    """Return df/dt of f(q, v, t) with dq/dt = v and dv/dt = a."""
-    terms = [f.diff(TIME)]
-    terms += [f.diff(x) * rate for x, rate in zip((*q, *v), (*v, *a), strict=True)]
-    return sp.Add(*terms)
+@dataclass(frozen=True, slots=True)
+class Mechanics:
+    """A Lagrangian system: kinetic energy T(q, v, t), potential V(q, t) and one generalised force Q(q, v, t) for each q.
+
+    Raises ValueError where the numbers of coordinates, velocities and forces differ.
+    """
+
+    coordinates: tuple[sp.Symbol, ...]
+    velocities: tuple[sp.Symbol, ...]
+    kinetic: sp.Expr
+    potential: sp.Expr
+    forces: tuple[sp.Expr, ...]
+
+    def __post_init__(self) -> None:
+        _one_each(self.coordinates, self.velocities, self.forces)
+
+    def accelerations(self) -> tuple[sp.Expr, ...]:
+        """The equations of motion, solved for the accelerations."""
+        return equations_of_motion(self.kinetic, self.potential, self.forces, self.coordinates, self.velocities)
+
+    def energy_rate(self) -> tuple[sp.Expr, sp.Expr]:
+        """dE/dt along the motion, and what it must be; see `energy_rate`."""
+        return energy_rate(self.kinetic, self.potential, self.forces, self.coordinates, self.velocities)
+
+
+def total_derivative(f: sp.Expr, q: Symbols, v: Symbols, a: Sequence[sp.Expr], time: sp.Symbol = TIME) -> sp.Expr:
+    """Return df/dt of f(q, v, t) along a motion with dq/dt = v and dv/dt = a."""
+    terms = [derivative(f, x) * rate for x, rate in zip((*q, *v), (*v, *a), strict=True)]
+    return sp.Add(derivative(f, time), *terms)
 
 
 def mass_matrix(kinetic: sp.Expr, v: Symbols) -> sp.Matrix:
     """Return the second derivatives of the kinetic energy with respect to the velocities."""
-    return sp.Matrix([[kinetic.diff(x, y) for y in v] for x in v])
+    return sp.Matrix([[derivative(derivative(kinetic, x), y) for y in v] for x in v])
 
 
-def accelerations(
-    kinetic: sp.Expr, potential: sp.Expr, forces: Sequence[sp.Expr], q: Symbols, v: Symbols
+def equations_of_motion(
+    kinetic: sp.Expr, potential: sp.Expr, forces: Sequence[sp.Expr], q: Symbols, v: Symbols, time: sp.Symbol = TIME
 ) -> tuple[sp.Expr, ...]:
-    """Solve d/dt dL/dv - dL/dq = Q, L = T - V, for the accelerations.
+    """Solve d/dt dL/dv - dL/dq = Q with L = T - V for the accelerations dv/dt.
 
-    `kinetic` T(q, v, t) and `potential` V(q, t) are energies, `forces` the generalised non-conservative forces Q(q, v, t),
-    one for each coordinate.  Raises ValueError where the numbers of coordinates, velocities and forces differ, or where the
-    mass matrix is singular (a velocity without kinetic energy).
+    A diagonal mass matrix is divided by, entry by entry.  Raises ValueError where the numbers of coordinates, velocities
+    and forces differ, or where the mass matrix is singular: some velocity then has no kinetic energy.
+    Source: Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. (Addison-Wesley, 2002), sect. 1.4.
     """
-    if not len(q) == len(v) == len(forces):
-        raise ValueError(f"{len(q)} coordinates, {len(v)} velocities, {len(forces)} forces; expected one each")
+    _one_each(q, v, forces)
     lagrangian = kinetic - potential
-    zeros = [sp.S.Zero] * len(q)
+    at_rest = [sp.S.Zero] * len(q)
     rest = []
     for x, rate, force in zip(q, v, forces, strict=True):
-        momentum = lagrangian.diff(rate)
-        rest.append(force + lagrangian.diff(x) - total_derivative(momentum, q, v, zeros))
-    masses = mass_matrix(kinetic, v)
+        momentum = derivative(lagrangian, rate)
+        rest.append(derivative(lagrangian, x) + force - total_derivative(momentum, q, v, at_rest, time))
+    masses = mass_matrix(lagrangian, v)
     if masses.is_diagonal():
-        if any(masses[i, i] == 0 for i in range(len(q))):
-            raise ValueError(f"no kinetic energy in {v[[masses[i, i] for i in range(len(q))].index(0)]}; every velocity needs some")
+        idle = [str(rate) for i, rate in enumerate(v) if masses[i, i] == 0]
+        if idle:
+            raise ValueError(f"no kinetic energy in the velocity {idle[0]}; expected T to grow with every velocity")
         return tuple(value / masses[i, i] for i, value in enumerate(rest))
     if sp.simplify(masses.det()) == 0:
-        raise ValueError("the mass matrix is singular; every combination of velocities needs kinetic energy")
+        raise ValueError(f"the mass matrix of {', '.join(map(str, v))} is singular; expected an invertible one")
     return tuple(masses.LUsolve(sp.Matrix(rest)))
 
 
 def energy_rate(
-    kinetic: sp.Expr, potential: sp.Expr, forces: Sequence[sp.Expr], q: Symbols, v: Symbols
+    kinetic: sp.Expr, potential: sp.Expr, forces: Sequence[sp.Expr], q: Symbols, v: Symbols, time: sp.Symbol = TIME
 ) -> tuple[sp.Expr, sp.Expr]:
-    """Return dE/dt along the motion and what it must be, sum v Q - dL/dt (explicit); their difference is zero.
+    """Return dE/dt along the motion and what it must be, sum v Q - (partial) dL/dt; their difference vanishes.
 
-    E = sum v dL/dv - L is the energy function (Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. 2002, sect. 2.7).
+    E = sum v dL/dv - L is the energy function, T + V for ordinary kinetic energies.
+    Source: Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. (Addison-Wesley, 2002), sect. 2.7.
     """
     lagrangian = kinetic - potential
-    energy = sp.Add(*(rate * lagrangian.diff(rate) for rate in v)) - lagrangian
-    found = total_derivative(energy, q, v, accelerations(kinetic, potential, forces, q, v))  # type: ignore[arg-type]
-    power = sp.Add(*(rate * force for rate, force in zip(v, forces, strict=True))) - derivative(lagrangian, TIME)
-    return found, power
+    energy = sp.Add(*(rate * derivative(lagrangian, rate) for rate in v)) - lagrangian
+    motion = equations_of_motion(kinetic, potential, forces, q, v, time)
+    power = sp.Add(*(rate * force for rate, force in zip(v, forces, strict=True)))
+    return total_derivative(energy, q, v, motion, time), power - derivative(lagrangian, time)
+
+
+def _one_each(q: Symbols, v: Symbols, forces: Sequence[sp.Expr]) -> None:
+    if not len(q) == len(v) == len(forces):
+        raise ValueError(f"{len(q)} coordinates, {len(v)} velocities and {len(forces)} forces; expected one each")

@@ -6,151 +6,167 @@ equations of a node are those of the single oscillator plus one force for each e
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
+from types import ModuleType
 
 import sympy as sp
 
-from .equations import Edge, Equations, Node
+from .equations import TIME, Edge, Equations, Node
 from .frictions import CONTACTS, KAPPA
-from .lagrangian import mass_matrix
-from .nondimensional import Scales, describe, model_energies, scaled_accelerations
+from .lagrangian import equations_of_motion, mass_matrix
+from .nondimensional import FRICTION, friction_coefficient, nondimensional, scale
 from .parameter import Parameter
-from .plugins import call, load
+from .plugins import call, load, names
 from .topology import Topology
 
 __all__ = ["connectivity", "edge", "network", "node", "parameters"]
 
 
-def parameters(oscillator: str, friction: str | None, contact: str, coupling: str | None) -> dict[str, Parameter]:
+def parameters(
+    oscillator: str, friction: str | None = None, contact: str = "atan", coupling: str | None = None
+) -> dict[str, Parameter]:
     """Return every parameter with default, unit, meaning and range, in the order of Equations.parameters.
 
-    Raises ValueError for an unknown oscillator, law, contact or coupling, and for a law that the oscillator does not take.
+    Raises ValueError for an unknown oscillator, law, contact or coupling, and where the oscillator takes no friction law but
+    is given one, or takes one but is given none.
     """
-    model = load("oscillator", oscillator)
-    scales = Scales(model)
-    table = dict(describe(model.PARAMETERS, scales)) if hasattr(model, "scales") else dict(model.PARAMETERS)
-    law = _law(oscillator, friction, contact)
+    model, law = _model(oscillator, friction, contact)
+    table: dict[str, Parameter] = dict(model.PARAMETERS)
     if law is not None:
-        table |= describe(law.PARAMETERS, scales)
-        if contact == "atan" and _jumps(law):
-            table["kappa"] = describe({"kappa": KAPPA}, scales)["kappa"]
+        table |= law.PARAMETERS
+        if contact == "atan" and friction_coefficient(law, "sign")(sp.Symbol("w", real=True)).has(sp.sign):
+            table["kappa"] = KAPPA
     if coupling is not None:
-        table |= describe(load("coupling", coupling).PARAMETERS, scales)
-    return table
-
-
-def _law(oscillator: str, friction: str | None, contact: str):  # type: ignore[no-untyped-def]
-    """The friction law's module, None where the oscillator takes none."""
-    if contact not in CONTACTS:
-        raise ValueError(f"unknown contact {contact!r}; known: {', '.join(CONTACTS)}")
-    takes = load("oscillator", oscillator).FRICTION
-    if friction is None:
-        if takes:
-            raise ValueError(f"oscillator {oscillator!r} needs a friction law, found none; give friction = 'exponential'")
-        return None
-    law = load("friction", friction)
-    if not takes:
-        raise ValueError(f"oscillator {oscillator!r} takes no friction law, found {friction!r}; leave friction out")
-    return law
-
-
-def _jumps(law) -> bool:  # type: ignore[no-untyped-def]
-    symbols = {name: sp.Symbol(name, real=True) for name in law.PARAMETERS}
-    return bool(call(law.force, {**symbols, "w": sp.Symbol("w", real=True)}).has(sp.sign))
+        table |= load("coupling", coupling).PARAMETERS
+    return {name: replace(p, scale=str(scale(model, p.unit))) for name, p in table.items()}
 
 
 @lru_cache(maxsize=64)
-def node(oscillator: str, friction: str | None, contact: str) -> Node:
-    """Derive the equations of one oscillator: state x, v, with x' = v and v' from the scaled Lagrangian.
+def node(oscillator: str, friction: str | None = None, contact: str = "atan") -> Node:
+    """Derive the equations of one oscillator: for a Lagrangian x' = v and v' from the Euler-Lagrange equations.
 
     Raises ValueError as `parameters` does.
     """
-    names = parameters(oscillator, friction, contact, None)
-    symbols = {name: sp.Symbol(name, real=True) for name in names}
-    model = load("oscillator", oscillator)
+    model, law = _model(oscillator, friction, contact)
+    symbols = {name: sp.Symbol(name, real=True) for name in parameters(oscillator, friction, contact)}
     if hasattr(model, "field"):
-        state = tuple(sp.Symbol(name, real=True) for name in model.STATE)
-        rates = call(model.field, {**symbols, **{s.name: s for s in state}})
-        return Node(state, tuple(rates), tuple(symbols.values()))
-    state, found = scaled_accelerations(model, _law(oscillator, friction, contact), contact, symbols)
-    half = len(state) // 2
-    return Node(state, (*state[half:], *found), tuple(symbols.values()))
+        state = {name: sp.Symbol(name, real=True) for name in model.STATE}
+        rates = call(model.field, {**symbols, **state, "t": TIME})
+        return Node(tuple(state.values()), tuple(map(sp.sympify, rates)), tuple(symbols.values()))
+    system = nondimensional(model)
+    found = system.accelerations()
+    if law is not None:
+        coefficient = friction_coefficient(law, contact)
+        found = tuple(e.replace(FRICTION, coefficient) for e in found)
+    return Node((*system.coordinates, *system.velocities), (*system.velocities, *found), tuple(symbols.values()))
+
+
+def _model(oscillator: str, friction: str | None, contact: str) -> tuple[ModuleType, ModuleType | None]:
+    """The modules of an oscillator and its friction law, None where it takes none."""
+    model = load("oscillator", oscillator)
+    if contact not in CONTACTS:
+        raise ValueError(f"unknown contact {contact!r}; known: {', '.join(CONTACTS)}")
+    if friction is None:
+        if model.FRICTION:
+            raise ValueError(
+                f"oscillator {oscillator!r} has no friction law; known: {', '.join(names('friction'))}; name one"
+            )
+        return model, None
+    law = load("friction", friction)
+    if not model.FRICTION:
+        raise ValueError(f"oscillator {oscillator!r} takes no friction law, found {friction!r}; leave it out")
+    return model, law
 
 
 @lru_cache(maxsize=64)
-def edge(coupling: str, single: Node, oscillator: str = "friction") -> Edge:
-    """Derive what one link adds to the rate of its target, from the coupling's potential or Rayleigh function.
+def edge(coupling: str, single: Node, oscillator: str | None = None) -> Edge:
+    """Derive what one link adds to the rates of its target, by the Euler-Lagrange equations of a pair with that link alone.
 
-    The force on coordinate q_i is -dV/dq_i - dR/dv_i, over the mass of the oscillator in its own units (`oscillator` names
-    the model whose mass that is).  Raises ValueError for an unknown coupling.
+    The node's state must be coordinates followed by their velocities.  `oscillator` names the model whose masses the
+    accelerations are divided by; without it they are 1, as they are in the units of every oscillator with one mass.
+    The force is kept as a function of differences, sigma w (x_j - x_i), so that equal states feel exactly nothing.
+
+    An undirected edge is two links, and the template is symmetric, so the two forces are those of the potential.  A one-way
+    link has no potential: the force that the template gives its target acts there, and nothing acts back on the source.
+
+    Raises ValueError for an unknown coupling, and for a node without coordinates and velocities.
     """
     model = load("coupling", coupling)
     half = len(single.state) // 2
+    if single.rhs[:half] != single.state[half:]:
+        raise ValueError(f"coupling {coupling!r} joins coordinates with velocities; found a node of {single.state}")
     here = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in single.state)
     there = tuple(sp.Symbol(f"{s.name}_j", real=True) for s in single.state)
     weight = sp.Symbol("weight", real=True)
     strengths = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
-    rates = []
-    for k in range(half):
-        force = sp.S.Zero
-        if hasattr(model, "potential"):
-            given = {"q_i": here[k], "q_j": there[k], "weight": weight, **strengths}
-            force -= call(model.potential, given).diff(here[k])
-        if hasattr(model, "dissipation"):
-            given = {"v_i": here[half + k], "v_j": there[half + k], "weight": weight, **strengths}
-            force -= call(model.dissipation, given).diff(here[half + k])
-        rates.append(_difference(sp.factor(force / _mass(oscillator, k))))
+    potential, dissipation = _pair(model, here, there, {"weight": weight, **strengths})
+    masses = _masses(oscillator, half)
+    moving = (*here[half:], *there[half:])
+    kinetic = sp.Add(*(m * v**2 / 2 for m, v in zip((*masses, *masses), moving, strict=True)))
+    forces = tuple(-dissipation.diff(v) for v in moving)
+    found = equations_of_motion(kinetic, potential, forces, (*here[:half], *there[:half]), moving)
+    rates = tuple(_in_differences(e, here, there) for e in found[:half])
     return Edge(here, there, weight, (*[sp.S.Zero] * half, *rates), tuple(strengths.values()))
 
 
-def _difference(e: sp.Expr) -> sp.Expr:
-    """sigma w (x_j - x_i) rather than -sigma w (x_i - x_j)."""
-    sums = [f for f in sp.Mul.make_args(e) if f.is_Add]
-    if sums and e.could_extract_minus_sign():
-        return sp.Mul(-e / sums[0], -sums[0])
-    return e
+def _pair(
+    model: ModuleType, here: tuple[sp.Symbol, ...], there: tuple[sp.Symbol, ...], given: dict[str, sp.Symbol]
+) -> tuple[sp.Expr, sp.Expr]:
+    """The potential and the Rayleigh function of a link, summed over the coordinates."""
+    half = len(here) // 2
+    potential = dissipation = sp.S.Zero
+    for k in range(half):
+        if hasattr(model, "potential"):
+            potential += call(model.potential, {"q_i": here[k], "q_j": there[k], **given})
+        if hasattr(model, "dissipation"):
+            dissipation += call(model.dissipation, {"v_i": here[half + k], "v_j": there[half + k], **given})
+    return potential, dissipation
 
 
-@lru_cache(maxsize=64)
-def _mass(oscillator: str, k: int) -> sp.Expr:
-    """Non-dimensional mass of coordinate k: the second derivative of T over the unit of mass."""
-    model = load("oscillator", oscillator)
-    if hasattr(model, "field"):
-        return sp.S.One
-    scales = Scales(model)
-    symbols = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
-    kinetic, _, _, pairs = model_energies(model, lambda w: sp.S.Zero, scales, symbols)
-    masses = mass_matrix(kinetic, [v for _, v in pairs])
-    if not masses.is_diagonal() or masses.free_symbols & {s for pair in pairs for s in pair}:
-        raise ValueError(f"oscillator {oscillator!r}: couplings need a constant diagonal mass matrix, found {masses}")
-    return sp.simplify(masses[k, k] / scales.of("kg"))
+def _in_differences(e: sp.Expr, here: tuple[sp.Symbol, ...], there: tuple[sp.Symbol, ...]) -> sp.Expr:
+    """The expression in terms of `there` - `here` where it depends on nothing else of both, unchanged otherwise."""
+    gaps = [sp.Dummy(f"d{k}", real=True) for k in range(len(here))]
+    shifted = sp.expand(e.xreplace({q: p + d for p, q, d in zip(here, there, gaps, strict=True)}))
+    if shifted.free_symbols & set(here):
+        return e
+    return sp.factor_terms(shifted).xreplace({d: q - p for p, q, d in zip(here, there, gaps, strict=True)})
+
+
+def _masses(oscillator: str | None, count: int) -> tuple[sp.Expr, ...]:
+    if oscillator is None:
+        return (sp.S.One,) * count
+    system = nondimensional(load("oscillator", oscillator))
+    masses = mass_matrix(system.kinetic, system.velocities)
+    if not masses.is_diagonal() or masses.free_symbols & {TIME, *system.coordinates, *system.velocities}:
+        raise ValueError(f"oscillator {oscillator!r}: a coupling needs a constant diagonal mass matrix, found {masses}")
+    return tuple(masses[i, i] for i in range(count))
 
 
 def network(single: Node, link: Edge | None, graph: Topology) -> Equations:
-    """Join copies of a node by the links of a graph."""
+    """Join copies of a node by the links of a graph; without an edge the nodes stay uncoupled."""
     return Equations(single, link, graph.n, graph.links if link is not None else ())
 
 
 def connectivity(coupling: str, graph: Topology) -> tuple[tuple[Fraction, ...], ...]:
-    """Read the connectivity matrix off the coupling: minus the Hessian of its potential over sigma, edge by edge.
+    """Read G off the coupling: minus the Hessian of its whole potential over sigma, n rows of n fractions.
 
-    For a damper the Rayleigh function takes the potential's place.  A one-way link has no potential of its own; it acts on
-    its target with the force that the template potential gives there, so its row is read off in the same way.
-    Raises ValueError for a coupling whose Hessian is not sigma times a constant.
+    The Hessian of one edge is derived once and added up over the links, so that a thousand nodes take no algebra.  For a
+    damper the Rayleigh function takes the potential's place; for a one-way link the row is read off the force on its target.
+    Raises ValueError for a coupling whose Hessian is not sigma times weight times a number: it has no matrix G.
     """
     model = load("coupling", coupling)
-    q_i, q_j, weight, sigma = (sp.Symbol(name, real=True) for name in ("q_i", "q_j", "weight", "sigma"))
-    strengths = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
-    if hasattr(model, "potential"):
-        energy = call(model.potential, {"q_i": q_i, "q_j": q_j, "weight": weight, **strengths})
-    else:
-        energy = call(model.dissipation, {"v_i": q_i, "v_j": q_j, "weight": weight, **strengths})
-    own, other = (sp.simplify(-energy.diff(q_i, q) / sigma / weight) for q in (q_i, q_j))
+    q_i, q_j, weight = (sp.Symbol(name, real=True) for name in ("q_i", "q_j", "weight"))
+    given = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
+    function = getattr(model, "potential", None) or model.dissipation
+    energy = call(function, {"q_i": q_i, "q_j": q_j, "v_i": q_i, "v_j": q_j, "weight": weight, **given})
+    own, other = (sp.simplify(-energy.diff(q_i, q) / (given["sigma"] * weight)) for q in (q_i, q_j))
     if not (own.is_Rational and other.is_Rational):
-        raise ValueError(f"coupling {coupling!r}: its Hessian over sigma is not constant ({own}, {other}); it has no matrix G")
+        raise ValueError(f"coupling {coupling!r}: Hessian over sigma and weight is {own}, {other}; expected numbers")
+    diagonal, aside = (Fraction(int(e.p), int(e.q)) for e in (own, other))
     rows = [[Fraction(0)] * graph.n for _ in range(graph.n)]
     for target, source, factor in graph.links:
-        rows[target][target] += factor * Fraction(int(own.p), int(own.q))
-        rows[target][source] += factor * Fraction(int(other.p), int(other.q))
+        rows[target][target] += factor * diagonal
+        rows[target][source] += factor * aside
     return tuple(map(tuple, rows))

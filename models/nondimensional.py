@@ -1,141 +1,145 @@
-"""From physical to non-dimensional equations, by substitution: nothing on the non-dimensional side is typed in.
+"""From a physical Lagrangian to non-dimensional equations, by substitution: no scaled equation is typed in.
 
-Every physical quantity q of unit kg^a m^b s^c is written as (its non-dimensional value) M^a L^b S^c, where M, L and S are
-the oscillator's own units of mass, length and time.  Put into the physical equations of motion and divided by the unit of
-acceleration, the units must cancel.
+Every physical quantity of unit kg^a m^b s^c is written as its non-dimensional value times M^a L^b T^c, where M, L and T are
+the oscillator's own units of mass, length and time.  Put into the energies and the forces, M, L and T must cancel.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import ModuleType
+from typing import Any
 
 import sympy as sp
 
 from .equations import TIME
-from .frictions import KAPPA, regularise
-from .lagrangian import accelerations
-from .parameter import Parameter
+from .frictions import CONTACTS, regularise
+from .lagrangian import Mechanics
 from .plugins import call
 from .units import dimension
 
-__all__ = ["Scales", "law_function", "model_energies", "scaled_accelerations"]
+__all__ = ["FRICTION", "friction_coefficient", "mechanics", "nondimensional", "physical", "scale"]
+
+FRICTION = sp.Function("f", real=True)
+"""The friction coefficient as an unknown function of the sliding velocity; a law takes its place at the end."""
+
+MASS, LENGTH, DURATION = sp.symbols("M L T", positive=True)
 
 
-class Scales:
-    """Units of mass, length and time in physical symbols; all 1 where a model is non-dimensional already."""
-
-    def __init__(self, model: ModuleType) -> None:
-        names = getattr(model, "UNITS", {})
-        self.symbols = {name: sp.Symbol(name, positive=True) for name in names}
-        units = call(model.scales, self.symbols) if hasattr(model, "scales") else {}
-        self.base = tuple(sp.sympify(units.get(unit, 1)) for unit in ("kg", "m", "s"))
-
-    def of(self, unit: str) -> sp.Expr:
-        """The amount of a quantity of this unit that the non-dimensional value 1 stands for."""
-        return sp.Mul(*(scale**power for scale, power in zip(self.base, dimension(unit), strict=True)))
+def magnitude(unit: str) -> sp.Expr:
+    """Return the amount M^a L^b T^c of a quantity that the non-dimensional value 1 stands for."""
+    mass, length, duration = dimension(unit)
+    return MASS**mass * LENGTH**length * DURATION**duration
 
 
-def law_function(
-    law: ModuleType | None, contact: str, scales: Scales, symbols: Mapping[str, sp.Symbol]
-) -> Callable[[sp.Expr], sp.Expr]:
-    """Return f(w), the friction coefficient as a function of the physical sliding velocity.
+def scale(model: ModuleType, unit: str) -> sp.Expr:
+    """Return that amount in the physical symbols of an oscillator, such as g*m/k for the unit m.
 
-    The law's own parameters are physical too: a rate of decay of unit s/m is its non-dimensional value over the unit of
-    velocity.  Raises ValueError where the units of a law do not cancel.
+    It is 1 where the oscillator is non-dimensional from the start.  Raises ValueError where the oscillator's scales do not
+    turn each quantity of its UNITS into 1.
     """
-
-    def friction(w: sp.Expr) -> sp.Expr:
-        if law is None:
-            raise ValueError("this oscillator needs a friction law; give one, for example friction = 'exponential'")
-        speed, inner = scales.of("m/s"), sp.Dummy("w", real=True)
-        physical = {name: symbols[name] * scales.of(p.unit) for name, p in law.PARAMETERS.items()}
-        value = call(law.force, {**physical, "w": speed * inner})
-        if contact == "atan" and value.has(sp.sign):
-            # sign(speed w) is sign(w) already, so kappa must carry the unit of velocity that the sign has lost
-            value = regularise(value, symbols["kappa"] * scales.of(KAPPA.unit) * speed)
-        value = cancel_units(value, scales, f"friction law {law.__name__.rpartition('.')[2]}")
-        return value.xreplace({inner: cancel_units(sp.expand(w / speed), scales, "sliding velocity")})
-
-    return friction
+    if not hasattr(model, "scales"):
+        return sp.S.One
+    symbols = {name: sp.Symbol(name, positive=True) for name in model.UNITS}
+    units = call(model.scales, symbols)
+    values = {MASS: units["kg"], LENGTH: units["m"], DURATION: units["s"]}
+    for name, own in model.UNITS.items():
+        value = sp.powdenest(symbols[name] / magnitude(own).xreplace(values), force=True)
+        if value != 1:
+            raise ValueError(f"{_name(model)}.scales: {name} becomes {value}; expected 1: correct the scales or UNITS")
+    return sp.powdenest(magnitude(unit).xreplace(values), force=True)
 
 
-def model_energies(
-    model: ModuleType, friction: Callable[[sp.Expr], sp.Expr], scales: Scales, symbols: Mapping[str, sp.Symbol]
-) -> tuple[sp.Expr, sp.Expr, tuple[sp.Expr, ...], tuple[tuple[sp.Symbol, sp.Symbol], ...]]:
-    """Return T, V, the forces Q and the pairs (coordinate, velocity), all physical, in non-dimensional symbols."""
-    coordinates: Mapping[str, tuple[str, str]] = getattr(model, "COORDINATES", {"x": ("v", "m")})
-    given: dict[str, object] = dict(scales.symbols)
-    pairs = []
-    for name, (speed, unit) in coordinates.items():
-        q, v = sp.Symbol(f"{name}_physical", real=True), sp.Symbol(f"{speed}_physical", real=True)
-        given |= {name: q, speed: v}
-        pairs.append((q, v))
-    physical: Mapping[str, str] = getattr(model, "PHYSICAL", {})
+def physical(model: ModuleType) -> Mechanics:
+    """Return the Lagrangian system of an oscillator in physical symbols (eq. 2), with `FRICTION` for its friction law."""
+    names = {name: sp.Symbol(name, positive=True) for name in getattr(model, "UNITS", {})}
+    terms = getattr(model, "PHYSICAL", {})
+    for name in model.PARAMETERS:
+        names[terms.get(name, name)] = sp.Symbol(terms.get(name, name), real=True)
+    return mechanics(model, {**names, **_state(model), "t": TIME, "friction": FRICTION})
+
+
+def nondimensional(model: ModuleType) -> Mechanics:
+    """Return the Lagrangian system in non-dimensional symbols (eq. 3), with `FRICTION` for its friction law.
+
+    Raises ValueError where units do not cancel.
+    """
+    if not hasattr(model, "scales"):
+        return physical(model)
+    scale(model, "1")  # the scales must turn every quantity of UNITS into 1
+    given: dict[str, Any] = {name: magnitude(unit) for name, unit in model.UNITS.items()}
     for name, parameter in model.PARAMETERS.items():
-        given[physical.get(name, name)] = symbols[name] * scales.of(parameter.unit if physical else "1")
-    given |= {"t": TIME, "friction": friction}
-    force = call(model.force, given) if hasattr(model, "force") else sp.S.Zero
-    forces = tuple(force) if isinstance(force, tuple | list) else (force,) + (sp.S.Zero,) * (len(pairs) - 1)
-    return call(model.kinetic, given), call(model.potential, given), forces, tuple(pairs)
+        given[model.PHYSICAL[name]] = sp.Symbol(name, real=True) * magnitude(parameter.unit)
+    units = coordinates(model)
+    symbols = _state(model)
+    for name, (speed, unit) in units.items():
+        given[name] = symbols[name] * magnitude(unit)
+        given[speed] = symbols[speed] * magnitude(unit) / DURATION
+    given["t"] = TIME * DURATION
+    given["friction"] = lambda w: FRICTION(_cancel(w / magnitude("m/s"), f"{_name(model)}: sliding velocity"))
+    found = mechanics(model, given)
+    energy = magnitude("N*m")
+    return Mechanics(
+        tuple(symbols[name] for name in units),
+        tuple(symbols[speed] for speed, _ in units.values()),
+        _cancel(found.kinetic / energy, f"{_name(model)}: kinetic energy"),
+        _cancel(found.potential / energy, f"{_name(model)}: potential energy"),
+        tuple(
+            _cancel(force * magnitude(unit) / energy, f"{_name(model)}: force on {name}")
+            for force, (name, (_, unit)) in zip(found.forces, units.items(), strict=True)
+        ),
+    )
 
 
-def scaled_accelerations(
-    model: ModuleType, law: ModuleType | None, contact: str, symbols: Mapping[str, sp.Symbol]
-) -> tuple[tuple[sp.Symbol, ...], tuple[sp.Expr, ...]]:
-    """Return the state (x …, v …) and the non-dimensional accelerations of an oscillator given by its Lagrangian."""
-    scales = Scales(model)
-    coordinates: Mapping[str, tuple[str, str]] = getattr(model, "COORDINATES", {"x": ("v", "m")})
-    hidden: dict[sp.Symbol, sp.Expr] = {}
-    friction = _hide(law_function(law, contact, scales, symbols), hidden, coordinates, scales)
-    kinetic, potential, forces, pairs = model_energies(model, friction, scales, symbols)
-    found = accelerations(kinetic, potential, forces, [q for q, _ in pairs], [v for _, v in pairs])
-    units = {name: unit if scales.symbols else "1" for name, (_, unit) in coordinates.items()}
-    swap: dict[sp.Symbol, sp.Expr] = {TIME: TIME * scales.of("s")}
-    for (q, v), (name, (speed, _)) in zip(pairs, coordinates.items(), strict=True):
-        length = scales.of(units[name])
-        swap |= {q: sp.Symbol(name, real=True) * length, v: sp.Symbol(speed, real=True) * length / scales.of("s")}
-    rates = []
-    for e, name in zip(found, coordinates, strict=True):
-        scaled = e.xreplace(swap)
-        if scales.symbols:
-            scaled = sp.expand(scaled * scales.of("s") ** 2 / scales.of(units[name]))
-        rates.append(cancel_units(scaled, scales, f"acceleration of {name}").xreplace(hidden))
-    state = (*(sp.Symbol(n, real=True) for n in coordinates), *(sp.Symbol(v, real=True) for v, _ in coordinates.values()))
-    return state, tuple(rates)
+def mechanics(model: ModuleType, given: Mapping[str, Any]) -> Mechanics:
+    """Return the energies and forces of an oscillator with `given` expressions put in for the names that it uses."""
+    units = coordinates(model)
+    force = call(model.force, given) if hasattr(model, "force") else (sp.S.Zero,) * len(units)
+    return Mechanics(
+        tuple(given[name] for name in units),
+        tuple(given[speed] for speed, _ in units.values()),
+        call(model.kinetic, given),
+        call(model.potential, given),
+        tuple(force) if isinstance(force, tuple | list) else (force,),
+    )
 
 
-def _hide(
-    friction: Callable[[sp.Expr], sp.Expr],
-    hidden: dict[sp.Symbol, sp.Expr],
-    coordinates: Mapping[str, tuple[str, str]],
-    scales: Scales,
-) -> Callable[[sp.Expr], sp.Expr]:
-    """Friction as a symbol that stands for its value in `hidden`, so that scaling leaves the law as it was written."""
-    swap = {}
-    for name, (speed, unit) in coordinates.items():
-        length = scales.of(unit) if scales.symbols else sp.S.One
-        swap[sp.Symbol(f"{speed}_physical", real=True)] = sp.Symbol(speed, real=True) * length / scales.of("s")
-        swap[sp.Symbol(f"{name}_physical", real=True)] = sp.Symbol(name, real=True) * length
+def friction_coefficient(law: ModuleType, contact: str) -> Callable[[sp.Expr], sp.Expr]:
+    """Return f(w), the friction coefficient as a function of the non-dimensional sliding velocity.
 
-    def opaque(w: sp.Expr) -> sp.Expr:
-        stand_in = sp.Dummy("f", real=True)
-        hidden[stand_in] = friction(w.xreplace(swap))
-        return stand_in
-
-    return opaque
+    The parameters of a law have units too, so they scale with the rest: a rate of decay a = 2.5 of unit s/m decays with
+    2.5 |w| only when w is measured in L/T.  Raises ValueError where the units of a law do not cancel, and for an unknown
+    contact.
+    """
+    if contact not in CONTACTS:
+        raise ValueError(f"unknown contact {contact!r}; known: {', '.join(CONTACTS)}")
+    w = sp.Dummy("w", real=True)
+    given = {name: sp.Symbol(name, real=True) * magnitude(p.unit) for name, p in law.PARAMETERS.items()}
+    value = _cancel(call(law.force, {**given, "w": w * magnitude("m/s")}), f"friction law {_name(law)}")
+    if contact == "atan":
+        value = regularise(value, sp.Symbol("kappa", real=True))
+    return lambda argument: value.xreplace({w: argument})
 
 
-def cancel_units(e: sp.Expr, scales: Scales, what: str) -> sp.Expr:
-    """The expression itself, once its physical units have cancelled; ValueError where they have not."""
-    left = sorted(s.name for s in e.free_symbols & set(scales.symbols.values()))
-    if left:
-        raise ValueError(f"{what}: the physical {', '.join(left)} did not cancel; check the units of the parameters")
-    return e
+def coordinates(model: ModuleType) -> Mapping[str, tuple[str, str]]:
+    """Return coordinate -> (velocity, unit) of an oscillator."""
+    return getattr(model, "COORDINATES", {"x": ("v", "m")})
 
 
-def describe(parameters: Mapping[str, Parameter], scales: Scales) -> dict[str, Parameter]:
-    """The parameters with what their value 1 stands for, in physical symbols."""
-    from dataclasses import replace
+def _state(model: ModuleType) -> dict[str, sp.Symbol]:
+    names = [name for pair in coordinates(model).items() for name in (pair[0], pair[1][0])]
+    return {name: sp.Symbol(name, real=True) for name in names}
 
-    return {name: replace(p, scale=str(scales.of(p.unit))) for name, p in parameters.items()}
+
+def _cancel(expression: sp.Expr, what: str) -> sp.Expr:
+    """The expression with common factors taken out; ValueError where a unit has not cancelled."""
+    result = sp.factor_terms(sp.sympify(expression))
+    left = {MASS: "kg", LENGTH: "m", DURATION: "s"}.items()
+    found = [name for symbol, name in left if result.has(symbol)]
+    if found:
+        raise ValueError(f"{what}: the unit {found[0]} does not cancel in {result}; check the units of the parameters")
+    return result
+
+
+def _name(model: ModuleType) -> str:
+    return model.__name__.rpartition(".")[2]

@@ -30,7 +30,7 @@ class Scene:
 
     Every keyword has a default; the same names are the keys of a scene file (see docs/scenes.md).  States,
     parameters and times are non-dimensional; `transient` and `window` count periods of the drive 2 pi/omega
-    where `time_unit` is "period", the default where there is a drive.  `friction` "default" is "exponential"
+    where `time_unit` is "period", the default where there is a drive.  `atol` is a tenth of `rtol` unless given.  `friction` "default" is "exponential"
     where the oscillator takes a friction law, else None.  Raises ValueError or TypeError on anything that the
     model does not know or cannot be given.
     """
@@ -77,7 +77,7 @@ class Scene:
         samples: int = 0,
         integrator: str = "rodas5p",
         rtol: float = 1e-8,
-        atol: float = 1e-10,
+        atol: float | None = None,
         max_steps: int = 10_000_000,
         axes: Iterable[Axis] | Mapping[str, Any] = (),
         zipped: bool = False,
@@ -157,11 +157,7 @@ class Scene:
         """
         given = {field.name: getattr(self, field.name) for field in fields(self)}
         given.update(_defaulted(self))
-        single = {
-            name: changes.pop(name)
-            for name in tuple(changes)
-            if name not in given and name in self.parameters
-        }
+        single = {name: changes.pop(name) for name in tuple(changes) if name not in given and name in self.parameters}
         given.update(changes)
         given["parameters"] = {**(given["parameters"] or {}), **single}
         if "initial" not in changes and (
@@ -203,11 +199,11 @@ def _defaulted(scene: Scene) -> dict[str, Any]:
     coupling = scene.coupling if scene.topology.links else None
     known = known_parameters(scene.oscillator, scene.friction, scene.contact, coupling)
     changed: dict[str, Any] = {
-        "parameters": {
-            name: value for name, value in scene.parameters.items() if value != known[name].default
-        }
+        "parameters": {name: value for name, value in scene.parameters.items() if value != known[name].default}
     }
     default = Scene(**{name: getattr(scene, name) for name in _MODEL}, topology=scene.topology)
+    if scene.atol == scene.rtol / 10:
+        changed["atol"] = None
     for name in ("record", "section", "time_unit"):
         if getattr(scene, name) == getattr(default, name):
             changed[name] = None

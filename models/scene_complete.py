@@ -109,7 +109,7 @@ def _numerics(made: dict[str, Any]) -> None:
     if not made["integrator"].isidentifier():
         raise ValueError(f"integrator: found {shown(made['integrator'])}; expected a name such as 'rodas5p'")
     made["rtol"] = number("rtol", made["rtol"], 1e-15, 0.1)
-    made["atol"] = number("atol", made["atol"], 0.0, 0.1)
+    made["atol"] = made["rtol"] / 10 if made["atol"] is None else number("atol", made["atol"], 0.0, 0.1)
     if made["atol"] < 1e-300:
         raise ValueError(
             f"atol: found {made['atol']!r}; expected a number above 0, since states pass through 0; take e.g. 1e-10"

@@ -6,6 +6,7 @@ every block of drive periods; the exponent is the mean growth rate over the bloc
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -14,11 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from synchain.codegen.emit import emit
-from synchain.codegen.load import load
+from synchain.codegen.load import Kernel, load
 from synchain.models.scene import Scene
 from synchain.models.tangent import transversal
 
 from .intervals import Interval
+from .plan import tolerances
 from .status import Status
 from .sweep import worker_count
 
@@ -72,27 +74,47 @@ def exponents(
     integration fails.
     """
     scene = scene.replace(axes=(), record=(), **parameters)
-    kernel = load(emit(transversal(scene.equations), scene.integrator, ()))
     alpha = np.asarray(alpha, dtype=float)
-    cells = len(alpha) * starts
-    names = kernel.equations.parameters
-    values = {**scene.parameters, "alpha": 0.0}
-    numbers = np.tile([values[name] for name in names], (cells, 1))
-    numbers[:, names.index("alpha")] = np.repeat(alpha, starts)
     unit = scene.period or 2.0 * math.pi
-    state = _start(scene, cells, starts, seed)
-    size = len(scene.components)
-    spans = np.tile([0.0, block * unit], (cells, 1))
-    control = np.array([scene.rtol, scene.atol, 1e-4, 0.5 * unit, scene.max_steps, 0.0, 0.0])
-    total, skip = round((periods + transient) / block), round(transient / block)
-    growth = np.zeros((total - skip, cells))
-    for k in range(total):
-        state = _advance(kernel, state, numbers, spans, control, worker_count(workers))
-        length = np.linalg.norm(state[:, size:], axis=1)
-        if k >= skip:
-            growth[k - skip] = np.log(np.maximum(length, 1e-300))
-        state[:, size:] /= np.maximum(length, 1e-300)[:, None]
+    work = _Blocks.prepare(scene, alpha, starts, block * unit, worker_count(workers), seed)
+    for _ in range(round(transient / block)):
+        work.advance()
+    growth = np.array([work.advance() for _ in range(round(periods / block))])
     return _summary(alpha, growth / (block * unit), starts, periods * unit)
+
+
+@dataclass(slots=True)
+class _Blocks:
+    """Cells (alpha, start) in step with each other, one block of time after the other."""
+
+    kernel: Kernel
+    state: np.ndarray
+    numbers: np.ndarray
+    spans: np.ndarray
+    control: np.ndarray
+    workers: int
+
+    @classmethod
+    def prepare(cls, scene: Scene, alpha: np.ndarray, starts: int, length: float, workers: int, seed: int) -> _Blocks:
+        kernel = load(emit(transversal(scene.equations), scene.integrator, ()))
+        cells = len(alpha) * starts
+        names = kernel.equations.parameters
+        values = {**scene.parameters, "alpha": 0.0}
+        numbers = np.tile([values[name] for name in names], (cells, 1))
+        numbers[:, names.index("alpha")] = np.repeat(alpha, starts)
+        limits = tolerances(scene, np.empty((0, 0)))
+        control = np.array([*limits, 1e-4, 0.5 * (scene.period or math.inf), scene.max_steps, 0.0, 0.0])
+        return cls(
+            kernel, _start(scene, cells, starts, seed), numbers, np.tile([0.0, length], (cells, 1)), control, workers
+        )
+
+    def advance(self) -> np.ndarray:
+        """Integrate over one block, scale the deviations back to 1 and return the logarithm of their growth (cells,)."""
+        self.state = _integrate(self)
+        half = self.state.shape[1] // 2
+        length = np.maximum(np.linalg.norm(self.state[:, half:], axis=1), 1e-300)
+        self.state[:, half:] /= length[:, None]
+        return np.log(length)
 
 
 def _start(scene: Scene, cells: int, starts: int, seed: int) -> np.ndarray:
@@ -106,18 +128,15 @@ def _start(scene: Scene, cells: int, starts: int, seed: int) -> np.ndarray:
     return state
 
 
-def _advance(kernel, state, numbers, spans, control, workers):  # type: ignore[no-untyped-def]
-    """Integrate all cells over one block on threads."""
-    cells, dimension = state.shape
-    end, sums, counts = np.empty_like(state), np.zeros((cells, 4)), np.zeros((cells, 4), np.int64)
+def _integrate(work: _Blocks) -> np.ndarray:
+    """The states of all cells at the end of a block, on threads; FloatingPointError where one fails."""
+    cells, dimension = work.state.shape
+    end, sums, counts = np.empty_like(work.state), np.zeros((cells, 4)), np.zeros((cells, 4), np.int64)
     points, samples = np.zeros((cells, 0, dimension + 1)), np.zeros((cells, 0, dimension))
-    cuts = np.linspace(0, cells, workers + 1).astype(int)
-    with ThreadPoolExecutor(workers) as pool:
-        jobs = [
-            pool.submit(kernel.drive, a, b, state, numbers, spans, control, end, sums, counts, points, samples)
-            for a, b in zip(cuts[:-1], cuts[1:], strict=True)
-            if b > a
-        ]
+    cuts = np.linspace(0, cells, work.workers + 1).astype(int)
+    fixed = (work.state, work.numbers, work.spans, work.control, end, sums, counts, points, samples)
+    with ThreadPoolExecutor(work.workers) as pool:
+        jobs = [pool.submit(work.kernel.drive, a, b, *fixed) for a, b in itertools.pairwise(cuts) if b > a]
         for job in jobs:
             job.result()
     bad = np.flatnonzero(counts[:, 0] != Status.FINISHED)

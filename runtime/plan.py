@@ -82,7 +82,8 @@ def tolerances(scene: Scene, numbers: np.ndarray) -> tuple[float, float]:
     """
     rtol, atol = scene.rtol, scene.atol
     names = scene.equations.parameters
-    if scene.contact == "atan" and "kappa" in names and numbers.size:
-        width = 1.0 / max(float(numbers[:, names.index("kappa")].max()), 1e-300)
+    if scene.contact == "atan" and "kappa" in names:
+        steepest = numbers[:, names.index("kappa")].max() if numbers.size else scene.parameters["kappa"]
+        width = 1.0 / max(float(steepest), 1e-300)
         rtol, atol = min(rtol, max(width, 1e-13)), min(atol, max(0.1 * width, 1e-13))
     return rtol, atol

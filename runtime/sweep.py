@@ -93,27 +93,63 @@ def run(
     Raises ValueError for an unknown axis or a result of another scene, SweepInterrupted on Ctrl-C.
     """
     scene = with_axes(scene, axes)
-    workers = worker_count(workers)
-    compiled = kernel(scene, width)
     cells = plan(scene)
-    rtol, atol = tolerances(scene, cells.numbers)
-    control = np.array([rtol, atol, 1e-4, _max_step(scene), scene.max_steps, DIRECTIONS[scene.section.direction], 0.0])
-    buffers = Buffers.empty(
-        scene.cells, len(scene.y0), _room(scene), scene.samples if "trajectory" in scene.record else 0
-    )
+    job = _job(scene, cells, kernel(scene, width), worker_count(workers))
     if resume is not None:
-        resume.restore(scene, buffers)
+        resume.restore(scene, job.buffers)
     bar = tqdm(total=scene.cells, unit="cell", disable=None if show_progress is None else not show_progress)
+    job.advance = bar.update
     try:
         with bar:
             if scene.continuation == "none":
-                _run_all(compiled, cells, control, buffers, workers, bar.update)
+                _run_all(job)
             else:
-                cells = _run_along(scene, compiled, cells, control, buffers, workers, bar.update)
-            _complete_points(compiled, cells, control, buffers, workers)
+                _run_along(scene, job)
+            _complete_points(job)
     except KeyboardInterrupt:
-        raise SweepInterrupted(gather(scene, compiled, cells, buffers, (rtol, atol))) from None
-    return gather(scene, compiled, cells, buffers, (rtol, atol))
+        raise SweepInterrupted(_report(scene, job)) from None
+    return _report(scene, job)
+
+
+@dataclass(slots=True)
+class Job:
+    """A kernel, the cells it works on, what it fills, and how many threads share the work."""
+
+    kernel: Kernel
+    cells: Plan
+    control: np.ndarray
+    buffers: Buffers
+    workers: int
+    advance: Callable[[int], Any]
+
+    def drive(self, first: int, last: int) -> int:
+        """Run some of the cells in this thread; returns how many."""
+        rows = self.cells
+        self.kernel.drive(first, last, rows.start, rows.numbers, rows.spans, self.control, *self.buffers.arrays())
+        return last - first
+
+    def part(self, rows: np.ndarray) -> Job:
+        """The same job for some rows, in copies of its arrays."""
+        cells = Plan(self.cells.start[rows], self.cells.numbers[rows], self.cells.spans[rows])
+        buffers = Buffers(*(array[rows] for array in self.buffers.arrays()))
+        return Job(self.kernel, cells, self.control, buffers, self.workers, self.advance)
+
+    def take(self, rows: np.ndarray, part: Job) -> None:
+        """Write the outcome of a part back."""
+        for whole, piece in zip(self.buffers.arrays(), part.buffers.arrays(), strict=True):
+            whole[rows] = piece
+
+
+def _job(scene: Scene, cells: Plan, compiled: Kernel, workers: int) -> Job:
+    direction = DIRECTIONS[scene.section.direction]
+    control = np.array([*tolerances(scene, cells.numbers), 1e-4, _max_step(scene), scene.max_steps, direction, 0.0])
+    samples = scene.samples if "trajectory" in scene.record else 0
+    buffers = Buffers.empty(scene.cells, len(scene.y0), _room(scene), samples)
+    return Job(compiled, cells, control, buffers, workers, lambda done: None)
+
+
+def _report(scene: Scene, job: Job) -> Result:
+    return gather(scene, job.kernel, job.cells, job.buffers, (float(job.control[0]), float(job.control[1])))
 
 
 def with_axes(scene: Scene, axes: dict[str, Any]) -> Scene:
@@ -162,30 +198,23 @@ def _room(scene: Scene) -> int:
     return int(min(2.0 * periods, 1e6)) + 8
 
 
-def _drive(compiled: Kernel, first: int, last: int, cells: Plan, control: np.ndarray, buffers: Buffers) -> int:
-    compiled.drive(first, last, cells.start, cells.numbers, cells.spans, control, *buffers.arrays())
-    return last - first
-
-
-def _run_all(
-    compiled: Kernel, cells: Plan, control: np.ndarray, buffers: Buffers, workers: int, advance: Callable[[int], Any]
-) -> None:
+def _run_all(job: Job) -> None:
     """Run the cells that have not finished, in chunks on threads; on Ctrl-C stop the threads and pass it on."""
-    todo = np.flatnonzero(buffers.counts[:, 0] != Status.FINISHED)
-    advance(len(buffers.counts) - len(todo))
+    count = len(job.buffers.counts)
+    todo = np.flatnonzero(job.buffers.counts[:, 0] != Status.FINISHED)
+    job.advance(count - len(todo))
     if len(todo) == 0:
         return
-    rows, part = (cells, buffers) if len(todo) == len(buffers.counts) else _select(cells, buffers, todo)
-    part.counts[:] = 0
-    size = _chunk(len(todo), compiled.origin.width, workers)
+    part = job if len(todo) == count else job.part(todo)
+    part.buffers.counts[:] = 0
+    size = _chunk(len(todo), job.kernel.origin.width, job.workers)
     chunks = ((i, min(i + size, len(todo))) for i in range(0, len(todo), size))
     try:
-        with ThreadPoolExecutor(workers) as pool:
-            _feed(pool, chunks, lambda a, b: _drive(compiled, a, b, rows, control, part), workers, control, advance)
+        with ThreadPoolExecutor(job.workers) as pool:
+            _feed(pool, chunks, part)
     finally:
-        if part is not buffers:
-            for whole, piece in zip(buffers.arrays(), part.arrays(), strict=True):
-                whole[todo] = piece
+        if part is not job:
+            job.take(todo, part)
 
 
 def _chunk(cells: int, width: int, workers: int) -> int:
@@ -193,25 +222,18 @@ def _chunk(cells: int, width: int, workers: int) -> int:
     return max(width, min(16 * width, math.ceil(cells / (8 * workers) / width) * width))
 
 
-def _feed(
-    pool: ThreadPoolExecutor,
-    chunks: Iterator[tuple[int, int]],
-    work: Callable[[int, int], int],
-    workers: int,
-    control: np.ndarray,
-    advance: Callable[[int], Any],
-) -> None:
+def _feed(pool: ThreadPoolExecutor, chunks: Iterator[tuple[int, int]], job: Job) -> None:
     """Keep two chunks a thread in flight; an interrupt raises the kernels' cancel flag."""
     running: set[Future[int]] = set()
     try:
         for first, last in chunks:
-            running.add(pool.submit(work, first, last))
-            while len(running) >= 2 * workers:
-                running = _collect(running, advance)
+            running.add(pool.submit(job.drive, first, last))
+            while len(running) >= 2 * job.workers:
+                running = _collect(running, job.advance)
         while running:
-            running = _collect(running, advance)
+            running = _collect(running, job.advance)
     except BaseException:
-        control[CANCEL] = 1.0
+        job.control[CANCEL] = 1.0
         raise
 
 
@@ -222,51 +244,42 @@ def _collect(running: set[Future[int]], advance: Callable[[int], Any]) -> set[Fu
     return set(left)
 
 
-def _select(cells: Plan, buffers: Buffers, rows: np.ndarray) -> tuple[Plan, Buffers]:
-    """Copies of some rows of a plan and its buffers."""
-    part = Plan(cells.start[rows], cells.numbers[rows], cells.spans[rows])
-    return part, Buffers(*(array[rows] for array in buffers.arrays()))
-
-
-def _run_along(
-    scene: Scene,
-    compiled: Kernel,
-    cells: Plan,
-    control: np.ndarray,
-    buffers: Buffers,
-    workers: int,
-    advance: Callable[[int], Any],
-) -> Plan:
+def _run_along(scene: Scene, job: Job) -> None:
     """Run the last axis cell by cell, each from the end of the one before; the other axes run side by side.
 
-    Returns the plan with the states that the cells really started from.
+    The plan of the job is replaced by one with the states that the cells really started from.
     """
     columns = scene.shape[-1]
     order = range(columns) if scene.continuation == "up" else range(columns - 1, -1, -1)
     table = np.arange(scene.cells).reshape(-1, columns)
-    started = cells.start.copy()
-    start = started[table[:, order[0]]]
-    for column in order:
-        rows = table[:, column]
-        started[rows] = start
-        part, filled = _select(cells, buffers, rows)
-        _run_all(compiled, Plan(start, part.numbers, part.spans), control, filled, workers, advance)
-        for whole, piece in zip(buffers.arrays(), filled.arrays(), strict=True):
-            whole[rows] = piece
-        good = filled.counts[:, 0] == Status.FINISHED
-        start = np.where(good[:, None], filled.end, cells.start[rows])
-    return Plan(started, cells.numbers, cells.spans)
+    stated, started = job.cells.start, job.cells.start.copy()
+    start = stated[table[:, order[0]]]
+    try:
+        for column in order:
+            rows = table[:, column]
+            started[rows] = start
+            part = job.part(rows)
+            part.cells = Plan(start, part.cells.numbers, part.cells.spans)
+            _run_all(part)
+            job.take(rows, part)
+            good = part.buffers.counts[:, 0] == Status.FINISHED
+            start = np.where(good[:, None], part.buffers.end, stated[rows])
+    finally:
+        job.cells = Plan(started, job.cells.numbers, job.cells.spans)
 
 
-def _complete_points(compiled: Kernel, cells: Plan, control: np.ndarray, buffers: Buffers, workers: int) -> None:
+def _complete_points(job: Job) -> None:
     """Run cells with more section points than there was room for again, with the room they need."""
+    buffers = job.buffers
     room = buffers.points.shape[1]
     short = np.flatnonzero(buffers.counts[:, 3] > room)
     if len(short) == 0:
         return
-    need = int(buffers.counts[:, 3].max())
-    wide = np.full((len(buffers.counts), need, buffers.points.shape[2]), np.nan)
+    wide = np.full((len(buffers.counts), int(buffers.counts[:, 3].max()), buffers.points.shape[2]), np.nan)
     wide[:, :room] = buffers.points
     buffers.points = wide
-    buffers.counts[short, 0] = Status.NOT_RUN
-    _run_all(compiled, cells, control, buffers, workers, lambda done: None)
+    job.advance = lambda done: None
+    again = job.part(short)
+    again.buffers.counts[:, 0] = Status.NOT_RUN
+    _run_all(again)
+    job.take(short, again)

@@ -9,8 +9,6 @@ SOURCE = "Marszal, Saha, Jankowski, Stefański, Eur. Phys. J. Special Topics (20
 PARAMETERS = {"sigma": Parameter(0.0, "N/m", "coupling stiffness", minimum=0)}
 
 
-def potential(
-    q_i: sp.Expr, q_j: sp.Expr, weight: sp.Expr, sigma: sp.Expr
-) -> sp.Expr:
+def potential(q_i: sp.Expr, q_j: sp.Expr, weight: sp.Expr, sigma: sp.Expr) -> sp.Expr:
     """Return the energy sigma weight (q_i - q_j)^2 / 2 of the spring (J, for lengths in m and sigma in N/m)."""
     return sigma * weight * (q_i - q_j) ** 2 / 2
