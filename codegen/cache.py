@@ -32,17 +32,20 @@ def open_folder(folder: Path) -> Path:
     made or written to.
     """
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    status = folder.stat()
-    if hasattr(os, "getuid"):
-        if status.st_uid != os.getuid():
-            raise PermissionError(
-                f"kernel cache {folder} belongs to another user; set SYNCHAIN_CACHE to a folder of yours"
-            )
-        if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-            raise PermissionError(f"kernel cache {folder} can be written by others; run: chmod go-w '{folder}'")
+    for place in (folder, folder / "__pycache__"):
+        if hasattr(os, "getuid") and place.exists():
+            _check_owner(place)
     if not os.access(folder, os.W_OK):
         raise PermissionError(f"kernel cache {folder} is read-only; set SYNCHAIN_CACHE to a folder you can write")
     return folder
+
+
+def _check_owner(folder: Path) -> None:
+    status = folder.stat()
+    if status.st_uid != os.getuid():
+        raise PermissionError(f"kernel cache {folder} belongs to another user; set SYNCHAIN_CACHE to a folder of yours")
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        raise PermissionError(f"kernel cache {folder} can be written by others; run: chmod go-w '{folder}'")
 
 
 def describe() -> dict[str, str | int]:

@@ -14,9 +14,11 @@ from . import elementary, lanes, skeletons
 from .blocks import Names, NodeBlocks, analyse
 from .explicit import write_explicit
 from .integrators import Integrator, integrator
+from .looped import LoopWriter, workspace
 from .naming import tidy
 from .printer import FUNCTIONS, show
 from .rosenbrock import write_rosenbrock
+from .sparse import program
 from .step import StepWriter, write_function
 
 __all__ = ["RECORDS", "KernelSource", "emit"]
@@ -24,8 +26,8 @@ __all__ = ["RECORDS", "KernelSource", "emit"]
 RECORDS = ("sync_error", "section", "trajectory")
 """What a kernel can record besides the final state."""
 
-LARGEST_UNROLLED = 64
-"""State variables above which an unrolled step is refused: its text would take minutes to compile."""
+LARGEST_UNROLLED = 8
+"""Nodes up to which a step is written out; larger networks are stepped through in loops, whose text stays small."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +45,13 @@ class KernelSource:
         """Hexadecimal SHA-256 of the text."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
+
+PAIR = '''
+@njit(error_model="numpy", forceinline=True)
+def pair(e5, e3, h):
+    """One error estimate out of two embedded ones."""
+    return h*e5*absolute(e5)/sqrt(e5*e5 + 0.01*(e3*e3) + 2.2250738585072014e-308)
+'''.strip()
 
 SCALED = '''
 @njit(error_model="numpy", forceinline=True)
@@ -63,7 +72,7 @@ def emit(
 
     `section` is an expression in the state symbols (x_1 …), the parameters and t whose zeros are recorded; it is needed
     with the record "section".  Raises ValueError for an unknown record or integrator, a section function that uses other
-    symbols, or a network too large to unroll, and UnprintableError where the equations cannot be printed.
+    symbols, and UnprintableError where the equations cannot be printed.
     """
     method = integrator(method) if isinstance(method, str) else method
     unknown = [r for r in records if r not in RECORDS]
@@ -71,10 +80,6 @@ def emit(
         raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(RECORDS)}")
     if "section" in records and section is None:
         raise ValueError("the record 'section' needs a section function, for example v_1")
-    if equations.dimension > LARGEST_UNROLLED:
-        raise ValueError(
-            f"{equations.dimension} state variables; unrolled kernels go up to {LARGEST_UNROLLED}. Use a smaller network"
-        )
     width = lanes.native_width() if width is None else width
     ordered = tuple(r for r in RECORDS if r in records)
     text = _module(equations, method, ordered, section if "section" in ordered else None, width)
@@ -88,15 +93,27 @@ def _module(
     names = Names([*plain.state, *plain.parameters, *(s.name for s in plain.node.state)])
     blocks = analyse(plain.node, names)
     writer = StepWriter(plain, blocks, method)
-    lines = write_rosenbrock(writer) if method.kind == "rosenbrock" else write_explicit(writer)
+    looped = equations.n > LARGEST_UNROLLED
+    entries = 0
+    if looped:
+        entries = program(equations).entries if method.kind == "rosenbrock" else 0
+        lines = LoopWriter(writer).lines()
+    else:
+        lines = write_rosenbrock(writer) if method.kind == "rosenbrock" else write_explicit(writer)
     functions = _node_functions(writer, blocks, method)
     parts = [
         _header(equations, plain, method, records, lines),
         _imports(functions, lines, section),
-        _constants(plain, method, records, width),
+        _constants(plain, method, records, width)
+        + (
+            f"\nLOOPED = True\nENTRIES = {entries}\nWORKSPACE = {workspace(writer, entries)}"
+            if looped
+            else "\nLOOPED = False\nWORKSPACE = 0"
+        ),
         *("\n".join(f) for f in functions),
         SCALED,
-        _step(lines),
+        *([PAIR, skeletons.text("sparse")] if looped else []),
+        _step(lines, looped),
         _section(equations, plain, section),
         skeletons.text("sweep"),
     ]
@@ -188,10 +205,11 @@ def _constants(equations: Equations, method: Integrator, records: tuple[str, ...
     return "\n".join(f"{name} = {value!r}" for name, value in rows.items())
 
 
-def _step(lines: list[str]) -> str:
+def _step(lines: list[str], looped: bool) -> str:
+    more = ", graph, weights" if looped else ""
     head = [
         "@njit(error_model='numpy')",
-        "def step(t, h, y, p, y_new, dense, rtol, atol):",
+        f"def step(t, h, y, p, y_new, dense, rtol, atol{more}):",
         '    """One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."""',
     ]
     return "\n".join([*head, *(f"    {line}" for line in lines)])

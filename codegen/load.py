@@ -23,22 +23,25 @@ from typing import Any
 
 import llvmlite.binding as llvm
 import numba
+import numpy as np
 from numba import types
 
 from synchain.models.equations import Equations
 
 from . import elementary, lane_types, lanes
 from .cache import cache_folder, open_folder
-from .emit import KernelSource
+from .emit import LARGEST_UNROLLED, KernelSource
+from .sparse import EMPTY, NAMES, program
 
 __all__ = ["Kernel", "load"]
 
 _matrix, _counts = types.float64[:, ::1], types.int64[:, ::1]
 _cube = types.float64[:, :, ::1]
 SIGNATURE = types.void(
-    types.int64, types.int64, _matrix, _matrix, _matrix, types.float64[::1], _matrix, _matrix, _counts, _cube, _cube
+    types.int64, types.int64, _matrix, _matrix, _matrix, types.float64[::1], _matrix, _matrix, _counts, _cube, _cube,
+    types.UniTuple(types.int64[::1], len(NAMES)), types.float64[::1],
 )  # fmt: skip
-"""first, last, start, numbers, spans, control, end, sums, counts, points, samples."""
+"""first, last, start, numbers, spans, control, end, sums, counts, points, samples, graph, weights."""
 
 _lock = threading.Lock()
 
@@ -47,13 +50,19 @@ _lock = threading.Lock()
 class Kernel:
     """A compiled kernel that keeps its text: `print(kernel.source)` shows what runs.
 
-    `drive` is the entry point of the kernel module; its arrays are described there.
+    `entry` is the compiled entry point of the kernel module, `drive`, whose arrays are described there.
     """
 
     origin: KernelSource
-    drive: Any
+    entry: Any
+    graph: tuple[np.ndarray, ...]
+    weights: np.ndarray
     path: str
     from_cache: bool
+
+    def drive(self, first: int, last: int, *arrays: np.ndarray) -> None:
+        """Run the cells first … last-1 on the arrays start, numbers, spans, control, end, sums, counts, points, samples."""
+        self.entry(first, last, *arrays, self.graph, self.weights)
 
     @property
     def source(self) -> str:
@@ -106,7 +115,10 @@ def _compile(source: KernelSource, name: str, path: Path) -> Kernel:
     module = _module(source.text, name, path)
     module.drive.compile(SIGNATURE)
     hits = sum(module.drive.stats.cache_hits.values())
-    return Kernel(source, module.drive, str(path), hits > 0)
+    if source.equations.n > LARGEST_UNROLLED:
+        made = program(source.equations)
+        return Kernel(source, module.drive, made.arrays, made.weights, str(path), hits > 0)
+    return Kernel(source, module.drive, EMPTY, np.zeros(0), str(path), hits > 0)
 
 
 def _module(text: str, name: str, path: Path) -> ModuleType:

@@ -12,13 +12,18 @@ import sympy as sp
 from synchain.models.equations import Edge, Equations, Node
 
 from . import elementary, lanes
+from .sparse import NAMES
 
 __all__ = ["RESERVED", "tidy"]
 
 RESERVED = frozenset(
-    {"t", "h", "y", "y_new", "dense", "shift", "reach", "rate", "error", "size", "rtol", "atol", "node", "node_linear",
+    {"i", "j", "k", "e", "old", "new", "graph", "weights", "pair", "factorise", "solve", "NODES", "DIMENSION",
+     "DENSE_ROWS",
+     "ENTRIES", "STATE", "SLOPE", "TIME_SLOPE", "MATRIX", *(f"K{i}" for i in range(1, 32)), "t", "h", "y", "y_new", "dense",
+     "shift", "reach", "rate", "error", "size", "rtol", "atol", "node", "node_linear",
      "step", "section", "theta", "now", "njit", "p", "drive", "scaled", "inside", "total", "e3", "e5", "np", "math",
      "WIDTH", "DENSE"}
+    | set(NAMES)
     | set(keyword.kwlist) | set(dir(builtins)) | set(elementary.__all__) | set(lanes.__all__)
 )  # fmt: skip
 """Words of the generated code; a user's symbol of that name gets an underscore behind it."""

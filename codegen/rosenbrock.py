@@ -96,8 +96,10 @@ def stage(w: StepWriter, i: int, steps: Plan, factors: Factors, time_slopes: Seq
     w.put(*write_solve(steps, factors, rights, results))
 
 
-def term(weight: float, slope: str) -> str:
-    """weight * h * slope with its sign in front."""
+def term(weight: float, slope: str, tidy: bool = True) -> str:
+    """weight * h * slope with its sign in front; a slope that is one call needs no tidying."""
+    if not tidy:
+        return f" {'-' if weight < 0 else '+'} {abs(weight)!r}*h*{slope}"
     if slope.startswith("-") and not set("+- ") & set(slope[1:]):
         weight, slope = -weight, slope[1:]
     inner = f"({slope})" if set("+- ") & set(slope) else slope

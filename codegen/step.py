@@ -122,13 +122,18 @@ class StepWriter:
     # -- beginning and end ------------------------------------------------------------------------------------
 
     def opening(self) -> None:
-        """Load state and parameters, compute what depends on parameters alone."""
+        """Load the state and the parameters."""
         for slot, name in enumerate(self.state):
             self.put(f"{name} = load(y, {slot}, WIDTH)")
+        self.parameters()
+
+    def parameters(self) -> None:
+        """Load the parameters and compute what depends on them alone."""
         for slot, name in enumerate(self.equations.parameters):
             self.put(f"{name} = load(p, {slot}, WIDTH)")
-        for symbol, e in self.blocks.constants:
-            self.put(f"{symbol} = {show(e)}")
+        body = self.blocks.linear if self.method.kind == "rosenbrock" else self.blocks.rhs
+        wanted = body.symbols.union(*(e.free_symbols for s, e in self.blocks.timed if s in body.symbols))
+        self.put(*(f"{symbol} = {show(e)}" for symbol, e in self.blocks.constants if symbol in wanted))
 
     def closing(self, errors: Sequence[str]) -> None:
         """Store the new state and reduce the error to one number a lane."""

@@ -14,10 +14,9 @@ __all__ = ["derivative"]
 def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
     """Return d(expression)/d(symbol) with d|w| = sign(w) dw and d sign(w) = 0, exact wherever w != 0."""
     expression = sp.sympify(expression)
-    kinks = sorted(expression.atoms(sp.Abs, sp.sign), key=sp.default_sort_key, reverse=True)
-    kinks.sort(key=sp.count_ops, reverse=True)  # outermost first: |a + |b|| before |b|
+    kinks = sorted(expression.atoms(sp.Abs, sp.sign), key=sp.default_sort_key)
     hidden = {kink: sp.Dummy(f"kink{i}", real=True) for i, kink in enumerate(kinks)}
-    smooth = expression.xreplace(hidden)
+    smooth = expression.xreplace(hidden)  # from the outside in: of |a + |b|| only the outer kink is hidden
     shown = {dummy: kink for kink, dummy in hidden.items()}
     total = smooth.diff(symbol).xreplace(shown)
     for kink, dummy in hidden.items():

@@ -118,9 +118,9 @@ class Equations:
             if (target, source) in seen:
                 raise ValueError(f"link {target} <- {source} occurs twice; add the weights up")
             seen.add((target, source))
-        for name in self.parameters:
-            if name in self.state:
-                raise ValueError(f"the parameter {name!r} has the name of a state variable; rename it")
+        taken = sorted(set(self.parameters).intersection(self.state))
+        if taken:
+            raise ValueError(f"the parameter {taken[0]!r} has the name of a state variable; rename it")
 
     @property
     def dimension(self) -> int:
@@ -192,6 +192,18 @@ class Equations:
         """The partial derivative of the right-hand side with respect to time, in state order."""
         own = self.node.time_derivative()
         return tuple(e.xreplace(self.at_node(i)) for e in own for i in range(self.n))
+
+    def latex(self) -> str:
+        """The equations in LaTeX (see `synchain.models.present`)."""
+        from .present import latex
+
+        return latex(self)
+
+    def text(self) -> str:
+        """The equations in plain text with Greek letters."""
+        from .present import text
+
+        return text(self)
 
     @property
     def digest(self) -> str:

@@ -26,14 +26,15 @@ def dimension(unit: str) -> Dimension:
     sign, rest = 1, unit.replace(" ", "")
     while True:
         cut = min((i for i in (rest.find("*"), rest.find("/")) if i >= 0), default=len(rest))
-        name, _, power = rest[:cut].partition("^")
-        if name not in UNITS or not _is_integer(power or "1"):
+        name, raised, power = rest[:cut].partition("^")
+        power = power if raised else "1"
+        if name not in UNITS or not _is_integer(power):
             raise ValueError(
                 f"unit {unit!r}: cannot read {rest[:cut]!r}; expected products and quotients of "
                 f"{', '.join(UNITS)} with integer powers, such as 'N/m' or 'kg*m/s^2'"
             )
         for k, exponent in enumerate(UNITS[name]):
-            total[k] += sign * int(power or "1") * exponent
+            total[k] += sign * int(power) * exponent
         if cut == len(rest):
             return (total[0], total[1], total[2])
         sign, rest = (1 if rest[cut] == "*" else -1), rest[cut + 1 :]

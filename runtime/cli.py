@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import warnings
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
@@ -17,7 +18,11 @@ from .commands._outcome import FAILED, FINE, WRONG_USE, Failed, WrongUse, senten
 __all__ = ["main"]
 
 ABOUT = "Networks of coupled oscillators: exact equations and spectra, generated kernels, sweeps, thresholds, figures."
-EXAMPLES = ("synchain figures --quick --out figures", "synchain spectrum chain 4", "synchain run figure_4a --out results")
+EXAMPLES = (
+    "synchain figures --quick --out figures",
+    "synchain spectrum chain 4",
+    "synchain run figure_4a --out results",
+)
 CODES = "exit codes: 0 fine, 1 failed run, 2 wrong use; SYNCHAIN_DEBUG=1 shows tracebacks"
 
 
@@ -37,11 +42,23 @@ class Parser(ArgumentParser):
 
     def read(self, words: Sequence[str]) -> Namespace:
         """Parse the words after the command."""
+        words = _negative_values(words)
         return self.parse_intermixed_args(words) if self.optional_positionals else self.parse_args(words)
 
     def error(self, message: str) -> NoReturn:
         """Raise with a hint where the help is."""
         raise WrongUse(f"{' '.join(message.split())}\nsee: {self.prog} --help")
+
+
+def _negative_values(words: Sequence[str]) -> list[str]:
+    """Join "--rtol", "-1e-8" to "--rtol=-1e-8": argparse would take such a number for an option."""
+    joined: list[str] = []
+    for word in words:
+        if joined and joined[-1].startswith("--") and "=" not in joined[-1] and re.match(r"-\.?[0-9]", word):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -56,7 +73,6 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
         return code
     except BrokenPipeError:  # whoever reads the output has seen enough
-        _silence()
         return FINE
     except (Exception, KeyboardInterrupt) as problem:
         return _report(name, problem)
@@ -131,7 +147,8 @@ def _report(name: str, problem: BaseException) -> int:
     elif isinstance(problem, MemoryError):
         words = "not enough memory; use a smaller network, fewer cells or a shorter record"
     elif isinstance(problem, ModuleNotFoundError) and not str(problem.name).startswith("synchain"):
-        words = f"the package {problem.name} is missing; install it: python -m pip install {str(problem.name).partition('.')[0]}"
+        package = str(problem.name).partition(".")[0]
+        words = f"the package {package} is missing; install it: python -m pip install {package}"
     elif isinstance(problem, OSError):
         words = sentence(problem)
     else:
@@ -142,11 +159,6 @@ def _report(name: str, problem: BaseException) -> int:
     if sys.stderr is not None:
         with suppress(OSError):
             print(f"{name}: {words}", file=sys.stderr)
-    try:
-        if sys.stdout is not None:
-            sys.stdout.flush()
-    except OSError:
-        _silence()
     return code
 
 
@@ -166,12 +178,3 @@ def _readable(stream: Any) -> None:
     """Write characters that the stream's encoding lacks as escapes instead of failing."""
     if getattr(stream, "errors", None) == "strict" and hasattr(stream, "reconfigure"):
         stream.reconfigure(errors="backslashreplace")
-
-
-def _silence() -> None:
-    """Let what is left in stdout's buffer go nowhere, so that the interpreter ends without a complaint."""
-    with suppress(OSError, ValueError, AttributeError):
-        descriptor = sys.stdout.fileno()
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, descriptor)
-        os.close(nowhere)

@@ -121,7 +121,7 @@ def gather(scene: Scene, kernel: Kernel, cells: Plan, buffers: Buffers, toleranc
     data: dict[str, Any] = {}
 
     def add(name: str, values: np.ndarray, *more: str) -> None:
-        data[name] = ((*dims, *more), values.reshape(*shape, *values.shape[1:]), {"long_name": MEANINGS[name]})
+        data[name] = ((*dims, *more), values.reshape((*shape, *values.shape[1:])), {"long_name": MEANINGS[name]})
 
     for name, column in (("status", 0), ("steps", 1), ("rejected", 2)):
         add(name, buffers.counts[:, column].astype(np.int32))

@@ -18,6 +18,10 @@ DENSE_ROWS = 3
 """Coefficients of the dense output for each state variable."""
 ERROR_ORDER = 4
 DENSE = True
+LOOPED = False
+"""True where the step loops over nodes and links; its arrays then come as arguments."""
+WORKSPACE = 0
+"""Groups of scratch memory behind the dense output."""
 SYNC_ERROR = False
 SECTION = False
 TRAJECTORY = False

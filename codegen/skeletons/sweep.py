@@ -18,12 +18,14 @@ from synchain.codegen.skeletons.names import (
     DENSE_ROWS,
     DIMENSION,
     ERROR_ORDER,
+    LOOPED,
     NODES,
     PARAMETERS,
     SECTION,
     SYNC_ERROR,
     TRAJECTORY,
     WIDTH,
+    WORKSPACE,
     section,
     step,
 )  # fmt: skip
@@ -301,15 +303,16 @@ def pause(lane, control):
 
 
 @njit(error_model="numpy", nogil=True, cache=True)
-def drive(first, last, start, numbers, spans, control, end, sums, counts, points, samples):
+def drive(first, last, start, numbers, spans, control, end, sums, counts, points, samples, graph, weights):
     """Run the cells first … last-1.
 
     start (cells, DIMENSION), numbers (cells, PARAMETERS), spans (cells, 2): start and end of the window; control: see
     the column names above.  Filled: end (cells, DIMENSION), sums (cells, 4), counts (cells, 4), points (cells, room,
-    DIMENSION + 1), samples (cells, samples, DIMENSION).
+    DIMENSION + 1), samples (cells, samples, DIMENSION).  graph and weights: the links and the elimination program of a
+    network that is stepped through in loops (codegen/sparse.py).
     """
     y, y_new, middle = np.zeros(DIMENSION * WIDTH), np.zeros(DIMENSION * WIDTH), np.zeros(DIMENSION * WIDTH)
-    p, dense = np.ones(PARAMETERS * WIDTH), np.zeros(DENSE_ROWS * DIMENSION * WIDTH)
+    p, dense = np.ones(PARAMETERS * WIDTH), np.zeros((DENSE_ROWS * DIMENSION + WORKSPACE) * WIDTH)
     lane, cell = np.zeros(GROUPS * WIDTH), np.full(WIDTH, -1)
     queue = first
     for which in range(WIDTH):
@@ -319,7 +322,10 @@ def drive(first, last, start, numbers, spans, control, end, sums, counts, points
     queue = settle(queue, last, lane, y, p, cell, start, numbers, spans, control, end, sums, counts, samples)
     while cell.max() >= 0:
         t, h = load(lane, TIME, WIDTH), aim(lane, control)
-        error = step(t, h, y, p, y_new, dense, control[RTOL], control[ATOL])
+        if LOOPED:
+            error = step(t, h, y, p, y_new, dense, control[RTOL], control[ATOL], graph, weights)
+        else:
+            error = step(t, h, y, p, y_new, dense, control[RTOL], control[ATOL])
         t_new = arrive(lane, t, h)
         accept = judge(lane, h, error)
         counted = accept & (t >= load(lane, START, WIDTH))

@@ -1,0 +1,200 @@
+"""Equations for people and for other programs: LaTeX, plain text, and a dictionary fit for JSON.
+
+Where an equation contains one of the friction laws, the law is written as f and defined once below, in the letters of
+Marszal et al., Eur. Phys. J. Special Topics (2016), eqs. 3-6: chi for the displacement and tau for the time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import sympy as sp
+
+from .equations import TIME, Edge, Equations, Node
+from .frictions import CONTACTS
+from .nondimensional import FRICTION, friction_coefficient
+from .plugins import load, names
+from .typeset import Latex, Style, Text, Writer
+
+__all__ = ["as_dict", "latex", "text"]
+
+LARGEST = 6
+"""Networks of more nodes are written once, for node i, instead of node by node."""
+
+SLIDING = sp.Symbol("w", real=True)
+WEIGHT = sp.Symbol("G_ij", real=True)
+
+
+def latex(equations: Equations) -> str:
+    """Return the equations as a LaTeX align* environment; more than LARGEST nodes as one equation for node i."""
+    lines = " \\\\\n".join(f"  & {line}" for line in _lines(equations, Latex()))
+    return f"\\begin{{align*}}\n{lines}\n\\end{{align*}}"
+
+
+def text(equations: Equations) -> str:
+    """Return the equations as lines of plain text with Greek letters, in the form of `latex`."""
+    return "\n".join(_lines(equations, Text()))
+
+
+def as_dict(equations: Equations) -> dict[str, object]:
+    """Return names, right-hand sides and derivatives as text that SymPy reads, and the digest.
+
+    `jacobian` has the non-zero entries only, under keys such as "v_1,x_1" (row, column); time is called t.
+    """
+    state = equations.state
+    entries = equations.jacobian().items()
+    return {
+        "state": list(state),
+        "parameters": list(equations.parameters),
+        "rhs": [str(e) for e in equations.rhs()],
+        "jacobian": {f"{state[row]},{state[column]}": str(e) for (row, column), e in entries},
+        "time_derivative": [str(e) for e in equations.time_derivative()],
+        "digest": equations.digest,
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class _Named:
+    """A node's right-hand side with its friction law as f(w), and the law itself; `law` is None where there is none."""
+
+    rhs: tuple[sp.Expr, ...]
+    law: sp.Expr | None
+
+
+def _name_law(node: Node) -> _Named:
+    taken = {s.name for s in (*node.state, *node.parameters)}
+    if not taken & {SLIDING.name, "f"}:
+        for law in _laws(taken):
+            rhs = tuple(_with_law(e, law, node.state) for e in node.rhs)
+            if any(e.has(FRICTION) for e in rhs):
+                return _Named(rhs, law)
+    return _Named(node.rhs, None)
+
+
+def _laws(known: set[str]) -> Iterator[sp.Expr]:
+    """Every friction law whose parameters are known, as a function of SLIDING, with each contact."""
+    for name in names("friction"):
+        module = load("friction", name)
+        if set(module.PARAMETERS) <= known:
+            yield from (friction_coefficient(module, contact)(SLIDING) for contact in CONTACTS)
+
+
+def _with_law(e: sp.Expr, law: sp.Expr, state: tuple[sp.Symbol, ...]) -> sp.Expr:
+    """The expression with (factor) law(w) written as (factor) f(w), for the first sum w of a state where that works."""
+    sums = sorted((s for s in e.atoms(sp.Add) if s != e and s.has(*state)), key=sp.default_sort_key)
+    for w in sums:
+        terms = sp.Add.make_args(e.xreplace({w: SLIDING}))
+        inside = sp.Add(*(term for term in terms if term.has(SLIDING)))
+        factor = inside / law
+        if inside != 0 and not factor.has(SLIDING, *state):
+            return sp.Add(*(term for term in terms if not term.has(SLIDING)), factor * FRICTION(w))
+    return e
+
+
+def _lines(equations: Equations, style: Style) -> Iterator[str]:
+    """Equation by equation, then the law, then what the indices of a large network mean."""
+    named = _name_law(equations.node)
+    if equations.n > LARGEST:
+        yield from _generic(equations, named, style)
+    else:
+        for i in range(equations.n):
+            yield from _at_node(equations, named, style, i)
+    if named.law is not None:
+        writer = Writer(style, {}, frozenset((SLIDING,)))
+        yield f"{writer.write(FRICTION(SLIDING))} = {writer.write(named.law)}"
+    if equations.n > LARGEST:
+        count, weights = len(equations.links), style.letter("G", "ij")
+        meaning = f", {weights}" + style.words(f" the weights of the {count} links") if count else ""
+        yield ("i, j" if count else "i") + f" = 1, {style.dots}, {equations.n}{meaning}"
+
+
+def _at_node(equations: Equations, named: _Named, style: Style, i: int) -> Iterator[str]:
+    """The equations of node i with all its links."""
+    here = equations.at_node(i)
+    letters: dict[sp.Symbol, str] = {}
+    for j in range(equations.n):
+        index = str(j + 1) if equations.n > 1 else ""
+        letters |= _letters(equations, named, style, equations.symbols(j), index)
+    writer = Writer(style, letters, frozenset((*letters, TIME)))
+    edge, links = equations.edge, [link for link in equations.links if link[0] == i]
+    for c in _shown(equations):
+        terms = [term.xreplace(here) for term in _ordered(named.rhs[c], equations.node)]
+        if edge is not None:
+            felt = sp.factor_terms(sp.Add(*(edge.rhs[c].xreplace(equations.at_link(link)) for link in links)))
+            terms += [term for term in sp.Add.make_args(felt) if term != 0]
+        yield f"{_left(equations, writer, c, here)} = {writer.total(terms)}"
+
+
+def _generic(equations: Equations, named: _Named, style: Style) -> Iterator[str]:
+    """The equations of node i, its links as a sum over j."""
+    node, edge = equations.node, equations.edge if equations.links else None
+    own = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in node.state)
+    here = dict(zip(node.state, own, strict=True))
+    letters = _letters(equations, named, style, own, "i")
+    if edge is not None:
+        letters |= _letters(equations, named, style, edge.here, "i")
+        letters |= _letters(equations, named, style, edge.there, "j")
+        letters[WEIGHT] = style.letter("G", "ij")
+    writer = Writer(style, letters, frozenset({TIME, *letters} - {WEIGHT}))
+    for c in _shown(equations):
+        line = writer.total([term.xreplace(here) for term in _ordered(named.rhs[c], node)])
+        if edge is not None and edge.rhs[c] != 0:
+            line += _sum_over_links(edge, c, writer)
+        yield f"{_left(equations, writer, c, here)} = {line}"
+
+
+def _sum_over_links(edge: Edge, c: int, writer: Writer) -> str:
+    """The links of node i: what all of them share stands before the sum sign."""
+    term = edge.rhs[c].xreplace({edge.weight: WEIGHT})
+    negative = term.as_coeff_Mul()[0].is_negative
+    outer, inner = (-term if negative else term).as_independent(WEIGHT, *edge.here, *edge.there, as_Add=False)
+    front = [] if outer == 1 else writer.factors(outer)
+    summed = writer.style.product([*front, writer.style.sum_over_j, *writer.factors(inner)])
+    return (" - " if negative else " + ") + summed
+
+
+def _pairs(equations: Equations) -> dict[int, int]:
+    """Component -> component that is its velocity: its rate is that state alone, links add nothing."""
+    node, edge = equations.node, equations.edge if equations.links else None
+    found: dict[int, int] = {}
+    for c, rate in enumerate(node.rhs):
+        free = edge is None or edge.rhs[c] == 0
+        if free and rate in node.state and rate != node.state[c] and node.state.index(rate) not in found.values():
+            found[c] = node.state.index(rate)
+    return found if not set(found) & set(found.values()) else {}
+
+
+def _shown(equations: Equations) -> list[int]:
+    """The components whose rate gets an equation: all but coordinates, whose second derivative stands for them."""
+    pairs = _pairs(equations)
+    return [c for c in range(len(equations.node.state)) if c not in pairs]
+
+
+def _left(equations: Equations, writer: Writer, c: int, here: Mapping[sp.Symbol, sp.Symbol]) -> str:
+    """The left side: the rate of component c, chi'' where it is the velocity of chi."""
+    return writer.write(here[equations.node.state[c]]) + "'"
+
+
+def _letters(
+    equations: Equations, named: _Named, style: Style, symbols: tuple[sp.Symbol, ...], index: str
+) -> dict[sp.Symbol, str]:
+    """How the states of one node and the time are written: chi and tau beside a friction law, velocities with a prime."""
+    node = equations.node
+    plain = named.law is None or {"chi", "tau"} & {s.name for s in (*node.state, *node.parameters)}
+    speeds = {velocity: c for c, velocity in _pairs(equations).items()}
+    letters = {} if plain else {TIME: style.letter("tau")}
+    for c, symbol in enumerate(symbols):
+        name = node.state[speeds.get(c, c)].name
+        letters[symbol] = style.letter("chi" if name == "x" and not plain else name, index, int(c in speeds))
+    return letters
+
+
+def _ordered(e: sp.Expr, node: Node) -> list[sp.Expr]:
+    """The terms of a node's equation: springs, damping, constants, what depends on time, friction last."""
+
+    def place(term: sp.Expr) -> tuple[bool, bool, int, int, tuple[object, ...]]:
+        used = [c for c, s in enumerate(node.state) if term.has(s)]
+        return term.has(FRICTION), term.has(TIME), max(used, default=len(node.state)), sp.count_ops(term), sp.default_sort_key(term)
+
+    return sorted((term for term in sp.Add.make_args(e) if term != 0), key=place)

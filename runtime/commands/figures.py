@@ -1,0 +1,47 @@
+"""`synchain figures`: every figure and threshold of the paper."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from ._arguments import add_workers, folder
+from ._outcome import FINE, wrong_use
+
+SUMMARY = "make the paper's figures and the table of thresholds"
+EXAMPLES = ("synchain figures --out figures", "synchain figures 4b 5 --quick")
+
+
+def configure(parser: ArgumentParser) -> None:
+    """Add names, folder and effort."""
+    parser.add_argument(
+        "names",
+        metavar="NAME",
+        nargs="*",
+        help="what to make, e.g. figure_4b, in short 4b, or thresholds (default: all)",
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", type=folder, default="figures", help="folder for the files (default: figures)"
+    )
+    parser.add_argument("--quick", action="store_true", help="coarse grids: the same code in minutes")
+    add_workers(parser)
+
+
+def execute(arguments: Namespace) -> int:
+    """Make the figures and print the names of their files."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+
+    from ..figures import load, names
+    from ..figures.make import make
+    from ..files import output_folder
+
+    with wrong_use():
+        known = names(extra=True)
+        wanted = [f"figure_{name}" if f"figure_{name}" in known else name for name in arguments.names]
+        for name in wanted:
+            load(name)
+        target = output_folder(arguments.out)
+    for file in make(wanted, target, arguments.quick, arguments.workers, None):
+        print(file)
+    return FINE

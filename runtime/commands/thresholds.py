@@ -1,0 +1,159 @@
+"""`synchain thresholds`: where a network synchronises."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from ._arguments import above_zero, add_workers, grid, positive, whole
+from ._outcome import FINE, WrongUse, print_json, warn, wrong_use
+
+if TYPE_CHECKING:
+    from synchain.models.scene import Scene
+    from synchain.models.topology import Topology
+
+    from ..intervals import Interval
+    from ..threshold import Criterion, Thresholds
+
+SUMMARY = "measure for which coupling a network synchronises, beside the prediction of the two-oscillator probe"
+EXAMPLES = (
+    "synchain thresholds --n 4 --omega 1.15",
+    "synchain thresholds --n 6 --topology star --omega 1.4 --sigma 0:0.3:121 --json",
+    "synchain thresholds --matrix G.txt --omega 1.55",
+)
+
+
+def configure(parser: ArgumentParser) -> None:
+    """Add network, drive, grid and criterion."""
+    parser.add_argument("--n", metavar="N", type=whole, help="number of oscillators")
+    parser.add_argument("--omega", metavar="W", type=above_zero, help="frequency of the drive (default: the scene's)")
+    parser.add_argument("--topology", metavar="T", help="family of graphs (see: synchain topologies; default: chain)")
+    parser.add_argument(
+        "--matrix", metavar="FILE", help="connectivity matrix in a text file, in place of --n, --topology"
+    )
+    parser.add_argument(
+        "--scene", metavar="SCENE", help="take oscillators and parameters from a scene (default: table 1)"
+    )
+    parser.add_argument(
+        "--sigma",
+        metavar="LO:HI:N",
+        type=grid,
+        help="coupling to look at (default: 0:0.6:241); ranges narrower than its step are not seen",
+    )
+    parser.add_argument(
+        "--starts", metavar="K", type=positive, default=8, help="initial states for each value (default: 8)"
+    )
+    parser.add_argument(
+        "--transient",
+        metavar="P",
+        type=above_zero,
+        default=1000.0,
+        help="drive periods before the error is averaged over 100 more (default: 1000)",
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON: intervals, probe, predicted, warnings")
+    add_workers(parser)
+
+
+def execute(arguments: Namespace) -> int:
+    """Print the synchronous ranges as a table or as JSON."""
+    from ..sweep import kernel_source
+    from ..threshold import Criterion, check_probe, thresholds
+
+    with wrong_use():
+        scene = _scene(arguments)
+        check_probe(scene.topology, scene.topology.spectrum)
+        if "sigma" not in scene.parameters:
+            raise WrongUse(
+                "the scene has no coupling constant sigma; expected a coupled network; choose another --scene"
+            )
+        kernel_source(scene)
+        criterion = Criterion(starts=arguments.starts, transient=arguments.transient)
+    warn(scene.warnings)
+    found = thresholds(scene, sigma=arguments.sigma, criterion=criterion, workers=arguments.workers)
+    if arguments.json:
+        print_json(found.as_dict())
+    else:
+        print(report(found, criterion))
+    return FINE
+
+
+def _scene(arguments: Namespace) -> Scene:
+    """The network that the arguments describe; ValueError where it cannot be."""
+    from synchain.models.scene import Scene
+    from synchain.models.scene_file import load_scene
+
+    scene = None if arguments.scene is None else load_scene(arguments.scene)
+    graph = _graph(arguments, scene)
+    if scene is None:
+        scene = Scene(topology=graph)
+    elif graph != scene.topology:
+        scene = scene.replace(topology=graph, axes=(), record=None)
+    if arguments.omega is None:
+        if arguments.scene is None or any(axis.name == "omega" for axis in scene.axes):
+            raise WrongUse("expected a frequency of the drive, e.g. --omega 1.15")
+        return scene.replace(axes=(), record=None)
+    if "omega" not in scene.parameters:
+        raise WrongUse(f"--omega: the oscillators of {arguments.scene} are not driven; leave it out")
+    return scene.replace(axes=(), record=None, omega=arguments.omega)
+
+
+def _graph(arguments: Namespace, scene: Scene | None) -> Topology:
+    """The graph by file, by name and size, or the scene's."""
+    from synchain.models.topology import names, read_matrix, topology
+
+    if arguments.matrix is not None:
+        if arguments.n is not None or arguments.topology is not None:
+            raise WrongUse("found --matrix beside --n or --topology; expected the matrix alone")
+        return read_matrix(arguments.matrix)
+    if scene is None:
+        if arguments.n is None:
+            raise WrongUse("expected a network, e.g. --n 4, --matrix FILE or --scene SCENE")
+        return topology(arguments.topology or "chain", arguments.n)
+    if arguments.n is None and arguments.topology is None:
+        return scene.topology
+    name = arguments.topology or (scene.topology.name if scene.topology.name in names() else "chain")
+    return topology(name, scene.n if arguments.n is None else arguments.n)
+
+
+def report(found: Thresholds, criterion: Criterion) -> str:
+    """The ranges as a table."""
+    scene, end = found.scene, float(found.direct.x[-1])
+    drive = f", omega = {scene.omega:g}" if scene.omega is not None else ""
+    unit = "drive periods" if scene.time_unit == "period" else "units of time"
+    rows = [
+        ("sigma, simulated", _written(found.direct.intervals, end)),
+        ("sigma, predicted by the probe", _written(found.predicted, end)),
+        *_wu_chua(found),
+        ("alpha = sigma |gamma|, probe", _written(found.probe.intervals, float(found.probe.x[-1]))),
+    ]
+    wide = max(len(name) for name, _ in rows)
+    return "\n".join(
+        [
+            f"{scene.topology.name}({scene.n}){drive}: where all oscillators synchronise",
+            *(f"  {name:<{wide}}  {ranges}" for name, ranges in rows),
+            f"synchronous: mean error below {criterion.tolerance:g} over {criterion.window:g} {unit} after "
+            f"{criterion.transient:g}, from at least half of {criterion.starts} starts",
+            *(["...: the grid ends here, the range may go on"] if any("..." in ranges for _, ranges in rows) else []),
+        ]
+    )
+
+
+def _wu_chua(found: Thresholds) -> list[tuple[str, str]]:
+    """The conjecture's row, where the probe's first range starts at no coupling and ends on the grid."""
+    from synchain.models.topology import topology
+
+    from ..threshold import wu_chua
+
+    if not found.probe.intervals:
+        return []
+    low, high = found.probe.intervals[0]
+    if low > 0.0 or high >= found.probe.x[-1]:
+        return []
+    end = wu_chua(high / 2.0, topology("chain", 2).spectrum, found.scene.topology.spectrum)
+    return [("sigma, Wu-Chua conjecture", _written([(0.0, end)], float("inf")))]
+
+
+def _written(ranges: Sequence[Interval], end: float) -> str:
+    words = [f"[{low:.4f}, {high:.4f}{'...' if high >= end else ''}]" for low, high in ranges]
+    return ", ".join(words) or "none"

@@ -1,0 +1,100 @@
+"""Figures 3 and 4d-f: bifurcation diagrams, the position at the section against the frequency or the coupling.
+
+Every cell starts from the state that the scene states.  Names that end in _up and _down are the same diagrams with each
+cell continued from its neighbour; what differs between them shows coexisting attractors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from synchain.models.scene_file import load_scene
+
+from ..result import Result
+from ..status import Status
+from .published import published
+from .study import Study
+from .style import BLACK, COLUMN, ORANGE, bands, bracket, failures, note
+from .sync_error import synchronous
+from .tables import Table, status_names
+
+__all__ = ["EXTRA", "NAMES", "SIZE", "compute", "draw", "points", "table"]
+
+NAMES = ("figure_3", "figure_4d", "figure_4e", "figure_4f")
+EXTRA = tuple(f"{name}_{direction}" for name in NAMES for direction in ("up", "down"))
+SIZE = (COLUMN, 2.5)
+LABELS = {"omega": r"drive frequency $\omega$", "sigma": r"coupling $\sigma$"}
+
+
+@dataclass(frozen=True, slots=True)
+class Diagram:
+    """A swept result with section points and the range of the swept parameter that the paper calls synchronous."""
+
+    result: Result
+    axis: str
+    published: tuple[tuple[float, float], ...]
+
+
+def compute(name: str, study: Study) -> Diagram:
+    """Run the scene of a figure; one with several oscillators also records its synchronisation error."""
+    plain, _, direction = name.removeprefix("figure_").partition("_")
+    scene = load_scene(f"figure_{plain}")
+    if scene.n > 1:
+        scene = scene.replace(record=("sync_error", "section"))
+    if direction:
+        scene = scene.replace(continuation=direction)
+    row = published(scene.n, scene.parameters["omega"]) if scene.n > 1 else None
+    return Diagram(study.run(scene), scene.axes[0].name, row.intervals if row else ())
+
+
+def points(data: Diagram) -> tuple[np.ndarray, np.ndarray]:
+    """The section points (k, 2) as axis value and x_1, and the cell (k,) each comes from; unfinished cells have none."""
+    result = data.result
+    values = result.data[data.axis].values
+    x = result.section.sel(state="x_1").values
+    good = np.isfinite(x) & (result.status.values == Status.FINISHED)[:, None]
+    cell = np.broadcast_to(np.arange(len(values))[:, None], x.shape)[good]
+    return np.stack([values[cell], x[good]], axis=1), cell
+
+
+def table(data: Diagram) -> Table:
+    """One row for each section point; a cell without any has one row with its status."""
+    result = data.result
+    states = [str(name) for name in result.data.state.values]
+    rows: list[tuple[Any, ...]] = []
+    names = status_names(result.status)
+    for k, value in enumerate(result.data[data.axis].values):
+        count = int(result.section_count.values[k]) if names[k] == "finished" else 0
+        for j in range(count):
+            rows.append((value, result.section_time.values[k, j], *result.section.values[k, j], names[k]))
+        if count == 0:
+            rows.append((value, None, *[None] * len(states), names[k]))
+    return Table((data.axis, "time", *states, "status"), tuple(rows))
+
+
+def draw(axes: Any, data: Diagram) -> Any:
+    """Section points as dots; grey where the oscillators are synchronous, and the published range as a thin bar."""
+    found, _ = points(data)
+    values = data.result.data[data.axis].values
+    if "sync_error" in data.result.data:
+        bands(axes, synchronous(data.result))
+        bracket(axes, data.published, 0.95, ORANGE, "published")
+    axes.plot(found[:, 0], found[:, 1], linestyle="none", marker=".", markersize=_size(len(values)), color=BLACK,
+              markeredgewidth=0.0, rasterized=True)  # fmt: skip
+    axes.set(
+        xlim=(values.min(), values.max()), xlabel=LABELS.get(data.axis, data.axis), ylabel=r"$\chi_1$ at the section"
+    )
+    if data.published and len(found):
+        low, high = found[:, 1].min(), found[:, 1].max()
+        axes.set_ylim(low - 0.05 * (high - low), high + 0.16 * (high - low))
+    failed = int((data.result.status.values != Status.FINISHED).sum())
+    note(axes, failures(failed, len(values)))
+    return axes
+
+
+def _size(cells: int) -> float:
+    """Marker size in points: larger where there are few columns of dots."""
+    return float(np.clip(700.0 / max(cells, 1), 0.9, 2.2))

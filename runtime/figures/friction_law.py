@@ -1,0 +1,83 @@
+"""Figure 1b: the friction force against the relative velocity, as the law says it and as it is integrated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from synchain.models.frictions import regularise
+from synchain.models.plugins import load as plugin
+from synchain.models.scene import Scene
+from synchain.models.scene_file import load_scene
+
+from .study import Study
+from .style import BLUE, COLUMN, ORANGE
+from .tables import Table
+
+__all__ = ["NAMES", "SIZE", "compute", "draw", "table"]
+
+NAMES = ("figure_1b",)
+SIZE = (COLUMN, 2.5)
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """Friction coefficient at relative velocities w: set-valued law (NaN at the jump) and smoothed; kappa of the latter."""
+
+    w: np.ndarray
+    sharp: np.ndarray
+    smooth: np.ndarray
+    kappa: float
+
+
+def compute(name: str, study: Study) -> Law:
+    """Evaluate the friction law of the scene; nothing is simulated."""
+    scene = load_scene(name)
+    kappa = scene.parameters["kappa"]
+    near = np.concatenate([np.geomspace(1e-2 / kappa, 1e-2, 200), np.linspace(1e-2, 1.0, 400)[1:]])
+    w = np.concatenate([-near[::-1], [0.0], near])
+    sharp, smooth = forces(scene)
+    return Law(w, np.where(w == 0.0, np.nan, sharp(w)), smooth(w), kappa)
+
+
+def forces(scene: Scene) -> tuple[Any, Any]:
+    """The friction coefficient as functions of an array of relative velocities: the law itself, and smoothed."""
+    law = plugin("friction", str(scene.friction))
+    w, kappa = sp.Symbol("w", real=True), sp.Symbol("kappa", real=True)
+    symbols = {key: sp.Symbol(key, real=True) for key in law.PARAMETERS}
+    sharp = law.force(w, **symbols)
+    numbers = {symbol: scene.parameters[key] for key, symbol in symbols.items()}
+    numbers[kappa] = scene.parameters["kappa"]
+    smooth = regularise(sharp, kappa)
+    return sp.lambdify(w, sharp.subs(numbers), "numpy"), sp.lambdify(w, smooth.subs(numbers), "numpy")
+
+
+def table(data: Law) -> Table:
+    """Relative velocity, set-valued law, smoothed law."""
+    return Table.of(theta_r=data.w, f=data.sharp, f_smoothed=data.smooth)
+
+
+def draw(axes: Any, data: Law) -> Any:
+    """The law over the whole range, and its jump magnified in an inset."""
+    axes.axhline(0.0, color="0.75", linewidth=0.6, zorder=0)
+    axes.axvline(0.0, color="0.75", linewidth=0.6, zorder=0)
+    axes.plot(data.w, data.smooth, color=BLUE)
+    axes.set(xlim=(-1, 1), ylim=(-0.36, 0.36), xticks=[-1, -0.5, 0, 0.5, 1], xlabel=r"relative velocity $\vartheta_r$",
+             ylabel=r"friction $f(\vartheta_r)$")  # fmt: skip
+    _magnify(axes.inset_axes((0.59, 0.17, 0.36, 0.31)), data)
+    return axes
+
+
+def _magnify(inset: Any, data: Law) -> None:
+    """The jump against kappa theta_r: the law jumps, what is integrated rises smoothly."""
+    near = np.abs(data.w) <= 12.0 / data.kappa
+    inset.plot(data.w[near] * data.kappa, data.sharp[near], color=ORANGE, linestyle="--", linewidth=0.9)
+    inset.plot(data.w[near] * data.kappa, data.smooth[near], color=BLUE)
+    inset.set(xlim=(-10, 10), ylim=(-0.36, 0.36), yticks=[-0.3, 0, 0.3], xticks=[-10, 0, 10])
+    inset.set_xlabel(r"$\kappa\,\vartheta_r$", fontsize=7, labelpad=1)
+    inset.tick_params(labelsize=6.5, length=2)
+    inset.annotate("law", (0.55, 0.11), xycoords="axes fraction", fontsize=6, color=ORANGE, va="center")
+    inset.annotate("smoothed", (0.53, 0.40), xycoords="axes fraction", fontsize=6, color=BLUE, va="center")

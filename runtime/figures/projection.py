@@ -1,0 +1,155 @@
+"""Figures 5-8: the two-oscillator probe, projected through the eigenvalues of a network onto its own error curve.
+
+Top left the probe e_II(alpha), drawn vertically; top right the lines alpha = sigma |gamma_k|; below the network's error.
+Grey bands carry the probe's synchronous ranges to the lines; where all lines are inside, a darker band drops from there:
+the predicted range of sigma.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from synchain.models.scene import Scene
+from synchain.models.scene_file import load_scene
+
+from ..intervals import Interval, intersect, scale
+from ..threshold import Sweep
+from .published import published
+from .study import Study
+from .style import BLACK, BLUE, COLUMN, GREEN, GREY, ORANGE, PURPLE, bands, bracket, failures, note
+from .tables import Table
+
+__all__ = ["NAMES", "SIZE", "compute", "draw", "layout", "ranges", "table"]
+
+NAMES = ("figure_5", "figure_6", "figure_7", "figure_8")
+SIZE = (COLUMN, 3.8)
+LINES = ((BLUE, "-"), (PURPLE, "--"), (GREEN, "-."), (BLACK, ":"))
+DARK = "#bdbdbd"
+
+
+@dataclass(frozen=True, slots=True)
+class Projection:
+    """Probe in alpha, network in sigma, the ranges predicted from the one and published for the other."""
+
+    scene: Scene
+    probe: Sweep
+    network: Sweep
+    predicted: tuple[Interval, ...]
+    published: tuple[Interval, ...]
+
+
+def compute(name: str, study: Study) -> Projection:
+    """Sweep the probe and the network of a figure's scene."""
+    scene = load_scene(name)
+    row = published(scene.n, scene.parameters["omega"])
+    return Projection(
+        scene, study.pair(scene), study.network(scene), tuple(study.predicted(scene)), row.intervals if row else ()
+    )
+
+
+def table(data: Projection) -> Table:
+    """Both curves: error (median over the starts), share of the starts that synchronised, and how the starts ended."""
+    rows: list[tuple[Any, ...]] = []
+    for curve, sweep in (("probe", data.probe), ("network", data.network)):
+        for x, error, share in zip(sweep.x, sweep.error, sweep.share, strict=True):
+            place = (x, None) if curve == "probe" else (None, x)
+            rows.append((curve, *place, error, share, "finished" if np.isfinite(error) else "failed"))
+    return Table(("curve", "alpha", "sigma", "e_avg", "share", "status"), tuple(rows))
+
+
+def ranges(data: Projection) -> Table:
+    """Synchronous ranges: of the probe in alpha; predicted, measured and published in sigma."""
+    groups = (
+        ("probe", "alpha", data.probe.intervals), ("predicted", "sigma", data.predicted),
+        ("measured", "sigma", data.network.intervals), ("published", "sigma", data.published),
+    )  # fmt: skip
+    rows = [(what, variable, low, high) for what, variable, found in groups for low, high in found]
+    return Table(("range", "variable", "low", "high"), tuple(rows))
+
+
+def layout(figure: Any) -> tuple[Any, Any, Any]:
+    """Axes of the probe (top left), of the lines (top right) and of the network (below the lines)."""
+    figure.set_layout_engine("none")  # the panels stand so close that the bands run through
+    left, middle, right = (0.12, 0.345), 0.375, 0.885
+    rays = figure.add_axes((middle, 0.40, right - middle, 0.51))
+    probe = figure.add_axes((left[0], 0.40, left[1] - left[0], 0.51), sharey=rays)
+    network = figure.add_axes((middle, 0.11, right - middle, 0.265), sharex=rays)
+    return probe, rays, network
+
+
+def draw(axes: tuple[Any, Any, Any], data: Projection) -> tuple[Any, Any, Any]:
+    """Draw probe, lines and network into the three axes of `layout`."""
+    probe, rays, network = axes
+    _draw_probe(probe, data)
+    _draw_rays(rays, data)
+    _draw_network(network, data)
+    _explain(probe, data)
+    failed = sum(int((~np.isfinite(s.error)).sum()) for s in (data.probe, data.network))
+    note(rays, failures(failed, len(data.probe.x) + len(data.network.x)))
+    return axes
+
+
+def _draw_probe(axes: Any, data: Projection) -> None:
+    bands(axes, data.probe.intervals, horizontal=True)
+    error = _finite(data.probe.error)
+    axes.plot(error, data.probe.x, color=BLACK, linewidth=0.8)
+    top = float(np.nanmax(error, initial=0.0)) or 1.0
+    axes.set(xlim=(1.12 * top, -0.04 * top), ylabel=r"$|\alpha|$")
+    axes.set_xlabel(r"$e_{\mathrm{II}}$", labelpad=4)
+    axes.xaxis.set_major_locator(MaxNLocator(2))
+    axes.xaxis.set_label_position("top")
+    axes.tick_params(axis="x", labeltop=True, labelbottom=False)
+
+
+def _draw_rays(axes: Any, data: Projection) -> None:
+    low, high = 0.0, max(data.scene.axes[0].values)
+    ceiling = float(data.probe.x[-1])
+    bands(axes, data.probe.intervals, horizontal=True)
+    bands(axes, data.predicted, color=DARK)
+    modes = data.scene.spectrum.nonzero
+    for k, mode in enumerate(modes):
+        size = abs(mode.value)
+        color, dashes = LINES[k % len(LINES)]
+        axes.plot([low, high], [0.0, high * size], color=color, linestyle=dashes, linewidth=0.7)
+        for a, b in intersect(scale(data.probe.intervals, 1.0 / size), [(low, high)]):
+            axes.plot([a, b], [a * size, b * size], color=color, linewidth=1.8, solid_capstyle="butt")
+        axes.annotate(f"${sp.latex(-mode.exact, order='rev-lex')}$", (high, min(high * size, ceiling)), xytext=(3, 0),
+                      textcoords="offset points", fontsize=6.5, color=color, va="center", annotation_clip=False)  # fmt: skip
+    axes.set(xlim=(low, high), ylim=(0.0, ceiling))
+    axes.annotate(r"$|\gamma_k|$", (1.0, 1.0), xycoords="axes fraction", xytext=(3, 8), textcoords="offset points",
+                  fontsize=7.0)  # fmt: skip
+    axes.set_title(r"$|\alpha| = \sigma\,|\gamma_k|$", fontsize=8.0, pad=5)
+    axes.tick_params(labelleft=False, labelbottom=False)
+
+
+def _draw_network(axes: Any, data: Projection) -> None:
+    bands(axes, data.predicted, color=DARK)
+    error = _finite(data.network.error)
+    axes.plot(data.network.x, error, color=BLACK, linewidth=0.8)
+    top = float(np.nanmax(error, initial=0.0)) or 1.0
+    axes.set(ylim=(-0.04 * top, 1.42 * top), xlabel=r"coupling $\sigma$", ylabel=r"$e_{\mathrm{avg}}$")
+    axes.yaxis.set_major_locator(MaxNLocator(4, prune="upper"))
+    bracket(axes, data.network.intervals, 0.91, BLUE)
+    bracket(axes, data.published, 0.80, ORANGE)
+
+
+def _explain(axes: Any, data: Projection) -> None:
+    """The legend, in the empty corner below the probe."""
+    bars = [Line2D([], [], color=color, marker="|", markersize=4, label=what)
+            for what, color in (("measured", BLUE), ("published", ORANGE))]  # fmt: skip
+    grey = [Patch(color=GREY, label="probe"), Patch(color=DARK, label="predicted")]
+    title = f"$n={data.scene.n}$\n$\\omega={data.scene.parameters['omega']:.2f}$\nsynchronous:"
+    legend = axes.legend(handles=[*grey, *bars], title=title, fontsize=6.5, title_fontsize=7, handlelength=1.3, borderpad=0,
+                         loc="upper left", bbox_to_anchor=(-0.45, -0.08), labelspacing=0.5, alignment="left")  # fmt: skip
+    legend.set_in_layout(False)
+
+
+def _finite(values: np.ndarray) -> np.ndarray:
+    return np.where(np.isfinite(values), values, np.nan)

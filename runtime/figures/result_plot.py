@@ -1,0 +1,167 @@
+"""A sensible picture of any result: error curve, bifurcation diagram, map or phase portrait."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..result import Result
+from ..status import Status
+from .style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, context, failures, new_figure, note
+
+__all__ = ["KINDS", "draw_result"]
+
+KINDS = ("error", "section", "map", "phase", "end")
+CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
+SIZE = (4.8, 3.4)
+MARKED = 60
+"""Up to so many cells are marked by a dot each."""
+
+
+def draw_result(result: Result, axes: Any = None, kind: str | None = None) -> Any:
+    """Draw a result and return the axes; a new figure is made where none are given.
+
+    `kind` is "error" (synchronisation error against one axis), "section" (section points against one axis, or each
+    against the next), "map" (colours over two axes), "phase" (trajectories) or "end" (final states); by default the first
+    of these that the result's axes and records allow.  Of more axes than a plot has, the leading ones are kept at their
+    first value; a phase portrait shows the first cell.  Cells that did not finish are left out and counted above the axes.
+
+    Raises ValueError for an unknown kind or one that this result has no numbers for.
+    """
+    if kind is not None and kind not in KINDS:
+        raise ValueError(f"unknown kind of plot {kind!r}; known: {', '.join(KINDS)}")
+    possible = _possible(result)
+    chosen = kind or possible[0]
+    if chosen not in possible:
+        raise ValueError(f"this result has no numbers for the plot {chosen!r}; it has them for: {', '.join(possible)}")
+    with context():
+        if axes is None:
+            axes = new_figure(SIZE).add_subplot()
+        cut, words = _cut(result, 2 if chosen == "map" else 1)
+        drawn = {"error": _error, "section": _section, "map": _map, "phase": _phase, "end": _end}[chosen](
+            axes, cut, result
+        )
+        failed = int((result.data.status != Status.FINISHED).sum())
+        note(axes, "; ".join(filter(None, [words, failures(failed, result.data.status.size)])))
+    return drawn
+
+
+def _possible(result: Result) -> tuple[str, ...]:
+    """The kinds that a result has numbers for, the most telling first."""
+    count, data = result.data.status.ndim, result.data
+    kinds = []
+    if count >= 2:
+        kinds.append("map")
+    if "sync_error" in data and count >= 1:
+        kinds.append("error")
+    if "trajectory" in data and count == 0:
+        kinds.append("phase")
+    if "section" in data:
+        kinds.append("section")
+    if "trajectory" in data and count > 0:
+        kinds.append("phase")
+    return (*kinds, "end")
+
+
+def _cut(result: Result, keep: int) -> tuple[xr.Dataset, str]:
+    """The last `keep` axes of a result with the others at their first value, unfinished cells set to NaN."""
+    data = result.data
+    leading = data.status.dims[: max(data.status.ndim - keep, 0)]
+    words = ", ".join(f"{name} = {float(data[name][0]):.4g}" for name in leading)
+    data = data.isel({name: 0 for name in leading})
+    good = data.status == Status.FINISHED
+    numbers = [name for name, values in data.items() if values.dtype.kind == "f"]
+    return data.assign({name: data[name].where(good) for name in numbers}), words
+
+
+def _along(data: xr.Dataset, result: Result) -> tuple[np.ndarray, str]:
+    """Values and name of what a one-dimensional result runs over."""
+    name = result.scene.axes[0].name if result.scene.zipped else str(data.status.dims[0])
+    return data[name].values, name
+
+
+def _error(axes: Any, data: xr.Dataset, result: Result) -> Any:
+    x, name = _along(data, result)
+    order = np.argsort(x, kind="stable")
+    marker = "." if len(x) <= MARKED else None
+    axes.plot(x[order], data.sync_error.values[order], color=BLUE, marker=marker)
+    axes.set(xlabel=name, ylabel="average synchronisation error")
+    return axes
+
+
+def _section(axes: Any, data: xr.Dataset, result: Result) -> Any:
+    """The first state other than the section's: against the axis where there is one, else against its next value."""
+    state = next(
+        (s for s in map(str, data.state.values) if s != result.scene.section.variable), str(data.state.values[0])
+    )
+    y = data.section.sel(state=state).values
+    dots = {"linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "color": BLACK, "rasterized": True}
+    if data.status.ndim == 0:
+        axes.plot(y[:-1], y[1:], markersize=3.0, **dots)
+        axes.set(xlabel=f"{state} at {result.scene.section}", ylabel=f"{state} the next time")
+        return _widen(axes)
+    x, name = _along(data, result)
+    axes.plot(np.repeat(x, y.shape[1]), y.reshape(-1), markersize=float(np.clip(700.0 / len(x), 1.0, 3.0)), **dots)
+    axes.set(xlabel=name, ylabel=f"{state} at {result.scene.section}")
+    return axes
+
+
+def _map(axes: Any, data: xr.Dataset, result: Result) -> Any:
+    """Colours over the last two axes: error, else number of section points, else the first state at the end."""
+    if "sync_error" in data:
+        values, label = data.sync_error, "average synchronisation error"
+    elif "section_count" in data:
+        values, label = data.section_count.where(data.status == Status.FINISHED), "section points"
+    else:
+        values, label = data.end.isel(state=0), f"{data.state.values[0]} at the end"
+    down, along = (str(name) for name in values.dims)
+    values = values.sortby([down, along])
+    painted = axes.pcolormesh(values[along], values[down], values, shading="nearest", cmap="cividis", rasterized=True)
+    axes.set(xlabel=along, ylabel=down, facecolor="0.8")
+    axes.figure.colorbar(painted, ax=axes, label=label)
+    return axes
+
+
+def _phase(axes: Any, data: xr.Dataset, result: Result) -> Any:
+    """Velocity against position of every oscillator, in the first cell."""
+    data = data.isel({name: 0 for name in data.status.dims})
+    first, second = (*result.scene.components, result.scene.components[0])[:2]
+    for i in range(1, result.scene.n + 1):
+        x, y = (data.trajectory.sel(state=f"{name}_{i}") for name in (first, second))
+        axes.plot(x, y, color=CYCLE[(i - 1) % len(CYCLE)], linewidth=0.7, label="oscillator " * (i == 1) + str(i))
+    axes.set(xlabel=first, ylabel=second)
+    return _legend(axes, result)
+
+
+def _end(axes: Any, data: xr.Dataset, result: Result) -> Any:
+    """Final state: of every oscillator against the axis, or against one another."""
+    first, second = (*result.scene.components, result.scene.components[0])[:2]
+    along = _along(data, result) if data.status.ndim else None
+    for i in range(1, result.scene.n + 1):
+        end = data.end.sel(state=f"{first}_{i}")
+        x = end if along is None else along[0]
+        y = data.end.sel(state=f"{second}_{i}") if along is None else end
+        color = CYCLE[(i - 1) % len(CYCLE)]
+        axes.plot(x, y, linestyle="none", marker=".", color=color, label="oscillator " * (i == 1) + str(i))
+    names = (f"{first} at the end", f"{second} at the end") if along is None else (along[1], f"{first} at the end")
+    axes.set(xlabel=names[0], ylabel=names[1])
+    return _legend(_widen(axes), result)
+
+
+def _legend(axes: Any, result: Result) -> Any:
+    """Which oscillator has which colour, above the axes; nothing for one oscillator or more than there are colours."""
+    if 1 < result.scene.n <= len(CYCLE):
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(CYCLE), handlelength=1.0, columnspacing=1.0,
+                    borderpad=0.2)  # fmt: skip
+    return axes
+
+
+def _widen(axes: Any) -> Any:
+    """Limits at least a hundredth of the size of the numbers apart, so that round-off is not blown up to a pattern."""
+    for low, high, put in ((*axes.get_xlim(), axes.set_xlim), (*axes.get_ylim(), axes.set_ylim)):
+        least = 0.01 * max(abs(low), abs(high), 1e-3)
+        if high - low < least:
+            put(0.5 * (low + high - least), 0.5 * (low + high + least))
+    return axes

@@ -1,0 +1,112 @@
+"""How figures look and how they are written.
+
+Every figure has an opaque white ground, so that it reads the same on paper, on a light and on a dark screen.  Colours are
+those of Okabe & Ito (https://jfly.uni-koeln.de/color/), which stay distinct for colour-blind readers; what they tell is
+told by line style or place as well.  Widths fit one column of a journal (88 mm) without scaling, with text of 7 to 8 points.
+Files depend on the numbers alone: no dates, fixed ids.  Text in SVG files stays text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from ..files import whole_file
+from ..intervals import Interval
+
+__all__ = [
+    "BLACK",
+    "BLUE",
+    "COLUMN",
+    "GREEN",
+    "GREY",
+    "ORANGE",
+    "bands",
+    "bracket",
+    "context",
+    "new_figure",
+    "note",
+    "save",
+]
+
+BLACK, BLUE, ORANGE, GREEN, PURPLE, SKY = "#1a1a1a", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
+GREY = "#d9d9d9"
+COLUMN = 3.46
+"""Width of one column in inches."""
+DPI = 300
+
+SETTINGS: dict[Any, Any] = {
+    "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "Helvetica", "sans-serif"],
+    "font.size": 8.0, "axes.labelsize": 8.5, "axes.titlesize": 8.5, "legend.fontsize": 7.0,
+    "xtick.labelsize": 7.5, "ytick.labelsize": 7.5, "mathtext.fontset": "dejavusans",
+    "axes.linewidth": 0.7, "xtick.major.width": 0.7, "ytick.major.width": 0.7, "xtick.direction": "in",
+    "ytick.direction": "in", "xtick.top": True, "ytick.right": True, "lines.linewidth": 1.0, "lines.markersize": 3.0,
+    "figure.facecolor": "white", "axes.facecolor": "white", "savefig.facecolor": "white", "savefig.transparent": False,
+    "text.color": BLACK, "axes.edgecolor": BLACK, "axes.labelcolor": BLACK, "xtick.color": BLACK, "ytick.color": BLACK,
+    "legend.frameon": False, "axes.axisbelow": False, "svg.fonttype": "none", "svg.hashsalt": "synchain",
+    "figure.dpi": DPI, "savefig.dpi": DPI, "path.simplify": True, "image.composite_image": True,
+}  # fmt: skip
+
+
+@contextmanager
+def context() -> Iterator[None]:
+    """Matplotlib with this style, whatever the user's own settings; theirs come back at the end of the with block."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(SETTINGS)
+        yield
+
+
+def new_figure(size: tuple[float, float]) -> Figure:
+    """An empty figure of a size in inches that no window belongs to; use inside `context`."""
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save(figure: Figure, folder: Path, name: str) -> list[Path]:
+    """Write `<name>.png` and `<name>.svg`, each whole or not at all; use inside `context`."""
+    written = []
+    for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None, "Creator": None})):
+        path = folder / f"{name}.{kind}"
+        with whole_file(path) as temporary:
+            figure.savefig(temporary, format=kind, dpi=DPI, metadata=metadata)
+        written.append(path)
+    return written
+
+
+def bands(axes: Axes, intervals: Sequence[Interval], *, horizontal: bool = False, **options: Any) -> None:
+    """Grey bands over intervals of the x axis, or of the y axis where `horizontal`."""
+    span = axes.axhspan if horizontal else axes.axvspan
+    for low, high in intervals:
+        span(low, high, **{"color": GREY, "linewidth": 0.0, "zorder": 0.0, **options})
+
+
+def bracket(axes: Axes, intervals: Sequence[Interval], height: float, color: str, text: str = "") -> None:
+    """Thin bars with end strokes over intervals of x, at a height in parts of the axes; `text` right of the last one."""
+    place = axes.get_xaxis_transform()
+    for low, high in intervals:
+        axes.plot([low, high], [height, height], color=color, linewidth=1.0, transform=place, zorder=4, marker="|",
+                  markersize=4.0, markeredgewidth=1.0, clip_on=False)  # fmt: skip
+    if text and intervals:
+        axes.annotate(text, (intervals[-1][1], height), xycoords=place, xytext=(4, 0), textcoords="offset points",
+                      color=color, fontsize=6.5, va="center", ha="left")  # fmt: skip
+
+
+def note(axes: Axes, text: str) -> None:
+    """A remark above the axes at the right; nothing where there is no text."""
+    if text:
+        axes.annotate(text, (1.0, 1.0), xycoords="axes fraction", xytext=(0, 2), textcoords="offset points",
+                      fontsize=6.5, color=ORANGE, ha="right", va="bottom")  # fmt: skip
+
+
+def failures(failed: int, cells: int) -> str:
+    """The remark on cells that did not finish; empty where all did."""
+    return f"{failed} of {cells} cells failed and are left out" if failed else ""

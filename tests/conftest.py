@@ -1,0 +1,32 @@
+"""Options and fixtures of the tests: golden files are compared, or written anew with --update."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+GOLDEN = Path(__file__).parent / "golden"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--update", action="store_true", help="write the golden files anew instead of comparing")
+
+
+@pytest.fixture
+def golden(request: pytest.FixtureRequest) -> Callable[[str, str], None]:
+    """A function of (file name, text) that fails where the text differs from the golden file of that name."""
+
+    def check(name: str, text: str) -> None:
+        path = GOLDEN / name
+        if request.config.getoption("--update"):
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+        if not path.is_file():
+            pytest.fail(f"no golden file {name}; write it with: pytest --update")
+        assert text.splitlines() == path.read_text(encoding="utf-8").splitlines(), (
+            f"{name} changed; look at the difference, then run: pytest --update"
+        )
+
+    return check

@@ -1,0 +1,61 @@
+"""Central differences in many digits, against which the tests hold exact derivatives."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping, Sequence
+
+import mpmath
+import sympy as sp
+
+from synchain.models.equations import TIME, Equations
+from synchain.models.network import edge, network, node
+from synchain.models.topology import Topology
+
+DIGITS = 50
+TABLE = {
+    "theta_b": 0.1, "epsilon": 2, "u": 0.1, "omega": 1.15, "mu_s": 0.3, "mu_k": 0.15, "mu": 0.3, "a": 2.5, "v_s": 0.4,
+    "c": 0.07, "kappa": 1e5, "sigma": 0.2, "alpha": 0.3, "delta": 0.1, "beta": 1.1,
+}  # fmt: skip
+"""A value for every parameter of the shipped models: table 1 of the paper where it has one."""
+
+Values = dict[sp.Symbol, mpmath.mpf]
+
+
+def made(graph: Topology, oscillator: str = "friction", friction: str | None = "exponential", contact: str = "atan",
+         coupling: str | None = "spring") -> Equations:  # fmt: skip
+    """The equations of a network by the names of its parts."""
+    single = node(oscillator, friction, contact)
+    return network(single, edge(coupling, single, oscillator) if coupling else None, graph)
+
+
+def states(equations: Equations, seed: int, near: float | None = None) -> Values:
+    """Time and states at random, parameters from TABLE; with `near`, sliding velocities of 0.2 … 0.9 times near/kappa."""
+    numbers = random.Random(seed)
+    values = {sp.Symbol(name, real=True): mpmath.mpf(TABLE[name]) for name in equations.parameters}
+    for name in equations.state:
+        value = mpmath.mpf(numbers.uniform(-0.5, 0.5))
+        if near is not None and name.startswith("v"):
+            value = mpmath.mpf(TABLE["theta_b"]) - near * mpmath.mpf(numbers.uniform(0.2, 0.9)) / mpmath.mpf(TABLE["kappa"])
+        values[sp.Symbol(name, real=True)] = value
+    return {**values, TIME: mpmath.mpf(numbers.uniform(0, 9))}
+
+
+def evaluate(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, mpmath.mpf]) -> list[mpmath.mpf]:
+    """Expressions as mpmath numbers, in the precision that is set."""
+    return [mpmath.mpmathify(x) for x in sp.lambdify(list(values), list(expressions), "mpmath")(*values.values())]
+
+
+def slopes(expressions: Sequence[sp.Expr], along: Mapping[sp.Symbol, mpmath.mpf], values: Values) -> list[mpmath.mpf]:
+    """Central differences of expressions along a direction, right to about 1e-35 relative to their curvature."""
+    step = mpmath.mpf(10) ** (-DIGITS // 2)
+    with mpmath.workdps(2 * DIGITS):
+        there = evaluate(expressions, {s: x + step * along.get(s, 0) for s, x in values.items()})
+        back = evaluate(expressions, {s: x - step * along.get(s, 0) for s, x in values.items()})
+        return [(a - b) / (2 * step) for a, b in zip(there, back, strict=True)]
+
+
+def close(found: Sequence[mpmath.mpf], expected: Sequence[mpmath.mpf], digits: int = 25) -> bool:
+    """True where all numbers agree to `digits` digits, relative to the larger of 1 and the number."""
+    pairs = zip(found, expected, strict=True)
+    return all(abs(a - b) <= mpmath.mpf(10) ** -digits * max(1, abs(b)) for a, b in pairs)

@@ -1,0 +1,104 @@
+"""What the tests of the figures share: results that nothing was simulated for, and ways to look at what was drawn."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from synchain.models import Scene
+from synchain.runtime.figures import load, make, study, style
+from synchain.runtime.result import Result
+from synchain.runtime.status import Status
+from synchain.runtime.threshold import Criterion, Sweep, project
+
+RANGE = {1.15: (0.0, 0.466), 1.4: (0.09, 0.6), 1.55: (0.176, 0.594)}
+"""Ranges of alpha that the stand-in for the simulation pretends to measure."""
+TINY = study.Quality(9, 13, Criterion(starts=1), 1e-3, (5,))
+
+
+def pretend(scene: Scene, failed: tuple[int, ...] = (), **options: Any) -> Result:
+    """A result of the right shape whose numbers are simple functions of the cell; some cells have failed."""
+    shape, dimension = scene.shape, len(scene.y0)
+    cells = np.arange(math.prod(shape), dtype=float)
+    status = np.full(len(cells), int(Status.FINISHED), np.int32)
+    status[list(failed)] = Status.DIVERGED
+    dims = ("cell",) if scene.zipped else tuple(axis.name for axis in scene.axes)
+    data: dict[str, Any] = {"status": (dims, status.reshape(shape))}
+    data["end"] = ((*dims, "state"), (cells[:, None] + np.arange(dimension)).reshape(*shape, dimension))
+    for name in ("sync_error", "sync_error_max", "sync_error_end"):
+        data[name] = (dims, np.where(cells % 3 == 1, 0.0, 0.1 * cells + 0.1).reshape(shape))
+    if "section" in scene.record:
+        counts = (cells % 3).astype(np.int32)
+        inside = np.arange(2) < counts[:, None]
+        data["section_count"] = (dims, counts.reshape(shape))
+        data["section_time"] = ((*dims, "point"), np.where(inside, cells[:, None], np.nan).reshape(*shape, 2))
+        points = np.where(inside[..., None], 0.1 * cells[:, None, None] + np.arange(dimension), np.nan)
+        data["section"] = ((*dims, "point", "state"), points.reshape(*shape, 2, dimension))
+    if "trajectory" in scene.record:
+        waves = np.sin(np.linspace(0, 6, 20)[:, None] + np.arange(dimension))
+        data["trajectory"] = ((*dims, "sample", "state"), np.broadcast_to(waves, (*shape, *waves.shape)))
+    coordinates: dict[str, Any] = {"state": list(scene.equations.state)}
+    for axis in scene.axes:
+        coordinates[axis.name] = ("cell" if scene.zipped else axis.name, np.array(axis.values))
+    return Result(xr.Dataset(data, coordinates), scene)
+
+
+class Simulation:
+    """Answers in place of runs and sweeps, and remembers what it was asked for."""
+
+    def __init__(self) -> None:
+        self.runs: list[Scene] = []
+        self.probes: list[tuple[float, int]] = []
+        self.networks: list[tuple[int, float, int]] = []
+        self.failed: tuple[int, ...] = ()
+
+    def install(self, monkeypatch: pytest.MonkeyPatch) -> Simulation:
+        """Stand in for a study's runs and sweeps, and make both qualities tiny."""
+        for name in ("run", "probe", "simulate"):
+            monkeypatch.setattr(study, name, getattr(self, name))
+        monkeypatch.setattr(make, "QUICK", TINY)
+        monkeypatch.setattr(make, "FULL", TINY)
+        return self
+
+    def run(self, scene: Scene, **options: Any) -> Result:
+        self.runs.append(scene)
+        return pretend(scene, self.failed)
+
+    def probe(self, scene: Scene, alpha: np.ndarray, **options: Any) -> Sweep:
+        omega = scene.parameters["omega"]
+        self.probes.append((omega, len(alpha)))
+        low, high = RANGE[omega]
+        good = (alpha >= low) & (alpha <= high)
+        return Sweep(alpha, np.where(good, 0.0, 0.2), good.astype(float), ((low, high),))
+
+    def simulate(self, scene: Scene, sigma: np.ndarray, **options: Any) -> Sweep:
+        omega = scene.parameters["omega"]
+        self.networks.append((scene.n, omega, len(sigma)))
+        found = project([RANGE[omega]], scene.spectrum, float(sigma[-1]))
+        good = np.array([any(a <= s <= b for a, b in found) for s in sigma])
+        error = np.where(good, 0.0, 0.3)
+        error[list(self.failed)] = np.inf
+        return Sweep(sigma, error, good.astype(float), tuple(found))
+
+
+def drawn(name: str, runs: study.Study) -> tuple[Any, Any]:
+    """Axes and data of a figure."""
+    drawing = load(name)
+    data = drawing.compute(runs)
+    with style.context():
+        return drawing.draw(drawing.layout(style.new_figure(drawing.size)), data), data
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def words(axes: Any) -> list[str]:
+    return [text.get_text() for text in axes.texts]

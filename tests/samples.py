@@ -1,0 +1,196 @@
+"""Equations that the tests of the code generator share, a way to run kernels, and kernels as plain Python."""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+import numpy as np
+import sympy as sp
+
+from synchain.codegen.emit import emit
+from synchain.codegen.load import Kernel, load
+from synchain.models.equations import TIME, Edge, Equations, Node
+
+TABLE = {"theta_b": 0.1, "mu_s": 0.3, "mu_k": 0.15, "a": 2.5, "kappa": 1e5, "epsilon": 2.0, "u": 0.1, "omega": 1.15,
+         "sigma": 0.1}  # fmt: skip
+"""Table 1 of the paper, its first frequency, and a weak coupling."""
+
+
+def real(*names: str) -> list[sp.Symbol]:
+    return [sp.Symbol(name, real=True) for name in names]
+
+
+def path(n: int) -> tuple[tuple[int, int, Fraction], ...]:
+    """The links of a chain of n nodes."""
+    pairs = [(i, i + 1) for i in range(n - 1)]
+    return tuple(sorted((*p, Fraction(1)) for i, j in pairs for p in ((i, j), (j, i))))
+
+
+def spring() -> Edge:
+    x, v, x_there, v_there, weight, sigma = real("x", "v", "x_there", "v_there", "weight", "sigma")
+    return Edge((x, v), (x_there, v_there), weight, (sp.S.Zero, sigma * weight * (x_there - x)), (sigma,))
+
+
+def friction_chain(n: int) -> Equations:
+    """Eq. 6 of the paper with the smoothed sign of eq. 5."""
+    x, v = real("x", "v")
+    theta_b, mu_s, mu_k, a, kappa, epsilon, u, omega = parameters = real(*list(TABLE)[:-1])
+    w = theta_b - v
+    law = (mu_k + (mu_s - mu_k) * sp.exp(-a * sp.Abs(w))) * 2 / sp.pi * sp.atan(kappa * w)
+    node = Node((x, v), (v, -x + u * sp.cos(omega * TIME) + epsilon * law), tuple(parameters))
+    return Equations(node, spring() if n > 1 else None, n, path(n))
+
+
+def harmonic_chain(n: int) -> Equations:
+    """Oscillators without friction or drive, joined by springs."""
+    x, v = real("x", "v")
+    return Equations(Node((x, v), (v, -x), ()), spring(), n, path(n))
+
+
+def waving() -> Equations:
+    """A damped pendulum driven such that x = cos t, v = -sin t solves it."""
+    x, v, damping = real("x", "v", "damping")
+    drive = -sp.cos(TIME) + sp.sin(sp.cos(TIME)) - damping * sp.sin(TIME)
+    return Equations(Node((x, v), (v, drive - sp.sin(x) - damping * v), (damping,)), None, 1)
+
+
+def looped() -> Equations:
+    """Three nodes in a one-way ring with a chord, weights that are no units, a coupling through velocities too."""
+    x, v, c, mu, omega = real("x", "v", "c", "mu", "omega")
+    x_2, v_2, w, sigma, delta = real("x_there", "v_there", "weight", "sigma", "delta")
+    node = Node((x, v), (v - x / 7, mu * (1 - x**2) * v - sp.exp(-c * x) + TIME * sp.sqrt(2) + sp.sin(omega * TIME) * x),
+                (c, mu, omega))  # fmt: skip
+    push = (delta * w * (v_2 - v), sigma * w * sp.sin(x_2 - x) + mu * v_2)
+    edge = Edge((x, v), (x_2, v_2), w, push, (sigma, delta, mu))
+    links = ((0, 1, Fraction(2, 3)), (1, 2, Fraction(1)), (2, 0, Fraction(-3, 2)), (0, 2, Fraction(1)))
+    return Equations(node, edge, 3, links)
+
+
+def third_order() -> Equations:
+    """One node of three states: a chain of derivatives, with kinks and a power."""
+    x, y, z, a, b = real("x", "y", "z", "a", "b")
+    kinks = sp.Abs(y) * sp.sign(x - b)
+    last = -a * z - kinks - x**3 + sp.cos(a * TIME) ** 2 - sp.log(b) / (1 + y**2)
+    return Equations(Node((x, y, z), (y, z + sp.Rational(1, 3), last), (a, b)), None, 1)
+
+
+def tanh_pair() -> Equations:
+    """Two nodes with the elementary functions that the others leave out, and a free-running phase."""
+    x, phase, a = real("x", "phase", "a")
+    rhs = (sp.tanh(a * x) * sp.sin(phase) - sp.sqrt(1 + x**2), sp.S.One)
+    x_2, phase_2, w, sigma = real("x_2", "phase_2", "w", "sigma")
+    edge = Edge((x, phase), (x_2, phase_2), w, (sp.S.Zero, sigma * w * sp.sin(phase_2 - phase)), (sigma,))
+    return Equations(Node((x, phase), rhs, (a,)), edge, 2, path(2))
+
+
+CASES: dict[str, Equations] = {
+    "friction 1": friction_chain(1), "friction 3": friction_chain(3), "harmonic": harmonic_chain(2), "looped": looped(),
+    "third order": third_order(), "tanh pair": tanh_pair(), "waving": waving(),
+}  # fmt: skip
+
+
+def numbers(equations: Equations, **changed: float) -> list[float]:
+    """Parameter values in the kernel's order."""
+    return [{**TABLE, **changed}[name] for name in equations.parameters]
+
+
+@functools.cache
+def kernel(
+    equations: Equations, method: str = "rodas5p", records: tuple[str, ...] = (), section: sp.Expr | None = None,
+    width: int | None = None,
+) -> Kernel:  # fmt: skip
+    """The compiled kernel; tests that ask for the same one share it."""
+    return load(emit(equations, method, records, section, width))
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a kernel wrote; the columns are described in the docstring of `drive`."""
+
+    end: np.ndarray
+    sums: np.ndarray
+    counts: np.ndarray
+    points: np.ndarray
+    samples: np.ndarray
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        return self.end, self.sums, self.counts, self.points, self.samples
+
+    def section(self, cell: int) -> np.ndarray:
+        """The section points of a cell: rows of time and state."""
+        return self.points[cell, : self.counts[cell, 3]]
+
+
+def blank(cells: int, dimension: int, room: int = 0, samples: int = 0) -> Outcome:
+    return Outcome(
+        np.full((cells, dimension), np.nan), np.full((cells, 4), np.nan), np.zeros((cells, 4), np.int64),
+        np.full((cells, room, dimension + 1), np.nan), np.full((cells, samples, dimension), np.nan),
+    )  # fmt: skip
+
+
+def drive(
+    compiled: Kernel, start: Any, values: Any, spans: Any, rtol: float, atol: float | None = None, *, room: int = 0,
+    samples: int = 0, direction: float = -1.0, max_step: float = math.inf, max_steps: float = 1e9,
+    into: Outcome | None = None, part: tuple[int, int] | None = None,
+) -> Outcome:  # fmt: skip
+    """Run cells: rows of start states, of parameters and of (begin, end) of the window."""
+    start, spans = np.array(start, float), np.array(spans, float)
+    cells = len(start)
+    values = np.array(values, float).reshape(cells, -1)
+    control = np.array([rtol, rtol / 10 if atol is None else atol, 1e-4, max_step, max_steps, direction, 0.0])
+    outcome = blank(cells, start.shape[1], room, samples) if into is None else into
+    compiled.drive(*(part or (0, cells)), start, values, spans, control, *outcome.arrays)
+    return outcome
+
+
+# -- kernels as plain Python ---------------------------------------------------------------------------------
+
+
+def _load(array: list, slot: int, width: int) -> Any:
+    return array[slot]
+
+
+def _store(array: list, slot: int, value: Any) -> None:
+    array[slot] = value
+
+
+PYTHON: dict[str, Any] = {
+    "njit": lambda **options: lambda function: function, "load": _load, "store": _store,
+    "select": lambda mask, yes, no: yes if mask else no, "broadcast": lambda number, width: number,
+    "any_lane": bool, "lane_bits": int, "absolute": abs, "maximum": max, "minimum": min, "np": np, "math": math,
+    "sign": lambda x: (x > 0) - (x < 0),
+}  # fmt: skip
+FLOATS = {**PYTHON, **{n: getattr(math, n) for n in ("exp", "log", "sin", "cos", "atan", "tanh", "sqrt", "floor")}}
+DIGITS = {**PYTHON, **{n: getattr(mpmath, n) for n in ("exp", "log", "sin", "cos", "atan", "tanh", "sqrt", "floor")}}
+"""What generated text calls, on Python floats and on mpmath numbers."""
+
+
+def plain(text: str, functions: dict[str, Any]) -> dict[str, Any]:
+    """The names that a kernel module of width 1 defines, run by Python itself on any kind of number."""
+    body = re.sub(r"^(import|from) .*$", "", text, flags=re.MULTILINE)
+    space = dict(functions)
+    exec(compile(body, "<kernel>", "exec"), space)
+    return space
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What one plain step wrote."""
+
+    y: list
+    y_new: list
+    dense: list
+    error: Any
+
+
+def take_step(space: dict[str, Any], t: Any, h: Any, y: list, p: list, rtol: Any = 0, atol: Any = 1) -> Step:
+    """One step of a kernel that runs as plain Python."""
+    y_new, dense = [None] * len(y), [None] * (len(y) * space["DENSE_ROWS"])
+    return Step(y, y_new, dense, space["step"](t, h, y, p, y_new, dense, rtol, atol))

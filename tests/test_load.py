@@ -1,0 +1,289 @@
+"""Compiled kernels on disk: loaded again, repaired, refused, and shared between processes."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+import shutil
+import stat
+import subprocess
+import sys
+import textwrap
+import warnings
+from pathlib import Path
+
+import pytest
+import sympy as sp
+from samples import drive, friction_chain, harmonic_chain, real
+
+from synchain.codegen import cache
+from synchain.codegen import load as loading
+from synchain.codegen.emit import emit
+from synchain.models.equations import Equations, Node
+
+x, v = real("x", "v")
+SWING = Equations(Node((x, v), (v, -x), ()), None, 1)
+REAL = emit(SWING, "cash_karp", (), width=1)
+MORE = ", ".join(f"more_{i}" for i in range(len(loading.SIGNATURE.args) - 7))
+TINY = '''
+from numba import njit
+
+
+@njit(error_model="numpy", nogil=True, cache=True)
+def drive(first, last, start, numbers, spans, control, end, MORE):
+    for i in range(first, last):
+        end[i, 0] = 2.0 * start[i, 0]
+        end[i, 1] = 3.0 * start[i, 1]
+'''.replace("MORE", MORE)
+SOURCE = dataclasses.replace(REAL, text=TINY)
+"""A module with the entry point of a kernel that compiles ten times faster than one."""
+
+PROGRAM = textwrap.dedent(
+    """
+    import json, sys, warnings
+    sys.path.insert(0, sys.argv[1])
+    from test_load import REAL, SOURCE, drive
+    from synchain.codegen.load import load
+    source = REAL if sys.argv[2:] else SOURCE
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        k = load(source)
+    end = drive(k, [[1.0, 2.0]], [[]], [(0.0, 1.0)], 1e-9).end[0]
+    stats = k.entry.stats
+    print(json.dumps({"end": list(end), "hits": sum(stats.cache_hits.values()), "from_cache": k.from_cache,
+                      "misses": sum(stats.cache_misses.values()), "path": k.path, "digest": k.digest,
+                      "warnings": [str(w.message) for w in caught]}))
+    """
+)
+
+
+def start(folder: Path, *arguments: str) -> subprocess.Popen:
+    """A process that loads the kernel and runs it; with an argument, the real one."""
+    return subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(Path(__file__).parent), *arguments],
+        env={**os.environ, "SYNCHAIN_CACHE": str(folder)}, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+
+
+def finish(process: subprocess.Popen, end: tuple[float, float] = (2.0, 6.0)) -> dict:
+    text, _ = process.communicate(timeout=120)
+    assert process.returncode == 0
+    report = json.loads(text)
+    assert report["end"] == pytest.approx(end, abs=1e-8)
+    return report
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch) -> Path:
+    """An empty cache folder for this process."""
+    place = tmp_path / "kernels"
+    monkeypatch.setenv("SYNCHAIN_CACHE", str(place))
+    return place
+
+
+def fresh(source=SOURCE):
+    """Load without what this process remembers."""
+    loading._load.cache_clear()
+    return loading.load(source)
+
+
+def works(compiled) -> bool:
+    return drive(compiled, [[1.0, 2.0]], [[]], [(0.0, 1.0)], 1e-9).end[0].tolist() == [2.0, 6.0]
+
+
+def machine_code(place: Path) -> list[Path]:
+    return sorted((place / "__pycache__").glob("kernel_*.nb*"))
+
+
+@pytest.fixture(scope="module")
+def compiled_folder(tmp_path_factory) -> Path:
+    """A folder that a first process has filled."""
+    place = tmp_path_factory.mktemp("shared") / "kernels"
+    report = finish(start(place))
+    assert (report["hits"], report["misses"], report["from_cache"]) == (0, 1, False)
+    assert Path(report["path"]).parent == place
+    return place
+
+
+def copied(source: Path, target: Path) -> None:
+    """Copy a cache with its times: Numba compares those of the module file."""
+    shutil.copytree(source, target)
+
+
+# -- the good cases ------------------------------------------------------------------------------------------
+
+
+def test_a_second_process_loads_without_compiling(compiled_folder):
+    report = finish(start(compiled_folder))
+    assert (report["hits"], report["misses"], report["from_cache"]) == (1, 0, True)
+    assert report["warnings"] == []
+    assert report["digest"] == SOURCE.digest
+
+
+def test_a_real_kernel_is_loaded_without_compiling(tmp_path):
+    exact = (math.cos(1.0) + 2 * math.sin(1.0), 2 * math.cos(1.0) - math.sin(1.0))
+    reports = [finish(start(tmp_path / "kernels", "real"), exact) for _ in range(2)]
+    assert [(r["hits"], r["misses"], r["from_cache"]) for r in reports] == [(0, 1, False), (1, 0, True)]
+    assert reports[0]["end"] == reports[1]["end"]
+
+
+def test_two_processes_may_compile_at_once(folder):
+    jobs = [start(folder), start(folder)]
+    reports = [finish(job) for job in jobs]
+    assert all(r["warnings"] == [] for r in reports)
+    assert not list(folder.glob("*.tmp"))
+    assert len(list(folder.glob("kernel_*.py"))) == 1
+    assert works(fresh())
+
+
+def test_the_kernel_keeps_its_text(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    compiled = fresh()
+    assert compiled.source == SOURCE.text == Path(compiled.path).read_text(encoding="utf-8")
+    assert compiled.digest == SOURCE.digest
+    assert compiled.equations is SWING
+    assert loading.load(SOURCE) is compiled, "the same kernel is loaded once"
+    assert stat.S_IMODE(Path(compiled.path).stat().st_mode) & 0o077 == 0
+
+
+def test_digests_are_stable_and_tell_kernels_apart():
+    assert emit(SWING, "cash_karp", (), width=1).digest == REAL.digest
+    others = [
+        emit(SWING, "dop853", (), width=1),
+        emit(SWING, "cash_karp", (), width=2),
+        emit(SWING, "cash_karp", ("trajectory",), width=1),
+        emit(SWING, "cash_karp", ("section",), sp.Symbol("v_1"), width=1),
+        emit(friction_chain(1), "cash_karp", (), width=1),
+        emit(harmonic_chain(2), "cash_karp", (), width=1),
+    ]
+    assert len({REAL.digest, *(o.digest for o in others)}) == len(others) + 1
+
+
+def test_the_file_name_follows_everything_that_shapes_machine_code(monkeypatch):
+    names = {loading._fingerprint(SOURCE)}
+    import llvmlite.binding as llvm
+    import numba
+
+    from synchain.codegen import elementary, lanes
+
+    def changed(*change) -> None:
+        with monkeypatch.context() as m:
+            m.setattr(*change)
+            loading._surroundings.cache_clear()
+            names.add(loading._fingerprint(SOURCE))
+        loading._surroundings.cache_clear()
+
+    changed(numba, "__version__", "9.9")
+    changed(sys, "version", "4.0")
+    changed(llvm, "get_host_cpu_name", lambda: "abacus")
+    changed(llvm, "get_host_cpu_features", lambda: {"beads": True})
+    changed(lanes, "__file__", __file__)
+    changed(elementary, "__file__", __file__)
+    changed(loading.importlib.metadata, "version", lambda name: "9.9")
+    changed(loading.platform, "machine", lambda: "sun dial")
+    names.add(loading._fingerprint(dataclasses.replace(SOURCE, text=SOURCE.text + "\n")))
+    assert len(names) == 10
+    assert loading._fingerprint(SOURCE) in names
+
+
+# -- damage --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", ["empty", "half", "noise"])
+def test_damaged_files_are_compiled_anew(compiled_folder, folder, suffix, damage):
+    copied(compiled_folder, folder)
+    path = next(p for p in machine_code(folder) if p.suffix == f".{suffix}")
+    whole = path.read_bytes()
+    path.write_bytes({"empty": b"", "half": whole[: len(whole) // 2], "noise": b"\x93noise" * 40}[damage])
+    compiled = fresh()
+    assert works(compiled)
+    assert not compiled.from_cache
+    assert fresh().from_cache, "the repaired cache is used"
+
+
+def test_a_changed_module_file_is_written_anew(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    path = next(folder.glob("kernel_*.py"))
+    path.write_text(path.read_text().replace("2.0", "2.5") + "\nraise SystemExit('not ours')\n")
+    assert works(fresh())
+    assert path.read_text() == SOURCE.text
+
+
+def test_a_missing_index_is_no_problem(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    for path in machine_code(folder):
+        path.unlink()
+    assert works(fresh())
+
+
+def test_a_kernel_that_cannot_be_compiled_is_an_error(folder):
+    broken = dataclasses.replace(SOURCE, text=TINY.replace("2.0", "undefined_name"))
+    with pytest.raises(Exception, match="undefined_name"):
+        fresh(broken)
+
+
+# -- places that cannot be used ------------------------------------------------------------------------------
+
+
+def warned(match: str):
+    with pytest.warns(RuntimeWarning, match=match) as caught:
+        compiled = fresh()
+    assert len(caught) == 1
+    assert "kernels are not kept on disk" in str(caught[0].message)
+    assert works(compiled)
+    return compiled
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs POSIX permissions")
+@pytest.mark.parametrize("mode", [0o777, 0o720, 0o702])
+def test_a_folder_that_others_can_write_is_refused(compiled_folder, folder, mode):
+    copied(compiled_folder, folder)
+    folder.chmod(mode)
+    compiled = warned(r"can be written by others; run: chmod go-w")
+    assert Path(compiled.path).parent != folder
+    assert not compiled.from_cache
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs POSIX permissions")
+def test_machine_code_that_others_can_write_is_refused(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    (folder / "__pycache__").chmod(0o777)
+    assert not warned("can be written by others").from_cache
+
+
+def test_a_read_only_folder_is_no_problem(folder, monkeypatch):
+    folder.mkdir()
+    monkeypatch.setattr(cache.os, "access", lambda path, mode: False)
+    warned("is read-only; set SYNCHAIN_CACHE to a folder you can write")
+    assert not list(folder.iterdir())
+
+
+def test_a_folder_of_somebody_else_is_refused(folder, monkeypatch):
+    monkeypatch.setattr(cache.os, "getuid", lambda: 4711, raising=False)
+    warned("belongs to another user; set SYNCHAIN_CACHE to a folder of yours")
+
+
+def test_a_file_in_the_place_of_the_folder_is_no_problem(folder):
+    folder.write_text("no folder")
+    warned("exists")
+    assert folder.read_text() == "no folder"
+
+
+def test_a_missing_home_is_no_problem(monkeypatch):
+    def homeless() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("SYNCHAIN_CACHE", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", homeless)
+    warned("Could not determine home directory")
+
+
+def test_a_good_folder_gives_no_warning(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert fresh().from_cache
