@@ -179,7 +179,7 @@ def _left(equations: Equations, writer: Writer, c: int, here: Mapping[sp.Symbol,
 def _letters(
     equations: Equations, named: _Named, style: Style, symbols: tuple[sp.Symbol, ...], index: str
 ) -> dict[sp.Symbol, str]:
-    """How the states of one node and the time are written: chi and tau beside a friction law, velocities with a prime."""
+    """How the states of a node and the time are written: chi and tau beside a friction law, velocities with a prime."""
     node = equations.node
     plain = named.law is None or {"chi", "tau"} & {s.name for s in (*node.state, *node.parameters)}
     speeds = {velocity: c for c, velocity in _pairs(equations).items()}
@@ -194,7 +194,7 @@ def _ordered(e: sp.Expr, node: Node) -> list[sp.Expr]:
     """The terms of a node's equation: springs, damping, constants, what depends on time, friction last."""
 
     def place(term: sp.Expr) -> tuple[bool, bool, int, int, tuple[object, ...]]:
-        used = [c for c, s in enumerate(node.state) if term.has(s)]
-        return term.has(FRICTION), term.has(TIME), max(used, default=len(node.state)), sp.count_ops(term), sp.default_sort_key(term)
+        last = max((c for c, s in enumerate(node.state) if term.has(s)), default=len(node.state))
+        return term.has(FRICTION), term.has(TIME), last, sp.count_ops(term), sp.default_sort_key(term)
 
     return sorted((term for term in sp.Add.make_args(e) if term != 0), key=place)

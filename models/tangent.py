@@ -1,7 +1,7 @@
 """Tangent dynamics: what a small deviation does, along the orbit it deviates from.
 
-Both functions return equations like any others, so that a deviation is integrated by the same generated kernels and with
-its own exact Jacobian.
+Both functions return equations like any others, so that a deviation is integrated by the same generated kernels and
+with its own exact Jacobian.
 """
 
 from __future__ import annotations
@@ -61,8 +61,6 @@ def _extend(node: Node, coupling: sp.Matrix, parameters: tuple[sp.Symbol, ...]) 
         raise ValueError(f"the symbol {sorted(taken)[0]!r} is needed for the deviation; rename it in the model")
     rows = []
     for i, rhs in enumerate(node.rhs):
-        terms = ((derivative(rhs, s) + coupling[i, j]) * d for j, (s, d) in enumerate(zip(node.state, names, strict=True)))
-        rows.append(sp.Add(*terms))
+        slopes = (derivative(rhs, s) + coupling[i, j] for j, s in enumerate(node.state))
+        rows.append(sp.Add(*(slope * d for slope, d in zip(slopes, names, strict=True))))
     return Node((*node.state, *names), (*node.rhs, *rows), (*node.parameters, *parameters))
-
-

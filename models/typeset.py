@@ -22,7 +22,9 @@ VARIANTS = {"theta": ("\\vartheta", "ϑ"), "epsilon": ("\\varepsilon", "ε")}
 NAMES = {"atan": "arctan", "asin": "arcsin", "acos": "arccos", "sign": "sgn"}
 """Functions that LaTeX calls otherwise than SymPy."""
 
-LATEX_FUNCTIONS = {"arccos", "arcsin", "arctan", "cos", "cosh", "exp", "log", "max", "min", "sin", "sinh", "tan", "tanh"}
+LATEX_FUNCTIONS = {
+    "arccos", "arcsin", "arctan", "cos", "cosh", "exp", "log", "max", "min", "sin", "sinh", "tan", "tanh",
+}  # fmt: skip
 
 
 class Style(Protocol):
@@ -157,7 +159,7 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Writer:
-    """Writes expressions in one style; `letters` are the written forms of symbols, `variables` come last in products."""
+    """Writes expressions in one style; `letters` are the written forms of symbols, `variables` follow parameters."""
 
     style: Style
     letters: Mapping[sp.Symbol, str]

@@ -73,6 +73,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
         return code
     except BrokenPipeError:  # whoever reads the output has seen enough
+        _silence()
         return FINE
     except (Exception, KeyboardInterrupt) as problem:
         return _report(name, problem)
@@ -159,6 +160,11 @@ def _report(name: str, problem: BaseException) -> int:
     if sys.stderr is not None:
         with suppress(OSError):
             print(f"{name}: {words}", file=sys.stderr)
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:
+        _silence()
     return code
 
 
@@ -178,3 +184,12 @@ def _readable(stream: Any) -> None:
     """Write characters that the stream's encoding lacks as escapes instead of failing."""
     if getattr(stream, "errors", None) == "strict" and hasattr(stream, "reconfigure"):
         stream.reconfigure(errors="backslashreplace")
+
+
+def _silence() -> None:
+    """Let what is left in stdout's buffer go nowhere, so that the interpreter ends without a complaint."""
+    with suppress(OSError, ValueError):
+        descriptor = sys.stdout.fileno()
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, descriptor)
+        os.close(nowhere)

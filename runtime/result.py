@@ -100,6 +100,10 @@ class Result:
             kept = kept.reshape(cells, -1, kept.shape[-1])
             buffers.points = np.full((cells, max(kept.shape[1], buffers.points.shape[1]), kept.shape[2]), np.nan)
             buffers.points[:, : kept.shape[1]] = kept
+        again = buffers.counts[:, 0] != Status.FINISHED
+        buffers.counts[again] = 0
+        for array in (buffers.end, buffers.sums, buffers.points, buffers.samples):
+            array[again] = np.nan
 
 
 def open_result(path: str | os.PathLike[str]) -> Result:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import mpmath
 import sympy as sp
@@ -30,20 +31,26 @@ def made(graph: Topology, oscillator: str = "friction", friction: str | None = "
 
 
 def states(equations: Equations, seed: int, near: float | None = None) -> Values:
-    """Time and states at random, parameters from TABLE; with `near`, sliding velocities of 0.2 … 0.9 times near/kappa."""
+    """Time and states at random, parameters of TABLE; with `near`, sliding velocities 0.2 … 0.9 times near/kappa."""
     numbers = random.Random(seed)
     values = {sp.Symbol(name, real=True): mpmath.mpf(TABLE[name]) for name in equations.parameters}
     for name in equations.state:
         value = mpmath.mpf(numbers.uniform(-0.5, 0.5))
         if near is not None and name.startswith("v"):
-            value = mpmath.mpf(TABLE["theta_b"]) - near * mpmath.mpf(numbers.uniform(0.2, 0.9)) / mpmath.mpf(TABLE["kappa"])
+            sliding = near * mpmath.mpf(numbers.uniform(0.2, 0.9)) / mpmath.mpf(TABLE["kappa"])
+            value = mpmath.mpf(TABLE["theta_b"]) - sliding
         values[sp.Symbol(name, real=True)] = value
     return {**values, TIME: mpmath.mpf(numbers.uniform(0, 9))}
 
 
 def evaluate(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, mpmath.mpf]) -> list[mpmath.mpf]:
     """Expressions as mpmath numbers, in the precision that is set."""
-    return [mpmath.mpmathify(x) for x in sp.lambdify(list(values), list(expressions), "mpmath")(*values.values())]
+    return [mpmath.mpmathify(x) for x in _compiled(tuple(values), tuple(expressions))(*values.values())]
+
+
+@functools.cache
+def _compiled(symbols: tuple[sp.Symbol, ...], expressions: tuple[sp.Expr, ...]) -> Callable[..., list]:
+    return sp.lambdify(list(symbols), list(expressions), "mpmath")
 
 
 def slopes(expressions: Sequence[sp.Expr], along: Mapping[sp.Symbol, mpmath.mpf], values: Values) -> list[mpmath.mpf]:

@@ -47,6 +47,10 @@ def matrix(folder: Path, text: str) -> str:
     return str(path)
 
 
+BUFFERED = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+"""The environment of a user, whose output waits in a buffer until the end."""
+
+
 def synchain(words: str, **options: Any) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "synchain.runtime", *words.split()]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, **options)
@@ -161,7 +165,10 @@ def test_equations_in_three_forms(capsys: pytest.CaptureFixture[str]) -> None:
     assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(present.as_dict(equations)))
 
 
-def test_kernel_prints_the_source_without_compiling(scene: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_kernel_prints_the_source_without_compiling(
+    scene: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(sweep, "load")
     assert main(["kernel", scene]) == 0
     out = capsys.readouterr().out
     assert out == sweep.kernel_source(load_scene(scene)).text
@@ -311,15 +318,25 @@ def test_thresholds_of_a_scene_of_a_matrix_and_of_other_graphs(
     asked: list[dict[str, Any]] = []
     monkeypatch.setattr(threshold, "thresholds", fake_thresholds(asked))
     own = matrix(tmp_path, "-2 2\n2 -2")
+    (tmp_path / "ring.toml").write_text('topology = {name = "ring", n = 3}')
     for words in (
         "--scene figure_6 --transient 50 --starts 3",
         "--scene figure_6 --n 4 --topology ring --omega 1.2",
         f"--matrix {own} --omega 1.15",
         "--scene harmonic_chain",
+        f"--scene {tmp_path}/ring.toml --n 5",
+        "--scene figure_6 --topology ring",
     ):
         assert main(["thresholds", *words.split(), "--json"]) == 0
     graphs = [(a["scene"].topology.name, a["scene"].n, a["scene"].omega) for a in asked]
-    assert graphs == [("chain", 3, 1.55), ("ring", 4, 1.2), ("G.txt", 2, 1.15), ("chain", 5, None)]
+    assert graphs == [
+        ("chain", 3, 1.55),
+        ("ring", 4, 1.2),
+        ("G.txt", 2, 1.15),
+        ("chain", 5, None),
+        ("ring", 5, 1.15),
+        ("ring", 3, 1.55),
+    ]
     assert (asked[0]["criterion"].transient, asked[0]["criterion"].starts) == (50.0, 3)
     assert asked[3]["scene"].parameters["sigma"] == 0.5
 
@@ -342,6 +359,19 @@ def test_figures_are_made_by_their_names(
     assert main(["figures", "--quick", "4b", "--out", str(tmp_path / "out"), "thresholds", "--workers", "1"]) == 0
     assert capsys.readouterr().out == f"{tmp_path / 'out' / 'figure_4b.png'}\n"
     assert asked == [(["figure_4b", "thresholds"], tmp_path / "out", True, 1, None)]
+
+
+def test_benchmarks_print_a_table_each(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    from synchain.runtime.bench import precision
+
+    asked: list[bool] = []
+    monkeypatch.setattr(precision, "measure", lambda quick: asked.append(quick) or [(2, "scalar", 0.25)])
+    assert main(["bench", "--quick", "precision"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "Numba" in lines[0]
+    assert lines[2] == "precision"
+    assert lines[-1] == "| 2 | scalar | 0.25 |"
+    assert asked == [True]
 
 
 def test_the_cache_is_described_and_emptied(
@@ -415,6 +445,7 @@ WRONG = [
     ("figures nope", "unknown figure 'nope'"),
     ("figures 4b --out {scene}", "cannot make the folder"),
     ("cache empty", "invalid choice"),
+    ("bench nope", "unknown benchmark 'nope'; known: precision"),
 ]
 
 
@@ -535,22 +566,18 @@ def test_warnings_are_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
     assert capsys.readouterr().err == "warning: the cache is read-only\n"
 
 
-def test_a_reader_that_leaves_early_ends_it_quietly() -> None:
-    command = f"'{sys.executable}' -m synchain.runtime spectrum chain 40 --json | true; exit ${{PIPESTATUS[0]}}"
-    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60)
+@pytest.mark.parametrize("words", ["topologies", "kernel two_oscillators"])
+def test_a_reader_that_leaves_early_ends_it_quietly(words: str) -> None:
+    command = f"'{sys.executable}' -m synchain.runtime {words} | true; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60, env=BUFFERED)
     assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
 def test_output_that_cannot_be_written_is_a_failure() -> None:
     with open("/dev/full", "w") as full:
-        done = subprocess.run(
-            [sys.executable, "-m", "synchain.runtime", "scenes"],
-            stdout=full,
-            stderr=subprocess.PIPE,
-            text=True,
-            timeout=60,
-        )
+        command = [sys.executable, "-m", "synchain.runtime", "scenes"]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, env=BUFFERED)
     assert done.returncode == 1
     assert done.stderr == "synchain scenes: No space left on device\n"
 

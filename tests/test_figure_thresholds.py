@@ -125,3 +125,15 @@ def test_the_probe_of_a_pair_is_its_own_network(simulation: Simulation) -> None:
     assert pair.intervals == ((0.045, 0.3),)
     assert pair.x[-1] == 0.6
     assert simulation.networks == []
+
+
+def test_longer_and_shorter_transients_are_compared(simulation: Simulation, tmp_path: Path) -> None:
+    simulation.failed = (0,)
+    make(["transient"], tmp_path)
+    found = rows(tmp_path / "transient.csv")
+    assert sorted({float(row["transient"]) for row in found}) == [100.0, 300.0, 1000.0, 3000.0]
+    assert {(row["n"], row["omega"]) for row in found} == {("2", "1.4"), ("2", "1.55"), ("3", "1.55"), ("4", "1.4")}
+    assert sum(row["status"] == "failed" for row in found) == 4 * 4
+    ends = [float(row["sigma"]) for row in found if row["n"] == "3" and row["transient"] == "100"]
+    assert (ends[0], ends[-1]) == pytest.approx((0.156, 0.216))
+    assert {0.176, 0.196} <= set(ends)

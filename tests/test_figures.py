@@ -72,7 +72,7 @@ def test_a_folder_that_cannot_be_made_is_an_error_before_anything_is_done(
 # -- files -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", [*names(), "transient"])
 def test_a_figure_is_written_as_png_svg_and_csv(name: str, tmp_path: Path, simulation: Simulation) -> None:
     written = make([name], tmp_path / "out", quick=True)
     assert set(written) == set((tmp_path / "out").iterdir())

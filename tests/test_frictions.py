@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import inspect
+import random
 from types import ModuleType
 
 import pytest
 import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from synchain.models.frictions import CONTACTS, KAPPA, regularise
 from synchain.models.nondimensional import friction_coefficient
@@ -65,6 +68,23 @@ def test_drags_along_and_never_drives(name: str) -> None:
     for speed in SPEEDS:
         assert f.subs(W, speed) > 0
         assert f.subs(W, -speed) < 0
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("contact", CONTACTS)
+@given(st.integers(0, 10**6), st.floats(1e-9, 1e3))
+@settings(max_examples=25, deadline=None)
+def test_never_drives_with_any_allowed_parameters(name: str, contact: str, seed: int, speed: float) -> None:
+    """w f(w) >= 0 also where friction grows with speed, mu_s < mu_k, and f(0) = 0 exactly, smoothed or not."""
+    numbers, law = random.Random(seed), load("friction", name)
+    values = {
+        sp.Symbol(p, real=True): sp.Rational(allowed.check(p, numbers.choice([0.01, 0.3, 2.0, 50.0])))
+        for p, allowed in {**law.PARAMETERS, "kappa": KAPPA}.items()
+    }
+    f = friction_coefficient(law, contact)(W).xreplace(values)
+    assert f.xreplace({W: sp.S.Zero}) == 0
+    assert f.xreplace({W: sp.Rational(speed)}).evalf() >= 0
+    assert f.xreplace({W: -sp.Rational(speed)}).evalf() <= 0
 
 
 @pytest.mark.parametrize("name", LAWS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from fractions import Fraction
 
 import pytest
@@ -140,7 +141,10 @@ def test_connectivity_of_one_way_links_is_the_jacobian_of_the_forces(coupling: s
 
 def test_connectivity_of_a_thousand_nodes() -> None:
     ring = topology("ring", 1000)
-    assert connectivity("spring", ring) == ring.rows
+    start = time.process_time()
+    found = connectivity("spring", ring)
+    assert time.process_time() - start < 1
+    assert found == ring.rows
 
 
 def test_a_coupling_without_a_matrix_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

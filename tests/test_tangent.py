@@ -171,7 +171,7 @@ def test_a_mode_needs_links() -> None:
 
 
 def test_a_mode_needs_a_synchronous_state() -> None:
-    with pytest.raises(ValueError, match="a link acts between equal states, so complete synchronisation is no solution"):
+    with pytest.raises(ValueError, match="between equal states, so complete synchronisation is no solution"):
         transversal(with_link(lambda s: s["sigma"] * s["weight"] * s["x_j"]))
 
 

@@ -154,18 +154,20 @@ def locate(hits, low, high, g_low, g_high, t, h, y, p, y_new, dense):
     """
     a, b, fa, fb = select(hits, low, high), high, g_low, g_high
     for k in range(60):
-        if not any_lane(absolute(b - a) > 1e-15):
+        active = absolute(b - a) > 1e-15  # the others are done and must not move, whatever their neighbours need
+        if not any_lane(active):
             break
         secant = b - fb * (b - a) / (fb - fa)
         good = (secant - a) * (b - secant) > 0.0
         c = select(good, secant, 0.5 * (a + b)) if k % 4 != 3 else 0.5 * (a + b)
+        c = select(active, c, b)
         fc = section(c, t, h, y, p, y_new, dense)
         done = (fc == 0.0) | (absolute(c - b) <= 1e-15)
         other = fc * fb < 0.0  # the zero lies between c and b
         weight = 1.0 - fc / fb
-        a, fa = select(other, b, a), select(other, fb, fa * select(weight > 0.0, weight, 0.5))
+        near, f_near = select(other, b, a), select(other, fb, fa * select(weight > 0.0, weight, 0.5))
+        a, fa = select(active, select(done, c, near), b), select(active, f_near, fa)
         b, fb = c, fc
-        a = select(done, b, a)
     return b
 
 
@@ -236,13 +238,15 @@ def outcome(which, lane, y, control):
         return FINISHED
     if control[CANCEL] != 0.0:
         return INTERRUPTED
+    largest = 0.0
     for c in range(DIMENSION):
-        if not abs(y[c * WIDTH + which]) < 1e100:
-            return DIVERGED
+        largest = max(largest, abs(y[c * WIDTH + which]))
+    if not largest < 1e100:
+        return DIVERGED
     if lane[ACCEPTED * WIDTH + which] + lane[REJECTED * WIDTH + which] >= control[MAX_STEPS]:
         return BUDGET
     if lane[STEP * WIDTH + which] <= 4e-16 * max(1.0, t):
-        return UNDERFLOW
+        return DIVERGED if largest > 1e8 else UNDERFLOW  # a blow-up in finite time stops the steps first
     return 0
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -86,6 +87,12 @@ class Study:
             sigma = np.array(scene.axes[0].values)
             self._sweeps[scene] = simulate(scene.replace(axes=(), record=("sync_error",)), sigma, **self._options(1.0))
         return self._sweeps[scene]
+
+    def after(self, scene: Scene, sigma: np.ndarray, transient: float) -> Sweep:
+        """Errors and shares at these values of sigma after a transient of another length; ends are not refined."""
+        criterion = replace(self.quality.criterion, transient=transient)
+        options = {**self._options(1.0), "criterion": criterion, "resolution": math.inf}
+        return simulate(scene.replace(axes=(), record=("sync_error",)), sigma, **options)
 
     def predicted(self, scene: Scene) -> list[Interval]:
         """What the probe's ranges leave of a scene's values of sigma, through its exact spectrum."""

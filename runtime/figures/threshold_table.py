@@ -17,7 +17,7 @@ from .study import Quality, Study
 from .style import BLUE, COLUMN, GREEN, ORANGE, failures
 from .tables import Table
 
-__all__ = ["NAMES", "SIZE", "Row", "compute", "document", "draw", "nearest", "table"]
+__all__ = ["NAMES", "SIZE", "Row", "compute", "document", "draw", "nearest", "scene_of", "table"]
 
 NAMES = ("thresholds",)
 SIZE = (COLUMN, 4.1)
@@ -73,14 +73,14 @@ def compute(name: str, study: Study) -> Comparison:
 
 
 def _row(n: int, omega: float, study: Study) -> Row:
-    scene = _scene(n, omega, study)
+    scene = scene_of(n, omega, study)
     found = study.network(scene)
     predicted = tuple(study.predicted(scene))
     failed = int((~np.isfinite(found.error)).sum())
     return Row(n, omega, found.intervals, predicted, published(n, omega), failed, len(found.x))
 
 
-def _scene(n: int, omega: float, study: Study) -> Scene:
+def scene_of(n: int, omega: float, study: Study) -> Scene:
     """The scene of the figure that shows this chain, so that both share their runs, or one made for it."""
     for scene in map(load_scene, projection.NAMES):
         if (scene.n, scene.parameters["omega"]) == (n, omega):
