@@ -4,7 +4,7 @@ Reductions follow the classical scheme (Cody & Waite, *Software Manual for the E
 logarithm's final sum as in Tang, ACM Trans. Math. Softw. 16, 378, 1990).  The polynomials are our own Remez fits in
 50-digit arithmetic, weighted by the relative error of the result; the bound stands beside each.
 The circular functions subtract three parts of pi/2: their error is below 1.5 units in the last place up to |x| = 1e9, below
-1e-15 up to 1e15, and beyond, where neighbouring doubles lie further apart than a radian matters, they stay within [-1, 1].
+2e-15 up to 1e15, and beyond, where neighbouring doubles lie further apart than a radian matters, they stay within [-1, 1].
 """
 
 from __future__ import annotations

@@ -66,45 +66,43 @@ def program(equations: Equations) -> Program:
 
 def order(size: int, pattern: set[Entry]) -> Plan:
     """Pivots by least degree in the symmetrised pattern, rows without a diagonal entry of J first; O(fill log n)."""
-    near: list[set[int]] = [set() for _ in range(size)]
     rows: list[set[int]] = [set() for _ in range(size)]
     columns: list[set[int]] = [set() for _ in range(size)]
     for r, c in pattern:
         if r != c:
-            near[r].add(c)
-            near[c].add(r)
             rows[r].add(c)
             columns[c].add(r)
+    near = [rows[k] | columns[k] for k in range(size)]
     late = [(k, k) in pattern for k in range(size)]
     heap = [(late[k], len(near[k]), k) for k in range(size)]
     heapq.heapify(heap)
-    done = [False] * size
-    found, below, after = [], [], []
-    while heap:
+    left, found, below, after = set(range(size)), [], [], []
+    while left:
         _, degree, k = heapq.heappop(heap)
-        if done[k] or degree != len(near[k]):
+        if k not in left or degree != len(near[k]):
             continue  # an outdated entry: the current one is in the heap as well
-        done[k] = True
-        down, right = sorted(columns[k]), sorted(rows[k])
-        for r in down:
-            rows[r].discard(k)
-            rows[r].update(c for c in right if c != r)
-        for c in right:
-            columns[c].discard(k)
-            columns[c].update(r for r in down if r != c)
-        for j in near[k]:
-            near[j].discard(k)
-        for r in down:
-            for c in right:
-                if r != c:
-                    near[r].add(c)
-                    near[c].add(r)
+        left.remove(k)
+        found.append(k)
+        below.append(tuple(sorted(columns[k])))
+        after.append(tuple(sorted(rows[k])))
+        _eliminate(k, rows, columns, near)
         for j in near[k]:
             heapq.heappush(heap, (late[j], len(near[j]), j))
-        found.append(k)
-        below.append(tuple(down))
-        after.append(tuple(right))
     return Plan(tuple(found), tuple(below), tuple(after))
+
+
+def _eliminate(k: int, rows: list[set[int]], columns: list[set[int]], near: list[set[int]]) -> None:
+    """Take pivot k out of the pattern and add the fill that it causes."""
+    for r in columns[k]:
+        rows[r].discard(k)
+        rows[r] |= rows[k] - {r}
+        near[r] |= rows[k] - {r}
+    for c in rows[k]:
+        columns[c].discard(k)
+        columns[c] |= columns[k] - {c}
+        near[c] |= columns[k] - {c}
+    for j in near[k]:
+        near[j].discard(k)
 
 
 def _slots(size: int, steps: Plan) -> dict[Entry, int]:

@@ -279,13 +279,13 @@ def test_resume_refuses_another_scene_and_a_missing_file(
 def fake_thresholds(found: list[dict[str, Any]]) -> Any:
     """In place of minutes of simulation: ranges with open and closed ends, and a record of what was asked for."""
 
-    def thresholds(scene: Any, *, sigma: Any, criterion: Any, workers: Any) -> threshold.Thresholds:
-        found.append({"scene": scene, "sigma": sigma, "workers": workers, "criterion": criterion})
+    def thresholds(scene: Any, *, criterion: Any, **options: Any) -> threshold.Thresholds:
+        found.append({"scene": scene, "criterion": criterion, **options})
         x = np.linspace(0.0, 0.6, 3)
         nothing = np.zeros(3)
         pair = threshold.Sweep(2 * x, nothing, nothing, ((0.0, 0.466), (0.9, 1.2)))
         direct = threshold.Sweep(x, nothing, nothing, ((0.0, 0.15), (0.3, 0.6)))
-        return threshold.Thresholds(scene, pair, ((0.0, 0.155),), direct, criterion, ("a warning",))
+        return threshold.Thresholds(scene, pair, ((0.0, 0.155), (0.3, 0.4)), direct, criterion, ("a warning",))
 
     return thresholds
 
@@ -298,13 +298,14 @@ def test_thresholds_as_json_and_as_a_table(monkeypatch: pytest.MonkeyPatch, caps
     assert json.loads(capsys.readouterr().out) == {
         "intervals": [[0.0, 0.15], [0.3, 0.6]],
         "probe": [[0.0, 0.466], [0.9, 1.2]],
-        "predicted": [[0.0, 0.155]],
+        "predicted": [[0.0, 0.155], [0.3, 0.4]],
         "warnings": ["a warning"],
     }
     assert main(words) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "chain(3), omega = 1.15: where all oscillators synchronise"
     assert lines[1].split(maxsplit=2)[2] == "[0.0000, 0.1500], [0.3000, 0.6000...]"
+    assert lines[2].endswith("[0.0000, 0.1550], [0.3000, 0.4000...]")  # the probe ends at 1.2 / 3
     assert next(line for line in lines if "Wu-Chua" in line).endswith(" [0.0000, 0.1553]")  # 0.466 / 3
     assert asked[0]["sigma"] == (0.0, 0.1, 0.2, 0.3, 0.4)
     assert asked[0]["workers"] == 2
@@ -339,6 +340,19 @@ def test_thresholds_of_a_scene_of_a_matrix_and_of_other_graphs(
     ]
     assert (asked[0]["criterion"].transient, asked[0]["criterion"].starts) == (50.0, 3)
     assert asked[3]["scene"].parameters["sigma"] == 0.5
+
+
+def test_thresholds_in_a_hurry(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    asked: list[dict[str, Any]] = []
+    monkeypatch.setattr(threshold, "thresholds", fake_thresholds(asked))
+    for words in ("", "--quick", "--quick --starts 2 --sigma 0:1:3"):
+        assert main(["thresholds", "--n", "2", "--omega", "1.15", *words.split()]) == 0
+    full, quick, own = (a["criterion"] for a in asked)
+    assert full == threshold.Criterion()
+    assert (quick.starts, quick.transient) == (5, 400.0)
+    assert (own.starts, own.transient) == (2, 400.0)
+    assert [len(a["sigma"]) for a in asked] == [241, 121, 3]
+    assert asked[0]["resolution"] < asked[1]["resolution"] == asked[2]["resolution"]
 
 
 def test_thresholds_really_simulates(capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import random
+import sys
 
 import mpmath
+import numpy as np
 import pytest
 import sympy as sp
 from mpmath import mp, mpf
@@ -13,6 +15,7 @@ from samples import CASES, DIGITS, TABLE, friction_chain, harmonic_chain, plain,
 
 from synchain.codegen import integrators, printer
 from synchain.codegen.emit import emit
+from synchain.codegen.sparse import program
 from synchain.models.equations import TIME, Equations
 
 SMALL = mpf(10) ** -38
@@ -127,18 +130,24 @@ def close(found: list, expected: list, allowed=SMALL) -> bool:
     return len(found) == len(expected) and all(abs(a - b) <= allowed * size for a, b in zip(found, expected, strict=True))
 
 
+@pytest.mark.parametrize("looped", [False, True], ids=["written out", "looped"])
 @pytest.mark.parametrize("method", integrators.names())
 @pytest.mark.parametrize("case", CASES)
-def test_a_step_is_what_its_definition_says(case, method, exact_numbers):
+def test_a_step_is_what_its_definition_says(case, method, looped, exact_numbers, monkeypatch):
     eq, m = CASES[case], integrators.integrator(method)
+    if looped:
+        monkeypatch.setattr(sys.modules["synchain.codegen.emit"], "LARGEST_UNROLLED", 0)
     space = plain(emit(eq, method, ("trajectory",), width=1).text, EXACT)
+    assert space["LOOPED"] is looped
+    weights = [mpf(w.numerator) / w.denominator for _, _, w in eq.links]
+    graph = (program(eq).arrays, np.array(weights, object)) if looped else ()
     for seed in range(6 if "friction" in case else 3):
         y, p = states(eq, seed)
         t, h = mpf(seed) / 3, mpf(1) / (20 + 30 * seed)
         reference = rosenbrock_reference if m.kind == "rosenbrock" else explicit_reference
         new, error, dense = reference(m, Right.of(eq, p), t, h, y)
         rtol, atol = mpf(1) / 7, mpf(1) / 1000
-        step = take_step(space, t, h, y, p, rtol, atol)
+        step = take_step(space, t, h, y, p, rtol, atol, *graph)
         assert close(step.y_new, new)
         assert close(step.dense, dense)
         scaled = [e / (atol + rtol * max(abs(a), abs(b))) for e, a, b in zip(error, y, new, strict=True)]

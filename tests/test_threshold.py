@@ -15,11 +15,15 @@ SHORT = Criterion(transient=100, window=20, starts=2, tolerance=1e-3)
 
 def test_projection_is_the_intersection_over_all_modes():
     spectrum = chain(3).spectrum  # 0, -1, -3
-    assert project([(0.3, 1.2)], spectrum) == pytest.approx([(0.3, 0.4)])
-    assert project([(0.3, 0.8)], spectrum) == []
-    assert project([(0.0, 0.9)], spectrum) == pytest.approx([(0.0, 0.3)])
-    ragged = project([(0.0, 0.1), (0.3, 1.2)], spectrum)
-    assert ragged == [pytest.approx(i) for i in [(0.0, 0.1 / 3), (0.3, 0.4)]]
+    for ranges, expected in (
+        ([(0.3, 1.2)], [(0.3, 0.4)]),
+        ([(0.3, 0.8)], []),
+        ([(0.0, 0.9)], [(0.0, 0.3)]),
+        ([(0.0, 0.1), (0.3, 1.2)], [(0.0, 0.1 / 3), (0.3, 0.4)]),
+    ):
+        found = project(ranges, spectrum)
+        assert np.shape(found) == np.shape(expected)
+        np.testing.assert_allclose(np.ravel(found), np.ravel(expected), rtol=1e-14)
     assert critical_ratio(spectrum) == pytest.approx(3)
     assert critical_ratio(complete(7).spectrum) == 1.0
 
@@ -78,7 +82,9 @@ def test_exponent_of_linear_nodes_is_exact():
     """x'' = -delta x' - (1 + alpha) x: every mode decays at delta/2 while it is underdamped."""
     scene = Scene(oscillator="duffing", topology=chain(2), parameters={"beta": 0.0, "delta": 0.2, "u": 0.1})
     found = exponents(scene, [0.0, 0.5, 2.0], periods=300, transient=20, starts=1, block=10)
-    assert found.exponent == pytest.approx(-0.1, abs=2e-4)  # the phase of the turning deviation leaves 1/time
+    # the deviation turns on an ellipse of axes 1 and sqrt(1 + alpha): its length says that little about the growth
+    bound = np.log(np.sqrt(1 + found.alpha)) / found.time + 1e-5
+    assert np.all(np.abs(found.exponent + 0.1) < bound)
     assert found.intervals == ((0.0, 2.0),)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ._arguments import above_zero, add_workers, grid, positive, whole
 from ._outcome import FINE, WrongUse, print_json, warn, wrong_use
@@ -20,8 +20,13 @@ SUMMARY = "measure for which coupling a network synchronises, beside the predict
 EXAMPLES = (
     "synchain thresholds --n 4 --omega 1.15",
     "synchain thresholds --n 6 --topology star --omega 1.4 --sigma 0:0.3:121 --json",
-    "synchain thresholds --matrix G.txt --omega 1.55",
+    "synchain thresholds --matrix G.txt --omega 1.55 --quick",
 )
+
+FULL = {"starts": 8, "transient": 1000.0, "window": 100.0}
+QUICK = {"starts": 5, "transient": 400.0, "window": 50.0}
+FINE_ENDS, COARSE = 5e-4, 2e-3
+"""How closely the ends of the ranges are located in sigma."""
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -41,15 +46,14 @@ def configure(parser: ArgumentParser) -> None:
         type=grid,
         help="coupling to look at (default: 0:0.6:241); ranges narrower than its step are not seen",
     )
+    parser.add_argument("--starts", metavar="K", type=positive, help="initial states for each value (default: 8)")
     parser.add_argument(
-        "--starts", metavar="K", type=positive, default=8, help="initial states for each value (default: 8)"
+        "--transient", metavar="P", type=above_zero, help="drive periods before the error is averaged (default: 1000)"
     )
     parser.add_argument(
-        "--transient",
-        metavar="P",
-        type=above_zero,
-        default=1000.0,
-        help="drive periods before the error is averaged over 100 more (default: 1000)",
+        "--quick",
+        action="store_true",
+        help=f"defaults of {QUICK['starts']} starts, {QUICK['transient']:g} periods and half the grid; ends to {COARSE:g}",
     )
     parser.add_argument("--json", action="store_true", help="print JSON: intervals, probe, predicted, warnings")
     add_workers(parser)
@@ -68,14 +72,27 @@ def execute(arguments: Namespace) -> int:
                 "the scene has no coupling constant sigma; expected a coupled network; choose another --scene"
             )
         kernel_source(scene)
-        criterion = Criterion(starts=arguments.starts, transient=arguments.transient)
+        criterion = Criterion(**_effort(arguments))
     warn(scene.warnings)
-    found = thresholds(scene, sigma=arguments.sigma, criterion=criterion, workers=arguments.workers)
+    found = thresholds(
+        scene,
+        sigma=arguments.sigma or grid("0:0.6:121" if arguments.quick else "0:0.6:241"),
+        resolution=COARSE if arguments.quick else FINE_ENDS,
+        criterion=criterion,
+        workers=arguments.workers,
+    )
     if arguments.json:
         print_json(found.as_dict())
     else:
         print(report(found, criterion))
     return FINE
+
+
+def _effort(arguments: Namespace) -> dict[str, Any]:
+    """The criterion's numbers: those of --quick or the full ones, unless given."""
+    effort: dict[str, Any] = dict(QUICK if arguments.quick else FULL)
+    effort.update({name: getattr(arguments, name) for name in ("starts", "transient") if getattr(arguments, name)})
+    return effort
 
 
 def _scene(arguments: Namespace) -> Scene:
@@ -118,14 +135,15 @@ def _graph(arguments: Namespace, scene: Scene | None) -> Topology:
 
 def report(found: Thresholds, criterion: Criterion) -> str:
     """The ranges as a table."""
-    scene, end = found.scene, float(found.direct.x[-1])
+    scene, end, reach = found.scene, float(found.direct.x[-1]), float(found.probe.x[-1])
+    steepest = max(abs(value) for value in scene.topology.spectrum.values)
     drive = f", omega = {scene.omega:g}" if scene.omega is not None else ""
     unit = "drive periods" if scene.time_unit == "period" else "units of time"
     rows = [
         ("sigma, simulated", _written(found.direct.intervals, end)),
-        ("sigma, predicted by the probe", _written(found.predicted, end)),
+        ("sigma, predicted by the probe", _written(found.predicted, min(end, reach / steepest))),
         *_wu_chua(found),
-        ("alpha = sigma |gamma|, probe", _written(found.probe.intervals, float(found.probe.x[-1]))),
+        ("alpha = sigma |gamma|, probe", _written(found.probe.intervals, reach)),
     ]
     wide = max(len(name) for name, _ in rows)
     return "\n".join(
@@ -155,5 +173,5 @@ def _wu_chua(found: Thresholds) -> list[tuple[str, str]]:
 
 
 def _written(ranges: Sequence[Interval], end: float) -> str:
-    words = [f"[{low:.4f}, {high:.4f}{'...' if high >= end else ''}]" for low, high in ranges]
+    words = [f"[{low:.4f}, {high:.4f}{'...' if high >= end * (1 - 1e-12) else ''}]" for low, high in ranges]
     return ", ".join(words) or "none"

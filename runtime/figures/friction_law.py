@@ -67,7 +67,7 @@ def draw(axes: Any, data: Law) -> Any:
     axes.plot(data.w, data.smooth, color=BLUE)
     axes.set(xlim=(-1, 1), ylim=(-0.36, 0.36), xticks=[-1, -0.5, 0, 0.5, 1], xlabel=r"relative velocity $\vartheta_r$",
              ylabel=r"friction $f(\vartheta_r)$")  # fmt: skip
-    _magnify(axes.inset_axes((0.59, 0.17, 0.36, 0.31)), data)
+    _magnify(axes.inset_axes((0.62, 0.17, 0.35, 0.31)), data)
     return axes
 
 
