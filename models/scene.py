@@ -30,9 +30,9 @@ class Scene:
 
     Every keyword has a default; the same names are the keys of a scene file (see docs/scenes.md).  States,
     parameters and times are non-dimensional; `transient` and `window` count periods of the drive 2 pi/omega
-    where `time_unit` is "period", the default where there is a drive.  `atol` is a tenth of `rtol` unless given.  `friction` "default" is "exponential"
-    where the oscillator takes a friction law, else None.  Raises ValueError or TypeError on anything that the
-    model does not know or cannot be given.
+    where `time_unit` is "period", the default where there is a drive.  `atol` is a tenth of `rtol` unless given.
+    `friction` "default" is "exponential" where the oscillator takes a friction law, else None.  Raises ValueError
+    or TypeError on anything that the model does not know or cannot be given.
     """
 
     title: str

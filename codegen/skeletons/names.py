@@ -28,7 +28,7 @@ TRAJECTORY = False
 """Records of this kernel; what is False costs nothing."""
 
 
-def step(t: Any, h: Any, y: Any, p: Any, y_new: Any, dense: Any, rtol: Any, atol: Any) -> Any:
+def step(t: Any, h: Any, y: Any, p: Any, y_new: Any, dense: Any, rtol: Any, atol: Any, *network: Any) -> Any:
     """One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."""
 
 

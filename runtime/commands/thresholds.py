@@ -25,7 +25,7 @@ EXAMPLES = (
 
 FULL = {"starts": 8, "transient": 1000.0, "window": 100.0}
 QUICK = {"starts": 5, "transient": 400.0, "window": 50.0}
-FINE_ENDS, COARSE = 5e-4, 2e-3
+RESOLUTION, COARSE = 5e-4, 2e-3
 """How closely the ends of the ranges are located in sigma."""
 
 
@@ -77,7 +77,7 @@ def execute(arguments: Namespace) -> int:
     found = thresholds(
         scene,
         sigma=arguments.sigma or grid("0:0.6:121" if arguments.quick else "0:0.6:241"),
-        resolution=COARSE if arguments.quick else FINE_ENDS,
+        resolution=COARSE if arguments.quick else RESOLUTION,
         criterion=criterion,
         workers=arguments.workers,
     )

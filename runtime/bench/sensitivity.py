@@ -1,0 +1,62 @@
+"""What the measured thresholds hang on: one choice of the criterion changed at a time.
+
+Each row is the widest synchronous range of sigma found with one choice changed, ends refined to 5e-4.  The exponent's row
+is where the transversal exponent of the synchronous state is negative: it knows no zero-error threshold and no transient.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from synchain.models.scene import Scene
+from synchain.models.topology import topology
+
+from ..exponent import exponents
+from ..intervals import Interval
+from ..threshold import Criterion, project, simulate
+
+__all__ = ["CASES", "CHANGES", "COLUMNS", "measure"]
+
+COLUMNS = ("n", "omega", "what is different", "lower end", "upper end", "ranges found")
+CASES = ((2, 1.15, 0.0, 0.3), (2, 1.40, 0.02, 0.34), (2, 1.55, 0.06, 0.34), (3, 1.55, 0.16, 0.22))
+"""Oscillators, drive frequency, and the grid of sigma from … to, 57 points."""
+
+CHANGES: tuple[tuple[str, dict[str, float | int]], ...] = (
+    ("nothing: 1000 periods, 1e-3, 8 starts, rtol 1e-8", {}),
+    ("transient 300 periods", {"transient": 300.0}),
+    ("transient 3000 periods", {"transient": 3000.0}),
+    ("window 400 periods", {"window": 400.0}),
+    ("zero-error threshold 1e-6", {"tolerance": 1e-6}),
+    ("zero-error threshold 1e-2", {"tolerance": 1e-2}),
+    ("one start, the stated one", {"starts": 1}),
+    ("other starts", {"seed": 1}),
+    ("rtol 1e-6", {"rtol": 1e-6}),
+    ("rtol 1e-10", {"rtol": 1e-10}),
+)
+
+
+def measure(quick: bool = False) -> list[tuple[object, ...]]:
+    """Return the rows of the table, in the order of COLUMNS; `quick` takes the first case and three choices."""
+    rows: list[tuple[object, ...]] = []
+    for n, omega, low, high in CASES[:1] if quick else CASES:
+        scene = Scene(topology=topology("chain", n), parameters={"omega": omega})
+        grid = np.linspace(low, high, 13 if quick else 57)
+        for words, change in CHANGES[:3] if quick else CHANGES:
+            criterion = replace(Criterion(), **change)  # type: ignore[arg-type]
+            found = simulate(scene, grid, criterion=criterion).intervals
+            rows.append((n, omega, words, *_widest(found), len(found)))
+        rows.append((n, omega, "sign of the transversal exponent", *_by_exponent(scene, grid, quick)))
+    return rows
+
+
+def _by_exponent(scene: Scene, grid: np.ndarray, quick: bool) -> tuple[float, float, int]:
+    alpha = np.linspace(0.02 if grid[0] > 0 else 0.0, 0.7, 36 if quick else 137)
+    found = exponents(scene, alpha, periods=300 if quick else 4000, starts=2 if quick else 8)
+    ranges = project(found.intervals, scene.topology.spectrum)
+    return (*_widest(ranges), len(ranges))
+
+
+def _widest(found: tuple[Interval, ...] | list[Interval]) -> Interval:
+    return max(found, key=lambda interval: interval[1] - interval[0], default=(float("nan"), float("nan")))
