@@ -62,7 +62,7 @@ def _piece(e: sp.Expr) -> tuple[str, int]:
 
 
 def _number(e: sp.Expr) -> tuple[str, int]:
-    value = float(e)
+    value = float(e if e.is_Rational else e.evalf(30))
     if not abs(value) <= 1.7976931348623157e308:
         raise UnprintableError(f"the number {e} does not fit into a double; rescale the equations")
     return repr(value), ATOM if value >= 0 else SUM

@@ -94,20 +94,24 @@ def run(
     """
     scene = with_axes(scene, axes)
     cells = plan(scene)
-    job = _job(scene, cells, kernel(scene, width), worker_count(workers))
-    if resume is not None:
-        resume.restore(scene, job.buffers)
+    workers = worker_count(workers)
     bar = tqdm(total=scene.cells, unit="cell", disable=None if show_progress is None else not show_progress)
-    job.advance = bar.update
-    try:
-        with bar:
+    with bar:
+        bar.set_description_str("compiling")
+        job = _job(scene, cells, kernel(scene, width), workers)
+        bar.set_description_str("")
+        bar.unpause()
+        job.advance = bar.update
+        if resume is not None:
+            resume.restore(scene, job.buffers)
+        try:
             if scene.continuation == "none":
                 _run_all(job)
             else:
                 _run_along(scene, job)
             _complete_points(job)
-    except KeyboardInterrupt:
-        raise SweepInterrupted(_report(scene, job)) from None
+        except KeyboardInterrupt:
+            raise SweepInterrupted(_report(scene, job)) from None
     return _report(scene, job)
 
 

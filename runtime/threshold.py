@@ -102,21 +102,36 @@ def thresholds(
 ) -> Thresholds:
     """Return probe, prediction and direct simulation of a scene's network; `parameters` override the scene's.
 
-    `sigma` is the grid on which ranges are looked for (default: 0 to 0.6 in steps of 0.0025, the probe's in alpha twice as
-    far); narrower ranges are not seen.  Ends are refined to `resolution` in sigma.
+    `sigma` is the grid on which ranges are looked for (default: `default_grid`); narrower ranges are not seen.  The probe's
+    grid in alpha covers every sigma |gamma|.  Ends are refined to `resolution` in sigma.  A network in several parts is
+    allowed; its warnings say so.
 
-    Raises ValueError for a network without links, with one-way links whose eigenvalues are complex, or unconnected.
+    Raises ValueError for a network without links, or with one-way links whose eigenvalues are complex.
     """
     scene = scene.replace(axes=(), record=("sync_error",), **parameters)
     criterion = criterion or Criterion()
     spectrum = scene.topology.spectrum
     check_probe(scene.topology, spectrum)
-    grid = np.linspace(0.0, 0.6, 241) if sigma is None else np.asarray(sigma, dtype=float)
+    grid = default_grid(spectrum) if sigma is None else np.asarray(sigma, dtype=float)
     options: dict[str, Any] = {"workers": workers, "show_progress": show_progress}
-    found = probe(scene, 2.0 * grid, resolution=2.0 * resolution, criterion=criterion, **options)
+    found = probe(scene, _probe_grid(grid, spectrum), resolution=2.0 * resolution, criterion=criterion, **options)
     direct = simulate(scene, grid, resolution=resolution, criterion=criterion, **options)
     predicted = project(found.intervals, spectrum, float(grid[-1]))
     return Thresholds(scene, found, tuple(predicted), direct, criterion, scene.warnings)
+
+
+def default_grid(spectrum: Spectrum, step: float = 0.0025) -> np.ndarray:
+    """Sigma from 0 to where the largest |sigma gamma| is 1.2, in at least 60 steps of at most `step`."""
+    highest = 1.2 / max(abs(value) for value in spectrum.values)
+    return np.linspace(0.0, highest, max(math.ceil(highest / step), 60) + 1)
+
+
+def _probe_grid(sigma: np.ndarray, spectrum: Spectrum) -> np.ndarray:
+    """Values of alpha that cover sigma |gamma| for every mode, as many as sigma has and at least one every 0.01."""
+    sizes = [abs(value) for value in spectrum.values if abs(value) > 0.0]
+    low = 0.0 if 0.0 in sigma or spectrum.multiplicities[0] > 1 else sigma[0] * min(sizes)
+    high = sigma[-1] * max(sizes)
+    return np.linspace(low, high, max(len(sigma), math.ceil((high - low) / 0.01) + 1, 2))
 
 
 def check_probe(graph: Topology, spectrum: Spectrum) -> None:
@@ -127,10 +142,6 @@ def check_probe(graph: Topology, spectrum: Spectrum) -> None:
         raise ValueError(
             f"{graph.name}({graph.n}) has complex eigenvalues; the two-oscillator probe covers real ones only. "
             "Use a network with symmetric coupling"
-        )
-    if graph.components > 1:
-        raise ValueError(
-            f"{graph.name}({graph.n}) falls into {graph.components} parts, which never synchronise completely; connect them"
         )
 
 
@@ -199,11 +210,17 @@ def _errors(
 
 
 def project(ranges: Sequence[Interval], spectrum: Spectrum, highest: float = math.inf) -> list[Interval]:
-    """The sigma for which every non-zero |sigma gamma_k| lies in one of the ranges of alpha, up to `highest`."""
+    """The sigma for which every transversal |sigma gamma_k| lies in one of the ranges of alpha, up to `highest`.
+
+    One zero eigenvalue belongs to the synchronous motion itself.  Every further one is a part of the network that nothing
+    couples to the rest: it asks that alpha = 0 be in a range (identical oscillators that the drive alone locks).
+    """
     allowed: list[Interval] = [(0.0, highest)]
-    for value in spectrum.values:
+    for value, multiplicity in zip(spectrum.values, spectrum.multiplicities, strict=True):
         if abs(value) > 0.0:
             allowed = intersect(allowed, scale(ranges, 1.0 / abs(value)))
+        elif multiplicity > 1 and not any(low <= 0.0 <= high for low, high in ranges):
+            return []
     return allowed
 
 

@@ -57,11 +57,16 @@ def test_projection_writes_curves_and_ranges(simulation: Simulation, tmp_path: P
 
 def test_published_numbers_are_never_used(simulation: Simulation, monkeypatch: pytest.MonkeyPatch) -> None:
     before = load("thresholds").compute(Study(TINY))
+    drawn_before = load("figure_8").compute(Study(TINY))
     wrong = tuple(published.Published(r.n, r.omega, ((0.01, 0.02),), "wrong") for r in published.PUBLISHED)
     monkeypatch.setattr(published, "PUBLISHED", wrong)
     after = load("thresholds").compute(Study(TINY))
     assert [(r.measured, r.predicted) for r in after.rows] == [(r.measured, r.predicted) for r in before.rows]
     assert after.rows[0].printed == ((0.01, 0.02),)
+    drawn_after = load("figure_8").compute(Study(TINY))
+    assert drawn_after.predicted == drawn_before.predicted
+    assert drawn_after.network.intervals == drawn_before.network.intervals
+    assert drawn_after.published == ((0.01, 0.02),)
 
 
 def test_the_published_rows_agree_among_themselves() -> None:

@@ -101,7 +101,9 @@ def test_all_figures_are_made_without_names(
 @pytest.mark.parametrize("name", ["figure_1b", "figure_4a", "figure_4d", "figure_8", "thresholds"])
 def test_files_depend_on_the_numbers_alone(name: str, tmp_path: Path, simulation: Simulation) -> None:
     first = make([name], tmp_path / "a")
-    with mpl.rc_context({"font.size": 30, "axes.facecolor": "red", "svg.hashsalt": "other", "svg.fonttype": "path"}):
+    with mpl.rc_context(
+        {"font.size": 30, "axes.facecolor": "red", "axes.grid": True, "svg.hashsalt": "other", "svg.fonttype": "path"}
+    ):
         second = make([name], tmp_path / "b")
     assert [p.name for p in first] == [p.name for p in second]
     assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]

@@ -44,7 +44,7 @@ def configure(parser: ArgumentParser) -> None:
         "--sigma",
         metavar="LO:HI:N",
         type=grid,
-        help="coupling to look at (default: 0:0.6:241); ranges narrower than its step are not seen",
+        help="coupling to look at (default: 0 to 1.2/max|gamma|); ranges narrower than its step are not seen",
     )
     parser.add_argument("--starts", metavar="K", type=positive, help="initial states for each value (default: 8)")
     parser.add_argument(
@@ -62,7 +62,7 @@ def configure(parser: ArgumentParser) -> None:
 def execute(arguments: Namespace) -> int:
     """Print the synchronous ranges as a table or as JSON."""
     from ..sweep import kernel_source
-    from ..threshold import Criterion, check_probe, thresholds
+    from ..threshold import Criterion, check_probe, default_grid, thresholds
 
     with wrong_use():
         scene = _scene(arguments)
@@ -76,7 +76,7 @@ def execute(arguments: Namespace) -> int:
     warn(scene.warnings)
     found = thresholds(
         scene,
-        sigma=arguments.sigma or grid("0:0.6:121" if arguments.quick else "0:0.6:241"),
+        sigma=arguments.sigma or default_grid(scene.topology.spectrum, 0.005 if arguments.quick else 0.0025),
         resolution=COARSE if arguments.quick else RESOLUTION,
         criterion=criterion,
         workers=arguments.workers,
