@@ -90,7 +90,8 @@ def _module(
     equations: Equations, method: Integrator, records: tuple[str, ...], section: sp.Expr | None, width: int
 ) -> str:
     plain = tidy(equations)
-    names = Names([*plain.state, *plain.parameters, *(s.name for s in plain.node.state)])
+    weight = [plain.edge.weight.name] if plain.edge is not None else []
+    names = Names([*plain.state, *plain.parameters, *(s.name for s in plain.node.state), *weight])
     blocks = analyse(plain.node, names)
     writer = StepWriter(plain, blocks, method)
     looped = equations.n > LARGEST_UNROLLED

@@ -32,6 +32,7 @@ PREFIXES = (
     "m_", "l_", "inv_", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "u_", "f_", "r_", "at_", "ft_", "n_", "j_",
     "e_", "_",
 )  # fmt: skip
+SUFFIXES = ("_here", "_there")
 NUMBERED = re.compile(r"_\d+$")
 """The end of a name that numbers a node: x_1 is x of the first one."""
 
@@ -43,21 +44,22 @@ def tidy(equations: Equations) -> Equations:
     if edge is not None:
         symbols |= {*edge.here, *edge.there, *edge.parameters, edge.weight}
     taken = {s.name for s in symbols}
-    swap = {}
+    swap: dict[sp.Symbol, sp.Symbol] = {}
     for s in sorted(symbols, key=str):
         if _clashes(s.name) or (s in node.state and NUMBERED.search(s.name)):
             name = _free(s.name, taken)
             taken.add(name)
             swap[s] = sp.Symbol(name, real=True)
-    if not swap:
-        return equations
+    own = {*node.state, *node.parameters}
     node = Node(_all(node.state, swap), _all(node.rhs, swap), _all(node.parameters, swap))
     if edge is not None:
+        if edge.weight in own:  # within the edge this name means the weight
+            swap[edge.weight] = sp.Symbol(_free(f"{edge.weight.name}_of_link", taken), real=True)
         edge = Edge(
             _all(edge.here, swap), _all(edge.there, swap), edge.weight.xreplace(swap),
             _all(edge.rhs, swap), _all(edge.parameters, swap),
         )  # fmt: skip
-    return Equations(node, edge, equations.n, equations.links)
+    return Equations(node, edge, equations.n, equations.links) if swap else equations
 
 
 def _all(expressions: tuple, swap: dict) -> tuple:
@@ -67,14 +69,14 @@ def _all(expressions: tuple, swap: dict) -> tuple:
 def _clashes(name: str) -> bool:
     """True for words of the generated code and for names that Python would not read as they are written."""
     written = name.isidentifier() and unicodedata.normalize("NFKC", name) == name
-    return name in RESERVED or not written or name.startswith(PREFIXES)
+    return name in RESERVED or not written or name.startswith(PREFIXES) or name.endswith(SUFFIXES)
 
 
 def _free(name: str, taken: set[str]) -> str:
     plain = "".join(c if f"a{c}".isidentifier() else "_" for c in unicodedata.normalize("NFKC", name)) or "symbol"
     if not plain.isidentifier() or plain.startswith("_"):
         plain = f"s_{plain}"
-    elif plain.startswith(PREFIXES):
+    elif f"{plain}_".startswith(PREFIXES):
         plain = f"user_{plain}"
     while plain in taken or _clashes(plain) or NUMBERED.search(plain):
         plain += "_"

@@ -93,7 +93,7 @@ class Thresholds:
 def thresholds(
     scene: Scene,
     *,
-    sigma: Sequence[float] | None = None,
+    sigma: Sequence[float] | np.ndarray | None = None,
     resolution: float = 5e-4,
     criterion: Criterion | None = None,
     workers: int | None = None,

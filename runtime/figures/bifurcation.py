@@ -81,7 +81,6 @@ def draw(axes: Any, data: Diagram) -> Any:
     values = data.result.data[data.axis].values
     if "sync_error" in data.result.data:
         bands(axes, synchronous(data.result))
-        bracket(axes, data.published, 0.95, ORANGE, "published")
     axes.plot(found[:, 0], found[:, 1], linestyle="none", marker=".", markersize=_size(len(values)), color=BLACK,
               markeredgewidth=0.0, rasterized=True)  # fmt: skip
     axes.set(
@@ -90,6 +89,7 @@ def draw(axes: Any, data: Diagram) -> Any:
     if data.published and len(found):
         low, high = found[:, 1].min(), found[:, 1].max()
         axes.set_ylim(low - 0.05 * (high - low), high + 0.16 * (high - low))
+    bracket(axes, data.published, 0.95, ORANGE, "published")
     failed = int((data.result.status.values != Status.FINISHED).sum())
     note(axes, failures(failed, len(values)))
     return axes

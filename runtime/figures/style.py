@@ -90,11 +90,15 @@ def bands(axes: Axes, intervals: Sequence[Interval], *, horizontal: bool = False
 
 
 def bracket(axes: Axes, intervals: Sequence[Interval], height: float, color: str, text: str = "") -> None:
-    """Thin bars with end strokes over intervals of x, at a height in parts of the axes; `text` right of the last one."""
+    """Thin bars with end strokes over intervals of x, at a height in parts of the axes whose limits are set; `text` right of the last one."""
     place = axes.get_xaxis_transform()
+    first, last = axes.get_xlim()
     for low, high in intervals:
-        axes.plot([low, high], [height, height], color=color, linewidth=1.0, transform=place, zorder=4, marker="|",
-                  markersize=4.0, markeredgewidth=1.0, clip_on=False)  # fmt: skip
+        stroke = 1.0 if high - low > 0.01 * (last - first) else 0.4  # ragged ends are a fringe of thin strokes
+        axes.plot(
+            [low, high], [height, height], color=color, linewidth=1.0, transform=place, zorder=4, marker="|",
+            markersize=4.0, markeredgewidth=stroke, clip_on=False,
+        )  # fmt: skip
     if text and intervals:
         axes.annotate(text, (intervals[-1][1], height), xycoords=place, xytext=(4, 0), textcoords="offset points",
                       color=color, fontsize=6.5, va="center", ha="left")  # fmt: skip
