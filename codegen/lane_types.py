@@ -20,8 +20,10 @@ __all__ = [
     "Mask",
     "as_lane",
     "common_width",
+    "constant",
     "native_width",
     "splat",
+    "vector",
 ]
 
 DOUBLE, INT32, INT64, BOOL = ir.DoubleType(), ir.IntType(32), ir.IntType(64), ir.IntType(1)
@@ -44,16 +46,26 @@ class Mask(types.Type):
         super().__init__(name=f"Mask({width})")
 
 
+def vector(element: ir.Type, width: int) -> ir.Type:
+    """The LLVM type of that many elements; a single one is a scalar (LLVM 20 aborts on some vectors of one truth value)."""
+    return element if width == 1 else ir.VectorType(element, width)
+
+
+def constant(element: ir.Type, width: int, value: int) -> ir.Constant:
+    """The same number in every lane."""
+    return ir.Constant(vector(element, width), value if width == 1 else [value] * width)
+
+
 @register_model(Lane)
 class _LaneModel(models.PrimitiveModel):
     def __init__(self, manager: Any, fe_type: Lane) -> None:
-        super().__init__(manager, fe_type, ir.VectorType(DOUBLE, fe_type.width))
+        super().__init__(manager, fe_type, vector(DOUBLE, fe_type.width))
 
 
 @register_model(Mask)
 class _MaskModel(models.PrimitiveModel):
     def __init__(self, manager: Any, fe_type: Mask) -> None:
-        super().__init__(manager, fe_type, ir.VectorType(BOOL, fe_type.width))
+        super().__init__(manager, fe_type, vector(BOOL, fe_type.width))
 
 
 def native_width() -> int:
@@ -73,11 +85,12 @@ def native_width() -> int:
 
 
 def splat(builder: ir.IRBuilder, value: ir.Value, width: int) -> ir.Value:
-    vector = ir.VectorType(DOUBLE, width)
-    undefined = ir.Constant(vector, ir.Undefined)
+    """The same value in every lane."""
+    if width == 1:
+        return value
+    undefined = ir.Constant(vector(DOUBLE, width), ir.Undefined)
     first = builder.insert_element(undefined, value, ir.Constant(INT32, 0))
-    zeros = ir.Constant(ir.VectorType(INT32, width), [0] * width)
-    return builder.shuffle_vector(first, undefined, zeros)
+    return builder.shuffle_vector(first, undefined, constant(INT32, width, 0))
 
 
 def as_lane(context: Any, builder: ir.IRBuilder, value: ir.Value, fe_type: types.Type, width: int) -> ir.Value:

@@ -18,7 +18,7 @@ from numba.core import cgutils
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin
 
-from .lane_types import DOUBLE, INT64, Lane, Mask, as_lane, common_width, native_width, splat
+from .lane_types import DOUBLE, INT64, Lane, Mask, as_lane, common_width, constant, native_width, splat, vector
 
 __all__ = [
     "Lane", "Mask", "absolute", "any_lane", "broadcast", "copysign", "floor", "fma", "lane_bits", "load",
@@ -101,10 +101,11 @@ def _llvm_function(name: str, arity: int) -> Any:
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         width = sig.return_type.width
-        vector = ir.VectorType(DOUBLE, width)
+        lane = vector(DOUBLE, width)
         values = [as_lane(context, builder, v, t, width) for v, t in zip(args, sig.args, strict=True)]
-        kind = ir.FunctionType(vector, [vector] * arity)
-        function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{width}f64")
+        kind = ir.FunctionType(lane, [lane] * arity)
+        suffix = "f64" if width == 1 else f"v{width}f64"
+        function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.{suffix}")
         return builder.call(function, values)
 
     def typed(*arguments: Any) -> Any:
@@ -123,6 +124,7 @@ floor = _llvm_function("floor", 1)
 round_even = _llvm_function("rint", 1)
 sqrt = _llvm_function("sqrt", 1)
 copysign = _llvm_function("copysign", 2)
+# of a number and a NaN these two return the number
 minimum = _llvm_function("minnum", 2)
 maximum = _llvm_function("maxnum", 2)
 fma = _llvm_function("fma", 3)
@@ -170,7 +172,7 @@ def any_lane(typingctx: Any, mask: Any) -> Any:
 def _slot(context: Any, builder: Any, array: Any, array_type: Any, index: Any, width: int) -> Any:
     data = context.make_array(array_type)(context, builder, array).data
     offset = builder.mul(index, ir.Constant(index.type, width))
-    return builder.bitcast(builder.gep(data, [offset]), ir.VectorType(DOUBLE, width).as_pointer())
+    return builder.bitcast(builder.gep(data, [offset]), vector(DOUBLE, width).as_pointer())
 
 
 def _width_of(literal: Any) -> int | None:
@@ -226,8 +228,7 @@ def scale_binary(typingctx: Any, value: Any, shifted: Any) -> Any:
         return None
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        whole = ir.VectorType(INT64, value.width)
-        shift = ir.Constant(whole, [52] * value.width)
+        whole, shift = vector(INT64, value.width), constant(INT64, value.width, 52)
         exponent = builder.shl(builder.bitcast(args[1], whole), shift)
         return builder.bitcast(builder.add(builder.bitcast(args[0], whole), exponent), args[0].type)
 
@@ -242,11 +243,11 @@ def split_binary(typingctx: Any, value: Any, pivot: Any) -> Any:
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         width = value.width
-        whole = ir.VectorType(INT64, width)
+        whole, shift = vector(INT64, width), constant(INT64, width, 52)
         start = builder.bitcast(splat(builder, args[1], width), whole)
         distance = builder.sub(builder.bitcast(args[0], whole), start)
-        exponent = builder.ashr(distance, ir.Constant(whole, [52] * width))
-        back = builder.shl(exponent, ir.Constant(whole, [52] * width))
+        exponent = builder.ashr(distance, shift)
+        back = builder.shl(exponent, shift)
         mantissa = builder.bitcast(builder.sub(builder.bitcast(args[0], whole), back), args[0].type)
         number = builder.sitofp(exponent, args[0].type)
         return context.make_tuple(builder, sig.return_type, [mantissa, number])

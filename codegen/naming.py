@@ -40,17 +40,15 @@ NUMBERED = re.compile(r"_\d+$")
 def tidy(equations: Equations) -> Equations:
     """Return the same equations with symbols that the generated code can use as names."""
     node, edge = equations.node, equations.edge
-    symbols = {*node.state, *node.parameters}
-    if edge is not None:
-        symbols |= {*edge.here, *edge.there, *edge.parameters, edge.weight}
-    taken = {s.name for s in symbols}
+    own = {*node.state, *node.parameters}
+    shown = own | ({*edge.parameters, edge.weight} if edge is not None else set())
+    taken = {s.name for s in (*shown, *(edge.here + edge.there if edge is not None else ()))}
     swap: dict[sp.Symbol, sp.Symbol] = {}
-    for s in sorted(symbols, key=str):
+    for s in sorted(shown, key=str):
         if _clashes(s.name) or (s in node.state and NUMBERED.search(s.name)):
             name = _free(s.name, taken)
             taken.add(name)
             swap[s] = sp.Symbol(name, real=True)
-    own = {*node.state, *node.parameters}
     node = Node(_all(node.state, swap), _all(node.rhs, swap), _all(node.parameters, swap))
     if edge is not None:
         if edge.weight in own:  # within the edge this name means the weight

@@ -34,14 +34,10 @@ class Axis:
     def between(cls, name: str, first: float, last: float, count: int) -> Axis:
         """Return `count` equally spaced values, both ends included, each the float nearest to its decimal."""
         what = f"axis {name}"
-        ends = [
-            Fraction(repr(number(f"{what}: {end}", value))) for end, value in (("from", first), ("to", last))
-        ]
+        ends = [Fraction(repr(number(f"{what}: {end}", value))) for end, value in (("from", first), ("to", last))]
         size = integer(f"{what}: count", count, 1, LIMIT)
         if size == 1 and ends[0] != ends[1]:
-            raise ValueError(
-                f"{what}: count = 1 with two different ends; expected at least 2 values; raise count"
-            )
+            raise ValueError(f"{what}: count = 1 with two different ends; expected at least 2 values; raise count")
         return cls(name, _spaced(ends[0], ends[1], size))
 
     @classmethod
@@ -53,9 +49,7 @@ class Axis:
         missing = [key for key in ("from", "to", "count") if key not in values]
         if missing:
             found = shown(dict(values))
-            raise ValueError(
-                f"axis {name}: {missing[0]!r} is missing in {found}; expected {{from, to, count}}"
-            )
+            raise ValueError(f"axis {name}: {missing[0]!r} is missing in {found}; expected {{from, to, count}}")
         return cls.between(name, values["from"], values["to"], values["count"])
 
     def __len__(self) -> int:
@@ -64,9 +58,7 @@ class Axis:
     def __repr__(self) -> str:
         if len(self.values) < 5:
             return f"Axis({self.name!r}, {list(self.values)})"
-        return (
-            f"Axis({self.name!r}, {len(self.values)} values from {self.values[0]:g} to {self.values[-1]:g})"
-        )
+        return f"Axis({self.name!r}, {len(self.values)} values from {self.values[0]:g} to {self.values[-1]:g})"
 
 
 def _spaced(first: Fraction, last: Fraction, count: int) -> Iterator[float]:

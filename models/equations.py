@@ -118,7 +118,8 @@ class Equations:
             if (target, source) in seen:
                 raise ValueError(f"link {target} <- {source} occurs twice; add the weights up")
             seen.add((target, source))
-        taken = sorted(set(self.parameters).intersection(self.state))
+        states = {*self.state, *(s.name for s in self.node.state)}
+        taken = sorted(states.intersection(self.parameters))
         if taken:
             raise ValueError(f"the parameter {taken[0]!r} has the name of a state variable; rename it")
 

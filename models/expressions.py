@@ -40,9 +40,7 @@ def constant(text: str) -> float:
     DEPTH nested operations, an exponent beyond EXPONENT or an intermediate value beyond MAGNITUDE.
     """
     if len(text) > LENGTH:
-        raise ValueError(
-            f"number written as {len(text)} characters; expected at most {LENGTH}; give its value"
-        )
+        raise ValueError(f"number written as {len(text)} characters; expected at most {LENGTH}; give its value")
     stray = text[_match_length(text) :]
     if stray:
         power = "; write ** for a power" if stray[0] == "^" else ""
@@ -100,6 +98,4 @@ def _call(name: str, argument: float, text: str) -> float:
     try:
         return FUNCTIONS[name](argument)
     except ValueError:
-        raise ValueError(
-            f"{name}({argument:g}) in the number {text!r} is not real; give another number"
-        ) from None
+        raise ValueError(f"{name}({argument:g}) in the number {text!r} is not real; give another number") from None

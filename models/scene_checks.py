@@ -55,9 +55,7 @@ def shown(value: object) -> str:
     short.maxlevel = 2
     try:
         words = " ".join(short.repr(value).split())
-    except (
-        Exception
-    ):  # a broken __repr__ or an integer beyond Python's limit of digits must not hide the message
+    except Exception:  # a broken __repr__ or an integer beyond Python's limit of digits must not hide the message
         words = f"<{type(value).__name__}>"
     return words if len(words) <= 120 else words[:117] + "..."
 
@@ -130,9 +128,7 @@ def integer(what: str, value: object, low: int, high: int) -> int:
         raise TypeError(f"{what}: found {_typed(value)}; expected a whole number, e.g. {low}")
     result = operator.index(value)
     if not low <= result <= high:
-        raise ValueError(
-            f"{what}: found {shown(result)}; expected a whole number from {low} to {high}; correct it"
-        )
+        raise ValueError(f"{what}: found {shown(result)}; expected a whole number from {low} to {high}; correct it")
     return result
 
 

@@ -26,9 +26,7 @@ __all__ = [
 
 
 @lru_cache(maxsize=64)
-def known_parameters(
-    oscillator: str, friction: str | None, contact: str, coupling: str | None
-) -> Frozen[Parameter]:
+def known_parameters(oscillator: str, friction: str | None, contact: str, coupling: str | None) -> Frozen[Parameter]:
     """Return every parameter of a model with its default, unit and range."""
     from .network import parameters
 
@@ -44,9 +42,7 @@ def node(oscillator: str, friction: str | None, contact: str) -> Node:
 
 
 @lru_cache(maxsize=64)
-def derived(
-    oscillator: str, friction: str | None, contact: str, coupling: str | None, graph: Topology
-) -> Equations:
+def derived(oscillator: str, friction: str | None, contact: str, coupling: str | None, graph: Topology) -> Equations:
     """Return the equations of the whole network."""
     from . import network
 

@@ -45,15 +45,11 @@ def _component(what: str, value: object, name: str, n: int, seed: int) -> tuple[
     if isinstance(listed, str) or not isinstance(listed, Iterable):
         return (number(what, listed),) * n
     if isinstance(listed, (bytes, set, frozenset)):
-        raise TypeError(
-            f"{what}: found {shown(listed)}; expected a number, {n} numbers or {{low, high, seed}}"
-        )
+        raise TypeError(f"{what}: found {shown(listed)}; expected a number, {n} numbers or {{low, high, seed}}")
     listed = tuple(islice(listed, n + 1))
     if len(listed) != n:
         count = f"more than {n}" if len(listed) > n else str(len(listed))
-        raise ValueError(
-            f"{what}: found {count} values for {n} oscillators; expected {n} values or one number for all"
-        )
+        raise ValueError(f"{what}: found {count} values for {n} oscillators; expected {n} values or one number for all")
     return tuple(number(f"{what}_{i + 1}", entry) for i, entry in enumerate(listed))
 
 
@@ -62,9 +58,7 @@ def _uniform(what: str, given: Mapping[object, object], name: str, n: int, seed:
     for key in ("low", "high"):
         if key not in given:
             found = shown(dict(given))
-            raise ValueError(
-                f"{what}: {key!r} is missing in {found}; expected {{low, high}} or {{low, high, seed}}"
-            )
+            raise ValueError(f"{what}: {key!r} is missing in {found}; expected {{low, high}} or {{low, high, seed}}")
     low, high = number(f"{what}: low", given["low"]), number(f"{what}: high", given["high"])
     if low > high:
         raise ValueError(f"{what}: low = {low!r} is above high = {high!r}; expected low <= high; swap them")

@@ -45,9 +45,7 @@ def _axes(given: object) -> tuple[Axis, ...]:
     if isinstance(given, Mapping):
         return tuple(Axis.from_table(name, values) for name, values in given.items())
     if isinstance(given, (str, bytes)) or not isinstance(given, Iterable):
-        raise TypeError(
-            f"axes: found {shown(given)}; expected Axis objects, e.g. [Axis('sigma', [0.1, 0.2])]"
-        )
+        raise TypeError(f"axes: found {shown(given)}; expected Axis objects, e.g. [Axis('sigma', [0.1, 0.2])]")
     axes = []
     for axis in given:
         if not isinstance(axis, Axis):
@@ -68,9 +66,7 @@ def _axis(made: Mapping[str, Any], axis: Axis) -> None:
             raise ValueError(unknown(made, axis.name, "axis", (*known, *states)))
         check_state(axis.name, own, made["topology"].n, "axis")
     if axis.name == "omega" and made["time_unit"] == "period" and 0.0 in axis.values:
-        raise ValueError(
-            'axis omega: found 0, which has no period; expected other values or time_unit = "time"'
-        )
+        raise ValueError('axis omega: found 0, which has no period; expected other values or time_unit = "time"')
 
 
 def _continuation(made: dict[str, Any]) -> None:
@@ -79,9 +75,7 @@ def _continuation(made: dict[str, Any]) -> None:
         return
     axes, known = made["axes"], model_parameters(made)
     if not axes:
-        raise ValueError(
-            f"continuation: found {made['continuation']!r} without axes; expected a sweep; add an axis"
-        )
+        raise ValueError(f"continuation: found {made['continuation']!r} without axes; expected a sweep; add an axis")
     for axis in axes if made["zipped"] else axes[-1:]:
         if axis.name not in known:
             raise ValueError(
@@ -91,6 +85,5 @@ def _continuation(made: dict[str, Any]) -> None:
     values = axes[-1].values
     if any(b <= a for a, b in pairwise(values)):
         raise ValueError(
-            f"continuation along axis {axes[-1].name!r}: its values do not rise; "
-            "expected rising values; sort them"
+            f"continuation along axis {axes[-1].name!r}: its values do not rise; expected rising values; sort them"
         )

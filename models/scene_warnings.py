@@ -29,9 +29,7 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     multiplicity = zero_multiplicity(graph)
     if multiplicity > 1:
         parts = graph.components
-        reason = (
-            f"is not connected ({parts} parts)" if parts > 1 else "has nodes that cannot reach one another"
-        )
+        reason = f"is not connected ({parts} parts)" if parts > 1 else "has nodes that cannot reach one another"
         found.append(
             f"topology {graph.name}({graph.n}) {reason}: zero is an eigenvalue of multiplicity "
             f"{multiplicity}, so there is no complete synchronisation; join the parts by links"

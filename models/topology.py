@@ -49,8 +49,7 @@ class Topology:
         for target, source, weight in self.links:
             if not (0 <= target < self.n and 0 <= source < self.n) or target == source:
                 raise ValueError(
-                    f"topology {self.name}: link {target} <- {source}; "
-                    f"expected two different nodes of 0 … {self.n - 1}"
+                    f"topology {self.name}: link {target} <- {source}; expected two different nodes of 0 … {self.n - 1}"
                 )
             if (target, source) <= last:
                 raise ValueError(
@@ -152,9 +151,7 @@ def topology(name: str, n: int) -> Topology:
     limit = LINK_LIMIT if directed else LINK_LIMIT // 2
     edges = [(i, j, Fraction(weight)) for i, j, weight in islice(module.edges(size), limit + 1)]
     if len(edges) > limit:
-        raise ValueError(
-            f"topology {name}: n = {size} has too many links; expected at most {LINK_LIMIT}: reduce n"
-        )
+        raise ValueError(f"topology {name}: n = {size} has too many links; expected at most {LINK_LIMIT}: reduce n")
     if not directed:
         edges += [(j, i, weight) for i, j, weight in edges]
     edges.sort(key=operator.itemgetter(0, 1))
@@ -186,9 +183,7 @@ def from_matrix(rows: Iterable[Iterable[Any]] | sp.MatrixBase, name: str = "matr
                 f"{name}: row {i + 1} sums to {total}; expected 0, or the synchronous state is no solution: "
                 f"set its diagonal entry {row[i]} to {row[i] - total}"
             )
-    links = tuple(
-        (i, j, weight) for i, row in enumerate(table) for j, weight in enumerate(row) if weight and i != j
-    )
+    links = tuple((i, j, weight) for i, row in enumerate(table) for j, weight in enumerate(row) if weight and i != j)
     return Topology(name, len(table), links)
 
 

@@ -190,7 +190,9 @@ class Step:
     error: Any
 
 
-def take_step(space: dict[str, Any], t: Any, h: Any, y: list, p: list, rtol: Any = 0, atol: Any = 1, *graph: Any) -> Step:
+def take_step(
+    space: dict[str, Any], t: Any, h: Any, y: list, p: list, rtol: Any = 0, atol: Any = 1, *graph: Any
+) -> Step:
     """One step of a kernel that runs as plain Python; a looped one needs its graph and weights."""
     room = space["DENSE_ROWS"] * len(y)
     y_new, dense = [None] * len(y), [None] * (room + space["WORKSPACE"])

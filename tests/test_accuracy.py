@@ -188,7 +188,9 @@ def test_synchronisation_error_of_the_friction_chain(tight):
 
 def steps_of(compiled) -> int:
     values = numbers(friction_chain(1))
-    return int(drive(compiled, [[0.3, 0.0]], [values], [(0.0, 5 * PERIOD)], 1e-6, max_steps=50_000).counts[0, 1:3].sum())
+    return int(
+        drive(compiled, [[0.3, 0.0]], [values], [(0.0, 5 * PERIOD)], 1e-6, max_steps=50_000).counts[0, 1:3].sum()
+    )
 
 
 def test_exact_jacobian_keeps_the_number_of_steps_low():

@@ -114,7 +114,9 @@ def test_names_avoid_those_that_are_taken():
 def test_constants_are_computed_before_the_stages():
     text = emit(friction_chain(2), "rodas5p", ("sync_error",), width=1).text
     step = ast.parse(text[text.index("def step") : text.index("# Groups of")].strip().split("\n\n\n")[0])
-    names = [s.targets[0].id for s in ast.walk(step) if isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name)]
+    names = [
+        s.targets[0].id for s in ast.walk(step) if isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name)
+    ]
     parameters = [n for n in names if n.startswith("p") and n[1:].isdigit()]
     assert len(parameters) == len(set(parameters)) > 3
     times = {c for c in integrators.integrator("rodas5p").c if c}
@@ -128,13 +130,15 @@ PLAIN = ("alpha", "beta", "delta", "omega", "kappa", "eta", "sigma")
 VALUES = [1.1, 0.2, 0.3, 1.7, 2.3, -0.4, 0.6]
 
 
-def network(names: tuple[str, ...] = PLAIN, states: tuple[str, str] = ("x", "v"), weight: str = "weight") -> Equations:
+def network(names: tuple[str, ...] = PLAIN, states: tuple[str, str] = ("x", "v"), weight: str = "weight",
+            edge_states: tuple[str, str] | None = None) -> Equations:  # fmt: skip
     """A pair of nodes with every kind of term; the names are parameters of the node, then that of the edge."""
     x, v = real(*states)
     p = real(*names)
     rhs = (v, -p[0] * x - p[1] * v * sp.Abs(v) + p[2] * sp.cos(p[3] * TIME) + sp.atan(p[4] * v) * p[5])
     x_there, v_there, w = real("x_at_source", "v_at_source", weight)
-    edge = Edge((x, v), (x_there, v_there), w, (sp.S.Zero, p[6] * w * (x_there - x)), (p[6],))
+    here = real(*(edge_states or states))
+    edge = Edge(tuple(here), (x_there, v_there), w, (sp.S.Zero, p[6] * w * (x_there - here[0])), (p[6],))
     return Equations(Node((x, v), rhs, tuple(p[:6])), edge, 2, path(2))
 
 
@@ -171,7 +175,7 @@ lambda if None True is print abs WIDTH DENSE NODES DIMENSION COMPONENTS DENSE_RO
 TIME STEP graph weights target source order solve factorise i j k e old new f r n m u
 k1_x_1 k12_v_2 u_x_1 f_x_1 f_x r_v_2 n_x_1 e_x_1 j_vv j_vv_1 ft_v ft_v_1 m_v_1_x_1 l_v_1_x_1 inv_v_1 x_here v_there
 hoisted_0 fixed_0 _ __name__ __debug__ mu_ x1 k10
-""".split()
+""".split()  # noqa: SIM905
 
 
 @pytest.mark.parametrize("chunk", range(6))
@@ -184,9 +188,14 @@ def test_parameters_may_have_any_name(chunk, same_numbers):
         same_numbers(network(some[3:] + some[:3]))
 
 
-@pytest.mark.parametrize("states", [("h", "p"), ("k1", "k2"), ("u", "u_x"), ("w0", "p0"), ("x", "x_1"), ("z0", "z1"), ("n", "e"),
-                                    ("r", "j"), ("f", "m"), ("inv", "ft"), ("l", "e5"), ("total", "now"), ("λ", "ϑ"), ("lambda", "_"),
-                                    ("v_1", "v"), ("a", "aa"), ("speed", "place"), ("S", "K1"), ("load", "sqrt")])  # fmt: skip
+STATES = [
+    ("h", "p"), ("k1", "k2"), ("u", "u_x"), ("w0", "p0"), ("x", "x_1"), ("z0", "z1"), ("n", "e"), ("r", "j"), ("f", "m"),
+    ("inv", "ft"), ("l", "e5"), ("total", "now"), ("λ", "ϑ"), ("lambda", "_"), ("v_1", "v"), ("a", "aa"), ("speed", "place"),
+    ("S", "K1"), ("load", "sqrt"), ("x", "x_here"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("states", STATES)
 def test_states_may_have_any_name(states, same_numbers):
     same_numbers(network(states=states))
 
@@ -228,5 +237,7 @@ def test_the_time_is_no_parameter():
         network(("t", *PLAIN[1:]))
     with pytest.raises(ValueError, match="edge: the name 't' is the time"):
         network((*PLAIN[:6], "t"))
+    with pytest.raises(ValueError, match="the parameter 'x' has the name of a state variable"):
+        network((*PLAIN[:6], "x"), edge_states=("q", "dq"))
     with pytest.raises(ValueError, match="node: the name 'x' stands for two things"):
         network(("x", *PLAIN[1:]))

@@ -44,7 +44,12 @@ def test_clearing_leaves_other_files_alone(folder):
     assert cache.describe() == {"folder": str(folder), "kernels": 0, "bytes": 0}
     assert cache.clear() == 0
     (folder / "__pycache__").mkdir(parents=True)
-    for name, text in (("kernel_a.py", "12"), ("kernel_b.py", "345"), ("__pycache__/kernel_a.nbi", "6"), ("notes.txt", "")):
+    for name, text in (
+        ("kernel_a.py", "12"),
+        ("kernel_b.py", "345"),
+        ("__pycache__/kernel_a.nbi", "6"),
+        ("notes.txt", ""),
+    ):
         (folder / name).write_text(text)
     assert cache.describe() == {"folder": str(folder), "kernels": 2, "bytes": 6}
     assert cache.clear() == 2

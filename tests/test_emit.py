@@ -127,7 +127,9 @@ def states(eq: Equations, seed: int) -> tuple[list, list]:
 
 def close(found: list, expected: list, allowed=SMALL) -> bool:
     size = max(map(abs, expected), default=mpf(0)) + 1
-    return len(found) == len(expected) and all(abs(a - b) <= allowed * size for a, b in zip(found, expected, strict=True))
+    return len(found) == len(expected) and all(
+        abs(a - b) <= allowed * size for a, b in zip(found, expected, strict=True)
+    )
 
 
 @pytest.mark.parametrize("looped", [False, True], ids=["written out", "looped"])

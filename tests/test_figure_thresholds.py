@@ -116,6 +116,15 @@ def test_the_range_compared_is_the_one_that_shares_most() -> None:
     assert nearest((), ((0.1, 0.2),)) is None
 
 
+def test_ragged_ranges_are_joined_over_narrow_gaps_only() -> None:
+    found = ((0.1, 0.12), (0.1205, 0.13), (0.1309, 0.14), (0.142, 0.15))
+    assert tables_of_thresholds.joined(found) == ((0.1, 0.14), (0.142, 0.15))
+    assert tables_of_thresholds.joined(found, 0.0) == found
+    assert tables_of_thresholds.joined(()) == ()
+    row = tables_of_thresholds.Row(4, 1.4, found, (), published.published(4, 1.4), 0, 9)
+    assert "2 narrow gaps bridged; 1 more range measured" in row.remark
+
+
 def test_failed_values_of_sigma_are_said_in_the_table(simulation: Simulation, tmp_path: Path) -> None:
     simulation.failed = (1, 2)
     make(["thresholds"], tmp_path)

@@ -111,9 +111,7 @@ def test_no_file_is_called_utils() -> None:
 def loaded_by(statement: str) -> set[str]:
     """The top-level modules in a fresh interpreter after a statement."""
     code = f"{statement}\nimport sys\nprint(*sorted({{name.split('.')[0] for name in sys.modules}}))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     return set(done.stdout.split())
 
 
@@ -148,7 +146,5 @@ def test_the_package_offers_its_names_on_first_use() -> None:
 
 def test_a_star_import_and_a_submodule_both_work() -> None:
     code = "from synchain.models import *; from synchain.models import topology; print(topology)"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     assert "module 'synchain.models.topology'" in done.stdout

@@ -83,7 +83,9 @@ def test_unknown_names_are_refused():
 def test_sections_are_checked():
     with pytest.raises(ValueError, match="record 'section' needs a section function, for example v_1"):
         emit(friction_chain(1), "rodas5p", ("section",))
-    with pytest.raises(ValueError, match=r"section function v_2: unknown symbol 'v_2'; use the state, parameters and t"):
+    with pytest.raises(
+        ValueError, match=r"section function v_2: unknown symbol 'v_2'; use the state, parameters and t"
+    ):
         emit(friction_chain(1), "rodas5p", ("section",), sp.Symbol("v_2", real=True))
     with pytest.raises(printer.UnprintableError, match="floating-point number"):
         emit(friction_chain(1), "rodas5p", ("section",), V_1 - sp.Float(0.5))

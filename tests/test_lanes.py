@@ -38,7 +38,9 @@ SPECIAL = [0.0, -0.0, 1.0, -1.0, INF, -INF, NAN, 5e-324, -5e-324, 2.3e-308, 1.7e
 PAIRS = np.array(list(itertools.product(SPECIAL, SPECIAL)))  # 256 pairs
 DICE = np.random.default_rng(20240229)
 A, B = (
-    np.concatenate([special, DICE.normal(size=512) * 10.0 ** DICE.integers(-12, 12, 512), np.round(DICE.normal(size=256))])
+    np.concatenate(
+        [special, DICE.normal(size=512) * 10.0 ** DICE.integers(-12, 12, 512), np.round(DICE.normal(size=256))]
+    )
     for special in PAIRS.T
 )
 C = np.roll(A[::-1], 7)

@@ -27,7 +27,7 @@ x, v = real("x", "v")
 SWING = Equations(Node((x, v), (v, -x), ()), None, 1)
 REAL = emit(SWING, "cash_karp", (), width=1)
 MORE = ", ".join(f"more_{i}" for i in range(len(loading.SIGNATURE.args) - 7))
-TINY = '''
+TINY = """
 from numba import njit
 
 
@@ -36,7 +36,7 @@ def drive(first, last, start, numbers, spans, control, end, MORE):
     for i in range(first, last):
         end[i, 0] = 2.0 * start[i, 0]
         end[i, 1] = 3.0 * start[i, 1]
-'''.replace("MORE", MORE)
+""".replace("MORE", MORE)
 SOURCE = dataclasses.replace(REAL, text=TINY)
 """A module with the entry point of a kernel that compiles ten times faster than one."""
 

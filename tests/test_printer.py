@@ -64,7 +64,9 @@ def test_text_has_the_value_of_the_expression(expression, values):
         numbers = [mpmath.mpf(v) for v in values]
         exact = sp.lambdify(SYMBOLS, expression, "mpmath")(*numbers)
         # how far a rounding of the values moves the result: what doubles can do at best
-        steps = [[v * (1 + mpmath.mpf(2) ** -45 * (i == j)) for j, v in enumerate(numbers)] for i in range(len(numbers))]
+        steps = [
+            [v * (1 + mpmath.mpf(2) ** -45 * (i == j)) for j, v in enumerate(numbers)] for i in range(len(numbers))
+        ]
         moved = [abs(sp.lambdify(SYMBOLS, expression, "mpmath")(*step) - exact) for step in steps]
         allowed = 100 * max(moved) + 1e-11 * (1 + abs(exact))
         assert math.isfinite(found)

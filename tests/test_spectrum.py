@@ -504,7 +504,5 @@ def test_spectra_need_neither_numpy_nor_numba_nor_matplotlib() -> None:
         "print(topology('chain', 7).spectrum, from_matrix([[-1, 1], [1, -1]]).spectrum);"
         "print([m for m in ('numpy', 'numba', 'matplotlib', 'scipy') if m in sys.modules])"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     assert done.stdout.splitlines()[-1] == "[]"

@@ -58,9 +58,7 @@ def test_the_four_families_by_hand() -> None:
 
 
 def test_the_connectivity_matrix_of_the_chain_is_the_published_one() -> None:
-    assert topology("chain", 4).matrix == sp.Matrix(
-        [[-1, 1, 0, 0], [1, -2, 1, 0], [0, 1, -2, 1], [0, 0, 1, -1]]
-    )
+    assert topology("chain", 4).matrix == sp.Matrix([[-1, 1, 0, 0], [1, -2, 1, 0], [0, 1, -2, 1], [0, 0, 1, -1]])
 
 
 def test_a_long_chain_is_built_at_once() -> None:
@@ -239,7 +237,5 @@ def test_a_graph_is_built_without_sympy() -> None:
         "import sys; from synchain.models.topology import topology; topology('ring', 5);"
         "print([m for m in ('sympy', 'flint', 'numpy') if m in sys.modules])"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     assert done.stdout == "[]\n"

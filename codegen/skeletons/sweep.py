@@ -215,19 +215,17 @@ def sample(lane, t_new, h, accepted, y, y_new, dense, cell, samples):
     for which in range(WIDTH):
         gap = lane[SAMPLE_GAP * WIDTH + which]
         while (accepted >> which) & 1 and lane[NEXT_SAMPLE * WIDTH + which] <= ends[which]:
-            begin = lane[START * WIDTH + which]
-            k = round((lane[NEXT_SAMPLE * WIDTH + which] - begin) / gap) if gap > 0.0 else 0
+            begin, wanted = lane[START * WIDTH + which], lane[NEXT_SAMPLE * WIDTH + which]
+            k = round((wanted - begin) / gap) if gap > 0.0 else 0
             if k >= samples.shape[1]:
                 break
-            theta = 1.0 - (ends[which] - lane[NEXT_SAMPLE * WIDTH + which]) / lengths[which]
+            theta = 1.0 - (ends[which] - wanted) / lengths[which]
+            following = begin + (k + 1) * gap if k + 2 != samples.shape[1] else lane[END * WIDTH + which]
+            still = samples.shape[1] if following <= wanted else k + 1  # a window without length: all samples are equal
             for c in range(DIMENSION):
                 store(place, c, inside(broadcast(theta, WIDTH), c, y, y_new, dense))
-                samples[cell[which], k, c] = place[c * WIDTH + which]
-            lane[NEXT_SAMPLE * WIDTH + which] = begin + (k + 1) * gap
-            if k + 2 == samples.shape[1]:
-                lane[NEXT_SAMPLE * WIDTH + which] = lane[END * WIDTH + which]
-            if k + 2 > samples.shape[1]:
-                lane[NEXT_SAMPLE * WIDTH + which] = math.inf
+                samples[cell[which], k:still, c] = place[c * WIDTH + which]
+            lane[NEXT_SAMPLE * WIDTH + which] = following if still < samples.shape[1] else math.inf
 
 
 @njit(error_model="numpy")
@@ -240,9 +238,10 @@ def outcome(which, lane, y, control):
         return INTERRUPTED
     largest = 0.0
     for c in range(DIMENSION):
-        largest = max(largest, abs(y[c * WIDTH + which]))
-    if not largest < 1e100:
-        return DIVERGED
+        size = abs(y[c * WIDTH + which])
+        if not size < 1e100:  # NaN too
+            return DIVERGED
+        largest = max(largest, size)
     if lane[ACCEPTED * WIDTH + which] + lane[REJECTED * WIDTH + which] >= control[MAX_STEPS]:
         return BUDGET
     if lane[STEP * WIDTH + which] <= 4e-16 * max(1.0, t):
@@ -299,11 +298,14 @@ def settle(queue, last, lane, y, p, cell, start, numbers, spans, control, end, s
 
 
 @njit(error_model="numpy", forceinline=True)
-def pause(lane, control):
-    """Mask of lanes that need a look: stopped, out of budget, or with a vanishing step."""
+def pause(lane, y, control):
+    """Mask of lanes that need a look: stopped, out of budget, with a vanishing step, or out of bounds."""
     t, h = load(lane, TIME, WIDTH), load(lane, STEP, WIDTH)
     spent = load(lane, ACCEPTED, WIDTH) + load(lane, REJECTED, WIDTH) >= control[MAX_STEPS]
-    return (t >= load(lane, END, WIDTH)) | spent | (h <= 4e-16 * maximum(t, 1.0))
+    largest = absolute(load(y, 0, WIDTH))
+    for c in range(1, DIMENSION):
+        largest = maximum(largest, absolute(load(y, c, WIDTH)))
+    return (t >= load(lane, END, WIDTH)) | spent | (h <= 4e-16 * maximum(t, 1.0)) | (largest >= 1e100)
 
 
 @njit(error_model="numpy", nogil=True, cache=True)
@@ -340,5 +342,5 @@ def drive(first, last, start, numbers, spans, control, end, sums, counts, points
         if TRAJECTORY and any_lane(accept):
             sample(lane, t_new, h, lane_bits(accept), y, y_new, dense, cell, samples)
         advance(lane, t, t_new, accept, y, y_new)
-        if any_lane(pause(lane, control)) or control[CANCEL] != 0.0:
+        if any_lane(pause(lane, y, control)) or control[CANCEL] != 0.0:
             queue = settle(queue, last, lane, y, p, cell, start, numbers, spans, control, end, sums, counts, samples)

@@ -20,7 +20,13 @@ from ..threshold import Criterion, project, simulate
 __all__ = ["CASES", "CHANGES", "COLUMNS", "measure"]
 
 COLUMNS = ("n", "omega", "what is different", "lower end", "upper end", "ranges found")
-CASES = ((2, 1.15, 0.0, 0.3), (2, 1.40, 0.02, 0.34), (2, 1.55, 0.06, 0.34), (3, 1.55, 0.16, 0.22), (4, 1.40, 0.13, 0.20))
+CASES = (
+    (2, 1.15, 0.0, 0.3),
+    (2, 1.40, 0.02, 0.34),
+    (2, 1.55, 0.06, 0.34),
+    (3, 1.55, 0.16, 0.22),
+    (4, 1.40, 0.13, 0.20),
+)
 """Oscillators, drive frequency, and the grid of sigma from … to, 57 points."""
 
 CHANGES: tuple[tuple[str, dict[str, float | int]], ...] = (

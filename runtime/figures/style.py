@@ -90,7 +90,7 @@ def bands(axes: Axes, intervals: Sequence[Interval], *, horizontal: bool = False
 
 
 def bracket(axes: Axes, intervals: Sequence[Interval], height: float, color: str, text: str = "") -> None:
-    """Thin bars with end strokes over intervals of x, at a height in parts of the axes whose limits are set; `text` right of the last one."""
+    """Thin bars with end strokes over intervals of x at a height in parts of the axes; set the limits of x before."""
     place = axes.get_xaxis_transform()
     first, last = axes.get_xlim()
     for low, high in intervals:

@@ -17,11 +17,13 @@ from .study import Quality, Study
 from .style import BLUE, COLUMN, GREEN, ORANGE, failures
 from .tables import Table
 
-__all__ = ["NAMES", "SIZE", "Row", "compute", "document", "draw", "nearest", "scene_of", "table"]
+__all__ = ["NAMES", "SIZE", "Row", "compute", "document", "draw", "joined", "nearest", "scene_of", "table"]
 
 NAMES = ("thresholds",)
 SIZE = (COLUMN, 4.1)
 KINDS = (("measured", BLUE, 0.26), ("predicted", GREEN, 0.0), ("published", ORANGE, -0.26))
+GAP = 0.001
+"""Gaps of up to this width in sigma are bridged before the ends are compared: ends of chaotic ranges are ragged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +49,10 @@ class Row:
         words = [self.published.remark] if self.published else []
         if self.n == 2:
             words.append("the probe itself")
-        more = len(self.measured) - 1
+        bridged = joined(self.measured)
+        gaps, more = len(self.measured) - len(bridged), len(bridged) - 1
+        if gaps > 0:
+            words.append(f"{gaps} narrow gap{'s' * (gaps > 1)} bridged")
         if more > 0:
             words.append(f"{more} more range{'s' * (more > 1)} measured")
         if not self.measured and not self.predicted:
@@ -88,6 +93,15 @@ def scene_of(n: int, omega: float, study: Study) -> Scene:
     return study.chain(n, omega)
 
 
+def joined(found: tuple[Interval, ...], gap: float = GAP) -> tuple[Interval, ...]:
+    """The ranges with gaps of up to `gap` between neighbours bridged."""
+    kept: list[Interval] = []
+    for low, high in found:
+        start = kept.pop()[0] if kept and low - kept[-1][1] <= gap else low
+        kept.append((start, high))
+    return tuple(kept)
+
+
 def nearest(found: tuple[Interval, ...], printed: tuple[Interval, ...]) -> Interval | None:
     """The range that shares most with the published ones, else the widest; None where there is none."""
 
@@ -121,7 +135,8 @@ def table(data: Comparison) -> Table:
 def _ends(row: Row) -> tuple[tuple[float | None, float | None], ...]:
     none = (None, None)
     printed = row.printed[0] if row.printed else none
-    return nearest(row.measured, row.printed) or none, nearest(row.predicted, row.printed) or none, printed
+    measured, predicted = (nearest(joined(found), row.printed) for found in (row.measured, row.predicted))
+    return measured or none, predicted or none, printed
 
 
 def _difference(found: float | None, printed: float | None) -> float | None:
@@ -161,8 +176,8 @@ def _how(quality: Quality) -> str:
         f"{c.tolerance:g}, over {c.window:g} drive periods after a transient of {c.transient:g}, with rtol = {c.rtol:g}. "
         f"Ends are refined to {quality.resolution:g} in sigma.\n\n"
         "Measured: direct simulation of the chain. Predicted: the two-oscillator probe's ranges of alpha, projected "
-        "through every non-zero eigenvalue of the chain. Where there are several ranges, the one nearest to the "
-        "published is shown; `thresholds.csv` has them all."
+        f"through every non-zero eigenvalue of the chain. Gaps of up to {GAP:g} within a range are bridged; where there "
+        "are several ranges, the one nearest to the published is shown. `thresholds.csv` lists all ranges as found."
     )
 
 

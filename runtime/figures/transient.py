@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 
 from ..intervals import Interval
 from ..threshold import Sweep
@@ -82,6 +83,7 @@ def draw(axes: list[Any], data: tuple[Trial, ...]) -> list[Any]:
         panel.set_yticks(heights, [f"{length:g}" for length in trial.transients])
         panel.set_title(rf"$n={trial.row.n}$, $\omega={trial.row.omega:.2f}$", fontsize=7.5, pad=3)
         panel.tick_params(labelsize=6.5)
+        panel.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
     figure = axes[0].figure
     figure.supxlabel(r"coupling $\sigma$ (orange: published ends)", fontsize=8)
     figure.supylabel("transient (drive periods)", fontsize=8)
