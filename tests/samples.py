@@ -161,10 +161,19 @@ def _store(array: list, slot: int, value: Any) -> None:
     array[slot] = value
 
 
+def _maximum(a: Any, b: Any) -> Any:
+    """Of a number and a NaN the number, as lanes have it."""
+    return b if a != a else a if b != b else max(a, b)
+
+
+def _minimum(a: Any, b: Any) -> Any:
+    return b if a != a else a if b != b else min(a, b)
+
+
 PYTHON: dict[str, Any] = {
     "njit": lambda **options: lambda function: function, "load": _load, "store": _store,
     "select": lambda mask, yes, no: yes if mask else no, "broadcast": lambda number, width: number,
-    "any_lane": bool, "lane_bits": int, "absolute": abs, "maximum": max, "minimum": min, "np": np, "math": math,
+    "any_lane": bool, "lane_bits": int, "absolute": abs, "maximum": _maximum, "minimum": _minimum, "np": np, "math": math,
     "sign": lambda x: (x > 0) - (x < 0),
 }  # fmt: skip
 FLOATS = {**PYTHON, **{n: getattr(math, n) for n in ("exp", "log", "sin", "cos", "atan", "tanh", "sqrt", "floor")}}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from synchain.runtime import bench
-from synchain.runtime.bench import precision
+from synchain.runtime.bench import precision, sensitivity
 
 
 def test_unknown_benchmarks_are_refused():
@@ -35,3 +35,15 @@ def test_scalar_step_needs_a_hundredth_of_the_paper_methods_steps():
 def test_markdown_has_one_line_a_row():
     text = bench.markdown(("a", "b"), [(1, 0.25), ("x", 1e-9)])
     assert text.splitlines() == ["| a | b |", "|---|---|", "| 1 | 0.25 |", "| x | 1e-09 |"]
+
+
+def test_sensitivity_brackets_the_published_end(monkeypatch):
+    """A short run of the first case: every choice finds one range, and its end lies near the exponent's."""
+    changes = (("short", {"transient": 200.0, "window": 20.0, "starts": 1}),)
+    monkeypatch.setattr(sensitivity, "CHANGES", changes)
+    rows = sensitivity.measure(quick=True)
+    assert [row[2] for row in rows] == ["short", "sign of the transversal exponent"]
+    assert all(len(row) == len(sensitivity.COLUMNS) and row[5] == 1 and row[3] == 0.0 for row in rows)
+    direct, exponent = (float(row[4]) for row in rows)
+    assert exponent == pytest.approx(0.2327, abs=2e-3)
+    assert exponent - 0.02 < direct < exponent  # a finite transient leaves the slowest decay undecided

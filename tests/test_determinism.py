@@ -69,7 +69,7 @@ def test_the_cells_are_a_fair_choice(alone):
     assert (counts[:, 0] == 1).sum() > 20
     assert counts[counts[:, 0] == 1, 1].max() > 20 * max(counts[counts[:, 0] == 1, 1].min(), 1)
     assert counts[:, 2].max() > 50, "rejected steps"
-    assert counts[:, 3].max() > 5, "section points"
+    assert counts[:, 3].max() >= 4, "section points"
     assert np.isfinite(alone.samples[counts[:, 0] == 1]).any()
 
 
