@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import threading
 
 import numpy as np
 import pytest
@@ -152,13 +151,27 @@ def test_saving_fails_whole(tmp_path, monkeypatch):
     assert [p.name for p in tmp_path.iterdir()] == ["pair.nc"]
 
 
-def test_interrupt_keeps_finished_cells_and_resume_completes_them():
-    scene = SECTIONS.replace(transient=200, window=200, axes={"sigma": list(np.linspace(0, 0.3, 200))})
-    kernel(scene)
-    timer = threading.Timer(0.25, lambda: os.kill(os.getpid(), signal.SIGINT))
-    timer.start()
+@pytest.fixture
+def interruptible():
+    """Ctrl-C raises KeyboardInterrupt even where the test run was started with that signal ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_interrupt_keeps_finished_cells_and_resume_completes_them(monkeypatch, interruptible):
+    scene = SECTIONS.replace(transient=50, window=50, axes={"sigma": list(np.linspace(0, 0.3, 200))})
+    collect = sweep_module._collect
+
+    def collect_then_interrupt(running, advance):
+        left = collect(running, advance)
+        os.kill(os.getpid(), signal.SIGINT)
+        return left
+
+    monkeypatch.setattr(sweep_module, "_collect", collect_then_interrupt)
     with pytest.raises(SweepInterrupted) as caught:
         run(scene, workers=1)
+    monkeypatch.setattr(sweep_module, "_collect", collect)
     partial = caught.value.result
     finished = partial.status.values == Status.FINISHED
     assert 0 < finished.sum() < 200
