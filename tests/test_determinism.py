@@ -73,6 +73,14 @@ def test_the_cells_are_a_fair_choice(alone):
     assert np.isfinite(alone.samples[counts[:, 0] == 1]).any()
 
 
+def test_cells_with_nothing_to_integrate_say_so(alone):
+    assert alone.counts[11].tolist() == [4, 0, 0, 0], "an undefined start has diverged"
+    assert alone.counts[17].tolist() == [4, 0, 0, 0], "so has one out of bounds"
+    assert alone.counts[3].tolist() == [1, 0, 0, 0]
+    assert alone.counts[8, 0] == 1
+    np.testing.assert_allclose(alone.samples[8], np.tile(alone.end[8], (SAMPLES, 1)), rtol=1e-14)
+
+
 @pytest.mark.parametrize("width", [1, 4, 8])
 @pytest.mark.parametrize("size", [29, 11, 3])
 def test_widths_and_chunks_change_nothing(alone, width, size):

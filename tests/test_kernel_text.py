@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
-from samples import TABLE, friction_chain, real
+from samples import CASES, TABLE, friction_chain, real
 
 from synchain.codegen import printer
 from synchain.codegen.emit import emit
@@ -68,6 +68,12 @@ def test_unforced_equations_have_no_time_terms():
     text = emit(Equations(Node((x, v), (v, -sp.sin(x)), ()), None, 1), "rodas5p").text.split("def step")[1]
     assert "cos(t" not in text
     assert "*h*w" not in text
+
+
+def test_slopes_without_state_are_lanes():
+    # where all stages were plain numbers, the functions of lanes would refuse them
+    for method in ("cash_karp", "dop853"):
+        assert "k1_phase_1 = broadcast(1.0, WIDTH)" in emit(CASES["tanh pair"], method).text
 
 
 # -- refusals ------------------------------------------------------------------------------------------------
