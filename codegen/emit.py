@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import sympy as sp
 
@@ -34,8 +34,8 @@ LARGEST_UNROLLED = 8
 class KernelSource:
     """The text of a kernel module and what its arrays mean."""
 
-    text: str
-    equations: Equations
+    text: str = field(repr=False)
+    equations: Equations = field(repr=False)
     integrator: str
     records: tuple[str, ...]
     width: int

@@ -16,7 +16,7 @@ import sys
 import tempfile
 import threading
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -54,9 +54,9 @@ class Kernel:
     """
 
     origin: KernelSource
-    entry: Any
-    graph: tuple[np.ndarray, ...]
-    weights: np.ndarray
+    entry: Any = field(repr=False)
+    graph: tuple[np.ndarray, ...] = field(repr=False)
+    weights: np.ndarray = field(repr=False)
     path: str
     from_cache: bool
 

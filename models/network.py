@@ -6,6 +6,7 @@ equations of a node are those of the single oscillator plus one force for each e
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
@@ -29,17 +30,17 @@ def parameters(
 ) -> dict[str, Parameter]:
     """Return every parameter with default, unit, meaning and range, in the order of Equations.parameters.
 
-    Raises ValueError for an unknown oscillator, law, contact or coupling, and where the oscillator takes no friction law but
-    is given one, or takes one but is given none.
+    Raises ValueError for an unknown oscillator, law, contact or coupling, where the oscillator takes no friction law but
+    is given one, or takes one but is given none, and where two of them have a parameter of the same name.
     """
     model, law = _model(oscillator, friction, contact)
     table: dict[str, Parameter] = dict(model.PARAMETERS)
     if law is not None:
-        table |= law.PARAMETERS
+        _join(table, law.PARAMETERS, f"friction law {friction!r}")
         if contact == "atan" and friction_coefficient(law, "sign")(sp.Symbol("w", real=True)).has(sp.sign):
-            table["kappa"] = KAPPA
+            _join(table, {"kappa": KAPPA}, f"contact {contact!r}")
     if coupling is not None:
-        table |= load("coupling", coupling).PARAMETERS
+        _join(table, load("coupling", coupling).PARAMETERS, f"coupling {coupling!r}")
     return {name: replace(p, scale=str(scale(model, p.unit))) for name, p in table.items()}
 
 
@@ -61,6 +62,14 @@ def node(oscillator: str, friction: str | None = None, contact: str = "atan") ->
         coefficient = friction_coefficient(law, contact)
         found = tuple(e.replace(FRICTION, coefficient) for e in found)
     return Node((*system.coordinates, *system.velocities), (*system.velocities, *found), tuple(symbols.values()))
+
+
+def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str) -> None:
+    """Add the parameters of another part; the same name in two parts would silently be one number."""
+    for name, parameter in more.items():
+        if name in table:
+            raise ValueError(f"{what}: its parameter {name!r} has the name of one of another part; rename it")
+        table[name] = parameter
 
 
 def _model(oscillator: str, friction: str | None, contact: str) -> tuple[ModuleType, ModuleType | None]:

@@ -32,7 +32,14 @@ def warnings(scene: Scene) -> tuple[str, ...]:
         reason = f"is not connected ({parts} parts)" if parts > 1 else "has nodes that cannot reach one another"
         found.append(
             f"topology {graph.name}({graph.n}) {reason}: zero is an eigenvalue of multiplicity "
-            f"{multiplicity}, so there is no complete synchronisation; join the parts by links"
+            f"{multiplicity}, so there is no complete synchronisation by coupling (a common drive may still lock the "
+            "parts); join them by links"
+        )
+    negative = [weight for _, _, weight in graph.links if weight < 0]
+    if negative:
+        found.append(
+            f"topology {graph.name}({graph.n}) has negative weights, which drive oscillators apart; if its matrix is a "
+            "Laplacian D - A, negate it: the connectivity matrix is A - D"
         )
     moved = {axis.name.rpartition("_")[0] for axis in scene.axes} & set(scene.initial)
     if "sync_error" in scene.record and not moved and all(len(set(x)) == 1 for x in scene.initial.values()):

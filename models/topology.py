@@ -172,12 +172,18 @@ def from_matrix(rows: Iterable[Iterable[Any]] | sp.MatrixBase, name: str = "matr
     """The graph of a connectivity matrix G: square, rational, every row sum zero; one-way links are allowed.
 
     Entries are integers, fractions, decimals, floats (read through their shortest decimal text: 0.1 is 1/10),
-    texts such as "1/2", or SymPy rationals.  Raises ValueError on a wrong shape, a wrong number or a row sum
-    other than zero, and TypeError on anything that is no number.
+    texts such as "1/2", or SymPy rationals.  A row with floats whose sum is zero but for rounding (1e-12 of its
+    entries) gets the diagonal entry that makes it exactly zero.  Raises ValueError on a wrong shape, a wrong number
+    or a row sum other than zero, and TypeError on anything that is no number.
     """
-    table = rational_rows(rows, name)
+    table = [list(row) for row in rational_rows(rows, name)]
+    given = rows.tolist() if hasattr(rows, "tolist") else rows  # an iterator is used up by now: its numbers are exact
+    rounded = [any(map(_rounded, row)) for row in given] if isinstance(given, list | tuple) else [False] * len(table)
     for i, row in enumerate(table):
         total = sum(row)
+        if total and rounded[i] and abs(total) <= sum(map(abs, row)) / 10**12:
+            row[i] -= total
+            total = sum(row)
         if total:
             raise ValueError(
                 f"{name}: row {i + 1} sums to {total}; expected 0, or the synchronous state is no solution: "
@@ -185,6 +191,11 @@ def from_matrix(rows: Iterable[Iterable[Any]] | sp.MatrixBase, name: str = "matr
             )
     links = tuple((i, j, weight) for i, row in enumerate(table) for j, weight in enumerate(row) if weight and i != j)
     return Topology(name, len(table), links)
+
+
+def _rounded(entry: Any) -> bool:
+    """True for a float, or a text that may be one: its decimals can be those of a rounded number."""
+    return isinstance(entry, float) or (isinstance(entry, str) and not set(entry).isdisjoint(".eE"))
 
 
 def read_matrix(path: str | Path) -> Topology:

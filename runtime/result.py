@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["Result", "gather", "open_result"]
 
 MEANINGS = {
-    "sync_error": "time average over the window of sum_i |(state of oscillator i) - (state of oscillator 1)|",
+    "sync_error": "average synchronisation error",
     "sync_error_max": "largest synchronisation error seen in the window",
     "sync_error_end": "synchronisation error at the end of the window",
     "status": "how the cell ended: " + "; ".join(f"{s.value} {s.name.lower()}" for s in Status),

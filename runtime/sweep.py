@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -171,6 +171,11 @@ def with_axes(scene: Scene, axes: dict[str, Any]) -> Scene:
         else:
             fixed[name] = value
             swept.pop(name, None)
+    settings = {setting.name for setting in fields(Scene)}
+    unknown = [name for name in fixed if name not in scene.parameters and name not in settings]
+    if unknown:
+        known = ", ".join((*scene.parameters, *scene.equations.state))
+        raise ValueError(f"unknown parameter or initial state {unknown[0]!r}; known: {known}")
     if axes:
         scene = scene.replace(axes=swept, initial=start, **fixed)
     return scene

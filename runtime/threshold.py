@@ -60,9 +60,9 @@ class Sweep:
     synchronised; intervals: where at least half do, ends refined.
     """
 
-    x: np.ndarray
-    error: np.ndarray
-    share: np.ndarray
+    x: np.ndarray = field(repr=False)
+    error: np.ndarray = field(repr=False)
+    share: np.ndarray = field(repr=False)
     intervals: tuple[Interval, ...]
 
 
@@ -108,7 +108,7 @@ def thresholds(
 
     Raises ValueError for a network without links, or with one-way links whose eigenvalues are complex.
     """
-    scene = scene.replace(axes=(), record=("sync_error",), **parameters)
+    scene = scene.replace(axes=(), zipped=False, continuation="none", record=("sync_error",), **parameters)
     criterion = criterion or Criterion()
     spectrum = scene.topology.spectrum
     check_probe(scene.topology, spectrum)
@@ -142,6 +142,12 @@ def check_probe(graph: Topology, spectrum: Spectrum) -> None:
         raise ValueError(
             f"{graph.name}({graph.n}) has complex eigenvalues; the two-oscillator probe covers real ones only. "
             "Use a network with symmetric coupling"
+        )
+    worst = max(float(value.real) for value in spectrum.values)
+    if worst > 0.0:
+        raise ValueError(
+            f"{graph.name}({graph.n}) has the positive eigenvalue {worst:g}, which drives oscillators apart; expected none. "
+            "If the matrix is a Laplacian D - A, negate it: the connectivity matrix is A - D"
         )
 
 

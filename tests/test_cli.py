@@ -131,7 +131,7 @@ def test_spectrum_of_separate_parts_is_allowed_but_said(tmp_path: Path, capsys: 
     captured = capsys.readouterr()
     assert captured.out.splitlines()[1].split() == ["0", "0", "2"]
     assert captured.err.startswith("warning: zero is an eigenvalue of multiplicity 2")
-    assert "never synchronises completely" in captured.err
+    assert "never synchronises it completely" in captured.err
     assert main(["spectrum", "--matrix", matrix(tmp_path, "-1 1\n1 -1")]) == 0
     assert capsys.readouterr().err == ""
 

@@ -251,7 +251,7 @@ def test_steepness_is_a_parameter_only_where_a_jump_is_smoothed() -> None:
         (("frictoin", None, "atan"), r"did you mean 'friction'\?"),
         (("friction", "exponental", "atan"), r"unknown friction 'exponental'; known: coulomb, .*'exponential'\?"),
         (("friction", "exponential", "arctan"), "unknown contact 'arctan'; known: atan, sign"),
-        (("friction", None, "atan"), "oscillator 'friction' has no friction law; known: coulomb, exponential"),
+        (("friction", None, "atan"), "oscillator 'friction' has no friction law; known: .*exponential"),
         (("duffing", "coulomb", "atan"), "oscillator 'duffing' takes no friction law, found 'coulomb'; leave it out"),
         (("../friction", None, "atan"), "unknown oscillator '../friction'"),
         (("__init__", None, "atan"), "unknown oscillator '__init__'"),

@@ -139,6 +139,10 @@ def test_text_is_the_same_for_an_equal_expression(expression):
         (sp.Min(x, 0), "minimum(0.0, x)"),
         (sp.Abs(x) * sp.sign(y), "absolute(x)*sign(y)"),
         (sp.Piecewise((x, x < 0), (y, True)), "select(x < 0.0, x, y)"),
+        (sp.Piecewise((x, x <= y), (y, True)), "select(x <= y, x, y)"),
+        (sp.Piecewise((x, x > y), (y, True)), "select(x > y, x, y)"),
+        (sp.Piecewise((x, x >= y), (y, x < z), (z, True)), "select(x >= y, x, select(x < z, y, z))"),
+        (sp.Piecewise((x, (x < 0) | (y > 1)), (y, True)), "select((y > 1.0) | (x < 0.0), x, y)"),
         (sp.Piecewise((x, (x < 0) & (y >= 1)), (y, True)), "select((y >= 1.0) & (x < 0.0), x, y)"),
     ],
 )

@@ -78,6 +78,7 @@ def test_failed_cells_never_count_as_synchronous():
     [
         (chain(1), "at least two"),
         (from_matrix([[-1, 1, 0], [0, -1, 1], [1, 0, -1]]), "complex"),
+        (from_matrix([[2, -1, -1], [-1, 2, -1], [-1, -1, 2]]), "negate it"),
     ],
 )
 def test_networks_that_the_probe_cannot_judge_are_refused(graph, words):

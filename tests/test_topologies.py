@@ -33,9 +33,22 @@ def test_every_family_says_what_it_is_and_where_it_comes_from(name: str) -> None
         topology(name, module.MINIMUM - 1)
 
 
+def test_float_rows_are_closed_exactly_and_real_errors_stay_errors() -> None:
+    random = np.random.default_rng(3).random((4, 4))
+    np.fill_diagonal(random, 0.0)
+    graph = from_matrix(random - np.diag(random.sum(axis=1)))
+    assert all(sum(row) == 0 for row in graph.rows)
+    assert abs(graph.rows[0][1] - Fraction(float(random[0, 1]))) < Fraction(1, 10**15)
+    with pytest.raises(ValueError, match="row 1 sums to"):
+        from_matrix([[-0.1, 0.1001], [0.1, -0.1]])
+    with pytest.raises(ValueError, match="row 1 sums to"):
+        from_matrix([[-(10**14), 10**14 + 1], [1, -1]])
+
+
 @pytest.mark.parametrize("name", names())
 @pytest.mark.parametrize("n", [3, 4, 9])
 def test_every_family_gives_a_connected_graph_with_zero_row_sums(name: str, n: int) -> None:
+    n = max(n, family(name).MINIMUM)
     graph = topology(name, n)
     assert graph.components == 1
     assert all(sum(row) == 0 for row in graph.rows)

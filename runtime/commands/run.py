@@ -6,6 +6,7 @@ import shlex
 import sys
 import time
 from argparse import ArgumentParser, Namespace
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,7 +71,7 @@ def execute(arguments: Namespace) -> int:
     except SweepInterrupted as stop:
         raise _partial(stop.result, target, arguments) from None
     result.save(target)
-    _unfinished(target).unlink(missing_ok=True)
+    _drop_unfinished(scene, target)
     files = (target, _draw(result, target.with_suffix(".png")))
     _summary(name, result, time.perf_counter() - began, files)
     return FINE if result.success else FAILED
@@ -89,6 +90,8 @@ def changed_scene(arguments: Namespace) -> Scene:
             raise WrongUse(f"--set gives {name} twice; expected it once")
         changes[name] = _fitting(scene, name, value)
     scene = with_axes(scene, changes)
+    if changes:
+        scene = scene.replace(title=f"{scene.title or arguments.scene}, changed: {', '.join(changes)}")
     return scene if arguments.rtol is None else scene.replace(rtol=arguments.rtol)
 
 
@@ -127,6 +130,17 @@ def _prepare(scene: Scene, target: Path) -> None:
 def _unfinished(target: Path) -> Path:
     """Where an interrupted run is kept: beside the result, which may be an earlier, complete one."""
     return target.with_suffix(".partial.nc")
+
+
+def _drop_unfinished(scene: Scene, target: Path) -> None:
+    """Delete the interrupted run that this one has replaced; one of another scene stays."""
+    from ..result import open_result
+
+    kept = _unfinished(target)
+    if kept.exists():
+        with suppress(OSError, ValueError):
+            if open_result(kept).scene.replace(title="") == scene.replace(title=""):
+                kept.unlink()
 
 
 def _earlier(scene: Scene, target: Path) -> Result:

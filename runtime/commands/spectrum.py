@@ -67,4 +67,4 @@ def graph(arguments: Namespace) -> Topology:
 def _reason(graph: Topology) -> str:
     parts = graph.components
     why = f"the graph falls into {parts} parts" if parts > 1 else "some nodes cannot reach one another"
-    return f"{why}, so it never synchronises completely"
+    return f"{why}, so its coupling alone never synchronises it completely"

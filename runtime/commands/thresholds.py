@@ -105,14 +105,14 @@ def _scene(arguments: Namespace) -> Scene:
     if scene is None:
         scene = Scene(topology=graph)
     elif graph != scene.topology:
-        scene = scene.replace(topology=graph, axes=(), record=None)
+        scene = scene.replace(topology=graph, axes=(), zipped=False, continuation="none", record=None)
     if arguments.omega is None:
         if arguments.scene is None or any(axis.name == "omega" for axis in scene.axes):
             raise WrongUse("expected a frequency of the drive, e.g. --omega 1.15")
-        return scene.replace(axes=(), record=None)
+        return scene.replace(axes=(), zipped=False, continuation="none", record=None)
     if "omega" not in scene.parameters:
         raise WrongUse(f"--omega: the oscillators of {arguments.scene} are not driven; leave it out")
-    return scene.replace(axes=(), record=None, omega=arguments.omega)
+    return scene.replace(axes=(), zipped=False, continuation="none", record=None, omega=arguments.omega)
 
 
 def _graph(arguments: Namespace, scene: Scene | None) -> Topology:
