@@ -45,7 +45,5 @@ def stage(w: StepWriter, i: int) -> None:
     for name in w.state if i else ():
         w.put(f"u_{name} = " + (f"n_{name}" if i >= m.stages and m.a[i] == m.b else
                                 f"{name} + h*({combine(m.a[i], w.stages(name, i))})"))  # fmt: skip
-    if i == 0 or m.c[i] != m.c[i - 1]:
-        w.put(f"now = {combine((m.c[i],), ['h'], 't')}")
-        w.timed("now", w.wanted(w.blocks.rhs.results, w.blocks.rhs))
+    w.stage_time(i, first=0)
     w.slopes("u_" if i else "", f"k{i + 1}_")

@@ -161,9 +161,7 @@ class LoopWriter:
         w.put(f"# stage {i + 1}")
         if i > 0:
             self.state_of(m.a[i], "", "")
-            if i == 1 or m.c[i] != m.c[i - 1]:
-                w.put(f"now = {combine((m.c[i],), ['h'], 't')}")
-                w.timed("now", w.wanted(w.blocks.rhs.results, w.blocks.rhs))
+            w.stage_time(i, first=1)
             self.slopes("STATE", "SLOPE")
         for c in range(len(self.state)):
             lines, text = [], f"load(dense, SLOPE + {c}*NODES + i, WIDTH)"
@@ -229,9 +227,7 @@ class LoopWriter:
             w.put(f"# stage {i + 1}")
             if i > 0:
                 self.state_of(m.a[i], "h*", "")
-            if i == 0 or m.c[i] != m.c[i - 1]:
-                w.put(f"now = {combine((m.c[i],), ['h'], 't')}")
-                w.timed("now", w.wanted(w.blocks.rhs.results, w.blocks.rhs))
+            w.stage_time(i, first=0)
             self.slopes("STATE" if i else "y", f"K{i + 1}")
         self.finish(m.b, [combine(row, self.stages(len(row))) for row in m.e], (), "h*")
 

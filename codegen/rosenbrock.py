@@ -80,9 +80,7 @@ def stage(w: StepWriter, i: int, steps: Plan, factors: Factors, time_slopes: Seq
     if i > 0:
         for name in w.state:
             w.put(f"u_{name} = {stage_state(m.a[i], m.a[i - 1], name)}")
-        if i == 1 or m.c[i] != m.c[i - 1]:
-            w.put(f"now = {combine((m.c[i],), ['h'], 't')}")
-            w.timed("now", w.wanted(w.blocks.rhs.results, w.blocks.rhs))
+        w.stage_time(i, first=1)
         w.slopes("u_", "f_")
     rights, results = {}, {}
     for slot, name in enumerate(w.state):

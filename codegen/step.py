@@ -84,6 +84,16 @@ class StepWriter:
             if symbol in wanted:
                 self.put(f"{symbol} = {show(e.xreplace({TIME: sp.Symbol(time)}))}")
 
+    def stage_time(self, i: int, first: int) -> None:
+        """The time of stage i and the time terms of the right-hand side, unless the stage before had the same time.
+
+        `first` is the first stage that is evaluated at all.
+        """
+        c = self.method.c
+        if i == first or c[i] != c[i - 1]:
+            self.put(f"now = {combine((c[i],), ['h'], 't')}")
+            self.timed("now", self.wanted(self.blocks.rhs.results, self.blocks.rhs))
+
     def wanted(self, results: Sequence[sp.Expr], body: Body) -> set[sp.Symbol]:
         """Time terms that some results use."""
         return Body(body.statements, tuple(results)).symbols & self.timed_names

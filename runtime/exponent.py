@@ -20,9 +20,9 @@ from synchain.models.scene import Scene
 from synchain.models.tangent import transversal
 
 from .intervals import Interval
-from .plan import tolerances
+from .plan import control_array, tolerances
 from .status import Status
-from .sweep import worker_count
+from .sweep import Buffers, worker_count
 
 __all__ = ["Exponents", "exponents"]
 
@@ -103,7 +103,7 @@ class _Blocks:
         numbers = np.tile([values[name] for name in names], (cells, 1))
         numbers[:, names.index("alpha")] = np.repeat(alpha, starts)
         limits = tolerances(scene, np.empty((0, 0)))
-        control = np.array([*limits, 1e-4, 0.5 * (scene.period or math.inf), scene.max_steps, 0.0, 0.0])
+        control = control_array(*limits, 0.5 * (scene.period or math.inf), scene.max_steps)
         return cls(
             kernel, _start(scene, cells, starts, seed), numbers, np.tile([0.0, length], (cells, 1)), control, workers
         )
@@ -131,18 +131,17 @@ def _start(scene: Scene, cells: int, starts: int, seed: int) -> np.ndarray:
 def _integrate(work: _Blocks) -> np.ndarray:
     """The states of all cells at the end of a block, on threads; FloatingPointError where one fails."""
     cells, dimension = work.state.shape
-    end, sums, counts = np.empty_like(work.state), np.zeros((cells, 4)), np.zeros((cells, 4), np.int64)
-    points, samples = np.zeros((cells, 0, dimension + 1)), np.zeros((cells, 0, dimension))
+    buffers = Buffers.empty(cells, dimension, room=0, samples=0)
     cuts = np.linspace(0, cells, work.workers + 1).astype(int)
-    fixed = (work.state, work.numbers, work.spans, work.control, end, sums, counts, points, samples)
+    fixed = (work.state, work.numbers, work.spans, work.control, *buffers.arrays())
     with ThreadPoolExecutor(work.workers) as pool:
         jobs = [pool.submit(work.kernel.drive, a, b, *fixed) for a, b in itertools.pairwise(cuts) if b > a]
         for job in jobs:
             job.result()
-    bad = np.flatnonzero(counts[:, 0] != Status.FINISHED)
+    bad = np.flatnonzero(buffers.counts[:, 0] != Status.FINISHED)
     if len(bad):
-        raise FloatingPointError(f"a tangent integration failed: {Status(int(counts[bad[0], 0])).message}")
-    return end
+        raise FloatingPointError(f"a tangent integration failed: {Status(int(buffers.counts[bad[0], 0])).message}")
+    return buffers.end
 
 
 def _summary(alpha: np.ndarray, rates: np.ndarray, starts: int, length: float) -> Exponents:

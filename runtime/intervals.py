@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -78,8 +77,3 @@ def intersect(left: Sequence[Interval], right: Sequence[Interval]) -> list[Inter
             if low < high or (low == high and (a == b or c == d)):
                 found.append((low, high))
     return sorted(found)
-
-
-def clip(intervals: Sequence[Interval], low: float = -math.inf, high: float = math.inf) -> list[Interval]:
-    """What lies between two bounds."""
-    return intersect(intervals, [(low, high)])

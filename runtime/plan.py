@@ -9,7 +9,13 @@ import numpy as np
 
 from synchain.models.scene import Scene
 
-__all__ = ["Plan", "plan", "tolerances"]
+__all__ = ["CANCEL", "Plan", "control_array", "plan", "tolerances"]
+
+FIRST_STEP = 1e-4
+"""Step tried first in every cell; the step control enlarges it sixfold at a time."""
+
+CANCEL = 6
+"""Entry of the control array that stops a running kernel when it is not zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +77,11 @@ def _spans(scene: Scene, columns: dict[str, np.ndarray]) -> np.ndarray:
             f"the run ends at t = {spans.max():.3g}; expected less than 1e12, where time has lost 4 digits"
         )
     return np.ascontiguousarray(spans)
+
+
+def control_array(rtol: float, atol: float, max_step: float, max_steps: float, direction: float = 0.0) -> np.ndarray:
+    """The numbers that steer a kernel, in the order of its column names (codegen/skeletons/sweep.py)."""
+    return np.array([rtol, atol, FIRST_STEP, max_step, max_steps, direction, 0.0])
 
 
 def tolerances(scene: Scene, numbers: np.ndarray) -> tuple[float, float]:

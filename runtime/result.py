@@ -76,12 +76,16 @@ class Result:
         with whole_file(path) as temporary:
             self.data.to_netcdf(temporary, engine="scipy", format="NETCDF3_64BIT")
 
+    def belongs_to(self, scene: Scene) -> bool:
+        """True where the scene is this result's but for its title."""
+        return self.scene.replace(title="") == scene.replace(title="")
+
     def restore(self, scene: Scene, buffers: Buffers) -> None:
         """Put the finished cells of this result into the buffers of a new run of the same scene.
 
         Raises ValueError where the scenes differ in more than their titles.
         """
-        if self.scene.replace(title="") != scene.replace(title=""):
+        if not self.belongs_to(scene):
             raise ValueError("the result to resume belongs to another scene; run without resume")
         if scene.continuation != "none":
             return  # every cell needs the one before: a continued sweep starts again

@@ -17,13 +17,12 @@ from synchain.codegen.emit import emit
 from synchain.codegen.load import Kernel, load
 from synchain.models.scene import Scene
 
-from .plan import Plan, plan, tolerances
+from .plan import CANCEL, Plan, control_array, plan, tolerances
 from .result import Result, gather
 from .status import Status
 
 __all__ = ["SweepInterrupted", "kernel", "run"]
 
-CANCEL = 6
 DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
 
 
@@ -146,7 +145,7 @@ class Job:
 
 def _job(scene: Scene, cells: Plan, compiled: Kernel, workers: int) -> Job:
     direction = DIRECTIONS[scene.section.direction]
-    control = np.array([*tolerances(scene, cells.numbers), 1e-4, _max_step(scene), scene.max_steps, direction, 0.0])
+    control = control_array(*tolerances(scene, cells.numbers), _max_step(scene), scene.max_steps, direction)
     samples = scene.samples if "trajectory" in scene.record else 0
     buffers = Buffers.empty(scene.cells, len(scene.y0), _room(scene), samples)
     return Job(compiled, cells, control, buffers, workers, lambda done: None)

@@ -18,7 +18,8 @@ import numpy as np
 from synchain.models.scene import Scene
 from synchain.models.topology import topology
 
-from ..sweep import kernel
+from ..plan import control_array
+from ..sweep import Buffers, kernel
 
 __all__ = ["CASES", "COLUMNS", "METHODS", "Case", "Method", "measure", "read_case", "solve"]
 
@@ -74,12 +75,11 @@ def solve(case: Case, method: Method, ends: np.ndarray) -> tuple[np.ndarray, np.
     start = np.tile(np.array(case.scene.y0), (cells, 1))
     numbers = np.tile([case.scene.parameters[name] for name in case.scene.equations.parameters], (cells, 1))
     spans = np.stack([np.zeros(cells), ends], axis=1).copy()
-    control = np.array([method.rtol, method.atol, 1e-4, np.inf, 1e12, 0.0, 0.0])
-    end, sums, counts = np.zeros((cells, dimension)), np.zeros((cells, 4)), np.zeros((cells, 4), np.int64)
-    points, samples = np.zeros((cells, 0, dimension + 1)), np.zeros((cells, 0, dimension))
+    control = control_array(method.rtol, method.atol, np.inf, 1e12)
+    buffers = Buffers.empty(cells, dimension, room=0, samples=0)
     begin = time.process_time()
-    compiled.drive(0, cells, start, numbers, spans, control, end, sums, counts, points, samples)
-    return end, counts, time.process_time() - begin
+    compiled.drive(0, cells, start, numbers, spans, control, *buffers.arrays())
+    return buffers.end, buffers.counts, time.process_time() - begin
 
 
 def measure(quick: bool = False) -> list[tuple[object, ...]]:

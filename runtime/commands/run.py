@@ -139,7 +139,7 @@ def _drop_unfinished(scene: Scene, target: Path) -> None:
     kept = _unfinished(target)
     if kept.exists():
         with suppress(OSError, ValueError):
-            if open_result(kept).scene.replace(title="") == scene.replace(title=""):
+            if open_result(kept).belongs_to(scene):
                 kept.unlink()
 
 
@@ -151,7 +151,7 @@ def _earlier(scene: Scene, target: Path) -> Result:
     if found is None:
         raise WrongUse(f"nothing to resume: {target} does not exist; run without --resume")
     earlier = open_result(found)
-    if earlier.scene.replace(title="") != scene.replace(title=""):
+    if not earlier.belongs_to(scene):
         raise WrongUse(f"{found} belongs to another scene; repeat the options of that run, or run without --resume")
     return earlier
 
