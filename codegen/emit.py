@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import sympy as sp
 
 from synchain.models.equations import Equations
+from synchain.models.periodicity import angular_frequency
 
 from . import elementary, lanes, skeletons
 from .blocks import Names, NodeBlocks, analyse
@@ -25,6 +26,9 @@ __all__ = ["RECORDS", "KernelSource", "emit"]
 
 RECORDS = ("sync_error", "section", "trajectory")
 """What a kernel can record besides the final state."""
+
+AUTO = "rodas5p"
+"""The integrator that "auto" stands for."""
 
 LARGEST_UNROLLED = 8
 """Nodes up to which a step is written out; larger networks are stepped through in loops, whose text stays small."""
@@ -63,74 +67,99 @@ def scaled(error, old, new, rtol, atol):
 
 def emit(
     equations: Equations,
-    method: str | Integrator = "rodas5p",
+    method: str | Integrator = "auto",
     records: Sequence[str] = ("sync_error",),
     section: sp.Expr | None = None,
     width: int | None = None,
+    multiplicity: Sequence[int] | None = None,
 ) -> KernelSource:
     """Write the kernel of these equations for one integrator, one set of records and one lane width.
 
+    The integrator "auto" is "rodas5p", the fastest at equal error in full lanes (docs/performance.md).
     `section` is an expression in the state symbols (x_1 …), the parameters and t whose zeros are recorded; it is needed
-    with the record "section".  Raises ValueError for an unknown record or integrator, a section function that uses other
+    with the record "section".  `multiplicity` says for each node how many oscillators it stands for in the synchronisation
+    error (default: one).  Raises ValueError for an unknown record or integrator, a section function that uses other
     symbols, and UnprintableError where the equations cannot be printed.
     """
+    method = AUTO if method == "auto" else method
     method = integrator(method) if isinstance(method, str) else method
     unknown = [r for r in records if r not in RECORDS]
     if unknown:
         raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(RECORDS)}")
     if "section" in records and section is None:
         raise ValueError("the record 'section' needs a section function, for example v_1")
-    width = lanes.native_width() if width is None else width
+    # a small system does not keep the pipelines of the processor busy with one register: it gets two
+    width = lanes.native_width(2 if equations.dimension <= 2 else 1) if width is None else width
     ordered = tuple(r for r in RECORDS if r in records)
-    text = _module(equations, method, ordered, section if "section" in ordered else None, width)
+    weights = tuple(multiplicity) if multiplicity is not None and "sync_error" in ordered else None
+    if weights is not None and len(weights) != equations.n:
+        raise ValueError(f"multiplicity has {len(weights)} entries; expected one for each of {equations.n} nodes")
+    text = _module(equations, method, ordered, section if "section" in ordered else None, width, weights)
     return KernelSource(text, equations, method.name, ordered, width)
 
 
 def _module(
-    equations: Equations, method: Integrator, records: tuple[str, ...], section: sp.Expr | None, width: int
+    equations: Equations,
+    method: Integrator,
+    records: tuple[str, ...],
+    section: sp.Expr | None,
+    width: int,
+    multiplicity: tuple[int, ...] | None,
 ) -> str:
     plain = tidy(equations)
     weight = [plain.edge.weight.name] if plain.edge is not None else []
     names = Names([*plain.state, *plain.parameters, *(s.name for s in plain.node.state), *weight])
     blocks = analyse(plain.node, names)
-    writer = StepWriter(plain, blocks, method)
     looped = equations.n > LARGEST_UNROLLED
-    entries = 0
     if looped:
-        entries = program(equations).entries if method.kind == "rosenbrock" else 0
-        lines = LoopWriter(writer).lines()
-    else:
-        lines = write_rosenbrock(writer) if method.kind == "rosenbrock" else write_explicit(writer)
-    functions = _node_functions(writer, blocks, method)
+        method = replace(method, smooth=None)
+    steps = _steps(equations, plain, blocks, method, looped)
+    lines = [line for writer in steps.values() for line in writer.lines]
+    functions = _node_functions(list(steps.values()), blocks)
+    entries = program(equations).entries if looped and method.kind == "rosenbrock" else 0
+    scratch = workspace(steps["step"], entries) if looped else 0
     parts = [
         _header(equations, plain, method, records, lines),
         _imports(functions, lines, section),
-        _constants(plain, method, records, width)
-        + (
-            f"\nLOOPED = True\nENTRIES = {entries}\nWORKSPACE = {workspace(writer, entries)}"
-            if looped
-            else "\nLOOPED = False\nWORKSPACE = 0"
-        ),
+        _constants(plain, method, records, width, multiplicity)
+        + (f"\nENTRIES = {entries}" if looped else "")
+        + f"\nLOOPED = {looped}\nWORKSPACE = {scratch}\nREPEATS = {angular_frequency(plain) is not None}",
         *("\n".join(f) for f in functions),
         SCALED,
         *([PAIR, skeletons.text("sparse")] if looped else []),
-        _step(lines, looped),
+        *(_step(name, writer.lines, looped) for name, writer in steps.items()),
         _section(equations, plain, section),
-        skeletons.text("sweep"),
+        *(skeletons.text(name) for name in ("recording", "cells", "control", "sweep")),
     ]
     return "\n\n\n".join(part for part in parts if part) + "\n"
 
 
-def _node_functions(writer: StepWriter, blocks: NodeBlocks, method: Integrator) -> list[list[str]]:
-    """The right-hand side of one node, and its linearisation where the method wants one."""
+def _steps(
+    equations: Equations, plain: Equations, blocks: NodeBlocks, method: Integrator, looped: bool
+) -> dict[str, StepWriter]:
+    """The steps of a kernel by the name of their function, written."""
+    methods = {"step": method} if method.smooth is None else {"step": method, "step_smooth": method.smooth}
+    steps = {name: StepWriter(plain, blocks, m, bounded=len(methods) > 1) for name, m in methods.items()}
+    for writer in steps.values():
+        if looped:
+            LoopWriter(writer).lines()
+        else:
+            (write_rosenbrock if writer.method.kind == "rosenbrock" else write_explicit)(writer)
+    return steps
+
+
+def _node_functions(steps: list[StepWriter], blocks: NodeBlocks) -> list[list[str]]:
+    """The right-hand side of one node, and its linearisations where a step wants one."""
     made = []
+    first = [writer.first_body for writer in steps]
     for name, doc, body in (
         ("node", "Right-hand side of one oscillator.", blocks.rhs),
         ("node_linear", "Right-hand side of one oscillator and the parts of its Jacobian that move.", blocks.linear),
+        ("node_local", "Right-hand side of one oscillator and the parts of its Jacobian that move.", blocks.local),
     ):
-        results = [e for e in body.results if not writer.is_plain(e)]
-        if results and (name == "node" or method.kind == "rosenbrock"):
-            arguments = [s.name for s in writer.arguments(body, results)]
+        results = [e for e in body.results if not steps[0].is_plain(e)]
+        if results and (name == "node" or any(body is b for b in first)):
+            arguments = [s.name for s in steps[0].arguments(body, results)]
             made.append(write_function(name, doc, body, arguments, results))
     return made
 
@@ -144,7 +173,7 @@ def _header(
         "",
         f"Equations   {equations.digest[:16]}",
         f"Integrator  {method.name}, order {method.order}: {method.source}",
-        f"State       {', '.join(equations.state)}",
+        f"State       {_listed(equations.state)}",
         f"Parameters  {', '.join(equations.parameters) or 'none'}",
         f"Records     {', '.join(('final state', *records))}",
         f"Step        {_operations(lines)} operations outside the node functions",
@@ -152,6 +181,13 @@ def _header(
     if swapped:
         rows.append(f"Renamed     {', '.join(swapped)}")
     return '"""' + "\n".join(rows) + '\n"""'
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    """Names with commas; of many the first and the last few."""
+    if len(names) <= 40:
+        return ", ".join(names)
+    return f"{', '.join(names[:6])}, … {', '.join(names[-3:])} ({len(names)} variables)"
 
 
 def _operations(lines: list[str]) -> int:
@@ -174,9 +210,11 @@ def _imports(functions: list[list[str]], lines: list[str], section: sp.Expr | No
         "load",
         "maximum",
         "minimum",
+        "one_lane",
         "select",
         "store",
         "sqrt",
+        "truncated",
     }
     primitive |= {n for n in used if n in lanes.__all__}
     return "\n".join([
@@ -190,7 +228,13 @@ def _imports(functions: list[list[str]], lines: list[str], section: sp.Expr | No
     ])  # fmt: skip
 
 
-def _constants(equations: Equations, method: Integrator, records: tuple[str, ...], width: int) -> str:
+def _constants(
+    equations: Equations,
+    method: Integrator,
+    records: tuple[str, ...],
+    width: int,
+    multiplicity: tuple[int, ...] | None,
+) -> str:
     flags = {name.upper(): name in records for name in RECORDS}
     rows = {
         "WIDTH": width,
@@ -198,19 +242,23 @@ def _constants(equations: Equations, method: Integrator, records: tuple[str, ...
         "COMPONENTS": len(equations.node.state),
         "DIMENSION": equations.dimension,
         "PARAMETERS": len(equations.parameters),
-        "DENSE_ROWS": len(method.dense),
+        "DENSE_ROWS": max(len(m.dense) for m in (method, method.smooth) if m is not None),
         "ERROR_ORDER": method.error_order,
+        "SWITCHING": method.smooth is not None,
+        **({"SMOOTH_ERROR_ORDER": method.smooth.error_order} if method.smooth is not None else {}),
+        "WEIGHTED": multiplicity is not None,
         **flags,
         "DENSE": any(flags.values()),
     }
-    return "\n".join(f"{name} = {value!r}" for name, value in rows.items())
+    text = "\n".join(f"{name} = {value!r}" for name, value in rows.items())
+    return text if multiplicity is None else f"{text}\nMULTIPLICITY = np.array({[float(m) for m in multiplicity]!r})"
 
 
-def _step(lines: list[str], looped: bool) -> str:
+def _step(name: str, lines: list[str], looped: bool) -> str:
     more = ", graph, weights" if looped else ""
     head = [
         "@njit(error_model='numpy')",
-        f"def step(t, h, y, p, y_new, dense, rtol, atol{more}):",
+        f"def {name}(t, h, y, p, y_new, dense, rtol, atol{more}):",
         '    """One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."""',
     ]
     return "\n".join([*head, *(f"    {line}" for line in lines)])
@@ -227,14 +275,14 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
     unknown = sorted(used - set(equations.state) - set(equations.parameters) - {"t"})
     if unknown:
         raise ValueError(f"section function {section}: unknown symbol {unknown[0]!r}; use the state, parameters and t")
-    lines = ["@njit(error_model='numpy', forceinline=True)", "def section(theta, t, h, y, p, y_new, dense):",
+    lines = ["@njit(error_model='numpy', forceinline=True)", "def section(theta, t, h, bank, y_new, dense):",
              '    """The section function at the fraction theta of the step."""']  # fmt: skip
     for slot, (name, shown) in enumerate(zip(equations.state, plain.state, strict=True)):
         if name in used:
-            lines.append(f"    {shown} = inside(theta, {slot}, y, y_new, dense)")
+            lines.append(f"    {shown} = inside(theta, {slot}, bank, y_new, dense)")
     for slot, (name, shown) in enumerate(zip(equations.parameters, plain.parameters, strict=True)):
         if name in used:
-            lines.append(f"    {shown} = load(p, {slot}, WIDTH)")
+            lines.append(f"    {shown} = load(bank, {equations.dimension + slot}, WIDTH)")
     text = show(section.xreplace({_real("t"): sp.Symbol("(t + theta*h)")}).xreplace(swap))
     return "\n".join([*lines, f"    return {text}"])
 

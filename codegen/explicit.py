@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .linearise import linearise, write_bound
 from .step import StepWriter, combine, indent_from
 
 __all__ = ["write_explicit"]
@@ -42,6 +43,10 @@ def stage(w: StepWriter, i: int) -> None:
     """Write one explicit stage; a row of `a` equal to `b` is the new state itself."""
     m = w.method
     w.put(f"# stage {i + 1}")
+    if i == 0 and w.bounded:
+        write_bound(w, linearise(w))
+        w.put(*(f"k1_{name} = f_{name}" for name in w.state))
+        return
     for name in w.state if i else ():
         w.put(f"u_{name} = " + (f"n_{name}" if i >= m.stages and m.a[i] == m.b else
                                 f"{name} + h*({combine(m.a[i], w.stages(name, i))})"))  # fmt: skip

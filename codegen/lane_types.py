@@ -68,8 +68,8 @@ class _MaskModel(models.PrimitiveModel):
         super().__init__(manager, fe_type, vector(BOOL, fe_type.width))
 
 
-def native_width() -> int:
-    """Return the lane width for this CPU: 8 with AVX-512, 4 with AVX, else 2; SYNCHAIN_WIDTH overrides it.
+def native_width(registers: int = 1) -> int:
+    """Return the lane width for this CPU: 8 with AVX-512, 4 with AVX, else 2 a register; SYNCHAIN_WIDTH overrides it.
 
     Raises ValueError where SYNCHAIN_WIDTH is not one of 1, 2, 4, 8, 16.
     """
@@ -80,8 +80,8 @@ def native_width() -> int:
         return int(wish)
     features = llvm.get_host_cpu_features()
     if features.get("avx512f"):
-        return 8
-    return 4 if features.get("avx") else 2
+        return 8 * registers
+    return (4 if features.get("avx") else 2) * registers
 
 
 def splat(builder: ir.IRBuilder, value: ir.Value, width: int) -> ir.Value:

@@ -18,11 +18,12 @@ from numba.core import cgutils
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin
 
-from .lane_types import DOUBLE, INT64, Lane, Mask, as_lane, common_width, constant, native_width, splat, vector
+from .lane_types import BOOL, DOUBLE, INT64, Lane, Mask, as_lane, common_width, constant, native_width, splat, vector
 
 __all__ = [
     "Lane", "Mask", "absolute", "any_lane", "broadcast", "copysign", "floor", "fma", "lane_bits", "load",
-    "maximum", "minimum", "native_width", "round_even", "scale_binary", "select", "split_binary", "sqrt", "store",
+    "maximum", "minimum", "native_width", "one_lane", "round_even",
+    "scale_binary", "select", "split_binary", "sqrt", "store", "truncated",
 ]  # fmt: skip
 
 CONTRACT = ("contract",)
@@ -253,3 +254,31 @@ def split_binary(typingctx: Any, value: Any, pivot: Any) -> Any:
         return context.make_tuple(builder, sig.return_type, [mantissa, number])
 
     return types.UniTuple(value, 2)(value, pivot), lower
+
+
+@intrinsic
+def truncated(typingctx: Any, value: Any) -> Any:
+    """The number cut to the first 9 bits of its significand, towards zero."""
+    if not isinstance(value, Lane):
+        return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        whole, mask = vector(INT64, value.width), constant(INT64, value.width, -(1 << 44))
+        return builder.bitcast(builder.and_(builder.bitcast(args[0], whole), mask), args[0].type)
+
+    return value(value), lower
+
+
+@intrinsic(prefer_literal=True)
+def one_lane(typingctx: Any, which: Any, width: Any) -> Any:
+    """The mask that holds in one lane alone."""
+    size = _width_of(width)
+    if size is None or not isinstance(which, types.Integer):
+        return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        index = context.cast(builder, args[0], sig.args[0], types.int64)
+        small = builder.trunc(builder.shl(ir.Constant(INT64, 1), index), ir.IntType(size))
+        return builder.bitcast(small, vector(BOOL, size))
+
+    return Mask(size)(which, width), lower

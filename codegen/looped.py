@@ -10,18 +10,24 @@ from collections.abc import Sequence
 import sympy as sp
 
 from .blocks import Body
+from .linearise import entry
 from .printer import show
-from .rosenbrock import entry, term
-from .sparse import NAMES
+from .rosenbrock import term
+from .sparse import NAMES, program
 from .step import StepWriter, combine
 
 __all__ = ["LoopWriter", "workspace"]
 
 
 def workspace(w: StepWriter, entries: int) -> int:
-    """Groups of scratch memory: stages, stage state, slopes, time slopes and, for implicit methods, the matrix."""
-    stages = len(w.method.c)
-    return (stages + 3) * w.equations.dimension + (entries if w.method.kind == "rosenbrock" else 0)
+    """Groups of scratch memory: stages, stage state, slopes, time slopes and, for implicit methods, the matrix.
+
+    Factors of an incomplete elimination stand beside the matrix, exact ones replace it.
+    """
+    vectors = (len(w.method.c) + 3) * w.equations.dimension
+    if w.method.kind != "rosenbrock":
+        return vectors
+    return vectors + (entries if program(w.equations).exact else 2 * entries)
 
 
 class LoopWriter:
@@ -120,7 +126,8 @@ class LoopWriter:
         w, m = self.w, self.method
         w.put(f"reach = h*{m.gamma!r}", "shift = 1.0/reach", f"rate = shift*{m.gamma!r}")
         self.linearise()
-        w.put("factorise(dense, MATRIX, order, below_start, below_slot, update_start, update_to, update_from)")
+        self.apart = "0" if program(w.equations).exact else "ENTRIES"
+        w.put(f"factorise(dense, MATRIX, {self.apart}, STATE, order, place, row_start, after_start, column)")
         for i in range(m.stages):
             self.stage(i)
         self.finish(m.b, [combine(row, self.stages(m.stages)) for row in m.e], m.a[-1])
@@ -171,10 +178,7 @@ class LoopWriter:
             if m.d[i] != 0.0 and c in self.timed_rows:
                 text += term(m.d[i], f"load(dense, TIME_SLOPE + {c}*NODES + i, WIDTH)", tidy=False)
             self.loop("for i in range(NODES):", [*lines, f"store(dense, K{i + 1} + {c}*NODES + i, {text})"])
-        w.put(
-            f"solve(dense, MATRIX, K{i + 1}, order, below_start, below_slot, below_row, "
-            "after_start, after_slot, after_column)"
-        )
+        w.put(f"solve(dense, MATRIX, {self.apart}, K{i + 1}, SLOPE, STATE, order, row_start, after_start, column)")
 
     def load_stages(self, c: int, row: Sequence[float]) -> list[str]:
         """Load the stage values of state variable c that a row of coefficients uses."""

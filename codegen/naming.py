@@ -21,7 +21,8 @@ RESERVED = frozenset(
      "DENSE_ROWS",
      "ENTRIES", "STATE", "SLOPE", "TIME_SLOPE", "MATRIX", *(f"K{i}" for i in range(1, 32)), "t", "h", "y", "y_new", "dense",
      "shift", "reach", "rate", "error", "size", "rtol", "atol", "node", "node_linear",
-     "step", "section", "theta", "now", "njit", "p", "drive", "scaled", "inside", "total", "e3", "e5", "np", "math",
+     "node_local", "bound", "bank", "step", "step_smooth", "section", "theta", "now",
+     "njit", "p", "drive", "scaled", "inside", "total", "e3", "e5", "np", "math",
      "WIDTH", "DENSE"}
     | set(NAMES)
     | set(keyword.kwlist) | set(dir(builtins)) | set(elementary.__all__) | set(lanes.__all__)

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import sympy as sp
 
 from .elimination import Factors, Plan, plan, write_factors, write_solve
+from .linearise import entry, linearise, write_bound
 from .printer import show
 from .step import StepWriter, combine, indent_from
 
-__all__ = ["write_rosenbrock"]
+__all__ = ["term", "write_rosenbrock"]
 
 Entries = dict[tuple[int, int], sp.Expr]
 
@@ -21,6 +22,8 @@ def write_rosenbrock(w: StepWriter) -> list[str]:
     # (shift - J) k = …; reach = 1/shift, rate = 1/h
     w.put(f"reach = h*{w.method.gamma!r}", "shift = 1.0/reach", f"rate = shift*{w.method.gamma!r}")
     own = linearise(w)
+    if w.bounded:
+        write_bound(w, own)
     entries = gather(w, own)
     steps = plan(len(w.state), set(entries))
     factors = write_factors(steps, entries, tuple(w.state))
@@ -30,34 +33,6 @@ def write_rosenbrock(w: StepWriter) -> list[str]:
         stage(w, i, steps, factors, slopes)
     finish(w)
     return w.lines
-
-
-def linearise(w: StepWriter) -> list[dict[str, sp.Expr]]:
-    """Write the right-hand side, Jacobian and time derivative at the start; return what stands for each, by node."""
-    eq, body = w.equations, w.blocks.linear
-    state = [s.name for s in eq.node.state]
-    kinds = [f"f_{r}" for r in state] + [entry(r, c) for r in eq.node.state for c in eq.node.state]
-    kinds += [f"ft_{r}" for r in state]
-    coded = [e for e in body.results if not w.is_plain(e)]
-    w.put("# right-hand side, Jacobian and time derivative at the start")
-    w.timed("t", w.wanted(body.results, body))
-    own: list[dict[str, sp.Expr]] = []
-    for i in range(eq.n):
-        at = {s: sp.Symbol(f"{s.name}_{i + 1}", real=True) for s in eq.node.state}
-        named = {kind: sp.Symbol(f"{kind}_{i + 1}", real=True) for kind in kinds}
-        plain = {kind: e.xreplace(at) for kind, e in zip(kinds, body.results, strict=True) if w.is_plain(e)}
-        if coded:
-            left = ", ".join(named[kind].name for kind in kinds if kind not in plain)
-            w.put(f"{left} = {w.call('node_linear', body, coded, i, '')}")
-        w.put(*(f"{named[kind]} = {show(plain[kind])}" for kind in kinds[: len(state)] if kind in plain))
-        own.append({kind: plain.get(kind, named[kind]) for kind in kinds})
-    w.links("", "f_")
-    return own
-
-
-def entry(r: sp.Symbol, c: sp.Symbol) -> str:
-    """The name of d(rhs of r)/dc: j_vx, and j_speed_by_place where letters run together."""
-    return f"j_{r.name}{c.name}" if len(r.name) == len(c.name) == 1 else f"j_{r.name}_by_{c.name}"
 
 
 def gather(w: StepWriter, own: list[dict[str, sp.Expr]]) -> Entries:

@@ -1,149 +1,203 @@
-"""The elimination of a large network as integer arrays that one small loop runs through."""
+"""The elimination of a large network as integer arrays that a few small loops run through.
+
+Chains, rings, stars and trees have an elimination without or almost without fill: it is exact, and its cost grows with the
+number of links.  Where the fill of the exact elimination exceeds FILL_LIMIT (large grids, random graphs: it grows faster
+than the network), the factors keep no more than the first level of fill (J. A. Meijerink, H. A. van der Vorst, Math.
+Comput. 31, 148, 1977; levels: Y. Saad, Iterative Methods for Sparse Linear Systems, SIAM, 2003, section 10.3.3), and the
+kernel refines every solution to rounding.
+"""
 
 from __future__ import annotations
 
 import heapq
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from synchain.models.equations import Equations
+from synchain.models.equations import Equations, Link
 
 from .elimination import Entry, Plan
 
-__all__ = ["EMPTY", "NAMES", "Program", "block_pattern", "program"]
+__all__ = ["EMPTY", "FILL_LIMIT", "NAMES", "Program", "block_pattern", "program"]
 
 NAMES = (
-    "target", "source", "node_slot", "here_slot", "there_slot", "order", "below_start", "below_slot", "below_row",
-    "update_start", "update_to", "update_from", "after_start", "after_slot", "after_column",
+    "target", "source", "node_slot", "here_slot", "there_slot", "order", "place", "row_start", "after_start", "column",
 )  # fmt: skip
 """What the arrays of a program are called, in the order in which a kernel takes them."""
 
 EMPTY: tuple[np.ndarray, ...] = tuple(np.zeros(0, np.int64) for _ in NAMES)
 """The program of a kernel that is written out."""
 
+FILL_LIMIT = 3.0
+"""Entries of the exact factors for each entry of the matrix, above which the elimination is incomplete."""
+
+Pattern = frozenset[Entry]
+
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """Integer arrays in the order of NAMES, weights of the links, and the number of matrix entries.
+    """Integer arrays in the order of NAMES, weights of the links, the number of matrix entries, exact or incomplete.
 
     target, source (links,): ends of each link.  node_slot (components**2 * n,), here_slot, there_slot
     (components**2 * links,): where the entries of the node's block and of a link's two blocks stand in the matrix, -1 where
-    there is none.  order (dimension,): pivots; below_*: rows under each pivot; update_*: what each of them changes;
-    after_*: columns behind each pivot.
+    there is none.  order (dimension,): pivots; place (dimension,): its inverse.  The off-diagonal entries of pivot order[q]
+    are row_start[q] … row_start[q + 1] - 1, those from after_start[q] on belong to later pivots; column: of each entry.
     """
 
     arrays: tuple[np.ndarray, ...]
     weights: np.ndarray
     entries: int
+    exact: bool
 
 
-def block_pattern(block: Iterable[Iterable[object]]) -> list[tuple[int, int]]:
+def block_pattern(block: Iterable[Iterable[object]]) -> tuple[Entry, ...]:
     """Row and column of the non-zero entries of a small block."""
-    return [(a, b) for a, row in enumerate(block) for b, e in enumerate(row) if e != 0]
+    return tuple((a, b) for a, row in enumerate(block) for b, e in enumerate(row) if e != 0)
 
 
 def program(equations: Equations) -> Program:
-    """Plan the elimination of (s - J) for a network; the cost grows with its links and the fill they cause."""
-    n, links = equations.n, equations.links
+    """Plan the elimination of (s - J) for a network; time and memory grow with its links.
+
+    Equations that differ only in what their symbols are called, or in numbers, share the program.
+    """
+    edge = equations.edge if equations.links else None
     own = block_pattern(equations.node.jacobian())
-    here = block_pattern(equations.edge.jacobian_here()) if equations.edge and links else []
-    there = block_pattern(equations.edge.jacobian_there()) if equations.edge and links else []
-    pattern = {(a * n + i, b * n + i) for a, b in own for i in range(n)}
-    pattern |= {(a * n + link[0], b * n + link[0]) for a, b in here for link in links}
-    pattern |= {(a * n + link[0], b * n + link[1]) for a, b in there for link in links}
-    steps = order(equations.dimension, pattern)
-    slots = _slots(equations.dimension, steps)
-    size = len(equations.node.state)
-    node_slot = _block_slots(size, own, [(i, i) for i in range(n)], n, slots)
-    here_slot = _block_slots(size, here, [(link[0], link[0]) for link in links], n, slots)
-    there_slot = _block_slots(size, there, [(link[0], link[1]) for link in links], n, slots)
-    ends = [np.array([link[side] for link in links], np.int64) for side in (0, 1)]
-    arrays = (*ends, node_slot, here_slot, there_slot, *_loops(steps, slots))
-    return Program(arrays, np.array([float(link[2]) for link in links]), len(slots))
+    here = block_pattern(edge.jacobian_here()) if edge else ()
+    there = block_pattern(edge.jacobian_there()) if edge else ()
+    return _program(equations.n, len(equations.node.state), own, here, there, equations.links)
+
+
+@lru_cache(maxsize=4)
+def _program(
+    n: int,
+    size: int,
+    own: tuple[Entry, ...],
+    here: tuple[Entry, ...],
+    there: tuple[Entry, ...],
+    links: tuple[Link, ...],
+) -> Program:
+    nodes = np.arange(n)
+    target, source = (np.array([link[side] for link in links], np.int64) for side in (0, 1))
+    blocks = ((own, nodes, nodes), (here, target, target), (there, target, source))
+    parts = [np.stack([a * n + i, b * n + j]) for block, i, j in blocks for a, b in block]
+    pattern = np.unique(np.concatenate(parts, axis=1), axis=1) if parts else np.zeros((2, 0), np.int64)
+    pivots, entries, exact = _factors(n * size, pattern)
+    place = np.empty(n * size, np.int64)
+    place[pivots] = np.arange(n * size)
+    keys = np.unique(place[entries[0]] * (n * size) + place[entries[1]])
+    columns = keys % (n * size)
+    starts = np.searchsorted(keys, np.arange(n * size + 1) * (n * size))
+    middles = np.searchsorted(keys, np.arange(n * size) * (n * size + 1))
+    slots = [_slots(size, n, block, i, j, place, keys) for block, i, j in blocks]
+    arrays = (target, source, *slots, pivots, place, starts, middles, pivots[columns])
+    weights = np.array([float(link[2]) for link in links])
+    return Program(tuple(np.ascontiguousarray(a, np.int64) for a in arrays), weights, n * size + len(keys), exact)
+
+
+def _slots(
+    size: int, n: int, block: tuple[Entry, ...], i: np.ndarray, j: np.ndarray, place: np.ndarray, keys: np.ndarray
+) -> np.ndarray:
+    """Slots of every block entry: (a * size + b) * len(i) + link or node."""
+    table = np.full((size * size, len(i)), -1, np.int64)
+    for a, b in block:
+        rows, columns = a * n + i, b * n + j
+        found = n * size + np.searchsorted(keys, place[rows] * (n * size) + place[columns])
+        table[a * size + b] = np.where(rows == columns, rows, found)
+    return table.reshape(-1)
+
+
+def _factors(dimension: int, pattern: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Pivots, off-diagonal entries (2, count) of the factors, and whether they are exact."""
+    off = pattern[:, pattern[0] != pattern[1]]
+    rows, columns = off.tolist()
+    listed = set(pattern[0, pattern[0] == pattern[1]].tolist())
+    found = _eliminate_all(dimension, rows, columns, listed, FILL_LIMIT * (dimension + len(rows)) - dimension)
+    if found is not None:
+        steps = found
+        lower = [(r, k) for k, below in zip(steps.order, steps.below, strict=True) for r in below]
+        upper = [(k, c) for k, after in zip(steps.order, steps.after, strict=True) for c in after]
+        return np.array(steps.order, np.int64), np.array([*lower, *upper], np.int64).reshape(-1, 2).T, True
+    late = np.isin(np.arange(dimension), list(listed))
+    pivots = np.argsort(late, kind="stable")
+    return pivots, _first_level(dimension, off, pivots), False
+
+
+def _first_level(dimension: int, off: np.ndarray, pivots: np.ndarray) -> np.ndarray:
+    """The pattern with the fill that its own entries cause: (r, k) and (k, c) with pivot k before both make (r, c)."""
+    place = np.empty(dimension, np.int64)
+    place[pivots] = np.arange(dimension)
+    rows, columns = place[off]
+    below, after = rows > columns, rows < columns
+    down = np.argsort(columns[below], kind="stable")
+    lower = np.stack([rows[below][down], columns[below][down]])  # by pivot
+    right = np.argsort(rows[after], kind="stable")
+    upper = np.stack([rows[after][right], columns[after][right]])
+    start = np.searchsorted(upper[0], np.arange(dimension + 1))
+    counts = (start[1:] - start[:-1])[lower[1]]
+    which = np.repeat(np.arange(lower.shape[1]), counts)
+    offset = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
+    fill = np.stack([lower[0][which], upper[1][start[lower[1][which]] + offset]])
+    fill = fill[:, fill[0] != fill[1]]
+    keys = np.unique(np.concatenate([rows * dimension + columns, fill[0] * dimension + fill[1]]))
+    return pivots[np.stack(np.divmod(keys, dimension))]
 
 
 def order(size: int, pattern: set[Entry]) -> Plan:
     """Pivots by least degree in the symmetrised pattern, rows without a diagonal entry of J first; O(fill log n)."""
+    off = [(r, c) for r, c in sorted(pattern) if r != c]
+    found = _eliminate_all(size, [r for r, _ in off], [c for _, c in off], {r for r, c in pattern if r == c}, np.inf)
+    if found is None:
+        raise RuntimeError("an elimination without a limit of fill was given up; this is a mistake in the program")
+    return found
+
+
+def _eliminate_all(size: int, row_of: list[int], column_of: list[int], listed: set[int], limit: float) -> Plan | None:
+    """The exact elimination, None as soon as its off-diagonal entries exceed the limit."""
     rows: list[set[int]] = [set() for _ in range(size)]
     columns: list[set[int]] = [set() for _ in range(size)]
-    for r, c in pattern:
-        if r != c:
-            rows[r].add(c)
-            columns[c].add(r)
+    for r, c in zip(row_of, column_of, strict=True):
+        rows[r].add(c)
+        columns[c].add(r)
     near = [rows[k] | columns[k] for k in range(size)]
-    late = [(k, k) in pattern for k in range(size)]
-    heap = [(late[k], len(near[k]), k) for k in range(size)]
+    heap = [(k in listed, len(near[k]), k) for k in range(size)]
     heapq.heapify(heap)
-    left, found, below, after = set(range(size)), [], [], []
-    while left:
+    done, found, below, after, count = bytearray(size), [], [], [], len(row_of)
+    while heap:
         _, degree, k = heapq.heappop(heap)
-        if k not in left or degree != len(near[k]):
+        if done[k] or degree != len(near[k]):
             continue  # an outdated entry: the current one is in the heap as well
-        left.remove(k)
+        done[k] = 1
         found.append(k)
         below.append(tuple(sorted(columns[k])))
         after.append(tuple(sorted(rows[k])))
-        _eliminate(k, rows, columns, near)
+        count += _eliminate(k, rows, columns, near)
+        if count > limit:
+            return None
         for j in near[k]:
-            heapq.heappush(heap, (late[j], len(near[j]), j))
+            heapq.heappush(heap, (j in listed, len(near[j]), j))
+        rows[k] = columns[k] = near[k] = set()
     return Plan(tuple(found), tuple(below), tuple(after))
 
 
-def _eliminate(k: int, rows: list[set[int]], columns: list[set[int]], near: list[set[int]]) -> None:
-    """Take pivot k out of the pattern and add the fill that it causes."""
+def _eliminate(k: int, rows: list[set[int]], columns: list[set[int]], near: list[set[int]]) -> int:
+    """Take pivot k out of the pattern, add the fill that it causes and return how much that is."""
+    fill = 0
     for r in columns[k]:
+        fill -= len(rows[r])
+        rows[r] |= rows[k]
+        rows[r].discard(r)
+        fill += len(rows[r])
         rows[r].discard(k)
-        rows[r] |= rows[k] - {r}
-        near[r] |= rows[k] - {r}
+        near[r] |= rows[k]
+        near[r].discard(r)
     for c in rows[k]:
         columns[c].discard(k)
-        columns[c] |= columns[k] - {c}
-        near[c] |= columns[k] - {c}
+        columns[c] |= columns[k]
+        columns[c].discard(c)
+        near[c] |= columns[k]
+        near[c].discard(c)
     for j in near[k]:
         near[j].discard(k)
-
-
-def _slots(size: int, steps: Plan) -> dict[Entry, int]:
-    """Where each entry of the factors stands: the diagonal first, then in order of elimination."""
-    slots = {(k, k): k for k in range(size)}
-    for k, down, right in zip(steps.order, steps.below, steps.after, strict=True):
-        for key in [*((r, k) for r in down), *((k, c) for c in right)]:
-            slots.setdefault(key, len(slots))
-    return slots
-
-
-def _block_slots(
-    size: int, pattern: list[tuple[int, int]], places: list[tuple[int, int]], n: int, slots: dict[Entry, int]
-) -> np.ndarray:
-    """Slots of every block entry: (a * size + b) * len(places) + place."""
-    table = np.full((size * size, len(places)), -1, np.int64)
-    for a, b in pattern:
-        table[a * size + b] = [slots[a * n + i, b * n + j] for i, j in places]
-    return table.reshape(-1)
-
-
-def _loops(steps: Plan, slots: dict[Entry, int]) -> tuple[np.ndarray, ...]:
-    """The arrays that the elimination loop runs through."""
-    below_start, below_slot, below_row = [0], [], []
-    update_start, update_to, update_from = [0], [], []
-    after_start, after_slot, after_column = [0], [], []
-    for k, down, right in zip(steps.order, steps.below, steps.after, strict=True):
-        for r in down:
-            below_slot.append(slots[r, k])
-            below_row.append(r)
-            for c in right:
-                update_to.append(slots[r, c])
-                update_from.append(slots[k, c])
-            update_start.append(len(update_to))
-        for c in right:
-            after_slot.append(slots[k, c])
-            after_column.append(c)
-        below_start.append(len(below_slot))
-        after_start.append(len(after_slot))
-    parts = (
-        steps.order, below_start, below_slot, below_row, update_start, update_to, update_from,
-        after_start, after_slot, after_column,
-    )  # fmt: skip
-    return tuple(np.array(part, np.int64) for part in parts)
+    return fill

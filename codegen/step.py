@@ -39,10 +39,13 @@ def combine(row: Sequence[float], names: Sequence[str], start: str = "") -> str:
 
 
 class StepWriter:
-    """Writes the statements of one step of `method` for `equations`, whose node was analysed into `blocks`."""
+    """Writes the statements of one step of `method` for `equations`, whose node was analysed into `blocks`.
 
-    def __init__(self, equations: Equations, blocks: NodeBlocks, method: Integrator) -> None:
-        self.equations, self.blocks, self.method = equations, blocks, method
+    A `bounded` step returns a bound of the eigenvalues at its start beside the error.
+    """
+
+    def __init__(self, equations: Equations, blocks: NodeBlocks, method: Integrator, bounded: bool = False) -> None:
+        self.equations, self.blocks, self.method, self.bounded = equations, blocks, method, bounded
         self.state = equations.state
         self.lines: list[str] = []
         self.timed_names = {s for s, _ in blocks.timed}
@@ -55,6 +58,13 @@ class StepWriter:
         """Names of the first `count` stage values of one state variable."""
         return [f"k{j + 1}_{name}" for j in range(count)]
 
+    @property
+    def first_body(self) -> Body:
+        """What is evaluated of a node at the start of a step."""
+        if self.method.kind == "rosenbrock":
+            return self.blocks.linear
+        return self.blocks.local if self.bounded else self.blocks.rhs
+
     # -- pieces of the right-hand side ------------------------------------------------------------------------
 
     def is_plain(self, e: sp.Expr) -> bool:
@@ -65,7 +75,7 @@ class StepWriter:
     @property
     def inner(self) -> set[sp.Symbol]:
         """Symbols defined inside the node functions."""
-        return {s for body in (self.blocks.rhs, self.blocks.linear) for s, _ in body.statements}
+        return {s for body in (self.blocks.rhs, self.blocks.linear, self.blocks.local) for s, _ in body.statements}
 
     def arguments(self, body: Body, results: Sequence[sp.Expr]) -> list[sp.Symbol]:
         """What a node function must be given: state first, then the rest by name."""
@@ -140,8 +150,8 @@ class StepWriter:
     def parameters(self) -> None:
         """Load the parameters and compute what depends on them alone."""
         for slot, name in enumerate(self.equations.parameters):
-            self.put(f"{name} = load(p, {slot}, WIDTH)")
-        body = self.blocks.linear if self.method.kind == "rosenbrock" else self.blocks.rhs
+            self.put(f"{name} = load(p, {len(self.state) + slot}, WIDTH)")
+        body = self.first_body
         wanted = body.symbols.union(*(e.free_symbols for s, e in self.blocks.timed if s in body.symbols))
         self.put(*(f"{symbol} = {show(e)}" for symbol, e in self.blocks.constants if symbol in wanted))
 
@@ -153,7 +163,7 @@ class StepWriter:
             terms.append(f"e_{name}")
         self.put(f"total = {' + '.join(terms)}", f"error = {terms[0]}")
         self.put(*(f"error = maximum(error, {term})" for term in terms[1:]))
-        self.put("return error + 0.0*total  # NaN or infinite where any estimate is")
+        self.put(f"return error + 0.0*total{', bound' * self.bounded}  # NaN or infinite where any estimate is")
 
     def dense(self, scale: str = "") -> None:
         """Store the coefficients of the dense output."""

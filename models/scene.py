@@ -75,7 +75,7 @@ class Scene:
         window: float = 100.0,
         time_unit: str | None = None,
         samples: int = 0,
-        integrator: str = "rodas5p",
+        integrator: str = "auto",
         rtol: float = 1e-8,
         atol: float | None = None,
         max_steps: int = 10_000_000,

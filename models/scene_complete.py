@@ -107,7 +107,7 @@ def _times(made: dict[str, Any]) -> None:
 def _numerics(made: dict[str, Any]) -> None:
     made["integrator"] = text("integrator", made["integrator"])
     if not made["integrator"].isidentifier():
-        raise ValueError(f"integrator: found {shown(made['integrator'])}; expected a name such as 'rodas5p'")
+        raise ValueError(f"integrator: found {shown(made['integrator'])}; expected 'auto' or a name such as 'rodas5p'")
     made["rtol"] = number("rtol", made["rtol"], 1e-15, 0.1)
     made["atol"] = made["rtol"] / 10 if made["atol"] is None else number("atol", made["atol"], 0.0, 0.1)
     if made["atol"] < 1e-300:

@@ -6,7 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import sympy as sp
 
+from synchain.models.equations import Equations
+from synchain.models.periodicity import angular_frequency
 from synchain.models.scene import Scene
 
 __all__ = ["CANCEL", "Plan", "control_array", "plan", "tolerances"]
@@ -22,8 +25,8 @@ CANCEL = 6
 class Plan:
     """Rows of all cells, in C order over the axes (the last one fastest).
 
-    start (cells, dimension), numbers (cells, parameters) in the order of Equations.parameters, spans (cells, 2): start and
-    end of the window in non-dimensional time.
+    start (cells, dimension), numbers (cells, parameters) in the order of Equations.parameters, spans (cells, 3): start and
+    end of the window, and the period after which the equations repeat themselves (0: none), in non-dimensional time.
     """
 
     start: np.ndarray
@@ -53,7 +56,20 @@ def plan(scene: Scene) -> Plan:
             numbers[:, names.index(name)] = values
         else:
             start[:, state.index(name)] = values
-    return Plan(start, numbers, _spans(scene, columns))
+    spans = np.column_stack([_spans(scene, columns), periods(scene.equations, numbers)])
+    return Plan(start, numbers, np.ascontiguousarray(spans))
+
+
+def periods(equations: Equations, numbers: np.ndarray) -> np.ndarray:
+    """The period of the equations for each row of parameters; 0 where time does not enter or no period is known."""
+    frequency = angular_frequency(equations)
+    if frequency is None or len(numbers) == 0:
+        return np.zeros(len(numbers))
+    value = sp.lambdify([sp.Symbol(name, real=True) for name in equations.parameters], frequency, "numpy")
+    size = np.abs(np.broadcast_to(np.asarray(value(*numbers.T), dtype=float), len(numbers)))
+    with np.errstate(divide="ignore"):
+        found = 2.0 * math.pi / size
+    return np.where(np.isfinite(found), found, 0.0)
 
 
 def axis_columns(scene: Scene) -> dict[str, np.ndarray]:
@@ -79,9 +95,14 @@ def _spans(scene: Scene, columns: dict[str, np.ndarray]) -> np.ndarray:
     return np.ascontiguousarray(spans)
 
 
-def control_array(rtol: float, atol: float, max_step: float, max_steps: float, direction: float = 0.0) -> np.ndarray:
-    """The numbers that steer a kernel, in the order of its column names (codegen/skeletons/sweep.py)."""
-    return np.array([rtol, atol, FIRST_STEP, max_step, max_steps, direction, 0.0])
+def control_array(
+    rtol: float, atol: float, max_step: float, max_steps: float, direction: float = 0.0, jumps: bool = True
+) -> np.ndarray:
+    """The numbers that steer a kernel, in the order of its column names (codegen/skeletons/recording.py).
+
+    Without `jumps` a cell that repeats itself is integrated to its end all the same.
+    """
+    return np.array([rtol, atol, FIRST_STEP, max_step, max_steps, direction, 0.0, float(not jumps)])
 
 
 def tolerances(scene: Scene, numbers: np.ndarray) -> tuple[float, float]:

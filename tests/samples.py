@@ -130,7 +130,7 @@ class Outcome:
 
 def blank(cells: int, dimension: int, room: int = 0, samples: int = 0) -> Outcome:
     return Outcome(
-        np.full((cells, dimension), np.nan), np.full((cells, 4), np.nan), np.zeros((cells, 4), np.int64),
+        np.full((cells, dimension), np.nan), np.full((cells, 4), np.nan), np.zeros((cells, 6), np.int64),
         np.full((cells, room, dimension + 1), np.nan), np.full((cells, samples, dimension), np.nan),
     )  # fmt: skip
 
@@ -197,13 +197,23 @@ class Step:
     y_new: list
     dense: list
     error: Any
+    bound: Any = None
 
 
 def take_step(
-    space: dict[str, Any], t: Any, h: Any, y: list, p: list, rtol: Any = 0, atol: Any = 1, *graph: Any
+    space: dict[str, Any],
+    t: Any,
+    h: Any,
+    y: list,
+    p: list,
+    rtol: Any = 0,
+    atol: Any = 1,
+    *graph: Any,
+    name: str = "step",
 ) -> Step:
     """One step of a kernel that runs as plain Python; a looped one needs its graph and weights."""
     room = space["DENSE_ROWS"] * len(y)
     y_new, dense = [None] * len(y), [None] * (room + space["WORKSPACE"])
-    error = space["step"](t, h, y, p, y_new, dense, rtol, atol, *graph)
-    return Step(y, y_new, dense[:room], error)
+    error = space[name](t, h, y, [*y, *p], y_new, dense, rtol, atol, *graph)
+    error, bound = error if space["SWITCHING"] else (error, None)
+    return Step(y, y_new, dense[:room], error, bound)

@@ -113,7 +113,7 @@ def test_names_avoid_those_that_are_taken():
 
 def test_constants_are_computed_before_the_stages():
     text = emit(friction_chain(2), "rodas5p", ("sync_error",), width=1).text
-    step = ast.parse(text[text.index("def step") : text.index("# Groups of")].strip().split("\n\n\n")[0])
+    step = ast.parse(text[text.index("def step") : text.index("# A bank holds")].strip().split("\n\n\n")[0])
     names = [
         s.targets[0].id for s in ast.walk(step) if isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name)
     ]
@@ -150,8 +150,13 @@ def numbers_of(eq: Equations, method: str, looped: bool, monkeypatch) -> list[fl
     space = plain(emit(eq, method, ("section",), section, width=1).text, FLOATS)
     made = program(eq)
     y, graph = [0.3, 0.1, -0.2, 0.5], (made.arrays, made.weights) if looped else ()
-    step = take_step(space, 0.3, 0.2, y, VALUES, 0.0, 1.0, *graph)
-    return [*step.y_new, *step.dense, step.error, space["section"](0.3, 0.3, 0.2, y, VALUES, step.y_new, step.dense)]
+    found: list[float] = []
+    for name in ("step", "step_smooth") if space["SWITCHING"] else ("step",):
+        step = take_step(space, 0.3, 0.2, y, VALUES, 0.0, 1.0, *graph, name=name)
+        dense = [0.0 if d is None else d for d in step.dense]
+        found += [*step.y_new, *dense, step.error, step.bound or 0.0]
+        found.append(space["section"](0.3, 0.3, 0.2, [*y, *VALUES], step.y_new, dense))
+    return found
 
 
 @pytest.fixture
@@ -169,12 +174,12 @@ def same_numbers(monkeypatch):
 
 
 WORDS = """
-h y p p0 p1 w0 w1 z0 z1 dense shift reach rate error size rtol atol now theta total e3 e5 scaled inside pair y_new node
-node_linear step section drive load store select broadcast absolute maximum minimum sqrt exp cos sin atan njit np math
-lambda if None True is print abs WIDTH DENSE NODES DIMENSION COMPONENTS DENSE_ROWS ENTRIES LOOPED MATRIX STATE SLOPE K1
-TIME STEP graph weights target source order solve factorise i j k e old new f r n m u
-k1_x_1 k12_v_2 u_x_1 f_x_1 f_x r_v_2 n_x_1 e_x_1 j_vv j_vv_1 ft_v ft_v_1 m_v_1_x_1 l_v_1_x_1 inv_v_1 x_here v_there
-hoisted_0 fixed_0 _ __name__ __debug__ mu_ x1 k10
+h y p p0 p1 w0 w1 z0 z1 dense shift reach rate error size rtol atol now theta total e3 e5 scaled inside pair y_new
+node node_linear node_local step step_smooth bound bank put section drive load store select broadcast absolute
+maximum minimum sqrt exp cos sin atan njit np math lambda if None True is print abs WIDTH DENSE NODES DIMENSION
+COMPONENTS DENSE_ROWS ENTRIES LOOPED MATRIX STATE SLOPE K1 TIME STEP graph weights target source order solve
+factorise i j k e old new f r n m u k1_x_1 k12_v_2 u_x_1 f_x_1 f_x r_v_2 n_x_1 e_x_1 j_vv j_vv_1 ft_v ft_v_1
+m_v_1_x_1 l_v_1_x_1 inv_v_1 x_here v_there hoisted_0 fixed_0 _ __name__ __debug__ mu_ x1 k10
 """.split()  # noqa: SIM905
 
 

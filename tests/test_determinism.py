@@ -15,8 +15,8 @@ PERIOD = 2 * np.pi / TABLE["omega"]
 CELLS, ROOM, SAMPLES = 29, 24, 9
 
 
-def compiled(width: int):
-    return kernel(EQ, "rodas5p", ALL, sp.Symbol("v_1", real=True), width)
+def compiled(width: int, method: str = "rodas5p"):
+    return kernel(EQ, method, ALL, sp.Symbol("v_1", real=True), width)
 
 
 def cells() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -25,8 +25,10 @@ def cells() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     start = dice.uniform(-0.4, 0.4, (CELLS, 4))
     values = np.array([numbers(EQ, sigma=s, omega=w) for s, w in dice.uniform([0.0, 1.1], [0.6, 1.9], (CELLS, 2))])
     begin = dice.uniform(0.0, 4.0, CELLS) * PERIOD
-    spans = np.stack([begin, begin + dice.uniform(0.0, 6.0, CELLS) * PERIOD], axis=1)
-    spans[3] = 0.0  # ends before it begins
+    period = 2 * np.pi / values[:, EQ.parameters.index("omega")]
+    period[::7] = 0.0  # not known to be periodic
+    spans = np.stack([begin, begin + dice.uniform(0.0, 6.0, CELLS) * PERIOD, period], axis=1)
+    spans[3, :2] = 0.0  # ends before it begins
     spans[5, 0] = 0.0
     spans[8, 0] = spans[8, 1]  # an empty window
     start[11] = [np.nan, 0.0, 0.0, 0.0]
@@ -35,12 +37,18 @@ def cells() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return start, values, spans
 
 
-def run(width: int, pieces: list[tuple[int, int]], workers: int = 1, order: np.ndarray | None = None) -> Outcome:
+def run(
+    width: int,
+    pieces: list[tuple[int, int]],
+    workers: int = 1,
+    order: np.ndarray | None = None,
+    method: str = "rodas5p",
+) -> Outcome:
     start, values, spans = (array if order is None else array[order] for array in cells())
     outcome = blank(CELLS, 4, ROOM, SAMPLES)
 
     def work(part: tuple[int, int]) -> None:
-        drive(compiled(width), start, values, spans, 1e-7, max_steps=1500, into=outcome, part=part)
+        drive(compiled(width, method), start, values, spans, 1e-7, max_steps=1500, into=outcome, part=part)
 
     with ThreadPoolExecutor(workers) as pool:
         list(pool.map(work, pieces))
@@ -74,17 +82,37 @@ def test_the_cells_are_a_fair_choice(alone):
 
 
 def test_cells_with_nothing_to_integrate_say_so(alone):
-    assert alone.counts[11].tolist() == [4, 0, 0, 0], "an undefined start has diverged"
-    assert alone.counts[17].tolist() == [4, 0, 0, 0], "so has one out of bounds"
-    assert alone.counts[3].tolist() == [1, 0, 0, 0]
+    assert alone.counts[11].tolist() == [4, 0, 0, 0, 0, 0], "an undefined start has diverged"
+    assert alone.counts[17].tolist() == [4, 0, 0, 0, 0, 0], "so has one out of bounds"
+    assert alone.counts[3].tolist() == [1, 0, 0, 0, 0, 0]
     assert alone.counts[8, 0] == 1
     np.testing.assert_allclose(alone.samples[8], np.tile(alone.end[8], (SAMPLES, 1)), rtol=1e-14)
+
+
+@pytest.fixture(scope="module")
+def alone_switching() -> Outcome:
+    """Every cell by itself in the scalar kernel with two kinds of step."""
+    return run(1, chunks(1), method="switching")
 
 
 @pytest.mark.parametrize("width", [1, 4, 8])
 @pytest.mark.parametrize("size", [29, 11, 3])
 def test_widths_and_chunks_change_nothing(alone, width, size):
     same(run(width, chunks(size)), alone)
+
+
+@pytest.mark.parametrize("width", [1, 4, 8])
+@pytest.mark.parametrize("size", [29, 11, 3])
+def test_changing_sides_changes_nothing(alone_switching, width, size):
+    smooth = alone_switching.counts[:, 5]
+    steps = alone_switching.counts[:, 1:3].sum(axis=1)
+    assert ((smooth > 10) & (smooth < steps - 10)).sum() > 10, "cells that take both kinds of step"
+    same(run(width, chunks(size), method="switching"), alone_switching)
+
+
+def test_the_order_of_cells_changes_nothing_where_they_change_sides(alone_switching):
+    order = np.random.default_rng(3).permutation(CELLS)
+    same(run(8, chunks(29), order=order, method="switching"), alone_switching, order)
 
 
 @pytest.mark.parametrize("width", [4, 8])

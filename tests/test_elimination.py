@@ -190,16 +190,17 @@ def test_the_program_solves_the_system(links, weighted):
         matrix[r, c] = float(e.subs({"sigma": 0.0}).xreplace({sp.Symbol("sigma", real=True): sp.Rational(2, 5)}))
     shifted = 3.0 * np.eye(2 * n) - matrix
     space = plain(skeletons.text("sparse"), {**FLOATS, "NODES": n, "DIMENSION": 2 * n, "WIDTH": 1})
-    dense = [0.0] * (made.entries + 2 * n)
+    dense = [0.0] * (made.entries + 3 * 2 * n)
     dense[: 2 * n] = np.diag(shifted).tolist()
     place(dense, shifted, arrays, n)
     right = dice.normal(size=2 * n)
-    dense[made.entries :] = right.tolist()
-    names = ("order", "below_start", "below_slot", "update_start", "update_to", "update_from")
-    space["factorise"](dense, 0, *(arrays[name] for name in names))
-    names = ("order", "below_start", "below_slot", "below_row", "after_start", "after_slot", "after_column")
-    space["solve"](dense, 0, made.entries, *(arrays[name] for name in names))
-    np.testing.assert_allclose(dense[made.entries :], np.linalg.solve(shifted, right), rtol=1e-11, atol=1e-13)
+    x, scratch, other = (made.entries + k * 2 * n for k in range(3))
+    dense[x:scratch] = right.tolist()
+    names = ("order", "place", "row_start", "after_start", "column")
+    space["factorise"](dense, 0, 0, scratch, *(arrays[name] for name in names))
+    names = ("order", "row_start", "after_start", "column")
+    space["solve"](dense, 0, 0, x, scratch, other, *(arrays[name] for name in names))
+    np.testing.assert_allclose(dense[x:scratch], np.linalg.solve(shifted, right), rtol=1e-11, atol=1e-13)
 
 
 def skeleton_names() -> tuple[str, ...]:

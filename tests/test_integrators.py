@@ -17,7 +17,7 @@ from synchain.codegen import integrators
 from synchain.codegen.emit import emit
 from synchain.codegen.integrators import Integrator
 
-METHODS = {name: integrators.integrator(name) for name in integrators.names()}
+METHODS = {name: m for name in integrators.names() if (m := integrators.integrator(name)).smooth is None}
 ROUNDING = {"rosenbrock": 4e-14, "explicit": 2e-14}
 """What the rounding of coefficients to doubles may do to a sum; those of Rosenbrock methods go up to 165."""
 
@@ -277,3 +277,12 @@ def test_wrong_integrators_are_refused():
         Integrator(**{**fields, "kind": "rosenbrock"})
     with pytest.raises(ValueError, match="unknown integrator 'euler'; known: cash_karp, dop853, rodas5p"):
         integrators.integrator("euler")
+
+
+def test_a_switching_integrator_is_the_two_it_names():
+    m = integrators.integrator("switching")
+    stiff, smooth = integrators.integrator("rodas5p"), integrators.integrator("dop853")
+    assert m.smooth == smooth
+    assert (m.a, m.b, m.c, m.e, m.gamma, m.order) == (stiff.a, stiff.b, stiff.c, stiff.e, stiff.gamma, stiff.order)
+    assert stiff.source in m.source
+    assert smooth.source in m.source

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from samples import FLOATS, plain
 
 import synchain.codegen.emit as emit_module
 import synchain.codegen.load as load_module
-from synchain.codegen.sparse import order, program
-from synchain.models import Scene, chain, complete, from_matrix, ring, star
+from synchain.codegen import skeletons, sparse
+from synchain.codegen.sparse import NAMES, order, program
+from synchain.models import Scene, chain, complete, from_matrix, grid, random_cubic, ring, star, tree
+from synchain.models.topology import topology
 from synchain.runtime import Status, run
 
 GRAPHS = [ring(5), star(5), complete(4), from_matrix([[-1, 1, 0], [0, "-1/2", "1/2"], [2, 0, -2]])]
@@ -52,59 +55,109 @@ def test_large_ring_runs_in_loops_and_keeps_its_symmetry():
     np.testing.assert_allclose(large.end.values.reshape(2, 12)[:, :2], small.end.values.reshape(2, 2), atol=1e-8)
 
 
+@pytest.fixture
+def incomplete(monkeypatch):
+    """Every elimination keeps only the first level of fill, and solutions are refined."""
+    monkeypatch.setattr(sparse, "FILL_LIMIT", 0.0)
+    sparse._program.cache_clear()
+    yield
+    sparse._program.cache_clear()
+
+
+def strong(equations, shift: float) -> np.ndarray:
+    """shift - J for random entries of J between -1 and 1."""
+    random = np.random.default_rng(1)
+    matrix = shift * np.eye(equations.dimension)
+    for place in equations.jacobian():
+        matrix[place] -= random.uniform(-1, 1)
+    return matrix
+
+
+def solved(equations, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """The solution by the generated program, run by Python itself."""
+    made, size = program(equations), equations.dimension
+    arrays = dict(zip(NAMES, made.arrays, strict=True))
+    space = plain(skeletons.text("sparse"), {**FLOATS, "DIMENSION": size, "WIDTH": 1})
+    rows = np.repeat(arrays["order"], np.diff(arrays["row_start"]))
+    apart = 0 if made.exact else made.entries
+    x = made.entries + apart
+    work = np.full(x + 3 * size, np.nan)
+    work[: made.entries] = [*np.diag(matrix), *matrix[rows, arrays["column"]]]
+    work[x : x + size] = right
+    both = ("row_start", "after_start", "column")
+    space["factorise"](work, 0, apart, x + size, arrays["order"], arrays["place"], *(arrays[k] for k in both))
+    space["solve"](work, 0, apart, x, x + size, x + 2 * size, arrays["order"], *(arrays[k] for k in both))
+    return work[x : x + size]
+
+
 @pytest.mark.parametrize("graph", GRAPHS, ids=lambda g: f"{g.name}{g.n}")
 def test_program_solves_like_numpy(graph):
     equations = Scene(topology=graph, parameters={"sigma": 0.1}).equations
+    assert program(equations).exact
+    matrix, right = strong(equations, 6.0), np.random.default_rng(2).normal(size=equations.dimension)
+    np.testing.assert_allclose(solved(equations, matrix, right), np.linalg.solve(matrix, right), rtol=1e-12)
+
+
+@pytest.mark.parametrize("shift", [8.0, 100.0, 1e6])
+@pytest.mark.parametrize("graph", [grid(30), random_cubic(20)], ids=lambda g: g.name)
+def test_incomplete_elimination_solves_to_rounding(graph, shift, incomplete):
+    equations = Scene(topology=graph).equations
     made = program(equations)
-    size = equations.dimension
-    names = dict(zip(load_module.NAMES, made.arrays, strict=True))
-    random = np.random.default_rng(1)
-    pattern = {key for key in equations.jacobian()}
-    matrix = np.diag(random.uniform(5, 6, size))
-    for r, c in pattern:
-        if r != c:
-            matrix[r, c] = random.uniform(-1, 1)
-    work, right = _fill(matrix, names, made.entries, size), random.normal(size=size)
-    _factorise(work, names, size)
-    np.testing.assert_allclose(_solve(work, right.copy(), names, size), np.linalg.solve(matrix, right), rtol=1e-12)
+    assert not made.exact
+    matrix, right = strong(equations, shift), np.random.default_rng(2).normal(size=equations.dimension)
+    found, expected = solved(equations, matrix, right), np.linalg.solve(matrix, right)
+    assert np.abs(found - expected).max() <= 4e-15 * np.abs(expected).max()
 
 
-def _fill(matrix, names, entries, size):
-    """The matrix in the program's storage: diagonal, then the entries in order of elimination."""
-    work = np.zeros(entries)
-    work[:size] = np.diag(matrix)
-    for q in range(size):
-        k = names["order"][q]
-        for b in range(names["below_start"][q], names["below_start"][q + 1]):
-            work[names["below_slot"][b]] = matrix[names["below_row"][b], k]
-        for a in range(names["after_start"][q], names["after_start"][q + 1]):
-            work[names["after_slot"][a]] = matrix[k, names["after_column"][a]]
-    return work
+def test_refinement_that_does_not_converge_says_so(incomplete):
+    equations = Scene(topology=grid(30)).equations
+    right = np.ones(equations.dimension)
+    assert np.isnan(solved(equations, strong(equations, 0.5), right)).all()
 
 
-def _factorise(work, names, size):
-    for q in range(size):
-        k = names["order"][q]
-        work[k] = 1.0 / work[k]
-        for b in range(names["below_start"][q], names["below_start"][q + 1]):
-            work[names["below_slot"][b]] *= work[k]
-            for u in range(names["update_start"][b], names["update_start"][b + 1]):
-                work[names["update_to"][u]] -= work[names["below_slot"][b]] * work[names["update_from"][u]]
+def test_incomplete_factors_keep_the_first_level_of_fill(incomplete):
+    """Positions first: (v_j, v_i) for every link and (v_i, v_i), which is the diagonal; nothing else."""
+    graph = grid(30)
+    equations = Scene(topology=graph).equations
+    made = program(equations)
+    links = len(graph.links)
+    assert made.entries == 2 * 30 + 2 * 30 + 2 * links
+    arrays = dict(zip(NAMES, made.arrays, strict=True))
+    assert set(arrays["order"][:30].tolist()) == set(range(30))
 
 
-def _solve(work, x, names, size):
-    for q in range(size):
-        for b in range(names["below_start"][q], names["below_start"][q + 1]):
-            x[names["below_row"][b]] -= work[names["below_slot"][b]] * x[names["order"][q]]
-    for q in range(size - 1, -1, -1):
-        k = names["order"][q]
-        for a in range(names["after_start"][q], names["after_start"][q + 1]):
-            x[k] -= work[names["after_slot"][a]] * x[names["after_column"][a]]
-        x[k] *= work[k]
-    return x
+@pytest.mark.parametrize(("name", "n"), [("grid", 2500), ("random_cubic", 1000)])
+def test_large_fill_is_not_built(name, n):
+    graph = topology(name, n)
+    made = program(Scene(topology=graph).equations)
+    assert not made.exact
+    assert made.entries == 4 * n + 2 * len(graph.links)
 
 
-@pytest.mark.parametrize("graph", [chain(2000), star(2000), ring(2000)], ids=lambda g: g.name)
+def test_incomplete_elimination_changes_no_result(incomplete, request):
+    scene = Scene(topology=grid(12), transient=0, window=1, rtol=1e-9, parameters={"sigma": 0.3})
+    refined = run(scene)
+    assert "solve(dense, MATRIX, ENTRIES, K1" in load_module.load(emit_module.emit(scene.equations)).source
+    sparse.FILL_LIMIT = 1e9  # the fixture restores it
+    sparse._program.cache_clear()
+    load_module._load.cache_clear()
+    exact = run(scene)
+    np.testing.assert_allclose(refined.end, exact.end, atol=1e-8)
+    assert abs(int(refined.steps) - int(exact.steps)) <= 0.02 * int(exact.steps)
+
+
+def test_lanes_are_refined_independently(incomplete):
+    """A lane with strong coupling needs more corrections than its neighbours, and changes nothing in them."""
+    scene = Scene(topology=grid(12), transient=0, window=0.2)
+    strengths = [0.1, 0.2, 1e4, 0.3, 0.0, 30.0, 0.5, 0.6]
+    together = run(scene, sigma=strengths, width=8)
+    assert (together.status == Status.FINISHED).all()
+    for i in (0, 2, 4):
+        alone = run(scene, sigma=[strengths[i]], width=8)
+        np.testing.assert_array_equal(alone.end.values[0], together.end.values[i])
+
+
+@pytest.mark.parametrize("graph", [chain(2000), star(2000), ring(2000), tree(2000)], ids=lambda g: g.name)
 def test_elimination_of_sparse_families_stays_sparse(graph):
     """Trees cause no fill between nodes; a ring adds at most one entry each way for every node."""
     made = program(Scene(topology=graph).equations)

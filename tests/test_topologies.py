@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
+from collections import Counter
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -19,6 +20,7 @@ from synchain.models.rationals import FILE_LIMIT
 from synchain.models.topology import Topology, family, from_matrix, names, read_matrix, topology
 
 ONE = Fraction(1)
+PAIRS_OF_EIGHT = {(0, 2), (1, 6), (3, 5), (4, 7)}
 
 
 @pytest.mark.parametrize("name", names())
@@ -70,6 +72,47 @@ def test_the_four_families_by_hand() -> None:
     assert neighbours("complete") == {(i, j) for i in range(4) for j in range(4) if i != j}
 
 
+def undirected(name: str, n: int) -> set[tuple[int, int]]:
+    return {(i, j) for i, j, _ in topology(name, n).links if i < j}
+
+
+def test_tree_and_grid_by_hand() -> None:
+    assert undirected("tree", 6) == {(0, 1), (0, 2), (1, 3), (1, 4), (2, 5)}
+    assert undirected("grid", 6) == {(0, 1), (1, 2), (3, 4), (4, 5), (0, 3), (1, 4), (2, 5)}
+    assert topology("grid", 7).links == topology("chain", 7).links
+
+
+@pytest.mark.parametrize(
+    ("n", "shape"), [(1, (1, 1)), (12, (3, 4)), (16, (4, 4)), (13, (1, 13)), (100_000, (250, 400))]
+)
+def test_the_grid_is_as_square_as_its_number_of_nodes_allows(n: int, shape: tuple[int, int]) -> None:
+    assert family("grid").shape(n) == shape
+
+
+def test_the_grid_has_the_eigenvalues_of_a_sum_of_chains() -> None:
+    rows, columns = (np.array(topology("chain", k).spectrum.evaluate(17), float) for k in (3, 4))
+    found = topology("grid", 12).spectrum
+    listed = np.repeat(np.array(found.values), found.multiplicities)
+    assert np.sort(listed) == pytest.approx(np.sort((rows[:, None] + columns[None, :]).ravel()), abs=1e-14)
+
+
+@pytest.mark.parametrize("n", [4, 5, 6, 7, 50, 1001])
+def test_random_cubic_nodes_have_three_neighbours(n: int) -> None:
+    degree = Counter(i for i, _, _ in topology("random_cubic", n).links)
+    assert sorted(degree.values()) == [2] * (n % 2) + [3] * (n - n % 2)
+
+
+def test_random_cubic_graphs_are_the_same_on_every_machine() -> None:
+    assert undirected("random_cubic", 8) - undirected("ring", 8) == PAIRS_OF_EIGHT
+
+
+def test_random_cubic_pairs_are_random() -> None:
+    """No pattern: the distances round the ring of a random matching are spread evenly."""
+    n = 4000
+    distance = [min((j - i) % n, (i - j) % n) for i, j in family("random_cubic").pairs(n)]
+    assert abs(np.mean(distance) - n / 4) < 4 * n / np.sqrt(48 * len(distance))
+
+
 def test_the_connectivity_matrix_of_the_chain_is_the_published_one() -> None:
     assert topology("chain", 4).matrix == sp.Matrix([[-1, 1, 0, 0], [1, -2, 1, 0], [0, 1, -2, 1], [0, 0, 1, -1]])
 
@@ -92,7 +135,12 @@ def test_too_many_links_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("name", "n", "error", "words"),
     [
-        ("rnig", 3, ValueError, "unknown topology 'rnig'; known: chain, complete, ring, star"),
+        (
+            "rnig",
+            3,
+            ValueError,
+            "unknown topology 'rnig'; known: chain, complete, grid, random_cubic, ring, star, tree",
+        ),
         ("", 3, ValueError, "unknown topology ''; known: "),
         ("../scene", 3, ValueError, "unknown topology '../scene'; known: "),
         (7, 3, TypeError, "topology name 7 is no text"),

@@ -1,14 +1,15 @@
 """Integrators as data, one file each: exact tableau, orders and the source of the coefficients.
 
 A file holds KIND ("rosenbrock" or "explicit"), ORDER, ERROR_ORDER, DENSE_ORDER, SOURCE and the coefficients; everything
-else (stage count, stiff accuracy, which sums can be reused) is computed from them.
+else (stage count, stiff accuracy, which sums can be reused) is computed from them.  A file of the kind "switching" names
+two others, STIFF and SMOOTH, between which every cell changes over as its stiffness asks for.
 """
 
 from __future__ import annotations
 
 import importlib
 import pkgutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 
 __all__ = ["Integrator", "integrator", "names"]
@@ -43,6 +44,8 @@ class Integrator:
     gamma: float = 0.0
     d: Row = ()
     big_c: tuple[Row, ...] = ()
+    smooth: Integrator | None = None
+    """The explicit method for cells that are not stiff at the moment; None where there is only one method."""
 
     def __post_init__(self) -> None:
         if self.kind not in ("rosenbrock", "explicit"):
@@ -67,7 +70,11 @@ def integrator(name: str) -> Integrator:
     """Return the integrator of that name; ValueError for an unknown one."""
     if name not in names():
         raise ValueError(f"unknown integrator {name!r}; known: {', '.join(names())}")
-    return _read(name, importlib.import_module(f".{name}", __name__))
+    data = importlib.import_module(f".{name}", __name__)
+    if data.KIND != "switching":
+        return _read(name, data)
+    stiff, smooth = integrator(data.STIFF), integrator(data.SMOOTH)
+    return replace(stiff, name=name, smooth=smooth, source=f"{stiff.source}; {smooth.name}: {smooth.source}")
 
 
 def _read(name: str, data: ModuleType) -> Integrator:

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 WIDTH = 1
 """Lanes in one register."""
 NODES = 1
@@ -17,6 +19,14 @@ PARAMETERS = 1
 DENSE_ROWS = 3
 """Coefficients of the dense output for each state variable."""
 ERROR_ORDER = 4
+SWITCHING = False
+"""True where the kernel has a second, explicit step for cells that are not stiff at the moment."""
+SMOOTH_ERROR_ORDER = 7
+REPEATS = False
+"""True where the right-hand side is periodic in time, so that a computation can repeat itself."""
+WEIGHTED = False
+MULTIPLICITY = np.ones(1)
+"""How many oscillators each node stands for; used where WEIGHTED."""
 DENSE = True
 LOOPED = False
 """True where the step loops over nodes and links; its arrays then come as arguments."""
@@ -32,5 +42,9 @@ def step(t: Any, h: Any, y: Any, p: Any, y_new: Any, dense: Any, rtol: Any, atol
     """One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."""
 
 
-def section(theta: Any, t: Any, h: Any, y: Any, p: Any, y_new: Any, dense: Any) -> Any:
+def step_smooth(t: Any, h: Any, y: Any, p: Any, y_new: Any, dense: Any, rtol: Any, atol: Any) -> Any:
+    """The explicit step of a switching kernel: the error as above, and a bound of the eigenvalues at the start."""
+
+
+def section(theta: Any, t: Any, h: Any, bank: Any, y_new: Any, dense: Any) -> Any:
     """The section function at the fraction theta of the step."""

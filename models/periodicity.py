@@ -1,0 +1,37 @@
+"""After which time the right-hand side of a driven network repeats itself."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from .equations import TIME, Equations
+
+__all__ = ["angular_frequency"]
+
+
+def angular_frequency(equations: Equations) -> sp.Expr | None:
+    """The angular frequency of the drive: the right-hand side has the period 2 pi over its absolute value.
+
+    None where time does not occur, or occurs other than in sines and cosines whose frequencies are whole multiples of one
+    among them.  Time may also not occur in the coupling.
+    """
+    found: set[sp.Expr] = set()
+    for e in equations.node.rhs:
+        rest = e.replace(lambda a: isinstance(a, sp.sin | sp.cos) and a.has(TIME), lambda a: _note(a, found))
+        if rest.has(TIME):
+            return None
+    if equations.edge is not None and any(e.has(TIME) for e in equations.edge.rhs):
+        return None
+    for candidate in sorted(found, key=sp.default_sort_key):
+        if all(sp.cancel(other / candidate).is_Integer for other in found):
+            return candidate
+    return None
+
+
+def _note(wave: sp.Expr, found: set[sp.Expr]) -> sp.Expr:
+    """Collect the frequency of a sine or cosine of a t + b; anything else is left in place."""
+    slope = sp.diff(wave.args[0], TIME)
+    if slope.has(TIME):
+        return wave
+    found.add(slope)
+    return sp.Symbol("wave")

@@ -1,0 +1,50 @@
+"""Random cubic graph: a ring whose nodes are also joined in random pairs, so that each has three neighbours."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+
+SUMMARY = "random graph: three neighbours each (where n is odd, one node has two), always the same for one n"
+MINIMUM = 4
+SOURCE = (
+    "B. Bollobás, F. R. K. Chung, SIAM J. Discrete Math. 1, 328 (1988); in the limit of many nodes like a uniformly "
+    "random cubic graph: R. W. Robinson, N. C. Wormald, Random Struct. Algorithms 3, 117 (1992)"
+)
+SEED = 1988
+
+
+def edges(n: int) -> Iterator[tuple[int, int, int]]:
+    """The ring, then the pairs."""
+    yield from ((i, i + 1, 1) for i in range(n - 1))
+    yield 0, n - 1, 1
+    yield from ((min(pair), max(pair), 1) for pair in pairs(n))
+
+
+def pairs(n: int) -> list[tuple[int, int]]:
+    """A random perfect matching (n odd: of all but one node) without edges of the ring.
+
+    Pairs that are neighbours in the ring swap their second nodes with those of random pairs until none is left.
+    """
+    stream = random.Random(SEED)
+
+    def below(count: int) -> int:
+        return int(stream.random() * count)  # the one method whose numbers Python promises never to change
+
+    nodes = list(range(n))
+    for i in range(n - 1, 0, -1):
+        j = below(i + 1)
+        nodes[i], nodes[j] = nodes[j], nodes[i]
+    first, second = nodes[: n // 2], nodes[n // 2 : 2 * (n // 2)]
+    wrong = [k for k in range(n // 2) if _adjacent(first[k], second[k], n)]
+    while wrong:
+        for k in wrong:
+            j = below(n // 2)
+            second[k], second[j] = second[j], second[k]
+        wrong = [k for k in range(n // 2) if _adjacent(first[k], second[k], n)]
+    return list(zip(first, second, strict=True))
+
+
+def _adjacent(i: int, j: int, n: int) -> bool:
+    """True for neighbours in the ring."""
+    return (i - j) % n in (1, n - 1)
