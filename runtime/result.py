@@ -18,11 +18,11 @@ from .status import Status
 
 if TYPE_CHECKING:
     from synchain.codegen.load import Kernel
+    from synchain.models.equations import Equations
 
     from .plan import Plan
-    from .sweep import Buffers
 
-__all__ = ["Result", "gather", "open_result"]
+__all__ = ["Buffers", "Result", "gather", "open_result"]
 
 MEANINGS = {
     "sync_error": "average synchronisation error",
@@ -31,6 +31,7 @@ MEANINGS = {
     "status": "how the cell ended: " + "; ".join(f"{s.value} {s.name.lower()}" for s in Status),
     "steps": "accepted steps",
     "rejected": "rejected steps",
+    "periods_skipped": "periods of the drive jumped over in a cell that repeats itself",
     "end": "state at the end of the window",
     "end_time": "non-dimensional time at which the cell stopped",
     "section_count": "number of section points in the window",
@@ -39,6 +40,32 @@ MEANINGS = {
     "trajectory": "states at equally spaced times of the window",
     "trajectory_time": "times of the trajectory",
 }
+
+
+@dataclass(slots=True)
+class Buffers:
+    """What the kernel fills, one row for each cell; see the docstring of `drive` in any kernel."""
+
+    end: np.ndarray
+    sums: np.ndarray
+    counts: np.ndarray
+    points: np.ndarray
+    samples: np.ndarray
+
+    @classmethod
+    def empty(cls, cells: int, dimension: int, room: int, samples: int) -> Buffers:
+        """Buffers in which nothing has run: numbers NaN, counts zero."""
+        return cls(
+            end=np.full((cells, dimension), np.nan),
+            sums=np.full((cells, 4), np.nan),
+            counts=np.zeros((cells, 6), np.int64),
+            points=np.full((cells, room, dimension + 1), np.nan),
+            samples=np.full((cells, samples, dimension), np.nan),
+        )
+
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """In the order of the kernel's arguments."""
+        return self.end, self.sums, self.counts, self.points, self.samples
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,20 +107,26 @@ class Result:
         """True where the scene is this result's but for its title."""
         return self.scene.replace(title="") == scene.replace(title="")
 
-    def restore(self, scene: Scene, buffers: Buffers) -> None:
-        """Put the finished cells of this result into the buffers of a new run of the same scene.
+    def stepped(self, equations: Equations) -> bool:
+        """True where these are the equations that were integrated: the scene's, or what was left of them to step."""
+        return bool(self.data.attrs["equations"] == equations.digest)
 
-        Raises ValueError where the scenes differ in more than their titles.
+    def restore(self, scene: Scene, buffers: Buffers, equations: Equations) -> None:
+        """Put the finished cells of this result into the buffers of a new run of the same scene that steps these equations.
+
+        Raises ValueError where the scenes differ in more than their titles, or this result comes of other equations.
         """
         if not self.belongs_to(scene):
             raise ValueError("the result to resume belongs to another scene; run without resume")
+        if not self.stepped(equations):
+            raise ValueError("the result to resume left out other parts of its scene; resume with the skip of that run")
         if scene.continuation != "none":
             return  # every cell needs the one before: a continued sweep starts again
         cells, data = scene.cells, self.data
         for source, target in (("end", buffers.end), ("trajectory", buffers.samples)):
             if source in data:
                 target[:] = data[source].values.reshape(target.shape)
-        counts = ("status", "steps", "rejected", "section_count")
+        counts = ("status", "steps", "rejected", "section_count", "periods_skipped")
         sums = ("sync_error", "sync_error_max", "sync_error_end", "end_time")
         for table, names in ((buffers.counts, counts), (buffers.sums, sums)):
             for column, name in enumerate(names):
@@ -122,8 +155,15 @@ def open_result(path: str | os.PathLike[str]) -> Result:
     return Result(data, Scene.from_dict(json.loads(data.attrs["scene"])))
 
 
-def gather(scene: Scene, kernel: Kernel, cells: Plan, buffers: Buffers, tolerances: tuple[float, float]) -> Result:
-    """Label what the kernel wrote."""
+def gather(
+    scene: Scene,
+    kernel: Kernel,
+    cells: Plan,
+    buffers: Buffers,
+    tolerances: tuple[float, float],
+    skipped: tuple[str, ...] = (),
+) -> Result:
+    """Label what the kernel wrote; `skipped` says what was left out of the equations (see `synchain.runtime.skip`)."""
     dims = ("cell",) if scene.zipped else tuple(axis.name for axis in scene.axes)
     shape = scene.shape
     data: dict[str, Any] = {}
@@ -131,7 +171,7 @@ def gather(scene: Scene, kernel: Kernel, cells: Plan, buffers: Buffers, toleranc
     def add(name: str, values: np.ndarray, *more: str) -> None:
         data[name] = ((*dims, *more), values.reshape((*shape, *values.shape[1:])), {"long_name": MEANINGS[name]})
 
-    for name, column in (("status", 0), ("steps", 1), ("rejected", 2)):
+    for name, column in (("status", 0), ("steps", 1), ("rejected", 2), ("periods_skipped", 4)):
         add(name, buffers.counts[:, column].astype(np.int32))
     add("end", buffers.end, "state")
     add("end_time", buffers.sums[:, 3])
@@ -145,10 +185,11 @@ def gather(scene: Scene, kernel: Kernel, cells: Plan, buffers: Buffers, toleranc
         add("section", buffers.points[:, :most, 1:], "point", "state")
     if "trajectory" in scene.record:
         parts = np.linspace(0.0, 1.0, scene.samples) if scene.samples > 1 else np.zeros(1)
-        times = cells.spans[:, :1] + (cells.spans[:, 1:] - cells.spans[:, :1]) * parts
+        times = cells.spans[:, :1] + (cells.spans[:, 1:2] - cells.spans[:, :1]) * parts
         add("trajectory_time", times, "sample")
         add("trajectory", buffers.samples, "sample", "state")
-    return Result(xr.Dataset(data, _coordinates(scene), _provenance(scene, kernel, tolerances)), scene)
+    provenance = {**_provenance(scene, kernel, tolerances), "skipped": "; ".join(skipped) or "nothing"}
+    return Result(xr.Dataset(data, _coordinates(scene), provenance), scene)
 
 
 def _coordinates(scene: Scene) -> dict[str, Any]:

@@ -13,15 +13,16 @@ import numpy as np
 import sympy as sp
 from tqdm import tqdm
 
-from synchain.codegen.emit import emit
+from synchain.codegen.emit import KernelSource, emit
 from synchain.codegen.load import Kernel, load
 from synchain.models.scene import Scene
 
 from .plan import CANCEL, Plan, control_array, plan, tolerances
-from .result import Result, gather
+from .result import Buffers, Result, gather
+from .skip import Skip, decide
 from .status import Status
 
-__all__ = ["SweepInterrupted", "kernel", "run"]
+__all__ = ["Buffers", "SweepInterrupted", "kernel", "kernel_source", "run"]
 
 DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
 
@@ -34,43 +35,28 @@ class SweepInterrupted(KeyboardInterrupt):
         self.result = result
 
 
-@dataclass(slots=True)
-class Buffers:
-    """What the kernel fills, one row for each cell; see the docstring of `drive` in any kernel."""
+def kernel(scene: Scene, width: int | None = None, skip: bool | Skip = False) -> Kernel:
+    """Return the compiled kernel of a scene; scenes that differ only in numbers share it.
 
-    end: np.ndarray
-    sums: np.ndarray
-    counts: np.ndarray
-    points: np.ndarray
-    samples: np.ndarray
-
-    @classmethod
-    def empty(cls, cells: int, dimension: int, room: int, samples: int) -> Buffers:
-        """Buffers in which nothing has run: numbers NaN, counts zero."""
-        return cls(
-            end=np.full((cells, dimension), np.nan),
-            sums=np.full((cells, 4), np.nan),
-            counts=np.zeros((cells, 4), np.int64),
-            points=np.full((cells, room, dimension + 1), np.nan),
-            samples=np.full((cells, samples, dimension), np.nan),
-        )
-
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        """In the order of the kernel's arguments."""
-        return self.end, self.sums, self.counts, self.points, self.samples
+    With `skip` it is the one that `run` uses, which leaves out what the scene does not need (see `synchain.runtime.skip`).
+    """
+    return load(kernel_source(scene, width, skip))
 
 
-def kernel(scene: Scene, width: int | None = None) -> Kernel:
-    """Return the compiled kernel of a scene; scenes that differ only in numbers share it."""
-    return load(kernel_source(scene, width))
-
-
-def kernel_source(scene: Scene, width: int | None = None) -> Any:
+def kernel_source(scene: Scene, width: int | None = None, skip: bool | Skip = False) -> KernelSource:
     """Return the text of a scene's kernel without compiling it."""
+    chosen = _chosen(scene, skip)
     section = None
     if "section" in scene.record:
-        section = sp.Symbol(scene.section.variable, real=True) - sp.Rational(repr(scene.section.level))
-    return emit(scene.equations, scene.integrator, scene.record, section, width)
+        section = sp.Symbol(chosen.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
+    return emit(chosen.equations, scene.integrator, chosen.records, section, width, chosen.multiplicity)
+
+
+def _chosen(scene: Scene, skip: bool | Skip) -> Skip:
+    chosen = skip if isinstance(skip, Skip) else decide(scene, skip)
+    if chosen.scene != scene:
+        raise ValueError("skip: found the reductions of another scene; make them with decide(scene)")
+    return chosen
 
 
 def run(
@@ -80,6 +66,7 @@ def run(
     resume: Result | None = None,
     show_progress: bool | None = None,
     width: int | None = None,
+    skip: bool | Skip = True,
     **axes: Any,
 ) -> Result:
     """Run every cell of a scene and return the labelled result.
@@ -87,31 +74,36 @@ def run(
     `axes` set parameters or initial states: a number fixes one, a sequence makes it an axis of the sweep (after those of
     the scene, replacing one of the same name).  `workers` is the number of threads (default: all cores), `width` the
     number of lanes (default: what the CPU has); neither changes a result.  `resume` is an earlier, unfinished result of the
-    same scene, whose finished cells are kept.  `show_progress` None shows a bar on terminals only.
+    same scene, whose finished cells are kept.  `show_progress` None shows a bar on terminals only.  `skip` leaves out what
+    the scene does not need, exactly (docs/skips.md); False integrates it as it stands, a Skip of this scene is taken as is.
 
-    Raises ValueError for an unknown axis or a result of another scene, SweepInterrupted on Ctrl-C.
+    Raises ValueError for an unknown axis, a result or a Skip of another scene, SweepInterrupted on Ctrl-C.
     """
     scene = with_axes(scene, axes)
-    cells = plan(scene)
+    chosen = _chosen(scene, skip)
+    width = 1 if width is None and scene.cells == 1 else width
     workers = worker_count(workers)
     bar = tqdm(total=scene.cells, unit="cell", disable=None if show_progress is None else not show_progress)
     with bar:
         bar.set_description_str("compiling")
-        job = _job(scene, cells, kernel(scene, width), workers)
+        job = _job(chosen, kernel(scene, width, chosen), workers, resume, skip is not False)
         bar.set_description_str("")
         bar.unpause()
         job.advance = bar.update
-        if resume is not None:
-            resume.restore(scene, job.buffers)
         try:
-            if scene.continuation == "none":
-                _run_all(job)
-            else:
-                _run_along(scene, job)
-            _complete_points(job)
+            _run_cells(scene, job)
         except KeyboardInterrupt:
-            raise SweepInterrupted(_report(scene, job)) from None
-    return _report(scene, job)
+            raise SweepInterrupted(_report(chosen, job)) from None
+    return _report(chosen, job)
+
+
+def _run_cells(scene: Scene, job: Job) -> None:
+    """Run what has not finished, side by side or one cell after the other."""
+    if scene.continuation == "none":
+        _run_all(job)
+    else:
+        _run_along(scene, job)
+    _complete_points(job)
 
 
 @dataclass(slots=True)
@@ -143,16 +135,22 @@ class Job:
             whole[rows] = piece
 
 
-def _job(scene: Scene, cells: Plan, compiled: Kernel, workers: int) -> Job:
+def _job(chosen: Skip, compiled: Kernel, workers: int, earlier: Result | None, jumps: bool) -> Job:
+    scene, whole = chosen.scene, plan(chosen.scene)
     direction = DIRECTIONS[scene.section.direction]
-    control = control_array(*tolerances(scene, cells.numbers), _max_step(scene), scene.max_steps, direction)
+    control = control_array(*tolerances(scene, whole.numbers), _max_step(scene), scene.max_steps, direction, jumps)
     samples = scene.samples if "trajectory" in scene.record else 0
-    buffers = Buffers.empty(scene.cells, len(scene.y0), _room(scene), samples)
-    return Job(compiled, cells, control, buffers, workers, lambda done: None)
+    buffers = Buffers.empty(scene.cells, len(chosen.states), _room(scene), samples)
+    if earlier is not None:
+        finished = Buffers.empty(scene.cells, len(chosen.places), _room(scene), samples)
+        earlier.restore(scene, finished, chosen.equations)
+        buffers = chosen.contract(finished)
+    return Job(compiled, chosen.cells(whole), control, buffers, workers, lambda done: None)
 
 
-def _report(scene: Scene, job: Job) -> Result:
-    return gather(scene, job.kernel, job.cells, job.buffers, (float(job.control[0]), float(job.control[1])))
+def _report(chosen: Skip, job: Job) -> Result:
+    limits = (float(job.control[0]), float(job.control[1]))
+    return gather(chosen.scene, job.kernel, job.cells, chosen.expand(job.buffers), limits, chosen.skipped)
 
 
 def with_axes(scene: Scene, axes: dict[str, Any]) -> Scene:

@@ -17,12 +17,14 @@ if TYPE_CHECKING:
     from synchain.models.scene import Scene
 
     from ..result import Result
+    from ..skip import Skip
 
 SUMMARY = "run a scene; write its results (netCDF) and a figure"
 EXAMPLES = (
     "synchain run figure_4a --out results",
     "synchain run two_oscillators --out results --set sigma=0:0.6:61 omega=1.4 --rtol 1e-9",
     "synchain run figure_4a --out results --resume",
+    "synchain run figure_4a --explain",
 )
 
 SETTINGS = ("transient", "window", "samples", "atol", "max_steps")
@@ -31,11 +33,13 @@ SETTINGS = ("transient", "window", "samples", "atol", "max_steps")
 
 def configure(parser: ArgumentParser) -> None:
     """Add scene, folder and changes to the scene."""
-    parser.usage = "synchain run SCENE --out DIR [--rtol X] [--workers N] [--set NAME=VALUE ...] [--resume]"
-    add_scene(parser)
-    parser.add_argument(
-        "--out", metavar="DIR", type=folder, required=True, help="folder for the files, made where it is missing"
+    parser.usage = (
+        "synchain run SCENE --out DIR [--rtol X] [--workers N] [--set NAME=VALUE ...] [--resume]\n"
+        "                    [--no-skip] [--explain]\n"
+        "       synchain run SCENE --explain [--rtol X] [--set NAME=VALUE ...] [--no-skip]"
     )
+    add_scene(parser)
+    parser.add_argument("--out", metavar="DIR", type=folder, help="folder for the files, made where it is missing")
     parser.add_argument(
         "--rtol", metavar="X", type=tolerance, help="relative tolerance of one step, above 0, at most 0.1"
     )
@@ -51,23 +55,35 @@ def configure(parser: ArgumentParser) -> None:
         + "; a,b,c or LO:HI:N sweeps a parameter or an initial state",
     )
     parser.add_argument("--resume", action="store_true", help="continue an interrupted run; finished cells are kept")
+    parser.add_argument(
+        "--explain", action="store_true", help="print what is left out of the scene and why; runs only with --out"
+    )
+    parser.add_argument("--no-skip", action="store_true", help="leave nothing out: integrate the scene as it stands")
     add_workers(parser)
 
 
 def execute(arguments: Namespace) -> int:
-    """Run the scene, save, draw, and say how the cells ended."""
+    """Explain the scene where asked to; run it, save, draw, and say how the cells ended."""
+    from ..skip import decide, explain
     from ..sweep import SweepInterrupted, run
 
+    if arguments.out is None and (arguments.resume or not arguments.explain):
+        raise WrongUse("the following arguments are required: --out\nsee: synchain run --help")
     with wrong_use():
         scene = changed_scene(arguments)
+        skip = decide(scene, not arguments.no_skip)
         name = Path(arguments.scene).stem if arguments.scene.endswith(".toml") else arguments.scene
+        if arguments.explain:
+            print(f"{name}: {_count(scene.cells, 'cell')} of {_count(scene.n, 'oscillator')}\n{explain(skip)}")
+        if arguments.out is None:
+            return FINE
         target = Path(arguments.out, f"{name}.nc")
-        earlier = _earlier(scene, target) if arguments.resume else None
-        _prepare(scene, target)
+        earlier = _earlier(skip, target) if arguments.resume else None
+        _prepare(skip, target)
     warn(scene.warnings)
     began = time.perf_counter()
     try:
-        result = run(scene, workers=arguments.workers, resume=earlier)
+        result = run(scene, workers=arguments.workers, resume=earlier, skip=skip)
     except SweepInterrupted as stop:
         raise _partial(stop.result, target, arguments) from None
     result.save(target)
@@ -114,14 +130,14 @@ def _fitting(scene: Scene, name: str, value: float | tuple[float, ...]) -> Any:
     return int(value) if name in ("samples", "max_steps") and value.is_integer() else value
 
 
-def _prepare(scene: Scene, target: Path) -> None:
+def _prepare(skip: Skip, target: Path) -> None:
     """Find out whatever can go wrong before the first cell runs, then make the folder."""
     from ..files import output_folder
     from ..plan import plan
     from ..sweep import kernel_source
 
-    plan(scene)
-    kernel_source(scene)
+    plan(skip.scene)
+    kernel_source(skip.scene, skip=skip)
     output_folder(target.parent)
     if target.is_dir():
         raise WrongUse(f"{target} is a folder; expected a file or nothing there; choose another --out")
@@ -143,16 +159,21 @@ def _drop_unfinished(scene: Scene, target: Path) -> None:
                 kept.unlink()
 
 
-def _earlier(scene: Scene, target: Path) -> Result:
-    """The result to resume; ValueError where it belongs to another scene."""
+def _earlier(skip: Skip, target: Path) -> Result:
+    """The result to resume; ValueError where it belongs to another scene or left out other parts of it."""
     from ..result import open_result
 
     found = next((path for path in (_unfinished(target), target) if path.exists()), None)
     if found is None:
         raise WrongUse(f"nothing to resume: {target} does not exist; run without --resume")
     earlier = open_result(found)
-    if not earlier.belongs_to(scene):
+    if not earlier.belongs_to(skip.scene):
         raise WrongUse(f"{found} belongs to another scene; repeat the options of that run, or run without --resume")
+    if not earlier.stepped(skip.equations):
+        raise WrongUse(
+            f"{found} left out other parts of its scene: {earlier.data.attrs.get('skipped', 'nothing')}; "
+            "repeat that run's --no-skip (or its absence), or run without --resume"
+        )
     return earlier
 
 

@@ -1,0 +1,199 @@
+"""Exact reductions of a network: parameters that are numbers go into the equations, nodes that move as one become one node.
+
+Nodes that start equal stay equal where the links treat them alike: where a partition of the nodes is balanced, that is
+where all nodes of a class feel every other class with the same total weight.  The quotient network has one node for each
+class and the same solutions.  Links inside a class drop out, because they are zero between equal states; such partitions
+are also called external equitable partitions.
+
+Sources: Golubitsky & Stewart, Bull. Amer. Math. Soc. 43, 305 (2006): balanced partitions and quotients; Schaub, O'Clery,
+Billeh, Delvenne, Lambiotte & Barahona, Chaos 26, 094821 (2016): those of difference couplings.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from fractions import Fraction
+from functools import lru_cache
+
+import sympy as sp
+
+from .equations import Edge, Equations, Link, Node
+
+__all__ = ["NoQuotient", "coarsest_balanced", "collapse", "fold", "quotient"]
+
+
+class NoQuotient(ValueError):
+    """The coupling has no exact quotient network, whatever the partition."""
+
+
+def fold(equations: Equations, values: Mapping[str, int | Fraction]) -> Equations:
+    """Return the equations with some parameters replaced by exact numbers; parameters that occur no more leave as well.
+
+    Links whose right-hand side has become zero leave too.  Raises TypeError for a number that is not exact, ValueError for
+    an unknown parameter and where a right-hand side is undefined at the numbers.
+    """
+    for name, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, (int, Fraction)):
+            raise TypeError(f"fold {name}: found {value!r} ({type(value).__name__}); expected an int or a Fraction")
+        if name not in equations.parameters:
+            raise ValueError(f"fold: unknown parameter {name!r}; known: {', '.join(equations.parameters) or 'none'}")
+    if not values:
+        return equations
+    numbers = {sp.Symbol(name, real=True): sp.Rational(v.numerator, v.denominator) for name, v in values.items()}
+    node = equations.node
+    rates = _folded("node", node.rhs, numbers)
+    single = Node(node.state, rates, _occurring(node.parameters, rates))
+    edge = equations.edge
+    if edge is not None:
+        pushes = _folded("edge", edge.rhs, numbers)
+        edge = Edge(edge.here, edge.there, edge.weight, pushes, _occurring(edge.parameters, pushes))
+    if edge is None or not equations.links or not any(edge.rhs):
+        return Equations(single, None, equations.n)
+    return Equations(single, edge, equations.n, equations.links)
+
+
+def _folded(what: str, rhs: Iterable[sp.Expr], numbers: Mapping[sp.Symbol, sp.Rational]) -> tuple[sp.Expr, ...]:
+    made = tuple(e.xreplace(dict(numbers)) for e in rhs)
+    for e in made:
+        if e.has(sp.nan, sp.zoo, sp.oo, -sp.oo):
+            found = ", ".join(f"{symbol} = {number}" for symbol, number in numbers.items())
+            raise ValueError(f"fold: a right-hand side of the {what} is undefined at {found}; leave it a parameter")
+    return made
+
+
+def _occurring(parameters: tuple[sp.Symbol, ...], rhs: tuple[sp.Expr, ...]) -> tuple[sp.Symbol, ...]:
+    used = set().union(*(e.free_symbols for e in rhs))
+    return tuple(p for p in parameters if p in used)
+
+
+def quotient(equations: Equations, colours: Sequence[Hashable]) -> tuple[Equations, tuple[int, ...]]:
+    """Return the smallest network that moves like this one where nodes of equal colour start equal, and each node's class.
+
+    `colours` has one entry for each node, its initial state; classes are numbered by their first nodes, so node 0 belongs to
+    class 0.  Raises NoQuotient where the coupling does not vanish between equal states or is not proportional to the weight
+    of a link (then no exact quotient is known), ValueError where there is not one colour for each node.
+    """
+    classes = coarsest_balanced(equations.n, equations.links, colours)
+    return collapse(equations, classes), classes
+
+
+def collapse(equations: Equations, classes: Sequence[int]) -> Equations:
+    """Return the network with one node for each class, its links those of any node of the class to the other classes.
+
+    Raises ValueError where the classes are not 0 … k-1, where two nodes of a class feel another class with different total
+    weights, NoQuotient for a coupling that `quotient` refuses.
+    """
+    if len(classes) != equations.n:
+        raise ValueError(f"partition: found {len(classes)} classes for {equations.n} nodes; expected one for each node")
+    count = len(set(classes))
+    if set(classes) != set(range(count)):
+        raise ValueError(f"partition: found the classes {sorted(set(classes))}; expected 0 … {count - 1}")
+    if count == equations.n and list(classes) == list(range(count)):
+        return equations
+    if equations.edge is not None and equations.links:
+        _check_coupling(equations.edge)
+    links = _class_links(equations, classes)
+    return Equations(equations.node, equations.edge if links else None, count, links)
+
+
+def _class_links(equations: Equations, classes: Sequence[int]) -> tuple[Link, ...]:
+    """The links between classes, proved to be the same for all nodes of a class."""
+    felt: list[dict[int, Fraction]] = [{} for _ in range(equations.n)]
+    for target, source, weight in equations.links:
+        k = classes[source]
+        if k != classes[target]:
+            felt[target][k] = felt[target].get(k, Fraction(0)) + weight
+    chosen: dict[int, tuple[int, dict[int, Fraction]]] = {}
+    for i, found in enumerate(felt):
+        total = {k: weight for k, weight in found.items() if weight != 0}
+        first, expected = chosen.setdefault(classes[i], (i, total))
+        if total != expected:
+            k = min(k for k in {*total, *expected} if total.get(k) != expected.get(k))
+            raise ValueError(
+                f"partition is not balanced: nodes {first + 1} and {i + 1} are of one class, but feel class {k} with the "
+                f"total weights {expected.get(k, 0)} and {total.get(k, 0)}"
+            )
+    return tuple((a, b, weight) for a in sorted(chosen) for b, weight in sorted(chosen[a][1].items()))
+
+
+@lru_cache(maxsize=64)
+def _check_coupling(edge: Edge) -> None:
+    """Prove that links add up by their weights and vanish between equal states."""
+    if not edge.diffusive:
+        raise NoQuotient(
+            "quotient: the coupling is not zero between equal states, so links inside a class would remain"
+        )
+    for e in edge.rhs:
+        if sp.simplify(e - edge.weight * e.xreplace({edge.weight: sp.S.One})) != 0:
+            raise NoQuotient(f"quotient: the coupling {e} is not proportional to its weight; links cannot be added up")
+
+
+def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]) -> tuple[int, ...]:
+    """Return the class of each node in the coarsest balanced partition in which classes are of one colour.
+
+    Colour refinement on the links and the diagonal that makes every row sum to zero (for this matrix a partition is
+    equitable exactly where it is balanced), in O(m log n) additions of whole numbers for m links: of the parts of a class,
+    the largest need not be looked at again (Hopcroft, in: Theory of Machines and Computations, Academic Press, 1971,
+    p. 189).
+    """
+    if len(colours) != n:
+        raise ValueError(f"colours: found {len(colours)} for {n} nodes; expected one for each node")
+    columns = _columns(n, tuple(links))
+    numbers: dict[Hashable, int] = {}
+    of = [numbers.setdefault(colour, len(numbers)) for colour in colours]
+    members: list[set[int]] = [set() for _ in numbers]
+    for i, k in enumerate(of):
+        members[k].add(i)
+    queue = deque(range(len(members)))
+    while queue:
+        for k, parts in _felt(members[queue.popleft()], columns, of).items():
+            for part in _split(members, k, parts):
+                queue.append(len(members))
+                for i in part:
+                    of[i] = len(members)
+                members.append(part)
+    order: dict[int, int] = {}
+    return tuple(order.setdefault(k, len(order)) for k in of)
+
+
+def _columns(n: int, links: tuple[Link, ...]) -> list[list[tuple[int, int]]]:
+    """For each source its targets with whole-number weights, the diagonal minus the sum of the row."""
+    scale = math.lcm(*(weight.denominator for _, _, weight in links))
+    columns: list[list[tuple[int, int]]] = [[] for _ in range(n)]
+    rows = [0] * n
+    for target, source, weight in links:
+        whole = weight.numerator * (scale // weight.denominator)
+        columns[source].append((target, whole))
+        rows[target] += whole
+    for i, total in enumerate(rows):
+        columns[i].append((i, -total))
+    return columns
+
+
+def _felt(sources: set[int], columns: list[list[tuple[int, int]]], of: list[int]) -> dict[int, list[set[int]]]:
+    """For each class the sets of its nodes that feel the sources with equal totals other than 0."""
+    totals: dict[int, int] = {}
+    for j in sources:
+        for i, weight in columns[j]:
+            totals[i] = totals.get(i, 0) + weight
+    found: dict[int, dict[int, set[int]]] = {}
+    for i, total in totals.items():
+        if total != 0:
+            found.setdefault(of[i], {}).setdefault(total, set()).add(i)
+    return {k: list(parts.values()) for k, parts in found.items()}
+
+
+def _split(members: list[set[int]], k: int, parts: list[set[int]]) -> list[set[int]]:
+    """Split class k into these parts and the rest; the largest keeps the number k, the others are returned."""
+    left = len(members[k]) - sum(map(len, parts))
+    parts.sort(key=len)
+    if left == 0 and len(parts) == 1:
+        return []
+    if left >= len(parts[-1]):
+        members[k].difference_update(*parts)
+        return parts
+    members[k], rest = parts.pop(), members[k]
+    rest.difference_update(members[k], *parts)
+    return [*parts, rest] if rest else parts

@@ -1,0 +1,152 @@
+"""What each skip saves: arithmetic operations of a step, time and answer with it and without it.
+
+Operations are those of one step of all oscillators, counted in the text of the kernel, calls of its functions included
+(an elementary function counts as one); searching sections, sampling and the synchronisation error are not part of a step
+and show in the time alone, which is CPU time of whole runs.  The answer is everything that both runs record: the largest
+difference over all cells, relative where a number is larger than 1, over the first twentieth of the time and at rtol 1e-10,
+since unstable motions part by rounding alone when they are given the time.
+"""
+
+from __future__ import annotations
+
+import ast
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from synchain.models.axis import Axis
+from synchain.models.scene import Scene
+from synchain.models.topology import topology
+
+from ..result import Result
+from ..skip import Skip, decide
+from ..sweep import kernel_source, run
+
+__all__ = ["CASES", "COLUMNS", "Case", "difference", "measure", "operations"]
+
+COLUMNS = (
+    "skipped", "oscillators", "operations a step", "operations without the skip", "milliseconds",
+    "milliseconds without the skip", "times faster", "largest difference",
+)  # fmt: skip
+
+FREE = ("broadcast", "select")
+"""Functions that are no arithmetic."""
+
+PARAMETERS = {"theta_b": 0.1, "sigma": 0.3}
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A skip and a scene in which it applies; `less` is what the scene with the skip has otherwise than the one without.
+
+    Without `less` the skip is a reduction, and the same scene is run with and without it; `fold_all` folds every number.
+    """
+
+    name: str
+    n: int
+    given: dict[str, Any] = field(default_factory=dict)
+    less: dict[str, Any] = field(default_factory=dict)
+    fold_all: bool = False
+    graph: str = "chain"
+
+
+CASES = (
+    Case("no forcing, u = 0", 2, {"parameters": {**PARAMETERS, "u": 0.0}, "time_unit": "time", "window": 550.0}),
+    Case("no coupling, sigma = 0", 4, {"parameters": {"sigma": 0.0}}),
+    Case("no synchronisation error", 4, {"record": ("sync_error",)}, {"record": ()}),
+    Case("no section", 4, {"record": ("section",)}, {"record": ()}),
+    Case("no trajectory", 4, {"record": ("trajectory",), "samples": 2001}, {"record": ()}),
+    Case("all start equal", 4, {"initial": {"x": 0.3}}),
+    Case("start mirrored", 4, {"initial": {"x": [0.3, 0.28, 0.28, 0.3]}, "record": ()}),
+    Case("hub and equal leaves", 8, {"initial": {"x": [0.3, *[0.28] * 7]}, "record": ()}, graph="star"),
+    Case("all fixed numbers folded", 2, {"parameters": PARAMETERS}, fold_all=True),
+)
+
+
+def measure(quick: bool = False) -> list[tuple[object, ...]]:
+    """Return the rows of the table, in the order of COLUMNS; `quick` runs fewer cells for shorter times."""
+    return [_row(case, quick) for case in CASES]
+
+
+def scenes(case: Case, quick: bool) -> tuple[Skip, Skip]:
+    """What is run with the skip and without it: cells of one core over the frequency of the drive."""
+    axis = Axis.between("omega", 1.1, 1.2, 8 if quick else 64)
+    given = {"parameters": PARAMETERS, "transient": 0.0, "window": 20.0 if quick else 100.0, **case.given}
+    if quick and "time_unit" in given:
+        given["window"] /= 5.0
+    scene = Scene(topology=topology(case.graph, case.n), axes=[axis], **given)
+    if case.less:
+        return decide(scene.replace(**case.less), skip=False), decide(scene, skip=False)
+    return decide(scene, fold_all=case.fold_all), decide(scene, skip=False)
+
+
+def _row(case: Case, quick: bool) -> tuple[object, ...]:
+    pair = scenes(case, quick)
+    counts = [operations(kernel_source(chosen.scene, skip=chosen).text) for chosen in pair]
+    seconds = [np.inf, np.inf]
+    for _ in range(2 if quick else 6):  # the first may compile
+        for k, chosen in enumerate(pair):
+            began = time.process_time()
+            run(chosen.scene, workers=1, skip=chosen, show_progress=False)
+            seconds[k] = min(seconds[k], time.process_time() - began)
+    fewer, more = seconds
+    return (case.name, case.n, *counts, 1e3 * fewer, 1e3 * more, more / fewer, _worst(case, pair))
+
+
+def _worst(case: Case, pair: tuple[Skip, Skip]) -> float:
+    """The largest difference of the answers over a short time."""
+    results = []
+    for chosen, skip in zip(pair, (not case.less, False), strict=True):
+        scene = chosen.scene.replace(window=chosen.scene.window / 20.0, rtol=1e-10)
+        short = decide(scene, skip, fold_all=case.fold_all)
+        results.append(run(scene, workers=1, skip=short, show_progress=False))
+    return difference(*results)
+
+
+def difference(one: Result, other: Result) -> float:
+    """The largest difference of what both results have; infinite where statuses or counts of section points differ."""
+    worst = 0.0
+    for name in ("status", "section_count", "end", "end_time", "sync_error", "sync_error_end", "section", "trajectory"):
+        if name not in one.data or name not in other.data:
+            continue
+        a, b = one.data[name].values.astype(float), other.data[name].values.astype(float)
+        if a.shape != b.shape or not np.array_equal(np.isnan(a), np.isnan(b)):
+            return float("inf")
+        if name in ("status", "section_count") and not np.array_equal(a, b):
+            return float("inf")
+        worst = max(worst, float(np.nanmax(np.abs(a - b) / np.maximum(1.0, np.abs(b)), initial=0.0)))
+    return worst
+
+
+def operations(text: str) -> int:
+    """Arithmetic operations of one step of an unrolled kernel; its own functions count as often as they are called."""
+    module = ast.parse(text)
+    flags = {
+        node.targets[0].id: node.value.value
+        for node in module.body
+        if isinstance(node, ast.Assign)
+        and isinstance(node.targets[0], ast.Name)
+        and isinstance(node.value, ast.Constant)
+    }
+    if flags.get("LOOPED"):
+        raise ValueError("operations are counted in unrolled kernels alone; found one that loops over its nodes")
+    own = {node.name: node for node in module.body if isinstance(node, ast.FunctionDef)}
+    return _count(own["step"].body, own, flags)
+
+
+def _count(parts: list[Any], own: dict[str, ast.FunctionDef], flags: dict[str, Any]) -> int:
+    total = 0
+    for part in parts:
+        if isinstance(part, ast.If) and isinstance(part.test, ast.Name) and part.test.id in flags:
+            total += _count(part.body if flags[part.test.id] else part.orelse, own, flags)
+            continue
+        if isinstance(part, ast.Call) and isinstance(part.func, ast.Name):
+            if part.func.id in ("load", "store"):
+                total += _count(part.args[2:], own, flags)  # not the arithmetic of the slot
+                continue
+            inner = own.get(part.func.id)
+            total += _count(inner.body, own, flags) if inner else part.func.id not in FREE
+        total += isinstance(part, ast.BinOp) + _count(list(ast.iter_child_nodes(part)), own, flags)
+    return total
