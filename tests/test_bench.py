@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
+import csv
+import types
+
 import pytest
 
 from synchain.runtime import bench
-from synchain.runtime.bench import precision, sensitivity
+from synchain.runtime.bench import sensitivity
+from synchain.runtime.figures.style import new_figure
 
 
 def test_unknown_benchmarks_are_refused():
@@ -14,27 +17,49 @@ def test_unknown_benchmarks_are_refused():
         bench.load("speed")
 
 
-@pytest.mark.parametrize("n", precision.CASES)
-def test_reference_cases_are_solved(n):
-    case = precision.read_case(n)
-    states, counts, seconds = precision.solve(case, precision.Method("rodas5p", 8, 1e-8, 1e-9, 1), case.times)
-    assert np.abs(states - case.states).max() < 1e-8
-    assert (counts[:, 0] == 1).all()
-    assert seconds > 0
-
-
-def test_scalar_step_needs_a_hundredth_of_the_paper_methods_steps():
-    """Cash-Karp at 1e-15/1e-12 is held back by stability, not accuracy: 15 thousand steps a period."""
-    case = precision.read_case(2)
-    period = np.array([10 * 2 * np.pi / 1.15])
-    _, slow, _ = precision.solve(case, precision.Method("cash_karp", 1, 1e-12, 1e-15, 1), period)
-    _, fast, _ = precision.solve(case, precision.Method("rodas5p", 1, 1e-6, 1e-7, 1), period)
-    assert slow[0, 1] > 100 * fast[0, 1]
-
-
 def test_markdown_has_one_line_a_row():
     text = bench.markdown(("a", "b"), [(1, 0.25), ("x", 1e-9)])
     assert text.splitlines() == ["| a | b |", "|---|---|", "| 1 | 0.25 |", "| x | 1e-09 |"]
+
+
+def plain(**more):
+    """A benchmark module with nothing optional, or with what is given."""
+    return types.SimpleNamespace(COLUMNS=("a", "b"), measure=lambda quick: [(1, 0.1 + 0.2)], **more)
+
+
+def test_csv_keeps_every_digit_and_leaves_missing_numbers_empty():
+    text = bench.csv_text(("a", "b, c"), [(1, 0.1 + 0.2), ("x", float("nan"))])
+    assert list(csv.reader(text.splitlines())) == [["a", "b, c"], ["1", repr(0.1 + 0.2)], ["x", ""]]
+
+
+def test_a_plain_benchmark_writes_a_table_in_two_forms(tmp_path):
+    module = plain()
+    found = bench.write("speed", module, module.measure(True), tmp_path)
+    assert [path.name for path in found] == ["speed.csv", "speed.md"]
+    assert sorted(tmp_path.iterdir()) == found
+    assert "| 1 | 0.3 |" in found[1].read_text()
+
+
+def test_summary_notes_and_figure_are_written_where_there_are_some(tmp_path):
+    module = plain(
+        summary=lambda rows: f"{len(rows)} row", notes=lambda: ["skipped: x"], draw=lambda rows: new_figure((1, 1))
+    )
+    found = bench.write("speed", module, module.measure(True), tmp_path)
+    assert [path.name for path in found] == ["speed.csv", "speed.md", "speed.png", "speed.svg"]
+    page = found[1].read_text()
+    assert page.index("| 1 |") < page.index("1 row") < page.index("skipped: x")
+    assert found[2].read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_command_writes_to_the_folder_and_says_so(monkeypatch, tmp_path, capsys):
+    from synchain.runtime.cli import main
+
+    module = plain(notes=lambda: ["skipped: x"])
+    monkeypatch.setattr(bench, "load", lambda name: module)
+    assert main(["bench", "speed", "--out", str(tmp_path / "new")]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.splitlines()[-2:] == [str(tmp_path / "new" / f"speed.{kind}") for kind in ("csv", "md")]
+    assert "skipped: x" in captured.err
 
 
 def test_sensitivity_brackets_the_published_end(monkeypatch):

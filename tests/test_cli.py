@@ -599,7 +599,10 @@ def test_output_that_cannot_be_written_is_a_failure() -> None:
 def test_exit_codes_and_streams_of_the_real_program() -> None:
     done = synchain("spectrum rnig 4")
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == "synchain spectrum: unknown topology 'rnig'; known: chain, complete, ring, star\n"
+    assert (
+        done.stderr
+        == "synchain spectrum: unknown topology 'rnig'; known: chain, complete, grid, random_cubic, ring, star, tree\n"
+    )
     done = synchain("equations two_oscillators", env={**os.environ, "PYTHONIOENCODING": "ascii"})
     assert (done.returncode, done.stderr) == (0, "")
     assert "cos(\\u03c9" in done.stdout  # the escape of an omega

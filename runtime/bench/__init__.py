@@ -1,15 +1,22 @@
-"""Benchmarks, one file each: cases as data, `measure(quick) -> list of rows`, and `COLUMNS`; run by `synchain bench`."""
+"""Benchmarks, one file each: cases as data, `measure(quick) -> list of rows`, and `COLUMNS`; run by `synchain bench`.
+
+Optional: `summary(rows) -> str`, more tables in Markdown; `notes() -> list of lines`, what is left out here and why;
+`draw(rows)`, a Matplotlib figure of the rows, called within the style of `synchain.runtime.figures.style`.
+"""
 
 from __future__ import annotations
 
+import csv
 import importlib
+import io
 import pkgutil
 import platform
 from collections.abc import Sequence
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-__all__ = ["load", "machine", "markdown", "names"]
+__all__ = ["csv_text", "load", "machine", "markdown", "names", "text", "write"]
 
 
 def names() -> tuple[str, ...]:
@@ -37,6 +44,37 @@ def markdown(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
     lines += ["| " + " | ".join(_cell(value) for value in row) + " |" for row in rows]
     return "\n".join(lines)
+
+
+def csv_text(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """A table as comma-separated values, numbers in full, a number that is not there empty."""
+    target = io.StringIO()
+    writer = csv.writer(target, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(["" if isinstance(v, float) and v != v else v for v in row] for row in rows)
+    return target.getvalue()
+
+
+def text(module: ModuleType, rows: Sequence[Sequence[Any]]) -> str:
+    """The table of a benchmark in Markdown, and under it its summary where it has one."""
+    more = str(module.summary(rows)) if rows and hasattr(module, "summary") else ""
+    return markdown(module.COLUMNS, rows) + (f"\n\n{more}" if more else "")
+
+
+def write(name: str, module: ModuleType, rows: Sequence[Sequence[Any]], folder: Path) -> list[Path]:
+    """Write `<name>.csv`, `<name>.md` and, where the benchmark draws, `<name>.png` and `.svg`; returns their paths."""
+    from ..files import write_text
+
+    table, page = folder / f"{name}.csv", folder / f"{name}.md"
+    write_text(table, csv_text(module.COLUMNS, rows))
+    left_out = [f"\n{line}\n" for line in (module.notes() if hasattr(module, "notes") else ())]
+    write_text(page, f"# {name}\n\n{machine()}\n\n{text(module, rows)}\n{''.join(left_out)}")
+    if not hasattr(module, "draw"):
+        return [table, page]
+    from ..figures.style import context, save
+
+    with context():
+        return [table, page, *save(module.draw(rows), folder, name)]
 
 
 def _cell(value: Any) -> str:

@@ -1,111 +1,167 @@
-"""Work and precision of the friction oscillators: time per drive period and core against the error of the state.
+"""Work and precision: time per drive period and core against the error of the state, for this program and its peers.
 
-The cases are the reference solutions in `data/` (quadruple precision, at least 15 certain decimals); the error is the
-largest over all components of the state at 40 times.  Every method runs through the same generated kernel and driver, so
-that only the method differs; width 1 is the scalar kernel.  The first row of each case is the source paper's method and
-tolerances, Cash-Karp with 1e-15 and 1e-12.
+The cases are those of `_cases.py`; the error is the largest over all components of the state at the case's times, half of
+them at period boundaries and half at spread phases.  "cash_karp" at 1e-12 and 1e-15 is the source paper's method and
+tolerances through this program's own kernel; one lane is the scalar kernel.  Peers are the files of `peers/`; one that is
+not installed is named and left out.  Times are CPU times of one core, per drive period and trajectory, compilation apart.
 """
 
 from __future__ import annotations
 
-import json
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from importlib.resources import files
+from functools import partial
+from typing import Any
 
 import numpy as np
+from tqdm import tqdm
 
-from synchain.models.scene import Scene
-from synchain.models.topology import topology
+from synchain.codegen.lanes import native_width
 
 from ..plan import control_array
 from ..sweep import Buffers, kernel
+from . import peers
+from ._cases import CASES, Case, read_case
+from ._clock import Point, best_time, curve
 
-__all__ = ["CASES", "COLUMNS", "METHODS", "Case", "Method", "measure", "read_case", "solve"]
+__all__ = ["CASES", "COLUMNS", "METHODS", "Method", "draw", "measure", "notes", "own_points", "prepare", "summary"]
 
-COLUMNS = ("n", "method", "lanes", "rtol", "error", "microseconds per period", "steps per period", "times faster")
-CASES = (1, 2)
+COLUMNS = (
+    "case", "method", "lanes", "rtol", "atol", "error", "microseconds per period", "steps per period", "periods",
+    "compile seconds", "remark",
+)  # fmt: skip
+Ends = tuple[np.ndarray, np.ndarray]
+"""States at the ends (m, dimension) and counts (m, …) of the kernel."""
+
+LADDER = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
+PAPER = (1e-12, 1e-15)
+"""The source paper's (rtol, atol) of Cash-Karp."""
 
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """A row of the benchmark."""
+    """Rows of the benchmark: an integrator of this program with full lanes or one, on stiff cases or on all."""
 
     integrator: str
-    width: int
-    rtol: float
-    atol: float
-    periods: int
+    full: bool
+    tolerances: tuple[tuple[float, float], ...]
+    longest: int = 100
+    stiff: bool = True
+
+    @property
+    def width(self) -> int:
+        """Number of lanes on this processor."""
+        return native_width() if self.full else 1
 
 
+TOLERANCES = tuple((rtol, 0.1 * rtol) for rtol in LADDER)
 METHODS = (
-    Method("cash_karp", 1, 1e-12, 1e-15, 10),
-    *(Method("rodas5p", 1, rtol, 0.1 * rtol, 100) for rtol in (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)),
-    *(Method("rodas5p", 8, rtol, 0.1 * rtol, 100) for rtol in (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)),
+    Method("cash_karp", False, (PAPER,), longest=10),
+    Method("rodas5p", False, TOLERANCES),
+    Method("rodas5p", True, TOLERANCES),
+    Method("dop853", False, TOLERANCES, stiff=False),
+    Method("dop853", True, TOLERANCES, stiff=False),
 )
+"""This program's rows; `stiff` False leaves out the cases in which stability holds an explicit method back."""
 
 
-@dataclass(frozen=True, slots=True)
-class Case:
-    """A reference solution: scene, times (m,) in non-dimensional time and states (m, dimension)."""
+def prepare(case: Case, integrator: str, width: int) -> Callable[[float, float, np.ndarray], Ends]:
+    """Compile or load the kernel of a case; returns solve(rtol, atol, ends) -> (states (m, dimension), counts).
 
-    scene: Scene
-    times: np.ndarray
-    states: np.ndarray
+    `solve` integrates one cell to each of the end times and raises RuntimeError where a cell did not reach its end.
+    """
+    compiled = kernel(case.scene.replace(integrator=integrator), width)
+    one = np.array([case.scene.parameters[name] for name in case.scene.equations.parameters])
+    y0 = np.array(case.scene.y0)
 
+    def solve(rtol: float, atol: float, ends: np.ndarray) -> Ends:
+        cells = len(ends)
+        spans = np.ascontiguousarray(np.stack([np.zeros(cells), ends], axis=1))
+        control = control_array(rtol, atol, 0.5 * case.period, 1e12)
+        buffers = Buffers.empty(cells, len(y0), room=0, samples=0)
+        compiled.drive(0, cells, np.tile(y0, (cells, 1)), np.tile(one, (cells, 1)), spans, control, *buffers.arrays())
+        if not np.isfinite(buffers.end).all():
+            raise RuntimeError(f"{integrator}: a cell did not finish at rtol = {rtol:g}")
+        return buffers.end, buffers.counts
 
-def read_case(n: int) -> Case:
-    """Return the reference solution of n oscillators (1 or 2)."""
-    data = json.loads(files(__package__).joinpath("data", f"trajectory_n{n}.json").read_text(encoding="utf-8"))
-    names = {"vb": "theta_b", "eps": "epsilon"}
-    parameters = {names.get(name, name): value for name, value in data["parameters"].items()}
-    if n > 1:
-        parameters["sigma"] = data["sigma"]
-    scene = Scene(
-        topology=topology("chain", n), parameters=parameters, initial=data["initial"], record=(), time_unit="time"
-    )
-    times = np.array([float.fromhex(t) for t in data["t"]])
-    return Case(scene, times, np.array(data["state"], dtype=float))
-
-
-def solve(case: Case, method: Method, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Integrate to each of the end times; returns states, counts and CPU seconds."""
-    compiled = kernel(case.scene.replace(integrator=method.integrator), method.width)
-    cells, dimension = len(ends), case.states.shape[1]
-    start = np.tile(np.array(case.scene.y0), (cells, 1))
-    numbers = np.tile([case.scene.parameters[name] for name in case.scene.equations.parameters], (cells, 1))
-    spans = np.stack([np.zeros(cells), ends], axis=1).copy()
-    control = control_array(method.rtol, method.atol, np.inf, 1e12)
-    buffers = Buffers.empty(cells, dimension, room=0, samples=0)
-    begin = time.process_time()
-    compiled.drive(0, cells, start, numbers, spans, control, *buffers.arrays())
-    return buffers.end, buffers.counts, time.process_time() - begin
+    return solve
 
 
-def measure(quick: bool = False) -> list[tuple[object, ...]]:
+def notes() -> list[str]:
+    """A line for each peer that cannot run here, with the reason and the remedy."""
+    found = [(peer.NAME, peers.absent(peer)) for peer in map(peers.load, peers.names())]
+    return [f"skipped: {name} ({why})" for name, why in found if why]
+
+
+def measure(quick: bool = False) -> list[tuple[Any, ...]]:
     """Return the rows of the table, in the order of COLUMNS."""
-    rows: list[tuple[object, ...]] = []
-    for n in CASES:
-        case = read_case(n)
-        slowest = 0.0
-        for method in METHODS:
-            row, cost = _row(case, method, quick, slowest)
-            slowest = slowest or cost
-            rows.append((n, *row))
+    present = [peer for peer in map(peers.load, peers.names()) if not peers.absent(peer)]
+    rows: list[tuple[Any, ...]] = []
+    with tqdm(total=len(CASES) * (1 + len(present)), unit="curve", disable=None) as bar:
+        for name in CASES:
+            case = read_case(name)
+            bar.set_description_str(name)
+            rows += [_row(case, point) for point in own_points(case, quick)]
+            bar.update()
+            for peer in present:
+                rows += [_row(case, point) for point in curve(peer, case, quick)]
+                bar.update()
     return rows
 
 
-def _row(case: Case, method: Method, quick: bool, slowest: float) -> tuple[tuple[object, ...], float]:
-    period = 2.0 * np.pi / case.scene.parameters["omega"]
-    chosen = slice(0, 8) if quick or method.integrator == "cash_karp" else slice(None)
-    states, _, _ = solve(case, method, case.times[chosen])
-    error = float(np.abs(states - case.states[chosen]).max())
-    length = np.full(method.width, method.periods * period)
-    best, counts = np.inf, np.zeros((1, 4))
-    for _ in range(1 if quick else 5):
-        _, counts, seconds = solve(case, method, length)
-        best = min(best, seconds)
-    cost = best / (method.periods * method.width) * 1e6
-    steps = float(counts[0, 1] + counts[0, 2]) / method.periods
-    ratio = slowest / cost if slowest else 1.0
-    return (method.integrator, method.width, method.rtol, error, cost, steps, ratio), cost
+def own_points(case: Case, quick: bool) -> Iterator[Point]:
+    """Yield this program's points of a case."""
+    for method in METHODS:
+        if case.stiff and not method.stiff:
+            continue
+        begin = time.perf_counter()
+        solve = prepare(case, method.integrator, method.width)
+        compiled = time.perf_counter() - begin
+        for rtol, atol in method.tolerances[::3] if quick else method.tolerances:
+            yield _own_point(case, method, partial(solve, rtol, atol), (rtol, atol), compiled, quick)
+
+
+def _own_point(
+    case: Case,
+    method: Method,
+    run: Callable[[np.ndarray], Ends],
+    tolerances: tuple[float, float],
+    compiled: float,
+    quick: bool,
+) -> Point:
+    periods = min(case.periods, method.longest)
+    part = case.within(periods)
+    states, _ = run(part.times)
+    ends = np.full(method.width, periods * case.period)
+    _, counts = run(ends)
+    seconds = best_time(lambda: run(ends), quick) / (periods * method.width)
+    error, steps = float(np.abs(states - part.states).max()), float(counts[0, 1] + counts[0, 2]) / periods
+    remark = "" if periods == case.periods else f"{periods} of {case.periods} periods"
+    return Point(
+        method.integrator, method.width, *tolerances, error, seconds, periods, compiled, steps=steps, remark=remark
+    )
+
+
+def _row(case: Case, point: Point) -> tuple[Any, ...]:
+    steps = "" if np.isnan(point.steps) else point.steps
+    return (
+        case.name, point.method, point.lanes, point.rtol, point.atol, point.error, 1e6 * point.seconds, steps,
+        point.periods, point.compile, point.remark,
+    )  # fmt: skip
+
+
+def summary(rows: list[tuple[Any, ...]]) -> str:
+    """A second table in Markdown: time of every method at the same error, and its ratio to the full lanes."""
+    from ._compare import table
+
+    return table([dict(zip(COLUMNS, row, strict=False)) for row in rows], own={method.integrator for method in METHODS})
+
+
+def draw(rows: list[tuple[Any, ...]]) -> Any:
+    """A figure with one panel a case: time against error, a curve for each method."""
+    from ._work_figure import figure
+
+    return figure(
+        [dict(zip(COLUMNS, row, strict=False)) for row in rows], own={method.integrator for method in METHODS}
+    )

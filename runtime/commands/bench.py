@@ -2,27 +2,40 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser, Namespace
 
+from ._arguments import folder
 from ._outcome import FINE, wrong_use
 
 SUMMARY = "run benchmarks and print their tables"
-EXAMPLES = ("synchain bench precision --quick", "synchain bench")
+EXAMPLES = ("synchain bench precision --quick", "synchain bench precision --out out", "synchain bench")
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add names and effort."""
+    """Add names, folder and effort."""
     parser.add_argument("names", metavar="NAME", nargs="*", help="benchmarks to run, e.g. precision (default: all)")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions and shorter runs")
+    parser.add_argument(
+        "--out", metavar="DIR", type=folder, help="folder for each table as CSV and Markdown, and for its figure"
+    )
 
 
 def execute(arguments: Namespace) -> int:
-    """Run the benchmarks one after the other and print a Markdown table of each."""
-    from ..bench import load, machine, markdown, names
+    """Run the benchmarks one after the other and print a Markdown table of each; with a folder, write files as well."""
+    from ..bench import load, machine, text, write
+    from ..bench import names as known
+    from ..files import output_folder
 
     with wrong_use():
-        chosen = [(name, load(name)) for name in arguments.names or names()]
+        chosen = [(name, load(name)) for name in arguments.names or known()]
+        target = None if arguments.out is None else output_folder(arguments.out)
     print(machine())
     for name, module in chosen:
-        print(f"\n{name}\n\n{markdown(module.COLUMNS, module.measure(arguments.quick))}", flush=True)
+        for line in module.notes() if hasattr(module, "notes") else ():
+            print(line, file=sys.stderr)
+        rows = module.measure(arguments.quick)
+        print(f"\n{name}\n\n{text(module, rows)}", flush=True)
+        for path in () if target is None else write(name, module, rows, target):
+            print(path)
     return FINE

@@ -1,0 +1,19 @@
+"""Taylor series through heyoka, one trajectory."""
+
+from __future__ import annotations
+
+from . import _heyoka
+from ._problem import Problem, Solve
+
+__all__ = ["CELLS", "NAME", "PACKAGE", "REQUIRES", "TOLERANCES", "prepare"]
+
+NAME = "heyoka Taylor"
+PACKAGE = "heyoka"
+REQUIRES = {"module": ("heyoka",)}
+TOLERANCES = tuple((10.0 * tol, tol) for tol in (1e-6, 1e-8, 1e-10, 1e-12, 1e-14))
+CELLS = 1
+
+
+def prepare(problem: Problem) -> Solve:
+    """Return a solver by Taylor series."""
+    return _heyoka.prepare(problem, CELLS)

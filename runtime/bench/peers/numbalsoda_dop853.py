@@ -1,0 +1,34 @@
+"""DOP853, explicit of order 8, through numbalsoda, with a right-hand side compiled by Numba."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._problem import Problem, Solve, ladder, load
+
+__all__ = ["NAME", "PACKAGE", "REQUIRES", "TOLERANCES", "prepare"]
+
+NAME = "numbalsoda DOP853"
+PACKAGE = "numbalsoda (its build needs gfortran)"
+REQUIRES = {"module": ("numbalsoda",)}
+TOLERANCES = ladder(5, 12)
+
+
+def prepare(problem: Problem) -> Solve:
+    """Return a solver by DOP853."""
+    import numba
+    from numbalsoda import lsoda_sig, solve_ivp
+
+    text = problem.python_rhs("def rhs(t, y, out, unused):")
+    rhs = numba.cfunc(lsoda_sig, error_model="numpy")(load(text, "rhs"))
+    address = rhs.address
+
+    def solve(rtol: float, atol: float, times: np.ndarray) -> np.ndarray:
+        span = np.array([0.0, times[-1]])
+        done = solve_ivp(address, span, problem.y0, t_eval=np.ascontiguousarray(times), rtol=rtol, atol=atol)
+        if not done.success or len(done.t) != len(times):
+            raise RuntimeError(f"numbalsoda DOP853 gave up at rtol = {rtol:g}: {done.message}")
+        return np.asarray(done.y)
+
+    solve.rhs = rhs  # type: ignore[attr-defined]  # keeps the compiled function alive
+    return solve

@@ -1,0 +1,18 @@
+"""SciPy's BDF with right-hand side and Jacobian compiled by Numba."""
+
+from __future__ import annotations
+
+from . import _scipy
+from ._problem import Problem, Solve, ladder
+
+__all__ = ["NAME", "PACKAGE", "REQUIRES", "TOLERANCES", "prepare"]
+
+NAME = "SciPy BDF"
+PACKAGE = "scipy"
+REQUIRES = {"module": ("scipy.integrate",)}
+TOLERANCES = ladder(4, 12, 2)
+
+
+def prepare(problem: Problem) -> Solve:
+    """Return a solver by BDF."""
+    return _scipy.prepare(problem, "BDF", implicit=True)

@@ -1,0 +1,208 @@
+"""How much of the processor's arithmetic a step of rodas5p uses: operations over time against a measured peak.
+
+The operations are counted in the text of the generated step and of every function that it calls, elementary functions
+included: one for each +, -, *, /, square root, two for a fused multiply-add; none for signs, comparisons, selections,
+maxima, roundings, conversions, work on bits, loads and stores.  A division counts as one
+although the processor needs many times longer for it.  The peak is that of independent chains of fused multiply-adds on
+the same lanes; both are timed in turn, so that they see the same clock, and the share is the median over the rounds.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import math
+import time
+from dataclasses import dataclass, field
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from synchain.codegen import elementary, lanes
+from synchain.codegen.emit import LARGEST_UNROLLED
+from synchain.models.scene import Scene
+from synchain.models.topology import topology
+
+from ..plan import plan
+from ..sweep import kernel
+
+__all__ = ["COLUMNS", "Counter", "flops_of_step", "measure"]
+
+COLUMNS = ("n", "lanes", "flops per step and lane", "nanoseconds per step", "Gflop/s", "peak Gflop/s", "share of peak")
+CHAINS = 12
+"""Independent multiply-adds in flight: at least latency times units, at most the vector registers."""
+
+PRIMITIVE = {"fma": 2, "sqrt": 1} | dict.fromkeys(
+    ("absolute", "any_lane", "broadcast", "copysign", "floor", "lane_bits", "load", "maximum", "minimum", "one_lane",
+     "round_even", "scale_binary", "select", "split_binary", "store", "truncated", "range"), 0,
+)  # fmt: skip
+"""Operations of what is no function of the text."""
+
+FREE = (ast.BitAnd, ast.BitOr, ast.BitXor, ast.LShift, ast.RShift)
+
+
+@dataclass(slots=True)
+class Counter:
+    """Counts the floating-point operations of functions in texts, each text given as its module's source."""
+
+    functions: dict[str, ast.FunctionDef] = field(default_factory=dict)
+    constants: dict[str, object] = field(default_factory=dict)
+    known: dict[str, int] = field(default_factory=dict)
+
+    def read(self, text: str) -> None:
+        """Add the functions and constants of a module."""
+        for statement in ast.parse(text).body:
+            if isinstance(statement, ast.FunctionDef):
+                if any(isinstance(d, ast.Name) and d.id == "intrinsic" for d in statement.decorator_list):
+                    self.known[statement.name] = 0  # works on the bits
+                self.functions[statement.name] = statement
+            elif isinstance(statement, ast.Assign) and isinstance(statement.value, ast.Constant):
+                for name in statement.targets:
+                    if isinstance(name, ast.Name):
+                        self.constants[name.id] = statement.value.value
+
+    def count(self, name: str) -> int:
+        """Operations of one call; ValueError for what cannot be counted in the text (loops over data, powers)."""
+        if name not in self.known:
+            if name in PRIMITIVE:
+                self.known[name] = PRIMITIVE[name]
+            elif name in self.functions:
+                self.known[name] = sum(self._of(statement) for statement in self.functions[name].body)
+            else:
+                raise ValueError(f"function {name!r} is in none of the texts; cannot count its operations")
+        return self.known[name]
+
+    def _of(self, part: ast.AST) -> int:
+        if isinstance(part, (ast.For, ast.While, ast.IfExp)):
+            raise ValueError(f"line {part.lineno}: {type(part).__name__} cannot be counted; expected straight text")
+        if isinstance(part, ast.If):
+            return sum(map(self._of, part.body if self._truth(part.test) else part.orelse))
+        total = sum(self._of(child) for child in self._inside(part))
+        if isinstance(part, ast.BinOp):
+            total += self._operator(part)
+        if isinstance(part, ast.Call):
+            if not isinstance(part.func, ast.Name):
+                raise ValueError(
+                    f"line {part.lineno}: {ast.unparse(part.func)} cannot be counted; expected a plain name"
+                )
+            total += self.count(part.func.id)
+        return total
+
+    def _inside(self, part: ast.AST) -> list[ast.AST]:
+        """What lies inside, less the integer arithmetic of addresses."""
+        if isinstance(part, ast.Call) and isinstance(part.func, ast.Name) and part.func.id in ("load", "store"):
+            return list(part.args[2:])
+        return list(ast.iter_child_nodes(part))
+
+    def _operator(self, part: ast.BinOp) -> int:
+        if isinstance(part.op, (ast.Add, ast.Sub, ast.Mult, ast.Div)):
+            fixed = all(isinstance(side, ast.Constant) for side in (part.left, part.right))
+            return 0 if fixed else 1
+        if isinstance(part.op, FREE):
+            return 0
+        raise ValueError(f"line {part.lineno}: operator {type(part.op).__name__} cannot be counted")
+
+    def _truth(self, test: ast.expr) -> bool:
+        if isinstance(test, ast.Name) and test.id in self.constants:
+            return bool(self.constants[test.id])
+        raise ValueError(f"line {test.lineno}: the condition {ast.unparse(test)} is no constant of the text")
+
+
+def flops_of_step(source: str) -> int:
+    """Operations of one step in one lane, from the text of a kernel that is written out."""
+    counter = Counter()
+    counter.read(inspect.getsource(elementary))
+    counter.read(source)
+    return counter.count("step")
+
+
+PEAK = """
+@njit(error_model="numpy")
+def work(start, count):
+    a, b = load(start, 0, WIDTH), load(start, 1, WIDTH)
+    {first}
+    for _ in range(count):
+{body}
+    store(start, 2, {total})
+"""
+
+STEPS = """
+@njit(error_model="numpy")
+def work(bank, clock, count):
+    y_new, dense = np.zeros(bank.size), np.zeros(DENSE_ROWS * bank.size)
+    worst = broadcast(0.0, WIDTH)
+    for _ in range(count):
+        error = step(load(clock, 0, WIDTH), load(clock, 1, WIDTH), bank, bank, y_new, dense, 1e-8, 1e-9)
+        worst = maximum(worst, error)
+    store(clock, 2, worst)
+"""
+
+
+def measure(quick: bool = False) -> list[tuple[object, ...]]:
+    """Return the rows of the table, in the order of COLUMNS."""
+    sizes = (1,) if quick else tuple(n for n in (1, 2, 4, 8) if n <= LARGEST_UNROLLED)
+    return [_row(n, lanes.native_width(), quick) for n in sizes]
+
+
+def _row(n: int, width: int, quick: bool) -> tuple[object, ...]:
+    scene = Scene(topology=topology("chain", n), record=(), integrator="rodas5p")
+    compiled = kernel(scene, width)
+    flops = flops_of_step(compiled.source)
+    module = inspect.getmodule(compiled.entry)
+    if module is None:
+        raise RuntimeError("the kernel has no module; this is a mistake in the program")
+    cells = plan(scene)
+    bank = np.repeat(np.concatenate([cells.start[0], cells.numbers[0]]), width)
+    clock = np.repeat([0.3, 0.01, 0.0], width)
+    steps = _function(STEPS, width, vars(module))
+    seconds, rounds = (1e-3, 3) if quick else (0.1, 15)
+    pairs = _in_turn(lambda count: steps(bank, clock, count), _peak(width), seconds, rounds)
+    if not (clock[2 * width :] > 0.0).all() or not (clock[2 * width :] <= 1.0).all():
+        raise RuntimeError(f"the timed step has the error {clock[-1]}; expected one that would be accepted")
+    done = [(flops * width / a * 1e-9, 2 * CHAINS * width / b * 1e-9) for a, b in pairs]
+    share = median(x / y for x, y in done)
+    spent = median(a for a, _ in pairs) * 1e9
+    return (n, width, flops, spent, median(x for x, _ in done), median(y for _, y in done), share)
+
+
+def _peak(width: int) -> Any:
+    """A function of a count that runs so many rounds of CHAINS independent multiply-adds."""
+    names = [f"x{i}" for i in range(CHAINS)]
+    text = PEAK.format(
+        first="\n    ".join(f"{name} = a*{i + 1}.0" for i, name in enumerate(names)),
+        body="\n".join(f"        {name} = fma({name}, b, a)" for name in names),
+        total=" + ".join(names),
+    )
+    function = _function(text, width, {})
+    start = np.repeat([1e-3, 0.999, 0.0], width)
+    return lambda count: function(start, count)
+
+
+def _function(text: str, width: int, names: dict[str, Any]) -> Any:
+    """Compile the function `work` of a text among the names of a module."""
+    from numba import njit
+
+    given = {name: getattr(lanes, name) for name in ("load", "store", "fma", "broadcast")}
+    space = {**names, **given, "njit": njit, "np": np, "WIDTH": width}
+    exec(compile(text, "<roofline benchmark>", "exec"), space)
+    return space["work"]
+
+
+def _in_turn(first: Any, second: Any, seconds: float, rounds: int) -> list[tuple[float, float]]:
+    """Seconds for one count of either function, timed in turn."""
+    counts = []
+    for function in (first, second):
+        function(1)
+        count, spent = 1, 0.0
+        while spent < seconds:
+            count *= 2
+            spent = _timed(function, count)
+        counts.append(count)
+    return [(_timed(first, counts[0]) / counts[0], _timed(second, counts[1]) / counts[1]) for _ in range(rounds)]
+
+
+def _timed(function: Any, count: int) -> float:
+    begin = time.perf_counter()
+    function(count)
+    return max(time.perf_counter() - begin, math.ulp(1.0))

@@ -1,0 +1,29 @@
+"""The stages of a first use are timed in processes that are what their row says."""
+
+from __future__ import annotations
+
+import pytest
+
+from synchain.runtime.bench import start
+
+
+def test_a_row_for_each_stage():
+    rows = start.measure(quick=True)
+    names = [row[0] for row in rows]
+    assert names == [
+        "import Numba alone", "import the models", "derive", "import the runtime", "emit", "compile, nothing in the cache",
+        "load from the cache",
+    ]  # fmt: skip
+    assert all(len(row) == len(start.COLUMNS) and row[2] > 0 for row in rows)
+
+
+def test_a_cache_that_is_not_what_it_should_be_is_no_measurement(tmp_path, monkeypatch):
+    monkeypatch.setattr(start, "_child", lambda code, folder, *arguments: ([1.0] * 5, True))
+    assert start.stages(2, str(tmp_path), cached=True) == [1.0] * 5
+    with pytest.raises(RuntimeError, match="came from the cache: True; expected False"):
+        start.stages(2, str(tmp_path), cached=False)
+
+
+def test_a_failing_process_is_an_error(tmp_path):
+    with pytest.raises(RuntimeError, match=r"(?s)to be timed failed: .*ZeroDivisionError"):
+        start._child("1/0", str(tmp_path))
