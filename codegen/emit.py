@@ -111,6 +111,10 @@ def _module(
     names = Names([*plain.state, *plain.parameters, *(s.name for s in plain.node.state), *weight])
     blocks = analyse(plain.node, names)
     looped = equations.n > LARGEST_UNROLLED
+    if looped and method.inexact:
+        raise ValueError(
+            f"integrator {method.name}: steps at most {LARGEST_UNROLLED} nodes, found {equations.n}; use rodas5p"
+        )
     if looped:
         method = replace(method, smooth=None)
     steps = _steps(equations, plain, blocks, method, looped)

@@ -212,7 +212,8 @@ class LoopWriter:
             for j, row in enumerate(m.dense):
                 place = f"{j}*DIMENSION + {c}*NODES + i"
                 lines.append("if DENSE:")
-                lines.append(f"    store(dense, {place}, {scale}({combine(row, self.stages(len(row)))}))")
+                value = combine(row, self.stages(len(row))) or "broadcast(0.0, WIDTH)"
+                lines.append(f"    store(dense, {place}, {scale}({value}))")
             self.loop("for i in range(NODES):", lines)
         w.put("return error + 0.0*total  # NaN or infinite where any estimate is")
 

@@ -44,6 +44,8 @@ def gather(w: StepWriter, own: list[dict[str, sp.Expr]]) -> Entries:
             for i in range(n):
                 entries[a * n + i, b * n + i] = own[i][entry(r, c)]
     for key, e in eq.link_jacobian():
+        if w.method.inexact and key[0] % n != key[1] % n:
+            continue
         entries[key] = entries.get(key, sp.S.Zero) + e
     return {key: e for key, e in entries.items() if e != 0}
 

@@ -169,7 +169,7 @@ class StepWriter:
         """Store the coefficients of the dense output."""
         for j, row in enumerate(self.method.dense):
             for slot, name in enumerate(self.state):
-                text = combine(row, [f"k{i + 1}_{name}" for i in range(len(row))])
+                text = combine(row, [f"k{i + 1}_{name}" for i in range(len(row))]) or "broadcast(0.0, WIDTH)"
                 self.put(
                     f"store(dense, {j * len(self.state) + slot}, {scale}({text}))"
                     if scale

@@ -99,10 +99,14 @@ def explicit_reference(m, f: Right, t, h, y) -> tuple[list, list, list]:
     return new, error, [h * d for row in m.dense for d in weighted(row, k, size)]
 
 
-def rosenbrock_reference(m, f: Right, t, h, y) -> tuple[list, list, list]:
+def rosenbrock_reference(m, f: Right, t, h, y, nodes: int) -> tuple[list, list, list]:
     size, k = len(y), []
     shift = 1 / (h * mpf(m.gamma))
-    matrix = shift * mpmath.eye(size) - f.jacobian(t, y)
+    jacobian = f.jacobian(t, y)
+    for i, j in itertools.product(range(size), repeat=2):
+        if m.inexact and i % nodes != j % nodes:
+            jacobian[i, j] = 0
+    matrix = shift * mpmath.eye(size) - jacobian
     slope = f.time_derivative(t, y)
     for i, c in enumerate(m.c):
         at = [u + d for u, d in zip(y, weighted(m.a[i], k, size), strict=True)]
@@ -138,6 +142,11 @@ def close(found: list, expected: list, allowed=SMALL) -> bool:
 @pytest.mark.parametrize("case", CASES)
 def test_a_step_is_what_its_definition_says(case, method, looped, exact_numbers, monkeypatch):
     eq, m = CASES[case], integrators.integrator(method)
+    if looped and m.inexact:
+        monkeypatch.setattr(sys.modules["synchain.codegen.emit"], "LARGEST_UNROLLED", 0)
+        with pytest.raises(ValueError, match="steps at most 0 nodes"):
+            emit(eq, method, (), width=1)
+        return
     if looped:
         monkeypatch.setattr(sys.modules["synchain.codegen.emit"], "LARGEST_UNROLLED", 0)
     space = plain(emit(eq, method, ("trajectory",), width=1).text, EXACT)
@@ -149,8 +158,10 @@ def test_a_step_is_what_its_definition_says(case, method, looped, exact_numbers,
         y, p = states(eq, seed)
         m = steps[name]
         t, h = mpf(seed) / 3, mpf(1) / (20 + 30 * seed)
-        reference = rosenbrock_reference if m.kind == "rosenbrock" else explicit_reference
-        new, error, dense = reference(m, Right.of(eq, p), t, h, y)
+        if m.kind == "rosenbrock":
+            new, error, dense = rosenbrock_reference(m, Right.of(eq, p), t, h, y, eq.n)
+        else:
+            new, error, dense = explicit_reference(m, Right.of(eq, p), t, h, y)
         rtol, atol = mpf(1) / 7, mpf(1) / 1000
         step = take_step(space, t, h, y, p, rtol, atol, *graph, name=name)
         assert close(step.y_new, new)

@@ -44,6 +44,8 @@ class Integrator:
     gamma: float = 0.0
     d: Row = ()
     big_c: tuple[Row, ...] = ()
+    inexact: bool = False
+    """True for a W-method, whose order does not need the exact Jacobian: its matrix has one block for each oscillator."""
     smooth: Integrator | None = None
     """The explicit method for cells that are not stiff at the moment; None where there is only one method."""
 
@@ -82,4 +84,5 @@ def _read(name: str, data: ModuleType) -> Integrator:
         name=name, kind=data.KIND, order=data.ORDER, error_order=data.ERROR_ORDER, dense_order=data.DENSE_ORDER,
         source=data.SOURCE, a=data.A, b=data.B, c=data.C, e=data.E, dense=data.DENSE,
         gamma=getattr(data, "GAMMA", 0.0), d=getattr(data, "TIME_WEIGHTS", ()), big_c=getattr(data, "BIG_C", ()),
+        inexact=getattr(data, "INEXACT", False),
     )  # fmt: skip

@@ -35,6 +35,8 @@ Ends = tuple[np.ndarray, np.ndarray]
 """States at the ends (m, dimension) and counts (m, …) of the kernel."""
 
 LADDER = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
+REFILLS = 8
+"""Cells that each lane works through in the rows with full lanes: the last ones cost what they do in a sweep."""
 PAPER = (1e-12, 1e-15)
 """The source paper's (rtol, atol) of Cash-Karp."""
 
@@ -49,10 +51,9 @@ class Method:
     longest: int = 100
     stiff: bool = True
 
-    @property
-    def width(self) -> int:
-        """Number of lanes on this processor."""
-        return native_width() if self.full else 1
+    def width(self, case: Case) -> int:
+        """Number of lanes on this processor: that of a sweep, or one."""
+        return native_width(2 if len(case.scene.y0) <= 2 else 1) if self.full else 1
 
 
 TOLERANCES = tuple((rtol, 0.1 * rtol) for rtol in LADDER)
@@ -60,6 +61,8 @@ METHODS = (
     Method("cash_karp", False, (PAPER,), longest=10),
     Method("rodas5p", False, TOLERANCES),
     Method("rodas5p", True, TOLERANCES),
+    Method("switching", False, TOLERANCES),
+    Method("switching", True, TOLERANCES),
     Method("dop853", False, TOLERANCES, stiff=False),
     Method("dop853", True, TOLERANCES, stiff=False),
 )
@@ -77,8 +80,8 @@ def prepare(case: Case, integrator: str, width: int) -> Callable[[float, float, 
 
     def solve(rtol: float, atol: float, ends: np.ndarray) -> Ends:
         cells = len(ends)
-        spans = np.ascontiguousarray(np.stack([np.zeros(cells), ends], axis=1))
-        control = control_array(rtol, atol, 0.5 * case.period, 1e12)
+        spans = np.ascontiguousarray(np.stack([np.zeros(cells), ends, np.full(cells, case.period)], axis=1))
+        control = control_array(rtol, atol, 0.5 * case.period, 1e12, jumps=False)
         buffers = Buffers.empty(cells, len(y0), room=0, samples=0)
         compiled.drive(0, cells, np.tile(y0, (cells, 1)), np.tile(one, (cells, 1)), spans, control, *buffers.arrays())
         if not np.isfinite(buffers.end).all():
@@ -116,7 +119,7 @@ def own_points(case: Case, quick: bool) -> Iterator[Point]:
         if case.stiff and not method.stiff:
             continue
         begin = time.perf_counter()
-        solve = prepare(case, method.integrator, method.width)
+        solve = prepare(case, method.integrator, method.width(case))
         compiled = time.perf_counter() - begin
         for rtol, atol in method.tolerances[::3] if quick else method.tolerances:
             yield _own_point(case, method, partial(solve, rtol, atol), (rtol, atol), compiled, quick)
@@ -133,14 +136,13 @@ def _own_point(
     periods = min(case.periods, method.longest)
     part = case.within(periods)
     states, _ = run(part.times)
-    ends = np.full(method.width, periods * case.period)
+    lanes = method.width(case)
+    ends = np.full(REFILLS * lanes if method.full else 1, periods * case.period)
     _, counts = run(ends)
-    seconds = best_time(lambda: run(ends), quick) / (periods * method.width)
+    seconds = best_time(lambda: run(ends), quick) / (periods * len(ends))
     error, steps = float(np.abs(states - part.states).max()), float(counts[0, 1] + counts[0, 2]) / periods
     remark = "" if periods == case.periods else f"{periods} of {case.periods} periods"
-    return Point(
-        method.integrator, method.width, *tolerances, error, seconds, periods, compiled, steps=steps, remark=remark
-    )
+    return Point(method.integrator, lanes, *tolerances, error, seconds, periods, compiled, steps=steps, remark=remark)
 
 
 def _row(case: Case, point: Point) -> tuple[Any, ...]:

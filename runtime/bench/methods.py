@@ -1,0 +1,68 @@
+"""Which integrator, and how many lanes: time per drive period and core against the error, all in the same driver.
+
+The cases are the friction oscillators of `precision`.  Every lane works through eight cells, so that what a scheduler loses
+at the end counts as it does in a sweep.  The last column is the time that the same error costs on the log-log line through the
+rows of rodas5p in one register, over the time of the row: above 1 the row is the better choice at its error.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from synchain.codegen.lanes import native_width
+
+from ._cases import Case, read_case
+from ._clock import best_time
+from .precision import REFILLS, prepare
+
+__all__ = ["CASES", "CHOICES", "COLUMNS", "measure"]
+
+COLUMNS = ("case", "method", "lanes", "rtol", "error", "microseconds per period", "steps per period", "gain")
+CASES = ("friction, n = 1", "friction, n = 2", "friction, n = 4")
+CHOICES: tuple[tuple[str, int, tuple[float, ...]], ...] = (
+    ("rodas5p", 1, (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)),
+    ("rodas5p", 2, (1e-6, 1e-8, 1e-10)),
+    ("switching", 1, (1e-6, 1e-7, 1e-8, 1e-9, 1e-10)),
+    ("rodas4", 1, (1e-5, 1e-7, 1e-9)),
+    ("rodas6p", 1, (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)),
+    ("ros34pw2", 1, (1e-4, 1e-5, 1e-6)),
+)
+"""Integrator, registers that the lanes fill, and relative tolerances; the first is what the others are compared with."""
+
+
+def measure(quick: bool = False) -> list[tuple[Any, ...]]:
+    """Return the rows of the table, in the order of COLUMNS."""
+    rows: list[tuple[Any, ...]] = []
+    for name in CASES[1:2] if quick else CASES:
+        case = read_case(name)
+        found = [point for choice in CHOICES for point in points(case, *choice, quick)]
+        first = [point for point in found if point[:2] == found[0][:2]]
+        rows += [(name, *point, gain(point, first)) for point in found]
+    return rows
+
+
+def points(
+    case: Case, method: str, registers: int, tolerances: tuple[float, ...], quick: bool
+) -> list[tuple[Any, ...]]:
+    """Method, lanes, tolerance, error, microseconds and steps per period of each tolerance."""
+    lanes = native_width(registers)
+    solve, periods = prepare(case, method, lanes), 5 if quick else min(case.periods, 50)
+    part, made = case.within(periods), []
+    for rtol in tolerances[1:3] if quick else tolerances:
+        ends = np.full(REFILLS * lanes, periods * case.period)
+        states, _ = solve(rtol, 0.1 * rtol, part.times)
+        _, counts = solve(rtol, 0.1 * rtol, ends)
+        seconds = best_time(lambda rtol=rtol, ends=ends: solve(rtol, 0.1 * rtol, ends), quick)  # type: ignore[misc]
+        error = float(np.abs(states - part.states).max())
+        steps = float(counts[0, 1] + counts[0, 2]) / periods
+        made.append((method, lanes, rtol, error, 1e6 * seconds / (periods * len(ends)), steps))
+    return made
+
+
+def gain(point: tuple[Any, ...], first: list[tuple[Any, ...]]) -> float:
+    """Time at the error of a point on the line through the first choice's points, over the time of the point."""
+    errors, times = (np.log([p[k] for p in first]) for k in (3, 4))
+    slope, level = np.polyfit(errors, times, 1)
+    return float(np.exp(level + slope * np.log(point[3])) / point[4])
