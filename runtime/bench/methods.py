@@ -1,8 +1,9 @@
 """Which integrator, and how many lanes: time per drive period and core against the error, all in the same driver.
 
-The cases are the friction oscillators of `precision`.  Every lane works through eight cells, so that what a scheduler loses
-at the end counts as it does in a sweep.  The last column is the time that the same error costs on the log-log line through the
-rows of rodas5p in one register, over the time of the row: above 1 the row is the better choice at its error.
+The cases are the friction oscillators of `precision`. Every lane works through eight cells, so that what a scheduler
+loses at the end counts as it does in a sweep. The last column is the time that the same error costs on the log-log
+line through the rows of rodas5p in one register, over the time of the row: above 1 the row is the better choice at
+its error.
 """
 
 from __future__ import annotations
