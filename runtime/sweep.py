@@ -49,15 +49,14 @@ def kernel_source(scene: Scene, width: int | None = None, skip: bool | Skip = Fa
     section = None
     if "section" in scene.record:
         section = sp.Symbol(chosen.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
-    method = best_integrator(chosen.equations.n, scene.rtol) if scene.integrator == "auto" else scene.integrator
+    method = best_integrator(scene.n, scene.rtol) if scene.integrator == "auto" else scene.integrator
     return emit(chosen.equations, method, chosen.records, section, width, chosen.multiplicity)
 
 
 def best_integrator(n: int, rtol: float) -> str:
-    """What the integrator "auto" stands for: the fastest at equal error, as `synchain bench methods` measured it.
+    """What "auto" stands for: the fastest at equal error (docs/performance.md).
 
-    Two oscillators at a tight tolerance gain from changing over to DOP853 while none of them sticks; one is done too soon to
-    pay for it, and of more some nearly always stick.
+    Two oscillators at a tight tolerance gain from DOP853 while none of them sticks; of more, some nearly always stick.
     """
     return "switching" if n == 2 and rtol <= 1e-9 else AUTO
 

@@ -459,7 +459,7 @@ WRONG = [
     ("figures nope", "unknown figure 'nope'"),
     ("figures 4b --out {scene}", "cannot make the folder"),
     ("cache empty", "invalid choice"),
-    ("bench nope", "unknown benchmark 'nope'; known: precision"),
+    ("bench nope", "unknown benchmark 'nope'; known: methods, precision"),
 ]
 
 

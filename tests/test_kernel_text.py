@@ -82,7 +82,10 @@ def test_slopes_without_state_are_lanes():
 def test_unknown_names_are_refused():
     with pytest.raises(ValueError, match=r"unknown record 'sync'; known: sync_error, section, trajectory"):
         emit(friction_chain(1), "rodas5p", ("sync",))
-    with pytest.raises(ValueError, match=r"unknown integrator 'rk4'; known: cash_karp, dop853, rodas5p"):
+    with pytest.raises(
+        ValueError,
+        match=r"unknown integrator 'rk4'; known: cash_karp, dop853, rodas4, rodas5p, rodas6p, ros34pw2, switching",
+    ):
         emit(friction_chain(1), "rk4")
 
 

@@ -230,6 +230,16 @@ def occupied(cell):
 
 
 @njit(error_model="numpy")
+def held(cell):
+    """The lanes that hold a cell, as bits."""
+    bits = 0
+    for which in range(WIDTH):
+        if cell[which] >= 0:
+            bits |= 1 << which
+    return bits
+
+
+@njit(error_model="numpy")
 def waiting(bank, cell, mode):
     """The lane of a waiting cell of one kind, -1 where there is none."""
     for which in range(WIDTH):

@@ -17,7 +17,7 @@ from numba import njit
 
 from synchain.codegen.lanes import any_lane, lane_bits, load, store
 from synchain.codegen.skeletons.cells import (
-    SLOTS, fill, finish, move, occupied, outcome, put, turn_over, vacant, vacate, waiting,
+    SLOTS, fill, finish, held, move, occupied, outcome, put, turn_over, vacant, vacate, waiting,
 )  # fmt: skip
 from synchain.codegen.skeletons.control import advance, aim, arrive, judge, pause, turned
 from synchain.codegen.skeletons.names import (
@@ -168,6 +168,7 @@ def drive(first, last, start, numbers, spans, control, end, sums, counts, points
         if SWITCHING and look != 0:
             room = 2 * WIDTH - 1 - occupied(cell) - occupied(away_cell) - occupied(lot_cell)
             head = queue
+            flips = flips & held(cell)  # an idle lane may ask for anything; who moves in must not inherit it
             if mode == STIFF:
                 queue = admit(queue, last, room, bank, cell, start, numbers, spans, control, samples)
                 look = look if queue == head else ALL
