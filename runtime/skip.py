@@ -29,6 +29,8 @@ AT_RUN_TIME: tuple[str, ...] = (
 )
 """What the kernel's driver may leave out of a single cell."""
 
+AS_IT_STANDS = "everything is integrated as it stands, as asked for"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Skip:
@@ -104,7 +106,7 @@ def decide(scene: Scene, skip: bool = True, fold_all: bool = False) -> Skip:
         equations, classes = _merge(scene, equations, skipped, kept)
         kept += _present(scene, equations)
     else:
-        kept.append("everything is integrated as it stands, as asked for")
+        kept.append(AS_IT_STANDS)
     together = max(classes) == 0 and scene.n > 1
     seen: dict[int, int] = {}
     for node, k in enumerate(classes):
@@ -225,10 +227,13 @@ def _multiplicity(scene: Scene, classes: tuple[int, ...]) -> tuple[int, ...] | N
 
 def explain(chosen: Skip) -> str:
     """What is left out of a scene and why, what is not, and what may be left out of a cell at run time."""
+    running = [
+        s for s in AT_RUN_TIME if s.startswith("diverged") or (chosen.scene.forced and AS_IT_STANDS not in chosen.kept)
+    ]
     parts = (
         ("left out", (*chosen.skipped, *_unwritten(chosen))),
         ("not left out", chosen.kept),
-        ("in a cell, while it runs", AT_RUN_TIME),
+        ("in a cell, while it runs", tuple(running)),
     )
     return "\n".join(
         "\n".join([title, *(f"  {sentence}" for sentence in sentences or ("nothing",))]) for title, sentences in parts

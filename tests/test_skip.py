@@ -330,3 +330,11 @@ def test_benchmark_sees_a_difference():
     assert bench.difference(one, other) > 1e-3
     other.data.status[0] = Status.DIVERGED
     assert bench.difference(one, other) == float("inf")
+
+
+def test_what_a_cell_may_skip_is_said_only_where_it_may():
+    forced, free = FRICTION, Scene(oscillator="harmonic", topology=chain(2))
+    assert "periodic:" in explain(decide(forced))
+    assert "periodic:" not in explain(decide(forced, False))
+    assert "periodic:" not in explain(decide(free))
+    assert all("diverged:" in explain(decide(scene)) for scene in (forced, free))
