@@ -20,16 +20,13 @@ from synchain.models.scene import Scene
 from .plan import Plan
 from .result import Buffers
 
-__all__ = ["AT_RUN_TIME", "Skip", "decide", "explain"]
+__all__ = ["Skip", "decide", "explain"]
 
-AT_RUN_TIME: tuple[str, ...] = (
-    "diverged: the cell ends as soon as its state is out of bounds",
+DIVERGED = "diverged: the cell ends as soon as its state is out of bounds"
+PERIODIC = (
     "periodic: a cell that repeats itself bit for bit from one period of the drive to a later one jumps over whole cycles, "
-    "before the window always, inside it where neither section nor trajectory is recorded",
+    "before the window always, inside it where neither section nor trajectory is recorded"
 )
-"""What the kernel's driver may leave out of a single cell."""
-
-AS_IT_STANDS = "everything is integrated as it stands, as asked for"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +37,7 @@ class Skip:
     the reduced one, `places` the column of the reduced state in which each state of the whole network is found, `numbers`
     the columns of the whole network's parameters that are left.  `multiplicity` counts the oscillators behind each node
     where the synchronisation error needs it, else None.  `skipped` and `kept` say in sentences what was left out, and what
-    not and why.
+    not and why; `jumps` whether a cell that repeats itself may leave out whole cycles.
     """
 
     scene: Scene
@@ -52,6 +49,7 @@ class Skip:
     multiplicity: tuple[int, ...] | None
     skipped: tuple[str, ...]
     kept: tuple[str, ...]
+    jumps: bool
 
     def section_variable(self) -> str:
         """The state variable of the reduced network that stands for the scene's section variable."""
@@ -106,7 +104,7 @@ def decide(scene: Scene, skip: bool = True, fold_all: bool = False) -> Skip:
         equations, classes = _merge(scene, equations, skipped, kept)
         kept += _present(scene, equations)
     else:
-        kept.append(AS_IT_STANDS)
+        kept.append("everything is integrated as it stands, as asked for")
     together = max(classes) == 0 and scene.n > 1
     seen: dict[int, int] = {}
     for node, k in enumerate(classes):
@@ -123,6 +121,7 @@ def decide(scene: Scene, skip: bool = True, fold_all: bool = False) -> Skip:
         _multiplicity(scene, classes),
         tuple(skipped),
         tuple(kept),
+        skip,
     )
 
 
@@ -227,13 +226,10 @@ def _multiplicity(scene: Scene, classes: tuple[int, ...]) -> tuple[int, ...] | N
 
 def explain(chosen: Skip) -> str:
     """What is left out of a scene and why, what is not, and what may be left out of a cell at run time."""
-    running = [
-        s for s in AT_RUN_TIME if s.startswith("diverged") or (chosen.scene.forced and AS_IT_STANDS not in chosen.kept)
-    ]
     parts = (
         ("left out", (*chosen.skipped, *_unwritten(chosen))),
         ("not left out", chosen.kept),
-        ("in a cell, while it runs", tuple(running)),
+        ("in a cell, while it runs", (DIVERGED, PERIODIC) if chosen.jumps and chosen.scene.forced else (DIVERGED,)),
     )
     return "\n".join(
         "\n".join([title, *(f"  {sentence}" for sentence in sentences or ("nothing",))]) for title, sentences in parts

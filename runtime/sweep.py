@@ -95,7 +95,7 @@ def run(
     bar = tqdm(total=scene.cells, unit="cell", disable=None if show_progress is None else not show_progress)
     with bar:
         bar.set_description_str("compiling")
-        job = _job(chosen, kernel(scene, width, chosen), workers, resume, skip is not False)
+        job = _job(chosen, kernel(scene, width, chosen), workers, resume)
         bar.set_description_str("")
         bar.unpause()
         job.advance = bar.update
@@ -144,10 +144,10 @@ class Job:
             whole[rows] = piece
 
 
-def _job(chosen: Skip, compiled: Kernel, workers: int, earlier: Result | None, jumps: bool) -> Job:
+def _job(chosen: Skip, compiled: Kernel, workers: int, earlier: Result | None) -> Job:
     scene, whole = chosen.scene, plan(chosen.scene)
-    direction = DIRECTIONS[scene.section.direction]
-    control = control_array(*tolerances(scene, whole.numbers), _max_step(scene), scene.max_steps, direction, jumps)
+    limits, direction = tolerances(scene, whole.numbers), DIRECTIONS[scene.section.direction]
+    control = control_array(*limits, _max_step(scene), scene.max_steps, direction, chosen.jumps)
     samples = scene.samples if "trajectory" in scene.record else 0
     buffers = Buffers.empty(scene.cells, len(chosen.states), _room(scene), samples)
     if earlier is not None:

@@ -338,3 +338,10 @@ def test_what_a_cell_may_skip_is_said_only_where_it_may():
     assert "periodic:" not in explain(decide(forced, False))
     assert "periodic:" not in explain(decide(free))
     assert all("diverged:" in explain(decide(scene)) for scene in (forced, free))
+
+
+def test_no_skip_integrates_every_period():
+    scene = Scene(parameters={"omega": 1.15}, record=(), transient=600, window=1, rtol=1e-6)
+    assert run(scene).data.periods_skipped.item() > 100
+    for skip in (False, decide(scene, False)):
+        assert run(scene, skip=skip).data.periods_skipped.item() == 0
