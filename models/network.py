@@ -14,6 +14,7 @@ from types import ModuleType
 
 import sympy as sp
 
+from . import coupling_matrix
 from .equations import TIME, Edge, Equations, Node
 from .frictions import CONTACTS, KAPPA
 from .lagrangian import equations_of_motion, mass_matrix
@@ -22,7 +23,7 @@ from .parameter import Parameter
 from .plugins import call, load, names
 from .topology import Topology
 
-__all__ = ["connectivity", "edge", "network", "node", "parameters"]
+__all__ = ["check_coupling", "connectivity", "edge", "network", "node", "parameters"]
 
 
 def parameters(
@@ -40,7 +41,8 @@ def parameters(
         if contact == "atan" and friction_coefficient(law, "sign")(sp.Symbol("w", real=True)).has(sp.sign):
             _join(table, {"kappa": KAPPA}, f"contact {contact!r}")
     if coupling is not None:
-        _join(table, load("coupling", coupling).PARAMETERS, f"coupling {coupling!r}")
+        own = coupling_matrix if coupling_matrix.is_matrix(coupling) else load("coupling", coupling)
+        _join(table, own.PARAMETERS, f"coupling {coupling!r}")
     return {name: replace(p, scale=str(scale(model, p.unit))) for name, p in table.items()}
 
 
@@ -89,26 +91,45 @@ def _model(oscillator: str, friction: str | None, contact: str) -> tuple[ModuleT
     return model, law
 
 
+def check_coupling(coupling: str, single: Node) -> None:
+    """Raise ValueError where a coupling cannot join nodes: an unknown name or component, a spring without velocities."""
+    if coupling_matrix.is_matrix(coupling):
+        coupling_matrix.entries(coupling, tuple(s.name for s in single.state))
+        return
+    load("coupling", coupling)
+    half = len(single.state) // 2
+    if single.rhs[:half] != single.state[half:]:
+        name = single.state[0].name
+        raise ValueError(
+            f"coupling {coupling!r} joins coordinates with velocities; found a node of {single.state} without them; "
+            f"name the components that a link joins, e.g. coupling = '{name}->{name}'"
+        )
+
+
 @lru_cache(maxsize=64)
 def edge(coupling: str, single: Node, oscillator: str | None = None) -> Edge:
-    """Derive what one link adds to the rates of its target, by the Euler-Lagrange equations of a pair with that link alone.
+    """Derive what one link adds to the rates of its target.
 
-    The node's state must be coordinates followed by their velocities.  `oscillator` names the model whose masses the
-    accelerations are divided by; without it they are 1, as they are in the units of every oscillator with one mass.
+    A text of entries such as "x->x, 1/2 y->z" adds sigma w factor (a_j - a_i) to the rate of its second component, whatever
+    the node is.  A spring or damper acts on coordinates followed by their velocities, by the Euler-Lagrange equations of a
+    pair with that link alone; `oscillator` names the model whose masses the accelerations are divided by, without it they
+    are 1, as they are in the units of every oscillator with one mass.
     The force is kept as a function of differences, sigma w (x_j - x_i), so that equal states feel exactly nothing.
 
     An undirected edge is two links, and the template is symmetric, so the two forces are those of the potential.  A one-way
     link has no potential: the force that the template gives its target acts there, and nothing acts back on the source.
 
-    Raises ValueError for an unknown coupling, and for a node without coordinates and velocities.
+    Raises ValueError as `check_coupling` does.
     """
-    model = load("coupling", coupling)
-    half = len(single.state) // 2
-    if single.rhs[:half] != single.state[half:]:
-        raise ValueError(f"coupling {coupling!r} joins coordinates with velocities; found a node of {single.state}")
+    check_coupling(coupling, single)
     here = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in single.state)
     there = tuple(sp.Symbol(f"{s.name}_j", real=True) for s in single.state)
     weight = sp.Symbol("weight", real=True)
+    if coupling_matrix.is_matrix(coupling):
+        sigma = sp.Symbol("sigma", real=True)
+        rates = _entry_rates(coupling, [s.name for s in single.state], sigma * weight, here, there)
+        return Edge(here, there, weight, rates, (sigma,))
+    model, half = load("coupling", coupling), len(single.state) // 2
     strengths = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
     potential, dissipation = _pair(model, here, there, {"weight": weight, **strengths})
     masses = _masses(oscillator, half)
@@ -118,6 +139,18 @@ def edge(coupling: str, single: Node, oscillator: str | None = None) -> Edge:
     found = equations_of_motion(kinetic, potential, forces, (*here[:half], *there[:half]), moving)
     rates = tuple(_in_differences(e, here, there) for e in found[:half])
     return Edge(here, there, weight, (*[sp.S.Zero] * half, *rates), tuple(strengths.values()))
+
+
+def _entry_rates(
+    coupling: str, names: list[str], strength: sp.Expr, here: tuple[sp.Symbol, ...], there: tuple[sp.Symbol, ...]
+) -> tuple[sp.Expr, ...]:
+    """strength H (there - here), each difference a factor of its own: a sum over all of them would feel round-off."""
+    rates = [sp.S.Zero] * len(names)
+    for (source, target), factor in coupling_matrix.entries(coupling).items():
+        k = names.index(source)
+        share = sp.Rational(factor.numerator, factor.denominator)
+        rates[names.index(target)] += sp.Mul(share, *strength.args, there[k] - here[k])
+    return tuple(rates)
 
 
 def _pair(
@@ -144,7 +177,7 @@ def _in_differences(e: sp.Expr, here: tuple[sp.Symbol, ...], there: tuple[sp.Sym
 
 
 def _masses(oscillator: str | None, count: int) -> tuple[sp.Expr, ...]:
-    if oscillator is None:
+    if oscillator is None or hasattr(load("oscillator", oscillator), "field"):
         return (sp.S.One,) * count
     system = nondimensional(load("oscillator", oscillator))
     masses = mass_matrix(system.kinetic, system.velocities)
@@ -163,8 +196,23 @@ def connectivity(coupling: str, graph: Topology) -> tuple[tuple[Fraction, ...], 
 
     The Hessian of one edge is derived once and added up over the links, so that a thousand nodes take no algebra.  For a
     damper the Rayleigh function takes the potential's place; for a one-way link the row is read off the force on its target.
+    Of entries such as "1/2 x->y" the factor belongs to H, so that G holds the weights alone.
     Raises ValueError for a coupling whose Hessian is not sigma times weight times a number: it has no matrix G.
     """
+    if coupling_matrix.is_matrix(coupling):
+        coupling_matrix.entries(coupling)
+        diagonal, aside = Fraction(-1), Fraction(1)
+    else:
+        diagonal, aside = _hessian(coupling)
+    rows = [[Fraction(0)] * graph.n for _ in range(graph.n)]
+    for target, source, factor in graph.links:
+        rows[target][target] += factor * diagonal
+        rows[target][source] += factor * aside
+    return tuple(map(tuple, rows))
+
+
+def _hessian(coupling: str) -> tuple[Fraction, Fraction]:
+    """Minus the second derivatives of one edge's energy over sigma and weight: twice by one end, and by both."""
     model = load("coupling", coupling)
     q_i, q_j, weight = (sp.Symbol(name, real=True) for name in ("q_i", "q_j", "weight"))
     given = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
@@ -173,9 +221,4 @@ def connectivity(coupling: str, graph: Topology) -> tuple[tuple[Fraction, ...], 
     own, other = (sp.simplify(-energy.diff(q_i, q) / (given["sigma"] * weight)) for q in (q_i, q_j))
     if not (own.is_Rational and other.is_Rational):
         raise ValueError(f"coupling {coupling!r}: Hessian over sigma and weight is {own}, {other}; expected numbers")
-    diagonal, aside = (Fraction(int(e.p), int(e.q)) for e in (own, other))
-    rows = [[Fraction(0)] * graph.n for _ in range(graph.n)]
-    for target, source, factor in graph.links:
-        rows[target][target] += factor * diagonal
-        rows[target][source] += factor * aside
-    return tuple(map(tuple, rows))
+    return Fraction(int(own.p), int(own.q)), Fraction(int(other.p), int(other.q))

@@ -12,6 +12,9 @@ from typing import Any
 
 __all__ = ["call", "load", "names"]
 
+OTHERWISE = {"coupling": ", or components such as 'x->x'"}
+"""What a kind can be besides the name of a file, for the message that refuses a name."""
+
 
 def names(kind: str) -> tuple[str, ...]:
     """Return the names of all plug-ins of a kind (``oscillator``, ``friction``, ``coupling``), sorted."""
@@ -25,7 +28,7 @@ def load(kind: str, name: str) -> ModuleType:
     if name not in known:
         close = difflib.get_close_matches(str(name), known, n=1)
         hint = f" (did you mean {close[0]!r}?)" if close else ""
-        raise ValueError(f"unknown {kind} {name!r}; known: {', '.join(known)}{hint}")
+        raise ValueError(f"unknown {kind} {name!r}; known: {', '.join(known)}{OTHERWISE.get(kind, '')}{hint}")
     return import_module(f".{kind}s.{name}", __package__)
 
 

@@ -147,9 +147,10 @@ def _generic(equations: Equations, named: _Named, style: Style) -> Iterator[str]
 def _sum_over_links(edge: Edge, c: int, writer: Writer) -> str:
     """The links of node i: what all of them share stands before the sum sign."""
     term = edge.rhs[c].xreplace({edge.weight: WEIGHT})
+    term = sp.factor_terms(term) if term.is_Add else term
     negative = term.as_coeff_Mul()[0].is_negative
     outer, inner = (-term if negative else term).as_independent(WEIGHT, *edge.here, *edge.there, as_Add=False)
-    front = [] if outer == 1 else writer.factors(outer)
+    front = [writer.write(outer)] if outer.is_Mul else writer.factors(outer) if outer != 1 else []
     summed = writer.style.product([*front, writer.style.sum_over_j, *writer.factors(inner)])
     return (" - " if negative else " + ") + summed
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from .coupling_matrix import canonical, is_matrix
 from .plugins import load
 from .scene_checks import Frozen, choice, integer, number, shown, table, text
-from .scene_model import check_state, components, in_range, model_parameters, node, unknown
+from .scene_model import check_links, check_state, components, in_range, model_parameters, node, unknown
 from .scene_section import Section
 from .scene_start import SEED_LIMIT, start
 from .scene_sweep import check_sweep
@@ -27,7 +28,8 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     made["seed"] = integer("seed", made["seed"], 0, SEED_LIMIT)
     _model(made)
     made["parameters"] = _parameters(made)
-    made["initial"] = start(made["initial"], components(made), made["topology"].n, made["seed"])
+    centre = getattr(load("oscillator", made["oscillator"]), "INITIAL", None)
+    made["initial"] = start(made["initial"], components(made), made["topology"].n, made["seed"], centre)
     _records(made)
     _times(made)
     _numerics(made)
@@ -43,8 +45,10 @@ def _model(made: dict[str, Any]) -> None:
     for name in ("friction", "coupling"):
         if made[name] is not None:
             made[name] = None if text(name, made[name]) == "none" else str(made[name])
-        if made[name] is not None:
+        if made[name] is not None and not (name == "coupling" and is_matrix(made[name])):
             load(name, made[name])  # an unknown name is refused even where nothing uses it
+    if made["coupling"] is not None and is_matrix(made["coupling"]):
+        made["coupling"] = canonical(made["coupling"], components(made))
     graph = made["topology"] = topology("chain", 1) if made["topology"] is None else made["topology"]
     if not isinstance(graph, Topology):
         raise TypeError(f"topology: found {shown(graph)} ({type(graph).__name__}); expected a graph, e.g. chain(4)")
@@ -53,6 +57,7 @@ def _model(made: dict[str, Any]) -> None:
             f"coupling: found none for {graph.name}({graph.n}), which has links; "
             "expected the name of a coupling, e.g. 'spring'"
         )
+    check_links(made)
 
 
 def _parameters(made: Mapping[str, Any]) -> Frozen[float]:
@@ -83,7 +88,8 @@ def _records(made: dict[str, Any]) -> None:
         )
     made["record"] = tuple(name for name in RECORDS if name in names)
     own = components(made)
-    default = f"{'v' if 'v' in own else own[-1]}_1 falling"
+    crossed = own[0] if hasattr(load("oscillator", made["oscillator"]), "field") else own[-1]
+    default = f"{'v' if 'v' in own else crossed}_1 falling"
     made["section"] = Section.parse(default if made["section"] is None else made["section"])
     check_state(made["section"].variable, own, n, "section variable")
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .parameter import Parameter
 
 __all__ = [
+    "check_links",
     "check_state",
     "components",
     "derived",
@@ -49,6 +50,14 @@ def derived(oscillator: str, friction: str | None, contact: str, coupling: str |
     single = node(oscillator, friction, contact)
     edge = network.edge(coupling, single, oscillator) if coupling is not None and graph.links else None
     return network.network(single, edge, graph)
+
+
+def check_links(made: Mapping[str, Any]) -> None:
+    """Raise ValueError where the coupling cannot join the oscillators of a scene with links."""
+    from .network import check_coupling
+
+    if made["topology"].links and made["coupling"] is not None:
+        check_coupling(made["coupling"], node(made["oscillator"], made["friction"], made["contact"]))
 
 
 def components(made: Mapping[str, Any]) -> tuple[str, ...]:

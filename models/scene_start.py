@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterable, Mapping
 from itertools import islice
+from typing import Any
 
 from .scene_checks import Frozen, integer, known_keys, number, shown, table
 
@@ -13,13 +14,20 @@ __all__ = ["default_start", "start"]
 SEED_LIMIT = 2**63 - 1
 
 
-def default_start(components: tuple[str, ...], n: int) -> dict[str, tuple[float, ...]]:
+def default_start(
+    components: tuple[str, ...], n: int, centre: Mapping[Any, float] | None = None
+) -> dict[str, tuple[float, ...]]:
     """Return the default initial states: the first component differs between oscillators, the rest is 0.
 
     Up to four oscillators start at 0.30, 0.28, 0.26, 0.24: the first two are those of the source paper
     (Marszal et al., Eur. Phys. J. Special Topics, 2016), the others continue them.  More are spread evenly
     over the same range, 0.30 … 0.24, so that the initial spread does not grow with the network.
+    With a `centre` the same distances lie around that state.  Raises ValueError where it has an unknown component.
     """
+    if centre is not None:
+        known_keys("INITIAL of the oscillator", centre, components)
+        middle = {name: number(f"INITIAL of the oscillator: {name}", centre.get(name, 0.0)) for name in components}
+        return {name: tuple(x + d for d in _distances(n, k)) for k, (name, x) in enumerate(middle.items())}
     if n <= 4:
         first = tuple((30 - 2 * i) / 100 for i in range(n))
     else:
@@ -27,11 +35,21 @@ def default_start(components: tuple[str, ...], n: int) -> dict[str, tuple[float,
     return {name: first if k == 0 else (0.0,) * n for k, name in enumerate(components)}
 
 
-def start(given: object, components: tuple[str, ...], n: int, seed: int) -> Frozen[tuple[float, ...]]:
-    """Return {component: n floats} from what the user gave for some or all components."""
+def _distances(n: int, k: int) -> tuple[float, ...]:
+    """How far component k of each oscillator starts from the centre: 0.02 from one to the next, 0.06 over all at most."""
+    if k > 0 or n == 1:
+        return (0.0,) * n
+    width = min(2 * (n - 1), 6)
+    return tuple(width * (n - 1 - 2 * i) / (200 * (n - 1)) for i in range(n))
+
+
+def start(
+    given: object, components: tuple[str, ...], n: int, seed: int, centre: Mapping[Any, float] | None = None
+) -> Frozen[tuple[float, ...]]:
+    """Return {component: n floats} from what the user gave for some or all components; `centre` as in `default_start`."""
     found = table("initial", {} if given is None else given)
     known_keys("initial", found, components)
-    states = default_start(components, n)
+    states = default_start(components, n, centre)
     for name in components:
         if name in found:
             states[name] = _component(f"initial {name}", found[name], name, n, seed)

@@ -232,10 +232,11 @@ def test_parameters_are_those_of_the_equations(oscillator: str, friction: str | 
     assert tuple(table) == tuple(s.name for s in single.parameters)
     used = set().union(*(e.free_symbols for e in single.rhs))
     assert {s.name for s in single.parameters} == {s.name for s in used} - {s.name for s in single.state} - {"t"}
-    if not hasattr(load("oscillator", oscillator), "field"):
-        for coupling in names("coupling"):
-            joined = network(single, edge(coupling, single, oscillator), topology("chain", 2))
-            assert joined.parameters == tuple(parameters(oscillator, friction, contact, coupling))
+    first, last = single.state[0].name, single.state[-1].name
+    springs = () if hasattr(load("oscillator", oscillator), "field") else names("coupling")
+    for coupling in (*springs, f"{first}->{last}"):
+        joined = network(single, edge(coupling, single, oscillator), topology("chain", 2))
+        assert joined.parameters == tuple(parameters(oscillator, friction, contact, coupling))
 
 
 def test_steepness_is_a_parameter_only_where_a_jump_is_smoothed() -> None:
@@ -272,7 +273,8 @@ def test_unknown_coupling() -> None:
 
 def test_an_edge_wants_coordinates_and_velocities() -> None:
     x, y = sp.symbols("x y", real=True)
-    with pytest.raises(ValueError, match="coupling 'spring' joins coordinates with velocities; found a node of"):
+    message = r"'spring' joins coordinates with velocities; found a node of \(x, y\) .* e\.g\. coupling = 'x->x'"
+    with pytest.raises(ValueError, match=message):
         edge("spring", Node((x, y), (-y, x), ()))
 
 

@@ -13,7 +13,7 @@ from differences import made
 from synchain.models.equations import TIME, Edge, Equations, Node
 from synchain.models.frictions import CONTACTS
 from synchain.models.network import edge, node
-from synchain.models.plugins import names
+from synchain.models.plugins import load, names
 from synchain.models.present import LARGEST, as_dict, latex, text
 from synchain.models.tangent import tangent, transversal
 from synchain.models.topology import from_matrix, topology
@@ -229,13 +229,32 @@ def test_a_force_turned_round_keeps_its_sign() -> None:
 @pytest.mark.parametrize("n", [1, 3, 8])
 def test_latex_of_every_oscillator_balances(oscillator: str, n: int) -> None:
     law = "stribeck" if oscillator == "friction" else None
-    lines = body(made(topology("chain", n), oscillator, law, coupling="spring" if n > 1 else None))
+    coupling = "spring"
+    if hasattr(load("oscillator", oscillator), "field"):
+        own = [s.name for s in node(oscillator).state]
+        coupling = f"{own[0]}->{own[0]}, -1/2 {own[-1]}->{own[0]}"
+    lines = body(made(topology("chain", n), oscillator, law, coupling=coupling if n > 1 else None))
     for line in lines:
         for left, right in ("()", "{}"):
             assert line.count(left) == line.count(right)
         assert line.count("|") % 2 == 0
         assert not re.search(r"\*|__|\\[A-Za-z]+_\{\}|\bnan\b", line)
         assert "=" in line
+
+
+def test_vector_fields_and_links_between_components() -> None:
+    """The right-hand sides as they stand in the papers; a link from two components in one pair of parentheses."""
+    assert text(made(topology("chain", 2), "rossler", None, coupling="x->x, -1/2 z->y")).splitlines()[:2] == [
+        "x_1' = -y_1 - z_1 + σ (x_2 - x_1)", "y_1' = x_1 + a y_1 - (1/2) σ (z_2 - z_1)",
+    ]  # fmt: skip
+    assert text(made(topology("chain", 1), "lorenz", None, coupling=None)).splitlines() == [
+        "x' = prandtl (y - x)", "y' = -y + x (rayleigh - z)", "z' = x y - b z",
+    ]  # fmt: skip
+    many = text(made(topology("ring", 9), "rossler", None, coupling="x->x, 1/2 y->x, -1/2 z->y")).splitlines()
+    assert many[:2] == [
+        "x_i' = -y_i - z_i + σ Σ_j G_ij (x_j + (1/2) y_j - x_i - (1/2) y_i)",
+        "y_i' = x_i + a y_i - (1/2) σ Σ_j G_ij (z_j - z_i)",
+    ]  # fmt: skip
 
 
 # -- for programs --------------------------------------------------------------------------------------------

@@ -14,4 +14,6 @@ A function receives what its signature names: the coordinate ``x``, the velocity
 and ``friction``, the friction coefficient as a function of the sliding velocity.  COORDINATES (name -> (name of its
 velocity, unit)) is ``{"x": ("v", "m")}`` unless the file says otherwise; with several coordinates ``force`` returns
 one entry for each.
+
+INITIAL (state -> number, states left out are 0) may say around which state oscillators start unless told otherwise.
 """

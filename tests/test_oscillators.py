@@ -1,0 +1,173 @@
+"""The shipped vector fields and van der Pol's oscillator: equations, divergence, rest states, published numbers, starts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from synchain.models import Scene, Section, chain
+from synchain.models.equations import TIME
+from synchain.models.network import node
+from synchain.models.plugins import load, names
+from synchain.models.scene_start import default_start
+from synchain.runtime import run
+
+X, Y, Z, V = sp.symbols("x y z v", real=True)
+A, B, C, P, Q, MU, U = sp.symbols("a b c p q mu u", real=True)
+PRANDTL, RAYLEIGH, OMEGA = sp.symbols("prandtl rayleigh omega", real=True)
+FIELDS = [name for name in names("oscillator") if hasattr(load("oscillator", name), "field")]
+RESERVED = {"alpha", "beta2", "sigma", "t", "weight"}
+
+
+def divergence(name: str) -> sp.Expr:
+    return sp.expand(sp.Add(*(row[k] for k, row in enumerate(node(name).jacobian()))))
+
+
+# -- equations -----------------------------------------------------------------------------------------------
+
+
+def test_roessler() -> None:
+    assert node("rossler").rhs == (-Y - Z, X + A * Y, B + Z * (X - C))
+    assert divergence("rossler") == A + X - C
+    rest = {Z: X / A, Y: -X / A}
+    assert sp.expand(node("rossler").rhs[2].xreplace(rest) * A - (X**2 - C * X + A * B)) == 0
+
+
+def test_lorenz() -> None:
+    written = (PRANDTL * Y - PRANDTL * X, RAYLEIGH * X - X * Z - Y, X * Y - B * Z)
+    assert [sp.expand(e) for e in node("lorenz").rhs] == list(written)
+    assert divergence("lorenz") == -PRANDTL - 1 - B
+
+
+def test_lorenz_convection_loses_its_stability_at_470_19() -> None:
+    """Lorenz, J. Atmos. Sci. 20, 130 (1963), eq. 33: steady convection is unstable above r = 470/19 = 24.74."""
+    at = {PRANDTL: sp.Integer(10), B: sp.Rational(8, 3), RAYLEIGH: sp.Rational(470, 19)}
+    corner = sp.sqrt((at[RAYLEIGH] - 1) * at[B])
+    rest = {**at, X: corner, Y: corner, Z: at[RAYLEIGH] - 1}
+    assert [sp.simplify(e.subs(rest)) for e in node("lorenz").rhs] == [0, 0, 0]
+    matrix = sp.Matrix(node("lorenz").jacobian()).subs(rest)
+    real = [root for root in sp.Poly(matrix.charpoly().as_expr()).all_roots() if root.is_real]
+    assert real == [-sp.Rational(41, 3)]  # the trace: the other two are imaginary
+
+
+def test_chua() -> None:
+    inner = {X: sp.Rational(1, 3), Y: sp.Integer(2), Z: sp.Integer(5)}
+    assert sp.expand(node("chua").rhs[0].subs(inner) - P * (2 - (1 + A) / 3)) == 0
+    for side in (1, -1):
+        outer = {**inner, X: sp.Integer(3 * side)}
+        assert sp.expand(node("chua").rhs[0].subs(outer) - P * (2 - side * (3 + A + 2 * B))) == 0
+    assert node("chua").rhs[1:] == (X - Y + Z, -Q * Y)
+    (slope,) = {divergence("chua").subs(X, x) for x in (-sp.Rational(1, 2), sp.Rational(1, 4))}
+    assert sp.expand(slope + P * (1 + A) + 1) == 0
+    assert sp.expand(divergence("chua").subs(X, -2) + P * (1 + B) + 1) == 0
+
+
+def test_chua_is_the_circuit_of_its_paper() -> None:
+    """Matsumoto's circuit has 1/C_1 = 9, 1/C_2 = 1, 1/L = 7, G = 0.7, slopes -0.5 and -0.8 and the kink at 1 volt."""
+    c_1, c_2, coil, g, inner, outer = map(sp.Rational, ("1/9", "1", "1/7", "7/10", "-4/5", "-1/2"))
+    unit = c_2 / g  # of time; current in units of g
+    resistor = outer * X + (inner - outer) * (sp.Abs(X + 1) - sp.Abs(X - 1)) / 2
+    circuit = ((g * (Y - X) - resistor) / c_1, (g * (X - Y) + g * Z) / c_2, -Y / coil / g)
+    values = {s: sp.nsimplify(load("oscillator", "chua").PARAMETERS[s.name].default, rational=True).limit_denominator(99)
+              for s in (P, Q, A, B)}  # fmt: skip
+    for ours, theirs in zip(node("chua").rhs, circuit, strict=True):
+        assert sp.expand(ours.subs(values) - unit * theirs) == 0
+    assert [e.subs({**values, X: sp.Rational(3, 2), Y: 0, Z: -sp.Rational(3, 2)}) for e in node("chua").rhs] == [0] * 3
+
+
+def test_van_der_pol() -> None:
+    assert node("van_der_pol").state == (X, V)
+    assert node("van_der_pol").rhs[0] == V
+    assert sp.expand(node("van_der_pol").rhs[1] - (MU * (1 - X**2) * V - X + U * sp.cos(OMEGA * TIME))) == 0
+
+
+def test_van_der_pol_has_its_limit_cycle() -> None:
+    """mu = 1: amplitude 2.008619860874843, period 6.663286859323130, Amore, Physica D 435, 133279 (2022)."""
+    scene = Scene(oscillator="van_der_pol", transient=60, window=40, time_unit="time", record=("section",), rtol=1e-11)
+    result = run(scene, workers=1, show_progress=False)
+    count = int(result.section_count)
+    assert result.success
+    assert count >= 5
+    assert np.abs(result.section.values[:count, 0] - 2.008619860874843).max() < 1e-9
+    assert np.abs(np.diff(result.section_time.values[:count]) - 6.663286859323130).max() < 1e-9
+
+
+def pair(name: str, sigma: list[float], **changes: object) -> np.ndarray:
+    """The synchronisation error of two oscillators that are joined in x."""
+    scene = Scene(oscillator=name, topology=chain(2), coupling="x->x", axes={"sigma": sigma}, transient=1500, window=200,
+                  **changes)  # fmt: skip
+    result = run(scene, workers=1, show_progress=False)
+    assert result.success, result.message
+    synchronous = result.sync_error.values < 1e-3
+    assert np.abs(result.end.values[synchronous]).max() < 100, "the default start leads to the attractor"
+    return result.sync_error.values
+
+
+def test_two_roessler_oscillators_synchronise_where_the_master_stability_function_is_negative() -> None:
+    """alpha = 2 sigma from 0.186 to 4.614: Huang, Chen, Lai & Pecora, Phys. Rev. E 80, 036204 (2009)."""
+    below, low, high, above = pair("rossler", [0.08, 0.11, 2.2, 2.36])
+    assert max(low, high) < 1e-4
+    assert min(below, above) > 1e-2
+
+
+def test_two_lorenz_oscillators_synchronise_above_one_threshold() -> None:
+    """b = 2, x -> x: alpha = 2 sigma above 7.3, Huang, Chen, Lai & Pecora, Phys. Rev. E 80, 036204 (2009)."""
+    below, above = pair("lorenz", [3.4, 3.9], parameters={"b": 2.0})
+    assert above < 1e-9
+    assert below > 1e-2
+
+
+def test_chua_visits_both_scrolls() -> None:
+    scene = Scene(oscillator="chua", transient=50, window=400, record=("trajectory",), samples=4001)
+    x = run(scene, workers=1, show_progress=False).trajectory.values[:, 0]
+    assert -3 < x.min() < -1.5
+    assert 1.5 < x.max() < 3
+
+
+# -- names and starts ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", names("oscillator"))
+def test_names_leave_room_for_modes_and_couplings(name: str) -> None:
+    states = node(name, "exponential" if name == "friction" else None).state
+    taken = {s.name for s in states} | set(load("oscillator", name).PARAMETERS)
+    assert not taken & RESERVED
+    assert not [word for word in taken if word.startswith("d_")]
+
+
+@pytest.mark.parametrize("name", names("oscillator"))
+def test_initial_names_states(name: str) -> None:
+    initial = getattr(load("oscillator", name), "INITIAL", {})
+    scene = Scene(oscillator=name)
+    assert set(initial) <= set(scene.components)
+    if name in FIELDS:
+        assert scene.y0 == tuple(initial.get(c, 0.0) for c in scene.components), "one oscillator starts at the centre"
+
+
+@pytest.mark.parametrize(("n", "x"), [(1, (2.0,)), (2, (2.01, 1.99)), (4, (2.03, 2.01, 1.99, 1.97)), (7, None)])
+def test_starts_lie_around_the_centre(n: int, x: tuple[float, ...] | None) -> None:
+    found = default_start(("x", "y"), n, {"x": 2.0, "y": 5.0})
+    assert found["y"] == (5.0,) * n
+    distances = np.diff(found["x"])
+    without = np.diff(default_start(("x", "y"), n)["x"])
+    assert np.allclose(distances, without, rtol=0, atol=1e-15)
+    assert math.isclose(sum(found["x"]), 2.0 * n)
+    assert x is None or found["x"] == x
+
+
+def test_an_unknown_state_in_initial_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(load("oscillator", "rossler"), "INITIAL", {"w": 1.0})
+    with pytest.raises(ValueError, match="INITIAL of the oscillator: unknown key 'w'; known: x, y, z"):
+        Scene(oscillator="rossler")
+    monkeypatch.setattr(load("oscillator", "rossler"), "INITIAL", {"x": math.nan})
+    with pytest.raises(ValueError, match="INITIAL of the oscillator: x: found nan; expected a finite number"):
+        Scene(oscillator="rossler")
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_the_default_section_is_crossed_by_the_first_state(name: str) -> None:
+    assert Scene(oscillator=name).section == Section("x_1", "falling")
+    assert Scene(oscillator=name, topology=chain(2), coupling="x->x").time_unit == "time"

@@ -1,0 +1,46 @@
+"""The manual's tables of oscillators, friction laws and couplings against the modules themselves."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from synchain.models.coupling_matrix import PARAMETERS
+from synchain.models.expressions import constant
+from synchain.models.frictions import KAPPA
+from synchain.models.plugins import load, names
+
+MANUAL = (Path(__file__).parent.parent / "docs" / "scenes.md").read_text("utf-8")
+TABLES = {"oscillator": "Oscillators", "friction": "Friction laws", "coupling": "Couplings"}
+
+Row = tuple[str, float, str]
+
+
+def table(title: str) -> dict[str, list[Row]]:
+    """Name -> rows of (parameter, default, meaning) of the table below a title."""
+    part = re.split(r"^#+ ", MANUAL.split(f"\n### {title}\n", 1)[1], maxsplit=1, flags=re.MULTILINE)[0]
+    found: dict[str, list[Row]] = {}
+    last = ""
+    for line in re.findall(r"^\| (.*) \|$", part, re.MULTILINE)[1:]:
+        name, parameter, default, meaning = (cell.strip() for cell in re.split(r"(?:^|(?<= ))\| ", f"{line} "))
+        last = name or last
+        rows = found.setdefault(last, [])
+        if parameter:
+            rows.append((parameter.strip("`"), constant(default), meaning.replace(r"\|", "|")))
+    return found
+
+
+@pytest.mark.parametrize("kind", TABLES)
+def test_the_tables_are_those_of_the_modules(kind: str) -> None:
+    expected = {name: load(kind, name).PARAMETERS for name in names(kind)}
+    if kind == "coupling":
+        expected["components"] = PARAMETERS
+    assert table(TABLES[kind]) == {
+        name: [(p, value.default, value.meaning) for p, value in known.items()] for name, known in expected.items()
+    }
+
+
+def test_the_steepness() -> None:
+    assert f"`kappa` = {KAPPA.default:.0f}, the steepness" in MANUAL
