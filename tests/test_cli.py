@@ -600,8 +600,8 @@ def test_exit_codes_and_streams_of_the_real_program() -> None:
     done = synchain("spectrum rnig 4")
     assert (done.returncode, done.stdout) == (2, "")
     assert (
-        done.stderr
-        == "synchain spectrum: unknown topology 'rnig'; known: chain, complete, grid, random_cubic, ring, star, tree\n"
+        done.stderr == "synchain spectrum: unknown topology 'rnig'; "
+        "known: chain, complete, grid, hypercube, random_cubic, ring, star, tree\n"
     )
     done = synchain("equations two_oscillators", env={**os.environ, "PYTHONIOENCODING": "ascii"})
     assert (done.returncode, done.stderr) == (0, "")

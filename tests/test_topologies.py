@@ -139,7 +139,7 @@ def test_too_many_links_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
             "rnig",
             3,
             ValueError,
-            "unknown topology 'rnig'; known: chain, complete, grid, random_cubic, ring, star, tree",
+            "unknown topology 'rnig'; known: chain, complete, grid, hypercube, random_cubic, ring, star, tree",
         ),
         ("", 3, ValueError, "unknown topology ''; known: "),
         ("../scene", 3, ValueError, "unknown topology '../scene'; known: "),

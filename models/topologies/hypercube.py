@@ -1,0 +1,55 @@
+"""Hypercube: nodes are joined where their places differ in one digit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import comb
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+SUMMARY = "hypercube where n is a power of two; for other n one digit for each prime factor (a prime n: all to all)"
+MINIMUM = 1
+SOURCE = (
+    "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), sections 1.4.6 and 1.4.1 (Cartesian product of "
+    "complete graphs); any n: L. N. Bhuyan, D. P. Agrawal, IEEE Trans. Comput. C-33, 323 (1984)"
+)
+
+
+def radices(n: int) -> list[int]:
+    """The prime factors of n, ascending: the base of each digit of a node's place."""
+    found, p = [], 2
+    while p * p <= n:
+        if n % p:
+            p += 1
+        else:
+            found.append(p)
+            n //= p
+    return found + ([n] if n > 1 else [])
+
+
+def edges(n: int) -> Iterator[tuple[int, int, int]]:
+    """Each node and those that are larger in one digit."""
+    bases = radices(n)
+    for i in range(n):
+        place, value = i, 1
+        for base in bases:
+            place, digit = divmod(place, base)
+            yield from ((i, i + step * value, 1) for step in range(1, base - digit))
+            value *= base
+
+
+def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
+    """-2 k, C(d, k) times, for n = 2**d; for each prime factor p of n a sum of 0 (once) and -p (p - 1 times)."""
+    from sympy import Integer
+
+    bases = radices(n)
+    counts = {0: 1}
+    for p in sorted(set(bases)):
+        d, more = bases.count(p), dict[int, int]()
+        for k in range(d + 1):
+            for value, count in counts.items():
+                more[value - p * k] = more.get(value - p * k, 0) + count * comb(d, k) * (p - 1) ** k
+        counts = more
+    return [(Integer(value), count) for value, count in counts.items()]
