@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
+import sys
 import types
 
 import numpy as np
@@ -14,6 +16,7 @@ from synchain.runtime.bench import peers, precision
 from synchain.runtime.bench._cases import CASES, normal_modes, read_case
 from synchain.runtime.bench._clock import curve
 from synchain.runtime.bench._compare import table, time_at
+from synchain.runtime.bench.peers import _numbalsoda
 from synchain.runtime.bench.peers._problem import Problem
 
 SMOOTH, STIFF = "smooth, n = 2", "friction, n = 2"
@@ -101,6 +104,24 @@ def test_peers_solve_the_smooth_case(peer):
     states = module.prepare(Problem(case.scene))(*module.TOLERANCES[len(module.TOLERANCES) // 2], case.times)
     assert states.shape == case.states.shape
     assert np.abs(states - case.states).max() < 1e-6
+
+
+def test_the_callback_of_numbalsoda_is_the_right_hand_side(monkeypatch):
+    """Through its C address, as the solvers call it; the signature is that of the package, which need not be there."""
+    numba = pytest.importorskip("numba")
+    pointer = numba.types.CPointer(numba.float64)
+    fake = types.SimpleNamespace(lsoda_sig=numba.types.void(numba.float64, pointer, pointer, pointer))
+    monkeypatch.setitem(sys.modules, "numbalsoda", fake)
+    problem = Problem(read_case(STIFF).scene)
+    rhs, _ = problem.compiled()
+    expected, out, unused = np.empty(4), np.empty(4), np.zeros(1)
+    rhs(0.7, problem.y0, expected)
+    callback = _numbalsoda.compiled(problem)
+    place = ctypes.POINTER(ctypes.c_double)
+    function = ctypes.CFUNCTYPE(None, ctypes.c_double, place, place, place)(callback.address)
+    function(0.7, *(a.ctypes.data_as(place) for a in (problem.y0, out, unused)))
+    np.testing.assert_allclose(out, expected, rtol=1e-14)
+    assert np.abs(expected).max() > 0.1
 
 
 @pytest.mark.parametrize("peer", peers.names())

@@ -15,8 +15,7 @@ import numpy as np
 from synchain.codegen.lanes import native_width
 
 from ._cases import Case, read_case
-from ._clock import best_time
-from .precision import REFILLS, prepare
+from ._own import REFILLS, Own
 
 __all__ = ["CASES", "CHOICES", "COLUMNS", "measure"]
 
@@ -49,17 +48,9 @@ def points(
 ) -> list[tuple[Any, ...]]:
     """Method, lanes, tolerance, error, microseconds and steps per period of each tolerance."""
     lanes = native_width(registers)
-    solve, periods = prepare(case, method, lanes), 5 if quick else min(case.periods, 50)
-    part, made = case.within(periods), []
-    for rtol in tolerances[1:3] if quick else tolerances:
-        ends = np.full(REFILLS * lanes, periods * case.period)
-        states, _ = solve(rtol, 0.1 * rtol, part.times)
-        _, counts = solve(rtol, 0.1 * rtol, ends)
-        seconds = best_time(lambda rtol=rtol, ends=ends: solve(rtol, 0.1 * rtol, ends), quick)  # type: ignore[misc]
-        error = float(np.abs(states - part.states).max())
-        steps = float(counts[0, 1] + counts[0, 2]) / periods
-        made.append((method, lanes, rtol, error, 1e6 * seconds / (periods * len(ends)), steps))
-    return made
+    own = Own.compiled(case, method, lanes, REFILLS * lanes, 5 if quick else min(case.periods, 50))
+    found = [own.point(rtol, 0.1 * rtol, quick) for rtol in (tolerances[1:3] if quick else tolerances)]
+    return [(method, lanes, p.rtol, p.error, 1e6 * p.seconds, p.steps) for p in found]
 
 
 def gain(point: tuple[Any, ...], first: list[tuple[Any, ...]]) -> float:

@@ -8,10 +8,8 @@ not installed is named and left out.  Times are CPU times of one core, per drive
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,11 +17,10 @@ from tqdm import tqdm
 
 from synchain.codegen.lanes import native_width
 
-from ..plan import control_array
-from ..sweep import Buffers, kernel
 from . import peers
 from ._cases import CASES, Case, read_case
-from ._clock import Point, best_time, curve
+from ._clock import Point, curve
+from ._own import REFILLS, Own, prepare
 
 __all__ = ["CASES", "COLUMNS", "METHODS", "Method", "draw", "measure", "notes", "own_points", "prepare", "summary"]
 
@@ -31,12 +28,7 @@ COLUMNS = (
     "case", "method", "lanes", "rtol", "atol", "error", "microseconds per period", "steps per period", "periods",
     "compile seconds", "remark",
 )  # fmt: skip
-Ends = tuple[np.ndarray, np.ndarray]
-"""States at the ends (m, dimension) and counts (m, …) of the kernel."""
-
 LADDER = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
-REFILLS = 8
-"""Cells that each lane works through in the rows with full lanes: the last ones cost what they do in a sweep."""
 PAPER = (1e-12, 1e-15)
 """The source paper's (rtol, atol) of Cash-Karp."""
 
@@ -69,28 +61,6 @@ METHODS = (
 """This program's rows; `stiff` False leaves out the cases in which stability holds an explicit method back."""
 
 
-def prepare(case: Case, integrator: str, width: int) -> Callable[[float, float, np.ndarray], Ends]:
-    """Compile or load the kernel of a case; returns solve(rtol, atol, ends) -> (states (m, dimension), counts).
-
-    `solve` integrates one cell to each of the end times and raises RuntimeError where a cell did not reach its end.
-    """
-    compiled = kernel(case.scene.replace(integrator=integrator), width)
-    one = np.array([case.scene.parameters[name] for name in case.scene.equations.parameters])
-    y0 = np.array(case.scene.y0)
-
-    def solve(rtol: float, atol: float, ends: np.ndarray) -> Ends:
-        cells = len(ends)
-        spans = np.ascontiguousarray(np.stack([np.zeros(cells), ends, np.full(cells, case.period)], axis=1))
-        control = control_array(rtol, atol, 0.5 * case.period, 1e12, jumps=False)
-        buffers = Buffers.empty(cells, len(y0), room=0, samples=0)
-        compiled.drive(0, cells, np.tile(y0, (cells, 1)), np.tile(one, (cells, 1)), spans, control, *buffers.arrays())
-        if not np.isfinite(buffers.end).all():
-            raise RuntimeError(f"{integrator}: a cell did not finish at rtol = {rtol:g}")
-        return buffers.end, buffers.counts
-
-    return solve
-
-
 def notes() -> list[str]:
     """A line for each peer that cannot run here, with the reason and the remedy."""
     found = [(peer.NAME, peers.absent(peer)) for peer in map(peers.load, peers.names())]
@@ -118,31 +88,10 @@ def own_points(case: Case, quick: bool) -> Iterator[Point]:
     for method in METHODS:
         if case.stiff and not method.stiff:
             continue
-        begin = time.perf_counter()
-        solve = prepare(case, method.integrator, method.width(case))
-        compiled = time.perf_counter() - begin
+        lanes, periods = method.width(case), min(case.periods, method.longest)
+        own = Own.compiled(case, method.integrator, lanes, REFILLS * lanes if method.full else 1, periods)
         for rtol, atol in method.tolerances[::3] if quick else method.tolerances:
-            yield _own_point(case, method, partial(solve, rtol, atol), (rtol, atol), compiled, quick)
-
-
-def _own_point(
-    case: Case,
-    method: Method,
-    run: Callable[[np.ndarray], Ends],
-    tolerances: tuple[float, float],
-    compiled: float,
-    quick: bool,
-) -> Point:
-    periods = min(case.periods, method.longest)
-    part = case.within(periods)
-    states, _ = run(part.times)
-    lanes = method.width(case)
-    ends = np.full(REFILLS * lanes if method.full else 1, periods * case.period)
-    _, counts = run(ends)
-    seconds = best_time(lambda: run(ends), quick) / (periods * len(ends))
-    error, steps = float(np.abs(states - part.states).max()), float(counts[0, 1] + counts[0, 2]) / periods
-    remark = "" if periods == case.periods else f"{periods} of {case.periods} periods"
-    return Point(method.integrator, lanes, *tolerances, error, seconds, periods, compiled, steps=steps, remark=remark)
+            yield own.point(rtol, atol, quick)
 
 
 def _row(case: Case, point: Point) -> tuple[Any, ...]:

@@ -1,15 +1,13 @@
 """What each skip saves: arithmetic operations of a step, time and answer with it and without it.
 
-Operations are those of one step of all oscillators, counted in the text of the kernel, calls of its functions included
-(an elementary function counts as one); searching sections, sampling and the synchronisation error are not part of a step
-and show in the time alone, which is CPU time of whole runs.  The answer is everything that both runs record: the largest
-difference over all cells, relative where a number is larger than 1, over the first twentieth of the time and at rtol 1e-10,
-since unstable motions part by rounding alone when they are given the time.
+Operations are those of one step of all oscillators, counted as `_operations.py` says; searching sections, sampling and the
+synchronisation error are not part of a step and show in the time alone, which is CPU time of whole runs.  The answer is
+everything that both runs record: the largest difference over all cells, relative where a number is larger than 1, over the
+first twentieth of the time and at rtol 1e-10, since unstable motions part by rounding alone when they are given the time.
 """
 
 from __future__ import annotations
 
-import ast
 import time
 from dataclasses import dataclass, field
 from typing import Any
@@ -23,6 +21,7 @@ from synchain.models.topology import topology
 from ..result import Result
 from ..skip import Skip, decide
 from ..sweep import kernel_source, run
+from ._operations import operations
 
 __all__ = ["CASES", "COLUMNS", "Case", "difference", "measure", "operations"]
 
@@ -30,9 +29,6 @@ COLUMNS = (
     "skipped", "oscillators", "operations a step", "operations without the skip", "milliseconds",
     "milliseconds without the skip", "times faster", "largest difference",
 )  # fmt: skip
-
-FREE = ("broadcast", "select")
-"""Functions that are no arithmetic."""
 
 PARAMETERS = {"theta_b": 0.1, "sigma": 0.3}
 
@@ -53,21 +49,24 @@ class Case:
 
 
 CASES = (
+    Case("no synchronisation error", 4, {"record": ("sync_error",)}, {"record": ()}),
+    Case("all start equal", 4, {"initial": {"x": 0.3}}),
     Case("no forcing, u = 0", 2, {"parameters": {**PARAMETERS, "u": 0.0}, "time_unit": "time", "window": 550.0}),
     Case("no coupling, sigma = 0", 4, {"parameters": {"sigma": 0.0}}),
-    Case("no synchronisation error", 4, {"record": ("sync_error",)}, {"record": ()}),
     Case("no section", 4, {"record": ("section",)}, {"record": ()}),
     Case("no trajectory", 4, {"record": ("trajectory",), "samples": 2001}, {"record": ()}),
-    Case("all start equal", 4, {"initial": {"x": 0.3}}),
     Case("start mirrored", 4, {"initial": {"x": [0.3, 0.28, 0.28, 0.3]}, "record": ()}),
     Case("hub and equal leaves", 8, {"initial": {"x": [0.3, *[0.28] * 7]}, "record": ()}, graph="star"),
     Case("all fixed numbers folded", 2, {"parameters": PARAMETERS}, fold_all=True),
 )
 
+QUICK = 2
+"""A quick run takes this many cases from the first on; they need three kernels in all."""
+
 
 def measure(quick: bool = False) -> list[tuple[object, ...]]:
-    """Return the rows of the table, in the order of COLUMNS; `quick` runs fewer cells for shorter times."""
-    return [_row(case, quick) for case in CASES]
+    """Return the rows of the table, in the order of COLUMNS; `quick` runs two cases with fewer cells for shorter times."""
+    return [_row(case, quick) for case in (CASES[:QUICK] if quick else CASES)]
 
 
 def scenes(case: Case, quick: bool) -> tuple[Skip, Skip]:
@@ -118,35 +117,3 @@ def difference(one: Result, other: Result) -> float:
             return float("inf")
         worst = max(worst, float(np.nanmax(np.abs(a - b) / np.maximum(1.0, np.abs(b)), initial=0.0)))
     return worst
-
-
-def operations(text: str) -> int:
-    """Arithmetic operations of one step of an unrolled kernel; its own functions count as often as they are called."""
-    module = ast.parse(text)
-    flags = {
-        node.targets[0].id: node.value.value
-        for node in module.body
-        if isinstance(node, ast.Assign)
-        and isinstance(node.targets[0], ast.Name)
-        and isinstance(node.value, ast.Constant)
-    }
-    if flags.get("LOOPED"):
-        raise ValueError("operations are counted in unrolled kernels alone; found one that loops over its nodes")
-    own = {node.name: node for node in module.body if isinstance(node, ast.FunctionDef)}
-    return _count(own["step"].body, own, flags)
-
-
-def _count(parts: list[Any], own: dict[str, ast.FunctionDef], flags: dict[str, Any]) -> int:
-    total = 0
-    for part in parts:
-        if isinstance(part, ast.If) and isinstance(part.test, ast.Name) and part.test.id in flags:
-            total += _count(part.body if flags[part.test.id] else part.orelse, own, flags)
-            continue
-        if isinstance(part, ast.Call) and isinstance(part.func, ast.Name):
-            if part.func.id in ("load", "store"):
-                total += _count(part.args[2:], own, flags)  # not the arithmetic of the slot
-                continue
-            inner = own.get(part.func.id)
-            total += _count(inner.body, own, flags) if inner else part.func.id not in FREE
-        total += isinstance(part, ast.BinOp) + _count(list(ast.iter_child_nodes(part)), own, flags)
-    return total

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._problem import Problem, Solve, ladder, load
+from ._numbalsoda import PACKAGE, REQUIRES, compiled
+from ._problem import Problem, Solve, ladder
 
 __all__ = ["NAME", "PACKAGE", "REQUIRES", "TOLERANCES", "prepare"]
 
 NAME = "numbalsoda DOP853"
-PACKAGE = "numbalsoda (its build needs gfortran)"
-REQUIRES = {"module": ("numbalsoda",)}
 TOLERANCES = ladder(5, 12)
 
 
 def prepare(problem: Problem) -> Solve:
     """Return a solver by DOP853."""
-    import numba
-    from numbalsoda import lsoda_sig, solve_ivp
+    from numbalsoda import solve_ivp
 
-    text = problem.python_rhs("def rhs(t, y, out, unused):")
-    rhs = numba.cfunc(lsoda_sig, error_model="numpy")(load(text, "rhs"))
+    rhs = compiled(problem)
     address = rhs.address
 
     def solve(rtol: float, atol: float, times: np.ndarray) -> np.ndarray:

@@ -8,23 +8,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._problem import Problem, Solve, ladder, load
+from ._numbalsoda import PACKAGE, REQUIRES, compiled
+from ._problem import Problem, Solve, ladder
 
 __all__ = ["NAME", "PACKAGE", "REQUIRES", "TOLERANCES", "prepare"]
 
 NAME = "numbalsoda LSODA"
-PACKAGE = "numbalsoda (its build needs gfortran)"
-REQUIRES = {"module": ("numbalsoda",)}
 TOLERANCES = ladder(5, 13)
 
 
 def prepare(problem: Problem) -> Solve:
     """Return a solver by LSODA."""
-    import numba
-    from numbalsoda import lsoda, lsoda_sig
+    from numbalsoda import lsoda
 
-    text = problem.python_rhs("def rhs(t, y, out, unused):")
-    rhs = numba.cfunc(lsoda_sig, error_model="numpy")(load(text, "rhs"))
+    rhs = compiled(problem)
     address, data = rhs.address, np.zeros(1)
 
     def solve(rtol: float, atol: float, times: np.ndarray) -> np.ndarray:

@@ -1,0 +1,191 @@
+"""The three-oscillator universal probe: which complex strengths of a mode synchronise, by direct simulation.
+
+Three cells in a ring with the weights a and b in its two directions have the transversal eigenvalues
+gamma = -(3/2)(a + b) ± i (sqrt(3)/2)(a - b).  With alpha + i beta = -sigma gamma and sigma = 1, a and b are
+alpha/3 ± beta/sqrt(3): the weights reach every point of the complex plane, and a network whose -sigma gamma_k all lie where
+the three synchronise should synchronise too, one-way links included (Fink, Johnson, Carroll, Mar & Pecora, Phys. Rev. E 61,
+5080 (2000)).  a and b are parameters of one kernel, so that a whole plane needs one compilation.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+import sympy as sp
+from numpy.typing import ArrayLike
+from tqdm import tqdm
+
+from synchain.codegen.emit import emit
+from synchain.codegen.load import Kernel, load
+from synchain.models.equations import Edge, Equations
+from synchain.models.scene import Scene
+from synchain.models.topology import topology
+
+from .plan import CANCEL, Plan, control_array, plan, tolerances
+from .status import Status
+from .sweep import Buffers, worker_count
+from .threshold import Criterion
+
+__all__ = ["MODE_ALPHA", "MODE_BETA", "Probe", "integrate", "ring_of_three", "universal_probe"]
+
+MODE_ALPHA = sp.Symbol("mode_alpha", real=True)
+MODE_BETA = sp.Symbol("mode_beta", real=True)
+"""Real and imaginary part of a mode's strength alpha + i beta = -sigma gamma."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Probe:
+    """Verdicts of the probe over complex strengths alpha + i beta.
+
+    alpha, beta, error and share have one shape: error is the median over the starts of the mean synchronisation error
+    (infinite where a cell did not finish), share the part of the starts that synchronised.  status (…, starts) says how each
+    cell ended.
+    """
+
+    scene: Scene
+    criterion: Criterion
+    alpha: np.ndarray = field(repr=False)
+    beta: np.ndarray = field(repr=False)
+    error: np.ndarray = field(repr=False)
+    share: np.ndarray = field(repr=False)
+    status: np.ndarray = field(repr=False)
+
+    @property
+    def synchronous(self) -> np.ndarray:
+        """True where at least half of the starts synchronised, as in `synchain.runtime.threshold`."""
+        return self.share >= 0.5
+
+
+def universal_probe(
+    scene: Scene,
+    alpha: ArrayLike,
+    beta: ArrayLike,
+    *,
+    criterion: Criterion | None = None,
+    workers: int | None = None,
+    show_progress: bool | None = None,
+) -> Probe:
+    """Simulate three oscillators at the mode strengths alpha + i beta: arrays that are broadcast, negative numbers allowed.
+
+    Oscillator, coupling and parameters are those of the scene; its network, axes, start and sigma are not used.  The starts
+    are those of `synchain.runtime.threshold`.
+
+    Raises ValueError for strengths that are not finite or none at all, for a scene without coupling, and for a coupling that
+    is not proportional to sigma and to the weight of a link.
+    """
+    criterion = criterion or Criterion()
+    real, imaginary = (np.array(part) for part in np.broadcast_arrays(*(_strengths(x) for x in (alpha, beta))))
+    three = scene.replace(
+        topology=topology("ring", 3), initial=None, axes=(), zipped=False, continuation="none", record=("sync_error",),
+        transient=criterion.transient, window=criterion.window, rtol=criterion.rtol,
+    )  # fmt: skip
+    compiled = load(emit(ring_of_three(three.equations), three.integrator, ("sync_error",)))
+    cells = _cells(three, compiled.equations.parameters, real.reshape(-1), imaginary.reshape(-1), criterion)
+    error, status = integrate(three, compiled, cells, workers=workers, show_progress=show_progress)
+    shape = (*real.shape, criterion.starts)
+    error, status = error.reshape(shape), status.reshape(shape)
+    share = np.asarray((error < criterion.tolerance).mean(axis=-1))
+    return Probe(scene, criterion, real, imaginary, np.asarray(np.median(error, axis=-1)), share, status)
+
+
+def ring_of_three(equations: Equations) -> Equations:
+    """Return three nodes in a ring, with links of the weight alpha/3 + beta/sqrt(3) one way and alpha/3 - beta/sqrt(3) back.
+
+    The parameters `mode_alpha` and `mode_beta` take the place of sigma; the weight of a link, 1 or -1, is its direction.
+    Raises ValueError where there is no coupling, where a link is not proportional to sigma and to its weight or does not
+    vanish between equal states, and where the model uses one of the two names itself.
+    """
+    edge = equations.edge
+    if edge is None:
+        raise ValueError("these equations have no coupling; the probe needs links")
+    _check_coupling(edge)
+    taken = {s.name for s in (*equations.node.state, *equations.node.parameters, *edge.parameters)}
+    for symbol in (MODE_ALPHA, MODE_BETA):
+        if symbol.name in taken:
+            raise ValueError(f"the name {symbol.name!r} is needed for the probe; rename it in the model")
+    strength = MODE_ALPHA / 3 + edge.weight * MODE_BETA / sp.sqrt(3)
+    unit = {edge.weight: sp.S.One, _sigma(edge): sp.S.One}
+    others = tuple(s for s in edge.parameters if s != _sigma(edge))
+    rates = tuple(strength * e.xreplace(unit) for e in edge.rhs)
+    turned = Edge(edge.here, edge.there, edge.weight, rates, (*others, MODE_ALPHA, MODE_BETA))
+    there = [(i, (i + 1) % 3, Fraction(1)) for i in range(3)]
+    back = [(i, (i + 2) % 3, Fraction(-1)) for i in range(3)]
+    return Equations(equations.node, turned, 3, (*there, *back))
+
+
+def _check_coupling(edge: Edge) -> None:
+    """Prove that a link is sigma times its weight times a function that is zero between equal states."""
+    strength = _sigma(edge)
+    if not edge.diffusive:
+        raise ValueError("a link acts between equal states, so complete synchronisation is no solution of this network")
+    for e in edge.rhs:
+        unit = e.xreplace({edge.weight: sp.S.One, strength: sp.S.One})
+        if sp.simplify(e - strength * edge.weight * unit) != 0:
+            raise ValueError(f"the coupling {e} is not proportional to sigma and the weight; a mode has no strength")
+
+
+def _sigma(edge: Edge) -> sp.Symbol:
+    found = [s for s in edge.parameters if s.name == "sigma"]
+    if not found:
+        names = ", ".join(s.name for s in edge.parameters) or "nothing"
+        raise ValueError(f"links depend on {names}; expected sigma, the strength of a coupling")
+    return found[0]
+
+
+def _strengths(given: ArrayLike) -> np.ndarray:
+    values = np.asarray(given, dtype=float)
+    if values.size == 0:
+        raise ValueError("alpha and beta: found no values; expected at least one of each")
+    if not np.isfinite(values).all():
+        raise ValueError("alpha and beta: found a value that is not finite; expected numbers")
+    return values
+
+
+def _cells(scene: Scene, names: tuple[str, ...], alpha: np.ndarray, beta: np.ndarray, criterion: Criterion) -> Plan:
+    """Rows of every strength and start, the starts fastest; a start moves all oscillators alike in the position."""
+    one, starts = plan(scene), criterion.starts
+    count = len(alpha) * starts
+    values = {**scene.parameters, MODE_ALPHA.name: 0.0, MODE_BETA.name: 0.0}
+    numbers = np.tile([values[name] for name in names], (count, 1))
+    numbers[:, names.index(MODE_ALPHA.name)] = np.repeat(alpha, starts)
+    numbers[:, names.index(MODE_BETA.name)] = np.repeat(beta, starts)
+    start = np.tile(one.start, (count, 1))
+    moves = np.random.default_rng(criterion.seed).uniform(-criterion.reach, criterion.reach, starts - 1)
+    start[:, : scene.n] += np.tile([0.0, *moves], len(alpha))[:, None]
+    return Plan(start, numbers, np.tile(one.spans, (count, 1)))
+
+
+def integrate(
+    scene: Scene, compiled: Kernel, cells: Plan, *, workers: int | None = None, show_progress: bool | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Run cells of a kernel on threads; returns mean synchronisation error (cells,) and status (cells,).
+
+    The error is infinite where a cell did not finish.  Tolerances and the drive that bounds the steps are the scene's.
+    """
+    workers, count = worker_count(workers), len(cells.start)
+    control = control_array(*tolerances(scene, np.empty((0, 0))), 0.5 * (scene.period or math.inf), scene.max_steps)
+    buffers = Buffers.empty(count, cells.start.shape[1], room=0, samples=0)
+    fixed = (cells.start, cells.numbers, cells.spans, control, *buffers.arrays())
+    width = compiled.origin.width
+    size = width * min(16, math.ceil(count / (8 * workers * width)))  # whole lanes, and enough chunks to share out
+    with (
+        tqdm(total=count, unit="cell", disable=None if show_progress is None else not show_progress) as bar,
+        ThreadPoolExecutor(workers) as pool,
+    ):
+        chunks = {
+            pool.submit(compiled.drive, i, min(i + size, count), *fixed): min(size, count - i)
+            for i in range(0, count, size)
+        }
+        try:
+            for done in as_completed(chunks):
+                done.result()
+                bar.update(chunks[done])
+        except BaseException:
+            control[CANCEL] = 1.0  # the kernels look at it and end
+            raise
+    status = buffers.counts[:, 0].copy()
+    return np.where(status == Status.FINISHED, buffers.sums[:, 0], np.inf), status
