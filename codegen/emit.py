@@ -22,7 +22,7 @@ from .rosenbrock import write_rosenbrock
 from .sparse import program
 from .step import StepWriter, write_function
 
-__all__ = ["RECORDS", "KernelSource", "emit"]
+__all__ = ["RECORDS", "KernelSource", "describe", "emit", "imports", "node_functions"]
 
 RECORDS = ("sync_error", "section", "trajectory")
 """What a kernel can record besides the final state."""
@@ -31,7 +31,7 @@ AUTO = "rodas5p"
 """The integrator that "auto" stands for."""
 
 LARGEST_UNROLLED = 8
-"""Nodes up to which a step is written out; larger networks are stepped through in loops, whose text stays small."""
+"""Nodes up to which a step is written out; larger networks are stepped through in loops."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +43,7 @@ class KernelSource:
     integrator: str
     records: tuple[str, ...]
     width: int
+    kind: str = "sweep"
 
     @property
     def digest(self) -> str:
@@ -119,12 +120,12 @@ def _module(
         method = replace(method, smooth=None)
     steps = _steps(equations, plain, blocks, method, looped)
     lines = [line for writer in steps.values() for line in writer.lines]
-    functions = _node_functions(list(steps.values()), blocks)
+    functions = node_functions(list(steps.values()), blocks)
     entries = program(equations).entries if looped and method.kind == "rosenbrock" else 0
     scratch = workspace(steps["step"], entries) if looped else 0
     parts = [
-        _header(equations, plain, method, records, lines),
-        _imports(functions, lines, section),
+        describe(equations, plain, method, records, lines),
+        imports(functions, lines, section),
         _constants(plain, method, records, width, multiplicity)
         + (f"\nENTRIES = {entries}" if looped else "")
         + f"\nLOOPED = {looped}\nWORKSPACE = {scratch}\nREPEATS = {angular_frequency(plain) is not None}",
@@ -152,7 +153,7 @@ def _steps(
     return steps
 
 
-def _node_functions(steps: list[StepWriter], blocks: NodeBlocks) -> list[list[str]]:
+def node_functions(steps: list[StepWriter], blocks: NodeBlocks) -> list[list[str]]:
     """The right-hand side of one node, and its linearisations where a step wants one."""
     made = []
     first = [writer.first_body for writer in steps]
@@ -168,9 +169,15 @@ def _node_functions(steps: list[StepWriter], blocks: NodeBlocks) -> list[list[st
     return made
 
 
-def _header(
-    equations: Equations, plain: Equations, method: Integrator, records: tuple[str, ...], lines: list[str]
+def describe(
+    equations: Equations,
+    plain: Equations,
+    method: Integrator,
+    records: tuple[str, ...],
+    lines: list[str],
+    more: str = "",
 ) -> str:
+    """The docstring at the head of a kernel module."""
     swapped = [f"{a} as {b}" for a, b in zip(equations.parameters, plain.parameters, strict=True) if a != b]
     rows = [
         f"Generated kernel: {equations.n} oscillator{'s' * (equations.n > 1)}, {len(equations.links)} links, {method.name}.",
@@ -180,6 +187,7 @@ def _header(
         f"State       {_listed(equations.state)}",
         f"Parameters  {', '.join(equations.parameters) or 'none'}",
         f"Records     {', '.join(('final state', *records))}",
+        *([f"Modes       {more}"] if more else []),
         f"Step        {_operations(lines)} operations outside the node functions",
     ]
     if swapped:
@@ -200,27 +208,15 @@ def _operations(lines: list[str]) -> int:
     )
 
 
-def _imports(functions: list[list[str]], lines: list[str], section: sp.Expr | None) -> str:
+def imports(functions: list[list[str]], lines: list[str], section: sp.Expr | None, more: Sequence[str] = ()) -> str:
+    """The import statements of a kernel module."""
     text = "\n".join([*(line for f in functions for line in f), *lines, show(section) if section is not None else ""])
     used = sorted(
         n for n in {*FUNCTIONS.values(), "sqrt", "exp", "log"} if f"{n}(" in text or n in ("sqrt", "exp", "log")
     )
     smooth = [n for n in used if n in elementary.__all__ and n not in lanes.__all__]
-    primitive = {
-        "absolute",
-        "any_lane",
-        "broadcast",
-        "lane_bits",
-        "load",
-        "maximum",
-        "minimum",
-        "one_lane",
-        "select",
-        "store",
-        "sqrt",
-        "truncated",
-    }
-    primitive |= {n for n in used if n in lanes.__all__}
+    primitive = {"absolute", "any_lane", "broadcast", "lane_bits", "load", "maximum", "minimum", "one_lane"}
+    primitive |= {"select", "store", "sqrt", "truncated", *more, *(n for n in used if n in lanes.__all__)}
     return "\n".join([
         "import math",
         "",

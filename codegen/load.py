@@ -36,12 +36,19 @@ from .sparse import EMPTY, NAMES, program
 __all__ = ["Kernel", "load"]
 
 _matrix, _counts = types.float64[:, ::1], types.int64[:, ::1]
+_given = types.Array(types.float64, 2, "C", readonly=True)
+"""What a kernel only reads may be read-only or not."""
 _cube = types.float64[:, :, ::1]
 SIGNATURE = types.void(
-    types.int64, types.int64, _matrix, _matrix, _matrix, types.float64[::1], _matrix, _matrix, _counts, _cube, _cube,
+    types.int64, types.int64, _given, _given, _given, types.float64[::1], _matrix, _matrix, _counts, _cube, _cube,
     types.UniTuple(types.int64[::1], len(NAMES)), types.float64[::1],
 )  # fmt: skip
 """first, last, start, numbers, spans, control, end, sums, counts, points, samples, graph, weights."""
+MODES = types.void(
+    types.int64, types.int64, _given, _given, _given, types.float64[::1], _given, _cube, _matrix, _matrix, _matrix,
+    _counts, _cube,
+)  # fmt: skip
+"""first, last, start, numbers, spans, control, strengths, vectors, growth, end, sums, counts, samples."""
 
 _lock = threading.Lock()
 
@@ -50,7 +57,8 @@ _lock = threading.Lock()
 class Kernel:
     """A compiled kernel that keeps its text: `print(kernel.source)` shows what runs.
 
-    `entry` is the compiled entry point of the kernel module, `drive`, whose arrays are described there.
+    `entry` is the compiled entry point of the kernel module, `drive` of a sweep and `march` of a kernel that carries modes;
+    their arrays are described there.
     """
 
     origin: KernelSource
@@ -113,12 +121,14 @@ def _load(source: KernelSource) -> Kernel:
 
 def _compile(source: KernelSource, name: str, path: Path) -> Kernel:
     module = _module(source.text, name, path)
-    module.drive.compile(SIGNATURE)
-    hits = sum(module.drive.stats.cache_hits.values())
-    if source.equations.n > LARGEST_UNROLLED:
+    entry, signature = (module.march, MODES) if source.kind == "modes" else (module.drive, SIGNATURE)
+    entry.compile(signature)
+    entry.disable_compile()  # arrays of another type are a mistake of ours, not a reason to compile anew
+    hits = sum(entry.stats.cache_hits.values())
+    if source.kind == "sweep" and source.equations.n > LARGEST_UNROLLED:
         made = program(source.equations)
-        return Kernel(source, module.drive, made.arrays, made.weights, str(path), hits > 0)
-    return Kernel(source, module.drive, EMPTY, np.zeros(0), str(path), hits > 0)
+        return Kernel(source, entry, made.arrays, made.weights, str(path), hits > 0)
+    return Kernel(source, entry, EMPTY, np.zeros(0), str(path), hits > 0)
 
 
 def _module(text: str, name: str, path: Path) -> ModuleType:

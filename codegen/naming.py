@@ -23,7 +23,8 @@ RESERVED = frozenset(
      "shift", "reach", "rate", "error", "size", "rtol", "atol", "node", "node_linear",
      "node_local", "bound", "bank", "step", "step_smooth", "section", "theta", "now",
      "njit", "p", "drive", "scaled", "inside", "total", "e3", "e5", "np", "math",
-     "WIDTH", "DENSE"}
+     "WIDTH", "DENSE", "LANES", "MODE_SIZE", "STRENGTHS", "SHARED", "shared", "steady", "moving", "bent", "lag",
+     "strengths", "which", "mode_step", "march"}
     | set(NAMES)
     | set(keyword.kwlist) | set(dir(builtins)) | set(elementary.__all__) | set(lanes.__all__)
 )  # fmt: skip
@@ -31,7 +32,7 @@ RESERVED = frozenset(
 
 PREFIXES = (
     "m_", "l_", "inv_", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "u_", "f_", "r_", "at_", "ft_", "n_", "j_",
-    "e_", "_",
+    "e_", "_", "along_", "value_", "bend_", "steady_",
 )  # fmt: skip
 SUFFIXES = ("_here", "_there")
 NUMBERED = re.compile(r"_\d+$")

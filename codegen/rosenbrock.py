@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import sympy as sp
 
@@ -16,8 +16,8 @@ __all__ = ["term", "write_rosenbrock"]
 Entries = dict[tuple[int, int], sp.Expr]
 
 
-def write_rosenbrock(w: StepWriter) -> list[str]:
-    """Return all statements of a Rosenbrock step."""
+def write_rosenbrock(w: StepWriter, note: Callable[[int], None] | None = None) -> list[str]:
+    """Return all statements of a Rosenbrock step; `note` may write more after each stage."""
     w.opening()
     # (shift - J) k = …; reach = 1/shift, rate = 1/h
     w.put(f"reach = h*{w.method.gamma!r}", "shift = 1.0/reach", f"rate = shift*{w.method.gamma!r}")
@@ -31,6 +31,8 @@ def write_rosenbrock(w: StepWriter) -> list[str]:
     slopes = [show(values[f"ft_{s.name}"]) for s in w.equations.node.state for values in own]
     for i in range(w.method.stages):
         stage(w, i, steps, factors, slopes)
+        if note is not None:
+            note(i)
     finish(w)
     return w.lines
 

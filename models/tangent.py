@@ -1,20 +1,85 @@
 """Tangent dynamics: what a small deviation does, along the orbit it deviates from.
 
-Both functions return equations like any others, so that a deviation is integrated by the same generated kernels and
-with its own exact Jacobian.
+`mode` and `whole` part the orbit from the linear equation of the deviations, so that one orbit carries any number of them;
+`tangent` and `transversal` return equations like any others, orbit and deviation in one state.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import sympy as sp
 
 from .calculus import derivative
 from .equations import Equations, Node
 
-__all__ = ["ALPHA", "deviation_names", "tangent", "transversal"]
+__all__ = ["ALPHA", "MODE", "Variation", "deviation_names", "mode", "tangent", "transversal", "whole"]
 
 ALPHA = sp.Symbol("alpha", real=True)
 """Coupling strength of a mode with its sign turned, alpha = -sigma gamma >= 0 for undirected networks."""
+
+MODE = (sp.Symbol("mode_alpha", real=True), sp.Symbol("mode_beta", real=True))
+"""Real and imaginary part of the strength of a mode, alpha + i beta = -sigma gamma."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variation:
+    """A linear system d' = A d along an orbit: what small deviations from it do.
+
+    `matrix` holds the non-zero entries ((row, column), expression) of A, in the symbols of the whole orbit (x_1 …), its
+    parameters, t, and `parameters`, numbers that differ from mode to mode and enter A linearly.
+    Raises ValueError for an entry outside the matrix or with an unknown symbol, or one that is not linear in `parameters`.
+    """
+
+    orbit: Equations
+    size: int
+    matrix: tuple[tuple[tuple[int, int], sp.Expr], ...]
+    parameters: tuple[sp.Symbol, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = {*self.orbit.state, *self.orbit.parameters, "t"}
+        taken = names & {s.name for s in self.parameters}
+        if taken:
+            raise ValueError(f"the symbol {min(taken)!r} is needed for the strength of a mode; rename it in the model")
+        for (row, column), e in self.matrix:
+            if not (0 <= row < self.size and 0 <= column < self.size):
+                raise ValueError(f"variation: entry ({row}, {column}) is outside the {self.size} x {self.size} matrix")
+            unknown = {s.name for s in e.free_symbols} - names - {s.name for s in self.parameters}
+            if unknown:
+                raise ValueError(f"variation: unknown symbol {min(unknown)!r} in entry ({row}, {column})")
+            slopes = [e.diff(s) for s in self.parameters]
+            if any(slope.has(*self.parameters) for slope in slopes):
+                raise ValueError(f"variation: entry ({row}, {column}) is not linear in the strengths of a mode: {e}")
+
+
+def mode(equations: Equations, plane: bool = False) -> Variation:
+    """Return the variational equation of one transversal mode along the synchronous orbit, d' = (J - alpha H) d.
+
+    With `plane` the strength is complex, alpha + i beta, and the deviation has its real parts first, then its imaginary
+    parts.  J and H as in `transversal`, which raises the same errors.
+    """
+    slope = coupling_slope(equations)
+    node = equations.node
+    orbit = Equations(node, None, 1)
+    here = orbit.at_node(0)
+    own = sp.Matrix(node.jacobian()).xreplace(here)
+    push = slope.xreplace(here)
+    alpha, beta = MODE
+    real = own - alpha * push
+    if not plane:
+        return Variation(orbit, len(node.state), _entries(real), (alpha,))
+    both = sp.Matrix(sp.BlockMatrix([[real, beta * push], [-beta * push, real]]))
+    return Variation(orbit, 2 * len(node.state), _entries(both), (alpha, beta))
+
+
+def whole(equations: Equations) -> Variation:
+    """Return the variational equation of the whole network, d' = J d, in state order."""
+    return Variation(equations, equations.dimension, tuple(equations.jacobian().items()))
+
+
+def _entries(matrix: sp.Matrix) -> tuple[tuple[tuple[int, int], sp.Expr], ...]:
+    rows, columns = matrix.shape
+    return tuple(((r, c), matrix[r, c]) for r in range(rows) for c in range(columns) if matrix[r, c] != 0)
 
 
 def deviation_names(node: Node) -> tuple[sp.Symbol, ...]:
@@ -37,6 +102,15 @@ def transversal(equations: Equations) -> Equations:
     Raises ValueError where there is no coupling, where a link does not vanish between equal states (the synchronous state
     is no solution), or where links are not proportional to sigma.
     """
+    slope = coupling_slope(equations)
+    return Equations(_extend(equations.node, -ALPHA * slope, (ALPHA,)), None, 1)
+
+
+def coupling_slope(equations: Equations) -> sp.Matrix:
+    """Return H: the derivative of a link of weight 1 with respect to the state at its source, over sigma, at equal states.
+
+    Raises ValueError as `transversal` does.
+    """
     edge = equations.edge
     if edge is None:
         raise ValueError("these equations have no coupling; a transversal mode needs links")
@@ -50,7 +124,7 @@ def transversal(equations: Equations) -> Equations:
     slope = matrix.diff(strength)
     if (matrix - strength * slope).applyfunc(sp.simplify) != sp.zeros(*matrix.shape):
         raise ValueError("links are not proportional to sigma; a mode has no single strength alpha")
-    return Equations(_extend(equations.node, -ALPHA * slope, (ALPHA,)), None, 1)
+    return slope
 
 
 def _extend(node: Node, coupling: sp.Matrix, parameters: tuple[sp.Symbol, ...]) -> Node:

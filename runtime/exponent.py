@@ -1,38 +1,44 @@
-"""Transversal Lyapunov exponents of the synchronous state as a function of alpha = sigma |gamma|.
+"""Transversal Lyapunov exponents of the synchronous state: the master stability function.
 
-One oscillator and one mode are integrated together (models/tangent.py).  The deviation is scaled back to length 1 after
-every block of drive periods; the exponent is the mean growth rate over the blocks.
+One orbit carries the modes of all strengths alpha + i beta = -sigma gamma at once (`synchain.codegen.modes`), the
+propagators of most of them interpolated in the strength (`synchain.runtime.propagate`).  On a fixed point or a periodic
+orbit locked to the drive the exponents follow from eigenvalues, elsewhere from the mean growth of a deviation, with an
+error from batch means.
+
+Sources: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15, 9
+(1980); batch means: Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989).
 """
 
 from __future__ import annotations
 
-import itertools
 import math
+from collections import Counter
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from tqdm import tqdm
 
-from synchain.codegen.emit import emit
-from synchain.codegen.load import Kernel, load
 from synchain.models.scene import Scene
-from synchain.models.tangent import transversal
+from synchain.models.topology import topology
 
+from .attractor import Attractor, find_attractor
 from .intervals import Interval
-from .plan import control_array, tolerances
-from .status import Status
-from .sweep import Buffers, worker_count
+from .orbits import Orbits
 
 __all__ = ["Exponents", "exponents"]
+
+BATCHES = 64
 
 
 @dataclass(frozen=True, slots=True)
 class Exponents:
-    """Exponent (m,) per unit of non-dimensional time at each alpha (m,), with its standard error (m,).
+    """Largest exponent (m,) per unit of non-dimensional time at each strength (m,), real or complex, with its standard
+    error.
 
-    The error comes from the scatter of ten batch means over time and over the starts; `time` is the length averaged over
-    for each start.
+    The mean is over the starts that reached the attractor found most often; by_start (starts, m) and attractors (starts,)
+    hold all of them.  On fixed points and drive-locked periodic orbits the error is the difference of two cycles;
+    elsewhere it comes from the scatter of batch means.  `time` is the length averaged over for each start.
     """
 
     alpha: np.ndarray
@@ -40,114 +46,171 @@ class Exponents:
     stderr: np.ndarray
     time: float
     starts: int
+    by_start: np.ndarray = field(repr=False)
+    attractors: tuple[Attractor, ...] = ()
 
     @property
     def intervals(self) -> tuple[Interval, ...]:
-        """Where the exponent is negative; ends between grid points by linear interpolation."""
-        x, y = self.alpha, self.exponent
-        ends = [float(x[0])] if y[0] < 0 else []
-        for i in np.flatnonzero((y[1:] < 0) != (y[:-1] < 0)):
-            ends.append(float(x[i] - y[i] * (x[i + 1] - x[i]) / (y[i + 1] - y[i])))
+        """Where the exponent is negative (real strengths); ends between grid points by linear interpolation."""
+        return tuple((low, high) for (low, _), (high, _) in self.ranges)
+
+    @property
+    def ranges(self) -> tuple[tuple[Interval, Interval], ...]:
+        """The intervals as ((low, its uncertainty), (high, its uncertainty)): standard error over the slope, 0 at grid
+        ends."""
+        x, y, error = self.alpha, self.exponent, self.stderr
+        if np.iscomplexobj(x):
+            raise ValueError("strengths are complex; ranges need real ones")
+        ends: list[Interval] = [(float(x[0]), 0.0)] if y[0] < 0 else []
+        for i in map(int, np.flatnonzero((y[1:] < 0) != (y[:-1] < 0))):
+            a, b = max(i - 2, 0), min(i + 3, len(x) - 1)
+            slope = abs((y[i + 1] - y[i]) / (x[i + 1] - x[i])) if b - a < 3 else abs(np.polyfit(x[a:b], y[a:b], 1)[0])
+            zero = x[i] - y[i] * (x[i + 1] - x[i]) / (y[i + 1] - y[i])
+            ends.append((float(zero), float(max(error[i], error[i + 1]) / max(slope, 1e-300))))
         if y[-1] < 0:
-            ends.append(float(x[-1]))
+            ends.append((float(x[-1]), 0.0))
         return tuple(zip(ends[::2], ends[1::2], strict=True))
 
 
 def exponents(
     scene: Scene,
-    alpha: Sequence[float] | np.ndarray,
+    alpha: Sequence[float] | Sequence[complex] | np.ndarray,
     *,
-    periods: float = 2000,
+    precision: float = 1e-3,
+    periods: float = 5000,
     transient: float = 300,
     starts: int = 4,
-    block: float = 10,
+    rtol: float = 1e-6,
     workers: int | None = None,
     seed: int = 0,
+    show_progress: bool | None = False,
     **parameters: float,
 ) -> Exponents:
-    """Return the largest transversal exponent of a scene's oscillator and coupling for each alpha.
+    """Return the largest transversal exponent of a scene's oscillator and coupling for each strength, real or complex.
 
-    `periods` (of the drive, or of 2 pi where there is none) are averaged over after `transient`, from `starts` initial
-    states; the first is that of the scene's first oscillator, the others are moved at random by up to 0.4 in the position.
+    Times count periods of the drive, or 2 pi where there is none.  After `transient` the averages run until the standard
+    error of every exponent is below `precision`, or for `periods`.  The `starts` initial states are that of the scene's
+    first oscillator and copies moved at random by up to 0.4 in the first component.  `rtol` is the tolerance of the
+    integration, never looser than what the friction law asks for.
 
-    Raises ValueError for a network without coupling or a coupling without synchronous state; FloatingPointError where an
-    integration fails.
+    Raises ValueError for a network without coupling or a coupling without synchronous state, and for time dependence
+    without a known period; FloatingPointError where an integration fails.
     """
-    scene = scene.replace(axes=(), record=(), **parameters)
-    alpha = np.asarray(alpha, dtype=float)
-    unit = scene.period or 2.0 * math.pi
-    work = _Blocks.prepare(scene, alpha, starts, block * unit, worker_count(workers), seed)
-    for _ in range(round(transient / block)):
-        work.advance()
-    growth = np.array([work.advance() for _ in range(round(periods / block))])
-    return _summary(alpha, growth / (block * unit), starts, periods * unit)
+    scene = _single(scene, rtol, parameters)
+    orbits = Orbits.make(scene, _strengths(alpha), _starts(scene, starts, seed), workers)
+    orbits.settle(transient)
+    attractors = tuple(find_attractor(orbits, row, transient) for row in range(starts))
+    by_start, error, length = _by_start(orbits, attractors, precision, periods, show_progress)
+    chosen = _most_common(attractors)
+    mean, spread = by_start[chosen].mean(axis=0), np.sqrt((error[chosen] ** 2).sum(axis=0)) / len(chosen)
+    return Exponents(orbits.strengths, mean, spread, length, starts, by_start, attractors)
 
 
-@dataclass(slots=True)
-class _Blocks:
-    """Cells (alpha, start) in step with each other, one block of time after the other."""
-
-    kernel: Kernel
-    state: np.ndarray
-    numbers: np.ndarray
-    spans: np.ndarray
-    control: np.ndarray
-    workers: int
-
-    @classmethod
-    def prepare(cls, scene: Scene, alpha: np.ndarray, starts: int, length: float, workers: int, seed: int) -> _Blocks:
-        kernel = load(emit(transversal(scene.equations), scene.integrator, ()))
-        cells = len(alpha) * starts
-        names = kernel.equations.parameters
-        values = {**scene.parameters, "alpha": 0.0}
-        numbers = np.tile([values[name] for name in names], (cells, 1))
-        numbers[:, names.index("alpha")] = np.repeat(alpha, starts)
-        limits = tolerances(scene, np.empty((0, 0)))
-        control = control_array(*limits, 0.5 * (scene.period or math.inf), scene.max_steps)
-        return cls(
-            kernel, _start(scene, cells, starts, seed), numbers, np.tile([0.0, length], (cells, 1)), control, workers
-        )
-
-    def advance(self) -> np.ndarray:
-        """Integrate over one block, scale the deviations back to 1 and return the logarithm of their growth (cells,)."""
-        self.state = _integrate(self)
-        half = self.state.shape[1] // 2
-        length = np.maximum(np.linalg.norm(self.state[:, half:], axis=1), 1e-300)
-        self.state[:, half:] /= length[:, None]
-        return np.log(length)
+def _strengths(alpha: Sequence[float] | Sequence[complex] | np.ndarray) -> np.ndarray:
+    found = np.atleast_1d(np.asarray(alpha))
+    found = found if np.iscomplexobj(found) else found.astype(float)
+    if not np.all(np.isfinite(found)):
+        raise ValueError("alpha: found a number that is not finite; expected finite strengths")
+    return found
 
 
-def _start(scene: Scene, cells: int, starts: int, seed: int) -> np.ndarray:
-    """Rows of orbit and deviation: the first oscillator's state, moved; the deviation along (1, 1, …)."""
-    own = np.array([values[0] for values in scene.initial.values()])
-    moves = np.concatenate([[0.0], np.random.default_rng(seed).uniform(-0.4, 0.4, starts - 1)])
-    state = np.ones((cells, 2 * len(own)))
-    state[:, : len(own)] = own
-    state[:, 0] += np.tile(moves, cells // starts)
-    state[:, len(own) :] /= math.sqrt(len(own))
+def _by_start(
+    orbits: Orbits, attractors: Sequence[Attractor], precision: float, periods: float, show_progress: bool | None
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Exponents and errors (starts, m): by eigenvalues where the motion has them, else by averages; the time they
+    took."""
+    found = np.empty((len(attractors), len(orbits.strengths)))
+    error = np.empty_like(found)
+    rest = [row for row, attractor in enumerate(attractors) if attractor.propagators is None]
+    for row, attractor in enumerate(attractors):
+        if attractor.propagators is not None:
+            found[row], error[row] = attractor.exponents()
+    length = max(attractor.cycle for attractor in attractors)
+    if rest:
+        found[rest], error[rest], length = _average(orbits.part(rest), precision, periods, show_progress)
+    return found, error, length
+
+
+def _single(scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
+    """The scene with fixed parameters and without records; a lone oscillator gets a partner, so that it has a
+    coupling."""
+    graph = scene.topology if scene.topology.links else topology("chain", 2)
+    scene = scene.replace(topology=graph, axes=(), zipped=False, continuation="none", record=())
+    return scene.replace(rtol=rtol, atol=None, **parameters)
+
+
+def _starts(scene: Scene, starts: int, seed: int) -> np.ndarray:
+    """Initial states (starts, components): the first oscillator's, and copies moved in the first component."""
+    if starts < 1:
+        raise ValueError(f"starts = {starts}; expected at least 1")
+    state = np.tile([values[0] for values in scene.initial.values()], (starts, 1))
+    state[1:, 0] += np.random.default_rng(seed).uniform(-0.4, 0.4, starts - 1)
     return state
 
 
-def _integrate(work: _Blocks) -> np.ndarray:
-    """The states of all cells at the end of a block, on threads; FloatingPointError where one fails."""
-    cells, dimension = work.state.shape
-    buffers = Buffers.empty(cells, dimension, room=0, samples=0)
-    cuts = np.linspace(0, cells, work.workers + 1).astype(int)
-    fixed = (work.state, work.numbers, work.spans, work.control, *buffers.arrays())
-    with ThreadPoolExecutor(work.workers) as pool:
-        jobs = [pool.submit(work.kernel.drive, a, b, *fixed) for a, b in itertools.pairwise(cuts) if b > a]
-        for job in jobs:
-            job.result()
-    bad = np.flatnonzero(buffers.counts[:, 0] != Status.FINISHED)
-    if len(bad):
-        raise FloatingPointError(f"a tangent integration failed: {Status(int(buffers.counts[bad[0], 0])).message}")
-    return buffers.end
+def _most_common(attractors: Sequence[Attractor]) -> list[int]:
+    """The starts on the kind of attractor found most often; of two the one found first."""
+    kinds = [found.kind for found in attractors]
+    kind = Counter(kinds).most_common(1)[0][0]
+    return [row for row, other in enumerate(kinds) if other == kind]
 
 
-def _summary(alpha: np.ndarray, rates: np.ndarray, starts: int, length: float) -> Exponents:
-    """Mean and standard error from ten batches in time for each start."""
-    table = rates.reshape(len(rates), len(alpha), starts)
-    batches = np.array([part.mean(axis=0) for part in np.array_split(table, min(10, len(table)))])
-    flat = batches.transpose(1, 0, 2).reshape(len(alpha), -1)
-    error = flat.std(axis=1, ddof=1) / math.sqrt(flat.shape[1]) if flat.shape[1] > 1 else np.full(len(alpha), np.nan)
-    return Exponents(alpha, table.mean(axis=(0, 2)), error, length, starts)
+def _average(
+    orbits: Orbits, precision: float, periods: float, show_progress: bool | None
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Mean growth rates (starts, m), their standard errors and the time averaged over."""
+    orbits.prepare()
+    batches = Batches(orbits.unit * orbits.block)
+    hidden = None if show_progress is None else not show_progress
+    with tqdm(total=math.ceil(periods / orbits.block), unit="block", disable=hidden) as bar:
+        while batches.blocks * orbits.block < periods:
+            batches.add(orbits.advance())
+            bar.update(1)
+            if batches.due and np.all(batches.error() <= precision):
+                break
+    mean, error = batches.mean(), batches.error_by_start()
+    return mean, error, batches.blocks * batches.length
+
+
+@dataclass(slots=True)
+class Batches:
+    """Means over batches of blocks; when BATCHES of them are full they are joined in pairs, so memory does not grow."""
+
+    length: float
+    blocks: int = 0
+    per_batch: int = 1
+    sums: list[np.ndarray] = field(default_factory=list)
+    due: bool = False
+
+    def add(self, growth: np.ndarray) -> None:
+        """Take the growth (starts, m) over one more block."""
+        if self.blocks % self.per_batch == 0:
+            if len(self.sums) == BATCHES:
+                self.sums = [a + b for a, b in zip(self.sums[::2], self.sums[1::2], strict=True)]
+                self.per_batch *= 2
+            self.sums.append(np.zeros_like(growth))
+        self.sums[-1] += growth
+        self.blocks += 1
+        self.due = self.blocks % self.per_batch == 0 and self.blocks >= BATCHES and len(self.sums) % 8 == 0
+
+    def mean(self) -> np.ndarray:
+        """Growth per unit of time (starts, m)."""
+        return np.asarray(np.sum(self.sums, axis=0) / (self.blocks * self.length))
+
+    def error_by_start(self) -> np.ndarray:
+        """Standard errors (starts, m): the largest over batches as they are, joined in twos and in fours."""
+        rates = np.array(self.sums[: self.blocks // self.per_batch]) / (self.per_batch * self.length)
+        found = []
+        for join in (1, 2, 4):
+            count = len(rates) // join
+            if count >= 8 or join == 1:
+                means = rates[: count * join].reshape(count, join, *rates.shape[1:]).mean(axis=1)
+                found.append(
+                    means.std(axis=0, ddof=1) / math.sqrt(count) if count > 1 else np.full(means[0].shape, np.inf)
+                )
+        return np.asarray(np.max(found, axis=0))
+
+    def error(self) -> np.ndarray:
+        """Standard error (m,) of the mean over the starts."""
+        each = self.error_by_start()
+        return np.asarray(np.sqrt((each**2).sum(axis=0)) / len(each))

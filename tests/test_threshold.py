@@ -92,18 +92,8 @@ def test_senseless_criteria_are_refused(bad):
         Criterion(**bad)
 
 
-def test_exponent_of_linear_nodes_is_exact():
-    """x'' = -delta x' - (1 + alpha) x: every mode decays at delta/2 while it is underdamped."""
-    scene = Scene(oscillator="duffing", topology=chain(2), parameters={"beta": 0.0, "delta": 0.2, "u": 0.1})
-    found = exponents(scene, [0.0, 0.5, 2.0], periods=300, transient=20, starts=1, block=10)
-    # the deviation turns on an ellipse of axes 1 and sqrt(1 + alpha): its length says that little about the growth
-    bound = np.log(np.sqrt(1 + found.alpha)) / found.time + 1e-5
-    assert np.all(np.abs(found.exponent + 0.1) < bound)
-    assert found.intervals == ((0.0, 2.0),)
-
-
 def test_exponent_changes_sign_where_the_probe_does():
-    found = exponents(Scene(topology=chain(2)), np.linspace(0.40, 0.54, 8), periods=200, transient=50, starts=1)
+    found = exponents(Scene(topology=chain(2)), np.linspace(0.40, 0.54, 8), starts=1)
     assert found.intervals[0][1] == pytest.approx(0.4653, abs=2e-3)
     assert np.all(np.diff(found.exponent) > 0)
     assert np.all(found.stderr < 2e-3)

@@ -37,6 +37,15 @@ SECTION = False
 TRAJECTORY = False
 """Records of this kernel; what is False costs nothing."""
 
+LANES = 1
+"""Modes in one register of a kernel that carries deviations along an orbit."""
+MODE_SIZE = 2
+"""State variables of one deviation."""
+STRENGTHS = 1
+"""Numbers that differ from mode to mode."""
+SHARED = 3
+"""Length of the array in which a step of the orbit leaves what the modes need."""
+
 
 def step(t: Any, h: Any, y: Any, p: Any, y_new: Any, dense: Any, rtol: Any, atol: Any, *network: Any) -> Any:
     """One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."""
@@ -48,3 +57,7 @@ def step_smooth(t: Any, h: Any, y: Any, p: Any, y_new: Any, dense: Any, rtol: An
 
 def section(theta: Any, t: Any, h: Any, bank: Any, y_new: Any, dense: Any) -> Any:
     """The section function at the fraction theta of the step."""
+
+
+def mode_step(shared: Any, strengths: Any, old: Any, new: Any, which: Any) -> Any:
+    """The orbit's last step, taken by the modes of one register: writes them, returns their error and their size."""

@@ -68,7 +68,8 @@ def _by_exponent(n: int, omega: float, quick: bool) -> tuple[object, ...]:
 def _negative(omega: float, quick: bool) -> tuple[Interval, ...]:
     """Ranges of alpha with a negative exponent; the same for every network."""
     alpha = np.linspace(0.0, 0.7, 36 if quick else 141)
-    return exponents(_chain(2, omega), alpha, periods=300 if quick else 3000, starts=2 if quick else 8).intervals
+    effort = {"periods": 300.0, "starts": 2} if quick else {"periods": 3000.0, "starts": 8, "precision": 1e-4}
+    return exponents(_chain(2, omega), alpha, **effort).intervals  # type: ignore[arg-type]
 
 
 def _widest(found: tuple[Interval, ...] | list[Interval]) -> Interval:

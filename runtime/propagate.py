@@ -1,0 +1,131 @@
+"""Propagators of many modes from few, along one orbit.
+
+The propagator of a mode over a stretch of time is an entire function of its strength, so a short polynomial in the
+strength gives it for all of them.  Strengths are parted into panels, pieces of the real line or squares of the plane.  On
+each panel the propagators of some nodes are integrated and the others interpolated from them (barycentric formula: at
+Chebyshev points, Berrut & Trefethen, SIAM Review 46, 501 (2004); on a circle, Austin, Kravanja & Trefethen, SIAM J.
+Numer. Anal. 52, 1795 (2014)).  Every panel has further strengths that are integrated only to compare.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["Interpolation", "exact", "interpolation"]
+
+Panel = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""Rows of the strengths on the panel, nodes, their barycentric weights, strengths to compare at."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interpolation:
+    """How the propagators of `strengths` (m,) follow from those of `nodes` (k,).
+
+    weights (m, k): propagators = weights @ propagators of the nodes; checked (c,): nodes that only serve to
+    compare, checks (c, k): how they follow from the others.
+    """
+
+    strengths: np.ndarray
+    nodes: np.ndarray
+    weights: np.ndarray
+    checked: np.ndarray
+    checks: np.ndarray
+
+    def apply(self, found: np.ndarray) -> np.ndarray:
+        """Propagators (cells, m, p, p) of all strengths from those of the nodes (cells, k, p, p)."""
+        return found if self.exact else _combine(self.weights, found)
+
+    def error(self, found: np.ndarray) -> float:
+        """The largest difference between integrated and interpolated propagators, relative to their size."""
+        if len(self.checked) == 0:
+            return 0.0
+        own = found[:, self.checked]
+        sizes = np.maximum(np.abs(own).max(axis=(2, 3)), 1e-300)
+        return float((np.abs(_combine(self.checks, found) - own).max(axis=(2, 3)) / sizes).max())
+
+    @property
+    def exact(self) -> bool:
+        """True where every strength is integrated."""
+        return self.nodes is self.strengths
+
+
+def exact(strengths: np.ndarray) -> Interpolation:
+    """Integrate every strength."""
+    nothing = np.zeros((0, len(strengths)))
+    return Interpolation(strengths, strengths, nothing, np.zeros(0, dtype=int), nothing)
+
+
+def interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) -> Interpolation:
+    """Cut the range of strengths into panels, `parts` a side, each with Chebyshev points, or twice as many on a circle.
+
+    The answer is `exact` where that takes as many nodes as there are strengths.
+
+    Raises ValueError where there is no strength.
+    """
+    if len(strengths) == 0:
+        raise ValueError("found no strength of a mode; expected at least one")
+    panels = list((_squares if np.iscomplexobj(strengths) else _pieces)(strengths, parts, nodes))
+    total = sum(len(own) + len(extra) for _, own, _, extra in panels)
+    if total >= len(strengths):
+        return exact(strengths)
+    weights = np.zeros((len(strengths), total), dtype=strengths.dtype)
+    found, checked, checks = [], [], []
+    first = 0
+    for rows, own, signs, extra in panels:
+        last = first + len(own)
+        weights[rows, first:last] = _barycentric(strengths[rows], own, signs)
+        for k, row in enumerate(_barycentric(extra, own, signs)):
+            checks.append(np.zeros(total, dtype=strengths.dtype))
+            checks[-1][first:last] = row
+            checked.append(last + k)
+        found += [own, extra]
+        first = last + len(extra)
+    return Interpolation(strengths, np.concatenate(found), weights, np.array(checked), np.array(checks))
+
+
+def _pieces(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
+    """Equal pieces of the real line with Chebyshev points of the second kind; comparisons lie between the outer
+    points."""
+    edges = np.linspace(strengths.min(), strengths.max(), count + 1)
+    which = np.clip(np.searchsorted(edges, strengths, side="right") - 1, 0, count - 1)
+    unit = np.cos(np.arange(nodes) * math.pi / (nodes - 1))
+    signs = (-1.0) ** np.arange(nodes)
+    signs[[0, -1]] *= 0.5
+    between = (unit[:-1] + unit[1:])[[0, nodes // 2 - 1, -1]] / 2
+    for k in np.unique(which):
+        centre, half = (edges[k] + edges[k + 1]) / 2, (edges[k + 1] - edges[k]) / 2
+        yield np.flatnonzero(which == k), centre + half * unit, signs, centre + half * between
+
+
+def _squares(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
+    """Squares that cover the rectangle around the strengths, each with nodes on the circle through its corners."""
+    low = complex(strengths.real.min(), strengths.imag.min())
+    size = complex(strengths.real.max(), strengths.imag.max()) - low
+    side = max(size.real, size.imag) / count
+    cells = np.stack([(strengths - low).real, (strengths - low).imag]) // (side if side > 0.0 else 1.0)
+    cells = np.minimum(cells, count - 1)
+    unit = np.exp(1j * math.pi * (np.arange(2 * nodes) + 0.5) / nodes)
+    for x, y in np.unique(cells, axis=1).T:
+        centre, half = low + side * complex(x + 0.5, y + 0.5), side / 2
+        rows = np.flatnonzero((cells[0] == x) & (cells[1] == y))
+        yield rows, centre + 1.5 * half * unit, unit, centre + half * np.array([0.0, 1.0 + 1.0j, -1.0 + 1.0j])
+
+
+def _barycentric(x: np.ndarray, nodes: np.ndarray, signs: np.ndarray) -> np.ndarray:
+    """The interpolating polynomial as a matrix (len(x), len(nodes)); exact at the nodes."""
+    gaps = x[:, None] - nodes
+    at = gaps == 0.0
+    terms = signs / np.where(at, 1.0, gaps)
+    terms[at.any(axis=1)] = 0.0
+    terms[at] = 1.0
+    return np.asarray(terms / terms.sum(axis=1, keepdims=True))
+
+
+def _combine(weights: np.ndarray, found: np.ndarray) -> np.ndarray:
+    cells, count, p, _ = found.shape
+    made = weights @ found.transpose(1, 0, 2, 3).reshape(count, -1)
+    return np.asarray(made.reshape(len(weights), cells, p, p).transpose(1, 0, 2, 3))
