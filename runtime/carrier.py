@@ -17,7 +17,7 @@ from synchain.models.tangent import Variation
 
 from .plan import CANCEL, control_array, periods, tolerances
 from .status import Status
-from .sweep import worker_count
+from .threads import worker_count
 
 __all__ = ["Carrier"]
 
@@ -94,7 +94,7 @@ class Carrier:
         Raises FloatingPointError where an orbit cannot be integrated, KeyboardInterrupt on Ctrl-C.
         """
         cells, dimension = self.state.shape
-        spans = np.zeros((cells, 3))
+        spans = np.zeros((cells, 4))
         spans[:, 1], spans[:, 2] = length, self.period
         growth = np.empty((cells, self.strengths.shape[1]))
         end, sums, counts = np.empty((cells, dimension)), np.empty((cells, 4)), np.zeros((cells, 6), dtype=np.int64)

@@ -50,6 +50,11 @@ class Exponents:
     attractors: tuple[Attractor, ...] = ()
 
     @property
+    def averaged(self) -> int:
+        """Number of starts in the mean."""
+        return len(_most_common(self.attractors))
+
+    @property
     def intervals(self) -> tuple[Interval, ...]:
         """Where the exponent is negative (real strengths); ends between grid points by linear interpolation."""
         return tuple((low, high) for (low, _), (high, _) in self.ranges)

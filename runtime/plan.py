@@ -25,8 +25,9 @@ CANCEL = 6
 class Plan:
     """Rows of all cells, in C order over the axes (the last one fastest).
 
-    start (cells, dimension), numbers (cells, parameters) in the order of Equations.parameters, spans (cells, 3): start and
-    end of the window, and the period after which the equations repeat themselves (0: none), in non-dimensional time.
+    start (cells, dimension), numbers (cells, parameters) in the order of Equations.parameters, spans (cells, 4): start and
+    end of the window, the period after which the equations repeat themselves (0: none), in non-dimensional time, and the
+    synchronisation error below which a cell is known to stay synchronous (0: not known).
     """
 
     start: np.ndarray
@@ -38,8 +39,8 @@ class Plan:
             array.flags.writeable = False
 
 
-def plan(scene: Scene) -> Plan:
-    """Lay out the cells of a scene.
+def plan(scene: Scene, near: np.ndarray | None = None) -> Plan:
+    """Lay out the cells of a scene; `near` (cells,) is the last column of the spans (default: 0).
 
     Raises ValueError where a window in drive periods meets a drive of frequency 0, or is too long for double precision.
     """
@@ -56,7 +57,8 @@ def plan(scene: Scene) -> Plan:
             numbers[:, names.index(name)] = values
         else:
             start[:, state.index(name)] = values
-    spans = np.column_stack([_spans(scene, columns), periods(scene.equations, numbers)])
+    last = np.zeros(scene.cells) if near is None else near
+    spans = np.column_stack([_spans(scene, columns), periods(scene.equations, numbers), last])
     return Plan(start, numbers, np.ascontiguousarray(spans))
 
 

@@ -13,6 +13,7 @@ import xarray as xr
 
 from synchain.models.scene import Scene
 
+from .certificate import VERDICTS, Certificate
 from .files import whole_file
 from .status import Status
 
@@ -39,6 +40,9 @@ MEANINGS = {
     "section": "states at the section points, NaN where there are fewer",
     "trajectory": "states at equally spaced times of the window",
     "trajectory_time": "times of the trajectory",
+    "transversal_exponent": "largest transversal exponent of the synchronous state",
+    "transversal_stderr": "standard error of the transversal exponent",
+    "verdict": "; ".join(f"{k} {words}" for k, words in enumerate(VERDICTS)),
 }
 
 
@@ -162,6 +166,7 @@ def gather(
     buffers: Buffers,
     tolerances: tuple[float, float],
     skipped: tuple[str, ...] = (),
+    certificate: Certificate | None = None,
 ) -> Result:
     """Label what the kernel wrote; `skipped` says what was left out of the equations (see `synchain.runtime.skip`)."""
     dims = ("cell",) if scene.zipped else tuple(axis.name for axis in scene.axes)
@@ -178,6 +183,9 @@ def gather(
     if "sync_error" in scene.record:
         for column, name in enumerate(("sync_error", "sync_error_max", "sync_error_end")):
             add(name, buffers.sums[:, column])
+    if certificate is not None:
+        for name, values in _certified(scene, buffers, certificate).items():
+            add(name, values)
     if "section" in scene.record:
         most = max(int(buffers.counts[:, 3].max(initial=0)), 1)
         add("section_count", buffers.counts[:, 3].astype(np.int32))
@@ -190,6 +198,15 @@ def gather(
         add("trajectory", buffers.samples, "sample", "state")
     provenance = {**_provenance(scene, kernel, tolerances), "skipped": "; ".join(skipped) or "nothing"}
     return Result(xr.Dataset(data, _coordinates(scene), provenance), scene)
+
+
+def _certified(scene: Scene, buffers: Buffers, certificate: Certificate) -> dict[str, np.ndarray]:
+    """What a certificate says of each cell."""
+    made = {"transversal_exponent": certificate.exponent, "transversal_stderr": certificate.stderr}
+    if "sync_error" in scene.record:
+        finished = buffers.counts[:, 0] == Status.FINISHED
+        made["verdict"] = certificate.verdicts(finished, buffers.sums[:, 0]).astype(np.int32)
+    return made
 
 
 def _coordinates(scene: Scene) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, fields
@@ -17,10 +16,12 @@ from synchain.codegen.emit import AUTO, KernelSource, emit
 from synchain.codegen.load import Kernel, load
 from synchain.models.scene import Scene
 
+from .certificate import Certificate, certify
 from .plan import CANCEL, Plan, control_array, plan, tolerances
 from .result import Buffers, Result, gather
 from .skip import Skip, decide
 from .status import Status
+from .threads import worker_count
 
 __all__ = ["Buffers", "SweepInterrupted", "kernel", "kernel_source", "run"]
 
@@ -38,7 +39,8 @@ class SweepInterrupted(KeyboardInterrupt):
 def kernel(scene: Scene, width: int | None = None, skip: bool | Skip = False) -> Kernel:
     """Return the compiled kernel of a scene; scenes that differ only in numbers share it.
 
-    With `skip` it is the one that `run` uses, which leaves out what the scene does not need (see `synchain.runtime.skip`).
+    With `skip` it is the one that `run` uses, which leaves out what the scene does not need (see
+    `synchain.runtime.skip`).
     """
     return load(kernel_source(scene, width, skip))
 
@@ -76,15 +78,18 @@ def run(
     show_progress: bool | None = None,
     width: int | None = None,
     skip: bool | Skip = True,
+    certified: bool = False,
     **axes: Any,
 ) -> Result:
     """Run every cell of a scene and return the labelled result.
 
     `axes` set parameters or initial states: a number fixes one, a sequence makes it an axis of the sweep (after those of
     the scene, replacing one of the same name).  `workers` is the number of threads (default: all cores), `width` the
-    number of lanes (default: what the CPU has); neither changes a result.  `resume` is an earlier, unfinished result of the
-    same scene, whose finished cells are kept.  `show_progress` None shows a bar on terminals only.  `skip` leaves out what
-    the scene does not need, exactly (docs/skips.md); False integrates it as it stands, a Skip of this scene is taken as is.
+    number of lanes (default: what the CPU has); neither changes a result.  `resume` is an earlier, unfinished result of
+    the same scene, whose finished cells are kept.  `show_progress` None shows a bar on terminals only.  `skip` leaves out
+    what the scene does not need, exactly (docs/skips.md); False integrates it as it stands, a Skip of this scene is taken
+    as is. `certified` adds the transversal exponent of every cell and a verdict on its synchronisation to the result, and
+    lets cells end that are certain to stay synchronous (see `synchain.runtime.certificate`).
 
     Raises ValueError for an unknown axis, a result or a Skip of another scene, SweepInterrupted on Ctrl-C.
     """
@@ -95,15 +100,16 @@ def run(
     bar = tqdm(total=scene.cells, unit="cell", disable=None if show_progress is None else not show_progress)
     with bar:
         bar.set_description_str("compiling")
-        job = _job(chosen, kernel(scene, width, chosen), workers, resume)
+        certificate = certify(scene, workers=workers) if certified else None
+        job = _job(chosen, kernel(scene, width, chosen), workers, resume, certificate)
         bar.set_description_str("")
         bar.unpause()
         job.advance = bar.update
         try:
             _run_cells(scene, job)
         except KeyboardInterrupt:
-            raise SweepInterrupted(_report(chosen, job)) from None
-    return _report(chosen, job)
+            raise SweepInterrupted(_report(chosen, job, certificate)) from None
+    return _report(chosen, job, certificate)
 
 
 def _run_cells(scene: Scene, job: Job) -> None:
@@ -144,8 +150,8 @@ class Job:
             whole[rows] = piece
 
 
-def _job(chosen: Skip, compiled: Kernel, workers: int, earlier: Result | None) -> Job:
-    scene, whole = chosen.scene, plan(chosen.scene)
+def _job(chosen: Skip, compiled: Kernel, workers: int, earlier: Result | None, certificate: Certificate | None) -> Job:
+    scene, whole = chosen.scene, plan(chosen.scene, None if certificate is None else certificate.near)
     limits, direction = tolerances(scene, whole.numbers), DIRECTIONS[scene.section.direction]
     control = control_array(*limits, _max_step(scene), scene.max_steps, direction, chosen.jumps)
     samples = scene.samples if "trajectory" in scene.record else 0
@@ -157,9 +163,10 @@ def _job(chosen: Skip, compiled: Kernel, workers: int, earlier: Result | None) -
     return Job(compiled, chosen.cells(whole), control, buffers, workers, lambda done: None)
 
 
-def _report(chosen: Skip, job: Job) -> Result:
+def _report(chosen: Skip, job: Job, certificate: Certificate | None) -> Result:
     limits = (float(job.control[0]), float(job.control[1]))
-    return gather(chosen.scene, job.kernel, job.cells, chosen.expand(job.buffers), limits, chosen.skipped)
+    buffers = chosen.expand(job.buffers)
+    return gather(chosen.scene, job.kernel, job.cells, buffers, limits, chosen.skipped, certificate)
 
 
 def with_axes(scene: Scene, axes: dict[str, Any]) -> Scene:
@@ -185,15 +192,6 @@ def with_axes(scene: Scene, axes: dict[str, Any]) -> Scene:
     if axes:
         scene = scene.replace(axes=swept, initial=start, **fixed)
     return scene
-
-
-def worker_count(workers: int | None) -> int:
-    """Number of threads to use; ValueError for less than one."""
-    if workers is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if workers < 1:
-        raise ValueError(f"workers = {workers}; expected at least 1")
-    return workers
 
 
 def _max_step(scene: Scene) -> float:

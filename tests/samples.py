@@ -142,6 +142,7 @@ def drive(
 ) -> Outcome:  # fmt: skip
     """Run cells: rows of start states, of parameters and of (begin, end) of the window."""
     start, spans = np.array(start, float), np.array(spans, float)
+    spans = np.pad(spans, ((0, 0), (0, 4 - spans.shape[1])))
     cells = len(start)
     values = np.array(values, float).reshape(cells, -1)
     control = np.array([rtol, rtol / 10 if atol is None else atol, 1e-4, max_step, max_steps, direction, 0.0])

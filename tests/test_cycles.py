@@ -19,6 +19,7 @@ def integrate(n: int, records: tuple[str, ...], start, spans, jumps: bool, **val
     section = sp.Symbol("v_1", real=True)
     compiled = kernel(eq, "rodas5p", records, section if "section" in records else None, 4)
     start, spans = np.array(start, float), np.array(spans, float)
+    spans = np.pad(spans, ((0, 0), (0, 4 - spans.shape[1])))
     outcome = blank(len(start), 2 * n, 2000 if "section" in records else 0, 0)
     control = control_array(1e-6, 1e-7, np.pi / 1.15, 1e9, -1.0, jumps)
     table = np.tile(numbers(eq, **values), (len(start), 1))

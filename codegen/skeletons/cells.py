@@ -44,8 +44,7 @@ def fill(which, cell, start, numbers, spans, control, bank, samples):
         put(bank, c, which, start[cell, c])
     for c in range(PARAMETERS):
         put(bank, DIMENSION + c, which, numbers[cell, c])
-    period = spans[cell, 2] if spans.shape[1] > 2 and spans[cell, 2] > 0.0 else math.inf
-    put(bank, PERIOD, which, period)
+    put(bank, PERIOD, which, spans[cell, 2] if spans[cell, 2] > 0.0 else math.inf)
     put(bank, STEP, which, control[FIRST_STEP])
     put(bank, CHANGE, which, math.inf)
     put(bank, POWER, which, 1.0)
@@ -88,12 +87,24 @@ def turn_over(which, cell, spans, control, bank):
     """Begin the next period of the drive; jump where the computation is known to repeat itself."""
     put(bank, PERIODS, which, bank[PERIODS * WIDTH + which] + 1.0)
     restart(which, bank)
-    if REPEATS and not (control.shape[0] > NO_JUMPS and control[NO_JUMPS] != 0.0):
+    if REPEATS and control[NO_JUMPS] == 0.0:
         if bank[CYCLE * WIDTH + which] == 0.0:
             compare(which, bank)
         if bank[CYCLE * WIDTH + which] > 0.0:
             jump(which, cell, spans, bank)
     begin(which, cell, spans, bank)
+    if SYNC_ERROR and not SECTION and not TRAJECTORY and bank[SYNC * WIDTH + which] < spans[cell, 3]:
+        settle_down(which, cell, spans, bank)
+
+
+@njit(error_model="numpy")
+def settle_down(which, cell, spans, bank):
+    """End a cell that is known to stay synchronous: its error counts as what it is now for the rest of the window."""
+    error, start, end = bank[SYNC * WIDTH + which], spans[cell, 0], spans[cell, 1]
+    now = bank[BASE * WIDTH + which] + bank[TIME * WIDTH + which]
+    put(bank, SYNC_SUM, which, bank[SYNC_SUM * WIDTH + which] + error * (end - max(start, now)))
+    put(bank, SYNC_PEAK, which, max(error, bank[SYNC_PEAK * WIDTH + which]))
+    put(bank, END, which, -math.inf)
 
 
 @njit(error_model="numpy")
@@ -192,14 +203,13 @@ def finish(which, status, bank, i, spans, end, sums, counts):
     sums[i, MEAN] = bank[SYNC_SUM * WIDTH + which] / length if length > 0.0 else bank[SYNC * WIDTH + which]
     sums[i, PEAK] = bank[SYNC_PEAK * WIDTH + which] if length > 0.0 else bank[SYNC * WIDTH + which]
     sums[i, LAST] = bank[SYNC * WIDTH + which]
-    stopped = bank[BASE * WIDTH + which] + bank[TIME * WIDTH + which]
-    sums[i, STOPPED_AT] = spans[i, 1] if status == FINISHED and spans[i, 1] > 0.0 else stopped
+    stopped, early = bank[BASE * WIDTH + which] + bank[TIME * WIDTH + which], bank[END * WIDTH + which] == -math.inf
+    sums[i, STOPPED_AT] = spans[i, 1] if status == FINISHED and spans[i, 1] > 0.0 and not early else stopped
     counts[i, STATUS] = status
     counts[i, N_ACCEPTED] = int(bank[ACCEPTED * WIDTH + which])
     counts[i, N_REJECTED] = int(bank[REJECTED * WIDTH + which])
-    if counts.shape[1] > N_SMOOTH:
-        counts[i, N_SKIPPED] = int(bank[SKIPPED * WIDTH + which])
-        counts[i, N_SMOOTH] = int(bank[SMOOTH_STEPS * WIDTH + which])
+    counts[i, N_SKIPPED] = int(bank[SKIPPED * WIDTH + which])
+    counts[i, N_SMOOTH] = int(bank[SMOOTH_STEPS * WIDTH + which])
 
 
 @njit(error_model="numpy")

@@ -149,10 +149,11 @@ def aligned(count):
 def drive(first, last, start, numbers, spans, control, end, sums, counts, points, samples, graph, weights):
     """Run the cells first … last-1.
 
-    start (cells, DIMENSION), numbers (cells, PARAMETERS), spans (cells, 2 or 3): start and end of the window, and the period
-    after which the right-hand side repeats (0: none); control: see the column names above.  Filled: end (cells, DIMENSION),
-    sums (cells, 4), counts (cells, 4 or 6), points (cells, room, DIMENSION + 1), samples (cells, samples, DIMENSION).  graph
-    and weights: the links and the elimination program of a network that is stepped through in loops (codegen/sparse.py).
+    start (cells, DIMENSION), numbers (cells, PARAMETERS), spans (cells, 4): start and end of the window, the period after
+    which the right-hand side repeats (0: none), and the synchronisation error below which a cell that records nothing
+    else may end early (0: never); control: see the column names above.  Filled: end (cells, DIMENSION), sums (cells, 4),
+    counts (cells, 6), points (cells, room, DIMENSION + 1), samples (cells, samples, DIMENSION).  graph and weights: the
+    links and the elimination program of a network that is stepped through in loops (codegen/sparse.py).
     """
     y_new, middle, bank = aligned(DIMENSION * WIDTH), aligned(DIMENSION * WIDTH), aligned(SLOTS * WIDTH)
     dense, cell = aligned((DENSE_ROWS * DIMENSION + WORKSPACE) * WIDTH), np.full(WIDTH, -1)
@@ -179,8 +180,8 @@ def drive(first, last, start, numbers, spans, control, end, sums, counts, points
             )
         if look != 0:
             queue = settle(
-                mode, look, flips, queue, last, bank, cell, away_bank, away_cell, lot_bank, lot_cell, start, numbers, spans,
-                control, end, sums, counts, samples,
+                mode, look, flips, queue, last, bank, cell, away_bank, away_cell, lot_bank, lot_cell, start, numbers,
+                spans, control, end, sums, counts, samples,
             )  # fmt: skip
             full, other, flips = occupied(cell), occupied(away_cell), 0
             waits = occupied(lot_cell) > 0 or (queue < last and control[CANCEL] == 0.0)

@@ -34,7 +34,9 @@ def prepare(case: Case, integrator: str, width: int) -> Integrate:
 
     def solve(rtol: float, atol: float, ends: np.ndarray) -> Ends:
         cells = len(ends)
-        spans = np.ascontiguousarray(np.stack([np.zeros(cells), ends, np.full(cells, case.period)], axis=1))
+        spans = np.ascontiguousarray(
+            np.stack([np.zeros(cells), ends, np.full(cells, case.period), np.zeros(cells)], axis=1)
+        )
         control = control_array(rtol, atol, 0.5 * case.period, 1e12, jumps=False)
         buffers = Buffers.empty(cells, len(y0), room=0, samples=0)
         compiled.drive(0, cells, np.tile(y0, (cells, 1)), np.tile(one, (cells, 1)), spans, control, *buffers.arrays())

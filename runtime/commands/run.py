@@ -35,7 +35,7 @@ def configure(parser: ArgumentParser) -> None:
     """Add scene, folder and changes to the scene."""
     parser.usage = (
         "synchain run SCENE --out DIR [--rtol X] [--workers N] [--set NAME=VALUE ...] [--resume]\n"
-        "                    [--no-skip] [--explain]\n"
+        "                    [--certify] [--no-skip] [--explain]\n"
         "       synchain run SCENE --explain [--rtol X] [--set NAME=VALUE ...] [--no-skip]"
     )
     add_scene(parser)
@@ -59,11 +59,17 @@ def configure(parser: ArgumentParser) -> None:
         "--explain", action="store_true", help="print what is left out of the scene and why; runs only with --out"
     )
     parser.add_argument("--no-skip", action="store_true", help="leave nothing out: integrate the scene as it stands")
+    parser.add_argument(
+        "--certify",
+        action="store_true",
+        help="add each cell's transversal exponent and a verdict; cells sure to stay synchronous end early",
+    )
     add_workers(parser)
 
 
 def execute(arguments: Namespace) -> int:
     """Explain the scene where asked to; run it, save, draw, and say how the cells ended."""
+    from ..certificate import check_certifiable
     from ..skip import decide, explain
     from ..sweep import SweepInterrupted, run
 
@@ -80,10 +86,12 @@ def execute(arguments: Namespace) -> int:
         target = Path(arguments.out, f"{name}.nc")
         earlier = _earlier(skip, target) if arguments.resume else None
         _prepare(skip, target)
+        if arguments.certify:
+            check_certifiable(scene)
     warn(scene.warnings)
     began = time.perf_counter()
     try:
-        result = run(scene, workers=arguments.workers, resume=earlier, skip=skip)
+        result = run(scene, workers=arguments.workers, resume=earlier, skip=skip, certified=arguments.certify)
     except SweepInterrupted as stop:
         raise _partial(stop.result, target, arguments) from None
     result.save(target)
@@ -210,6 +218,7 @@ def _summary(name: str, result: Result, seconds: float, files: tuple[Path, ...])
     """Say how many cells ended how, failures on stderr, and where the files are."""
     import numpy as np
 
+    from ..certificate import VERDICTS
     from ..status import Status
 
     scene = result.scene
@@ -222,6 +231,9 @@ def _summary(name: str, result: Result, seconds: float, files: tuple[Path, ...])
             print(f"  {words}")
         else:
             print(f"synchain run: {words}", file=sys.stderr)
+    if "verdict" in result.data:
+        for code, count in zip(*np.unique(result.data.verdict.values, return_counts=True), strict=True):
+            print(f"  {_count(int(count), 'cell')} {VERDICTS[code]}")
     for file in files:
         print(f"  {file}")
 
