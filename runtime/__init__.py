@@ -1,21 +1,32 @@
-"""Running scenes: sweeps, thresholds, figures, benchmarks and the command line."""
+"""Running scenes: sweeps, thresholds, exponents, figures, benchmarks and the command line."""
 
 from __future__ import annotations
 
 import importlib
+import sys
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .basin import Basin, basin
+    from .exponent import Exponents, exponents
+    from .msf import MSF, Plane, msf, plane
+    from .probe import Probe, universal_probe
     from .result import Result, open_result
     from .status import Status
     from .sweep import SweepInterrupted, kernel, run
     from .threshold import Thresholds, thresholds
 
-__all__ = ["Result", "Status", "SweepInterrupted", "Thresholds", "kernel", "open_result", "run", "thresholds"]
+__all__ = [
+    "MSF", "Basin", "Exponents", "Plane", "Probe", "Result", "Status", "SweepInterrupted", "Thresholds", "basin",
+    "exponents", "kernel", "msf", "open_result", "plane", "run", "thresholds", "universal_probe",
+]  # fmt: skip
 
 _HOME = {
-    "Result": "result", "open_result": "result", "SweepInterrupted": "sweep", "kernel": "sweep", "run": "sweep",
-    "Status": "status", "Thresholds": "threshold", "thresholds": "threshold",
+    "Basin": "basin", "basin": "basin", "Exponents": "exponent", "exponents": "exponent", "MSF": "msf", "Plane": "msf",
+    "msf": "msf", "plane": "msf", "Probe": "probe", "universal_probe": "probe", "Result": "result", "open_result": "result",
+    "SweepInterrupted": "sweep", "kernel": "sweep", "run": "sweep", "Status": "status",
+    "Thresholds": "threshold", "thresholds": "threshold",
 }  # fmt: skip
 
 
@@ -28,3 +39,15 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted(__all__)
+
+
+class _Package(ModuleType):
+    """A package in which a public function goes before the module of the same name that it lives in."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if isinstance(value, ModuleType) and _HOME.get(name) == name:  # the import system has just loaded it
+            value = getattr(value, name)
+        super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

@@ -12,7 +12,10 @@ import pytest
 import xarray as xr
 
 from synchain.models import Scene
-from synchain.runtime.figures import load, make, study, style
+from synchain.runtime.attractor import Attractor
+from synchain.runtime.exponent import Exponents
+from synchain.runtime.figures import exponent, load, make, plane, study, style, synchronisability_map
+from synchain.runtime.msf import MSF, Plane
 from synchain.runtime.result import Result
 from synchain.runtime.status import Status
 from synchain.runtime.threshold import Criterion, Sweep, project
@@ -56,12 +59,16 @@ class Simulation:
         self.runs: list[Scene] = []
         self.probes: list[tuple[float, int]] = []
         self.networks: list[tuple[int, float, int]] = []
+        self.functions: list[tuple[str, float, int]] = []
         self.failed: tuple[int, ...] = ()
 
     def install(self, monkeypatch: pytest.MonkeyPatch) -> Simulation:
         """Stand in for a study's runs and sweeps, and make both qualities tiny."""
         for name in ("run", "probe", "simulate"):
             monkeypatch.setattr(study, name, getattr(self, name))
+        monkeypatch.setattr(exponent, "msf", self.msf)
+        monkeypatch.setattr(plane, "plane", self.plane)
+        monkeypatch.setattr(synchronisability_map, "exponents", self.exponents)
         monkeypatch.setattr(make, "QUICK", TINY)
         monkeypatch.setattr(make, "FULL", TINY)
         return self
@@ -85,6 +92,31 @@ class Simulation:
         error = np.where(good, 0.0, 0.3)
         error[list(self.failed)] = np.inf
         return Sweep(sigma, error, good.astype(float), tuple(found))
+
+    def exponents(self, scene: Scene, alpha: np.ndarray, omega: float | None = None, **options: Any) -> Exponents:
+        omega = scene.parameters["omega"] if omega is None else omega
+        self.functions.append(("exponents", omega, len(alpha)))
+        return parabola(omega, alpha)
+
+    def msf(self, scene: Scene, alpha: np.ndarray, **options: Any) -> MSF:
+        omega = scene.parameters["omega"]
+        self.functions.append(("msf", omega, len(alpha)))
+        return MSF(scene, alpha, parabola(omega, np.union1d(alpha, np.linspace(alpha[0], alpha[-1], 101))))
+
+    def plane(self, scene: Scene, alpha: np.ndarray, beta: np.ndarray, **options: Any) -> Plane:
+        omega = scene.parameters["omega"]
+        self.functions.append(("plane", omega, len(alpha) * len(beta)))
+        table = parabola(omega, alpha).exponent[:, None] + beta**2
+        return Plane(scene, alpha, beta, table, np.full(table.shape, 1e-3), ("aperiodic",), 500.0)
+
+
+def parabola(omega: float, alpha: np.ndarray) -> Exponents:
+    """Exponents that vanish at the ends of RANGE, those of 1.4 where omega has none, with an error of 0.001."""
+    low, high = RANGE.get(omega, RANGE[1.4])
+    value = (alpha - low) * (alpha - high)
+    return Exponents(
+        alpha, value, np.full(len(alpha), 1e-3), 500.0, 1, value[None], (Attractor("aperiodic", 0.0),)
+    )  # fmt: skip
 
 
 def drawn(name: str, runs: study.Study) -> tuple[Any, Any]:

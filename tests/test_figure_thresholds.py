@@ -36,6 +36,10 @@ def test_projection_shows_probe_lines_and_network(simulation: Simulation, tmp_pa
     assert network.get_xlim() == lines.get_xlim()
     for axes in (probe, lines):
         assert any(patch.get_y() == pytest.approx(0.09) for patch in axes.patches)
+    (own,) = (axes for axes in probe.figure.axes if axes not in (probe, lines, network))
+    (ends,) = (line for line in own.lines if line.get_marker() == "o")
+    np.testing.assert_allclose(ends.get_ydata(), (0.09, 0.6), atol=1e-4)
+    assert own.get_ylim() == probe.get_ylim()
     for axes in (lines, network):
         assert any(patch.get_x() == pytest.approx(data.predicted[0][0]) for patch in axes.patches)
 
@@ -44,11 +48,12 @@ def test_projection_writes_curves_and_ranges(simulation: Simulation, tmp_path: P
     simulation.failed = (3,)
     make(["figure_6"], tmp_path)
     found = rows(tmp_path / "figure_6.csv")
-    assert list(found[0]) == ["curve", "alpha", "sigma", "e_avg", "share", "status"]
-    assert [row["curve"] for row in found] == ["probe"] * 13 + ["network"] * 13
+    assert list(found[0]) == ["curve", "alpha", "sigma", "e_avg", "share", "status", "exponent", "stderr"]
+    assert [row["curve"] for row in found] == ["probe"] * 13 + ["network"] * 13 + ["exponent"] * 9
+    assert float(found[-1]["exponent"]) == pytest.approx((1.2 - 0.176) * (1.2 - 0.594))
     assert [k for k, row in enumerate(found) if row["status"] != "finished"] == [13 + 3]
     ranges = rows(tmp_path / "figure_6_ranges.csv")
-    assert [row["range"] for row in ranges] == ["probe", "predicted", "measured", "published"]
+    assert [row["range"] for row in ranges] == ["probe", "exponent", "predicted", "measured", "published"]
     assert (ranges[-1]["low"], ranges[-1]["high"]) == ("0.176", "0.196")
     (_, lines, network), _ = drawn("figure_6", Study(TINY))
     assert "1 of 26 cells failed and are left out" in words(lines)

@@ -22,7 +22,7 @@ from synchain.runtime.figures.tables import Table, as_csv
 from synchain.runtime.status import Status
 
 PAPER = ("figure_1b", "figure_3", "figure_4a", "figure_4b", "figure_4c", "figure_4d", "figure_4e", "figure_4f", "figure_5",
-         "figure_6", "figure_7", "figure_8", "thresholds")  # fmt: skip
+         "figure_6", "figure_7", "figure_8", "msf", "msf_plane", "synchronisability_map", "thresholds")  # fmt: skip
 
 
 @pytest.fixture
@@ -76,7 +76,8 @@ def test_a_folder_that_cannot_be_made_is_an_error_before_anything_is_done(
 def test_a_figure_is_written_as_png_svg_and_csv(name: str, tmp_path: Path, simulation: Simulation) -> None:
     written = make([name], tmp_path / "out", quick=True)
     assert set(written) == set((tmp_path / "out").iterdir())
-    more = {"thresholds": {"thresholds.md"}, **{n: {f"{n}_ranges.csv"} for n in projection.NAMES}}
+    more = {"thresholds": {"thresholds.md"}}
+    more.update({n: {f"{n}_ranges.csv"} for n in (*projection.NAMES, "msf", "msf_plane")})
     assert {path.name for path in written} == {f"{name}.{kind}" for kind in ("png", "svg", "csv")} | more.get(
         name, set()
     )
@@ -98,7 +99,7 @@ def test_all_figures_are_made_without_names(
     assert make(None, tmp_path) == make([], tmp_path) == [tmp_path / name for name in PAPER]
 
 
-@pytest.mark.parametrize("name", ["figure_1b", "figure_4a", "figure_4d", "figure_8", "thresholds"])
+@pytest.mark.parametrize("name", ["figure_1b", "figure_4a", "figure_4d", "figure_8", "msf", "thresholds"])
 def test_files_depend_on_the_numbers_alone(name: str, tmp_path: Path, simulation: Simulation) -> None:
     first = make([name], tmp_path / "a")
     with mpl.rc_context(
@@ -171,6 +172,7 @@ def test_figures_share_their_runs(simulation: Simulation) -> None:
         load(name).compute(study)
     assert len(simulation.runs) == 4  # figure 3 and three frequencies of figure 4
     assert sorted(omega for omega, _ in simulation.probes) == [1.15, 1.4, 1.55]
+    assert sorted(omega for kind, omega, _ in simulation.functions if kind == "msf") == [1.15, 1.4, 1.55]
     assert sorted(set(simulation.networks)) == sorted(simulation.networks)
     assert {(n, omega) for n, omega, _ in simulation.networks} == {
         (3, 1.15), (3, 1.55), (4, 1.15), (4, 1.4), (5, 1.4), (5, 1.55)

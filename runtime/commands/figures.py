@@ -1,4 +1,4 @@
-"""`synchain figures`: every figure and threshold of the paper."""
+"""`synchain figures`: every figure and threshold of the paper, and the master stability function beside them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from argparse import ArgumentParser, Namespace
 from ._arguments import add_workers, folder
 from ._outcome import FINE, wrong_use
 
-SUMMARY = "make the paper's figures and the table of thresholds"
-EXAMPLES = ("synchain figures --out figures", "synchain figures 4b 5 --quick")
+SUMMARY = "make the paper's figures, those of the exponents, and the table of thresholds"
+EXAMPLES = ("synchain figures --out figures", "synchain figures 4b 5 --quick", "synchain figures msf msf_plane --quick")
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -17,7 +17,7 @@ def configure(parser: ArgumentParser) -> None:
         "names",
         metavar="NAME",
         nargs="*",
-        help="what to make, e.g. figure_4b, in short 4b, or thresholds (default: all)",
+        help="what to make, e.g. figure_4b, in short 4b, msf or thresholds (default: all)",
     )
     parser.add_argument(
         "--out", metavar="DIR", type=folder, default="figures", help="folder for the files (default: figures)"

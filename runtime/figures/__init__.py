@@ -1,4 +1,4 @@
-"""The figures of the paper, one file for each kind.
+"""The figures of the paper and of the exponents behind them, one file for each kind.
 
 A figure is a module of this folder with
 

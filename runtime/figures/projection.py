@@ -1,6 +1,7 @@
 """Figures 5-8: the two-oscillator probe, projected through the eigenvalues of a network onto its own error curve.
 
-Top left the probe e_II(alpha), drawn vertically; top right the lines alpha = sigma |gamma_k|; below the network's error.
+Top left the probe e_II(alpha), drawn vertically, and the exponent of a mode with an axis of its own, whose changes of sign
+are marked; top right the lines alpha = sigma |gamma_k|; below the network's error.
 Grey bands carry the probe's synchronous ranges to the lines; where all lines are inside, a darker band drops from there:
 the predicted range of sigma.
 """
@@ -20,7 +21,9 @@ from synchain.models.scene import Scene
 from synchain.models.scene_file import load_scene
 
 from ..intervals import Interval, intersect, scale
+from ..msf import MSF
 from ..threshold import Sweep
+from .exponent import curve, finite
 from .published import published
 from .study import Study
 from .style import BLACK, BLUE, COLUMN, GREEN, GREY, ORANGE, PURPLE, bands, bracket, failures, note
@@ -29,46 +32,52 @@ from .tables import Table
 __all__ = ["NAMES", "SIZE", "compute", "draw", "layout", "ranges", "table"]
 
 NAMES = ("figure_5", "figure_6", "figure_7", "figure_8")
-SIZE = (COLUMN, 3.8)
+SIZE = (COLUMN, 4.0)
 LINES = ((BLUE, "-"), (PURPLE, "--"), (GREEN, "-."), (BLACK, ":"))
 DARK = "#bdbdbd"
 
 
 @dataclass(frozen=True, slots=True)
 class Projection:
-    """Probe in alpha, network in sigma, the ranges predicted from the one and published for the other."""
+    """Probe and exponent in alpha, network in sigma, the ranges predicted from the probe and published for the network."""
 
     scene: Scene
     probe: Sweep
     network: Sweep
     predicted: tuple[Interval, ...]
     published: tuple[Interval, ...]
+    exponent: MSF
 
 
 def compute(name: str, study: Study) -> Projection:
-    """Sweep the probe and the network of a figure's scene."""
+    """Sweep the probe and the network of a figure's scene, and take the exponent from its tangent equations."""
     scene = load_scene(name)
     row = published(scene.n, scene.parameters["omega"])
     return Projection(
-        scene, study.pair(scene), study.network(scene), tuple(study.predicted(scene)), row.intervals if row else ()
-    )
+        scene, study.pair(scene), study.network(scene), tuple(study.predicted(scene)), row.intervals if row else (),
+        curve(scene, study),
+    )  # fmt: skip
 
 
 def table(data: Projection) -> Table:
-    """Both curves: error (median over the starts), share of the starts that synchronised, and how the starts ended."""
+    """Errors (median over the starts), share of the starts that synchronised, how they ended; exponents and their errors."""
     rows: list[tuple[Any, ...]] = []
-    for curve, sweep in (("probe", data.probe), ("network", data.network)):
+    for what, sweep in (("probe", data.probe), ("network", data.network)):
         for x, error, share in zip(sweep.x, sweep.error, sweep.share, strict=True):
-            place = (x, None) if curve == "probe" else (None, x)
-            rows.append((curve, *place, error, share, "finished" if np.isfinite(error) else "failed"))
-    return Table(("curve", "alpha", "sigma", "e_avg", "share", "status"), tuple(rows))
+            place = (x, None) if what == "probe" else (None, x)
+            rows.append((what, *place, error, share, "finished" if np.isfinite(error) else "failed", None, None))
+    found = data.exponent
+    for x, value, error in zip(found.alpha, found.exponent, found.stderr, strict=True):
+        rows.append(("exponent", x, None, None, None, "finished", value, error))
+    return Table(("curve", "alpha", "sigma", "e_avg", "share", "status", "exponent", "stderr"), tuple(rows))
 
 
 def ranges(data: Projection) -> Table:
-    """Synchronous ranges: of the probe in alpha; predicted, measured and published in sigma."""
+    """Ranges: synchronous by the probe and stable by the exponent in alpha; predicted, measured and published in sigma."""
     groups = (
-        ("probe", "alpha", data.probe.intervals), ("predicted", "sigma", data.predicted),
-        ("measured", "sigma", data.network.intervals), ("published", "sigma", data.published),
+        ("probe", "alpha", data.probe.intervals), ("exponent", "alpha", data.exponent.intervals),
+        ("predicted", "sigma", data.predicted), ("measured", "sigma", data.network.intervals),
+        ("published", "sigma", data.published),
     )  # fmt: skip
     rows = [(what, variable, low, high) for what, variable, found in groups for low, high in found]
     return Table(("range", "variable", "low", "high"), tuple(rows))
@@ -88,6 +97,7 @@ def draw(axes: tuple[Any, Any, Any], data: Projection) -> tuple[Any, Any, Any]:
     """Draw probe, lines and network into the three axes of `layout`."""
     probe, rays, network = axes
     _draw_probe(probe, data)
+    _draw_exponent(probe, data)
     _draw_rays(rays, data)
     _draw_network(network, data)
     _explain(probe, data)
@@ -106,6 +116,26 @@ def _draw_probe(axes: Any, data: Projection) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(2))
     axes.xaxis.set_label_position("top")
     axes.tick_params(axis="x", labeltop=True, labelbottom=False)
+
+
+def _draw_exponent(axes: Any, data: Projection) -> None:
+    """The exponent against its own axis below the panel, with a dot where it changes its sign."""
+    found, value = data.exponent, finite(data.exponent.exponent)
+    own = axes.twiny()
+    axes.xaxis.tick_top()
+    own.axvline(0.0, color=BLUE, linewidth=0.5, linestyle=":")
+    own.plot(value, found.alpha, color=BLUE, linewidth=0.7)
+    ends = [end for interval in found.intervals for end in interval if found.alpha[0] < end < found.alpha[-1]]
+    own.plot([0.0] * len(ends), ends, linestyle="none", marker="o", markersize=2.6, color=BLUE, markerfacecolor="white",
+             markeredgewidth=0.8)  # fmt: skip
+    low, high = float(np.nanmin(value, initial=0.0)), float(np.nanmax(value, initial=0.0))
+    room = 0.08 * (high - low) or 1.0
+    own.set_xlim(high + room, low - room)
+    own.xaxis.set_label_position("bottom")
+    own.xaxis.tick_bottom()
+    own.set_xticks([0.0, *([float(f"{0.65 * low:.0e}")] if low < 0.0 else [])])
+    own.set_xlabel(r"$\Lambda$", labelpad=1, color=BLUE)
+    own.tick_params(axis="x", colors=BLUE, labelsize=6.5)
 
 
 def _draw_rays(axes: Any, data: Projection) -> None:
@@ -147,7 +177,7 @@ def _explain(axes: Any, data: Projection) -> None:
     grey = [Patch(color=GREY, label="probe"), Patch(color=DARK, label="predicted")]
     title = f"$n={data.scene.n}$\n$\\omega={data.scene.parameters['omega']:.2f}$\nsynchronous:"
     legend = axes.legend(handles=[*grey, *bars], title=title, fontsize=6.5, title_fontsize=7, handlelength=1.3, borderpad=0,
-                         loc="upper left", bbox_to_anchor=(-0.45, -0.08), labelspacing=0.5, alignment="left")  # fmt: skip
+                         loc="upper left", bbox_to_anchor=(-0.45, -0.22), labelspacing=0.5, alignment="left")  # fmt: skip
     legend.set_in_layout(False)
 
 

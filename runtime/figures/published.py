@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from ..intervals import Interval
 
-__all__ = ["NOT_PERIODIC", "PUBLISHED", "Published", "published"]
+__all__ = ["NOT_PERIODIC", "PAIRS", "PUBLISHED", "Published", "published"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +39,9 @@ PUBLISHED = (
     Published(4, 1.15, ((0.0, 0.136),), "all three modes inside"),
     Published(4, 1.40, ((0.153, 0.177),), "narrow window"),
 )
+
+PAIRS = (1.15, 1.40, 1.55)
+"""Frequencies at which the paper measures two oscillators."""
 
 NOT_PERIODIC = (1.40, 1.55)
 """Frequencies for which the paper finds no synchronisation of five and more oscillators."""

@@ -1,0 +1,164 @@
+"""`synchain msf`: exponents of the modes of a network against their strength, and what they say about the network."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ._arguments import above_zero, add_workers, folder, positive, spaced, whole
+from ._outcome import FINE, Failed, WrongUse, print_json, sentence, warn, wrong_use
+
+if TYPE_CHECKING:
+    from synchain.models.scene import Scene
+    from synchain.models.topology import Topology
+
+    from ._line_report import LineReport
+    from ._plane_report import PlaneReport
+
+SUMMARY = "compute the exponents of a network's modes from tangent equations, and where the network synchronises"
+EXAMPLES = (
+    "synchain msf figure_8",
+    "synchain msf --omega 1.4 --topology star --n 5 --json",
+    "synchain msf --omega 1.4 --matrix G.txt --alpha 0:1.2:81 --beta 0:0.6:41 --out results",
+)
+
+POINTS = 1_000_000
+"""Most strengths of one plane."""
+
+
+def configure(parser: ArgumentParser) -> None:
+    """Add oscillator, network, strengths and effort."""
+    parser.add_argument(
+        "scene",
+        metavar="SCENE",
+        nargs="?",
+        help="a shipped name (see: synchain scenes) or a path to a .toml file (default: the oscillator of table 1)",
+    )
+    parser.add_argument(
+        "--alpha", metavar="LO:HI:N", type=spaced, help="strengths, -sigma times an eigenvalue (default: 0:1.2:241)"
+    )
+    parser.add_argument("--beta", metavar="LO:HI:N", type=spaced, help="imaginary parts: look at complex strengths")
+    parser.add_argument("--omega", metavar="W", type=above_zero, help="frequency of the drive (default: the scene's)")
+    parser.add_argument(
+        "--precision", metavar="P", type=above_zero, help="standard error to be reached (default: 0.001)"
+    )
+    parser.add_argument(
+        "--periods", metavar="T", type=above_zero, help="drive periods (else units of 2 pi) at most (default: 5000)"
+    )
+    parser.add_argument("--starts", metavar="K", type=positive, help="initial states (default: 4)")
+    parser.add_argument("--topology", metavar="NAME", help="network: a family of graphs (default: the scene's)")
+    parser.add_argument("--n", metavar="N", type=whole, help="network: number of oscillators")
+    parser.add_argument("--matrix", metavar="FILE", help="network: connectivity matrix in a text file")
+    parser.add_argument("--json", action="store_true", help="print JSON: alpha, exponent, stderr, intervals, class ...")
+    parser.add_argument("--out", metavar="DIR", type=folder, help="write a figure (PNG) and the numbers (CSV) there")
+    add_workers(parser)
+
+
+def execute(arguments: Namespace) -> int:
+    """Compute the function on a line or over a plane; print what it says, and write files where asked to."""
+    import numpy as np
+
+    from ..files import output_folder
+    from ..msf import msf, plane
+    from ._line_report import LineReport, complex_modes
+    from ._plane_report import PlaneReport
+
+    with wrong_use():
+        scene, network = _scene(arguments)
+        _check(scene, network, arguments)
+        target = None if arguments.out is None else output_folder(arguments.out)
+    warn(scene.warnings)
+    alpha = np.linspace(0.0, 1.2, 241) if arguments.alpha is None else np.array(arguments.alpha)
+    options: dict[str, Any] = {"workers": arguments.workers, "show_progress": None}
+    effort = {name: getattr(arguments, name) for name in ("precision", "periods", "starts")}
+    options.update({name: value for name, value in effort.items() if value is not None})
+    report: LineReport | PlaneReport
+    try:
+        if arguments.beta is None:
+            if network:
+                warn(complex_modes(scene.topology, float(alpha[-1])))
+            report = LineReport(msf(scene, alpha, **options), network)
+        else:
+            report = PlaneReport(plane(scene, alpha, np.array(arguments.beta), **options), network)
+    except FloatingPointError as problem:
+        raise Failed(sentence(problem)) from problem
+    _tell(report, arguments.json, [] if target is None else report.write(target))
+    return FINE
+
+
+def _tell(report: LineReport | PlaneReport, json: bool, files: list[Path]) -> None:
+    """Print the report and the files' names, as text or as one JSON value."""
+    if json:
+        print_json({**report.as_dict(), **({"files": [str(file) for file in files]} if files else {})})
+        return
+    print(report.text())
+    for file in files:
+        print(f"  {file}")
+
+
+def _scene(arguments: Namespace) -> tuple[Scene, bool]:
+    """The oscillator with its network, and whether it has one; ValueError where it cannot be."""
+    from synchain.models.scene import Scene
+    from synchain.models.scene_file import load_scene
+    from synchain.models.topology import topology
+
+    scene = None if arguments.scene is None else load_scene(arguments.scene)
+    graph = _graph(arguments, scene)
+    if scene is None:
+        if arguments.omega is None:
+            raise WrongUse("expected a frequency of the drive, e.g. --omega 1.4, or a SCENE")
+        scene = Scene(topology=graph or topology("chain", 2))
+    elif graph is not None and graph != scene.topology:
+        scene = scene.replace(topology=graph, axes=(), zipped=False, continuation="none", record=None)
+    changes: dict[str, Any] = {"axes": (), "zipped": False, "continuation": "none", "record": None}
+    if arguments.omega is not None:
+        if "omega" not in scene.parameters:
+            raise WrongUse(f"--omega: the oscillators of {arguments.scene} are not driven; leave it out")
+        changes["omega"] = arguments.omega
+    elif any(axis.name == "omega" for axis in scene.axes):
+        raise WrongUse(f"{arguments.scene} sweeps omega; expected one frequency of the drive, e.g. --omega 1.4")
+    return scene.replace(**changes), graph is not None
+
+
+def _graph(arguments: Namespace, scene: Scene | None) -> Topology | None:
+    """The network by file, by name and size, or the scene's; None where there is none."""
+    from synchain.models.topology import names, read_matrix, topology
+
+    if arguments.matrix is not None:
+        if arguments.n is not None or arguments.topology is not None:
+            raise WrongUse("found --matrix beside --n or --topology; expected the matrix alone")
+        graph = read_matrix(arguments.matrix)
+    elif arguments.n is None and arguments.topology is None:
+        return scene.topology if scene is not None and scene.topology.links else None
+    else:
+        known = scene is not None and scene.topology.name in names()
+        name = arguments.topology or (scene.topology.name if scene is not None and known else "chain")
+        size = arguments.n if arguments.n is not None else scene.n if scene is not None else None
+        if size is None:
+            raise WrongUse(f"--topology {name}: expected its number of oscillators too, e.g. --n 5")
+        graph = topology(name, size)
+    if not graph.links:
+        raise WrongUse(f"{graph.name}({graph.n}) has no links; expected a network of at least two coupled oscillators")
+    return graph
+
+
+def _check(scene: Scene, network: bool, arguments: Namespace) -> None:
+    """Raise ValueError for what cannot be computed, before anything is."""
+    import numpy as np
+
+    from synchain.models.topology import topology
+
+    from ..orbits import Orbits
+    from ..synchronisability import windows
+    from ._line_report import complex_modes
+
+    if scene.coupling is None:
+        raise WrongUse("the scene has no coupling, by which modes differ; expected one, e.g. coupling = 'spring'")
+    one = scene if scene.topology.links else scene.replace(topology=topology("chain", 2))
+    strength = np.zeros(1, dtype=float if arguments.beta is None else complex)
+    Orbits.make(one, strength, np.zeros((1, len(one.components))), None)
+    if len(arguments.alpha or [0] * 241) * len(arguments.beta or [0]) > POINTS:
+        raise WrongUse(f"--alpha and --beta make more than {POINTS} strengths; expected fewer: take coarser grids")
+    if network and not complex_modes(scene.topology, 1.0):
+        windows((), scene.topology)

@@ -1,0 +1,130 @@
+"""The exponents of a network's modes against their strength: the master stability function of the friction oscillator.
+
+One panel for each frequency of the paper; grey where a mode dies out, beside the published ranges of two oscillators.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from synchain.models.scene import Scene
+from synchain.models.topology import topology
+
+from ..intervals import Interval, scale
+from ..msf import MSF, msf
+from .published import PAIRS, published
+from .study import Study
+from .style import BLUE, COLUMN, ORANGE, bands, bracket
+from .tables import Table
+
+__all__ = [
+    "NAMES",
+    "SIZE",
+    "compute",
+    "curve",
+    "draw",
+    "draw_exponent",
+    "effort",
+    "finite",
+    "layout",
+    "ranges",
+    "table",
+]
+
+NAMES = ("msf",)
+SIZE = (COLUMN, 4.4)
+HIGHEST = 1.2
+"""Largest strength: that of the paper's probe, sigma = 0.6 of two oscillators."""
+
+_KEPT: WeakKeyDictionary[Study, dict[Scene, MSF]] = WeakKeyDictionary()
+
+
+def curve(scene: Scene, study: Study) -> MSF:
+    """The function of a scene's oscillator on 0 … HIGHEST; figures that share a study share it."""
+    pair = scene.replace(topology=topology("chain", 2), initial=None, axes=(), record=None, title="", sigma=0.0)
+    kept = _KEPT.setdefault(study, {})
+    if pair not in kept:
+        alpha = np.linspace(0.0, HIGHEST, min(study.quality.points or 241, 241))
+        kept[pair] = msf(pair, alpha, **effort(study))
+    return kept[pair]
+
+
+def effort(study: Study) -> dict[str, Any]:
+    """Options of `exponents` that fit the quality of a study."""
+    quality = study.quality
+    return {
+        "precision": 2.0 * quality.resolution, "periods": 5.0 * quality.criterion.transient, "transient": 200.0,
+        "starts": min(quality.criterion.starts, 4), "workers": study.workers, "show_progress": study.show_progress,
+    }  # fmt: skip
+
+
+def compute(name: str, study: Study) -> tuple[MSF, ...]:
+    """The function at each of the paper's frequencies."""
+    return tuple(curve(Scene(topology=topology("chain", 2), parameters={"omega": omega}), study) for omega in PAIRS)
+
+
+def table(data: tuple[MSF, ...]) -> Table:
+    """Exponent and standard error, per unit of time, for each frequency and strength."""
+    rows = [
+        (found.scene.omega, alpha, exponent, error)
+        for found in data
+        for alpha, exponent, error in zip(found.alpha, found.exponent, found.stderr, strict=True)
+    ]
+    return Table(("omega", "alpha", "exponent", "stderr"), tuple(rows))
+
+
+def ranges(data: tuple[MSF, ...]) -> Table:
+    """Ranges of alpha with a negative exponent, the uncertainties of their ends, and the kind of motion."""
+    rows = [
+        (found.scene.omega, low, high, *errors, found.attractors[0])
+        for found in data
+        for (low, high), errors in zip(found.intervals, found.uncertainties, strict=True)
+    ]
+    return Table(("omega", "low", "high", "low_error", "high_error", "motion"), tuple(rows))
+
+
+def layout(figure: Any) -> list[Any]:
+    """One pair of axes for each frequency, one above the other."""
+    return list(figure.subplots(len(PAIRS), 1, sharex=True))
+
+
+def draw(axes: list[Any], data: tuple[MSF, ...]) -> list[Any]:
+    """One curve in each panel, with the published range of two oscillators as a thin bar."""
+    for panel, found in zip(axes, data, strict=True):
+        draw_exponent(panel, found)
+        row = published(2, float(found.scene.omega or 0.0))
+        low, high = panel.get_ylim()
+        panel.set_ylim(low, high + 0.16 * (high - low))
+        bracket(panel, _inside(scale(row.intervals, 2.0), panel.get_xlim()) if row else (), 0.92, ORANGE, "published")
+        motion = found.attractors[0].replace("drive periods", "periods")
+        panel.set_title(rf"$\omega={found.scene.omega:.2f}$, {motion}", fontsize=7.5, pad=3, loc="left")
+        stable = ", ".join(f"{a:.3f} … {b:.3f}" for a, b in found.intervals[:2]) or "nowhere"
+        panel.set_title(rf"$\Lambda<0$: {stable}", fontsize=7.0, pad=3, loc="right")
+        panel.set_ylabel("")
+        panel.label_outer()
+    axes[0].figure.supylabel(r"exponent $\Lambda$ per unit of $\tau$", fontsize=8.5)
+    return axes
+
+
+def draw_exponent(axes: Any, found: MSF) -> Any:
+    """The exponent with a band of two standard errors either side, grey where it is negative, and a line at zero."""
+    value, error = finite(found.exponent), finite(found.stderr)
+    bands(axes, found.intervals)
+    axes.axhline(0.0, color="0.35", linewidth=0.6, zorder=1)
+    axes.fill_between(found.alpha, value - 2 * error, value + 2 * error, color=BLUE, alpha=0.3, linewidth=0.0, zorder=2)
+    axes.plot(found.alpha, value, color=BLUE, linewidth=0.9, zorder=3)
+    axes.set(xlim=(found.alpha[0], found.alpha[-1]), xlabel=r"strength of a mode $\alpha=\sigma\,|\gamma|$",
+             ylabel=r"exponent $\Lambda$ per unit of $\tau$")  # fmt: skip
+    return axes
+
+
+def finite(values: np.ndarray) -> np.ndarray:
+    """The values with NaN in place of infinities, which are not drawn."""
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def _inside(found: list[Interval], limits: tuple[float, float]) -> list[Interval]:
+    return [(max(a, limits[0]), min(b, limits[1])) for a, b in found if a < limits[1] and b > limits[0]]

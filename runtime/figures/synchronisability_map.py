@@ -1,0 +1,118 @@
+"""For which drive frequency and coupling networks synchronise: the largest exponent of their modes, one panel each.
+
+The function of one oscillator on a line of strengths serves all networks: the mode of the eigenvalue gamma has the exponent
+Lambda(sigma |gamma|) (Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998)).  Where the starts lead to different motions a
+network counts as stable if it is so for most of them, as in `synchain.runtime.threshold`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from synchain.models.scene import Scene
+from synchain.models.topology import Topology, topology
+
+from ..exponent import exponents
+from ..transversal import transversal
+from .exponent import effort
+from .published import PAIRS, published
+from .study import Study
+from .style import COLUMN, ORANGE
+from .tables import Table
+
+__all__ = ["NAMES", "NETWORKS", "SIZE", "Map", "compute", "draw", "largest_exponent", "layout", "table"]
+
+NAMES = ("synchronisability_map",)
+SIZE = (COLUMN, 4.7)
+NETWORKS = (("chain", 2), ("chain", 3), ("chain", 4), ("ring", 6), ("star", 5), ("complete", 5))
+LOW, HIGH, SIGMA = 1.0, 1.8, 0.6
+"""Frequencies, and the largest coupling."""
+
+
+@dataclass(frozen=True, slots=True)
+class Map:
+    """The function of one oscillator: exponent (omegas, starts, strengths) at omega and alpha; sigma for the panels.
+
+    attractors: the kinds of motion that the starts led to, at each frequency.
+    """
+
+    omega: np.ndarray
+    alpha: np.ndarray
+    sigma: np.ndarray
+    exponent: np.ndarray
+    attractors: tuple[str, ...]
+
+
+def compute(name: str, study: Study) -> Map:
+    """One run over all strengths for each frequency."""
+    grid = study.quality.grid or 241
+    omega = np.linspace(LOW, HIGH, grid // 2 + 1 if study.quality.grid else 161)
+    sigma = np.linspace(0.0, SIGMA, grid)
+    steepest = max(mode.size for graph in _graphs() for mode in transversal(graph))
+    alpha = np.linspace(0.0, SIGMA * steepest, 2 * grid - 1)
+    options = {**effort(study), "precision": 10.0 * study.quality.resolution, "transient": 100.0}
+    options.update(periods=study.quality.criterion.transient, starts=min(study.quality.criterion.starts, 3))
+    pair = Scene(topology=topology("chain", 2))
+    found = [exponents(pair, alpha, omega=float(value), **options) for value in omega]
+    kinds = tuple("; ".join(dict.fromkeys(a.kind for a in e.attractors)) for e in found)
+    return Map(omega, alpha, sigma, np.array([e.by_start for e in found]), kinds)
+
+
+def _graphs() -> list[Topology]:
+    return [topology(name, n) for name, n in NETWORKS]
+
+
+def largest_exponent(data: Map, graph: Topology) -> np.ndarray:
+    """The largest exponent (omegas, sigmas) of a network's modes, interpolated between strengths: the starts' median."""
+    strengths = [data.sigma * mode.size for mode in transversal(graph)]
+    worst = [[[np.interp(x, data.alpha, row) for x in strengths] for row in starts] for starts in data.exponent]
+    return np.asarray(np.median(np.max(worst, axis=2), axis=1))
+
+
+def table(data: Map) -> Table:
+    """The largest exponent, per unit of time, at every frequency and coupling, a column for each network."""
+    columns = {f"{graph.name}_{graph.n}": largest_exponent(data, graph).reshape(-1) for graph in _graphs()}
+    omega, sigma = (part.reshape(-1) for part in np.meshgrid(data.omega, data.sigma, indexing="ij"))
+    motion = np.repeat(np.array(data.attractors, dtype=object), len(data.sigma))
+    return Table.of(omega=omega, sigma=sigma, **columns, motion=motion)
+
+
+def layout(figure: Any) -> list[Any]:
+    """One pair of axes for each network, two beside each other."""
+    return list(figure.subplots(3, 2, sharex=True, sharey=True).flat)
+
+
+def draw(axes: list[Any], data: Map) -> list[Any]:
+    """Colours where every mode dies out, white elsewhere; the published ranges of the chains as upright bars."""
+    graphs = _graphs()
+    values = [largest_exponent(data, graph) for graph in graphs]
+    stable = np.concatenate([-v[(v < 0) & np.isfinite(v)] for v in values])
+    top = float(np.quantile(stable, 0.99)) if stable.size else 1.0
+    for panel, graph, value in zip(axes, graphs, values, strict=True):
+        speed = np.where(value < 0, np.minimum(-value, top), np.nan)
+        painted = panel.pcolormesh(data.omega, data.sigma, speed.T, shading="nearest", cmap="cividis_r", vmin=0.0,
+                                   vmax=top, rasterized=True)  # fmt: skip
+        panel.set_title(f"{graph.name}({graph.n})", fontsize=7.5, pad=3)
+        panel.set(xlim=(data.omega[0], data.omega[-1]), ylim=(0.0, data.sigma[-1]))
+        panel.tick_params(labelsize=7)
+        _published(panel, graph)
+    figure = axes[0].figure
+    figure.supxlabel(r"drive frequency $\omega$ (white: not stable; orange: published)", fontsize=8.0)
+    figure.supylabel(r"coupling $\sigma$", fontsize=8.0)
+    bar = figure.colorbar(painted, ax=axes, location="top", aspect=35, shrink=0.9, pad=0.02, extend="max")
+    bar.set_label(r"rate of synchronisation $-\max\,\Lambda(\sigma|\gamma_k|)$ per unit of $\tau$", fontsize=7.5)
+    bar.ax.tick_params(labelsize=7)
+    return axes
+
+
+def _published(panel: Any, graph: Topology) -> None:
+    """The published ranges of a chain as bars at their frequency."""
+    if graph.name != "chain":
+        return
+    for omega in PAIRS:
+        row = published(graph.n, omega)
+        for low, high in row.intervals if row else ():
+            panel.plot([omega, omega], [low, high], color=ORANGE, linewidth=1.2, marker="_", markersize=4.0)
