@@ -1,7 +1,8 @@
 """From a Lagrangian and a graph to exact equations and exact spectra.
 
 Names are loaded on first use, so that importing this package costs next to nothing.  Every file of the folder
-`topologies` is offered as a function of the number of nodes: ``chain(4)`` is ``topology("chain", 4)``.
+`topologies` is offered as a function of the number of nodes and of its options: ``circulant(10, offsets=(1, 3))`` is
+``topology("circulant", 10, offsets=(1, 3))``.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .axis import Axis
+    from .graph_readers import from_edges, from_graph, from_sparse, read_edges, read_graphml
+    from .products import cartesian, complement, kronecker, union, weighted
     from .scene import Scene
     from .scene_file import load_scene, scene_names
     from .scene_section import Section
@@ -23,10 +26,20 @@ _HOMES = {
     "Section": "scene_section",
     "Spectrum": "spectrum",
     "Topology": "topology",
+    "cartesian": "products",
+    "complement": "products",
+    "from_edges": "graph_readers",
+    "from_graph": "graph_readers",
     "from_matrix": "topology",
+    "from_sparse": "graph_readers",
+    "kronecker": "products",
     "load_scene": "scene_file",
+    "read_edges": "graph_readers",
+    "read_graphml": "graph_readers",
     "read_matrix": "topology",
     "scene_names": "scene_file",
+    "union": "products",
+    "weighted": "products",
 }
 
 __all__ = [
@@ -35,10 +48,20 @@ __all__ = [
     "Section",
     "Spectrum",
     "Topology",
+    "cartesian",
+    "complement",
+    "from_edges",
+    "from_graph",
     "from_matrix",
+    "from_sparse",
+    "kronecker",
     "load_scene",
+    "read_edges",
+    "read_graphml",
     "read_matrix",
     "scene_names",
+    "union",
+    "weighted",
 ]
 
 
@@ -67,10 +90,10 @@ def _families() -> set[str]:
 def _family(name: str) -> Any:
     from .topology import topology
 
-    def family(n: int) -> Topology:
-        return topology(name, n)
+    def family(n: int, **options: Any) -> Topology:
+        return topology(name, n, **options)
 
     family.__name__ = family.__qualname__ = name
     family.__module__ = __name__
-    family.__doc__ = f"Return the {name} of `n` nodes; ValueError where n is too small for it."
+    family.__doc__ = f"Return the {name} of `n` nodes, with the options of its file; ValueError where n is too small."
     return family

@@ -1,26 +1,26 @@
 """Real and complex algebraic numbers: an irreducible integer polynomial and what isolates one of its roots.
 
 A real root is held between two rationals where the polynomial changes sign, a complex root by Arb's certified
-isolation (F. Johansson, IEEE Trans. Comput. 66, 1281, 2017); both are refined to any accuracy.  Real roots
-are refined exactly: secant guesses, proved by signs (J. Abbott, ACM Commun. Comput. Algebra 48, 3, 2014).
+isolation (F. Johansson, IEEE Trans. Comput. 66, 1281, 2017); both are refined to any accuracy.  Polynomials
+with real roots only are isolated by `isolation.py`.  Real roots are refined exactly: secant guesses, proved by
+signs (J. Abbott, ACM Commun. Comput. Algebra 48, 3, 2014).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from itertools import pairwise
 from math import isqrt
 
 import sympy as sp
-from flint import acb, acb_mat, arb, fmpq, fmpq_mat, fmpz_poly
+from flint import acb, arb, fmpq, fmpz_poly
 
 from .balls import precision
+from .isolation import dyadic, real_brackets, sign
 from .sympy_order import complex_order
 
-__all__ = ["ComplexRoot", "RealRoot", "approximate", "complex_roots", "real_roots"]
+__all__ = ["ComplexRoot", "RealRoot", "complex_roots", "real_roots"]
 
 Polynomial = tuple[int, ...]
 """Integer coefficients, constant first; irreducible and primitive, the leading one positive."""
@@ -43,7 +43,7 @@ class RealRoot:
 
     def __post_init__(self) -> None:
         f = fmpz_poly(list(self.polynomial))
-        if not self.low < self.high or f(_exact(self.low)) * f(_exact(self.high)) >= 0:
+        if not self.low < self.high or sign(f, _exact(self.low)) * sign(f, _exact(self.high)) >= 0:
             raise ValueError(
                 f"{self.text}: no sign change from {self.low} to {self.high}; expected a bracket of one root"
             )
@@ -90,7 +90,7 @@ class ComplexRoot:
         """A ball that holds this number, of radius below 2**-bits times its modulus."""
         with precision(bits + 96):
             near = acb(_exact(self.near[0]), _exact(self.near[1]))
-            return min(_balls(self.polynomial, bits + 16), key=lambda ball: _dyadic(abs(ball - near)))
+            return min(_balls(self.polynomial, bits + 16), key=lambda ball: dyadic(abs(ball - near)))
 
 
 @lru_cache(maxsize=64)
@@ -111,38 +111,12 @@ def _balls(polynomial: Polynomial, bits: int) -> tuple[acb, ...]:
         return tuple(root for root, _ in fmpz_poly(list(polynomial)).complex_roots())
 
 
-def approximate(rows: Sequence[Sequence[Fraction]], bits: int) -> list[fmpq]:
-    """The real parts of all eigenvalues of a matrix, ascending, without guarantee: hints for `real_roots`."""
-    with precision(bits):
-        values = acb_mat(fmpq_mat([[_exact(x) for x in row] for row in rows])).eig(algorithm="approx")
-        return sorted(_dyadic(value.real) for value in values)
-
-
-def real_roots(polynomial: Polynomial, hints: Sequence[fmpq]) -> tuple[RealRoot, ...] | None:
-    """All roots, ascending, of an irreducible polynomial of degree >= 2; None where not all prove real.
-
-    The polynomial is evaluated exactly between neighbouring hints; as many sign changes as its degree isolate
-    all roots completely.
-    """
-    f = fmpz_poly(list(polynomial))
-    middles = sorted(set(hints))
-    cuts = [middles[0] - 1, *(_between(a, b) for a, b in pairwise(middles)), middles[-1] + 1]
-    positive = [f(cut) > 0 for cut in cuts]  # never 0: no rational root
-    places = [k for k in range(1, len(cuts)) if positive[k] != positive[k - 1]]
-    if len(places) != f.degree():
+def real_roots(polynomial: Polynomial) -> tuple[RealRoot, ...] | None:
+    """All roots, ascending, of an irreducible polynomial of degree >= 2; None where not all prove real."""
+    brackets = real_brackets(fmpz_poly(list(polynomial)))
+    if brackets is None:
         return None
-    found = []
-    for i, k in enumerate(places):
-        low, high = _tightened(f, cuts[k - 1], cuts[k], middles[k - 1])
-        found.append(RealRoot(polynomial, i, _fraction(low), _fraction(high)))
-    return tuple(found)
-
-
-def _tightened(f: fmpz_poly, low: fmpq, high: fmpq, hint: fmpq) -> tuple[fmpq, fmpq]:
-    """A narrow bracket around the hint, where the signs prove it; otherwise the bracket as it was."""
-    near = fmpq((hint * 2**60).floor(), 2**60)
-    a, b = near - fmpq(1, 2**50), near + fmpq(1, 2**50)
-    return (a, b) if low < a and b < high and f(a) * f(b) < 0 else (low, high)
+    return tuple(RealRoot(polynomial, i, _fraction(low), _fraction(high)) for i, (low, high) in enumerate(brackets))
 
 
 def complex_roots(polynomial: Polynomial) -> tuple[RealRoot | ComplexRoot, ...]:
@@ -151,15 +125,15 @@ def complex_roots(polynomial: Polynomial) -> tuple[RealRoot | ComplexRoot, ...]:
     Real ones come first, ascending; conjugates are neighbours.  A second at degree 100, minutes at 200.
     """
     balls = _balls(polynomial, 96)
-    reals = sorted((b.real for b in balls if b.imag == 0), key=lambda ball: _dyadic(ball.mid()))
+    reals = sorted((b.real for b in balls if b.imag == 0), key=lambda ball: dyadic(ball.mid()))
     upper = [ball for ball in balls if ball.imag > 0]
     found: list[RealRoot | ComplexRoot] = [
-        RealRoot(polynomial, i, _fraction(_dyadic(b.lower()) - tiny), _fraction(_dyadic(b.upper()) + tiny))
+        RealRoot(polynomial, i, _fraction(dyadic(b.lower()) - tiny), _fraction(dyadic(b.upper()) + tiny))
         for i, b in enumerate(reals)
         for tiny in [fmpq(1, 2**90)]
     ]
     for place, k in enumerate(complex_order(polynomial, upper)):
-        x, y = (_fraction(_dyadic(part)) for part in (upper[k].real, upper[k].imag))
+        x, y = (_fraction(dyadic(part)) for part in (upper[k].real, upper[k].imag))
         found.append(ComplexRoot(polynomial, len(reals) + 2 * place, (x, -y)))
         found.append(ComplexRoot(polynomial, len(reals) + 2 * place + 1, (x, y)))
     return tuple(found)
@@ -169,6 +143,8 @@ def complex_roots(polynomial: Polynomial) -> tuple[RealRoot | ComplexRoot, ...]:
 def _refined(root: RealRoot, bits: int) -> tuple[fmpq, fmpq]:
     """Narrow the bracket to 2**-bits of its ends: guess by the secant, prove by signs, square the step."""
     f, low, high = fmpz_poly(list(root.polynomial)), _exact(root.low), _exact(root.high)
+    if low * high > 0 and (high - low) * 2**bits <= min(abs(low), abs(high)):
+        return low, high
     at_low, at_high = f(low), f(high)
     pieces = 2**16
     while low * high <= 0 or (high - low) * 2**bits > min(abs(low), abs(high)):
@@ -190,20 +166,6 @@ def _refined(root: RealRoot, bits: int) -> tuple[fmpq, fmpq]:
             else:
                 low, at_low = middle, value
     return low, high
-
-
-def _between(a: fmpq, b: fmpq) -> fmpq:
-    """A dyadic number with few bits in the middle half of [a, b]."""
-    bits = 2
-    while fmpq(1, 2**bits) * 4 > b - a:
-        bits += 1
-    return fmpq(((a + b) / 2 * 2**bits + fmpq(1, 2)).floor(), 2**bits)
-
-
-def _dyadic(ball: arb) -> fmpq:
-    """The midpoint of a ball, exactly."""
-    mantissa, exponent = ball.mid().man_exp()
-    return fmpq(mantissa) * fmpq(2) ** int(exponent)
 
 
 def _exact(x: Fraction) -> fmpq:

@@ -16,7 +16,9 @@ from flint import fmpq, fmpq_poly, fmpz_poly
 __all__ = [
     "cosine",
     "cosine_roots",
+    "exponential",
     "exponential_roots",
+    "is_short",
     "linear_cosine",
     "linear_exponential",
     "minimal_polynomial",
@@ -36,6 +38,20 @@ _SHORT = {
     (7, 24): "sqrt(2)/2 - sqrt(6)/2", (11, 24): "-sqrt(6)/2 - sqrt(2)/2",
 }  # fmt: skip
 """2 cos(2πk/m) by (k, m)."""
+
+
+def is_short(k: int, m: int) -> bool:
+    """True where cos(2πk/m), 0 <= k/m <= 1/2 in lowest terms, is written as a short real radical."""
+    return (k, m) in _SHORT
+
+
+def exponential(shift: int, k: int, m: int) -> sp.Expr:
+    """shift + exp(2πik/m), as radicals where m (in lowest terms) is at most 4, or 6."""
+    turn = Fraction(2 * k, m) % 2
+    angle = sp.Rational(*(turn - 2 if turn > 1 else turn).as_integer_ratio()) * sp.pi
+    if 2 * turn % 1 == 0 or 3 * turn % 1 == 0:
+        return shift + sp.cos(angle) + sp.I * sp.sin(angle)
+    return shift + sp.exp(sp.I * angle, evaluate=False)
 
 
 def minus_four_sine_squared(k: int, m: int) -> sp.Expr:

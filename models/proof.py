@@ -16,7 +16,7 @@ from typing import Protocol
 import sympy as sp
 from flint import acb, fmpq, fmpq_poly, fmpz_poly
 
-from . import angles
+from . import angle_sums, angles
 from .algebraic import ComplexRoot, RealRoot
 from .balls import Ball, precision
 
@@ -41,12 +41,12 @@ class Claim(Protocol):
 
 def check(claims: Iterable[Claim], characteristic: fmpq_poly, name: str) -> None:
     """Multiply the claims out; ProofError where that is not the exact characteristic polynomial."""
-    groups: dict[tuple[fmpq, ...], list[Claim]] = {}
+    groups: dict[tuple[int, ...], list[Claim]] = {}
     for claim in claims:
-        groups.setdefault(tuple(minimal_polynomial(claim.number).coeffs()), []).append(claim)
+        groups.setdefault(_key(claim.number), []).append(claim)
     product = fmpq_poly([1])
     for coefficients, members in groups.items():
-        factor = fmpq_poly(list(coefficients))
+        factor = _monic(coefficients)
         counts = {claim.multiplicity for claim in members}
         if len(members) != factor.degree() or len(counts) != 1 or not distinct(members):
             shown = ", ".join(str(claim) for claim in members[:4])
@@ -61,6 +61,17 @@ def check(claims: Iterable[Claim], characteristic: fmpq_poly, name: str) -> None
             f"spectrum of {name}: the eigenvalues multiply out to a polynomial of degree {product.degree()}; "
             f"expected the characteristic one, of degree {characteristic.degree()}: correct the closed form"
         )
+
+
+def _key(number: sp.Expr | RealRoot | ComplexRoot) -> tuple[int, ...]:
+    """The minimal polynomial with coprime integer coefficients, the leading one positive."""
+    if isinstance(number, (RealRoot, ComplexRoot)):
+        return number.polynomial
+    return tuple(int(c) for c in minimal_polynomial(number).numer().coeffs())
+
+
+def _monic(coefficients: Sequence[int]) -> fmpq_poly:
+    return fmpq_poly(list(coefficients)) / coefficients[-1]
 
 
 def distinct(claims: Sequence[Claim]) -> bool:
@@ -91,7 +102,7 @@ def _touch(balls: list[acb], i: int) -> bool:
 def minimal_polynomial(number: sp.Expr | RealRoot | ComplexRoot) -> fmpq_poly:
     """The monic irreducible polynomial over the rationals of which a number is a root."""
     if isinstance(number, (RealRoot, ComplexRoot)):
-        return fmpq_poly(list(number.polynomial)) / number.polynomial[-1]
+        return _monic(number.polynomial)
     if number.is_Rational:
         return fmpq_poly([fmpq(-int(number.p), int(number.q)), 1])
     form = angles.linear_cosine(number)
@@ -102,6 +113,9 @@ def minimal_polynomial(number: sp.Expr | RealRoot | ComplexRoot) -> fmpq_poly:
     if form is not None:
         a, b, _, m = form
         return angles.minimal_polynomial(a, b, m, fmpz_poly.cyclotomic(m))
+    terms = angle_sums.read(number)
+    if terms is not None:
+        return angle_sums.minimal_polynomial(terms)
     return fmpq_poly(list(_radical(number)))
 
 

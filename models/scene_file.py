@@ -10,9 +10,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from .family_options import defaults
 from .scene import Scene
 from .scene_checks import integer, known_keys, shown, suggestion, table, text
-from .topology import Topology, from_matrix, read_matrix, topology
+from .topology import Topology, family, from_matrix, names, read_matrix, topology
 
 __all__ = ["as_dict", "from_dict", "load_scene", "scene_names"]
 
@@ -94,8 +95,8 @@ def _scene(name: str, content: bytes, folder: Path | None) -> Scene:
 def from_dict(values: Mapping[str, Any], folder: Path | None = None) -> Scene:
     """Return the scene of names and values as in a scene file; a matrix file is looked up in `folder`."""
     found = table("scene", values)
-    names = ["sweep" if field.name == "axes" else field.name for field in fields(Scene)]
-    known_keys("scene", found, names)
+    keys = ["sweep" if field.name == "axes" else field.name for field in fields(Scene)]
+    known_keys("scene", found, keys)
     given: dict[str, Any] = {str(key): value for key, value in found.items()}
     if "topology" in given:
         given["topology"] = _topology(table("topology", given["topology"]), folder)
@@ -112,7 +113,9 @@ def from_dict(values: Mapping[str, Any], folder: Path | None = None) -> Scene:
 
 
 def _topology(given: Mapping[object, Any], folder: Path | None) -> Topology:
-    known_keys("topology", given, ("name", "n", "matrix", "file"))
+    name = given.get("name")
+    options = defaults(family(name)) if isinstance(name, str) and name in names() and "matrix" not in given else {}
+    known_keys("topology", given, ("name", "n", *options, "matrix", "file"))
     if "file" in given:
         if len(given) > 1:
             raise ValueError(f"topology: found {shown(dict(given))}; expected 'file' alone; remove the other keys")
@@ -130,7 +133,8 @@ def _topology(given: Mapping[object, Any], folder: Path | None) -> Topology:
         if key not in given:
             found = shown(dict(given))
             raise ValueError(f"topology: {key!r} is missing in {found}; expected name and n, or matrix, or file")
-    return topology(text("topology name", given["name"]), integer("topology n", given["n"], 0, NODES))
+    chosen = {key: given[key] for key in options if key in given}
+    return topology(text("topology name", name), integer("topology n", given["n"], 0, NODES), **chosen)
 
 
 def as_dict(scene: Scene) -> dict[str, Any]:
@@ -149,9 +153,10 @@ def as_dict(scene: Scene) -> dict[str, Any]:
 
 def _graph(graph: Topology) -> dict[str, Any]:
     try:
-        same = topology(graph.name, graph.n) == graph
-    except ValueError:
+        same = topology(graph.name, graph.n, **dict(graph.options)) == graph
+    except (ValueError, TypeError):
         same = False
     if same:
-        return {"name": graph.name, "n": graph.n}
+        options = {key: list(value) if isinstance(value, tuple) else value for key, value in graph.options}
+        return {"name": graph.name, "n": graph.n, **options}
     return {"name": graph.name, "matrix": [[str(entry) for entry in row] for row in graph.rows]}

@@ -1,28 +1,31 @@
 """Exact eigenvalues of a connectivity matrix with multiplicities, proved by its characteristic polynomial.
 
-A family's closed form is used where its file has one; any other rational matrix goes through its exact
-characteristic polynomial and the factors of that over the rationals (python-flint), whose roots are written
-as rationals, short real radicals, cosines of rational angles, or real and complex algebraic numbers.
+A closed form is used where the family or operation that made the graph has one; any other rational matrix goes
+through its exact characteristic polynomial and the factors of that over the rationals (python-flint), whose roots are
+written as rationals, short real radicals, cosines of rational angles, or real and complex algebraic numbers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from fractions import Fraction
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import lru_cache, reduce
-from typing import Any
+from math import lcm
+from typing import Any, overload
 
 import sympy as sp
-from flint import fmpq, fmpq_mat, fmpq_poly
+from flint import fmpq, fmpq_poly, fmpz_mat
 
-from . import angles
-from .algebraic import ComplexRoot, RealRoot, approximate, complex_roots, real_roots
-from .balls import Ball, accurate, decimals, enclose, nearest, precision
-from .proof import ProofError, check, distinct
+from .algebraic import complex_roots, real_roots
+from .balls import precision
+from .descending import Descending
+from .eigenvalue import Eigenvalue, ordered
+from .proof import ProofError, check
+from .radicals import written
+from .spectrum_table import table
 from .topology import Topology, family, names, topology
 
-__all__ = ["Eigenvalue", "ProofError", "Spectrum", "spectrum", "table"]
+__all__ = ["Eigenvalue", "ProofError", "Spectrum", "characteristic", "spectrum", "table"]
 
 PROOF_LIMIT = 200
 """Up to so many nodes a closed form is proved when it is made; above only on request."""
@@ -30,55 +33,8 @@ PROOF_LIMIT = 200
 DENSE_LIMIT = 1000
 """Largest matrix without a closed form."""
 
-
-@dataclass(frozen=True, slots=True)
-class Eigenvalue:
-    """An exact number with its algebraic multiplicity.
-
-    `number` is a SymPy expression or an algebraic number that is not written as radicals; `value` is the
-    nearest float, or complex.
-    """
-
-    number: sp.Expr | RealRoot | ComplexRoot
-    multiplicity: int
-    value: float | complex = field(init=False, compare=False)
-
-    def __post_init__(self) -> None:
-        count = self.multiplicity
-        if isinstance(count, bool) or not isinstance(count, int) or count < 1:
-            raise ValueError(f"eigenvalue {self.text}: multiplicity {count!r}; expected an integer >= 1")
-        object.__setattr__(self, "value", nearest(self._ball))
-
-    @property
-    def exact(self) -> sp.Expr:
-        """The number as a SymPy expression (CRootOf where no shorter form is known)."""
-        return self.number.expression if isinstance(self.number, (RealRoot, ComplexRoot)) else self.number
-
-    @property
-    def text(self) -> str:
-        """The exact number as text that SymPy reads back."""
-        return self.number.text if isinstance(self.number, (RealRoot, ComplexRoot)) else sp.sstr(self.number)
-
-    def enclosure(self, bits: int) -> Ball:
-        """A certified ball (flint.arb or flint.acb) of radius below 2**-bits times the modulus."""
-        return accurate(self._ball, bits)
-
-    def evaluate(self, digits: int) -> sp.Expr:
-        """The value as a SymPy Float, within one unit of the last of `digits` significant digits."""
-        if isinstance(digits, bool) or not isinstance(digits, int) or digits < 1:
-            raise ValueError(f"digits = {digits!r}; expected a positive integer")
-        return decimals(self._ball, digits)
-
-    def _ball(self, bits: int) -> Ball:
-        if isinstance(self.number, (RealRoot, ComplexRoot)):
-            return self.number.enclosure(bits)
-        return enclose(self.number, bits)
-
-    def __str__(self) -> str:
-        text = self.text
-        if len(text) <= 60 or not isinstance(self.number, (RealRoot, ComplexRoot)):
-            return text
-        return f"{_decimal(self.value)} (degree {len(self.number.polynomial) - 1})"
+SHOWN = 1000
+"""The text of a spectrum leaves out the middle of more eigenvalues than this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +42,11 @@ class Spectrum:
     """The distinct eigenvalues from 0 downwards by real part, conjugates side by side.
 
     `verified` is True where the product of (z - γ)^multiplicity was multiplied out and found equal to the
-    exact characteristic polynomial; False says that nobody looked (a closed form above PROOF_LIMIT nodes).
+    exact characteristic polynomial; False says that nobody looked (a closed form above PROOF_LIMIT nodes).  There
+    `eigenvalues` of a chain or ring are made one by one as they are asked for; elsewhere they are a tuple.
     """
 
-    eigenvalues: tuple[Eigenvalue, ...]
+    eigenvalues: Sequence[Eigenvalue]
     verified: bool = False
 
     def __post_init__(self) -> None:
@@ -99,7 +56,22 @@ class Spectrum:
     @property
     def n(self) -> int:
         """Number of eigenvalues, each counted as often as it occurs."""
+        if isinstance(self.eigenvalues, Descending):
+            return self.eigenvalues.n
         return sum(self.multiplicities)
+
+    def __len__(self) -> int:
+        return len(self.eigenvalues)
+
+    @overload
+    def __getitem__(self, place: int) -> Eigenvalue: ...
+    @overload
+    def __getitem__(self, place: slice) -> Sequence[Eigenvalue]: ...
+    def __getitem__(self, place: int | slice) -> Eigenvalue | Sequence[Eigenvalue]:
+        return self.eigenvalues[place]
+
+    def __iter__(self) -> Iterator[Eigenvalue]:
+        return iter(self.eigenvalues)
 
     @property
     def exact(self) -> tuple[sp.Expr, ...]:
@@ -124,6 +96,8 @@ class Spectrum:
     @property
     def largest(self) -> sp.Expr:
         """The eigenvalue of largest modulus; of several, the first in the order of the spectrum."""
+        if isinstance(self.eigenvalues, Descending):  # all real, none positive
+            return self.eigenvalues[-1].exact
         near = max(abs(value) for value in self.values) * (1 - 1e-12)
         best, bits = [e for e in self.eigenvalues if abs(e.value) >= near], 64
         while len(best) > 1 and bits <= 1024:
@@ -133,6 +107,16 @@ class Spectrum:
                 best = [e for e, size in zip(best, sizes, strict=True) if not size < top]
             bits *= 4
         return best[0].exact
+
+    @property
+    def slowest(self) -> sp.Expr:
+        """The eigenvalue other than 0 of smallest modulus, the first of several; ValueError where all are 0."""
+        lazy = isinstance(self.eigenvalues, Descending)
+        others = self.eigenvalues[1:2] if lazy else self.nonzero
+        if not others:
+            raise ValueError("all eigenvalues are 0; expected a graph with links")
+        least = min(abs(e.value) for e in others) * (1 + 1e-12)
+        return next(e.exact for e in others if abs(e.value) <= least)
 
     def evaluate(self, digits: int) -> tuple[sp.Expr, ...]:
         """The distinct eigenvalues as SymPy Floats, each within one unit of the last of `digits` digits."""
@@ -151,7 +135,10 @@ class Spectrum:
         return {"n": self.n, "eigenvalues": listed, "verified": self.verified}
 
     def __repr__(self) -> str:
-        return "{" + ", ".join(f"{e}: {e.multiplicity}" for e in self.eigenvalues) + "}"
+        many = len(self) > SHOWN
+        shown = [f"{e}: {e.multiplicity}" for e in (self.eigenvalues[: SHOWN - 1] if many else self.eigenvalues)]
+        last = [f"… ({len(self) - SHOWN} more)", f"{self[-1]}: {self[-1].multiplicity}"] if many else []
+        return "{" + ", ".join(shown + last) + "}"
 
 
 @lru_cache(maxsize=32)
@@ -161,122 +148,58 @@ def spectrum(graph: Topology, prove: bool | None = None) -> Spectrum:
     It proves itself; a closed form with more than PROOF_LIMIT nodes does so only where `prove` is True.
     Raises ProofError where the proof fails, ValueError on more than DENSE_LIMIT nodes without a closed form.
     """
-    claims = _closed_form(graph)
-    if claims is not None and not (graph.n <= PROOF_LIMIT if prove is None else prove):
-        return Spectrum(_ordered(claims))
-    if claims is None and graph.n > DENSE_LIMIT:
+    listed = _closed_form(graph)
+    if listed is not None and not (graph.n <= PROOF_LIMIT if prove is None else prove):
+        if isinstance(listed, Descending):
+            return Spectrum(Descending(len(listed), listed.n, lambda k: _claim(listed[k])))
+        return Spectrum(ordered([_claim(pair) for pair in listed]))
+    if listed is None and graph.n > DENSE_LIMIT:
         raise ValueError(
             f"topology {graph.name}: n = {graph.n} without a closed form; expected at most {DENSE_LIMIT} "
             "nodes: exact factors of larger matrices take too long"
         )
-    characteristic = fmpq_mat([[_exact(x) for x in row] for row in graph.rows]).charpoly()
-    if claims is None:
-        claims = _by_factors(graph, characteristic)
-    check(claims, characteristic, f"{graph.name} {graph.n}")
-    return Spectrum(_ordered(claims), verified=True)
+    polynomial = characteristic(graph)
+    claims = _by_factors(polynomial) if listed is None else [_claim(pair) for pair in listed]
+    check(claims, polynomial, f"{graph.name} {graph.n}")
+    return Spectrum(ordered(claims), verified=True)
 
 
-def _closed_form(graph: Topology) -> list[Eigenvalue] | None:
-    """The eigenvalues that the family's file gives, where it does and the graph is really of that family."""
+def characteristic(graph: Topology) -> fmpq_poly:
+    """The exact characteristic polynomial det(z - G)."""
+    scale = lcm(*(weight.denominator for _, _, weight in graph.links))
+    rows = [[0] * graph.n for _ in range(graph.n)]
+    for target, source, weight in graph.links:
+        whole = weight.numerator * (scale // weight.denominator)
+        rows[target][source] = whole
+        rows[target][target] -= whole
+    found = fmpq_poly(fmpz_mat(rows).charpoly())
+    return found if scale == 1 else found(fmpq_poly([0, scale])) / fmpq(scale) ** graph.n
+
+
+def _closed_form(graph: Topology) -> Sequence[tuple[sp.Expr, int]] | None:
+    """The eigenvalues that the graph's rule gives, or its family where the graph is really of that family."""
+    if graph.rule is not None:
+        return graph.rule()
     if graph.name not in names() or not hasattr(family(graph.name), "spectrum"):
         return None
-    if graph.n < family(graph.name).MINIMUM or topology(graph.name, graph.n).links != graph.links:
+    if graph.n < family(graph.name).MINIMUM:
         return None
-    return [Eigenvalue(sp.sympify(number), count) for number, count in family(graph.name).spectrum(graph.n)]
+    try:
+        made = topology(graph.name, graph.n, **dict(graph.options))
+    except ValueError:
+        return None
+    return made.rule() if made.rule is not None and made.links == graph.links else None
 
 
-def _by_factors(graph: Topology, characteristic: fmpq_poly) -> list[Eigenvalue]:
+def _claim(pair: tuple[sp.Expr, int]) -> Eigenvalue:
+    return Eigenvalue(sp.sympify(pair[0]), pair[1])
+
+
+def _by_factors(polynomial: fmpq_poly) -> list[Eigenvalue]:
     """The roots of each irreducible factor of the characteristic polynomial."""
-    hints: dict[int, Sequence[fmpq]] = {}
-
-    def isolate(polynomial: tuple[int, ...]) -> Sequence[RealRoot | ComplexRoot]:
-        for bits in (64, 128, 512) if graph.symmetric else ():
-            if bits not in hints:
-                hints[bits] = approximate(graph.rows, bits)
-            found = real_roots(polynomial, hints[bits])
-            if found is not None:
-                return found
-        return complex_roots(polynomial)
-
     claims = []
-    for factor, count in characteristic.factor()[1]:
-        numbers = _written(factor) or isolate(tuple(int(c) for c in factor.numer().coeffs()))
+    for factor, count in polynomial.factor()[1]:
+        whole = tuple(int(c) for c in factor.numer().coeffs())
+        numbers = written(factor) or real_roots(whole) or complex_roots(whole)
         claims += [Eigenvalue(number, count) for number in numbers]
     return claims
-
-
-def _written(factor: fmpq_poly) -> list[sp.Expr] | None:
-    """The roots of an irreducible polynomial in closed form, where a short one is known."""
-    monic = factor / factor[factor.degree()]
-    c = [sp.Rational(int(x.p), int(x.q)) for x in monic.coeffs()]
-    if len(c) == 2:
-        return [-c[0]]
-    if len(c) == 3:
-        root = sp.sqrt(c[1] ** 2 / 4 - c[0])
-        return [sp.expand(-c[1] / 2 + root), sp.expand(-c[1] / 2 - root)]
-    quartic = _biquadratic(monic) if len(c) == 5 else None
-    return angles.cosine_roots(monic) or quartic or angles.exponential_roots(monic)
-
-
-def _biquadratic(monic: fmpq_poly) -> list[sp.Expr] | None:
-    """Real nested roots a ± sqrt(b ± sqrt(c)), or a ± sqrt(b) ± sqrt(c), of a quartic that has them."""
-    shift = monic[3] / 4
-    even = monic(fmpq_poly([-shift, 1]))
-    p, q, discriminant = even[2], even[0], even[2] ** 2 - 4 * even[0]
-    if even[1] != 0 or discriminant < 0 or p > 0 or q < 0:
-        return None
-    a, b, c = (sp.Rational(int(x.p), int(x.q)) for x in (-shift, -p / 2, discriminant / 4))
-    product = sp.sqrt(sp.Rational(int(q.p), int(q.q)))
-    if product.is_Rational:
-        parts = [sp.sqrt((b + product) / 2), sp.sqrt((b - product) / 2)]
-        roots = [a + s * parts[0] + t * parts[1] for s in (1, -1) for t in (1, -1)]
-    else:
-        roots = [a + s * sp.sqrt(b + t * sp.sqrt(c)) for s in (1, -1) for t in (1, -1)]
-    return roots if all(len(sp.sstr(root)) <= 60 for root in roots) else None
-
-
-def _ordered(claims: Sequence[Eigenvalue]) -> tuple[Eigenvalue, ...]:
-    """From 0 downwards by real part; reals compared by certified balls, conjugates side by side."""
-    if any(isinstance(e.value, complex) for e in claims):
-        return tuple(sorted(claims, key=_complex_key))
-    if len({e.value for e in claims}) == len(claims):
-        return tuple(sorted(claims, key=lambda e: e.value.real, reverse=True))
-    if not distinct(claims):
-        raise ProofError(f"two of {len(claims)} eigenvalues coincide; expected distinct ones")
-    return tuple(sorted(claims, key=_midpoint, reverse=True))
-
-
-def _complex_key(e: Eigenvalue) -> tuple[float, float, float]:
-    return -round(e.value.real, 12), abs(e.value.imag), e.value.imag
-
-
-def _midpoint(e: Eigenvalue) -> fmpq:
-    mantissa, exponent = e.enclosure(4200).mid().man_exp()
-    return fmpq(mantissa) * fmpq(2) ** int(exponent)
-
-
-def _exact(x: Fraction) -> fmpq:
-    return fmpq(x.numerator, x.denominator)
-
-
-def table(found: Spectrum) -> str:
-    """The spectrum as text: exact, decimal, multiplicity; long polynomials are cut short."""
-    head = ("exact", "decimal", "multiplicity")
-    lines = [(_short(e), _decimal(e.value), str(e.multiplicity)) for e in found.eigenvalues]
-    wide = [max(len(line[k]) for line in (head, *lines)) for k in range(3)]
-    rows = [f"{a:<{wide[0]}}  {b:>{wide[1]}}  {c:>{wide[2]}}" for a, b, c in (head, *lines)]
-    state = "proved" if found.verified else "not proved (closed form of a large graph)"
-    rows.append(f"{found.n} eigenvalues, {len(lines)} distinct; characteristic polynomial: {state}")
-    return "\n".join(rows)
-
-
-def _short(e: Eigenvalue) -> str:
-    if len(e.text) <= 60 or not isinstance(e.number, (RealRoot, ComplexRoot)):
-        return e.text
-    return f"root {e.number.index} of a polynomial of degree {len(e.number.polynomial) - 1}"
-
-
-def _decimal(value: float | complex) -> str:
-    if isinstance(value, complex):
-        return f"{value.real:.15g} {'-' if value.imag < 0 else '+'} {abs(value.imag):.15g}i"
-    return f"{value:.16g}"

@@ -1,22 +1,25 @@
 """Who feels whom: a graph with exact weights, by name, from a matrix or from a file.
 
 The connectivity matrix is G = weighted adjacency minus in-degree, so that every row sums to zero and the
-coupling term is sigma * G * x.  Building a graph costs no algebra: only `matrix` and `spectrum` load SymPy.
+coupling term is sigma * G * x.  Building a graph costs no algebra: only `matrix` and `spectrum` load SymPy; and a
+family that counts its edges builds them when they are first asked for.
 """
 
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import partial
 from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from pkgutil import iter_modules
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
+from .family_options import Options, settled
 from .rationals import FILE_LIMIT, parse_rows, rational_rows
 
 if TYPE_CHECKING:
@@ -25,7 +28,10 @@ if TYPE_CHECKING:
     from .equations import Link
     from .spectrum import Spectrum
 
-__all__ = ["Topology", "from_matrix", "names", "read_matrix", "topology"]
+__all__ = ["Rule", "Topology", "family", "from_matrix", "names", "read_matrix", "ruled", "topology"]
+
+Rule: TypeAlias = Callable[[], "Sequence[tuple[sp.Expr, int]] | None"]
+"""Gives the eigenvalues of G with multiplicities, without repetition; None where no closed form is known."""
 
 LINK_LIMIT = 20_000_000
 """More links than this are refused: they would not fit into the memory of an ordinary machine."""
@@ -35,12 +41,26 @@ LINK_LIMIT = 20_000_000
 class Topology:
     """`n` nodes and their sorted links (target, source, weight); an undirected edge is two links.
 
-    Raises ValueError on a link outside the nodes, from a node to itself, repeated, unsorted or of no weight.
+    `options` are the keywords with which its family made it.  Raises ValueError on a link outside the nodes, from a
+    node to itself, repeated, unsorted or of no weight.
     """
 
     name: str
     n: int
     links: tuple[Link, ...]
+    options: Options = ()
+    _rule: Rule | None = field(default=None, init=False, repr=False, compare=False)
+    _count: int = field(default=-1, init=False, repr=False, compare=False)
+
+    if not TYPE_CHECKING:  # links that are not there yet
+
+        def __getattr__(self, name: str) -> Any:
+            if name != "links":
+                raise AttributeError(f"'Topology' object has no attribute {name!r}")
+            module = family(self.name)
+            made = Topology(self.name, self.n, tuple(_links(self.name, module, self.n, dict(self.options))))
+            object.__setattr__(self, "links", made.links)
+            return made.links
 
     def __post_init__(self) -> None:
         if self.n < 1:
@@ -62,6 +82,26 @@ class Topology:
                     "expected a Fraction other than 0: leave the link out or give it a weight"
                 )
             last = (target, source)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Topology):
+            return NotImplemented
+        if (self.name, self.n, self.options) != (other.name, other.n, other.options):
+            return False
+        return (self._count >= 0 and other._count >= 0) or self.links == other.links
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.n, self.options))
+
+    @property
+    def rule(self) -> Rule | None:
+        """What gives the spectrum in closed form, where the graph was made by a family or an operation."""
+        return self._rule
+
+    @property
+    def link_count(self) -> int:
+        """The number of links, known without building them where the family counts them."""
+        return self._count if self._count >= 0 else len(self.links)
 
     @property
     def symmetric(self) -> bool:
@@ -114,7 +154,8 @@ class Topology:
         return spectrum(self)
 
     def __repr__(self) -> str:
-        return f"Topology({self.name!r}, n={self.n}, {len(self.links)} links)"
+        more = "".join(f", {key}={value!r}" for key, value in self.options)
+        return f"Topology({self.name!r}, n={self.n}{more}, {self.link_count} links)"
 
 
 def names() -> tuple[str, ...]:
@@ -129,8 +170,11 @@ def family(name: str) -> ModuleType:
 
     A plug-in has SUMMARY, MINIMUM, SOURCE and `edges(n)`, which yields (i, j, weight) once for each edge,
     i < j; with DIRECTED = True it yields (target, source, weight) once for each link.  It may have
-    `spectrum(n)`, a list of (eigenvalue of G as a SymPy expression, multiplicity) without repetition, and
-    TOO_SMALL, what to do below MINIMUM.
+    `spectrum(n)`, a sequence of (eigenvalue of G as a SymPy expression, multiplicity) without repetition (or None for
+    an n without a closed form), `count(n)`, the number of edges, TOO_SMALL, what to do below MINIMUM, and
+    CONNECTED = False where it may fall into parts.  Keyword-only parameters of `edges` with defaults are options of
+    the family: `spectrum` and `count` take the same ones, and `settle(n, **options)` checks them and returns them
+    as they are stored (see `family_options`; None is not stored).
     """
     if not isinstance(name, str):
         raise TypeError(f"topology name {name!r} is no text; expected one of {', '.join(names())}")
@@ -139,23 +183,52 @@ def family(name: str) -> ModuleType:
     return import_module(f".topologies.{name}", __package__)
 
 
-def topology(name: str, n: int) -> Topology:
-    """The named graph of `n` nodes, all weights as its family gives them.
+def topology(name: str, n: int, **options: Any) -> Topology:
+    """The named graph of `n` nodes, all weights as its family gives them, with the family's own options.
 
-    Raises ValueError on an unknown name, on n below the family's minimum and on more than LINK_LIMIT links,
-    and TypeError where n is no integer.
+    Raises ValueError on an unknown name or option, on n below the family's minimum and on more than LINK_LIMIT
+    links, and TypeError where n is no integer.
     """
     module = family(name)
     size = _size(name, n, module)
-    directed = getattr(module, "DIRECTED", False)
+    chosen = settled(name, module, size, options)
+    keywords = dict(chosen)
+    rule = partial(module.spectrum, size, **keywords) if hasattr(module, "spectrum") else None
+    if not hasattr(module, "count"):
+        found = tuple(_links(name, module, size, keywords))
+        return ruled(Topology(name, size, found, chosen), rule, len(found))
+    count = module.count(size, **keywords) * (1 if getattr(module, "DIRECTED", False) else 2)
+    if count > LINK_LIMIT:
+        raise _too_many(name, size)
+    made = object.__new__(Topology)
+    for key, value in (("name", name), ("n", size), ("options", chosen)):
+        object.__setattr__(made, key, value)
+    return ruled(made, rule, count)
+
+
+def ruled(graph: Topology, rule: Rule | None, count: int = -1) -> Topology:
+    """Give a graph that was just made its closed form, and the number of its links where its family made them all."""
+    object.__setattr__(graph, "_rule", rule)
+    object.__setattr__(graph, "_count", count)
+    return graph
+
+
+def _links(name: str, module: ModuleType, n: int, keywords: dict[str, Any]) -> Iterator[Link]:
+    """The sorted links of a family's edges; ValueError where they are too many."""
+    directed, one = getattr(module, "DIRECTED", False), Fraction(1)
     limit = LINK_LIMIT if directed else LINK_LIMIT // 2
-    edges = [(i, j, Fraction(weight)) for i, j, weight in islice(module.edges(size), limit + 1)]
-    if len(edges) > limit:
-        raise ValueError(f"topology {name}: n = {size} has too many links; expected at most {LINK_LIMIT}: reduce n")
+    edges = module.edges(n, **keywords)
+    found = [(i, j, one if weight == 1 else Fraction(weight)) for i, j, weight in islice(edges, limit + 1)]
+    if len(found) > limit:
+        raise _too_many(name, n)
     if not directed:
-        edges += [(j, i, weight) for i, j, weight in edges]
-    edges.sort(key=operator.itemgetter(0, 1))
-    return Topology(name, size, tuple(edges))
+        found += [(j, i, weight) for i, j, weight in found]
+    found.sort(key=operator.itemgetter(0, 1))
+    return iter(found)
+
+
+def _too_many(name: str, n: int) -> ValueError:
+    return ValueError(f"topology {name}: n = {n} has too many links; expected at most {LINK_LIMIT}: reduce n")
 
 
 def _size(name: str, n: Any, module: ModuleType) -> int:

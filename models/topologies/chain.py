@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -18,8 +18,14 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
     return ((i, i + 1, 1) for i in range(n - 1))
 
 
-def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
+def count(n: int) -> int:
+    """Number of edges."""
+    return n - 1
+
+
+def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
     """-4 sin²(kπ/2n), k = 0 … n - 1, each once."""
     from ..angles import minus_four_sine_squared
+    from ..descending import Descending
 
-    return [(minus_four_sine_squared(k, 2 * n), 1) for k in range(n)]
+    return Descending(n, n, lambda k: (minus_four_sine_squared(k, 2 * n), 1))

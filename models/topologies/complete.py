@@ -19,6 +19,11 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
     return ((i, j, 1) for i, j in combinations(range(n), 2))
 
 
+def count(n: int) -> int:
+    """Number of edges."""
+    return n * (n - 1) // 2
+
+
 def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
     """0 once, -n n - 1 times."""
     from sympy import Integer

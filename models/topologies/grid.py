@@ -1,26 +1,58 @@
-"""Grid: rows and columns of nodes, each joined to its neighbours left, right, above and below."""
+"""Grid: rows and columns of nodes, or more directions, each node joined to its neighbours in all of them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import isqrt
+from math import isqrt, prod
+from typing import TYPE_CHECKING, Any
 
-SUMMARY = "two-dimensional grid with open ends, as square as n allows (a prime n leaves one row: a chain)"
+from ..family_options import whole_numbers
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+SUMMARY = (
+    "grid with open ends, as square as n allows (a prime n: a chain); shape: nodes in each of any number of directions"
+)
 MINIMUM = 1
 SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.6 (Cartesian product of paths)"
 
 
-def shape(n: int) -> tuple[int, int]:
+def settle(n: int, shape: Any) -> dict[str, Any]:
+    """One or more nodes in each direction, n in all."""
+    if shape is None:
+        return {}
+    sizes = whole_numbers("shape", shape, 1)
+    if prod(sizes) != n:
+        raise ValueError(f"shape = {sizes} has {prod(sizes)} nodes; expected n = {n}")
+    return {"shape": sizes}
+
+
+def sides(n: int) -> tuple[int, int]:
     """Rows and columns: the two factors of n that are closest to each other, rows <= columns."""
     rows = next(r for r in range(isqrt(n), 0, -1) if n % r == 0)
     return rows, n // rows
 
 
-def edges(n: int) -> Iterator[tuple[int, int, int]]:
-    """Row by row: each node with the next of its row and the one below."""
-    _, columns = shape(n)
+def edges(n: int, *, shape: tuple[int, ...] | None = None) -> Iterator[tuple[int, int, int]]:
+    """Row by row: each node with the next in every direction; the last direction varies fastest."""
+    sizes = shape or sides(n)
     for i in range(n):
-        if (i + 1) % columns:
-            yield i, i + 1, 1
-        if i + columns < n:
-            yield i, i + columns, 1
+        step = 1
+        for size in reversed(sizes):
+            if i // step % size + 1 < size:
+                yield i, i + step, 1
+            step *= size
+
+
+def count(n: int, *, shape: tuple[int, ...] | None = None) -> int:
+    """Number of edges."""
+    return sum(n // size * (size - 1) for size in shape or sides(n))
+
+
+def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> list[tuple[sp.Expr, int]]:
+    """Sums of -4 sin²(kπ/2m), one for each direction of m nodes, k = 0 … m - 1."""
+    from ..angle_sums import box
+
+    sizes = shape or sides(n)
+    return box(sizes, (False,) * len(sizes))

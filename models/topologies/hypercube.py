@@ -40,6 +40,11 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
             value *= base
 
 
+def count(n: int) -> int:
+    """Number of edges: half of n (p - 1) for each prime factor p."""
+    return n * sum(p - 1 for p in radices(n)) // 2
+
+
 def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
     """-2 k, C(d, k) times, for n = 2**d; for each prime factor p of n a sum of 0 (once) and -p (p - 1 times)."""
     from sympy import Integer

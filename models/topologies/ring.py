@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -20,8 +20,14 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
     yield 0, n - 1, 1
 
 
-def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
+def count(n: int) -> int:
+    """Number of edges."""
+    return n
+
+
+def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
     """-4 sin²(kπ/n), k = 0 … n/2: twice each, but once for k = 0 and k = n/2."""
     from ..angles import minus_four_sine_squared
+    from ..descending import Descending
 
-    return [(minus_four_sine_squared(k, n), 1 if k in (0, n - k) else 2) for k in range(n // 2 + 1)]
+    return Descending(n // 2 + 1, n, lambda k: (minus_four_sine_squared(k, n), 1 if k in (0, n - k) else 2))

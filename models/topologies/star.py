@@ -18,6 +18,11 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
     return ((0, i, 1) for i in range(1, n))
 
 
+def count(n: int) -> int:
+    """Number of edges."""
+    return n - 1
+
+
 def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
     """0 once, -1 n - 2 times, -n once."""
     from sympy import Integer

@@ -12,3 +12,8 @@ SOURCE = "D. E. Knuth, The Art of Computer Programming 1 (Addison-Wesley, 1997),
 def edges(n: int) -> Iterator[tuple[int, int, int]]:
     """Each node and the one that it hangs on: of nodes 1 … n, node i on node i/2 rounded down."""
     return (((i - 1) // 2, i, 1) for i in range(1, n))
+
+
+def count(n: int) -> int:
+    """Number of edges."""
+    return n - 1

@@ -15,22 +15,34 @@ SUMMARY = "print the exact eigenvalues of a graph's connectivity matrix"
 EXAMPLES = (
     "synchain spectrum chain 4",
     "synchain spectrum star 6 --json",
+    "synchain spectrum circulant 10 --option offsets=1,3",
     "synchain spectrum --matrix G.txt",
+    "synchain spectrum --edges friends.txt",
+    "synchain spectrum --graphml network.graphml",
 )
+
+FILES = ("matrix", "edges", "graphml")
 
 PROVED = 500
 """Up to so many nodes closed forms are multiplied out here; this takes about two seconds."""
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add topology and size, or a file."""
+    """Add topology, size and options, or a file."""
     parser.add_argument("topology", metavar="TOPOLOGY", nargs="?", help="a family of graphs (see: synchain topologies)")
     parser.add_argument("n", metavar="N", nargs="?", type=whole, help="number of nodes")
+    parser.add_argument(
+        "--option", metavar="NAME=VALUE", action="append", default=[],
+        help="an option of the family, e.g. offsets=1,3 or p=1/10 (see: synchain topologies); may be repeated",
+    )  # fmt: skip
     parser.add_argument(
         "--matrix",
         metavar="FILE",
         help="a text file of rows such as '-1 1/2 0.5' that sum to zero; '#' starts a comment",
     )
+    parser.add_argument("--edges", metavar="FILE", help="a text file of edges, one a line: two nodes, perhaps a weight")
+    parser.add_argument("--directed", action="store_true", help="edges of the file act on their second node only")
+    parser.add_argument("--graphml", metavar="FILE", help="a GraphML file; weights as 'weight' of its edges")
     parser.add_argument("--json", action="store_true", help="print JSON: n, eigenvalues, verified")
 
 
@@ -52,16 +64,39 @@ def execute(arguments: Namespace) -> int:
 
 
 def graph(arguments: Namespace) -> Topology:
-    """The graph that the arguments `topology`, `n` and `matrix` ask for."""
+    """The graph that the arguments ask for: of a family or of one of the files."""
+    from synchain.models.graph_readers import read_edges, read_graphml
     from synchain.models.topology import read_matrix, topology
 
+    files = [key for key in FILES if getattr(arguments, key) is not None]
+    if arguments.directed and files != ["edges"]:
+        raise WrongUse("found --directed without --edges; GraphML files and matrices say themselves what is one-way")
+    if len(files) > 1:
+        raise WrongUse(f"found {' and '.join(f'--{key}' for key in files)}; expected one of them")
+    if files and (arguments.topology is not None or arguments.option):
+        raise WrongUse(f"found both a topology and --{files[0]}; expected one of them")
     if arguments.matrix is not None:
-        if arguments.topology is not None or arguments.n is not None:
-            raise WrongUse("found both a topology and --matrix; expected one of them")
         return read_matrix(arguments.matrix)
+    if arguments.edges is not None:
+        return read_edges(arguments.edges, directed=arguments.directed)
+    if arguments.graphml is not None:
+        return read_graphml(arguments.graphml)
     if arguments.topology is None or arguments.n is None:
-        raise WrongUse("expected TOPOLOGY and N, e.g. synchain spectrum chain 4, or --matrix FILE")
-    return topology(arguments.topology, arguments.n)
+        files_text = ", ".join(f"--{key} FILE" for key in FILES)
+        raise WrongUse(f"expected TOPOLOGY and N, e.g. synchain spectrum chain 4, or one of {files_text}")
+    return topology(arguments.topology, arguments.n, **_options(arguments.option))
+
+
+def _options(given: list[str]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not equals or not name.isidentifier():
+            raise WrongUse(f"--option: found {text!r}; expected NAME=VALUE, e.g. offsets=1,3")
+        if name in found:
+            raise WrongUse(f"--option {name} is given twice; expected it once")
+        found[name] = value
+    return found
 
 
 def _reason(graph: Topology) -> str:

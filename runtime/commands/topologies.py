@@ -15,11 +15,14 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Print name, summary and smallest size of every family."""
+    """Print name, summary, smallest size and options of every family."""
+    from synchain.models.family_options import defaults
     from synchain.models.topology import family, names
 
     rows = [(name, family(name)) for name in names()]
     wide = max(len(name) for name, _ in rows)
     for name, module in rows:
-        print(f"{name:<{wide}}  {module.SUMMARY}, {module.MINIMUM} or more nodes")
+        chosen = ", ".join(defaults(module))
+        more = f"; options: {chosen}" if chosen else ""
+        print(f"{name:<{wide}}  {module.SUMMARY}, {module.MINIMUM} or more nodes{more}")
     return FINE

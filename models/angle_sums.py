@@ -1,0 +1,219 @@
+"""Sums of cosines of rational angles with rational factors: added, multiplied, compared and written exactly.
+
+Such sums lie in a cyclotomic field: two are equal where the cyclotomic polynomial divides the difference, and the
+conjugates of one are had by multiplying all its angles (L. C. Washington, Introduction to Cyclotomic Fields, Springer,
+1997, chapter 2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from itertools import product
+from math import cos, gcd, lcm, pi
+
+import sympy as sp
+from flint import arb, arb_poly, fmpq, fmpq_poly, fmpz_poly
+
+from . import angles
+from .balls import Ball, precision
+
+__all__ = ["AngleSum", "box", "expression", "merged", "minimal_polynomial", "read"]
+
+
+@dataclass(frozen=True, slots=True)
+class AngleSum:
+    """shift + Σ 2 b cos(2πt) over `terms` (t, b), 0 < t < 1/2, ascending, each t once, no b = 0."""
+
+    shift: Fraction
+    terms: tuple[tuple[Fraction, Fraction], ...] = ()
+
+    @classmethod
+    def rational(cls, value: Fraction | int) -> AngleSum:
+        """A rational number."""
+        return cls(Fraction(value))
+
+    @classmethod
+    def cosine(cls, a: Fraction | int, b: Fraction | int, k: int, m: int) -> AngleSum:
+        """a + 2 b cos(2πk/m)."""
+        return _collected(Fraction(a), [(Fraction(k, m), Fraction(b))])
+
+    def __add__(self, other: AngleSum) -> AngleSum:
+        if not other.terms or not self.terms:
+            return AngleSum(self.shift + other.shift, self.terms or other.terms)
+        return _collected(self.shift + other.shift, [*self.terms, *other.terms])
+
+    def __mul__(self, other: AngleSum) -> AngleSum:
+        """2 cos x · 2 cos y = 2 cos(x + y) + 2 cos(x - y)."""
+        parts = [(t, self.shift * b) for t, b in other.terms] + [(t, other.shift * b) for t, b in self.terms]
+        for (s, a), (t, b) in product(self.terms, other.terms):
+            parts += [(s + t, a * b), (s - t, a * b)]
+        return _collected(self.shift * other.shift, parts)
+
+    def __neg__(self) -> AngleSum:
+        return AngleSum(-self.shift, tuple((t, -b) for t, b in self.terms))
+
+    @property
+    def near(self) -> float:
+        """The value as a float, within rounding."""
+        return float(self.shift) + sum(2 * float(b) * cos(2 * pi * float(t)) for t, b in self.terms)
+
+    @property
+    def modulus(self) -> int:
+        """The least m such that all angles are multiples of 2π/m."""
+        return lcm(*(t.denominator for t, _ in self.terms))
+
+    def vanishes(self) -> bool:
+        """True where the number is 0, decided exactly."""
+        if not self.terms:
+            return self.shift == 0
+        m = self.modulus
+        coefficients = [fmpq(0)] * m
+        coefficients[0] = _exact(self.shift)
+        for t, b in self.terms:
+            k = int(t * m)
+            coefficients[k] += _exact(b)
+            coefficients[m - k] += _exact(b)
+        remainder = fmpq_poly(coefficients) % fmpq_poly(fmpz_poly.cyclotomic(m))
+        return remainder.degree() < 0
+
+
+def _collected(shift: Fraction, parts: Iterable[tuple[Fraction, Fraction]]) -> AngleSum:
+    """Bring all angles into the first half turn, those with rational cosines into the shift, and add up."""
+    counts: dict[Fraction, Fraction] = {}
+    for turn, b in parts:
+        t = turn % 1
+        t = min(t, 1 - t)
+        if t.denominator in _RATIONAL:
+            shift += b * _RATIONAL[t.denominator]
+        else:
+            counts[t] = counts.get(t, Fraction(0)) + b
+    return AngleSum(shift, tuple(sorted((t, b) for t, b in counts.items() if b)))
+
+
+_RATIONAL = {1: 2, 2: -2, 3: -1, 4: 0, 6: 1}
+"""2 cos(2πt) by the denominator of t, where it is rational."""
+
+
+def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]]:
+    """Equal numbers once, their multiplicities added, descending; nearly equal ones are told apart exactly."""
+    counts: dict[AngleSum, int] = {}
+    for number, times in numbers:
+        counts[number] = counts.get(number, 0) + times
+    ordered = sorted(counts, key=lambda number: number.near, reverse=True)
+    groups: list[list[AngleSum]] = []
+    for number in ordered:
+        if groups and groups[-1][-1].near - number.near < 1e-9 * (1 + abs(number.near)):
+            groups[-1].append(number)
+        else:
+            groups.append([number])
+    found = []
+    for group in groups:
+        different: dict[AngleSum, int] = {}
+        for number in group:
+            same = next((other for other in different if (other + -number).vanishes()), number)
+            different[same] = different.get(same, 0) + counts[number]
+        found += list(different.items())
+    return found
+
+
+def box(sizes: Sequence[int], closed: Sequence[bool]) -> list[tuple[sp.Expr, int]]:
+    """The spectrum of the Cartesian product of chains, and of rings where `closed`: sums of -4 sin² of each."""
+    numbers = [(AngleSum.rational(0), 1)]
+    for size, ring in zip(sizes, closed, strict=True):
+        if ring:
+            one = [(AngleSum.cosine(-2, 1, k, size), 1 if k in (0, size - k) else 2) for k in range(size // 2 + 1)]
+        else:
+            one = [(AngleSum.cosine(-2, 1, k, 2 * size), 1) for k in range(size)]
+        numbers = merged([(a + b, m * times) for (a, m), (b, times) in product(numbers, one)])
+    return [(expression(number), times) for number, times in numbers]
+
+
+def expression(number: AngleSum) -> sp.Expr:
+    """The number with short radicals, and -4 b sin² for all other cosines."""
+    shift, short, long = number.shift, [], []
+    for t, b in number.terms:
+        k, m = t.numerator, t.denominator
+        if angles.is_short(k, m):
+            short.append(angles.cosine(Fraction(0), b, k, m))
+        else:
+            shift += 2 * b
+            long.append(angles.minus_four_sine_squared(k, m) * sp.Rational(b.numerator, b.denominator))
+    return sp.Add(sp.Rational(shift.numerator, shift.denominator), *short, *long)
+
+
+def read(number: sp.Expr) -> AngleSum | None:
+    """A SymPy expression as such a sum; None where it is none, or has radicals other than those of `angles.cosine`."""
+    found = AngleSum.rational(0)
+    for part in sp.Add.make_args(number):
+        factor, core = part.as_coeff_Mul()
+        if not factor.is_Rational:
+            return None
+        b = Fraction(int(factor.p), int(factor.q))
+        known = _atoms().get(core)
+        if known is not None:
+            found += AngleSum(known.shift * b, tuple((t, x * b) for t, x in known.terms))
+            continue
+        form = angles.linear_cosine(part)
+        if form is None:
+            return None
+        found += AngleSum.cosine(*form)
+    return found
+
+
+@lru_cache(maxsize=1)
+def _atoms() -> dict[sp.Expr, AngleSum]:
+    """1 and the radicals that `angles.cosine` writes; √5 = 1 + 4 cos(2π/5), √6 = 2 cos(π/12) + 2 cos(5π/12)."""
+
+    def c(*turns: tuple[int, int]) -> AngleSum:
+        return sum((AngleSum.cosine(0, 1, k, m) for k, m in turns), AngleSum.rational(0))
+
+    root = sp.sqrt
+    return {
+        sp.S.One: AngleSum.rational(1),
+        root(2): c((1, 8)),
+        root(3): c((1, 12)),
+        root(5): AngleSum.rational(1) + c((1, 5), (1, 5)),
+        root(6): c((1, 24), (5, 24)),
+        root(2 + root(2)): c((1, 16)),
+        root(2 - root(2)): c((3, 16)),
+        root(sp.Rational(5, 2) + root(5) / 2): c((1, 20)),
+        root(sp.Rational(5, 2) - root(5) / 2): c((3, 20)),
+    }
+
+
+def minimal_polynomial(number: AngleSum) -> fmpq_poly:
+    """The monic irreducible polynomial over the rationals of which the number is a root.
+
+    The product of (z - conjugate) over all multiples of the angles is a power of it; times a common denominator
+    the number is an algebraic integer, so that balls around the coefficients of that product give them exactly.
+    """
+    if not number.terms:
+        return fmpq_poly([-_exact(number.shift), 1])
+    scale = lcm(number.shift.denominator, *(b.denominator for _, b in number.terms))
+    m = number.modulus
+    units = [u for u in range(1, m // 2 + 1) if gcd(u, m) == 1]
+    bits = 64
+    while True:
+        with precision(bits):
+            power = arb_poly.from_roots([_conjugate(number, u, scale) for u in units]).unique_fmpz_poly()
+        if power is not None:
+            break
+        bits *= 2
+    whole = fmpq_poly(power)
+    part = whole / whole.gcd(whole.derivative())
+    scaled = part(fmpq_poly([0, scale]))
+    return scaled / scaled[scaled.degree()]
+
+
+def _conjugate(number: AngleSum, unit: int, scale: int) -> Ball:
+    total = arb(_exact(number.shift * scale))
+    for t, b in number.terms:
+        total += 2 * arb(_exact(b * scale)) * arb.cos_pi_fmpq(_exact(2 * unit * t))
+    return total
+
+
+def _exact(x: Fraction) -> fmpq:
+    return fmpq(x.numerator, x.denominator)

@@ -1,0 +1,37 @@
+"""Sequences whose items are made when they are asked for: spectra of a million nodes cost nothing until then."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar, overload
+
+__all__ = ["Descending"]
+
+T = TypeVar("T", covariant=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Descending(Sequence[T]):
+    """`length` items, `make(0)`, `make(1)` …: the distinct real eigenvalues of `n` nodes, the largest (0) first.
+
+    A slice is a list of its items.
+    """
+
+    length: int
+    n: int
+    make: Callable[[int], T]
+
+    def __len__(self) -> int:
+        return self.length
+
+    @overload
+    def __getitem__(self, place: int) -> T: ...
+    @overload
+    def __getitem__(self, place: slice) -> list[T]: ...
+    def __getitem__(self, place: int | slice) -> T | list[T]:
+        places = range(self.length)[place]
+        return self.make(places) if isinstance(places, int) else [self.make(k) for k in places]
+
+    def __repr__(self) -> str:
+        return f"Descending({self.length} items)"

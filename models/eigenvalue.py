@@ -1,0 +1,91 @@
+"""One exact eigenvalue: a SymPy expression or an algebraic number, its multiplicity, its float and any digits of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import sympy as sp
+from flint import fmpq
+
+from .algebraic import ComplexRoot, RealRoot
+from .balls import Ball, accurate, decimals, enclose, nearest
+from .proof import ProofError, distinct
+
+__all__ = ["Eigenvalue", "decimal", "ordered"]
+
+
+@dataclass(frozen=True, slots=True)
+class Eigenvalue:
+    """An exact number with its algebraic multiplicity.
+
+    `number` is a SymPy expression or an algebraic number that is not written as radicals; `value` is the
+    nearest float, or complex.
+    """
+
+    number: sp.Expr | RealRoot | ComplexRoot
+    multiplicity: int
+    value: float | complex = field(init=False, compare=False)
+
+    def __post_init__(self) -> None:
+        count = self.multiplicity
+        if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+            raise ValueError(f"eigenvalue {self.text}: multiplicity {count!r}; expected an integer >= 1")
+        object.__setattr__(self, "value", nearest(self._ball))
+
+    @property
+    def exact(self) -> sp.Expr:
+        """The number as a SymPy expression (CRootOf where no shorter form is known)."""
+        return self.number.expression if isinstance(self.number, (RealRoot, ComplexRoot)) else self.number
+
+    @property
+    def text(self) -> str:
+        """The exact number as text that SymPy reads back."""
+        return self.number.text if isinstance(self.number, (RealRoot, ComplexRoot)) else sp.sstr(self.number)
+
+    def enclosure(self, bits: int) -> Ball:
+        """A certified ball (flint.arb or flint.acb) of radius below 2**-bits times the modulus."""
+        return accurate(self._ball, bits)
+
+    def evaluate(self, digits: int) -> sp.Expr:
+        """The value as a SymPy Float, within one unit of the last of `digits` significant digits."""
+        if isinstance(digits, bool) or not isinstance(digits, int) or digits < 1:
+            raise ValueError(f"digits = {digits!r}; expected a positive integer")
+        return decimals(self._ball, digits)
+
+    def _ball(self, bits: int) -> Ball:
+        if isinstance(self.number, (RealRoot, ComplexRoot)):
+            return self.number.enclosure(bits)
+        return enclose(self.number, bits)
+
+    def __str__(self) -> str:
+        text = self.text
+        if len(text) <= 60 or not isinstance(self.number, (RealRoot, ComplexRoot)):
+            return text
+        return f"{decimal(self.value)} (degree {len(self.number.polynomial) - 1})"
+
+
+def ordered(claims: Sequence[Eigenvalue]) -> tuple[Eigenvalue, ...]:
+    """From 0 downwards by real part; reals compared by certified balls, conjugates side by side."""
+    if any(isinstance(e.value, complex) for e in claims):
+        return tuple(sorted(claims, key=_complex_key))
+    if len({e.value for e in claims}) == len(claims):
+        return tuple(sorted(claims, key=lambda e: e.value.real, reverse=True))
+    if not distinct(claims):
+        raise ProofError(f"two of {len(claims)} eigenvalues coincide; expected distinct ones")
+    return tuple(sorted(claims, key=_midpoint, reverse=True))
+
+
+def _complex_key(e: Eigenvalue) -> tuple[float, float, float]:
+    return -round(e.value.real, 12), abs(e.value.imag), e.value.imag
+
+
+def _midpoint(e: Eigenvalue) -> fmpq:
+    mantissa, exponent = e.enclosure(4200).mid().man_exp()
+    return fmpq(mantissa) * fmpq(2) ** int(exponent)
+
+
+def decimal(value: float | complex) -> str:
+    if isinstance(value, complex):
+        return f"{value.real:.15g} {'-' if value.imag < 0 else '+'} {abs(value.imag):.15g}i"
+    return f"{value:.16g}"

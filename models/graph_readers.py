@@ -1,0 +1,182 @@
+"""Graphs out of what users have: lists of edges, networkx graphs, sparse matrices, edge lists and GraphML files.
+
+Everything is taken by what it can do, so that none of those packages is needed here.  An edge from u to v means that v
+feels u: it becomes the link v <- u.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from .rationals import FILE_LIMIT, rational
+from .topology import LINK_LIMIT, Topology
+
+__all__ = ["from_edges", "from_graph", "from_sparse", "read_edges", "read_graphml"]
+
+Weights = dict[tuple[int, int], Fraction]
+
+
+def from_edges(
+    edges: Iterable[Sequence[Any]], n: int | None = None, directed: bool = False, name: str = "edges"
+) -> Topology:
+    """The graph of edges (i, j) or (i, j, weight), nodes 0 … n - 1; `directed`: j feels i, not the other way round.
+
+    Without `n` the largest node is the last.  Raises ValueError on a wrong node, a loop, a repeated edge, a weight that
+    is not rational or 0, and TypeError on nodes that are no whole numbers.
+    """
+    found = [_edge(edge, f"{name}: edge {k + 1}") for k, edge in enumerate(edges)]
+    size = 1 + max((max(i, j) for i, j, _ in found), default=-1) if n is None else _whole(n, f"{name}: n")
+    weights: Weights = {}
+    for i, j, weight in found:
+        _put(weights, j, i, weight, directed, name, lambda k: str(k))
+    return _graph(name, size, weights)
+
+
+def from_graph(graph: Any, weight: str = "weight", name: str = "graph") -> Topology:
+    """The graph of a networkx graph, nodes in its order; weights by their decimal text, 1 where there is none.
+
+    Edges of a directed graph act from their first node on their second; parallel edges of a multigraph add up.
+    Raises TypeError on another object, ValueError on loops and on weights that are not rational.
+    """
+    if not all(hasattr(graph, need) for need in ("nodes", "edges", "is_directed")):
+        raise TypeError(f"{name} is a {type(graph).__name__}; expected a networkx graph (nodes, edges, is_directed)")
+    nodes = list(graph.nodes())
+    place = {node: k for k, node in enumerate(nodes)}
+    many = bool(graph.is_multigraph()) if hasattr(graph, "is_multigraph") else False
+    weights: Weights = {}
+    for u, v, data in graph.edges(data=True):
+        value = rational(data.get(weight, 1), f"{name}: weight of edge {u!r} - {v!r}")
+        _put(weights, place[v], place[u], value, graph.is_directed(), name, lambda k: repr(nodes[k]), many)
+    return _graph(name, len(nodes), weights)
+
+
+def from_sparse(matrix: Any, adjacency: bool = False, name: str = "matrix") -> Topology:
+    """The graph of a SciPy sparse connectivity matrix G with row sums of zero, or with `adjacency` of weights A_ij, j on i.
+
+    Raises TypeError where there is no `tocoo`, ValueError where it is not square, a row sum is not zero (beyond 1e-12
+    of its entries) or an adjacency matrix has a diagonal.
+    """
+    if not hasattr(matrix, "tocoo"):
+        raise TypeError(f"{name} is a {type(matrix).__name__}; expected a SciPy sparse matrix (one that has tocoo)")
+    entries = matrix.tocoo()
+    rows, columns = entries.shape
+    if rows != columns:
+        raise ValueError(f"{name} has {rows} rows and {columns} columns; expected a square matrix")
+    weights, sums, sizes = Weights(), [Fraction(0)] * rows, [Fraction(0)] * rows
+    for i, j, value in zip(entries.row.tolist(), entries.col.tolist(), entries.data.tolist(), strict=True):
+        number = rational(value, f"{name}: entry ({i + 1}, {j + 1})")
+        sums[i], sizes[i] = sums[i] + number, sizes[i] + abs(number)
+        if i != j:
+            weights[i, j] = weights.get((i, j), Fraction(0)) + number
+        elif adjacency and number:
+            raise ValueError(
+                f"{name}: entry ({i + 1}, {i + 1}) is {number}; expected no diagonal in an adjacency matrix"
+            )
+    wrong = next((i for i in range(rows) if abs(sums[i]) * 10**12 > sizes[i]), None)
+    if wrong is not None and not adjacency:
+        raise ValueError(
+            f"{name}: row {wrong + 1} sums to {sums[wrong]}; expected 0, or the synchronous state is no solution: "
+            "correct its diagonal, or say adjacency=True"
+        )
+    return _graph(name, rows, weights)
+
+
+def read_edges(path: str | Path, directed: bool = False) -> Topology:
+    """The graph of a text file with an edge a line: two nodes and, if wanted, a weight; `#` starts a comment.
+
+    Nodes are any words; whole numbers are put in ascending order, other names in that of their first mention.  A line
+    with one word is a node without edges.  Raises FileNotFoundError, and ValueError on what `from_edges` refuses.
+    """
+    text, name = file_text(path, "edge file")
+    edges: list[tuple[str, str, Any]] = []
+    order: dict[str, None] = {}
+    for number, line in enumerate(text.splitlines(), 1):
+        words = line.partition("#")[0].replace(",", " ").split()
+        if len(words) > 3:
+            raise ValueError(f"{name}: line {number} has {len(words)} words; expected two nodes and perhaps a weight")
+        order.update(dict.fromkeys(words[:2]))
+        if len(words) > 1:
+            edges.append((words[0], words[1], rational(words[2], f"{name}: line {number}") if words[2:] else 1))
+    numbers = all(word.isascii() and word.isdecimal() and len(word) < 19 for word in order)
+    nodes = sorted(order, key=int) if numbers else list(order)
+    return assembled(nodes, [(u, v, weight, directed) for u, v, weight in edges], name)
+
+
+def read_graphml(path: str | Path, weight: str = "weight") -> Topology:
+    """The graph of a GraphML file, nodes in its order; the weight of an edge is its data of that name, 1 without.
+
+    Raises FileNotFoundError, and ValueError on a document type, on nested graphs, hyperedges, unknown nodes and
+    whatever `from_edges` refuses.  (U. Brandes et al., Graph Drawing 2001, LNCS 2265, 501.)
+    """
+    from .graphml import parsed
+
+    text, name = file_text(path, "GraphML file")
+    nodes, edges = parsed(text, name, weight)
+    return assembled(nodes, edges, name)
+
+
+def assembled(nodes: Sequence[Hashable], edges: Iterable[tuple[Hashable, Hashable, Any, bool]], name: str) -> Topology:
+    """The graph of named nodes and edges (from, to, weight, one-way)."""
+    place = {node: k for k, node in enumerate(nodes)}
+    weights: Weights = {}
+    for u, v, value, directed in edges:
+        number = rational(value, f"{name}: weight of edge {u} - {v}")
+        _put(weights, place[v], place[u], number, directed, name, lambda k: str(nodes[k]))
+    return _graph(name, len(nodes), weights)
+
+
+def file_text(path: str | Path, what: str) -> tuple[str, str]:
+    """The text of a file of at most FILE_LIMIT bytes, and its name."""
+    place = Path(path)
+    if not place.exists():
+        raise FileNotFoundError(f"{what} {str(place)!r} does not exist; check the path")
+    if not place.is_file():
+        raise ValueError(f"{what} {str(place)!r} is a folder or device; expected a text file")
+    size = place.stat().st_size
+    if size > FILE_LIMIT:
+        raise ValueError(f"{what} {str(place)!r} has {size} bytes; expected at most {FILE_LIMIT}")
+    try:
+        return place.read_text(encoding="utf-8-sig"), place.name
+    except UnicodeDecodeError:
+        raise ValueError(f"{what} {str(place)!r} is not UTF-8; save it in that encoding") from None
+
+
+def _put(
+    weights: Weights, target: int, source: int, value: Fraction, directed: bool, name: str,
+    called: Callable[[int], str], many: bool = False,
+) -> None:  # fmt: skip
+    """Add an edge; ValueError where it is a loop, has no weight or is there already."""
+    edge = f"{name}: edge {called(source)} - {called(target)}"
+    if target == source:
+        raise ValueError(f"{edge} joins a node to itself; it has no effect on a difference: leave it out")
+    if not value:
+        raise ValueError(f"{edge} has weight 0; leave it out or give it a weight")
+    for link in [(target, source)] if directed else [(target, source), (source, target)]:
+        if link in weights and not many:
+            raise ValueError(f"{edge} is given twice; expected each edge once: add the weights up")
+        weights[link] = weights.get(link, Fraction(0)) + value
+
+
+def _edge(edge: Sequence[Any], where: str) -> tuple[int, int, Fraction]:
+    if isinstance(edge, str) or not hasattr(edge, "__len__") or len(edge) not in (2, 3):
+        raise ValueError(f"{where} is {edge!r}; expected (i, j) or (i, j, weight)")
+    i, j = (_whole(node, where) for node in edge[:2])
+    return i, j, rational(edge[2], where) if len(edge) == 3 else Fraction(1)
+
+
+def _whole(value: Any, where: str) -> int:
+    if isinstance(value, bool) or not hasattr(value, "__index__"):
+        raise TypeError(f"{where}: {value!r} is a {type(value).__name__}; expected a whole number")
+    number = int(value.__index__())
+    if number < 0:
+        raise ValueError(f"{where}: {number}; expected 0 or more: nodes are counted from 0")
+    return number
+
+
+def _graph(name: str, n: int, weights: Weights) -> Topology:
+    if len(weights) > LINK_LIMIT:
+        raise ValueError(f"{name}: {len(weights)} links; expected at most {LINK_LIMIT}")
+    return Topology(name, n, tuple((i, j, weights[i, j]) for i, j in sorted(weights) if weights[i, j]))

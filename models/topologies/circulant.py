@@ -1,0 +1,52 @@
+"""Circulant graph: a ring whose nodes are also joined at other distances."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+from ..family_options import whole_numbers
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+SUMMARY = "circulant graph: every node joined to those at given distances round a ring (offsets, 1 and 2)"
+MINIMUM = 3
+SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 6.4 (Cayley graphs)"
+
+CONNECTED = False
+
+
+def settle(n: int, offsets: Any) -> dict[str, Any]:
+    """Distances of 1 … n/2, each once; n - s is s."""
+    given = whole_numbers("offsets", offsets, 1)
+    for s in given:
+        if s % n == 0:
+            raise ValueError(f"offsets = {given}: {s} joins nodes of a ring of {n} to themselves; leave it out")
+    return {"offsets": tuple(sorted({min(s % n, -s % n) for s in given}))}
+
+
+def edges(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> Iterator[tuple[int, int, int]]:
+    """Each node and those that are further by an offset; by n/2, half of the nodes only."""
+    for s in offsets:
+        for i in range(n // 2 if 2 * s == n else n):
+            j = (i + s) % n
+            yield min(i, j), max(i, j), 1
+
+
+def count(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> int:
+    """Number of edges."""
+    return sum(n // 2 if 2 * s == n else n for s in offsets)
+
+
+def spectrum(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> list[tuple[sp.Expr, int]]:
+    """Sums of -4 sin²(ksπ/n) over the offsets s (half of it for s = n/2), k = 0 … n - 1."""
+    from ..angle_sums import AngleSum, expression, merged
+
+    weights = [(s, Fraction(1, 2) if 2 * s == n else Fraction(1)) for s in offsets]
+    numbers = []
+    for k in range(n // 2 + 1):
+        parts = [AngleSum.cosine(-2 * weight, weight, k * s, n) for s, weight in weights]
+        numbers.append((sum(parts, AngleSum.rational(0)), 1 if k in (0, n - k) else 2))
+    return [(expression(number), times) for number, times in merged(numbers)]

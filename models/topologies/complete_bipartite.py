@@ -1,0 +1,49 @@
+"""Complete bipartite graph: two groups; every node is joined to all of the other group."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from ..family_options import whole
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+SUMMARY = "complete bipartite graph: all nodes of one group with all of another (left: size of the first, half of n)"
+MINIMUM = 2
+SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.2"
+
+
+def settle(n: int, left: Any) -> dict[str, Any]:
+    """1 … n - 1 nodes on the left."""
+    if left is None:
+        return {}
+    size = whole("left", left, 1)
+    if size >= n:
+        raise ValueError(f"left = {size} of n = {n} nodes; expected at most {n - 1}, so that both groups have nodes")
+    return {"left": size}
+
+
+def edges(n: int, *, left: int | None = None) -> Iterator[tuple[int, int, int]]:
+    """Each node of the first group and each of the second."""
+    p = left or n // 2
+    return ((i, j, 1) for i in range(p) for j in range(p, n))
+
+
+def count(n: int, *, left: int | None = None) -> int:
+    """Number of edges."""
+    p = left or n // 2
+    return p * (n - p)
+
+
+def spectrum(n: int, *, left: int | None = None) -> list[tuple[sp.Expr, int]]:
+    """0, -p q - 1 times, -q p - 1 times, -(p + q), for groups of p and q."""
+    from sympy import Integer
+
+    p = left or n // 2
+    counts = {0: 1}
+    for value, times in ((p, n - p - 1), (n - p, p - 1), (n, 1)):
+        if times:
+            counts[value] = counts.get(value, 0) + times
+    return [(Integer(-value), times) for value, times in sorted(counts.items())]

@@ -1,0 +1,41 @@
+"""Random graph: every pair is joined with the same probability."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from math import log1p
+from typing import Any
+
+from ..family_options import probability, whole
+
+SUMMARY = "random graph: each pair joined with probability p (1/2), fixed by seed (0); it may fall into parts"
+MINIMUM = 1
+SOURCE = (
+    "E. N. Gilbert, Ann. Math. Stat. 30, 1141 (1959); P. Erdős, A. Rényi, Publ. Math. Debrecen 6, 290 (1959); drawn as "
+    "V. Batagelj, U. Brandes, Phys. Rev. E 71, 036113 (2005)"
+)
+
+CONNECTED = False
+
+
+def settle(n: int, p: Any, seed: Any) -> dict[str, Any]:
+    """A probability and a whole number."""
+    return {"p": probability("p", p), "seed": whole("seed", seed, 0)}
+
+
+def edges(n: int, *, p: str = "1/2", seed: int = 0) -> Iterator[tuple[int, int, int]]:
+    """Each pair with probability p: one draw for each edge, which tells how many pairs are left out before it."""
+    stream = random.Random(seed)
+    top, _, bottom = p.partition("/")
+    chance = int(top) / int(bottom or 1)
+    if chance == 1:
+        yield from ((i, j, 1) for j in range(n) for i in range(j))
+    elif chance:
+        i, j, scale = -1, 1, log1p(-chance)
+        while j < n:
+            i += 1 + int(log1p(-stream.random()) / scale)
+            while i >= j and j < n:
+                i, j = i - j, j + 1
+            if j < n:
+                yield i, j, 1

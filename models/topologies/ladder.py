@@ -1,0 +1,38 @@
+"""Ladder: two chains, the rails, joined by rungs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+SUMMARY = "ladder: two chains joined node by node (odd n: the first chain is one node longer)"
+MINIMUM = 2
+SOURCE = (
+    "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.6 (Cartesian product of two paths)"
+)
+
+
+def edges(n: int) -> Iterator[tuple[int, int, int]]:
+    """Nodes 0, 2, 4 … are one rail, 1, 3, 5 … the other."""
+    for i in range(n):
+        if i % 2 == 0 and i + 1 < n:
+            yield i, i + 1, 1
+        if i + 2 < n:
+            yield i, i + 2, 1
+
+
+def count(n: int) -> int:
+    """Number of edges."""
+    return n // 2 + n - 2
+
+
+def spectrum(n: int) -> list[tuple[sp.Expr, int]] | None:
+    """-4 sin²(kπ/n) and that less 2, k = 0 … n/2 - 1; none for odd n."""
+    if n % 2:
+        return None
+    from ..angle_sums import box
+
+    return box((2, n // 2), (False, False))

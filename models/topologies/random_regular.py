@@ -1,0 +1,60 @@
+"""Random regular graph: every node has the same number of neighbours, drawn at random."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from typing import Any
+
+from ..family_options import whole
+
+SUMMARY = "random graph with the same number of neighbours at each node (degree, 4), fixed by seed (0)"
+MINIMUM = 5
+SOURCE = "A. Steger, N. C. Wormald, Comb. Probab. Comput. 8, 377 (1999)"
+
+CONNECTED = False
+Edges = set[tuple[int, int]]
+
+
+def settle(n: int, degree: Any, seed: Any) -> dict[str, Any]:
+    """A degree below n, and n times the degree even."""
+    neighbours = whole("degree", degree, 1)
+    if neighbours >= n or n * neighbours % 2:
+        raise ValueError(f"degree = {neighbours} with n = {n}; expected less than n, and n times degree even")
+    return {"degree": neighbours, "seed": whole("seed", seed, 0)}
+
+
+def edges(n: int, *, degree: int = 4, seed: int = 0) -> Iterator[tuple[int, int, int]]:
+    """Pair free ends at random until none is left; from the start again where the rest cannot be paired."""
+    stream = random.Random(seed)
+    found = None
+    while found is None:
+        found = _paired(n, degree, stream)
+    return ((i, j, 1) for i, j in sorted(found))
+
+
+def _paired(n: int, degree: int, stream: random.Random) -> Edges | None:
+    """The edges of one attempt; None where the ends that are left have no pair to form."""
+    ends = [i for i in range(n) for _ in range(degree)]
+    found: Edges = set()
+    while ends:
+        for k in range(len(ends) - 1, 0, -1):
+            j = int(stream.random() * (k + 1))
+            ends[k], ends[j] = ends[j], ends[k]
+        left: list[int] = []
+        for a, b in zip(ends[::2], ends[1::2], strict=True):
+            pair = (min(a, b), max(a, b))
+            if a == b or pair in found:
+                left += pair
+            else:
+                found.add(pair)
+        if left and not _possible(left, found):
+            return None
+        ends = left
+    return found
+
+
+def _possible(ends: list[int], found: Edges) -> bool:
+    """True where two of the free ends can still be joined."""
+    nodes = sorted(set(ends))
+    return any((a, b) not in found for k, a in enumerate(nodes) for b in nodes[k + 1 :])

@@ -1,0 +1,50 @@
+"""Small world: a ring with several neighbours on either side, some edges of which lead elsewhere."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from typing import Any
+
+from ..family_options import probability, whole
+
+SUMMARY = "ring with several neighbours (4), each edge led elsewhere with probability p (1/10), fixed by seed (0)"
+MINIMUM = 5
+SOURCE = "D. J. Watts, S. H. Strogatz, Nature 393, 440 (1998)"
+
+CONNECTED = False
+
+
+def settle(n: int, neighbours: Any, p: Any, seed: Any) -> dict[str, Any]:
+    """An even number of neighbours below n, a probability, a whole number."""
+    count = whole("neighbours", neighbours, 2)
+    if count % 2 or count >= n:
+        raise ValueError(f"neighbours = {count} with n = {n}; expected an even number below n")
+    return {"neighbours": count, "p": probability("p", p), "seed": whole("seed", seed, 0)}
+
+
+def edges(n: int, *, neighbours: int = 4, p: str = "1/10", seed: int = 0) -> Iterator[tuple[int, int, int]]:
+    """Lap by lap, nearest first: each edge keeps its first node and, by chance, gets another second one."""
+    stream = random.Random(seed)
+    top, _, bottom = p.partition("/")
+    chance = int(top) / int(bottom or 1)
+    near: list[set[int]] = [set() for _ in range(n)]
+    laps = range(1, neighbours // 2 + 1)
+    for i, s in ((i, s) for s in laps for i in range(n)):
+        near[i].add((i + s) % n)
+        near[(i + s) % n].add(i)
+    for s in laps:
+        for i in range(n):
+            if stream.random() < chance and len(near[i]) < n - 1:
+                _rewire(near, i, (i + s) % n, stream)
+    return ((i, j, 1) for i in range(n) for j in sorted(near[i]) if i < j)
+
+
+def _rewire(near: list[set[int]], i: int, old: int, stream: random.Random) -> None:
+    new = i
+    while new == i or new in near[i]:
+        new = int(stream.random() * len(near))
+    near[i].remove(old)
+    near[old].remove(i)
+    near[i].add(new)
+    near[new].add(i)

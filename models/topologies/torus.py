@@ -1,0 +1,58 @@
+"""Torus: a grid of any dimension whose opposite ends are joined."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import isqrt, prod
+from typing import TYPE_CHECKING, Any
+
+from ..family_options import whole_numbers
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+SUMMARY = (
+    "grid with joined ends, as square as n allows (a prime n: a ring); shape: nodes in each of any number of directions"
+)
+MINIMUM = 3
+SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.6 (Cartesian product of cycles)"
+
+
+def settle(n: int, shape: Any) -> dict[str, Any]:
+    """Three or more nodes in each direction, n in all."""
+    if shape is None:
+        return {}
+    sizes = whole_numbers("shape", shape, 3)
+    if prod(sizes) != n:
+        raise ValueError(f"shape = {sizes} has {prod(sizes)} nodes; expected n = {n}")
+    return {"shape": sizes}
+
+
+def sides(n: int) -> tuple[int, ...]:
+    """The two factors of n, 3 or more, that are closest to each other; n alone, a ring, where there are none."""
+    rows = next((r for r in range(isqrt(n), 2, -1) if n % r == 0), None)
+    return (n,) if rows is None else (rows, n // rows)
+
+
+def edges(n: int, *, shape: tuple[int, ...] | None = None) -> Iterator[tuple[int, int, int]]:
+    """Each node and the next one in every direction; the last direction varies fastest."""
+    for i in range(n):
+        step = 1
+        for size in reversed(shape or sides(n)):
+            place = i // step % size
+            j = i + step if place + 1 < size else i - step * (size - 1)
+            yield min(i, j), max(i, j), 1
+            step *= size
+
+
+def count(n: int, *, shape: tuple[int, ...] | None = None) -> int:
+    """Number of edges."""
+    return n * len(shape or sides(n))
+
+
+def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> list[tuple[sp.Expr, int]]:
+    """Sums of -4 sin²(kπ/m), one for each direction of m nodes, k = 0 … m - 1."""
+    from ..angle_sums import box
+
+    sizes = shape or sides(n)
+    return box(sizes, (True,) * len(sizes))

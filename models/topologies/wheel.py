@@ -1,0 +1,37 @@
+"""Wheel: a hub, node 0, joined to every node of a ring."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+SUMMARY = "wheel: a hub (the first node) joined to every node of a ring"
+MINIMUM = 4
+SOURCE = (
+    "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.3, with the join of section 1.4.5"
+)
+
+
+def edges(n: int) -> Iterator[tuple[int, int, int]]:
+    """The spokes, then the rim."""
+    spokes = ((0, i, 1) for i in range(1, n))
+    return chain(spokes, ((i, i + 1, 1) for i in range(1, n - 1)), [(1, n - 1, 1)])
+
+
+def count(n: int) -> int:
+    """Number of edges."""
+    return 2 * (n - 1)
+
+
+def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
+    """0, -n, and -1 - 4 sin²(kπ/(n - 1)) for k = 1 … n - 2."""
+    from ..angle_sums import AngleSum, expression, merged
+
+    ring = [(AngleSum.cosine(-3, 1, k, n - 1), 1) for k in range(1, n - 1)]
+    return [
+        (expression(a), times) for a, times in merged([(AngleSum.rational(0), 1), (AngleSum.rational(-n), 1), *ring])
+    ]
