@@ -1,45 +1,154 @@
-"""One-file plug-ins: found by listing their directory, called with the symbols their functions ask for by name."""
+"""One-file plug-ins: found by listing their directory, called with the symbols their functions ask for by name.
+
+Besides the files of this package there are entry points of installed packages (groups ``synchain.oscillators``,
+``synchain.frictions``, ``synchain.couplings``), and files anywhere, named by a path that ends in ``.py``.  Such a file is
+run only after `allow_code` has been called for it, so that a scene, which is data, never runs code by itself.
+"""
 
 from __future__ import annotations
 
 import difflib
 import inspect
 import pkgutil
+import traceback
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-__all__ = ["call", "load", "names"]
+__all__ = ["allow_code", "call", "load", "names"]
 
 OTHERWISE = {"coupling": ", or components such as 'x->x'"}
 """What a kind can be besides the name of a file, for the message that refuses a name."""
 
+NEEDED = {"oscillator": ("PARAMETERS", "FRICTION"), "friction": ("PARAMETERS", "force"), "coupling": ("PARAMETERS",)}
+ONE_OF = {"oscillator": ("field", "kinetic"), "coupling": ("potential", "dissipation")}
+"""What a file from outside must hold; of ONE_OF at least one."""
+
+_allowed: set[Path] = set()
+
 
 def names(kind: str) -> tuple[str, ...]:
     """Return the names of all plug-ins of a kind (``oscillator``, ``friction``, ``coupling``), sorted."""
-    package = import_module(f".{kind}s", __package__)
-    return tuple(sorted(m.name for m in pkgutil.iter_modules(package.__path__) if not m.name.startswith("_")))
+    return tuple(sorted({*_own(kind), *_entry_points(kind)}))
+
+
+def allow_code(*paths: str | Path) -> None:
+    """Allow files outside the package to be run as plug-ins, from now on; ValueError where one is no .py file.
+
+    Afterwards their paths are names: Scene(friction="./my_law.py").  Only allow what you have read.
+    """
+    for path in paths:
+        place = Path(path)
+        if place.suffix != ".py" or not place.is_file():
+            raise ValueError(f"plug-in {str(path)!r} is no file that ends in .py; check the path")
+        _allowed.add(place.resolve())
 
 
 def load(kind: str, name: str) -> ModuleType:
-    """Return the plug-in module `name`; raises ValueError with the known names where there is none."""
+    """Return the plug-in module `name`; raises ValueError with the known names where there is none.
+
+    A path that ends in ".py" is loaded where `allow_code` has allowed it; an error in that file names its line.
+    """
+    if name in _own(kind):
+        return import_module(f".{kind}s.{name}", __package__)
+    if isinstance(name, str) and name.endswith(".py"):
+        return _file(kind, name)
+    entries = _entry_points(kind)
+    if name in entries:
+        return _entry(kind, name)
     known = names(kind)
-    if name not in known:
-        close = difflib.get_close_matches(str(name), known, n=1)
-        hint = f" (did you mean {close[0]!r}?)" if close else ""
-        raise ValueError(f"unknown {kind} {name!r}; known: {', '.join(known)}{OTHERWISE.get(kind, '')}{hint}")
-    return import_module(f".{kind}s.{name}", __package__)
+    close = difflib.get_close_matches(str(name), known, n=1)
+    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    raise ValueError(f"unknown {kind} {name!r}; known: {', '.join(known)}{OTHERWISE.get(kind, '')}{hint}")
 
 
 def call(function: Callable[..., Any], symbols: Mapping[str, Any]) -> Any:
     """Call a plug-in's function with those of `symbols` that its signature names.
 
-    Raises ValueError where it asks for a name that is not among them.
+    Raises ValueError where it asks for a name that is not among them, and where a function from outside the package
+    fails, with its file and line.
     """
     wanted = inspect.signature(function).parameters
     for name in wanted:
         if name not in symbols:
             where = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
             raise ValueError(f"{where} asks for {name!r}; known: {', '.join(symbols)}; declare it as a parameter")
-    return function(**{name: symbols[name] for name in wanted})
+    given = {name: symbols[name] for name in wanted}
+    if str(function.__module__).startswith(f"{__package__}."):
+        return function(**given)
+    try:
+        return function(**given)
+    except Exception as error:
+        raise _located(error, inspect.getsourcefile(function) or function.__module__) from error
+
+
+def _own(kind: str) -> tuple[str, ...]:
+    package = import_module(f".{kind}s", __package__)
+    return tuple(m.name for m in pkgutil.iter_modules(package.__path__) if not m.name.startswith("_"))
+
+
+@lru_cache(maxsize=8)
+def _entry_points(kind: str) -> Mapping[str, Any]:
+    """The plug-ins that installed packages announce; none is loaded for this."""
+    from importlib.metadata import entry_points
+
+    return {entry.name: entry for entry in entry_points(group=f"synchain.{kind}s")}
+
+
+def _entry(kind: str, name: str) -> ModuleType:
+    entry = _entry_points(kind)[name]
+    try:
+        module = entry.load()
+    except Exception as error:
+        raise _located(error, "", f"{kind} {name!r} of the entry point {entry.value!r}") from error
+    return _complete(kind, module, f"{kind} {name!r} of the entry point {entry.value!r}")
+
+
+def _file(kind: str, name: str) -> ModuleType:
+    place = Path(name).resolve()
+    if place not in _allowed:
+        raise ValueError(
+            f"{kind} {name!r} is a file of code, which is not run unasked; read it, then allow it: "
+            f"synchain.models.plugins.allow_code({name!r}), or --allow-code where a command has it"
+        )
+    return _run(kind, place)
+
+
+@lru_cache(maxsize=64)
+def _run(kind: str, place: Path) -> ModuleType:
+    spec = spec_from_file_location(f"synchain_{kind}_{place.stem}", place)
+    if spec is None or spec.loader is None:
+        raise ValueError(f"{kind} {str(place)!r} cannot be loaded as Python; expected a .py file")
+    module = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise _located(error, str(place)) from error
+    return _complete(kind, module, str(place))
+
+
+def _complete(kind: str, module: Any, where: str) -> ModuleType:
+    """The module, where it holds what its kind must hold."""
+    missing = [name for name in NEEDED[kind] if not hasattr(module, name)]
+    choice = ONE_OF.get(kind, ())
+    if choice and not any(hasattr(module, name) for name in choice):
+        missing.append(" or ".join(choice))
+    if missing or not isinstance(module, ModuleType):
+        found = "no module" if not isinstance(module, ModuleType) else f"no {', no '.join(missing)}"
+        raise ValueError(f"{where}: found {found}; expected a {kind} file; see: synchain new {kind} NAME")
+    return module
+
+
+def _located(error: Exception, file: str, what: str = "") -> ValueError:
+    """An error in a plug-in with the file and the line where it arose; without `file`, the innermost one."""
+    frames = traceback.extract_tb(error.__traceback__)
+    places = [(frame.filename, frame.lineno) for frame in frames if file in ("", frame.filename)]
+    if isinstance(error, SyntaxError) and error.filename and file in ("", error.filename):
+        places.append((error.filename, error.lineno))
+    place = f"{places[-1][0]}, line {places[-1][1]}" if places else file
+    where = f"{what}: {place}" if what else place
+    return ValueError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}; correct the file")

@@ -5,10 +5,20 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from ._arguments import add_scene
-from ._outcome import FINE, print_json, wrong_use
+from ._outcome import FINE, print_json, warn, wrong_use
 
 SUMMARY = "print the equations of motion that a scene integrates"
-EXAMPLES = ("synchain equations figure_4a", "synchain equations duffing_chain --latex")
+EXAMPLES = (
+    "synchain equations figure_4a",
+    "synchain equations duffing_chain --latex",
+    "synchain equations figure_7 --c > figure_7.c",
+)
+
+SOURCES = {
+    "python": "print a Python module: rhs, jac and sparsity for scipy.integrate.solve_ivp",
+    "c": "print C99 source: rhs and jacobian",
+    "numba": "print a Python module whose rhs is a Numba cfunc with NumbaLSODA's signature",
+}
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -17,16 +27,35 @@ def configure(parser: ArgumentParser) -> None:
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--latex", action="store_true", help="print LaTeX")
     form.add_argument("--json", action="store_true", help="print JSON: states, parameters, right-hand sides")
+    parser.add_argument(
+        "--allow-code",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="let the scene name this .py file as a part of its own, e.g. friction = './my_law.py'; the file is run",
+    )
+    for name, meaning in SOURCES.items():
+        form.add_argument(f"--{name}", action="store_true", help=meaning)
 
 
 def execute(arguments: Namespace) -> int:
-    """Print the equations as text, LaTeX or JSON."""
+    """Print the equations as text, LaTeX, JSON or source."""
+    from synchain.models.plugins import allow_code
     from synchain.models.present import as_dict, latex, text
     from synchain.models.scene_file import load_scene
 
     with wrong_use():
+        allow_code(*arguments.allow_code)
         scene = load_scene(arguments.scene)
-    if arguments.json:
+    source = next((name for name in SOURCES if getattr(arguments, name)), None)
+    if source is not None:
+        from synchain.models import export
+
+        if scene.contact == "set-valued":
+            warn(["set-valued contact: the source holds between events; where sticking starts and ends is not in it"])
+        with wrong_use():
+            print(getattr(export, f"to_{source}")(scene.equations, scene.parameters), end="")
+    elif arguments.json:
         print_json(as_dict(scene.equations))
     else:
         print((latex if arguments.latex else text)(scene.equations))

@@ -1,0 +1,182 @@
+"""Claims about spectra, one a line of text, each compared exactly with the proved spectrum of its graph.
+
+chain 4: 0, -2+sqrt(2), -2, -2-sqrt(2)      # the whole spectrum, in any order
+star 6: 0, -1^4, -6                         # ^4: four times
+star n=3..12: 0, -1^(n-2), -n               # every n of a range
+ring n=3..9: -4*sin(k*pi/n)**2 for k=0..n-1
+matrix G.txt: ~-3.414, -2, ~-0.586, 0       # ~: an approximation, right if it is the value rounded to its digits
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+
+import sympy as sp
+
+from .exact_text import exact_number, whole_number
+from .scene_checks import shown
+from .topology import Topology, read_matrix, topology
+
+__all__ = ["Claim", "Claimed", "read_claims"]
+
+LARGEST = 500
+"""Largest graph of a claim: above it, closed forms take long to prove."""
+
+BYTES, REPETITIONS = 1_000_000, 100_000
+_RANGE = re.compile(r"(\w+)\s+n\s*=\s*([0-9]{1,6})\s*\.\.\s*([0-9]{1,6})")
+_ONE = re.compile(r"(\w+)\s+([0-9]{1,6})")
+_FOR = re.compile(r"(.*\S)\s+for\s+([A-Za-z])\s*=\s*(.+?)\s*\.\.\s*(.+)")
+_ROUNDED = re.compile(r"~\s*([+-]?[0-9]{1,40}(?:\.[0-9]{1,60})?(?:[eE][+-]?[0-9]{1,3})?)")
+_FORMS = "expected 'chain 4: …', 'star n=3..12: …' or 'matrix FILE: …'"
+
+
+@dataclass(frozen=True, slots=True)
+class Claimed:
+    """A number as it was written and how often; `exact` is None for an approximation, which has its `interval`."""
+
+    text: str
+    count: int
+    exact: sp.Expr | None = None
+    interval: tuple[Fraction, Fraction] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """The claimed spectrum of one graph; `n` is the size where the line is about a range of sizes, else None."""
+
+    line: int
+    text: str
+    graph: Topology
+    numbers: tuple[Claimed, ...]
+    n: int | None = None
+
+
+def read_claims(path: str | Path) -> list[tuple[Claim, ...]]:
+    """Return the claims of a text file, those of one line together; matrix files are looked up beside it.
+
+    Raises FileNotFoundError, and ValueError with the line's number on whatever cannot be read.  Nothing in the file is run.
+    """
+    place = Path(path)
+    if not place.exists():
+        raise FileNotFoundError(f"claims {shown(str(place))}: no such file; expected a text file; check the path")
+    if not place.is_file() or place.stat().st_size > BYTES:
+        raise ValueError(f"claims {shown(str(place))}: expected a text file of at most {BYTES} bytes; check the path")
+    try:
+        lines = place.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise ValueError(
+            f"claims {shown(str(place))}: not UTF-8; expected UTF-8 text; save it in that encoding"
+        ) from None
+    found = []
+    for number, line in enumerate(lines, 1):
+        bare = line.partition("#")[0].strip()
+        if bare:
+            try:
+                found.append(_line(number, bare, place.parent))
+            except (ValueError, TypeError, OSError) as error:
+                raise ValueError(f"{place.name}, line {number}: {' '.join(str(error).split())}") from None
+    if not found:
+        raise ValueError(f"claims {shown(str(place))}: found no claim; {_FORMS}")
+    return found
+
+
+def _line(number: int, text: str, folder: Path) -> tuple[Claim, ...]:
+    head, colon, listed = (part.strip() for part in text.rpartition(":"))
+    if not colon or not head:
+        raise ValueError(f"found {shown(text)}; {_FORMS}")
+    if head.split()[0] == "matrix":
+        return (Claim(number, text, _small(read_matrix(folder / head[6:].strip())), _numbers(listed, {})),)
+    one, many = _ONE.fullmatch(head), _RANGE.fullmatch(head)
+    if one:
+        size = int(one[2])
+        return (Claim(number, text, _small(_family(one[1], size)), _numbers(listed, {"n": size})),)
+    if not many:
+        raise ValueError(f"found {shown(head)} before the colon; {_FORMS}")
+    low, high = int(many[2]), int(many[3])
+    if not low <= high <= LARGEST:
+        raise ValueError(f"found n = {low} … {high}; expected a range that rises and ends at {LARGEST} or before")
+    return tuple(Claim(number, text, _family(many[1], n), _numbers(listed, {"n": n}), n) for n in range(low, high + 1))
+
+
+def _family(name: str, n: int) -> Topology:
+    if n > LARGEST:
+        raise ValueError(
+            f"{name} {n}: expected at most {LARGEST} nodes; claims about larger graphs are not proved here"
+        )
+    return topology(name, n)
+
+
+def _small(graph: Topology) -> Topology:
+    if graph.n > LARGEST:
+        raise ValueError(
+            f"{graph.name} has {graph.n} nodes; expected at most {LARGEST}; spectra are proved up to there"
+        )
+    return graph
+
+
+def _numbers(listed: str, values: dict[str, int]) -> tuple[Claimed, ...]:
+    found = [claimed for part in _split(listed, ",") for claimed in _entry(part, values)]
+    if sum(claimed.count for claimed in found) > REPETITIONS:
+        raise ValueError(f"found more than {REPETITIONS} eigenvalues; expected as many as the graph has nodes")
+    return tuple(found)
+
+
+def _split(text: str, mark: str) -> Iterator[str]:
+    """The parts of a text between marks outside parentheses."""
+    depth, begin = 0, 0
+    for place, letter in enumerate(text):
+        depth += (letter == "(") - (letter == ")")
+        if letter == mark and depth == 0:
+            yield text[begin:place].strip()
+            begin = place + 1
+    yield text[begin:].strip()
+
+
+def _entry(part: str, values: dict[str, int]) -> Iterator[Claimed]:
+    """One entry: a number, perhaps with a multiplicity, perhaps for a range of a letter."""
+    if not part:
+        raise ValueError("found an empty entry between commas; expected a number")
+    many = _FOR.fullmatch(part)
+    if many:
+        body, letter = many[1], many[2]
+        if letter in (*values, "I"):
+            raise ValueError(f"{shown(part)}: the letter {letter!r} has a meaning already; expected another, e.g. k")
+        low, high = whole_number(many[3], values), whole_number(many[4], values)
+        if high - low > LARGEST:
+            raise ValueError(
+                f"{shown(part)}: found {high - low + 1} values of {letter}; expected at most {LARGEST + 1}"
+            )
+        for k in range(low, high + 1):
+            yield from _entry(body, {**values, letter: k})
+        return
+    pieces = list(_split(part, "^"))
+    if len(pieces) > 2:
+        raise ValueError(
+            f"found {shown(part)} with {len(pieces) - 1} times ^; expected number^multiplicity, ** for powers"
+        )
+    count = whole_number(pieces[1], values) if len(pieces) == 2 else 1
+    if count < 0:
+        raise ValueError(f"{shown(part)}: multiplicity {count}{_where(values)}; expected at least 0")
+    if count:
+        yield _number(pieces[0], count, values)
+
+
+def _where(values: dict[str, int]) -> str:
+    return f" for {', '.join(f'{name} = {value}' for name, value in values.items())}" if values else ""
+
+
+def _number(text: str, count: int, values: dict[str, int]) -> Claimed:
+    if not text.startswith("~"):
+        exact = exact_number(text, values)
+        return Claimed(text if exact.is_Rational is False and not values else sp.sstr(exact), count, exact=exact)
+    rounded = _ROUNDED.fullmatch(text)
+    if not rounded:
+        raise ValueError(f"unreadable approximation {shown(text)}; expected ~ and a real decimal, e.g. ~-3.414")
+    value = Decimal(rounded[1])
+    half = Fraction(10) ** int(value.as_tuple().exponent) / 2
+    return Claimed(text, count, interval=(Fraction(value) - half, Fraction(value) + half))

@@ -1,0 +1,71 @@
+"""`synchain new`: a commented file to start a part of one's own from."""
+
+from __future__ import annotations
+
+import keyword
+import re
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from ._arguments import folder
+from ._outcome import FINE, WrongUse, wrong_use
+
+SUMMARY = "write a commented file to start a friction law, oscillator, coupling or topology from"
+EXAMPLES = ("synchain new friction my_law", "synchain new topology caterpillar --dir models/topologies")
+
+HOMES = {"topology": "topologies", "friction": "frictions", "oscillator": "oscillators", "coupling": "couplings"}
+LENGTH = 40
+
+
+def configure(parser: ArgumentParser) -> None:
+    """Add the kind, the name and the folder."""
+    parser.add_argument("kind", metavar="KIND", choices=tuple(HOMES), help=", ".join(HOMES))
+    parser.add_argument("name", metavar="NAME", help="small letters, digits and underscores, e.g. my_law")
+    parser.add_argument("--dir", metavar="DIR", type=folder, default=".", help="where to write (default: this folder)")
+
+
+def execute(arguments: Namespace) -> int:
+    """Write the file; one that exists is left as it is."""
+    from importlib import resources
+
+    from ..files import output_folder
+
+    _check(arguments.kind, arguments.name)
+    template = resources.files("synchain.models").joinpath("templates", f"{arguments.kind}.txt")
+    text = template.read_text(encoding="utf-8").replace("NAME", arguments.name)
+    with wrong_use():
+        path = output_folder(arguments.dir) / f"{arguments.name}.py"
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise WrongUse(f"{path} exists; expected a new file: choose another name, or remove it") from None
+    except OSError as problem:
+        raise WrongUse(f"cannot write {path}: {problem.strerror}; choose another --dir") from problem
+    print(path)
+    print("\n".join(_next(arguments.kind, arguments.name, path)))
+    return FINE
+
+
+def _check(kind: str, name: str) -> None:
+    """Refuse a name that is no module's, or that a part has already."""
+    plain = re.fullmatch(r"[a-z][a-z0-9_]*", name) is not None and len(name) <= LENGTH
+    if not plain or keyword.iskeyword(name) or name in ("default", "none"):
+        raise WrongUse(
+            f"name {name!r}; expected small letters, digits and underscores, a letter first, at most {LENGTH}, no word "
+            "of Python, and neither 'default' nor 'none': e.g. my_law"
+        )
+    from synchain.models import plugins, topology
+
+    known = topology.names() if kind == "topology" else plugins.names(kind)
+    if name in known:
+        raise WrongUse(f"{kind} {name!r} exists already; choose another name; known: {', '.join(known)}")
+
+
+def _next(kind: str, name: str, path: Path) -> list[str]:
+    """What to do with the file."""
+    home = f"in models/{HOMES[kind]} of an editable installation it is found by its name, {name!r}, and tested"
+    if kind == "topology":
+        return [f"  {home}"]
+    here = path.as_posix() if path.is_absolute() else f"./{path.as_posix()}"
+    return [f"  {home}; anywhere else:", f"  plugins.allow_code({here!r}); Scene({kind}={here!r}, …)"]
