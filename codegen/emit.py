@@ -13,6 +13,7 @@ from synchain.models.periodicity import angular_frequency
 
 from . import elementary, lanes, skeletons
 from .blocks import Names, NodeBlocks, analyse
+from .contacts import write_pushes
 from .explicit import write_explicit
 from .integrators import Integrator, integrator
 from .looped import LoopWriter, workspace
@@ -20,7 +21,7 @@ from .naming import tidy
 from .printer import FUNCTIONS, show
 from .rosenbrock import write_rosenbrock
 from .sparse import program
-from .step import StepWriter, write_function
+from .step import PAIR, SCALED, StepWriter, write_function
 
 __all__ = ["RECORDS", "KernelSource", "describe", "emit", "imports", "node_functions"]
 
@@ -49,21 +50,6 @@ class KernelSource:
     def digest(self) -> str:
         """Hexadecimal SHA-256 of the text."""
         return hashlib.sha256(self.text.encode()).hexdigest()
-
-
-PAIR = '''
-@njit(error_model="numpy", forceinline=True)
-def pair(e5, e3, h):
-    """One error estimate out of two embedded ones."""
-    return h*e5*absolute(e5)/sqrt(e5*e5 + 0.01*(e3*e3) + 2.2250738585072014e-308)
-'''.strip()
-
-SCALED = '''
-@njit(error_model="numpy", forceinline=True)
-def scaled(error, old, new, rtol, atol):
-    """The error estimate of one state variable in units of its tolerance."""
-    return absolute(error)/(atol + rtol*maximum(absolute(old), absolute(new)))
-'''.strip()
 
 
 def emit(
@@ -112,12 +98,9 @@ def _module(
     names = Names([*plain.state, *plain.parameters, *(s.name for s in plain.node.state), *weight])
     blocks = analyse(plain.node, names)
     looped = equations.n > LARGEST_UNROLLED
-    if looped and method.inexact:
-        raise ValueError(
-            f"integrator {method.name}: steps at most {LARGEST_UNROLLED} nodes, found {equations.n}; use rodas5p"
-        )
+    sticking = ("contacts",) if plain.node.contact is not None else ()
     if looped:
-        method = replace(method, smooth=None)
+        method = _for_many(method, equations)
     steps = _steps(equations, plain, blocks, method, looped)
     lines = [line for writer in steps.values() for line in writer.lines]
     functions = node_functions(list(steps.values()), blocks)
@@ -133,10 +116,24 @@ def _module(
         SCALED,
         *([PAIR, skeletons.text("sparse")] if looped else []),
         *(_step(name, writer.lines, looped) for name, writer in steps.items()),
+        write_pushes(plain, names),
         _section(equations, plain, section),
-        *(skeletons.text(name) for name in ("recording", "cells", "control", "sweep")),
+        *(skeletons.text(name) for name in ("recording", "cells", "control", *sticking, "sweep")),
     ]
     return "\n\n\n".join(part for part in parts if part) + "\n"
+
+
+def _for_many(method: Integrator, equations: Equations) -> Integrator:
+    """The method as looped kernels have it; ValueError for what only written-out kernels can."""
+    if equations.node.contact is not None:
+        raise ValueError(
+            f"set-valued friction of {equations.n} oscillators; expected at most {LARGEST_UNROLLED}: use contact 'atan'"
+        )
+    if method.inexact:
+        raise ValueError(
+            f"integrator {method.name}: steps at most {LARGEST_UNROLLED} nodes, found {equations.n}; use rodas5p"
+        )
+    return replace(method, smooth=None)
 
 
 def _steps(
@@ -239,7 +236,7 @@ def _constants(
     rows = {
         "WIDTH": width,
         "NODES": equations.n,
-        "COMPONENTS": len(equations.node.state),
+        "COMPONENTS": 2 if equations.node.contact is not None else len(equations.node.state),
         "DIMENSION": equations.dimension,
         "PARAMETERS": len(equations.parameters),
         "DENSE_ROWS": max(len(m.dense) for m in (method, method.smooth) if m is not None),
@@ -248,7 +245,8 @@ def _constants(
         **({"SMOOTH_ERROR_ORDER": method.smooth.error_order} if method.smooth is not None else {}),
         "WEIGHTED": multiplicity is not None,
         **flags,
-        "DENSE": any(flags.values()),
+        "DENSE": any(flags.values()) or equations.node.contact is not None,
+        "CONTACTS": equations.node.contact is not None,
     }
     text = "\n".join(f"{name} = {value!r}" for name, value in rows.items())
     return text if multiplicity is None else f"{text}\nMULTIPLICITY = np.array({[float(m) for m in multiplicity]!r})"

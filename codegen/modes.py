@@ -19,13 +19,14 @@ from synchain.models.tangent import Variation
 
 from . import lanes, skeletons
 from .blocks import Body, Names, analyse
+from .contacts import write_pushes
 from .elimination import plan, write_factors, write_solve
-from .emit import LARGEST_UNROLLED, SCALED, KernelSource, describe, imports, node_functions
+from .emit import LARGEST_UNROLLED, KernelSource, describe, imports, node_functions
 from .integrators import Integrator, integrator
 from .naming import tidy
 from .printer import show
 from .rosenbrock import stage_state, write_rosenbrock
-from .step import StepWriter, combine, write_function
+from .step import SCALED, StepWriter, combine, write_function
 
 __all__ = ["emit_modes"]
 
@@ -57,7 +58,7 @@ def emit_modes(variation: Variation, width: int | None = None) -> KernelSource:
     write_rosenbrock(writer, lambda i: _note(writer, parts, functions, method, i))
     carry = _mode_step(variation, parts, method)
     bodies = [*node_functions([writer], blocks), *(f.lines for f in functions if f.lines)]
-    text = _module(variation, plain, method, width, parts, writer.lines, bodies, carry)
+    text = _module(variation, plain, method, width, parts, writer.lines, bodies, carry, names)
     return KernelSource(text, equations, method.name, (), width, "modes")
 
 
@@ -250,14 +251,9 @@ def _module(
     lines: list[str],
     functions: list[list[str]],
     carry: list[str],
+    names: Names,
 ) -> str:
-    constants = {
-        "WIDTH": 1, "LANES": width, "NODES": plain.n, "COMPONENTS": len(plain.node.state),
-        "DIMENSION": plain.dimension, "PARAMETERS": len(plain.parameters),
-        "DENSE_ROWS": len(method.dense), "ERROR_ORDER": method.error_order, "SWITCHING": False, "WEIGHTED": False,
-        "SYNC_ERROR": False, "SECTION": False, "TRAJECTORY": False, "DENSE": False, "LOOPED": False, "REPEATS": False,
-        "MODE_SIZE": variation.size, "STRENGTHS": len(variation.parameters), "SHARED": parts.size,
-    }  # fmt: skip
+    sticking = ("contacts",) if plain.node.contact is not None else ()
     orbit = [
         "@njit(error_model='numpy')",
         "def step(t, h, y, p, y_new, dense, rtol, atol, shared):",
@@ -272,12 +268,26 @@ def _module(
     ]
     made = [
         describe(variation.orbit, plain, method, (), lines, f"{variation.size} deviations, {width} modes a register"),
-        imports(functions, [*lines, *carry], None, ("scale_binary", "split_binary")),
-        "\n".join(f"{name} = {value!r}" for name, value in constants.items()),
+        imports(functions, [*lines, *carry], None, ("scale_binary", "split_binary", "store")),
+        _constants(variation, plain, method, width, parts.size),
         *("\n".join(f) for f in functions),
         SCALED,
         "\n".join(orbit),
         "\n".join(modes),
-        *(skeletons.text(name) for name in ("recording", "cells", "control", "modes")),
+        *([write_pushes(plain, names)] if sticking else []),
+        *(skeletons.text(name) for name in ("recording", "cells", "control", *sticking, "modes")),
     ]
     return "\n\n\n".join(made) + "\n"
+
+
+def _constants(variation: Variation, plain: Equations, method: Integrator, width: int, shared: int) -> str:
+    sticking = plain.node.contact is not None
+    constants = {
+        "WIDTH": 1, "LANES": width, "NODES": plain.n, "COMPONENTS": 2 if sticking else len(plain.node.state),
+        "DIMENSION": plain.dimension, "PARAMETERS": len(plain.parameters),
+        "DENSE_ROWS": len(method.dense), "ERROR_ORDER": method.error_order, "SWITCHING": False, "WEIGHTED": False,
+        "CONTACTS": sticking, "SYNC_ERROR": False, "SECTION": False, "TRAJECTORY": False,
+        "DENSE": sticking, "LOOPED": False, "REPEATS": False,
+        "MODE_SIZE": variation.size, "STRENGTHS": len(variation.parameters), "SHARED": shared,
+    }  # fmt: skip
+    return "\n".join(f"{name} = {value!r}" for name, value in constants.items())

@@ -24,7 +24,7 @@ RESERVED = frozenset(
      "node_local", "bound", "bank", "step", "step_smooth", "section", "theta", "now",
      "njit", "p", "drive", "scaled", "inside", "total", "e3", "e5", "np", "math",
      "WIDTH", "DENSE", "LANES", "MODE_SIZE", "STRENGTHS", "SHARED", "shared", "steady", "moving", "bent", "lag",
-     "strengths", "which", "mode_step", "march"}
+     "strengths", "which", "mode_step", "march", "pushes", "out"}
     | set(NAMES)
     | set(keyword.kwlist) | set(dir(builtins)) | set(elementary.__all__) | set(lanes.__all__)
 )  # fmt: skip
@@ -51,7 +51,8 @@ def tidy(equations: Equations) -> Equations:
             name = _free(s.name, taken)
             taken.add(name)
             swap[s] = sp.Symbol(name, real=True)
-    node = Node(_all(node.state, swap), _all(node.rhs, swap), _all(node.parameters, swap))
+    contact = None if node.contact is None else node.contact.map(lambda e: e.xreplace(swap))
+    node = Node(_all(node.state, swap), _all(node.rhs, swap), _all(node.parameters, swap), contact)
     if edge is not None:
         if edge.weight in own:  # within the edge this name means the weight
             swap[edge.weight] = sp.Symbol(_free(f"{edge.weight.name}_of_link", taken), real=True)

@@ -13,7 +13,21 @@ from .blocks import Body, NodeBlocks
 from .integrators import Integrator
 from .printer import show
 
-__all__ = ["StepWriter", "combine", "indent_from", "write_function"]
+__all__ = ["PAIR", "SCALED", "StepWriter", "combine", "indent_from", "write_function"]
+
+PAIR = '''
+@njit(error_model="numpy", forceinline=True)
+def pair(e5, e3, h):
+    """One error estimate out of two embedded ones."""
+    return h*e5*absolute(e5)/sqrt(e5*e5 + 0.01*(e3*e3) + 2.2250738585072014e-308)
+'''.strip()
+
+SCALED = '''
+@njit(error_model="numpy", forceinline=True)
+def scaled(error, old, new, rtol, atol):
+    """The error estimate of one state variable in units of its tolerance."""
+    return absolute(error)/(atol + rtol*maximum(absolute(old), absolute(new)))
+'''.strip()
 
 
 def write_function(name: str, doc: str, body: Body, arguments: Sequence[str], results: Sequence[sp.Expr]) -> list[str]:

@@ -14,6 +14,7 @@ from fractions import Fraction
 import sympy as sp
 
 from .calculus import derivative
+from .contact import SLIP, Contact
 
 __all__ = ["TIME", "Edge", "Equations", "Link", "Node"]
 
@@ -30,15 +31,22 @@ class Node:
 
     Raises ValueError where the right-hand side uses a symbol that is not declared, contains a floating-point number
     (numbers are parameters or rationals), has not one entry for each state symbol, or where two names are the same.
+    With set-valued friction (`contact`) the third state is the mode, which only events change.
     """
 
     state: tuple[sp.Symbol, ...]
     rhs: tuple[sp.Expr, ...]
     parameters: tuple[sp.Symbol, ...]
+    contact: Contact | None = None
 
     def __post_init__(self) -> None:
         _differ("node", (TIME, *self.state, *self.parameters))
-        _check("node", self.rhs, len(self.state), {TIME, *self.state, *self.parameters})
+        known = {TIME, *self.state, *self.parameters}
+        _check("node", self.rhs, len(self.state), known)
+        if self.contact is not None:
+            if len(self.state) != 3 or self.state[2] != SLIP:
+                raise ValueError(f"a node with set-valued friction has the states x, v, slip; found {self.state}")
+            _check("contact", self.contact.expressions, len(self.contact.expressions), known)
 
     @property
     def forced(self) -> bool:
@@ -211,6 +219,8 @@ class Equations:
         """Hexadecimal SHA-256 of the equations: equal equations have equal digests, whatever made them."""
         edge = self.edge if self.links else None
         parts = [_text(self.node.state, self.node.rhs, self.node.parameters), str(self.n), repr(self.links)]
+        if self.node.contact is not None:
+            parts.append("; ".join(map(sp.srepr, self.node.contact.expressions)))
         if edge is not None:
             parts.append(_text((*edge.here, *edge.there, edge.weight), edge.rhs, edge.parameters))
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()

@@ -15,10 +15,11 @@ from types import ModuleType
 import sympy as sp
 
 from . import coupling_matrix
+from .contact import SLIP, set_valued
 from .equations import TIME, Edge, Equations, Node
 from .frictions import CONTACTS, KAPPA
-from .lagrangian import equations_of_motion, mass_matrix
-from .nondimensional import FRICTION, friction_coefficient, nondimensional, scale
+from .lagrangian import Mechanics, equations_of_motion, mass_matrix
+from .nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
 from .parameter import Parameter
 from .plugins import call, load, names
 from .topology import Topology
@@ -60,10 +61,30 @@ def node(oscillator: str, friction: str | None = None, contact: str = "atan") ->
         return Node(tuple(state.values()), tuple(map(sp.sympify, rates)), tuple(symbols.values()))
     system = nondimensional(model)
     found = system.accelerations()
+    if law is not None and contact == "set-valued" and _jumps(law):
+        return _sticking(system, found, law, tuple(symbols.values()))
     if law is not None:
         coefficient = friction_coefficient(law, contact)
         found = tuple(e.replace(FRICTION, coefficient) for e in found)
     return Node((*system.coordinates, *system.velocities), (*system.velocities, *found), tuple(symbols.values()))
+
+
+def _jumps(law: ModuleType) -> bool:
+    """True where friction has a jump at rest; without one nothing sticks and the equations are smooth as they are."""
+    return hasattr(law, "static") or friction_coefficient(law, "sign")(sp.Symbol("w", real=True)).has(sp.sign)
+
+
+def _sticking(
+    system: Mechanics, found: tuple[sp.Expr, ...], law: ModuleType, parameters: tuple[sp.Symbol, ...]
+) -> Node:
+    """The node that sticks and slips: states x, v and the mode."""
+    if len(found) != 1:
+        raise ValueError(f"set-valued contact: the oscillator has {len(found)} coordinates; expected one")
+    w = sp.Dummy("w", real=True)
+    coefficient = friction_coefficient(law, "set-valued")(w)
+    (velocity,) = system.velocities
+    rate, contact = set_valued(found[0], FRICTION, coefficient, w, static_coefficient(law), velocity)
+    return Node((*system.coordinates, velocity, SLIP), (velocity, SLIP**2 * rate, sp.S.Zero), parameters, contact)
 
 
 def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str) -> None:
@@ -98,6 +119,8 @@ def check_coupling(coupling: str, single: Node) -> None:
         return
     load("coupling", coupling)
     half = len(single.state) // 2
+    if single.contact is not None:
+        return
     if single.rhs[:half] != single.state[half:]:
         name = single.state[0].name
         raise ValueError(
@@ -119,8 +142,11 @@ def edge(coupling: str, single: Node, oscillator: str | None = None) -> Edge:
     An undirected edge is two links, and the template is symmetric, so the two forces are those of the potential.  A one-way
     link has no potential: the force that the template gives its target acts there, and nothing acts back on the source.
 
+    Set-valued friction takes up the force of a link while its target sticks.
     Raises ValueError as `check_coupling` does.
     """
+    if single.contact is not None:
+        return _on_sliding(edge(coupling, Node(single.state[:2], (single.state[1], sp.S.Zero), ()), oscillator))
     check_coupling(coupling, single)
     here = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in single.state)
     there = tuple(sp.Symbol(f"{s.name}_j", real=True) for s in single.state)
@@ -139,6 +165,15 @@ def edge(coupling: str, single: Node, oscillator: str | None = None) -> Edge:
     found = equations_of_motion(kinetic, potential, forces, (*here[:half], *there[:half]), moving)
     rates = tuple(_in_differences(e, here, there) for e in found[:half])
     return Edge(here, there, weight, (*[sp.S.Zero] * half, *rates), tuple(strengths.values()))
+
+
+def _on_sliding(plain: Edge) -> Edge:
+    """A link between nodes with a mode: it acts on the velocity of a target that slips."""
+    if plain.rhs[0] != 0:
+        raise ValueError("set-valued contact: a link acts on the rate of the position; expected forces alone")
+    modes = (sp.Symbol(f"{SLIP.name}_i", real=True), sp.Symbol(f"{SLIP.name}_j", real=True))
+    here, there = (*plain.here, modes[0]), (*plain.there, modes[1])
+    return Edge(here, there, plain.weight, (sp.S.Zero, modes[0] ** 2 * plain.rhs[1], sp.S.Zero), plain.parameters)
 
 
 def _entry_rates(

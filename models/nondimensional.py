@@ -18,7 +18,7 @@ from .lagrangian import Mechanics
 from .plugins import call
 from .units import dimension
 
-__all__ = ["FRICTION", "friction_coefficient", "mechanics", "nondimensional", "physical", "scale"]
+__all__ = ["FRICTION", "friction_coefficient", "mechanics", "nondimensional", "physical", "scale", "static_coefficient"]
 
 FRICTION = sp.Function("f", real=True)
 """The friction coefficient as an unknown function of the sliding velocity; a law takes its place at the end."""
@@ -119,6 +119,14 @@ def friction_coefficient(law: ModuleType, contact: str) -> Callable[[sp.Expr], s
     if contact == "atan":
         value = regularise(value, sp.Symbol("kappa", real=True))
     return lambda argument: value.xreplace({w: argument})
+
+
+def static_coefficient(law: ModuleType) -> sp.Expr | None:
+    """Return the static friction coefficient of a law that has one of its own."""
+    if not hasattr(law, "static"):
+        return None
+    given = {name: sp.Symbol(name, real=True) * magnitude(p.unit) for name, p in law.PARAMETERS.items()}
+    return _cancel(call(law.static, given), f"friction law {_name(law)}: static")
 
 
 def coordinates(model: ModuleType) -> Mapping[str, tuple[str, str]]:

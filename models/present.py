@@ -94,6 +94,7 @@ def _with_law(e: sp.Expr, law: sp.Expr, state: tuple[sp.Symbol, ...]) -> sp.Expr
 
 def _lines(equations: Equations, style: Style) -> Iterator[str]:
     """Equation by equation, then the law, then what the indices of a large network mean."""
+    sticks, equations = equations.node.contact is not None, _in_slip(equations)
     named = _name_law(equations.node)
     if equations.n > LARGEST:
         yield from _generic(equations, named, style)
@@ -103,10 +104,26 @@ def _lines(equations: Equations, style: Style) -> Iterator[str]:
     if named.law is not None:
         writer = Writer(style, {}, frozenset((SLIDING,)))
         yield f"{writer.write(FRICTION(SLIDING))} = {writer.write(named.law)}"
+    if sticks:
+        yield style.words("at zero sliding velocity f is what holds the body, up to the static coefficient")
     if equations.n > LARGEST:
         count, weights = len(equations.links), style.letter("G", "ij")
         meaning = f", {weights}" + style.words(f" the weights of the {count} links") if count else ""
         yield ("i, j" if count else "i") + f" = 1, {style.dots}, {equations.n}{meaning}"
+
+
+def _in_slip(equations: Equations) -> Equations:
+    """Equations with set-valued friction as they are in slip, without the modes."""
+    node, edge = equations.node, equations.edge
+    if node.contact is None:
+        return equations
+    plain = Node(node.state[:2], (node.rhs[0], node.contact.shown), node.parameters)
+    if edge is not None:
+        one = {edge.here[2]: sp.S.One}
+        edge = Edge(
+            edge.here[:2], edge.there[:2], edge.weight, tuple(e.xreplace(one) for e in edge.rhs[:2]), edge.parameters
+        )
+    return Equations(plain, edge, equations.n, equations.links)
 
 
 def _at_node(equations: Equations, named: _Named, style: Style, i: int) -> Iterator[str]:

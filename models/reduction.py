@@ -19,6 +19,7 @@ from functools import lru_cache
 
 import sympy as sp
 
+from .contact import Contact
 from .equations import Edge, Equations, Link, Node
 
 __all__ = ["NoQuotient", "coarsest_balanced", "collapse", "fold", "quotient"]
@@ -44,7 +45,9 @@ def fold(equations: Equations, values: Mapping[str, int | Fraction]) -> Equation
     numbers = {sp.Symbol(name, real=True): sp.Rational(v.numerator, v.denominator) for name, v in values.items()}
     node = equations.node
     rates = _folded("node", node.rhs, numbers)
-    single = Node(node.state, rates, _occurring(node.parameters, rates))
+    conditions = () if node.contact is None else _folded("contact", node.contact.expressions, numbers)
+    contact = Contact(*conditions) if conditions else None
+    single = Node(node.state, rates, _occurring(node.parameters, (*rates, *conditions)), contact)
     edge = equations.edge
     if edge is not None:
         pushes = _folded("edge", edge.rhs, numbers)

@@ -1,25 +1,43 @@
 """Tangent dynamics: what a small deviation does, along the orbit it deviates from.
 
-`mode` and `whole` part the orbit from the linear equation of the deviations, so that one orbit carries any number of them;
-`tangent` and `transversal` return equations like any others, orbit and deviation in one state.
+`mode`, `whole` and `clustered` part the orbit from the linear equation of the deviations, so that one orbit carries any
+number of them; `tangent` and `transversal` return equations like any others, orbit and deviation in one state.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
 from .calculus import derivative
-from .equations import Equations, Node
+from .equations import TIME, Edge, Equations, Node
+from .reduction import collapse
 
-__all__ = ["ALPHA", "MODE", "Variation", "deviation_names", "mode", "tangent", "transversal", "whole"]
+if TYPE_CHECKING:
+    from .clusters import Block, Clusters
+
+__all__ = [
+    "ALPHA", "LOG_VOLUME", "MODE", "PHASE", "STRENGTH", "Variation", "clustered", "deviation_names", "mode", "phased",
+    "tangent", "transversal", "whole", "with_volume",
+]  # fmt: skip
 
 ALPHA = sp.Symbol("alpha", real=True)
 """Coupling strength of a mode with its sign turned, alpha = -sigma gamma >= 0 for undirected networks."""
 
 MODE = (sp.Symbol("mode_alpha", real=True), sp.Symbol("mode_beta", real=True))
 """Real and imaginary part of the strength of a mode, alpha + i beta = -sigma gamma."""
+
+STRENGTH = sp.Symbol("mode_sigma", real=True)
+"""Coupling strength sigma in the variational equation of a cluster state."""
+
+PHASE = sp.Symbol("phase", real=True)
+"""Time at which the clock of shifted equations stands at 0."""
+
+LOG_VOLUME = sp.Symbol("log_volume", real=True)
+"""One oscillator's share of the logarithm of a volume of states that is carried along."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,19 +80,108 @@ def mode(equations: Equations, plane: bool = False) -> Variation:
     node = equations.node
     orbit = Equations(node, None, 1)
     here = orbit.at_node(0)
-    own = sp.Matrix(node.jacobian()).xreplace(here)
-    push = slope.xreplace(here)
+    size = 2 if node.contact is not None else len(node.state)  # a mode does not deviate
+    own = sp.Matrix(node.jacobian())[:size, :size].xreplace(here)
+    push = slope[:size, :size].xreplace(here)
     alpha, beta = MODE
     real = own - alpha * push
     if not plane:
-        return Variation(orbit, len(node.state), _entries(real), (alpha,))
+        return Variation(orbit, size, _entries(real), (alpha,))
     both = sp.Matrix(sp.BlockMatrix([[real, beta * push], [-beta * push, real]]))
-    return Variation(orbit, 2 * len(node.state), _entries(both), (alpha, beta))
+    return Variation(orbit, 2 * size, _entries(both), (alpha, beta))
 
 
 def whole(equations: Equations) -> Variation:
     """Return the variational equation of the whole network, d' = J d, in state order."""
     return Variation(equations, equations.dimension, tuple(equations.jacobian().items()))
+
+
+def clustered(equations: Equations, found: Clusters) -> Variation:
+    """Return the variational equation of a cluster state: first that of the clusters' own motion, then its blocks in turn.
+
+    The orbit is that of the quotient network.  Coordinate k of a block lives on the orbit of its cluster c and obeys
+    d_k' = J(s_c) d_k + sigma sum_l B_kl H d_l, B the block's matrix and `STRENGTH` the place of sigma; a block of b
+    coordinates has b rows for each component (Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014)).
+
+    Raises ValueError as `transversal` does, for a link whose derivative depends on the state, for a partition that is not
+    balanced, and for set-valued friction.
+    """
+    _check_smooth(equations)
+    slope = _constant_slope(equations)
+    orbit = collapse(equations, found.classes)
+    entries = dict(orbit.jacobian())
+    first = orbit.dimension
+    for block in found.blocks:
+        for (row, column), e in _of_block(block, orbit, slope):
+            key = (first + row, first + column)
+            entries[key] = entries.get(key, sp.S.Zero) + e
+        first += len(block.nodes) * len(orbit.node.state)
+    kept = tuple((key, e) for key, e in sorted(entries.items()) if e != 0)
+    return Variation(orbit, first, kept, (STRENGTH,))
+
+
+def _of_block(block: Block, orbit: Equations, slope: sp.Matrix) -> Iterator[tuple[tuple[int, int], sp.Expr]]:
+    """Yield ((row, column), entry) of one block, component by component; keys repeat."""
+    size, own = len(block.nodes), orbit.node.jacobian()
+    for r, line in enumerate(own):
+        for c, entry in enumerate(line):
+            for k, cluster in enumerate(block.nodes):
+                yield (r * size + k, c * size + k), entry.xreplace(orbit.at_node(cluster))
+                for j, weight in enumerate(block.matrix[k]):
+                    factor = sp.Rational(weight.numerator, weight.denominator)
+                    yield (r * size + k, c * size + j), STRENGTH * factor * slope[r, c]
+
+
+def _constant_slope(equations: Equations) -> sp.Matrix:
+    """H of a link that is linear in the difference of the states it joins."""
+    slope = coupling_slope(equations)
+    edge = equations.edge
+    if edge is None:
+        raise ValueError("these equations have no coupling; differences within clusters need links")
+    here, there = sp.Matrix(edge.jacobian_here()), sp.Matrix(edge.jacobian_there())
+    if there.has(*edge.here, *edge.there) or (here + there).applyfunc(sp.simplify) != sp.zeros(*here.shape):
+        raise ValueError(
+            f"a link {', '.join(map(str, edge.rhs))} has a derivative that depends on the states it joins; cluster states "
+            "need one that is linear in their difference"
+        )
+    return slope
+
+
+def phased(variation: Variation) -> Variation:
+    """Return the same equations with a clock that is set to 0 at the time `PHASE`, a new parameter."""
+    later = {TIME: TIME + PHASE}
+    orbit = variation.orbit
+    rates = tuple(e.xreplace(later) for e in orbit.node.rhs)
+    node = Node(orbit.node.state, rates, (*orbit.node.parameters, PHASE))
+    matrix = tuple((key, e.xreplace(later)) for key, e in variation.matrix)
+    return Variation(Equations(node, orbit.edge, orbit.n, orbit.links), variation.size, matrix, variation.parameters)
+
+
+def with_volume(equations: Equations) -> Equations:
+    """Return the equations with one more state of each oscillator, `LOG_VOLUME`, its share of the divergence summed up.
+
+    The sum over the oscillators is the logarithm of a volume of states carried along (Liouville's formula).
+    Raises ValueError for set-valued friction.
+    """
+    _check_smooth(equations)
+    node = equations.node
+    rate = sp.Add(*(derivative(e, s) for e, s in zip(node.rhs, node.state, strict=True)))
+    single = Node((*node.state, LOG_VOLUME), (*node.rhs, rate), node.parameters)
+    edge = equations.edge
+    if edge is not None:
+        share = sp.Add(*(derivative(e, s) for e, s in zip(edge.rhs, edge.here, strict=True)))
+        ends = (sp.Symbol(f"{LOG_VOLUME}_here", real=True), sp.Symbol(f"{LOG_VOLUME}_there", real=True))
+        here, there = (*edge.here, ends[0]), (*edge.there, ends[1])
+        edge = Edge(here, there, edge.weight, (*edge.rhs, share), edge.parameters)
+    return Equations(single, edge, equations.n, equations.links)
+
+
+def _check_smooth(equations: Equations) -> None:
+    if equations.node.contact is not None:
+        raise ValueError(
+            "tangent dynamics of a whole network: found set-valued friction, whose events are not smooth; expected contact "
+            "'atan'"
+        )
 
 
 def _entries(matrix: sp.Matrix) -> tuple[tuple[tuple[int, int], sp.Expr], ...]:

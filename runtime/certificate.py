@@ -119,9 +119,6 @@ def _transversal(scene: Scene) -> np.ndarray:
 
 
 def _least_stable(found: Exponents) -> tuple[np.ndarray, np.ndarray]:
-    """Exponent and error (m,) of the kind of attractor that is least stable at each strength."""
-    kinds = [attractor.kind for attractor in found.attractors]
-    means = [
-        found.by_start[[k for k, kind in enumerate(kinds) if kind == one]].mean(axis=0) for one in dict.fromkeys(kinds)
-    ]
+    """Exponent and error (m,) of the attractor that is least stable at each strength."""
+    means = [found.by_start[rows].mean(axis=0) for rows in found.groups]
     return np.max(means, axis=0), found.stderr

@@ -12,7 +12,6 @@ Sources: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); Benettin, Galgani, 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -26,7 +25,7 @@ from .attractor import Attractor, find_attractor
 from .intervals import Interval
 from .orbits import Orbits
 
-__all__ = ["Exponents", "exponents"]
+__all__ = ["Exponents", "exponents", "group"]
 
 BATCHES = 64
 
@@ -52,7 +51,12 @@ class Exponents:
     @property
     def averaged(self) -> int:
         """Number of starts in the mean."""
-        return len(_most_common(self.attractors))
+        return max(map(len, self.groups))
+
+    @property
+    def groups(self) -> list[list[int]]:
+        """The starts that reached the same attractor, by their numbers."""
+        return group(self.attractors, self.by_start)
 
     @property
     def intervals(self) -> tuple[Interval, ...]:
@@ -69,8 +73,10 @@ class Exponents:
         ends: list[Interval] = [(float(x[0]), 0.0)] if y[0] < 0 else []
         for i in map(int, np.flatnonzero((y[1:] < 0) != (y[:-1] < 0))):
             a, b = max(i - 2, 0), min(i + 3, len(x) - 1)
-            slope = abs((y[i + 1] - y[i]) / (x[i + 1] - x[i])) if b - a < 3 else abs(np.polyfit(x[a:b], y[a:b], 1)[0])
-            zero = x[i] - y[i] * (x[i + 1] - x[i]) / (y[i + 1] - y[i])
+            step = y[i + 1] - y[i] if np.isfinite(y[i] * y[i + 1]) else np.inf  # an exponent of -inf has no slope
+            smooth = b - a >= 3 and bool(np.all(np.isfinite(y[a:b])))
+            slope = abs(np.polyfit(x[a:b], y[a:b], 1)[0] if smooth else step / (x[i + 1] - x[i]))
+            zero = x[i] - y[i] / step * (x[i + 1] - x[i]) if np.isfinite(step) else (x[i] if y[i] >= 0 else x[i + 1])
             ends.append((float(zero), float(max(error[i], error[i + 1]) / max(slope, 1e-300))))
         if y[-1] < 0:
             ends.append((float(x[-1]), 0.0))
@@ -106,7 +112,7 @@ def exponents(
     orbits.settle(transient)
     attractors = tuple(find_attractor(orbits, row, transient) for row in range(starts))
     by_start, error, length = _by_start(orbits, attractors, precision, periods, show_progress)
-    chosen = _most_common(attractors)
+    chosen = max(group(attractors, by_start), key=len)
     mean, spread = by_start[chosen].mean(axis=0), np.sqrt((error[chosen] ** 2).sum(axis=0)) / len(chosen)
     return Exponents(orbits.strengths, mean, spread, length, starts, by_start, attractors)
 
@@ -153,11 +159,20 @@ def _starts(scene: Scene, starts: int, seed: int) -> np.ndarray:
     return state
 
 
-def _most_common(attractors: Sequence[Attractor]) -> list[int]:
-    """The starts on the kind of attractor found most often; of two the one found first."""
-    kinds = [found.kind for found in attractors]
-    kind = Counter(kinds).most_common(1)[0][0]
-    return [row for row, other in enumerate(kinds) if other == kind]
+def group(attractors: Sequence[Attractor], by_start: np.ndarray) -> list[list[int]]:
+    """The starts by attractor: of one kind and, where eigenvalues give the exponents, with the same exponents."""
+    found: list[list[int]] = []
+    for row, attractor in enumerate(attractors):
+        for others in found:
+            alike = attractors[others[0]].kind == attractor.kind
+            if alike and attractor.propagators is not None:
+                alike = np.allclose(by_start[others[0]], by_start[row], rtol=1e-3, atol=1e-4)
+            if alike:
+                others.append(row)
+                break
+        else:
+            found.append([row])
+    return found
 
 
 def _average(

@@ -63,7 +63,7 @@ class MSF:
     @property
     def kind(self) -> str:
         """The class of the function on its grid, in words (see `classify`)."""
-        return classify(self.intervals, float(self.fine.alpha[-1]))
+        return classify(self.intervals, float(self.fine.alpha[-1]), float(self.fine.alpha[0]))
 
     @property
     def attractors(self) -> tuple[str, ...]:
@@ -160,11 +160,11 @@ def plane(
     return Plane(scene, across, up, table, error, kinds, found.time)
 
 
-def classify(intervals: Sequence[Interval], end: float) -> str:
-    """The class of a function that is negative on `intervals` of 0 … `end`.
+def classify(intervals: Sequence[Interval], end: float, begin: float = 0.0) -> str:
+    """The class of a function that is negative on `intervals` of the grid begin … end.
 
     "never stable" (no zero), "stable everywhere" on the grid, "half-line" (one zero, stable from there to the end of the
-    grid), "bounded interval" (also one that begins at 0), "several intervals".
+    grid), "bounded interval" (also one that begins with the grid), "several intervals".
     """
     if not intervals:
         return "never stable"
@@ -173,4 +173,4 @@ def classify(intervals: Sequence[Interval], end: float) -> str:
     low, high = intervals[0]
     if high < end:
         return "bounded interval"
-    return "half-line" if low > 0.0 else "stable everywhere"
+    return "half-line" if low > begin else "stable everywhere"

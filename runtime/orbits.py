@@ -11,6 +11,7 @@ from synchain.models.scene import Scene
 from synchain.models.tangent import Variation, mode
 
 from .carrier import Carrier
+from .contact_modes import with_modes
 from .propagate import Interpolation, exact, interpolation
 
 __all__ = ["Orbits"]
@@ -47,12 +48,19 @@ class Orbits:
             raise ValueError(
                 "exponents need equations that are periodic in time; found time dependence without a period"
             )
+        contact = variation.orbit.node.contact
+        if contact is not None and contact.jumps:
+            raise ValueError(
+                "exponents: slip begins with a jump of acceleration under this friction law; expected f(0+) = mu_s"
+            )
+        row = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])
+        state = with_modes(variation.orbit, state, np.repeat(row, len(state), axis=0))
         return cls(scene, variation, strengths, state, workers, scene.period or 2.0 * math.pi)
 
     @property
     def components(self) -> int:
         """State variables of one deviation, real or complex."""
-        return self.state.shape[1]
+        return self.variation.size // len(self.variation.parameters)
 
     def part(self, rows: list[int]) -> Orbits:
         """The orbits of some starts."""

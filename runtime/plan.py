@@ -12,6 +12,8 @@ from synchain.models.equations import Equations
 from synchain.models.periodicity import angular_frequency
 from synchain.models.scene import Scene
 
+from .contact_modes import with_modes
+
 __all__ = ["CANCEL", "Plan", "control_array", "plan", "tolerances"]
 
 FIRST_STEP = 1e-4
@@ -57,6 +59,7 @@ def plan(scene: Scene, near: np.ndarray | None = None) -> Plan:
             numbers[:, names.index(name)] = values
         else:
             start[:, state.index(name)] = values
+    start = with_modes(scene.equations, start, numbers)
     last = np.zeros(scene.cells) if near is None else near
     spans = np.column_stack([_spans(scene, columns), periods(scene.equations, numbers), last])
     return Plan(start, numbers, np.ascontiguousarray(spans))

@@ -16,6 +16,7 @@ class Status(IntEnum):
     STEP_UNDERFLOW = 3
     DIVERGED = 4
     INTERRUPTED = 5
+    CHATTERING = 6
 
     @property
     def message(self) -> str:
@@ -30,5 +31,7 @@ _MESSAGES = {
     Status.STEP_UNDERFLOW: "the step size fell below rounding; the equations may be singular here, or the tolerance "
     "tighter than double precision allows",
     Status.DIVERGED: "the state grew without bound or became undefined",
+    Status.CHATTERING: "a contact changed between stick and slip hundreds of times while no time passed; "
+    "check the friction law",
     Status.INTERRUPTED: "stopped by the user before the end; run again with resume",
 }

@@ -51,7 +51,9 @@ def kernel_source(scene: Scene, width: int | None = None, skip: bool | Skip = Fa
     section = None
     if "section" in scene.record:
         section = sp.Symbol(chosen.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
-    method = best_integrator(scene.n, scene.rtol) if scene.integrator == "auto" else scene.integrator
+    sticking = scene.equations.node.contact is not None
+    best = "dop853" if sticking else best_integrator(scene.n, scene.rtol)
+    method = best if scene.integrator == "auto" else scene.integrator
     return emit(chosen.equations, method, chosen.records, section, width, chosen.multiplicity)
 
 

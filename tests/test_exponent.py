@@ -175,6 +175,20 @@ def test_classes(intervals: list[tuple[float, float]], kind: str) -> None:
     assert classify(intervals, 1.0) == kind
 
 
+def test_a_grid_that_begins_inside_a_stable_range_shows_no_zero() -> None:
+    assert classify([(0.3, 1.0)], 1.0, 0.3) == "stable everywhere"
+
+
+def test_two_periodic_attractors_are_not_averaged() -> None:
+    """omega = 1.07: two motions of period two, one transversally stable at alpha = 0.1, the other not."""
+    found = exponents(scene("friction", "spring", omega=1.07), [0.1], starts=8)
+    assert len(found.groups) > 1
+    for rows in found.groups:
+        assert np.ptp(found.by_start[rows]) < 1e-3
+    assert found.exponent[0] == found.by_start[max(found.groups, key=len)].mean()
+    assert np.ptp(found.by_start) > 0.3
+
+
 def test_what_is_refused() -> None:
     s = scene("friction", "spring")
     with pytest.raises(ValueError, match="alpha: found a number that is not finite"):

@@ -12,7 +12,7 @@ from sympy.physics import mechanics
 from synchain.models.equations import TIME, Equations, Node
 from synchain.models.frictions import CONTACTS
 from synchain.models.network import connectivity, edge, network, node, parameters
-from synchain.models.nondimensional import FRICTION, friction_coefficient, nondimensional
+from synchain.models.nondimensional import FRICTION, friction_coefficient, nondimensional, static_coefficient
 from synchain.models.plugins import call, load, names
 from synchain.models.topology import Topology, from_matrix, topology
 from synchain.models.topology import names as families
@@ -230,9 +230,12 @@ def test_parameters_are_those_of_the_equations(oscillator: str, friction: str | 
     single = node(oscillator, friction, contact)
     table = parameters(oscillator, friction, contact)
     assert tuple(table) == tuple(s.name for s in single.parameters)
-    used = set().union(*(e.free_symbols for e in single.rhs))
+    conditions = () if single.contact is None else single.contact.expressions
+    if friction is not None and contact != "set-valued":  # only set-valued contacts know a static coefficient
+        conditions = (static_coefficient(load("friction", friction)) or sp.S.Zero,)
+    used = set().union(*(e.free_symbols for e in (*single.rhs, *conditions)))
     assert {s.name for s in single.parameters} == {s.name for s in used} - {s.name for s in single.state} - {"t"}
-    first, last = single.state[0].name, single.state[-1].name
+    first, last = single.state[0].name, single.state[-1 if single.contact is None else 1].name
     springs = () if hasattr(load("oscillator", oscillator), "field") else names("coupling")
     for coupling in (*springs, f"{first}->{last}"):
         joined = network(single, edge(coupling, single, oscillator), topology("chain", 2))

@@ -13,11 +13,20 @@ import numpy as np
 from numba import njit
 
 from synchain.codegen.lanes import broadcast, load, one_lane, select, store
-from synchain.codegen.skeletons.names import DIMENSION, PARAMETERS, REPEATS, SECTION, SYNC_ERROR, TRAJECTORY, WIDTH
+from synchain.codegen.skeletons.names import (
+    CONTACTS,
+    DIMENSION,
+    PARAMETERS,
+    REPEATS,
+    SECTION,
+    SYNC_ERROR,
+    TRAJECTORY,
+    WIDTH,
+)
 from synchain.codegen.skeletons.recording import (
-    ACCEPTED, BASE, BUDGET, CANCEL, CHANGE, CYCLE, DIVERGED, END, FINISHED, FIRST_STEP, INTERRUPTED, LAG, LAST,
+    ACCEPTED, BASE, BUDGET, CANCEL, CHANGE, CHATTERING, CYCLE, DIVERGED, END, FINISHED, FIRST_STEP, INTERRUPTED, LAG, LAST,
     LEFT, MAX_STEPS, MEAN, MEMORY, MODE, N_ACCEPTED, N_REJECTED, N_SKIPPED, N_SMOOTH, NEXT_SAMPLE, NO_JUMPS, PEAK,
-    PERIOD, PERIODS, POWER, REJECTED, SAMPLE_GAP, SAVED, SKIPPED, SMOOTH_STEPS, START, STATUS, STEP, STOP,
+    PERIOD, PERIODS, POWER, REJECTED, RUSH, SAMPLE_GAP, SAVED, SKIPPED, SMOOTH_STEPS, START, STATUS, STEP, STOP,
     STOPPED_AT, SUM_BEFORE, SYNC, SYNC_PEAK, SYNC_SUM, TIME, UNDERFLOW, spread,
 )  # fmt: skip
 
@@ -25,6 +34,8 @@ from synchain.codegen.skeletons.recording import (
 # What must repeat for the future to repeat, saved behind the other groups: the state and the step control.
 REPEATING = (STEP, MODE, SYNC)
 LONGEST_CYCLE = 32.0
+# So many events in a row without time passing are chattering.
+LONGEST_RUSH = 200.0
 SLOTS = SAVED + DIMENSION + len(REPEATING)
 
 
@@ -189,6 +200,8 @@ def outcome(which, bank, control):
         largest = max(largest, size)
     if bank[ACCEPTED * WIDTH + which] + bank[REJECTED * WIDTH + which] >= control[MAX_STEPS]:
         return BUDGET
+    if CONTACTS and bank[RUSH * WIDTH + which] >= LONGEST_RUSH:
+        return CHATTERING
     if bank[STEP * WIDTH + which] <= 4e-16 * max(1.0, t):
         return DIVERGED if largest > 1e8 else UNDERFLOW  # a blow-up in finite time stops the steps first
     return 0

@@ -9,9 +9,9 @@ from numba import njit
 
 from synchain.codegen.elementary import exp, log
 from synchain.codegen.lanes import absolute, load, maximum, minimum, select, store, truncated
-from synchain.codegen.skeletons.names import DIMENSION, WIDTH
+from synchain.codegen.skeletons.names import CONTACTS, DIMENSION, WIDTH
 from synchain.codegen.skeletons.recording import (
-    ACCEPTED, CHANGE, END, MAX_STEP, MAX_STEPS, MEMORY, PERIOD, REJECTED, SMOOTH, STEP, STOP, TIME,
+    ACCEPTED, CHANGE, END, MAX_STEP, MAX_STEPS, MEMORY, PERIOD, REJECTED, RUSH, SMOOTH, START, STEP, STOP, TIME,
 )  # fmt: skip
 
 
@@ -59,9 +59,16 @@ def arrive(bank, t, h):
 
 
 @njit(error_model="numpy", forceinline=True)
+def next_stop(bank, t):
+    """The next stop after this one: the start of the window, the end of the period or of the run."""
+    last, start = minimum(load(bank, END, WIDTH), load(bank, PERIOD, WIDTH)), load(bank, START, WIDTH)
+    return select(t < start, minimum(start, last), last)
+
+
+@njit(error_model="numpy", forceinline=True)
 def advance(bank, t, t_new, accept, y_new):
     """Move the accepted lanes on."""
-    stop, following = load(bank, STOP, WIDTH), minimum(load(bank, END, WIDTH), load(bank, PERIOD, WIDTH))
+    stop, following = load(bank, STOP, WIDTH), next_stop(bank, t_new)
     store(bank, TIME, select(accept, t_new, t))
     store(bank, STOP, select(accept & (t_new >= stop), following, stop))
     for c in range(DIMENSION):
@@ -77,7 +84,8 @@ def pause(bank, control):
     for c in range(1, DIMENSION):
         largest = maximum(largest, absolute(load(bank, c, WIDTH)))
     stopped = (t >= load(bank, END, WIDTH)) | (t >= load(bank, PERIOD, WIDTH))
-    return stopped | spent | (h <= 4e-16 * maximum(t, 1.0)) | (largest >= 1e100)
+    found = stopped | spent | (h <= 4e-16 * maximum(t, 1.0)) | (largest >= 1e100)
+    return found | (load(bank, RUSH, WIDTH) >= 200.0) if CONTACTS else found
 
 
 @njit(error_model="numpy", forceinline=True)

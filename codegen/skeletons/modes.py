@@ -17,9 +17,10 @@ from synchain.codegen.lanes import (
     absolute, any_lane, broadcast, lane_bits, load, maximum, scale_binary, select, split_binary, store,
 )  # fmt: skip
 from synchain.codegen.skeletons.cells import SLOTS, fill, outcome, turn_over
+from synchain.codegen.skeletons.contacts import change_modes, take_back
 from synchain.codegen.skeletons.control import advance, aim, arrive, judge, pause
 from synchain.codegen.skeletons.names import (
-    DIMENSION, ERROR_ORDER, LANES, MODE_SIZE, SHARED, STRENGTHS, WIDTH, mode_step, step,
+    CONTACTS, DENSE_ROWS, DIMENSION, ERROR_ORDER, LANES, MODE_SIZE, NODES, SHARED, STRENGTHS, WIDTH, mode_step, step,
 )  # fmt: skip
 from synchain.codegen.skeletons.recording import (
     ACCEPTED, ATOL, BASE, N_ACCEPTED, N_REJECTED, PERIOD, REJECTED, RTOL, STATUS, STOPPED_AT, TIME,
@@ -67,6 +68,26 @@ def scale(modes, powers, registers):
 
 
 @njit(error_model="numpy")
+def saltate(before, after, out, modes, registers):
+    """What an event of a single contact does to deviations (position, velocity, …): it multiplies the velocity.
+
+    Landing in stick makes it 0, the start of slip leaves it, for both fields agree there, and a turn without stick
+    multiplies it by the ratio of the accelerations.  In general S = I + (F+ - F-) n / (n F-), n the gradient of the
+    sliding velocity.  Source: Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer,
+    2004), chapter 7.
+    """
+    if after == 0.0:
+        factor = 0.0
+    elif before == 0.0:
+        factor = 1.0
+    else:
+        factor = out[4 * NODES] / out[5 * NODES] if after > 0.0 else out[5 * NODES] / out[4 * NODES]
+    for which in range(registers):
+        for c in range(1, MODE_SIZE, 2):
+            store(modes, MODE_SIZE * which + c, factor * load(modes, MODE_SIZE * which + c, LANES))
+
+
+@njit(error_model="numpy")
 def take_in(vectors, modes, registers):
     """Put the deviations of a cell into registers."""
     for which in range(registers):
@@ -103,6 +124,7 @@ def march(first, last, start, numbers, spans, control, strengths, vectors, growt
     registers = growth.shape[1] // LANES
     y_new, bank, shared = aligned(DIMENSION), aligned(SLOTS), aligned(SHARED)
     old, new = aligned(registers * MODE_SIZE * LANES), aligned(registers * MODE_SIZE * LANES)
+    dense, middle, out = aligned(DENSE_ROWS * DIMENSION), aligned(DIMENSION), aligned(6 * NODES)
     powers, strong = aligned(registers * LANES), aligned(registers * max(1, STRENGTHS) * LANES)
     for which in range(registers):
         for k in range(STRENGTHS):
@@ -115,7 +137,7 @@ def march(first, last, start, numbers, spans, control, strengths, vectors, growt
         status, taken = outcome(0, bank, control), 0
         while status == 0:
             t, h = load(bank, TIME, WIDTH), aim(bank, control)
-            error = step(t, h, bank, bank, y_new, y_new, control[RTOL], control[ATOL], shared)
+            error = step(t, h, bank, bank, y_new, dense, control[RTOL], control[ATOL], shared)
             if any_lane(error <= 1.0):
                 worst = watched(shared, strong, old, new, registers - 1, control[RTOL])
                 if worst <= 1.0 and registers > 1:
@@ -123,6 +145,8 @@ def march(first, last, start, numbers, spans, control, strengths, vectors, growt
                 error = maximum(error, broadcast(worst, WIDTH))
             t_new = arrive(bank, t, h)
             accept = judge(bank, h, error, 1.0 / (ERROR_ORDER + 1.0))
+            if CONTACTS:
+                accept = take_back(accept, t, h, bank, y_new, dense, middle, out)
             if any_lane(accept):
                 for which in range(1, registers - 1):
                     mode_step(shared, strong, old, new, which)
@@ -131,6 +155,11 @@ def march(first, last, start, numbers, spans, control, strengths, vectors, growt
                 if taken % BETWEEN_SCALINGS == 0:
                     scale(old, powers, registers)
             advance(bank, t, t_new, accept, y_new)
+            if CONTACTS:
+                before = bank[2 * NODES]
+                change_modes(accept, t_new, bank, out)
+                if bank[2 * NODES] != before:
+                    saltate(before, bank[2 * NODES], out, old, registers)
             if lane_bits(pause(bank, control)) != 0:
                 status = outcome(0, bank, control)
                 if status == 0 and bank[TIME] >= bank[PERIOD]:

@@ -32,6 +32,8 @@ LOOPED = False
 """True where the step loops over nodes and links; its arrays then come as arguments."""
 WORKSPACE = 0
 """Groups of scratch memory behind the dense output."""
+CONTACTS = False
+"""True where oscillators stick and slip: their third state is the mode, which events change."""
 SYNC_ERROR = False
 SECTION = False
 TRAJECTORY = False
@@ -61,3 +63,7 @@ def section(theta: Any, t: Any, h: Any, bank: Any, y_new: Any, dense: Any) -> An
 
 def mode_step(shared: Any, strengths: Any, old: Any, new: Any, which: Any) -> Any:
     """The orbit's last step, taken by the modes of one register: writes them, returns their error and their size."""
+
+
+def pushes(t: Any, y: Any, p: Any, out: Any) -> Any:
+    """For each contact: sliding velocity, ground's velocity, accelerations under static friction both ways, in slip."""

@@ -19,10 +19,11 @@ from synchain.codegen.lanes import any_lane, lane_bits, load, store
 from synchain.codegen.skeletons.cells import (
     SLOTS, fill, finish, held, move, occupied, outcome, put, turn_over, vacant, vacate, waiting,
 )  # fmt: skip
+from synchain.codegen.skeletons.contacts import change_modes, take_back
 from synchain.codegen.skeletons.control import advance, aim, arrive, judge, pause, turned
 from synchain.codegen.skeletons.names import (
-    DENSE_ROWS, DIMENSION, ERROR_ORDER, LOOPED, SECTION, SMOOTH_ERROR_ORDER, SWITCHING, SYNC_ERROR, TRAJECTORY, WIDTH,
-    WORKSPACE, step, step_smooth,
+    CONTACTS, DENSE_ROWS, DIMENSION, ERROR_ORDER, LOOPED, NODES, SECTION, SMOOTH_ERROR_ORDER, SWITCHING, SYNC_ERROR,
+    TRAJECTORY, WIDTH, WORKSPACE, step, step_smooth,
 )  # fmt: skip
 from synchain.codegen.skeletons.recording import (
     ALL, ATOL, BASE, CANCEL, CHANGE, DIRECTION, MEMORY, MODE, PERIOD, RTOL, SMOOTH, SMOOTH_STEPS, START, STIFF, TIME, cut,
@@ -105,7 +106,7 @@ def admit(queue, last, flying, bank, cell, start, numbers, spans, control, sampl
 
 
 @njit(error_model="numpy", forceinline=True)
-def attempt(mode, bank, dense, y_new, middle, cell, spans, control, counts, points, samples, graph, weights):
+def attempt(mode, bank, dense, y_new, middle, out, cell, spans, control, counts, points, samples, graph, weights):
     """One step of all lanes of a group; returns the lanes that need a look, and those that change sides, as bits."""
     t, h = load(bank, TIME, WIDTH), aim(bank, control)
     power = 1.0 / (ERROR_ORDER + 1.0)
@@ -122,6 +123,8 @@ def attempt(mode, bank, dense, y_new, middle, cell, spans, control, counts, poin
         error = step(t, h, bank, bank, y_new, dense, control[RTOL], control[ATOL])
     t_new = arrive(bank, t, h)
     accept = judge(bank, h, error, power)
+    if CONTACTS:
+        accept = take_back(accept, t, h, bank, y_new, dense, middle, out)
     counted = accept & (t >= load(bank, START, WIDTH))
     if SYNC_ERROR:
         observe(bank, h, counted, accept, y_new, dense, middle)
@@ -131,6 +134,8 @@ def attempt(mode, bank, dense, y_new, middle, cell, spans, control, counts, poin
     if TRAJECTORY and any_lane(accept):
         sample(bank, t_new, h, lane_bits(accept), y_new, dense, cell, spans, samples)
     advance(bank, t, t_new, accept, y_new)
+    if CONTACTS:
+        change_modes(accept, t_new, bank, out)
     flips = 0
     if SWITCHING:
         flips = lane_bits(turned(bank, accept, rate, mode))
@@ -160,6 +165,7 @@ def drive(first, last, start, numbers, spans, control, end, sums, counts, points
     size = SLOTS * WIDTH if SWITCHING else 0
     away_bank, away_dense, away_cell = aligned(size), aligned(DENSE_ROWS * DIMENSION * WIDTH), np.full(WIDTH, -1)
     lot_bank, lot_cell = aligned(size), np.full(WIDTH, -1)
+    out = aligned(6 * NODES * WIDTH if CONTACTS else 0)
     for which in range(WIDTH):
         fill(which, -1, start, numbers, spans, control, bank, samples)
         if SWITCHING:
@@ -194,5 +200,5 @@ def drive(first, last, start, numbers, spans, control, end, sums, counts, points
             if full == 0:
                 break
         look, flips = attempt(
-            mode, bank, dense, y_new, middle, cell, spans, control, counts, points, samples, graph, weights
+            mode, bank, dense, y_new, middle, out, cell, spans, control, counts, points, samples, graph, weights
         )

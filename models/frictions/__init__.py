@@ -4,7 +4,8 @@ A law is a module with SUMMARY, SOURCE (journal, volume, page), PARAMETERS (name
 quantity), ODD (True where f(-w) = -f(w); tested) and ``force(w, <names of its parameters>)``.  `force` returns the
 friction coefficient, the friction force divided by the normal load (unit 1), on the sliding body for the velocity
 w of the ground relative to the body (unit m/s), so that w f(w) >= 0: the body is dragged along.  Write the jump
-with ``sympy.sign`` and ``sympy.Abs`` of w and no floating-point numbers.
+with ``sympy.sign`` and ``sympy.Abs`` of w and no floating-point numbers.  A law may have ``static(<parameters>)``, the
+static friction coefficient where it exceeds f(0+); only the contact "set-valued" knows it.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from ..parameter import Parameter
 
 __all__ = ["CONTACTS", "KAPPA", "regularise"]
 
-CONTACTS = ("atan", "sign")
-"""How a jump is treated: smoothed by the arcus tangent, or left as it is with sign(0) = 0."""
+CONTACTS = ("atan", "sign", "set-valued")
+"""How a jump is treated: smoothed by the arcus tangent, left as it is with sign(0) = 0, or as stick and slip."""
 
 KAPPA = Parameter(1e5, "s/m", "steepness of the regularised jump, sgn w = (2/pi) atan(kappa w)", positive=True)
 

@@ -1,0 +1,150 @@
+"""Events of set-valued friction: which step would pass one, where it lies, and what each contact does there.
+
+The gap of a contact is positive while it keeps its mode: of one that slips the sliding velocity in the direction of its
+slip, of one that sticks the distance of its load from the limits of static friction.  A step that would make a gap negative
+is taken back and tried again with the length after which the gap has just passed zero, until the passage lies at its end
+to within rounding; all contacts that have passed change together.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from synchain.codegen.lanes import absolute, any_lane, broadcast, load, maximum, minimum, select, store
+from synchain.codegen.skeletons.names import NODES, WIDTH, pushes
+from synchain.codegen.skeletons.recording import ACCEPTED, REJECTED, RUSH, STOP, inside
+
+# --- kernel text below ---
+# A gap this little below zero counts as zero; a passage is never sought closer than the shortest step to it.
+PASSED, SHORTEST = 1e-13, 1e-13
+# Steps in which an event is looked for, equally spaced; a dip is followed to its bottom where a parabola through three
+# looks comes down to this part of the third.
+LOOKS, SHALLOW = 4, 0.2
+
+
+@njit(error_model="numpy", forceinline=True)
+def smallest_gap(t, y, p, out):
+    """The smallest gap of all contacts at a state."""
+    pushes(t, y, p, out)
+    least = broadcast(1e300, WIDTH)
+    for i in range(NODES):
+        slip = load(p, 2 * NODES + i, WIDTH)
+        held = minimum(load(out, 2 * NODES + i, WIDTH), -load(out, 3 * NODES + i, WIDTH))
+        least = minimum(least, select(absolute(slip) < 0.5, held, slip * load(out, i, WIDTH)))
+    return least
+
+
+@njit(error_model="numpy", forceinline=True)
+def gap_inside(theta, t, h, bank, y_new, dense, middle, out):
+    """The smallest gap at a fraction of the step."""
+    for c in range(2 * NODES):
+        store(middle, c, inside(theta, c, bank, y_new, dense))
+    return smallest_gap(t + theta * h, middle, bank, out)
+
+
+@njit(error_model="numpy")
+def bottom(theta, span, t, h, bank, y_new, dense, middle, out):
+    """The least gap near a fraction of the step where a parabola has its bottom, and its place, by two parabolas more.
+
+    A gap that dips below zero and comes back between two looks would otherwise pass unseen.
+    """
+    place, least = theta, gap_inside(theta, t, h, bank, y_new, dense, middle, out)
+    for divisor in (8.0, 64.0):
+        part = span / divisor
+        before = gap_inside(place - part, t, h, bank, y_new, dense, middle, out)
+        after = gap_inside(place + part, t, h, bank, y_new, dense, middle, out)
+        bend, slope = before - 2.0 * least + after, 0.5 * (after - before)
+        turn = minimum(maximum(select(bend > 0.0, -slope / bend, 0.0 * bend), -1.0), 1.0)
+        shifted = minimum(maximum(place + part * turn, theta - span), theta + span)
+        gap = gap_inside(shifted, t, h, bank, y_new, dense, middle, out)
+        better = gap < least
+        place, least = select(better, shifted, place), select(better, gap, least)
+    return place, least
+
+
+@njit(error_model="numpy")
+def first_passage(accept, t, h, bank, y_new, dense, middle, out):
+    """The fraction of the step after which the first gap has just become negative; 2 in lanes where none does."""
+    zero, span = broadcast(0.0, WIDTH), 1.0 / LOOKS
+    low, high, f_low, f_high = zero, broadcast(2.0, WIDTH), zero, broadcast(-1.0, WIDTH)
+    earlier, before, open_lanes = zero, smallest_gap(t, bank, bank, out), accept
+    for k in range(1, LOOKS + 1):
+        theta = broadcast(k * span, WIDTH)
+        last = k == LOOKS
+        gap = (
+            smallest_gap(t + h, y_new, bank, out) if last else gap_inside(theta, t, h, bank, y_new, dense, middle, out)
+        )
+        hit = open_lanes & (gap < -PASSED)
+        bend, slope = earlier - 2.0 * before + gap, 0.5 * (gap - earlier)
+        dips = open_lanes & ~hit & (absolute(slope) < bend) & (before - 0.5 * slope * slope / bend < SHALLOW * gap)
+        f_low, low = select(hit, maximum(before, 0.0), f_low), select(hit, theta - span, low)
+        f_high, high = select(hit, gap, f_high), select(hit, theta, high)
+        if k > 1 and any_lane(dips):
+            turn = minimum(maximum(theta - span * (1.0 + slope / bend), 0.0), 1.0)
+            place, least = bottom(turn, span, t, h, bank, y_new, dense, middle, out)
+            sunk = dips & (least < -PASSED)
+            late = place > theta - span
+            f_low, low = (
+                select(sunk, maximum(select(late, before, earlier), 0.0), f_low),
+                select(sunk, select(late, theta - span, theta - 2.0 * span), low),
+            )
+            f_high, high = select(sunk, least, f_high), select(sunk, place, high)
+            hit = hit | sunk
+        earlier, before, open_lanes = before, gap, open_lanes & ~hit
+    return narrowed(low, high, f_low, f_high, t, h, bank, y_new, dense, middle, out)
+
+
+@njit(error_model="numpy")
+def narrowed(low, high, f_low, f_high, t, h, bank, y_new, dense, middle, out):
+    """The end of the bracket `high` (2: no bracket) moved back until its gap is just below zero."""
+    found = high < 1.5
+    if any_lane(found):
+        for k in range(60):
+            active = found & (f_high < -0.5 * PASSED) & (high - low > 1e-15)
+            if not any_lane(active):
+                break
+            secant = high - f_high * (high - low) / (f_high - f_low)
+            fit = (secant > low) & (secant < high)
+            middle_point = 0.5 * (low + high)
+            theta = middle_point if k % 3 == 2 else select(fit, secant, middle_point)
+            theta = select(active, theta, 0.0 * high)
+            gap = gap_inside(theta, t, h, bank, y_new, dense, middle, out)
+            below = active & (gap < 0.0)
+            above = active & ~(gap < 0.0)
+            # the end that stays is given half its weight (Illinois)
+            high, f_high = select(below, theta, high), select(below, gap, select(above, 0.5 * f_high, f_high))
+            low, f_low = select(above, theta, low), select(above, gap, select(below, 0.5 * f_low, f_low))
+    return high
+
+
+@njit(error_model="numpy", forceinline=True)
+def take_back(accept, t, h, bank, y_new, dense, middle, out):
+    """Take back the steps that pass an event before their end, and aim at it; returns the lanes that go on."""
+    theta = first_passage(accept, t, h, bank, y_new, dense, middle, out)
+    least = SHORTEST * maximum(t, 1.0)
+    wanted = maximum(theta * h, least)
+    early = accept & (theta < 1.5) & (wanted < h) & (h > 2.0 * least)
+    store(bank, STOP, select(early, t + wanted, load(bank, STOP, WIDTH)))
+    store(bank, ACCEPTED, load(bank, ACCEPTED, WIDTH) - select(early, 1.0, 0.0 * h))
+    store(bank, REJECTED, load(bank, REJECTED, WIDTH) + select(early, 1.0, 0.0 * h))
+    rush = load(bank, RUSH, WIDTH)
+    short = h <= 100.0 * least
+    store(bank, RUSH, select(accept & ~early, select(short, rush + 1.0, 0.0), rush))
+    return accept & ~early
+
+
+@njit(error_model="numpy")
+def change_modes(moved, t, bank, out):
+    """Let every contact whose gap has closed stick, slip or turn, by what acts on it; `t` is the time of the event."""
+    if not any_lane(moved & (smallest_gap(t, bank, bank, out) <= 0.0)):
+        return
+    for i in range(NODES):
+        slip, speed = load(bank, 2 * NODES + i, WIDTH), load(bank, NODES + i, WIDTH)
+        up, down = load(out, 2 * NODES + i, WIDTH), load(out, 3 * NODES + i, WIDTH)
+        sticking = absolute(slip) < 0.5
+        touch = moved & ~sticking & (slip * load(out, i, WIDTH) <= 0.0)
+        leave = moved & sticking & (minimum(up, -down) <= 0.0)
+        lands = select(up < 0.0, 1.0, select(down > 0.0, -1.0, 0.0 * slip))
+        leaves = select(up <= 0.0, 1.0, -1.0 + 0.0 * slip)
+        store(bank, NODES + i, select(touch, load(out, NODES + i, WIDTH), speed))
+        store(bank, 2 * NODES + i, select(touch, lands, select(leave, leaves, slip)))
