@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .basin import Basin, basin
+    from .cluster_states import ClusterExponents, cluster_exponents
     from .exponent import Exponents, exponents
+    from .lyapunov import Lyapunov, lyapunov_spectrum
     from .msf import MSF, Plane, msf, plane
     from .probe import Probe, universal_probe
     from .result import Result, open_result
@@ -18,11 +20,13 @@ if TYPE_CHECKING:
     from .threshold import Thresholds, thresholds
 
 __all__ = [
-    "MSF", "Basin", "Exponents", "Plane", "Probe", "Result", "Status", "SweepInterrupted", "Thresholds", "basin",
-    "exponents", "kernel", "msf", "open_result", "plane", "run", "thresholds", "universal_probe",
+    "MSF", "Basin", "ClusterExponents", "Exponents", "Lyapunov", "Plane", "Probe", "Result", "Status", "SweepInterrupted",
+    "Thresholds", "basin", "cluster_exponents", "exponents", "kernel", "lyapunov_spectrum", "msf", "open_result", "plane", "run", "thresholds", "universal_probe",
 ]  # fmt: skip
 
 _HOME = {
+    "ClusterExponents": "cluster_states", "cluster_exponents": "cluster_states",
+    "Lyapunov": "lyapunov", "lyapunov_spectrum": "lyapunov",
     "Basin": "basin", "basin": "basin", "Exponents": "exponent", "exponents": "exponent", "MSF": "msf", "Plane": "msf",
     "msf": "msf", "plane": "msf", "Probe": "probe", "universal_probe": "probe", "Result": "result", "open_result": "result",
     "SweepInterrupted": "sweep", "kernel": "sweep", "run": "sweep", "Status": "status",

@@ -101,6 +101,20 @@ class Carrier:
         rest = (self.state, self.numbers, spans, self.control, self.strengths, self.vectors, growth, end, sums, counts,
                 np.empty((cells, 0, dimension)))  # fmt: skip
         cuts = np.linspace(0, cells, min(cells, self.workers) + 1).astype(int)
+        if len(cuts) == 2:
+            self.kernel.entry(0, cells, *rest)
+        else:
+            self._share(cuts, rest)
+        bad = np.flatnonzero(counts[:, 0] != Status.FINISHED)
+        if len(bad):
+            status = Status(int(counts[bad[0], 0]))
+            raise FloatingPointError(f"the orbit with its deviations cannot be integrated: {status.message}")
+        self.state = end
+        self.steps += int(counts[:, 1:3].sum())
+        return growth[:, self.order]
+
+    def _share(self, cuts: np.ndarray, rest: tuple[np.ndarray, ...]) -> None:
+        """Run the parts of the cells on threads; on Ctrl-C they stop at once."""
         with ThreadPoolExecutor(self.workers) as pool:
             jobs = [pool.submit(self.kernel.entry, a, b, *rest) for a, b in itertools.pairwise(cuts)]
             try:
@@ -109,13 +123,6 @@ class Carrier:
             except KeyboardInterrupt:
                 self.control[CANCEL] = 1.0
                 raise
-        bad = np.flatnonzero(counts[:, 0] != Status.FINISHED)
-        if len(bad):
-            status = Status(int(counts[bad[0], 0]))
-            raise FloatingPointError(f"the orbit with its deviations cannot be integrated: {status.message}")
-        self.state = end
-        self.steps += int(counts[:, 1:3].sum())
-        return growth[:, self.order]
 
 
 @lru_cache(maxsize=64)

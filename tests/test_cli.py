@@ -460,7 +460,7 @@ WRONG = [
     ("figures nope", "unknown figure 'nope'"),
     ("figures 4b --out {scene}", "cannot make the folder"),
     ("cache empty", "invalid choice"),
-    ("bench nope", "unknown benchmark 'nope'; known: methods, precision"),
+    ("bench nope", "unknown benchmark 'nope'; known: agreement, "),
 ]
 
 
