@@ -12,7 +12,7 @@ from synchain.models.tangent import MODE, Variation
 from .orbits import Orbits
 from .propagate import exact
 
-__all__ = ["Attractor", "find_attractor"]
+__all__ = ["Attractor", "find_attractor", "over_one_cycle"]
 
 LONGEST = 32
 """Longest cycle, in periods of the drive, that is looked for."""
@@ -68,7 +68,7 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
         cycle = next((k + 1 for k, gap in enumerate(gaps) if gap < closed), 0)
         orbits.state[row] = own.state[0] = states[-1]
         if cycle:
-            found = np.concatenate([_over_one_cycle(own, cycle) for _ in range(2)])
+            found = np.concatenate([over_one_cycle(own, cycle) for _ in range(2)])
             words = "periodic" if cycle == 1 else f"periodic, {cycle} drive periods"
             return Attractor(words, cycle * own.unit, found)
         if min(gaps) > 1e-3:
@@ -81,7 +81,7 @@ def _distance(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.abs(a - b).max() / max(1e-3, np.abs(b).max()))
 
 
-def _over_one_cycle(own: Orbits, cycle: int) -> np.ndarray:
+def over_one_cycle(own: Orbits, cycle: int) -> np.ndarray:
     """Propagators (1, m, p, p) of all modes over one cycle, from where the orbit is."""
     own.chosen, own.block = exact(own.strengths), 1.0
     own.carrier = own.carry(own.strengths)

@@ -25,7 +25,7 @@ from .attractor import Attractor, find_attractor
 from .intervals import Interval
 from .orbits import Orbits
 
-__all__ = ["Exponents", "exponents", "group"]
+__all__ = ["Exponents", "exponents", "group", "single"]
 
 BATCHES = 64
 
@@ -107,7 +107,7 @@ def exponents(
     Raises ValueError for a network without coupling or a coupling without synchronous state, and for time dependence
     without a known period; FloatingPointError where an integration fails.
     """
-    scene = _single(scene, rtol, parameters)
+    scene = single(scene, rtol, parameters)
     orbits = Orbits.make(scene, _strengths(alpha), _starts(scene, starts, seed), workers)
     orbits.settle(transient)
     attractors = tuple(find_attractor(orbits, row, transient) for row in range(starts))
@@ -142,7 +142,7 @@ def _by_start(
     return found, error, length
 
 
-def _single(scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
+def single(scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
     """The scene with fixed parameters and without records; a lone oscillator gets a partner, so that it has a
     coupling."""
     graph = scene.topology if scene.topology.links else topology("chain", 2)

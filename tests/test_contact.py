@@ -115,6 +115,16 @@ def test_starts_on_the_ground_stick_or_slip_by_their_load() -> None:
     assert list(cells.end.values[:, 2]) == [0.0, 0.0, 1.0, -1.0]
 
 
+def test_slip_that_begins_slower_than_a_step_can_tell_does_not_chatter() -> None:
+    """The load passes its limit by 9e-6 where the drive turns: the sliding velocity grows from zero at that rate."""
+    s = scene(integrator="rodas5p", rtol=1e-6, window=4.0, parameters={"omega": 1.4}, record=())
+    start = {"x_1": [float.fromhex("0x1.d3815b289d0f8p-2")], "v_1": 0.1}
+    loose = run(s, show_progress=False, **start)
+    tight = run(s.replace(rtol=1e-12, integrator="auto"), show_progress=False, **start)
+    assert loose.success
+    assert np.abs(loose.end.values - tight.end.values).max() < 1e-3
+
+
 def test_large_networks_are_refused_in_words() -> None:
     with pytest.raises(ValueError, match="set-valued friction of 9 oscillators; expected at most 8"):
         run(scene(9), show_progress=False)

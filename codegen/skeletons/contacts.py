@@ -12,7 +12,7 @@ from numba import njit
 
 from synchain.codegen.lanes import absolute, any_lane, broadcast, load, maximum, minimum, select, store
 from synchain.codegen.skeletons.names import NODES, WIDTH, pushes
-from synchain.codegen.skeletons.recording import ACCEPTED, REJECTED, RUSH, STOP, inside
+from synchain.codegen.skeletons.recording import ACCEPTED, REJECTED, RUSH, STEP, STOP, inside
 
 # --- kernel text below ---
 # A gap this little below zero counts as zero; a passage is never sought closer than the shortest step to it.
@@ -34,7 +34,7 @@ def smallest_gap(t, y, p, out):
     return least
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(error_model="numpy")
 def gap_inside(theta, t, h, bank, y_new, dense, middle, out):
     """The smallest gap at a fraction of the step."""
     for c in range(2 * NODES):
@@ -124,7 +124,10 @@ def take_back(accept, t, h, bank, y_new, dense, middle, out):
     least = SHORTEST * maximum(t, 1.0)
     wanted = maximum(theta * h, least)
     early = accept & (theta < 1.5) & (wanted < h) & (h > 2.0 * least)
-    store(bank, STOP, select(early, t + wanted, load(bank, STOP, WIDTH)))
+    # a gap that closes at once after it has opened may be an error of a long step: a shorter one will tell
+    doubtful = early & (theta * h < least) & (h > 16.0 * least)
+    store(bank, STEP, select(doubtful, 0.25 * h, load(bank, STEP, WIDTH)))
+    store(bank, STOP, select(early & ~doubtful, t + wanted, load(bank, STOP, WIDTH)))
     store(bank, ACCEPTED, load(bank, ACCEPTED, WIDTH) - select(early, 1.0, 0.0 * h))
     store(bank, REJECTED, load(bank, REJECTED, WIDTH) + select(early, 1.0, 0.0 * h))
     rush = load(bank, RUSH, WIDTH)

@@ -1,0 +1,185 @@
+"""Periodic orbits of one driven oscillator by Newton's method on its stroboscopic map, their stability, and their
+branches.
+
+The derivative of the map is the propagator of a deviation along the orbit (`synchain.runtime.orbits`), through stick and
+slip where friction is set-valued, so Newton's method converges quadratically for both forms of the law.
+
+Sources: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapter 7; for orbits with stick:
+Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer, 2004), chapters 7-8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import brentq
+
+from synchain.models.scene import Scene
+
+from .attractor import over_one_cycle
+from .exponent import single
+from .orbits import Orbits
+
+__all__ = ["Branch", "PeriodicOrbit", "follow", "periodic_orbit", "stability_end"]
+
+TOLERANCE = 1e-12
+"""Relative tolerance of the integration."""
+
+MOST_STEPS = 30
+
+
+@dataclass(frozen=True, slots=True)
+class PeriodicOrbit:
+    """A motion that repeats itself after `periods` periods of the drive.
+
+    state (components,): at the beginning of a period of the drive; multipliers: the Floquet multipliers of the oscillator
+    by itself, the largest first; residual: largest distance of the state from its image; steps: those of Newton's method.
+    """
+
+    scene: Scene = field(repr=False)
+    periods: int
+    state: np.ndarray
+    multipliers: np.ndarray
+    residual: float
+    steps: int
+
+    @property
+    def stable(self) -> bool:
+        """True where every multiplier lies inside the unit circle."""
+        return bool(abs(self.multipliers[0]) < 1.0)
+
+    def transversal(self, alpha: float) -> np.ndarray:
+        """The multipliers of a transversal mode of strength alpha along the orbit, the largest first."""
+        return _sorted(_strobe(self.scene, self.state, self.periods, alpha)[1])
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """Periodic orbits along a parameter: values (k,), an orbit for each, and the bifurcations between them.
+
+    bifurcations: (value of the parameter, "period doubling" or "fold").  The branch ends where Newton's method fails.
+    """
+
+    name: str
+    values: np.ndarray
+    orbits: tuple[PeriodicOrbit, ...]
+    bifurcations: tuple[tuple[float, str], ...]
+
+
+def periodic_orbit(
+    scene: Scene, periods: int = 1, start: Sequence[float] | np.ndarray | None = None, **parameters: float
+) -> PeriodicOrbit:
+    """Find a periodic orbit of a scene's oscillator near `start` (default: the scene's, after its transient).
+
+    Raises ValueError for an oscillator that is not driven or a number of periods below 1, ArithmeticError where Newton's
+    method does not converge.
+    """
+    scene = single(scene, TOLERANCE, parameters)
+    if not scene.period:
+        raise ValueError(
+            "periodic orbits are looked for on the stroboscopic map of a drive; found an oscillator without one"
+        )
+    if periods < 1:
+        raise ValueError(f"periods = {periods}; expected at least 1")
+    state = np.zeros(len(scene.initial))
+    given = [values[0] for values in scene.initial.values()] if start is None else start
+    state[: len(given)] = given
+    orbits = Orbits.make(scene, np.zeros(1), state[None], 1)
+    if start is None:
+        orbits.settle(scene.transient)
+        state = orbits.state[0]
+    size = orbits.components
+    state, best, steps = state[:size], np.inf, 0
+    kept = state
+    while steps < MOST_STEPS:
+        image, matrix = _strobe(scene, state, periods, 0.0)
+        gap = image[:size] - state
+        residual = float(np.abs(gap).max())
+        if not residual < best:
+            break
+        best, kept, found = residual, state, matrix
+        if residual == 0.0:
+            break
+        state = state + np.linalg.solve(np.eye(size) - matrix, gap)
+        steps += 1
+    if not best < 1e-9 * max(1.0, float(np.abs(kept).max())):
+        raise ArithmeticError(f"no orbit of {periods} drive periods near the start: the best residual was {best:.1e}")
+    return PeriodicOrbit(scene, periods, kept, _sorted(found), best, steps)
+
+
+def follow(scene: Scene, name: str, values: Sequence[float], first: PeriodicOrbit) -> Branch:
+    """Follow a periodic orbit along a parameter, from `first` at values[0] on, and locate where it loses its stability.
+
+    Raises ValueError for an unknown parameter.
+    """
+    if name not in first.scene.parameters:
+        raise ValueError(f"unknown parameter {name!r}; known: {', '.join(first.scene.parameters)}")
+    orbits: list[PeriodicOrbit] = []
+    bifurcations = []
+    for k, value in enumerate(values):
+        guess = first.state if k == 0 else orbits[-1].state
+        if k > 1 and orbits[-1].state.shape == orbits[-2].state.shape:
+            slope = (orbits[-1].state - orbits[-2].state) / (values[k - 1] - values[k - 2])
+            guess = guess + slope * (value - values[k - 1])
+        try:
+            orbits.append(periodic_orbit(scene, first.periods, guess, **{name: float(value)}))
+        except ArithmeticError:
+            break
+        if k > 0:
+            bifurcations += _between(scene, name, float(values[k - 1]), float(value), orbits[-2], orbits[-1])
+    return Branch(name, np.asarray(values[: len(orbits)], dtype=float), tuple(orbits), tuple(bifurcations))
+
+
+def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
+    """The strength alpha between `low` and `high` at which the largest transversal multiplier has modulus 1, to rounding.
+
+    Raises ValueError where the modulus is on the same side of 1 at both ends.
+    """
+
+    def growth(alpha: float) -> float:
+        return float(np.log(abs(orbit.transversal(alpha)[0])))
+
+    if growth(low) * growth(high) > 0.0:
+        raise ValueError(f"alpha: the mode grows, or decays, at {low} and at {high}; expected a change between them")
+    return float(brentq(growth, low, high, xtol=1e-14, rtol=1e-14))
+
+
+def _strobe(scene: Scene, state: np.ndarray, periods: int, alpha: float) -> tuple[np.ndarray, np.ndarray]:
+    """The state some periods later, and the propagator of a deviation of strength alpha."""
+    start = np.zeros(len(scene.initial))
+    start[: len(state)] = state
+    orbits = Orbits.make(scene, np.array([alpha]), start[None], 1)
+    matrix = over_one_cycle(orbits, periods)[0, 0]
+    return orbits.state[0], matrix
+
+
+def _sorted(matrix: np.ndarray) -> np.ndarray:
+    found = np.linalg.eigvals(matrix)
+    return np.asarray(found[np.argsort(-np.abs(found), kind="stable")])
+
+
+def _between(
+    scene: Scene, name: str, low: float, high: float, before: PeriodicOrbit, after: PeriodicOrbit
+) -> list[tuple[float, str]]:
+    """The crossing of a real multiplier through -1 or 1 between two neighbours on a branch."""
+    found = []
+    for at, words in ((-1.0, "period doubling"), (1.0, "fold")):
+        ends = [_nearest(orbit, at) for orbit in (before, after)]
+        if None in ends or ends[0] * ends[1] > 0.0:  # type: ignore[operator]
+            continue
+
+        def distance(value: float, at: float = at) -> float:
+            share = (value - low) / (high - low)
+            guess = before.state + share * (after.state - before.state)
+            return _nearest(periodic_orbit(scene, before.periods, guess, **{name: value}), at) or 0.0
+
+        found.append((float(brentq(distance, low, high, xtol=1e-12)), words))
+    return found
+
+
+def _nearest(orbit: PeriodicOrbit, at: float) -> float | None:
+    """How far the largest multiplier is from a point of the real axis; None where it is complex."""
+    value = complex(orbit.multipliers[0])
+    return value.real - at if value.imag == 0.0 else None

@@ -1,0 +1,95 @@
+"""Periodic orbits by Newton's method against closed forms, and bifurcations on their branches."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from synchain.models.scene import Scene
+from synchain.models.topology import topology
+from synchain.runtime.periodic import follow, periodic_orbit, stability_end
+
+PAIR = topology("chain", 2)
+
+
+def scene(**more: object) -> Scene:
+    return Scene(**{"topology": PAIR, "contact": "set-valued", **more})  # type: ignore[arg-type]
+
+
+def test_den_hartogs_motion() -> None:
+    """x'' + x + r sgn x' = cos(beta t), no stops: amplitude sqrt(V^2 - r^2 U^2) (Phil. Mag. 9, 801 (1930))."""
+    beta, r = 1.4, 0.3
+    v, u = 1 / (1 - beta**2), np.sin(np.pi / beta) / (beta * (1 + np.cos(np.pi / beta)))
+    amplitude = np.sqrt(v**2 - (r * u) ** 2)
+    s = scene(
+        friction="coulomb",
+        parameters={"theta_b": 0.0, "epsilon": 1.0, "mu": r, "u": 1.0, "omega": beta},
+        transient=200.0,
+    )
+    orbit = periodic_orbit(s)
+    assert orbit.residual < 1e-13
+    assert orbit.stable
+    # the phase at the beginning of a period is where the drive is largest: sin phi = -r U / V
+    phase = np.arctan2(-r * u / v, np.sign(v) * np.sqrt(1 - (r * u / v) ** 2))
+    turning = phase / beta  # time of the turning point, where x is largest
+    assert abs(orbit.state[0]) < amplitude
+    later = _position(s, orbit.state, turning % (2 * np.pi / beta))
+    assert abs(abs(later) - amplitude) < 1e-11
+
+
+def _position(s: Scene, state: np.ndarray, length: float) -> float:
+    from synchain.runtime import run
+
+    one = s.replace(
+        topology=topology("chain", 1), transient=0.0, window=length, time_unit="time", record=(), rtol=1e-12
+    )
+    return float(run(one, x_1=float(state[0]), v_1=float(state[1]), show_progress=False).end.values[0])
+
+
+def test_a_linear_oscillator_has_the_multipliers_of_its_damping() -> None:
+    s = Scene(oscillator="duffing", topology=PAIR, parameters={"beta": 1e-12, "delta": 0.2, "omega": 1.3})
+    orbit = periodic_orbit(s)
+    expected = np.exp(-0.1 * 2 * np.pi / 1.3)
+    np.testing.assert_allclose(np.abs(orbit.multipliers), expected, rtol=1e-9)
+
+
+def test_the_end_of_the_stable_range_to_rounding() -> None:
+    """omega = 1.15, period two: the smoothed law approaches the exact one, and another start gives the same ten
+    digits."""
+    exact = stability_end(periodic_orbit(scene(), 2, omega=1.15), 0.4, 0.5)
+    again = stability_end(periodic_orbit(scene(initial={"x": [0.1, 0.1]}, transient=401.0), 2, omega=1.15), 0.4, 0.5)
+    assert abs(exact - again) < 1e-10
+    gaps = [abs(stability_end(periodic_orbit(scene(contact="atan"), 2, omega=1.15, kappa=k), 0.4, 0.5) - exact)
+            for k in (1e5, 1e7, 1e9)]  # fmt: skip
+    assert gaps[0] > 50 * gaps[1]
+    assert gaps[2] < 1e-6
+    with pytest.raises(ValueError, match="expected a change between them"):
+        stability_end(periodic_orbit(scene(), 2, omega=1.15), 0.6, 0.7)
+
+
+def test_a_period_doubling_is_found_where_the_double_period_is_born() -> None:
+    first = periodic_orbit(scene(), 2, omega=1.2)
+    branch = follow(scene(), "omega", np.linspace(1.2, 1.24, 5), first)
+    ((at, words),) = branch.bifurcations
+    assert words == "period doubling"
+    assert len(branch.orbits) == 5
+    assert [orbit.stable for orbit in branch.orbits] == [bool(value < at) for value in branch.values]
+    far = scene(transient=3000.0)
+    gaps = []
+    for value in (at - 0.002, at + 0.002):
+        twice = periodic_orbit(far, 2, branch.orbits[2].state, omega=value)
+        gaps.append(np.abs(periodic_orbit(far, 4, omega=value).state - twice.state).max())
+    below, above = gaps
+    assert below < 1e-9  # the period of four is that of two below, and another motion above
+    assert above > 1e-3
+
+
+def test_what_is_refused() -> None:
+    with pytest.raises(ValueError, match="an oscillator without one"):
+        periodic_orbit(Scene(oscillator="lorenz", coupling="x->x", topology=PAIR))
+    with pytest.raises(ValueError, match="periods = 0; expected at least 1"):
+        periodic_orbit(scene(), 0)
+    with pytest.raises(ArithmeticError, match="no orbit of 1 drive periods near the start"):
+        periodic_orbit(scene(), 1, start=[50.0, -40.0], omega=1.55)
+    with pytest.raises(ValueError, match="unknown parameter 'omga'"):
+        follow(scene(), "omga", [1.0], periodic_orbit(scene(), 2, omega=1.15))
