@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from mpmath import mp, mpf
 
-ORDER, STEP, LOOKS = 26, "0.125", 8
+ORDER, STEP, LOOKS = 20, "0.2", 6
 
 
 def value(series: list[mpf], tau: mpf) -> mpf:
@@ -97,7 +97,10 @@ class Reference:
                         while high - low > tiny:
                             half = (low + high) / 2
                             low, high = (low, half) if self.gap(i, made, half) < -tiny else (half, high)
-                        first, who = (high, [i]) if high < first - 2 * tiny else (first, [*who, i])
+                        if high < first - 2 * tiny:
+                            first, who = high, []
+                        if high <= first + 2 * tiny:
+                            who.append(i)
                         break
                     low = high
             self.x = [value(s, first) for s in made[0]]
