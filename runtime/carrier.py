@@ -51,10 +51,12 @@ class Carrier:
         numbers: np.ndarray,
         strengths: np.ndarray,
         workers: int | None = None,
+        looseness: float = 1.0,
     ) -> Carrier:
         """Prepare the kernel and the arrays; tolerances and step budget are the scene's.
 
-        strengths: (number of strengths, modes), any order.  Deviations start along (1, 1, …).
+        strengths: (number of strengths, modes), any order.  Deviations start along (1, 1, …).  `looseness`: how many
+        times the tolerance of the orbit the deviations are allowed.
         """
         kernel = _kernel(variation)
         width, count = kernel.origin.width, strengths.shape[1]
@@ -66,7 +68,7 @@ class Carrier:
         rtol, atol = tolerances(scene, numbers)
         repeat = periods(kernel.equations, numbers)
         longest = 0.5 * repeat[repeat > 0.0].min() if np.any(repeat > 0.0) else math.inf
-        control = control_array(rtol, atol, longest, scene.max_steps, jumps=False)
+        control = np.append(control_array(rtol, atol, longest, scene.max_steps, jumps=False), looseness)
         vectors = np.full((len(state), variation.size, padded), 1.0 / math.sqrt(variation.size))
         kept = np.ascontiguousarray(strengths[:, chosen], dtype=float)
         kept = kept if len(kept) else np.zeros((1, padded))

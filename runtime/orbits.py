@@ -19,6 +19,9 @@ __all__ = ["Orbits"]
 NODES, PARTS = (14, 20, 28, 40, 60), (1, 2, 4, 8, 16)
 """Nodes of a panel of strengths, and panels a side, that are tried."""
 
+LOOSENESS = 10.0
+"""Times the tolerance that modes are allowed where their growth is averaged: it moves exponents by less than rtol."""
+
 
 @dataclass(slots=True)
 class Orbits:
@@ -66,13 +69,13 @@ class Orbits:
         """The orbits of some starts."""
         return Orbits(self.scene, self.variation, self.strengths, self.state[rows], self.workers, self.unit)
 
-    def carry(self, strengths: np.ndarray) -> Carrier:
+    def carry(self, strengths: np.ndarray, looseness: float = 1.0) -> Carrier:
         """A carrier of these strengths along the orbits from where they are, one deviation for each component."""
         repeated = np.repeat(strengths, self.components)
         rows = np.stack([repeated.real, repeated.imag]) if np.iscomplexobj(self.strengths) else repeated[None]
         names = self.variation.orbit.parameters
         numbers = np.tile([self.scene.parameters[name] for name in names], (len(self.state), 1))
-        return Carrier.make(self.scene, self.variation, self.state, numbers, rows, self.workers)
+        return Carrier.make(self.scene, self.variation, self.state, numbers, rows, self.workers, looseness)
 
     def settle(self, periods: float) -> None:
         """Run through a transient."""
@@ -86,12 +89,12 @@ class Orbits:
         limit = max(0.1 * self.scene.rtol, 1e-12)
         for block, nodes, parts in _choices(self.scene.forced):
             self.block, self.chosen = block, interpolation(self.strengths, nodes, parts)
-            self.carrier = self.carry(self.chosen.nodes)
+            self.carrier = self.carry(self.chosen.nodes, LOOSENESS)
             if self.chosen.exact or self.chosen.error(self.propagators()) < limit:
                 break
         else:
             self.chosen = exact(self.strengths)
-        self.carrier = self.carry(self.chosen.nodes)
+        self.carrier = self.carry(self.chosen.nodes, LOOSENESS)
         start = np.ones((len(self.state), len(self.strengths), self.components), dtype=self.strengths.dtype)
         self.deviations = start / math.sqrt(self.components)
 

@@ -29,6 +29,8 @@ from synchain.codegen.skeletons.recording import (
 # --- kernel text below ---
 # Steps between two scalings: a step's growth is bounded by its error, that of so many stays far from overflow.
 BETWEEN_SCALINGS = 8
+# Entry of `control`: how many times the tolerance of the orbit the modes are allowed.
+LOOSENESS = 8
 
 
 @njit(error_model="numpy")
@@ -130,6 +132,7 @@ def march(first, last, start, numbers, spans, control, strengths, vectors, growt
         for k in range(STRENGTHS):
             for lane in range(LANES):
                 strong[(STRENGTHS * which + k) * LANES + lane] = strengths[k, which * LANES + lane]
+    tolerance = control[RTOL] * control[LOOSENESS]
     for cell in range(first, last):
         fill(0, cell, start, numbers, spans, control, bank, samples)
         take_in(vectors[cell], old, registers)
@@ -139,9 +142,9 @@ def march(first, last, start, numbers, spans, control, strengths, vectors, growt
             t, h = load(bank, TIME, WIDTH), aim(bank, control)
             error = step(t, h, bank, bank, y_new, dense, control[RTOL], control[ATOL], shared)
             if any_lane(error <= 1.0):
-                worst = watched(shared, strong, old, new, registers - 1, control[RTOL])
+                worst = watched(shared, strong, old, new, registers - 1, tolerance)
                 if worst <= 1.0 and registers > 1:
-                    worst = max(worst, watched(shared, strong, old, new, 0, control[RTOL]))
+                    worst = max(worst, watched(shared, strong, old, new, 0, tolerance))
                 error = maximum(error, broadcast(worst, WIDTH))
             t_new = arrive(bank, t, h)
             accept = judge(bank, h, error, 1.0 / (ERROR_ORDER + 1.0))
