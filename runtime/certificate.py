@@ -27,10 +27,11 @@ NEAR = 1e-11
 
 ERRORS, CHANCE = 5.0, 1e-6
 """A cell may end early where its exponent is below 0 by so many standard errors, and where the chance of a burst from
-NEAR to SYNCHRONOUS is below CHANCE."""
+NEAR to BURST is below CHANCE."""
 
-SYNCHRONOUS = 1e-6
-"""Mean synchronisation error below which a cell counts as synchronous."""
+BURST, SYNCHRONOUS = 1e-6, 1e-3
+"""Synchronisation error that a certified cell must not reach again; mean error below which a cell counts as synchronous,
+as in `synchain.runtime.threshold`."""
 
 VERDICTS = (
     "did not finish",
@@ -61,7 +62,7 @@ class Certificate:
         A deviation whose logarithm drifts down at the rate -exponent and diffuses ever climbs by g with the chance
         exp(-2 g |exponent| / diffusion) (Redner, A Guide to First-Passage Processes (Cambridge, 2001), section 3.2).
         """
-        climb = math.log(SYNCHRONOUS / NEAR)
+        climb = math.log(BURST / NEAR)
         rare = -2.0 * climb * self.exponent > -math.log(CHANCE) * self.diffusion
         return np.where((self.exponent + ERRORS * self.stderr < 0.0) & rare, NEAR, 0.0)
 

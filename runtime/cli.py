@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from .commands import command, names
-from .commands._outcome import FAILED, FINE, WRONG_USE, Failed, WrongUse, sentence
+from .commands._outcome import FAILED, FINE, WRONG_USE, Failed, WrongUse, sentence, wrong_use
 
 __all__ = ["main"]
 
@@ -72,9 +72,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         if sys.stdout is not None:
             sys.stdout.flush()
         return code
-    except BrokenPipeError:  # whoever reads the output has seen enough
+    except BrokenPipeError as closed:  # whoever reads the output has seen enough
         _silence()
-        return FINE
+        return int(getattr(closed, "exit_code", FINE))
     except (Exception, KeyboardInterrupt) as problem:
         return _report(name, problem)
 
@@ -103,6 +103,11 @@ def _dispatch(words: list[str]) -> int:
     except SystemExit:  # --help has been printed
         return FINE
     arguments.command_line = ("synchain", *words)
+    if getattr(arguments, "allow_code", None):
+        from synchain.models.plugins import allow_code
+
+        with wrong_use():
+            allow_code(*arguments.allow_code)
     return int(module.execute(arguments))
 
 

@@ -42,6 +42,7 @@ MEANINGS = {
     "trajectory_time": "times of the trajectory",
     "transversal_exponent": "largest transversal exponent of the synchronous state",
     "transversal_stderr": "standard error of the transversal exponent",
+    "ended_early": "1 where the cell ended before its window did, certain to stay synchronous",
     "verdict": "; ".join(f"{k} {words}" for k, words in enumerate(VERDICTS)),
 }
 
@@ -184,7 +185,7 @@ def gather(
         for column, name in enumerate(("sync_error", "sync_error_max", "sync_error_end")):
             add(name, buffers.sums[:, column])
     if certificate is not None:
-        for name, values in _certified(scene, buffers, certificate).items():
+        for name, values in _certified(scene, cells, buffers, certificate).items():
             add(name, values)
     if "section" in scene.record:
         most = max(int(buffers.counts[:, 3].max(initial=0)), 1)
@@ -200,9 +201,11 @@ def gather(
     return Result(xr.Dataset(data, _coordinates(scene), provenance), scene)
 
 
-def _certified(scene: Scene, buffers: Buffers, certificate: Certificate) -> dict[str, np.ndarray]:
+def _certified(scene: Scene, cells: Plan, buffers: Buffers, certificate: Certificate) -> dict[str, np.ndarray]:
     """What a certificate says of each cell."""
     made = {"transversal_exponent": certificate.exponent, "transversal_stderr": certificate.stderr}
+    last = cells.spans[:, 1]
+    made["ended_early"] = ((buffers.counts[:, 0] == Status.FINISHED) & (buffers.sums[:, 3] < last)).astype(np.int32)
     if "sync_error" in scene.record:
         finished = buffers.counts[:, 0] == Status.FINISHED
         made["verdict"] = certificate.verdicts(finished, buffers.sums[:, 0]).astype(np.int32)

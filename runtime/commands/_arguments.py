@@ -9,7 +9,18 @@ from synchain.models.axis import Axis
 from synchain.models.expressions import constant
 from synchain.models.scene_checks import shown
 
-__all__ = ["add_scene", "add_workers", "folder", "grid", "number", "positive", "setting", "tolerance", "whole"]
+__all__ = [
+    "add_allow_code",
+    "add_scene",
+    "add_workers",
+    "folder",
+    "grid",
+    "number",
+    "positive",
+    "setting",
+    "tolerance",
+    "whole",
+]
 
 NODES = 100_000
 """Largest number of oscillators that can be asked for."""
@@ -98,6 +109,18 @@ def add_scene(parser: ArgumentParser) -> None:
     """Add the argument SCENE."""
     parser.add_argument(
         "scene", metavar="SCENE", help="a shipped name (see: synchain scenes) or a path to a .toml file"
+    )
+    add_allow_code(parser)
+
+
+def add_allow_code(parser: ArgumentParser) -> None:
+    """Add the option --allow-code, which every command obeys before it reads a scene."""
+    parser.add_argument(
+        "--allow-code",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="let the scene name this .py file as a part of its own, e.g. friction = './my_law.py'; the file is run",
     )
 
 

@@ -33,6 +33,8 @@ def wrong_use() -> Iterator[None]:
     """Errors about values, types and files inside the block are the user's; anything else stays what it is."""
     try:
         yield
+    except BrokenPipeError:  # nobody's mistake: whoever reads the output has seen enough
+        raise
     except (ValueError, TypeError, OSError) as problem:
         raise WrongUse(sentence(problem)) from problem
 

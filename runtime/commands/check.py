@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -51,6 +52,17 @@ def execute(arguments: Namespace) -> int:
     if arguments.junit is not None:
         with wrong_use():
             _write_junit(arguments.junit, arguments.file, found, wrong)
+    code = FAILED if wrong else FINE
+    try:
+        _print(arguments, found, wrong)
+    except BrokenPipeError as closed:  # the reader has seen enough, but the answer counts
+        setattr(closed, "exit_code", code)  # noqa: B010
+        raise
+    return code
+
+
+def _print(arguments: Namespace, found: Sequence[Sequence[Verdict]], wrong: int) -> None:
+    """Print all claims as JSON or text."""
     if arguments.json:
         claims = [_as_dict(line) for line in found]
         print_json({"file": arguments.file, "right": len(found) - wrong, "wrong": wrong, "claims": claims})
@@ -58,7 +70,8 @@ def execute(arguments: Namespace) -> int:
         for verdicts in found:
             print("\n".join(_report(verdicts)))
         print(f"{len(found)} claim{'s' * (len(found) != 1)}: {len(found) - wrong} right, {wrong} wrong")
-    return FAILED if wrong else FINE
+    if sys.stdout is not None:
+        sys.stdout.flush()
 
 
 def _name(line: Sequence[Verdict]) -> str:

@@ -27,25 +27,16 @@ def configure(parser: ArgumentParser) -> None:
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--latex", action="store_true", help="print LaTeX")
     form.add_argument("--json", action="store_true", help="print JSON: states, parameters, right-hand sides")
-    parser.add_argument(
-        "--allow-code",
-        metavar="FILE",
-        action="append",
-        default=[],
-        help="let the scene name this .py file as a part of its own, e.g. friction = './my_law.py'; the file is run",
-    )
     for name, meaning in SOURCES.items():
         form.add_argument(f"--{name}", action="store_true", help=meaning)
 
 
 def execute(arguments: Namespace) -> int:
     """Print the equations as text, LaTeX, JSON or source."""
-    from synchain.models.plugins import allow_code
     from synchain.models.present import as_dict, latex, text
     from synchain.models.scene_file import load_scene
 
     with wrong_use():
-        allow_code(*arguments.allow_code)
         scene = load_scene(arguments.scene)
     source = next((name for name in SOURCES if getattr(arguments, name)), None)
     if source is not None:

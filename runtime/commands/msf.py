@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._arguments import above_zero, add_workers, folder, positive, spaced, whole
+from ._arguments import above_zero, add_allow_code, add_workers, folder, positive, spaced, whole
 from ._outcome import FINE, Failed, WrongUse, print_json, sentence, warn, wrong_use
 
 if TYPE_CHECKING:
@@ -52,6 +52,7 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument("--matrix", metavar="FILE", help="network: connectivity matrix in a text file")
     parser.add_argument("--json", action="store_true", help="print JSON: alpha, exponent, stderr, intervals, class ...")
     parser.add_argument("--out", metavar="DIR", type=folder, help="write a figure (PNG) and the numbers (CSV) there")
+    add_allow_code(parser)
     add_workers(parser)
 
 

@@ -69,6 +69,8 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Explain the scene where asked to; run it, save, draw, and say how the cells ended."""
+    from synchain.codegen.integrators import integrator
+
     from ..certificate import check_certifiable
     from ..skip import decide, explain
     from ..sweep import SweepInterrupted, run
@@ -81,6 +83,8 @@ def execute(arguments: Namespace) -> int:
         name = Path(arguments.scene).stem if arguments.scene.endswith(".toml") else arguments.scene
         if arguments.explain:
             print(f"{name}: {_count(scene.cells, 'cell')} of {_count(scene.n, 'oscillator')}\n{explain(skip)}")
+        if scene.integrator != "auto":
+            integrator(scene.integrator)
         if arguments.out is None:
             return FINE
         target = Path(arguments.out, f"{name}.nc")
@@ -232,6 +236,8 @@ def _summary(name: str, result: Result, seconds: float, files: tuple[Path, ...])
         else:
             print(f"synchain run: {words}", file=sys.stderr)
     if "verdict" in result.data:
+        early = int((result.data.ended_early.values != 0).sum())
+        print(f"  {_count(early, 'cell')} of these ended early, certain to stay synchronous")
         for code, count in zip(*np.unique(result.data.verdict.values, return_counts=True), strict=True):
             print(f"  {_count(int(count), 'cell')} {VERDICTS[code]}")
     for file in files:

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ._arguments import above_zero, add_workers, grid, positive, whole
+from ._arguments import above_zero, add_allow_code, add_workers, grid, positive, whole
 from ._outcome import FINE, WrongUse, print_json, warn, wrong_use
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ def configure(parser: ArgumentParser) -> None:
         help=f"defaults of {QUICK['starts']} starts, {QUICK['transient']:g} periods and half the grid; ends to {COARSE:g}",
     )
     parser.add_argument("--json", action="store_true", help="print JSON: intervals, probe, predicted, warnings")
+    add_allow_code(parser)
     add_workers(parser)
 
 
