@@ -13,6 +13,8 @@ from synchain.runtime.exponent import Exponents, exponents
 from synchain.runtime.sweep import run
 from synchain.runtime.threshold import Criterion
 
+pytestmark = pytest.mark.long
+
 PAIR = topology("chain", 2)
 SHORT = Criterion(transient=300, window=20, starts=2)
 

@@ -12,6 +12,8 @@ from synchain.models.topology import topology
 from synchain.runtime.bench import families
 from synchain.runtime.synchronisability import verdict
 
+pytestmark = pytest.mark.long
+
 
 def function(*ranges: tuple[float, float], error: float = 0.0) -> SimpleNamespace:
     """A stability function that is negative on these ranges."""

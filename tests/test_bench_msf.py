@@ -15,6 +15,8 @@ from synchain.runtime import orbits, propagate
 from synchain.runtime.bench import msf
 from synchain.runtime.bench.peers import _jitcode_transversal as jitcode
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def rows() -> list[dict[str, object]]:

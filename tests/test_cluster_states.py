@@ -18,6 +18,8 @@ from synchain.runtime.cluster_states import ClusterExponents, cluster_exponents
 from synchain.runtime.exponent import exponents
 from synchain.runtime.sweep import run
 
+pytestmark = pytest.mark.long
+
 PAIR, RING, STAR = topology("chain", 2), topology("ring", 4), topology("star", 4)
 
 

@@ -18,6 +18,8 @@ from synchain.runtime.result import Result
 from synchain.runtime.status import Status
 from synchain.runtime.sweep import run
 
+pytestmark = pytest.mark.long
+
 ONE, THREE = topology("chain", 1), topology("chain", 3)
 
 

@@ -14,6 +14,8 @@ from synchain.runtime.exponent import exponents
 from synchain.runtime.lyapunov import Lyapunov, Walk, lyapunov_spectrum
 from synchain.runtime.sweep import run
 
+pytestmark = pytest.mark.long
+
 PAIR = topology("chain", 2)
 APART = from_matrix([[1, -1], [-1, 1]])
 """A link of weight -1, which drives two oscillators apart: gamma = 2."""
