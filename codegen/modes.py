@@ -52,7 +52,7 @@ def emit_modes(variation: Variation, width: int | None = None) -> KernelSource:
     plain = tidy(equations)
     names = Names([*plain.state, *plain.parameters, *(s.name for s in plain.node.state)])
     blocks = analyse(plain.node, names)
-    parts = Parts.of(variation, _renamed(variation, plain), method.stages)
+    parts = Parts.of(variation, plain, method.stages)
     writer = StepWriter(plain, blocks, method)
     functions = _functions(parts, plain.state, names)
     write_rosenbrock(writer, lambda i: _note(writer, parts, functions, method, i))
@@ -83,11 +83,11 @@ class Parts:
     moving: dict[sp.Expr, int] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, variation: Variation, matrix: Mapping[Entry, sp.Expr], stages: int) -> Parts:
+    def of(cls, variation: Variation, plain: Equations, stages: int) -> Parts:
+        """The parts of a variation whose orbit has the names of `plain`."""
         made = cls(stages)
-        plain = tidy(variation.orbit)
         states = {sp.Symbol(name, real=True) for name in plain.state} | {TIME}
-        for key, e in matrix.items():
+        for key, e in _renamed(variation, plain).items():
             rest = e.xreplace(dict.fromkeys(variation.parameters, sp.S.Zero))
             terms = [(rest, sp.S.One), *((e.diff(s), s) for s in variation.parameters)]
             made.rows[key] = [(made.slot(c, states), s) for c, s in terms if c != 0]

@@ -43,6 +43,11 @@ class Contact:
         """The same with every expression changed."""
         return Contact(*(change(e) for e in self.expressions))
 
+    def under(self, force: sp.Expr) -> Contact:
+        """The same where a further force acts on the body, unit mass."""
+        pushes = (e + force for e in (self.up, self.down, self.pushed, self.pulled, self.shown))
+        return Contact(self.speed, self.sliding, *pushes)
+
     @property
     def expressions(self) -> tuple[sp.Expr, ...]:
         """All of them, in the order of the fields."""

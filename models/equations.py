@@ -166,6 +166,19 @@ class Equations:
         there = dict(zip(self.edge.there, self.symbols(source), strict=True))
         return {**here, **there, self.edge.weight: sp.Rational(weight.numerator, weight.denominator)}
 
+    def contact_at(self, i: int) -> Contact | None:
+        """What decides between stick and slip for node `i`, with the forces of its links; None without a contact."""
+        contact = self.node.contact
+        if contact is None:
+            return None
+        _, velocity, mode = self.symbols(i)
+        own = contact.map(lambda e: e.xreplace(self.at_node(i)))
+        links = sp.S.Zero
+        if self.edge is not None:
+            links = sp.Add(*(self.edge.rhs[1].xreplace(self.at_link(link)) for link in self.links if link[0] == i))
+        links = links.xreplace({mode: sp.S.One, velocity: own.speed})
+        return own.under(links)
+
     def rhs(self) -> tuple[sp.Expr, ...]:
         """The whole right-hand side, in state order (algebra grows with n: meant for small n)."""
         table = [[e.xreplace(self.at_node(i)) for e in self.node.rhs] for i in range(self.n)]

@@ -20,6 +20,7 @@ from synchain.models.tangent import Variation, clustered
 
 from .carrier import Carrier
 from .exponent import Batches
+from .orbits import unit_of_time
 
 __all__ = ["ClusterExponents", "cluster_exponents"]
 
@@ -104,7 +105,7 @@ def cluster_exponents(
     scene = scene.replace(axes=(), zipped=False, continuation="none", record=(), rtol=rtol, atol=None, **parameters)
     found = _of_graph(scene, state)
     variation = clustered(scene.equations, found)
-    unit = _unit(scene)
+    unit = unit_of_time(scene)
     carrier = _carrier(scene, found, variation, seed)
     for _ in range(round(transient)):
         carrier.advance(unit)
@@ -131,12 +132,6 @@ def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
             "classes)"
         )
     return found
-
-
-def _unit(scene: Scene) -> float:
-    if scene.forced and not scene.period and scene.omega != 0.0:
-        raise ValueError("exponents need equations that are periodic in time; found time dependence without a period")
-    return scene.period or 2.0 * math.pi
 
 
 def _carrier(scene: Scene, found: Clusters, variation: Variation, seed: int) -> Carrier:

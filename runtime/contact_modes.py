@@ -15,32 +15,20 @@ def with_modes(equations: Equations, start: np.ndarray, numbers: np.ndarray) -> 
 
     An oscillator at exactly the ground's velocity sticks where static friction can hold it.
     """
-    contact, n = equations.node.contact, equations.n
-    if contact is None:
+    if equations.node.contact is None:
         return start
     names = [*equations.state, *equations.parameters, "t"]
     symbols = [sp.Symbol(name, real=True) for name in names]
     made = np.array(start, dtype=float)
     columns = [*made.T, *numbers.T, np.zeros(len(made))]
-    for i in range(n):
-        sliding, up, down = (_at(e, symbols, columns) for e in conditions(equations, i))
+    for i in range(equations.n):
+        contact = equations.contact_at(i)
+        if contact is None:
+            continue
+        sliding, up, down = (_at(e, symbols, columns) for e in (contact.sliding, contact.up, contact.down))
         stuck = np.where(up < 0.0, 1.0, np.where(down > 0.0, -1.0, 0.0))
-        made[:, 2 * n + i] = np.where(sliding == 0.0, stuck, np.sign(sliding))
+        made[:, 2 * equations.n + i] = np.where(sliding == 0.0, stuck, np.sign(sliding))
     return made
-
-
-def conditions(equations: Equations, i: int) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-    """Sliding velocity of node i, and its accelerations under the largest static friction in either direction."""
-    contact, node = equations.node.contact, equations.node
-    if contact is None:
-        raise ValueError("these equations have no contact")
-    at = equations.at_node(i)
-    mode, velocity = (sp.Symbol(f"{node.state[k].name}_{i + 1}", real=True) for k in (2, 1))
-    links = sp.S.Zero
-    if equations.edge is not None:
-        links = sp.Add(*(equations.edge.rhs[1].xreplace(equations.at_link(k)) for k in equations.links if k[0] == i))
-    links = links.xreplace({mode: sp.S.One, velocity: contact.speed.xreplace(at)})
-    return contact.sliding.xreplace(at), contact.up.xreplace(at) + links, contact.down.xreplace(at) + links
 
 
 def _at(e: sp.Expr, symbols: list[sp.Symbol], columns: list[np.ndarray]) -> np.ndarray:

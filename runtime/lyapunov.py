@@ -20,6 +20,7 @@ from synchain.models.tangent import PHASE, Variation, phased, whole, with_volume
 
 from .carrier import Carrier
 from .exponent import Batches
+from .orbits import unit_of_time
 
 __all__ = ["Lyapunov", "lyapunov_spectrum"]
 
@@ -145,10 +146,7 @@ class Walk:
     @classmethod
     def make(cls, scene: Scene, count: int, seed: int) -> Walk:
         """At the scene's start, with random directions; ValueError where time enters without a known period."""
-        if scene.forced and not scene.period and scene.omega != 0.0:
-            raise ValueError(
-                "exponents need equations that are periodic in time; found time dependence without a period"
-            )
+        unit = unit_of_time(scene)
         own = whole(scene.equations)
         variation = Variation(with_volume(own.orbit), own.size, own.matrix)
         variation = phased(variation) if scene.forced else variation
@@ -157,7 +155,7 @@ class Walk:
         state = np.array([[*scene.y0, *(0.0 for _ in range(scene.n))]])
         carrier = Carrier.make(scene, variation, state, numbers, np.zeros((0, count)), 1)
         basis = np.linalg.qr(np.random.default_rng(seed).normal(size=(own.size, count)))[0]
-        return cls(scene, variation, carrier, basis, scene.period or 2.0 * math.pi)
+        return cls(scene, variation, carrier, basis, unit)
 
     @property
     def count(self) -> int:

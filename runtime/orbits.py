@@ -14,7 +14,7 @@ from .carrier import Carrier
 from .contact_modes import with_modes
 from .propagate import Interpolation, exact, interpolation
 
-__all__ = ["Orbits"]
+__all__ = ["Orbits", "unit_of_time"]
 
 NODES, PARTS = (14, 20, 28, 40, 60), (1, 2, 4, 8, 16)
 """Nodes of a panel of strengths, and panels a side, that are tried."""
@@ -47,10 +47,7 @@ class Orbits:
     def make(cls, scene: Scene, strengths: np.ndarray, state: np.ndarray, workers: int | None) -> Orbits:
         """Orbits at the start of their transient; ValueError where time enters without a known period."""
         variation = mode(scene.equations, plane=bool(np.iscomplexobj(strengths)))
-        if scene.forced and not scene.period and scene.omega != 0.0:
-            raise ValueError(
-                "exponents need equations that are periodic in time; found time dependence without a period"
-            )
+        unit = unit_of_time(scene)
         contact = variation.orbit.node.contact
         if contact is not None and contact.jumps:
             raise ValueError(
@@ -58,7 +55,7 @@ class Orbits:
             )
         row = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])
         state = with_modes(variation.orbit, state, np.repeat(row, len(state), axis=0))
-        return cls(scene, variation, strengths, state, workers, scene.period or 2.0 * math.pi)
+        return cls(scene, variation, strengths, state, workers, unit)
 
     @property
     def components(self) -> int:
@@ -126,6 +123,13 @@ class Orbits:
         with np.errstate(divide="ignore", invalid="ignore"):
             self.deviations = np.where(length[..., None] > 0.0, moved / length[..., None], 0.0)
             return np.log(length)
+
+
+def unit_of_time(scene: Scene) -> float:
+    """The period of the drive, or 2 pi where there is none; ValueError where time enters without a known period."""
+    if scene.forced and not scene.period and scene.omega != 0.0:
+        raise ValueError("exponents need equations that are periodic in time; found time dependence without a period")
+    return scene.period or 2.0 * math.pi
 
 
 def _choices(forced: bool) -> list[tuple[float, int, int]]:

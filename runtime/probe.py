@@ -28,7 +28,7 @@ from synchain.models.topology import topology
 from .plan import CANCEL, Plan, control_array, plan, tolerances
 from .status import Status
 from .sweep import Buffers, worker_count
-from .threshold import Criterion
+from .threshold import Criterion, offsets
 
 __all__ = ["MODE_ALPHA", "MODE_BETA", "Probe", "integrate", "ring_of_three", "universal_probe"]
 
@@ -154,8 +154,7 @@ def _cells(scene: Scene, names: tuple[str, ...], alpha: np.ndarray, beta: np.nda
     numbers[:, names.index(MODE_ALPHA.name)] = np.repeat(alpha, starts)
     numbers[:, names.index(MODE_BETA.name)] = np.repeat(beta, starts)
     start = np.tile(one.start, (count, 1))
-    moves = np.random.default_rng(criterion.seed).uniform(-criterion.reach, criterion.reach, starts - 1)
-    start[:, : scene.n] += np.tile([0.0, *moves], len(alpha))[:, None]
+    start[:, : scene.n] += np.tile(offsets(criterion), len(alpha))[:, None]
     return Plan(start, numbers, np.tile(one.spans, (count, 1)))
 
 

@@ -22,7 +22,17 @@ from .intervals import Interval, find, intersect, scale
 from .status import Status
 from .sweep import run
 
-__all__ = ["Criterion", "Thresholds", "critical_ratio", "probe", "project", "simulate", "thresholds", "wu_chua"]
+__all__ = [
+    "Criterion",
+    "Thresholds",
+    "critical_ratio",
+    "offsets",
+    "probe",
+    "project",
+    "simulate",
+    "thresholds",
+    "wu_chua",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,11 +182,11 @@ def simulate(
 ) -> Sweep:
     """Sweep sigma by direct simulation and return errors, shares and refined synchronous intervals."""
     criterion = criterion or Criterion()
-    offsets = _offsets(criterion)
+    moves = offsets(criterion)
     seen: dict[str, np.ndarray] = {}
 
     def judge(points: np.ndarray) -> np.ndarray:
-        errors = _errors(scene, points, offsets, criterion, workers, show_progress)
+        errors = _errors(scene, points, moves, criterion, workers, show_progress)
         seen.setdefault("error", np.median(errors, axis=1))
         share = (errors < criterion.tolerance).mean(axis=1)
         seen.setdefault("share", share)
@@ -187,7 +197,7 @@ def simulate(
     return Sweep(x, seen["error"], seen["share"], tuple(intervals))
 
 
-def _offsets(criterion: Criterion) -> np.ndarray:
+def offsets(criterion: Criterion) -> np.ndarray:
     """How far the starts are moved: not at all, then at random."""
     random = np.random.default_rng(criterion.seed)
     return np.concatenate([[0.0], random.uniform(-criterion.reach, criterion.reach, criterion.starts - 1)])

@@ -25,8 +25,8 @@ from synchain.codegen.skeletons.names import (
 )
 from synchain.codegen.skeletons.recording import (
     ACCEPTED, BASE, BUDGET, CANCEL, CHANGE, CHATTERING, CYCLE, DIVERGED, END, FINISHED, FIRST_STEP, INTERRUPTED, LAG, LAST,
-    LEFT, MAX_STEPS, MEAN, MEMORY, MODE, N_ACCEPTED, N_REJECTED, N_SKIPPED, N_SMOOTH, NEXT_SAMPLE, NO_JUMPS, PEAK,
-    PERIOD, PERIODS, POWER, REJECTED, RUSH, SAMPLE_GAP, SAVED, SKIPPED, SMOOTH_STEPS, START, STATUS, STEP, STOP,
+    LEFT, LONGEST_RUSH, MAX_STEPS, MEAN, MEMORY, MODE, N_ACCEPTED, N_REJECTED, N_SKIPPED, N_SMOOTH, NEXT_SAMPLE, NO_JUMPS,
+    PEAK, PERIOD, PERIODS, POWER, REJECTED, RUSH, SAMPLE_GAP, SAVED, SKIPPED, SMOOTH_STEPS, START, STATUS, STEP, STOP,
     STOPPED_AT, SUM_BEFORE, SYNC, SYNC_PEAK, SYNC_SUM, TIME, UNDERFLOW, spread,
 )  # fmt: skip
 
@@ -34,9 +34,15 @@ from synchain.codegen.skeletons.recording import (
 # What must repeat for the future to repeat, saved behind the other groups: the state and the step control.
 REPEATING = (STEP, MODE, SYNC)
 LONGEST_CYCLE = 32.0
-# So many events in a row without time passing are chattering.
-LONGEST_RUSH = 200.0
 SLOTS = SAVED + DIMENSION + len(REPEATING)
+
+
+@njit(error_model="numpy")
+def aligned(count):
+    """Zeros that begin on a cache line: a register that lies across two is slow to read and slower to read back."""
+    block = np.zeros(count + 8)
+    shift = (64 - block.ctypes.data % 64) % 64 // 8
+    return block[shift : shift + count]
 
 
 @njit(error_model="numpy", forceinline=True)

@@ -16,7 +16,7 @@ from numba import njit
 from synchain.codegen.lanes import (
     absolute, any_lane, broadcast, lane_bits, load, maximum, scale_binary, select, split_binary, store,
 )  # fmt: skip
-from synchain.codegen.skeletons.cells import SLOTS, fill, outcome, turn_over
+from synchain.codegen.skeletons.cells import SLOTS, aligned, fill, outcome, turn_over
 from synchain.codegen.skeletons.contacts import change_modes, take_back
 from synchain.codegen.skeletons.control import advance, aim, arrive, judge, pause
 from synchain.codegen.skeletons.names import (
@@ -31,14 +31,6 @@ from synchain.codegen.skeletons.recording import (
 BETWEEN_SCALINGS = 8
 # Entry of `control`: how many times the tolerance of the orbit the modes are allowed.
 LOOSENESS = 8
-
-
-@njit(error_model="numpy")
-def aligned(count):
-    """Zeros that begin on a cache line."""
-    block = np.zeros(count + 8)
-    shift = (64 - block.ctypes.data % 64) % 64 // 8
-    return block[shift : shift + count]
 
 
 @njit(error_model="numpy")

@@ -17,7 +17,7 @@ from numba import njit
 
 from synchain.codegen.lanes import any_lane, lane_bits, load, store
 from synchain.codegen.skeletons.cells import (
-    SLOTS, fill, finish, held, move, occupied, outcome, put, turn_over, vacant, vacate, waiting,
+    SLOTS, aligned, fill, finish, held, move, occupied, outcome, put, turn_over, vacant, vacate, waiting,
 )  # fmt: skip
 from synchain.codegen.skeletons.contacts import change_modes, take_back
 from synchain.codegen.skeletons.control import advance, aim, arrive, judge, pause, turned
@@ -140,14 +140,6 @@ def attempt(mode, bank, dense, y_new, middle, out, cell, spans, control, counts,
     if SWITCHING:
         flips = lane_bits(turned(bank, accept, rate, mode))
     return ALL if control[CANCEL] != 0.0 else lane_bits(pause(bank, control)) | flips, flips
-
-
-@njit(error_model="numpy")
-def aligned(count):
-    """Zeros that begin on a cache line: a register that lies across two is slow to read and slower to read back."""
-    block = np.zeros(count + 8)
-    shift = (64 - block.ctypes.data % 64) % 64 // 8
-    return block[shift : shift + count]
 
 
 @njit(error_model="numpy", nogil=True, cache=True)
