@@ -193,11 +193,25 @@ def test_what_is_refused() -> None:
     s = scene("friction", "spring")
     with pytest.raises(ValueError, match="alpha: found a number that is not finite"):
         exponents(s, [0.1, np.nan])
-    with pytest.raises(ValueError, match="alpha: found strengths that do not increase"):
+    with pytest.raises(ValueError, match="alpha: found numbers that do not increase"):
         msf(s, [0.3, 0.1])
     with pytest.raises(ValueError, match="beta: found numbers that do not increase"):
-        plane(s, [0.0, 0.1], [0.2])
+        plane(s, [0.0, 0.1], [0.2, 0.1])
     with pytest.raises(ValueError, match="starts = 0; expected at least 1"):
         exponents(s, [0.1], starts=0)
     with pytest.raises(ValueError, match="coupling: found none"):
         exponents(Scene(coupling=None), [0.1])
+
+
+@pytest.mark.parametrize(
+    ("strengths", "words"),
+    [
+        ([0.0, np.nan, 1.0], "found nan; expected finite numbers"),
+        ([[0.0, 1.0]], r"found an array of shape \(1, 2\); expected a row"),
+        ("a", "found 'a'; expected real numbers"),
+        (0.5, "at least two numbers"),
+    ],
+)
+def test_a_line_of_strengths_that_is_none_is_named(strengths: object, words: str) -> None:
+    with pytest.raises(ValueError, match=f"alpha: .*{words}"):
+        msf(scene("harmonic", "spring"), strengths)  # type: ignore[arg-type]

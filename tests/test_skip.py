@@ -24,8 +24,9 @@ DUFFING = Scene(
     section="v_3 rising", rtol=1e-10,
 )  # fmt: skip
 FRICTION = Scene(
-    topology=chain(2), parameters={"sigma": 0.1}, record=RECORDS, samples=7, transient=2, window=4, rtol=1e-10
-)
+    topology=chain(2), parameters={"sigma": 0.1}, record=RECORDS, samples=7, transient=2, window=4, rtol=1e-10,
+    integrator="rodas5p",
+)  # fmt: skip
 MIRRORED = DUFFING.replace(initial={"x": [0.5, 0.1, 0.5], "v": [0.0, 0.2, 0.0]})
 
 
