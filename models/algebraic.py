@@ -1,9 +1,9 @@
 """Real and complex algebraic numbers: an irreducible integer polynomial and what isolates one of its roots.
 
-A real root is held between two rationals where the polynomial changes sign, a complex root by Arb's certified
-isolation (F. Johansson, IEEE Trans. Comput. 66, 1281, 2017); both are refined to any accuracy.  Polynomials
-with real roots only are isolated by `isolation.py`.  Real roots are refined exactly: secant guesses, proved by
-signs (J. Abbott, ACM Commun. Comput. Algebra 48, 3, 2014).
+A real root is held between two rationals where the polynomial changes sign, a complex root in a disc that holds no
+other; both are refined to any accuracy.  Polynomials with real roots only are isolated by `isolation.py`, others by
+`complex_isolation.py` or, should that fail, by Arb (F. Johansson, IEEE Trans. Comput. 66, 1281, 2017).  Real roots are
+refined exactly: secant guesses, proved by signs (J. Abbott, ACM Commun. Comput. Algebra 48, 3, 2014).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import sympy as sp
 from flint import acb, arb, fmpq, fmpz_poly
 
 from .balls import precision
+from .complex_isolation import Disc, discs, sharpened
 from .isolation import dyadic, real_brackets, sign
 from .sympy_order import complex_order
 
@@ -67,7 +68,7 @@ class RealRoot:
 
 @dataclass(frozen=True, slots=True)
 class ComplexRoot:
-    """The root of `polynomial` (irreducible, degree >= 2) nearest to `near` = (real, imaginary), not real.
+    """The only root of `polynomial` (irreducible, degree >= 2) within `room` of `near` = (real, imaginary); not real.
 
     `index` is its place among SymPy's CRootOf, which lists real roots first.
     """
@@ -75,6 +76,7 @@ class ComplexRoot:
     polynomial: Polynomial
     index: int
     near: tuple[Fraction, Fraction]
+    room: Fraction
 
     @property
     def text(self) -> str:
@@ -88,9 +90,7 @@ class ComplexRoot:
 
     def enclosure(self, bits: int) -> acb:
         """A ball that holds this number, of radius below 2**-bits times its modulus."""
-        with precision(bits + 96):
-            near = acb(_exact(self.near[0]), _exact(self.near[1]))
-            return min(_balls(self.polynomial, bits + 16), key=lambda ball: dyadic(abs(ball - near)))
+        return _sharpened(self, bits)
 
 
 @lru_cache(maxsize=64)
@@ -104,11 +104,22 @@ def _expression(polynomial: Polynomial, index: int) -> sp.Expr:
     return sp.CRootOf(sp.Poly(list(polynomial[::-1]), _X), index)
 
 
-@lru_cache(maxsize=16)
-def _balls(polynomial: Polynomial, bits: int) -> tuple[acb, ...]:
-    """Disjoint balls, one around each root; real roots have an imaginary part that is exactly 0."""
-    with precision(bits):
-        return tuple(root for root, _ in fmpz_poly(list(polynomial)).complex_roots())
+@lru_cache(maxsize=4096)
+def _sharpened(root: ComplexRoot, bits: int) -> acb:
+    disc = Disc(_exact(root.near[0]), _exact(root.near[1]), fmpq(0))
+    return sharpened(fmpz_poly(list(root.polynomial)), disc, _exact(root.room), bits)
+
+
+def _by_arb(f: fmpz_poly) -> list[Disc]:
+    """Discs around the roots by Arb's own isolation: a second at degree 100, minutes at 200."""
+    with precision(128):
+        found = [root for root, _ in f.complex_roots()]
+        reals = sorted((ball for ball in found if ball.imag == 0), key=lambda ball: dyadic(ball.real))
+        others = [ball for ball in found if ball.imag != 0]
+        radii = [dyadic((ball.real.rad() + ball.imag.rad()).upper()) + fmpq(1, 2**120) for ball in reals + others]
+    return [
+        Disc(dyadic(ball.real), dyadic(ball.imag), radius) for ball, radius in zip(reals + others, radii, strict=True)
+    ]
 
 
 def real_roots(polynomial: Polynomial) -> tuple[RealRoot, ...] | None:
@@ -120,23 +131,30 @@ def real_roots(polynomial: Polynomial) -> tuple[RealRoot, ...] | None:
 
 
 def complex_roots(polynomial: Polynomial) -> tuple[RealRoot | ComplexRoot, ...]:
-    """All roots of an irreducible polynomial of degree >= 2, by Arb's certified isolation.
+    """All roots of an irreducible polynomial of degree >= 2, each isolated by a disc that is proved to hold it alone.
 
-    Real ones come first, ascending; conjugates are neighbours.  A second at degree 100, minutes at 200.
+    Real ones come first, ascending; conjugates are neighbours.
     """
-    balls = _balls(polynomial, 96)
-    reals = sorted((b.real for b in balls if b.imag == 0), key=lambda ball: dyadic(ball.mid()))
-    upper = [ball for ball in balls if ball.imag > 0]
+    f = fmpz_poly(list(polynomial))
+    isolated = discs(f) or _by_arb(f)
+    reals = [disc for disc in isolated if disc.y == 0]
+    upper = [disc for disc in isolated if disc.y > 0]
     found: list[RealRoot | ComplexRoot] = [
-        RealRoot(polynomial, i, _fraction(dyadic(b.lower()) - tiny), _fraction(dyadic(b.upper()) + tiny))
-        for i, b in enumerate(reals)
-        for tiny in [fmpq(1, 2**90)]
+        RealRoot(polynomial, i, _fraction(d.x - d.radius), _fraction(d.x + d.radius)) for i, d in enumerate(reals)
     ]
-    for place, k in enumerate(complex_order(polynomial, upper)):
-        x, y = (_fraction(dyadic(part)) for part in (upper[k].real, upper[k].imag))
-        found.append(ComplexRoot(polynomial, len(reals) + 2 * place, (x, -y)))
-        found.append(ComplexRoot(polynomial, len(reals) + 2 * place + 1, (x, y)))
+    with precision(256):
+        balls = [disc.ball for disc in upper]
+    for place, k in enumerate(complex_order(polynomial, balls)):
+        x, y, room = (_fraction(part) for part in (upper[k].x, upper[k].y, _room(upper[k], isolated)))
+        found.append(ComplexRoot(polynomial, len(reals) + 2 * place, (x, -y), room))
+        found.append(ComplexRoot(polynomial, len(reals) + 2 * place + 1, (x, y), room))
     return tuple(found)
+
+
+def _room(disc: Disc, others: list[Disc]) -> fmpq:
+    """A quarter of the distance to the next disc, or somewhat less: within it there is no root but the disc's own."""
+    gaps = (max(abs(disc.x - other.x), abs(disc.y - other.y)) for other in others if other is not disc)
+    return max(min(gaps) / 4, disc.radius)
 
 
 @lru_cache(maxsize=4096)

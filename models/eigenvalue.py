@@ -10,6 +10,7 @@ from flint import fmpq
 
 from .algebraic import ComplexRoot, RealRoot
 from .balls import Ball, accurate, decimals, enclose, nearest
+from .jordan import Blocks
 from .proof import ProofError, distinct
 
 __all__ = ["Eigenvalue", "decimal", "ordered"]
@@ -19,18 +20,23 @@ __all__ = ["Eigenvalue", "decimal", "ordered"]
 class Eigenvalue:
     """An exact number with its algebraic multiplicity.
 
-    `number` is a SymPy expression or an algebraic number that is not written as radicals; `value` is the
-    nearest float, or complex.
+    `number` is a SymPy expression or an algebraic number that is not written as radicals; `blocks` are its Jordan
+    blocks, (size, count), the largest first, None where nobody looked; `value` is the nearest float, or complex.
     """
 
     number: sp.Expr | RealRoot | ComplexRoot
     multiplicity: int
+    blocks: Blocks | None = field(default=None, compare=False)
     value: float | complex = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
         count = self.multiplicity
         if isinstance(count, bool) or not isinstance(count, int) or count < 1:
             raise ValueError(f"eigenvalue {self.text}: multiplicity {count!r}; expected an integer >= 1")
+        if self.blocks is None and count == 1:
+            object.__setattr__(self, "blocks", ((1, 1),))
+        if self.blocks is not None and sum(size * times for size, times in self.blocks) != count:
+            raise ValueError(f"eigenvalue {self.text}: blocks {self.blocks} do not add up to multiplicity {count}")
         object.__setattr__(self, "value", nearest(self._ball))
 
     @property
@@ -42,6 +48,16 @@ class Eigenvalue:
     def text(self) -> str:
         """The exact number as text that SymPy reads back."""
         return self.number.text if isinstance(self.number, (RealRoot, ComplexRoot)) else sp.sstr(self.number)
+
+    @property
+    def geometric(self) -> int | None:
+        """How many independent eigenvectors there are: one for each Jordan block; None where nobody looked."""
+        return None if self.blocks is None else sum(times for _, times in self.blocks)
+
+    @property
+    def defective(self) -> bool:
+        """True where eigenvectors are known to be missing: a Jordan block is larger than 1."""
+        return self.blocks is not None and self.blocks[0][0] > 1
 
     def enclosure(self, bits: int) -> Ball:
         """A certified ball (flint.arb or flint.acb) of radius below 2**-bits times the modulus."""

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from flint import arb, arb_poly, fmpq, fmpq_mat, fmpq_poly
+from flint import arb, arb_poly, fmpq, fmpq_poly
 
 from .balls import Ball, precision
+from .jordan import nullity
 from .proof import minimal_polynomial
 from .spectrum import Eigenvalue
 from .topology import Topology
@@ -66,12 +67,7 @@ def geometric_multiplicity(graph: Topology, eigenvalue: Eigenvalue) -> int:
     if eigenvalue.multiplicity == 1 or graph.symmetric:
         return eigenvalue.multiplicity
     p = minimal_polynomial(eigenvalue.number)
-    g = fmpq_mat([[_exact(x) for x in row] for row in graph.rows])
-    one = fmpq_mat([[fmpq(int(i == j)) for j in range(graph.n)] for i in range(graph.n)])
-    value = fmpq_mat(graph.n, graph.n)
-    for coefficient in reversed(p.coeffs()):
-        value = value * g + one * coefficient
-    return (graph.n - int(value.rank())) // int(p.degree())
+    return nullity(graph, p) // int(p.degree())
 
 
 def _exact(x: Fraction) -> fmpq:

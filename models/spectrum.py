@@ -20,7 +20,8 @@ from .algebraic import complex_roots, real_roots
 from .balls import precision
 from .descending import Descending
 from .eigenvalue import Eigenvalue, ordered
-from .proof import ProofError, check
+from .jordan import blocks, semisimple
+from .proof import ProofError, check, minimal_polynomial
 from .radicals import written
 from .spectrum_table import table
 from .topology import Topology, family, names, topology
@@ -94,6 +95,11 @@ class Spectrum:
         return tuple(e for e in self.eigenvalues if e.number is not sp.S.Zero)
 
     @property
+    def defective(self) -> tuple[Eigenvalue, ...]:
+        """The eigenvalues that are known to have fewer eigenvectors than their multiplicity says."""
+        return () if isinstance(self.eigenvalues, Descending) else tuple(e for e in self.eigenvalues if e.defective)
+
+    @property
     def largest(self) -> sp.Expr:
         """The eigenvalue of largest modulus; of several, the first in the order of the spectrum."""
         if isinstance(self.eigenvalues, Descending):  # all real, none positive
@@ -129,6 +135,8 @@ class Spectrum:
                 "exact": e.text,
                 "value": [e.value.real, e.value.imag] if isinstance(e.value, complex) else e.value,
                 "multiplicity": e.multiplicity,
+                "geometric_multiplicity": e.geometric,
+                "jordan_blocks": None if e.blocks is None else [list(block) for block in e.blocks],
             }
             for e in self.eigenvalues
         ]
@@ -151,15 +159,16 @@ def spectrum(graph: Topology, prove: bool | None = None) -> Spectrum:
     listed = _closed_form(graph)
     if listed is not None and not (graph.n <= PROOF_LIMIT if prove is None else prove):
         if isinstance(listed, Descending):
-            return Spectrum(Descending(len(listed), listed.n, lambda k: _claim(listed[k])))
-        return Spectrum(ordered([_claim(pair) for pair in listed]))
+            return Spectrum(Descending(len(listed), listed.n, lambda k: _claim(listed[k], True)))
+        simple = semisimple(graph)
+        return Spectrum(ordered([_claim(pair, simple) for pair in listed]))
     if listed is None and graph.n > DENSE_LIMIT:
         raise ValueError(
             f"topology {graph.name}: n = {graph.n} without a closed form; expected at most {DENSE_LIMIT} "
             "nodes: exact factors of larger matrices take too long"
         )
     polynomial = characteristic(graph)
-    claims = _by_factors(polynomial) if listed is None else [_claim(pair) for pair in listed]
+    claims = _by_factors(graph, polynomial) if listed is None else _listed(graph, listed)
     check(claims, polynomial, f"{graph.name} {graph.n}")
     return Spectrum(ordered(claims), verified=True)
 
@@ -191,15 +200,27 @@ def _closed_form(graph: Topology) -> Sequence[tuple[sp.Expr, int]] | None:
     return made.rule() if made.rule is not None and made.links == graph.links else None
 
 
-def _claim(pair: tuple[sp.Expr, int]) -> Eigenvalue:
-    return Eigenvalue(sp.sympify(pair[0]), pair[1])
+def _claim(pair: tuple[sp.Expr, int], simple: bool) -> Eigenvalue:
+    return Eigenvalue(sp.sympify(pair[0]), pair[1], ((1, pair[1]),) if simple else None)
 
 
-def _by_factors(polynomial: fmpq_poly) -> list[Eigenvalue]:
+def _listed(graph: Topology, pairs: Sequence[tuple[sp.Expr, int]]) -> list[Eigenvalue]:
+    """The eigenvalues of a closed form with their Jordan blocks."""
+    if semisimple(graph):
+        return [_claim(pair, True) for pair in pairs]
+    numbers = [(sp.sympify(number), count) for number, count in pairs]
+    return [
+        Eigenvalue(number, count, None if count == 1 else blocks(graph, minimal_polynomial(number), count))
+        for number, count in numbers
+    ]
+
+
+def _by_factors(graph: Topology, polynomial: fmpq_poly) -> list[Eigenvalue]:
     """The roots of each irreducible factor of the characteristic polynomial."""
     claims = []
     for factor, count in polynomial.factor()[1]:
         whole = tuple(int(c) for c in factor.numer().coeffs())
         numbers = written(factor) or real_roots(whole) or complex_roots(whole)
-        claims += [Eigenvalue(number, count) for number in numbers]
+        found = blocks(graph, factor, count)
+        claims += [Eigenvalue(number, count, found) for number in numbers]
     return claims

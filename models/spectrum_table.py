@@ -19,9 +19,23 @@ def table(found: Spectrum) -> str:
     lines = [(_short(e), decimal(e.value), str(e.multiplicity)) for e in found.eigenvalues]
     wide = [max(len(line[k]) for line in (head, *lines)) for k in range(3)]
     rows = [f"{a:<{wide[0]}}  {b:>{wide[1]}}  {c:>{wide[2]}}" for a, b, c in (head, *lines)]
+    if found.defective:
+        words = ("Jordan blocks", *(_blocks(e) for e in found.eigenvalues))
+        rows = [f"{row}  {word}" for row, word in zip(rows, words, strict=True)]
     state = "proved" if found.verified else "not proved (closed form of a large graph)"
     rows.append(f"{found.n} eigenvalues, {len(lines)} distinct; characteristic polynomial: {state}")
+    if found.defective:
+        rows.append(
+            "defective: of a block of size s, errors go as t^(s-1) exp(lambda t), lambda the exponent of its mode"
+        )
     return "\n".join(rows)
+
+
+def _blocks(e: Eigenvalue) -> str:
+    """Sizes of blocks, as 3, 1 (2 times)."""
+    if e.blocks is None:
+        return "not computed"
+    return ", ".join(f"{size}" if times == 1 else f"{size} ({times} times)" for size, times in e.blocks)
 
 
 def _short(e: Eigenvalue) -> str:

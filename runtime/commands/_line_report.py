@@ -15,7 +15,18 @@ from ..intervals import Interval
 from ..msf import MSF
 from ..synchronisability import Verdict, Window, verdict, windows
 from ..transversal import transversal
-from ._stability_words import exact, finite, headline, how, measured, rows_of, window_dict, window_text, write_files
+from ._stability_words import (
+    defective_rows,
+    exact,
+    finite,
+    headline,
+    how,
+    measured,
+    rows_of,
+    window_dict,
+    window_text,
+    write_files,
+)
 
 __all__ = ["LineReport", "complex_modes"]
 
@@ -121,7 +132,7 @@ class LineReport:
             answer += f" (largest over smallest |gamma|: {exact}{given.ratio_value:.6g}; allowed: {allowed})"
         rows = [("sigma", words) for words in map(window_text, self.windows)] or [("sigma", "none")]
         title = f"{graph.name}({graph.n}): every mode dies out for"
-        return [title, *rows_of([*rows, ("possible", answer)])]
+        return [title, *rows_of([*rows, ("possible", answer), *defective_rows(graph)])]
 
     def write(self, folder: Path) -> list[Path]:
         """Write msf.csv and msf.png."""

@@ -13,7 +13,7 @@ from ..msf import Plane
 from ..one_way import windows_complex
 from ..synchronisability import Window
 from ..transversal import transversal
-from ._stability_words import finite, headline, how, rows_of, window_dict, window_text, write_files
+from ._stability_words import defective_rows, finite, headline, how, rows_of, window_dict, window_text, write_files
 
 __all__ = ["PlaneReport", "plane_windows"]
 
@@ -56,7 +56,7 @@ class PlaneReport:
             ranges = [window_text(window, error=False) for window in plane_windows(found)] or ["none in this plane"]
             lines += [
                 f"{graph.name}({graph.n}): every mode dies out for",
-                *rows_of([("sigma", words) for words in ranges]),
+                *rows_of([*(("sigma", words) for words in ranges), *defective_rows(graph)]),
             ]
             if any("..." in words for words in ranges):
                 lines.append("...: a mode leaves the plane here, the range may go on")

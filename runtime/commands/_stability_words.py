@@ -11,11 +11,23 @@ from typing import Any
 import numpy as np
 
 from synchain.models.scene import Scene
+from synchain.models.topology import Topology
 
 from ..synchronisability import Window
 from ..transversal import Mode
 
-__all__ = ["exact", "finite", "headline", "how", "measured", "rows_of", "window_dict", "window_text", "write_files"]
+__all__ = [
+    "defective_rows",
+    "exact",
+    "finite",
+    "headline",
+    "how",
+    "measured",
+    "rows_of",
+    "window_dict",
+    "window_text",
+    "write_files",
+]
 
 
 def headline(scene: Scene) -> str:
@@ -104,3 +116,13 @@ def write_files(folder: Path, name: str, numbers: Any, draw: Any) -> list[Path]:
         with whole_file(paths[1]) as temporary:
             figure.savefig(temporary, dpi=200)
     return paths
+
+
+def defective_rows(graph: Topology) -> list[tuple[str, str]]:
+    """A row for each eigenvalue that lacks eigenvectors: how its errors go while its exponent is lambda."""
+    rows = []
+    for e in graph.spectrum.defective:
+        power = e.blocks[0][0] - 1 if e.blocks else 0
+        words = f"gamma = {e}: growth t^{power} e^(lambda t)" if power > 1 else f"gamma = {e}: growth t e^(lambda t)"
+        rows.append(("defective", words))
+    return rows

@@ -1,0 +1,103 @@
+"""Discs around all roots: against Arb's own isolation and known roots; what cannot be isolated is left to Arb."""
+
+from __future__ import annotations
+
+import cmath
+import math
+import random
+from itertools import pairwise
+
+import pytest
+from effort import effort
+from flint import acb, arb, fmpq, fmpz_poly
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from synchain.models import algebraic
+from synchain.models.algebraic import ComplexRoot, RealRoot, complex_roots
+from synchain.models.balls import precision
+from synchain.models.complex_isolation import Disc, discs, sharpened
+
+
+def inside(disc: Disc, ball: acb) -> bool:
+    """True where a ball is surely in a disc."""
+    return bool(abs(ball - acb(disc.x, disc.y)) < arb(disc.radius) + arb(2) ** -150)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.integers(-(10**6), 10**6), min_size=3, max_size=14))
+def test_every_root_of_arb_is_in_a_disc_of_its_own(coefficients: list[int]) -> None:
+    f = fmpz_poly(coefficients)
+    if f.degree() < 2 or f.gcd(f.derivative()).degree() > 0:
+        return
+    found = discs(f)
+    if found is None:
+        return
+    assert len(found) == f.degree()
+    with precision(256):
+        for root, count in f.complex_roots():
+            assert count == 1
+            assert sum(inside(disc, root) for disc in found) == 1
+            assert any(inside(disc, root) and (disc.y == 0) == (root.imag == 0) for disc in found)
+
+
+def test_most_random_polynomials_are_isolated() -> None:
+    """Nothing would be left of the speed if discs gave up: 200 polynomials of degree 20, all isolated."""
+    stream = random.Random(3)
+    for _ in range(200):
+        f = fmpz_poly([stream.randint(-1000, 1000) for _ in range(20)] + [1])
+        assert f.gcd(f.derivative()).degree() > 0 or discs(f) is not None
+
+
+def test_the_roots_of_unity() -> None:
+    found = discs(fmpz_poly.cyclotomic(101))
+    assert found is not None
+    angles = sorted(cmath.phase(complex(disc.ball)) % (2 * math.pi) for disc in found)
+    assert angles == pytest.approx([2 * math.pi * k / 101 for k in range(1, 101)], abs=1e-14)
+
+
+@pytest.mark.parametrize("gap", [10**3, 10**6])
+def test_near_roots_are_told_apart_or_left(gap: int) -> None:
+    """Mignotte's polynomials have two real roots a distance of about gap**-4 apart."""
+    f = fmpz_poly([-2, 4 * gap, -2 * gap * gap, 0, 0, 0, 0, 1])
+    roots = complex_roots(tuple(int(c) for c in f.coeffs()))
+    reals = [root for root in roots if isinstance(root, RealRoot)]
+    assert len(roots) == 7
+    assert len(reals) == 3
+    assert all(first.high <= second.low for first, second in pairwise(reals))
+
+
+def test_arb_takes_what_discs_leave(monkeypatch: pytest.MonkeyPatch) -> None:
+    polynomial = (7, 3, -1, 5, 1, 1)
+    quick = complex_roots(polynomial)
+    monkeypatch.setattr(algebraic, "discs", lambda f: None)
+    slow = complex_roots(polynomial)
+    assert [type(root) for root in quick] == [type(root) for root in slow]
+    for a, b in zip(quick, slow, strict=True):
+        assert a.index == b.index
+        assert abs(complex(a.enclosure(80)) - complex(b.enclosure(80))) < 1e-15
+
+
+def test_any_number_of_digits() -> None:
+    root = next(r for r in complex_roots((1, 1, 0, 0, 0, 1, 0, 3)) if isinstance(r, ComplexRoot))
+    for bits in (60, 600, 6000):
+        ball = root.enclosure(bits)
+        with precision(2 * bits):
+            assert (ball.real.rad() + ball.imag.rad()) * arb(2) ** bits < abs(ball)
+            assert fmpz_poly(list(root.polynomial))(ball).contains(0)
+
+
+def test_a_disc_without_its_root_is_refused() -> None:
+    f = fmpz_poly([1, 0, 1])
+    with pytest.raises(ValueError, match="expected one within"):
+        sharpened(f, Disc(fmpq(5), fmpq(1), fmpq(0)), fmpq(1, 10), 60)
+
+
+def test_a_hundred_complex_roots_take_the_fast_route(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Arb alone took minutes at degree 200."""
+    stream = random.Random(5)
+    f = fmpz_poly([stream.randint(-(10**9), 10**9) for _ in range(100)] + [1])
+    monkeypatch.setattr(algebraic, "_by_arb", None)
+    roots, calls = effort(lambda: complex_roots(tuple(int(c) for c in f.coeffs())))
+    assert len(roots) == 100
+    assert calls < 4_000_000
