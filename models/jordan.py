@@ -37,6 +37,10 @@ def blocks(graph: Topology, polynomial: fmpq_poly, multiplicity: int) -> Blocks:
     while sums[-1] < multiplicity:
         sums.append((graph.n - int(power.rank())) // polynomial.degree())
         longer.append(sums[-1] - sums[-2])
+        if longer[-1] <= 0:
+            raise RuntimeError(
+                f"{graph.name}: blocks of {polynomial} end at {sums[-1]} of {multiplicity}; it is no factor"
+            )
         if longer[-1] == 1:  # the last block takes what is left
             size = len(sums) - 1 + multiplicity - sums[-1]
             longer += [1] * (size - len(sums) + 1)

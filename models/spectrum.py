@@ -18,6 +18,7 @@ from flint import fmpq, fmpq_poly, fmpz_mat
 
 from .algebraic import complex_roots, real_roots
 from .balls import precision
+from .continuant import banded, cyclic
 from .descending import Descending
 from .eigenvalue import Eigenvalue, ordered
 from .jordan import blocks, semisimple
@@ -176,12 +177,16 @@ def spectrum(graph: Topology, prove: bool | None = None) -> Spectrum:
 def characteristic(graph: Topology) -> fmpq_poly:
     """The exact characteristic polynomial det(z - G)."""
     scale = lcm(*(weight.denominator for _, _, weight in graph.links))
-    rows = [[0] * graph.n for _ in range(graph.n)]
+    entries = {(i, i): 0 for i in range(graph.n)}
     for target, source, weight in graph.links:
         whole = weight.numerator * (scale // weight.denominator)
-        rows[target][source] = whole
-        rows[target][target] -= whole
-    found = fmpq_poly(fmpz_mat(rows).charpoly())
+        entries[target, source] = whole
+        entries[target, target] -= whole
+    if banded(graph.n, entries):
+        found = fmpq_poly(cyclic(graph.n, entries))
+    else:
+        rows = [[entries.get((i, j), 0) for j in range(graph.n)] for i in range(graph.n)]
+        found = fmpq_poly(fmpz_mat(rows).charpoly())
     return found if scale == 1 else found(fmpq_poly([0, scale])) / fmpq(scale) ** graph.n
 
 
