@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
+    from ..closed_forms import ClosedForm
+
 SUMMARY = "open chain (path graph)"
 MINIMUM = 1
 SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.4"
@@ -29,3 +31,13 @@ def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
     from ..descending import Descending
 
     return Descending(n, n, lambda k: (minus_four_sine_squared(k, 2 * n), 1))
+
+
+def formula() -> ClosedForm:
+    """-4 sin²(kπ/2n) and its cosine wave."""
+    from sympy import S, cos, pi, sin
+
+    from ..closed_forms import NODE, ClosedForm, K, N, Term
+
+    wave = cos(pi * K * (2 * NODE + 1) / (2 * N))
+    return ClosedForm((Term(-4 * sin(pi * K / (2 * N)) ** 2, S.One, ((K, S.Zero, N - 1),), wave),))

@@ -11,6 +11,8 @@ from ..family_options import whole_numbers
 if TYPE_CHECKING:
     import sympy as sp
 
+    from ..closed_forms import ClosedForm
+
 SUMMARY = "circulant graph: every node joined to those at given distances round a ring (offsets, 1 and 2)"
 MINIMUM = 3
 SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 6.4 (Cayley graphs)"
@@ -50,3 +52,15 @@ def spectrum(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> list[tuple[sp.Expr
         parts = [AngleSum.cosine(-2 * weight, weight, k * s, n) for s, weight in weights]
         numbers.append((sum(parts, AngleSum.rational(0)), 1 if k in (0, n - k) else 2))
     return [(expression(number), times) for number, times in merged(numbers)]
+
+
+def formula() -> ClosedForm:
+    """Sums of -4 sin²(ksπ/n) over the distances s = 1 and 2."""
+    from sympy import I, S, exp, pi, sin
+
+    from ..closed_forms import NODE, ClosedForm, K, N, Term
+
+    value = -4 * sin(pi * K / N) ** 2 - 4 * sin(2 * pi * K / N) ** 2
+    wave = exp(2 * pi * I * NODE * K / N)
+    note = "for the distances 1 and 2; each distance s adds -4 sin²(pi k s/n), half of it where s = n/2"
+    return ClosedForm((Term(value, S.One, ((K, S.Zero, N - 1),), wave),), least=5, note=note)

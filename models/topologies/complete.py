@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
+    from ..closed_forms import ClosedForm
+
 SUMMARY = "complete graph: all to all"
 MINIMUM = 1
 SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.1"
@@ -29,3 +31,12 @@ def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
     from sympy import Integer
 
     return [(Integer(0), 1)] + ([(Integer(-n), n - 1)] if n > 1 else [])
+
+
+def formula() -> ClosedForm:
+    """0, -n."""
+    from sympy import S
+
+    from ..closed_forms import ClosedForm, N, Term
+
+    return ClosedForm((Term(S.Zero, vector=S.One), Term(-N, N - 1)))

@@ -10,6 +10,8 @@ from ..family_options import whole
 if TYPE_CHECKING:
     import sympy as sp
 
+    from ..closed_forms import ClosedForm
+
 SUMMARY = "complete bipartite graph: all nodes of one group with all of another (left: size of the first, half of n)"
 MINIMUM = 2
 SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.2"
@@ -47,3 +49,13 @@ def spectrum(n: int, *, left: int | None = None) -> list[tuple[sp.Expr, int]]:
         if times:
             counts[value] = counts.get(value, 0) + times
     return [(Integer(-value), times) for value, times in sorted(counts.items())]
+
+
+def formula() -> ClosedForm:
+    """0, -p, -q, -(p + q)."""
+    from sympy import S
+
+    from ..closed_forms import ClosedForm, P, Q, Term
+
+    terms = (Term(S.Zero, vector=S.One), Term(-P, Q - 1), Term(-Q, P - 1), Term(-P - Q))
+    return ClosedForm(terms, P + Q, {"left": P}, note="p and q nodes in the two groups")

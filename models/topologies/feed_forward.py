@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
+    from ..closed_forms import ClosedForm
+
 SUMMARY = "feed-forward (one-way) chain: every node but the first feels the one before it"
 MINIMUM = 1
 SOURCE = "T. Nishikawa, A. E. Motter, Phys. Rev. E 73, 065106 (2006)"
@@ -30,3 +32,14 @@ def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
     from sympy import Integer
 
     return [(Integer(0), 1)] + ([(Integer(-1), n - 1)] if n > 1 else [])
+
+
+def formula() -> ClosedForm:
+    """0, -1; one Jordan block."""
+    from sympy import KroneckerDelta, S
+
+    from ..closed_forms import NODE, ClosedForm, N, Term
+
+    last = KroneckerDelta(NODE, N - 1)
+    note = "one Jordan block of n - 1 for -1: one eigenvector"
+    return ClosedForm((Term(S.Zero, vector=S.One), Term(S.NegativeOne, N - 1, (), last)), least=2, note=note)

@@ -11,6 +11,8 @@ from ..family_options import whole_numbers
 if TYPE_CHECKING:
     import sympy as sp
 
+    from ..closed_forms import ClosedForm
+
 SUMMARY = (
     "grid with open ends, as square as n allows (a prime n: a chain); shape: nodes in each of any number of directions"
 )
@@ -56,3 +58,17 @@ def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> list[tuple[sp.E
 
     sizes = shape or sides(n)
     return box(sizes, (False,) * len(sizes))
+
+
+def formula() -> ClosedForm:
+    """Sums of -4 sin² of each direction; node i is in row i // q and column i % q."""
+    from sympy import Mod, S, cos, floor, pi, sin
+
+    from ..closed_forms import NODE, ClosedForm, J, K, P, Q, Term
+
+    value = -4 * sin(pi * J / (2 * P)) ** 2 - 4 * sin(pi * K / (2 * Q)) ** 2
+    wave = cos(pi * J * (2 * floor(NODE / Q) + 1) / (2 * P)) * cos(pi * K * (2 * Mod(NODE, Q) + 1) / (2 * Q))
+    term = Term(value, S.One, ((J, S.Zero, P - 1), (K, S.Zero, Q - 1)), wave)
+    return ClosedForm(
+        (term,), P * Q, {"shape": (P, Q)}, note="p rows and q columns; another direction adds its own -4 sin²"
+    )

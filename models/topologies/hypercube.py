@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
+    from ..closed_forms import ClosedForm
+
 SUMMARY = "hypercube where n is a power of two; for other n one digit for each prime factor (a prime n: all to all)"
 MINIMUM = 1
 SOURCE = (
@@ -58,3 +60,12 @@ def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
                 more[value - p * k] = more.get(value - p * k, 0) + count * comb(d, k) * (p - 1) ** k
         counts = more
     return [(Integer(value), count) for value, count in counts.items()]
+
+
+def formula() -> ClosedForm:
+    """-2 k, C(d, k) times."""
+    from sympy import S, binomial
+
+    from ..closed_forms import ClosedForm, D, K, Term
+
+    return ClosedForm((Term(-2 * K, binomial(D, K), ((K, S.Zero, D),)),), 2**D, note="d dimensions")

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
+    from ..closed_forms import ClosedForm
+
 SUMMARY = "ladder: two chains joined node by node (odd n: the first chain is one node longer)"
 MINIMUM = 2
 SOURCE = (
@@ -36,3 +38,13 @@ def spectrum(n: int) -> list[tuple[sp.Expr, int]] | None:
     from ..angle_sums import box
 
     return box((2, n // 2), (False, False))
+
+
+def formula() -> ClosedForm:
+    """-4 sin²(kπ/2p), and 2 less."""
+    from sympy import S, pi, sin
+
+    from ..closed_forms import ClosedForm, K, P, Term
+
+    wave, rungs = -4 * sin(pi * K / (2 * P)) ** 2, ((K, S.Zero, P - 1),)
+    return ClosedForm((Term(wave, S.One, rungs), Term(wave - 2, S.One, rungs)), 2 * P, note="p rungs")

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
+    from ..closed_forms import ClosedForm
+
 SUMMARY = "one-way ring: every node feels the next one only"
 MINIMUM = 2
 SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.3 (directed cycle)"
@@ -30,3 +32,13 @@ def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
     from ..angles import exponential
 
     return [(exponential(-1, k, n), 1) for k in range(n)]
+
+
+def formula() -> ClosedForm:
+    """-1 + exp(2πik/n) and its wave."""
+    from sympy import I, S, exp, pi
+
+    from ..closed_forms import NODE, ClosedForm, K, N, Term
+
+    value, wave = exp(2 * pi * I * K / N) - 1, exp(2 * pi * I * NODE * K / N)
+    return ClosedForm((Term(value, S.One, ((K, S.Zero, N - 1),), wave),), least=2)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
+    from ..closed_forms import ClosedForm
+
 SUMMARY = "closed ring (cycle graph)"
 MINIMUM = 3
 TOO_SMALL = "a ring of two would join one pair twice; two nodes joined once are chain 2"
@@ -31,3 +33,13 @@ def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
     from ..descending import Descending
 
     return Descending(n // 2 + 1, n, lambda k: (minus_four_sine_squared(k, n), 1 if k in (0, n - k) else 2))
+
+
+def formula() -> ClosedForm:
+    """-4 sin²(kπ/n) and its wave."""
+    from sympy import I, S, exp, pi, sin
+
+    from ..closed_forms import NODE, ClosedForm, K, N, Term
+
+    wave = exp(2 * pi * I * NODE * K / N)
+    return ClosedForm((Term(-4 * sin(pi * K / N) ** 2, S.One, ((K, S.Zero, N - 1),), wave),), least=3)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
+    from ..closed_forms import ClosedForm
+
 SUMMARY = "star: a hub (the first node) and n - 1 leaves"
 MINIMUM = 1
 SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.2 (K_{1,n-1})"
@@ -31,3 +33,13 @@ def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
         return [(Integer(0), 1)]
     middle = [(Integer(-1), n - 2)] if n > 2 else []
     return [(Integer(0), 1), *middle, (Integer(-n), 1)]
+
+
+def formula() -> ClosedForm:
+    """0, -1, -n."""
+    from sympy import KroneckerDelta, S
+
+    from ..closed_forms import NODE, ClosedForm, N, Term
+
+    hub = N * KroneckerDelta(NODE, 0) - 1
+    return ClosedForm((Term(S.Zero, vector=S.One), Term(S.NegativeOne, N - 2), Term(-N, vector=hub)), least=2)

@@ -11,6 +11,8 @@ from ..family_options import whole_numbers
 if TYPE_CHECKING:
     import sympy as sp
 
+    from ..closed_forms import ClosedForm
+
 SUMMARY = (
     "grid with joined ends, as square as n allows (a prime n: a ring); shape: nodes in each of any number of directions"
 )
@@ -56,3 +58,16 @@ def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> list[tuple[sp.E
 
     sizes = shape or sides(n)
     return box(sizes, (True,) * len(sizes))
+
+
+def formula() -> ClosedForm:
+    """Sums of -4 sin² of each direction; node i is in row i // q and column i % q."""
+    from sympy import I, Mod, S, exp, floor, pi, sin
+
+    from ..closed_forms import NODE, ClosedForm, J, K, P, Q, Term
+
+    value = -4 * sin(pi * J / P) ** 2 - 4 * sin(pi * K / Q) ** 2
+    wave = exp(2 * pi * I * (J * floor(NODE / Q) / P + K * Mod(NODE, Q) / Q))
+    term = Term(value, S.One, ((J, S.Zero, P - 1), (K, S.Zero, Q - 1)), wave)
+    note = "p rows and q columns; another direction adds its own -4 sin²"
+    return ClosedForm((term,), P * Q, {"shape": (P, Q)}, least=3, note=note)

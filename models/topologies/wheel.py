@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
+    from ..closed_forms import ClosedForm
+
 SUMMARY = "wheel: a hub (the first node) joined to every node of a ring"
 MINIMUM = 4
 SOURCE = (
@@ -35,3 +37,14 @@ def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
     return [
         (expression(a), times) for a, times in merged([(AngleSum.rational(0), 1), (AngleSum.rational(-n), 1), *ring])
     ]
+
+
+def formula() -> ClosedForm:
+    """0, -n, -1 - 4 sin²(kπ/(n - 1))."""
+    from sympy import KroneckerDelta, S, pi, sin
+
+    from ..closed_forms import NODE, ClosedForm, K, N, Term
+
+    rim = Term(-1 - 4 * sin(pi * K / (N - 1)) ** 2, S.One, ((K, S.One, N - 2),))
+    hub = N * KroneckerDelta(NODE, 0) - 1
+    return ClosedForm((Term(S.Zero, vector=S.One), Term(-N, vector=hub), rim), least=4)

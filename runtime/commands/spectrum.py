@@ -16,6 +16,7 @@ EXAMPLES = (
     "synchain spectrum chain 4",
     "synchain spectrum star 6 --json",
     "synchain spectrum circulant 10 --option offsets=1,3",
+    "synchain spectrum chain --symbolic",
     "synchain spectrum --matrix G.txt",
     "synchain spectrum --edges friends.txt",
     "synchain spectrum --graphml network.graphml",
@@ -43,6 +44,7 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument("--edges", metavar="FILE", help="a text file of edges, one a line: two nodes, perhaps a weight")
     parser.add_argument("--directed", action="store_true", help="edges of the file act on their second node only")
     parser.add_argument("--graphml", metavar="FILE", help="a GraphML file; weights as 'weight' of its edges")
+    parser.add_argument("--symbolic", action="store_true", help="print the closed form of the family, for any N")
     parser.add_argument("--json", action="store_true", help="print JSON: n, eigenvalues, verified")
 
 
@@ -50,6 +52,8 @@ def execute(arguments: Namespace) -> int:
     """Print the spectrum as a table or as JSON."""
     from synchain.models.spectrum import spectrum, table
 
+    if arguments.symbolic:
+        return _symbolic(arguments)
     with wrong_use():
         chosen = graph(arguments)
         found = spectrum(chosen, prove=chosen.n <= PROVED)
@@ -60,6 +64,22 @@ def execute(arguments: Namespace) -> int:
         print_json(found.as_dict())
     else:
         print(table(found))
+    return FINE
+
+
+def _symbolic(arguments: Namespace) -> int:
+    """Print the closed form of a family with symbols for its size."""
+    from synchain.models.closed_forms import closed_form
+
+    given = [key for key in FILES if getattr(arguments, key) is not None]
+    if arguments.topology is None or arguments.n is not None or arguments.option or given:
+        raise WrongUse("--symbolic: expected a family alone, e.g. synchain spectrum chain --symbolic")
+    with wrong_use():
+        found = closed_form(arguments.topology)
+    if arguments.json:
+        print_json({"topology": arguments.topology, **found.as_dict()})
+    else:
+        print(found.text(arguments.topology))
     return FINE
 
 
