@@ -3,6 +3,7 @@
 chain 4: 0, -2+sqrt(2), -2, -2-sqrt(2)      # the whole spectrum, in any order
 star 6: 0, -1^4, -6                         # ^4: four times
 star n=3..12: 0, -1^(n-2), -n               # every n of a range
+torus 9 shape=3x3: 0, -3^4, -6^4            # options of the family: name=value, without blanks
 ring n=3..9: -4*sin(k*pi/n)**2 for k=0..n-1
 matrix G.txt: ~-3.414, -2, ~-0.586, 0       # ~: an approximation, right if it is the value rounded to its digits
 """
@@ -28,11 +29,12 @@ LARGEST = 500
 """Largest graph of a claim: above it, closed forms take long to prove."""
 
 BYTES, REPETITIONS = 1_000_000, 100_000
-_RANGE = re.compile(r"(\w+)\s+n\s*=\s*([0-9]{1,6})\s*\.\.\s*([0-9]{1,6})")
-_ONE = re.compile(r"(\w+)\s+([0-9]{1,6})")
+_OPTIONS = r"((?:\s+[A-Za-z_]\w*=\S+)*)"
+_RANGE = re.compile(r"(\w+)\s+n\s*=\s*([0-9]{1,6})\s*\.\.\s*([0-9]{1,6})" + _OPTIONS)
+_ONE = re.compile(r"(\w+)\s+([0-9]{1,6})" + _OPTIONS)
 _FOR = re.compile(r"(.*\S)\s+for\s+([A-Za-z])\s*=\s*(.+?)\s*\.\.\s*(.+)")
 _ROUNDED = re.compile(r"~\s*([+-]?[0-9]{1,40}(?:\.[0-9]{1,60})?(?:[eE][+-]?[0-9]{1,3})?)")
-_FORMS = "expected 'chain 4: …', 'star n=3..12: …' or 'matrix FILE: …'"
+_FORMS = "expected 'chain 4: …', 'star n=3..12: …', 'torus 9 shape=3x3: …' or 'matrix FILE: …'"
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,21 +96,29 @@ def _line(number: int, text: str, folder: Path) -> tuple[Claim, ...]:
     one, many = _ONE.fullmatch(head), _RANGE.fullmatch(head)
     if one:
         size = int(one[2])
-        return (Claim(number, text, _small(_family(one[1], size)), _numbers(listed, {"n": size})),)
+        return (Claim(number, text, _small(_family(one[1], size, one[3])), _numbers(listed, {"n": size})),)
     if not many:
         raise ValueError(f"found {shown(head)} before the colon; {_FORMS}")
     low, high = int(many[2]), int(many[3])
     if not low <= high <= LARGEST:
         raise ValueError(f"found n = {low} … {high}; expected a range that rises and ends at {LARGEST} or before")
-    return tuple(Claim(number, text, _family(many[1], n), _numbers(listed, {"n": n}), n) for n in range(low, high + 1))
+    return tuple(
+        Claim(number, text, _family(many[1], n, many[4]), _numbers(listed, {"n": n}), n) for n in range(low, high + 1)
+    )
 
 
-def _family(name: str, n: int) -> Topology:
+def _family(name: str, n: int, written: str) -> Topology:
+    options: dict[str, str] = {}
+    for word in written.split():
+        key, _, value = word.partition("=")
+        if key in options:
+            raise ValueError(f"option {key} is given twice; expected it once")
+        options[key] = value
     if n > LARGEST:
         raise ValueError(
             f"{name} {n}: expected at most {LARGEST} nodes; claims about larger graphs are not proved here"
         )
-    return topology(name, n)
+    return topology(name, n, **options)
 
 
 def _small(graph: Topology) -> Topology:

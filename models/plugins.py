@@ -1,8 +1,9 @@
 """One-file plug-ins: found by listing their directory, called with the symbols their functions ask for by name.
 
 Besides the files of this package there are entry points of installed packages (groups ``synchain.oscillators``,
-``synchain.frictions``, ``synchain.couplings``), and files anywhere, named by a path that ends in ``.py``.  Such a file is
-run only after `allow_code` has been called for it, so that a scene, which is data, never runs code by itself.
+``synchain.frictions``, ``synchain.couplings``, ``synchain.topologies``), and files anywhere, named by a path that ends in
+``.py``.  Such a file is run only after `allow_code` has been called for it, so that a scene, which is data, never runs code
+by itself.
 """
 
 from __future__ import annotations
@@ -19,12 +20,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-__all__ = ["allow_code", "call", "load", "names"]
+__all__ = ["allow_code", "call", "load", "located", "names"]
 
 OTHERWISE = {"coupling": ", or components such as 'x->x'"}
 """What a kind can be besides the name of a file, for the message that refuses a name."""
 
-NEEDED = {"oscillator": ("PARAMETERS", "FRICTION"), "friction": ("PARAMETERS", "force"), "coupling": ("PARAMETERS",)}
+NEEDED = {"oscillator": ("PARAMETERS", "FRICTION"), "friction": ("PARAMETERS", "force"), "coupling": ("PARAMETERS",),
+          "topology": ("SUMMARY", "MINIMUM", "edges")}  # fmt: skip
 ONE_OF = {"oscillator": ("field", "kinetic"), "coupling": ("potential", "dissipation")}
 """What a file from outside must hold; of ONE_OF at least one."""
 
@@ -32,7 +34,7 @@ _allowed: set[Path] = set()
 
 
 def names(kind: str) -> tuple[str, ...]:
-    """Return the names of all plug-ins of a kind (``oscillator``, ``friction``, ``coupling``), sorted."""
+    """Return the names of all plug-ins of a kind (``oscillator``, ``friction``, ``coupling``, ``topology``), sorted."""
     return tuple(sorted({*_own(kind), *_entry_points(kind)}))
 
 
@@ -54,7 +56,7 @@ def load(kind: str, name: str) -> ModuleType:
     A path that ends in ".py" is loaded where `allow_code` has allowed it; an error in that file names its line.
     """
     if name in _own(kind):
-        return import_module(f".{kind}s.{name}", __package__)
+        return import_module(f".{_home(kind)}.{name}", __package__)
     if isinstance(name, str) and name.endswith(".py"):
         return _file(kind, name)
     entries = _entry_points(kind)
@@ -78,16 +80,29 @@ def call(function: Callable[..., Any], symbols: Mapping[str, Any]) -> Any:
             where = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
             raise ValueError(f"{where} asks for {name!r}; known: {', '.join(symbols)}; declare it as a parameter")
     given = {name: symbols[name] for name in wanted}
-    if str(function.__module__).startswith(f"{__package__}."):
-        return function(**given)
     try:
         return function(**given)
     except Exception as error:
-        raise _located(error, inspect.getsourcefile(function) or function.__module__) from error
+        told = located(error, function)
+        if told is error:
+            raise
+        raise told from error
+
+
+def _home(kind: str) -> str:
+    """The folder of a kind, which also names its entry points."""
+    return "topologies" if kind == "topology" else f"{kind}s"
+
+
+def located(error: Exception, function: Callable[..., Any]) -> Exception:
+    """The error of a plug-in's function: as it is from this package, else a ValueError with file and line."""
+    if str(function.__module__).startswith(f"{__package__}."):
+        return error
+    return _located(error, inspect.getsourcefile(function) or function.__module__)
 
 
 def _own(kind: str) -> tuple[str, ...]:
-    package = import_module(f".{kind}s", __package__)
+    package = import_module(f".{_home(kind)}", __package__)
     return tuple(m.name for m in pkgutil.iter_modules(package.__path__) if not m.name.startswith("_"))
 
 
@@ -96,7 +111,7 @@ def _entry_points(kind: str) -> Mapping[str, Any]:
     """The plug-ins that installed packages announce; none is loaded for this."""
     from importlib.metadata import entry_points
 
-    return {entry.name: entry for entry in entry_points(group=f"synchain.{kind}s")}
+    return {entry.name: entry for entry in entry_points(group=f"synchain.{_home(kind)}")}
 
 
 def _entry(kind: str, name: str) -> ModuleType:

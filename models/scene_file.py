@@ -114,7 +114,8 @@ def from_dict(values: Mapping[str, Any], folder: Path | None = None) -> Scene:
 
 def _topology(given: Mapping[object, Any], folder: Path | None) -> Topology:
     name = given.get("name")
-    options = defaults(family(name)) if isinstance(name, str) and name in names() and "matrix" not in given else {}
+    known = isinstance(name, str) and "matrix" not in given and (name in names() or name.endswith(".py"))
+    options = defaults(family(str(name))) if known else {}
     known_keys("topology", given, ("name", "n", *options, "matrix", "file"))
     if "file" in given:
         if len(given) > 1:

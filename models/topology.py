@@ -12,13 +12,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
-from importlib import import_module
 from itertools import islice
 from pathlib import Path
-from pkgutil import iter_modules
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from . import plugins
 from .family_options import Options, settled
 from .rationals import FILE_LIMIT, parse_rows, rational_rows
 
@@ -159,14 +158,12 @@ class Topology:
 
 
 def names() -> tuple[str, ...]:
-    """All topologies that `topology` knows: the files of the folder `topologies`."""
-    from . import topologies
-
-    return tuple(sorted(m.name for m in iter_modules(topologies.__path__) if not m.name.startswith("_")))
+    """All topologies that `topology` knows: the files of the folder `topologies`, and entry points of other packages."""
+    return plugins.names("topology")
 
 
 def family(name: str) -> ModuleType:
-    """The plug-in module of a topology; ValueError on an unknown name.
+    """The plug-in module of a topology, by name or by a path that `plugins.allow_code` allowed; else ValueError.
 
     A plug-in has SUMMARY, MINIMUM, SOURCE and `edges(n)`, which yields (i, j, weight) once for each edge,
     i < j; with DIRECTED = True it yields (target, source, weight) once for each link.  It may have
@@ -178,9 +175,7 @@ def family(name: str) -> ModuleType:
     """
     if not isinstance(name, str):
         raise TypeError(f"topology name {name!r} is no text; expected one of {', '.join(names())}")
-    if name not in names():
-        raise ValueError(f"unknown topology {name!r}; known: {', '.join(names())}")
-    return import_module(f".topologies.{name}", __package__)
+    return plugins.load("topology", name)
 
 
 def topology(name: str, n: int, **options: Any) -> Topology:
@@ -217,8 +212,14 @@ def _links(name: str, module: ModuleType, n: int, keywords: dict[str, Any]) -> I
     """The sorted links of a family's edges; ValueError where they are too many."""
     directed, one = getattr(module, "DIRECTED", False), Fraction(1)
     limit = LINK_LIMIT if directed else LINK_LIMIT // 2
-    edges = module.edges(n, **keywords)
-    found = [(i, j, one if weight == 1 else Fraction(weight)) for i, j, weight in islice(edges, limit + 1)]
+    try:
+        edges = module.edges(n, **keywords)
+        found = [(i, j, one if weight == 1 else Fraction(weight)) for i, j, weight in islice(edges, limit + 1)]
+    except Exception as error:
+        told = plugins.located(error, module.edges)
+        if told is error:
+            raise
+        raise told from error
     if len(found) > limit:
         raise _too_many(name, n)
     if not directed:

@@ -51,6 +51,10 @@ RIGHT = [
     "matrix G.txt: 0, -1+I/2, -1-I/2",
     "chain 4: -2, 0, -2-sqrt(2), -sqrt(6-4*sqrt(2))",
     "hypercube 8: 0, -2^3, -4^3, -6",
+    "torus 9 shape=3x3: 0, -3^4, -6^4",
+    "circulant n=5..9 offsets=1: -4*sin(k*pi/n)**2 for k=0..n-1",
+    "complete_bipartite 7 left=2: 0, -2^4, -5, -7",
+    "erdos_renyi 5 p=1 seed=7: 0, -5^4",
     "chain 80: -4*sin(k*pi/160)**2 for k=0..79",
 ]
 
@@ -210,6 +214,10 @@ def test_letters() -> None:
         ("chain 4 0, 1", "expected 'chain 4"),
         ("chain four: 0", "before the colon"),
         ("chian 4: 0", "unknown topology 'chian'"),
+        ("torus 9 shape=2x5: 0", "expected at least 3"),
+        ("torus 9 sides=3x3: 0", "unknown option 'sides'"),
+        ("torus 9 shape=3x3 shape=3x3: 0", "option shape is given twice"),
+        ("torus 9 shape: 0", "before the colon"),
         ("ring 2: 0", "expected at least 3"),
         ("star n=5..3: 0", "range that rises"),
         ("star n=5..501: 0", "ends at 500"),
@@ -280,7 +288,7 @@ def test_exit_codes_and_forms(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert (found["right"], found["wrong"]) == (1, 1)
     assert [(c["line"], c["right"], len(c["graphs"])) for c in found["claims"]] == [(2, True, 1), (4, False, 7)]
     assert found["claims"][1]["graphs"][2] == {
-        "topology": "star", "n": 5, "right": True, "problems": [], "expected": "0, -1^3, -5"
+        "topology": "star", "n": 5, "options": {}, "right": True, "problems": [], "expected": "0, -1^3, -5"
     }  # fmt: skip
     suites = ElementTree.parse(report).getroot()
     cases = suites.findall("testsuite/testcase")

@@ -181,6 +181,46 @@ def test_entry_points_are_plug_ins(law: Path, monkeypatch: pytest.MonkeyPatch) -
         plugins.load("friction", "nope")
 
 
+def test_topologies_from_outside(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By a path that was allowed, in a scene and on the command line; errors name file and line."""
+    monkeypatch.setattr(plugins, "_allowed", set())
+    assert main(["new", "topology", "my_graph", "--dir", str(tmp_path)]) == 0
+    assert "plugins.allow_code" in capsys.readouterr().out
+    path = tmp_path / "my_graph.py"
+    with pytest.raises(ValueError, match="not run unasked"):
+        topology(str(path), 5)
+    assert main(["spectrum", str(path), "5"]) == 2
+    assert main(["spectrum", str(path), "5", "--allow-code", str(path)]) == 0
+    assert "5 eigenvalues" in capsys.readouterr().out
+    graph = topology(str(path), 5)
+    assert [(i, j) for i, j, _ in graph.links if i < j] == [(0, 1), (0, 2), (1, 2), (1, 3), (2, 3), (2, 4), (3, 4)]
+    scene = Scene(topology=graph)
+    assert Scene.from_dict(scene.as_dict()).topology == graph
+    wrong = tmp_path / "wrong.py"
+    wrong.write_text('SUMMARY, MINIMUM = "", 1\n\n\ndef edges(n):\n    yield 0, 1, 1 / (n - n)\n', encoding="utf-8")
+    plugins.allow_code(wrong)
+    with pytest.raises(ValueError, match=r"wrong.py, line 5: ZeroDivisionError"):
+        _ = topology(str(wrong), 3).links
+    wrong.with_name("none.py").write_text("MINIMUM = 1\n", encoding="utf-8")
+    plugins.allow_code(wrong.with_name("none.py"))
+    with pytest.raises(ValueError, match="found no SUMMARY, no edges; expected a topology file"):
+        topology(str(wrong.with_name("none.py")), 3)
+
+
+def test_topologies_of_entry_points_have_options_and_closed_forms(monkeypatch: pytest.MonkeyPatch) -> None:
+    from synchain.models.topologies import circulant
+
+    entries = {"elsewhere": SimpleNamespace(value="elsewhere:ring", load=lambda: circulant)}
+    monkeypatch.setattr(plugins, "_entry_points", lambda kind: entries if kind == "topology" else {})
+    assert "elsewhere" in names()
+    graph = topology("elsewhere", 10, offsets=(1, 3))
+    assert graph.links == topology("circulant", 10, offsets=(1, 3)).links
+    assert graph.spectrum.exact == topology("circulant", 10, offsets=(1, 3)).spectrum.exact
+    assert Scene.from_dict(Scene(topology=graph).as_dict()).topology == graph
+
+
 def test_the_groups_of_entry_points_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
     import importlib.metadata
 
@@ -188,5 +228,6 @@ def test_the_groups_of_entry_points_are_read(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: asked.append(group) or [])
     plugins._entry_points.cache_clear()
     plugins.names("oscillator")
+    plugins.names("topology")
     plugins._entry_points.cache_clear()
-    assert asked == ["synchain.oscillators"]
+    assert asked == ["synchain.oscillators", "synchain.topologies"]

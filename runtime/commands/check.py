@@ -78,7 +78,12 @@ def _name(line: Sequence[Verdict]) -> str:
     """The graphs of a line."""
     first, last = line[0].claim, line[-1].claim
     sizes = f"n = {first.n} … {last.n}" if first.n is not None else str(first.graph.n)
-    return f"{first.graph.name} {sizes}"
+    chosen = "".join(f" {key}={_option(value)}" for key, value in first.graph.options)
+    return f"{first.graph.name} {sizes}{chosen}"
+
+
+def _option(value: object) -> str:
+    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
 def _report(line: Sequence[Verdict]) -> list[str]:
@@ -101,7 +106,8 @@ def _problems(line: Sequence[Verdict]) -> list[str]:
 
 def _as_dict(line: Sequence[Verdict]) -> dict[str, Any]:
     graphs = [
-        {"topology": v.claim.graph.name, "n": v.claim.graph.n, "right": v.right, "problems": list(v.problems),
+        {"topology": v.claim.graph.name, "n": v.claim.graph.n, "options": dict(v.claim.graph.options),
+         "right": v.right, "problems": list(v.problems),
          "expected": v.expected}
         for v in line
     ]  # fmt: skip

@@ -55,9 +55,9 @@ def _check(kind: str, name: str) -> None:
             f"name {name!r}; expected small letters, digits and underscores, a letter first, at most {LENGTH}, no word "
             "of Python, and neither 'default' nor 'none': e.g. my_law"
         )
-    from synchain.models import plugins, topology
+    from synchain.models import plugins
 
-    known = topology.names() if kind == "topology" else plugins.names(kind)
+    known = plugins.names(kind)
     if name in known:
         raise WrongUse(f"{kind} {name!r} exists already; choose another name; known: {', '.join(known)}")
 
@@ -65,7 +65,6 @@ def _check(kind: str, name: str) -> None:
 def _next(kind: str, name: str, path: Path) -> list[str]:
     """What to do with the file."""
     home = f"in models/{HOMES[kind]} of an editable installation it is found by its name, {name!r}, and tested"
-    if kind == "topology":
-        return [f"  {home}"]
     here = path.as_posix() if path.is_absolute() else f"./{path.as_posix()}"
-    return [f"  {home}; anywhere else:", f"  plugins.allow_code({here!r}); Scene({kind}={here!r}, …)"]
+    use = f"topology({here!r}, 6)" if kind == "topology" else f"Scene({kind}={here!r}, …)"
+    return [f"  {home}; anywhere else:", f"  plugins.allow_code({here!r}); {use}"]

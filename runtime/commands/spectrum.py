@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from ._arguments import whole
+from ._arguments import add_allow_code, whole
 from ._outcome import FINE, WrongUse, print_json, warn, wrong_use
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument("--edges", metavar="FILE", help="a text file of edges, one a line: two nodes, perhaps a weight")
     parser.add_argument("--directed", action="store_true", help="edges of the file act on their second node only")
     parser.add_argument("--graphml", metavar="FILE", help="a GraphML file; weights as 'weight' of its edges")
+    add_allow_code(parser)
     parser.add_argument("--symbolic", action="store_true", help="print the closed form of the family, for any N")
     parser.add_argument("--json", action="store_true", help="print JSON: n, eigenvalues, verified")
 
