@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..contact_modes import with_modes
 from ..plan import control_array
 from ..sweep import Buffers, kernel
 from ._cases import Case
@@ -30,7 +31,7 @@ def prepare(case: Case, integrator: str, width: int) -> Integrate:
     """
     compiled = kernel(case.scene.replace(integrator=integrator), width)
     one = np.array([case.scene.parameters[name] for name in case.scene.equations.parameters])
-    y0 = np.array(case.scene.y0)
+    (y0,) = with_modes(case.scene.equations, np.array([case.scene.y0]), one[None])
 
     def solve(rtol: float, atol: float, ends: np.ndarray) -> Ends:
         cells = len(ends)

@@ -22,7 +22,19 @@ from ._cases import CASES, Case, read_case
 from ._clock import Point, curve
 from ._own import REFILLS, Own, prepare
 
-__all__ = ["CASES", "COLUMNS", "METHODS", "Method", "draw", "measure", "notes", "own_points", "prepare", "summary"]
+__all__ = [
+    "CASES",
+    "COLUMNS",
+    "METHODS",
+    "Method",
+    "draw",
+    "measure",
+    "notes",
+    "own_points",
+    "prepare",
+    "row",
+    "summary",
+]
 
 COLUMNS = (
     "case", "method", "lanes", "rtol", "atol", "error", "microseconds per period", "steps per period", "periods",
@@ -75,10 +87,10 @@ def measure(quick: bool = False) -> list[tuple[Any, ...]]:
         for name in CASES:
             case = read_case(name)
             bar.set_description_str(name)
-            rows += [_row(case, point) for point in own_points(case, quick)]
+            rows += [row(case, point) for point in own_points(case, quick)]
             bar.update()
             for peer in present:
-                rows += [_row(case, point) for point in curve(peer, case, quick)]
+                rows += [row(case, point) for point in curve(peer, case, quick)]
                 bar.update()
     return rows
 
@@ -94,7 +106,8 @@ def own_points(case: Case, quick: bool) -> Iterator[Point]:
             yield own.point(rtol, atol, quick)
 
 
-def _row(case: Case, point: Point) -> tuple[Any, ...]:
+def row(case: Case, point: Point) -> tuple[Any, ...]:
+    """A point of a case in the order of COLUMNS."""
     steps = "" if np.isnan(point.steps) else point.steps
     return (
         case.name, point.method, point.lanes, point.rtol, point.atol, point.error, 1e6 * point.seconds, steps,
