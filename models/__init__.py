@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .scene_file import load_scene, scene_names
     from .scene_section import Section
     from .spectrum import Spectrum
+    from .symbolic_weights import from_symbols
     from .topology import Topology, from_matrix, read_matrix
 
 _HOMES = {
@@ -32,6 +33,7 @@ _HOMES = {
     "from_graph": "graph_readers",
     "from_matrix": "topology",
     "from_sparse": "graph_readers",
+    "from_symbols": "symbolic_weights",
     "kronecker": "products",
     "load_scene": "scene_file",
     "read_edges": "graph_readers",
@@ -54,6 +56,7 @@ __all__ = [
     "from_graph",
     "from_matrix",
     "from_sparse",
+    "from_symbols",
     "kronecker",
     "load_scene",
     "read_edges",

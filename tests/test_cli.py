@@ -600,7 +600,10 @@ def test_output_that_cannot_be_written_is_a_failure() -> None:
 def test_exit_codes_and_streams_of_the_real_program() -> None:
     done = synchain("spectrum rnig 4")
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == f"synchain spectrum: unknown topology 'rnig'; known: {', '.join(families())}\n"
+    assert (
+        done.stderr
+        == f"synchain spectrum: unknown topology 'rnig'; known: {', '.join(families())} (did you mean 'ring'?)\n"
+    )
     done = synchain("equations two_oscillators", env={**os.environ, "PYTHONIOENCODING": "ascii"})
     assert (done.returncode, done.stderr) == (0, "")
     assert "cos(\\u03c9" in done.stdout  # the escape of an omega

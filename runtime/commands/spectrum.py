@@ -45,12 +45,23 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument("--directed", action="store_true", help="edges of the file act on their second node only")
     parser.add_argument("--graphml", metavar="FILE", help="a GraphML file; weights as 'weight' of its edges")
     add_allow_code(parser)
-    parser.add_argument("--symbolic", action="store_true", help="print the closed form of the family, for any N")
+    parser.add_argument(
+        "--symbolic", action="store_true", help="the closed form of a family, or of a --matrix of letters"
+    )
+    parser.add_argument(
+        "--value",
+        metavar="NAME=NUMBER",
+        action="append",
+        default=[],
+        help="with --symbolic --matrix: a number for a letter",
+    )
     parser.add_argument("--json", action="store_true", help="print JSON: n, eigenvalues, verified")
 
 
 def execute(arguments: Namespace) -> int:
     """Print the spectrum as a table or as JSON."""
+    if arguments.value and not (arguments.symbolic and arguments.matrix):
+        raise WrongUse("found --value without --symbolic --matrix FILE; expected all of them")
     from synchain.models.spectrum import spectrum, table
 
     if arguments.symbolic:
@@ -69,9 +80,11 @@ def execute(arguments: Namespace) -> int:
 
 
 def _symbolic(arguments: Namespace) -> int:
-    """Print the closed form of a family with symbols for its size."""
+    """Print the closed form of a family with symbols for its size, or the spectrum of a matrix of letters."""
     from synchain.models.closed_forms import closed_form
 
+    if arguments.matrix is not None and arguments.topology is None:
+        return _letters(arguments)
     given = [key for key in FILES if getattr(arguments, key) is not None]
     if arguments.topology is None or arguments.n is not None or arguments.option or given:
         raise WrongUse("--symbolic: expected a family alone, e.g. synchain spectrum chain --symbolic")
@@ -81,6 +94,26 @@ def _symbolic(arguments: Namespace) -> int:
         print_json({"topology": arguments.topology, **found.as_dict()})
     else:
         print(found.text(arguments.topology))
+    return FINE
+
+
+def _letters(arguments: Namespace) -> int:
+    """Print the spectrum of a matrix of letters, or for numbers in their place."""
+    from synchain.models.spectrum import table
+    from synchain.models.symbolic_weights import read_symbols
+
+    with wrong_use():
+        found = read_symbols(arguments.matrix)
+        if arguments.value:
+            exact = found.at(**_options(arguments.value, "--value")).spectrum
+            text, listed = table(exact), exact.as_dict()
+        else:
+            spectrum = found.spectrum
+            text, listed = spectrum.text, spectrum.as_dict()
+    if arguments.json:
+        print_json(listed)
+    else:
+        print(text)
     return FINE
 
 
@@ -108,14 +141,14 @@ def graph(arguments: Namespace) -> Topology:
     return topology(arguments.topology, arguments.n, **_options(arguments.option))
 
 
-def _options(given: list[str]) -> dict[str, str]:
+def _options(given: list[str], flag: str = "--option") -> dict[str, str]:
     found: dict[str, str] = {}
     for text in given:
         name, equals, value = text.partition("=")
         if not equals or not name.isidentifier():
-            raise WrongUse(f"--option: found {text!r}; expected NAME=VALUE, e.g. offsets=1,3")
+            raise WrongUse(f"{flag}: found {text!r}; expected NAME=VALUE, e.g. offsets=1,3")
         if name in found:
-            raise WrongUse(f"--option {name} is given twice; expected it once")
+            raise WrongUse(f"{flag} {name} is given twice; expected it once")
         found[name] = value
     return found
 
