@@ -7,7 +7,7 @@ conjugates of one are had by multiplying all its angles (L. C. Washington, Intro
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -54,6 +54,23 @@ class AngleSum:
 
     def __neg__(self) -> AngleSum:
         return AngleSum(-self.shift, tuple((t, -b) for t, b in self.terms))
+
+    @property
+    def folded(self) -> AngleSum:
+        """The number with all angles in the first quarter turn: one form for -cos x and cos(π - x)."""
+        return self._turned(lambda t, b: 4 * t > 1)
+
+    @property
+    def risen(self) -> AngleSum:
+        """The number with all factors positive, as the closed forms of families have them."""
+        return self._turned(lambda t, b: b < 0)
+
+    def _turned(self, when: Callable[[Fraction, Fraction], bool]) -> AngleSum:
+        half, counts = Fraction(1, 2), dict[Fraction, Fraction]()
+        for t, b in self.terms:
+            turn, factor = (half - t, -b) if when(t, b) else (t, b)
+            counts[turn] = counts.get(turn, Fraction(0)) + factor
+        return AngleSum(self.shift, tuple(sorted((t, b) for t, b in counts.items() if b)))
 
     @property
     def near(self) -> float:

@@ -19,6 +19,8 @@ from pathlib import Path
 
 import sympy as sp
 
+from .angle_sums import AngleSum, expression
+from .angle_text import angle_number
 from .exact_text import exact_number, whole_number
 from .scene_checks import shown
 from .topology import Topology, read_matrix, topology
@@ -39,12 +41,23 @@ _FORMS = "expected 'chain 4: …', 'star n=3..12: …', 'torus 9 shape=3x3: …'
 
 @dataclass(frozen=True, slots=True)
 class Claimed:
-    """A number as it was written and how often; `exact` is None for an approximation, which has its `interval`."""
+    """A number as it was written and how often: `exact`, or `angle`, or an approximation, which has its `interval`."""
 
     text: str
     count: int
     exact: sp.Expr | None = None
     interval: tuple[Fraction, Fraction] | None = None
+    angle: AngleSum | None = None
+
+    @property
+    def number(self) -> sp.Expr | None:
+        """The exact number as a SymPy expression; None for an approximation."""
+        return self.exact if self.angle is None else expression(self.angle.risen)
+
+    @property
+    def words(self) -> str:
+        """The number as a sentence names it."""
+        return self.text if self.angle is None else sp.sstr(self.number)
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,6 +195,9 @@ def _where(values: dict[str, int]) -> str:
 
 def _number(text: str, count: int, values: dict[str, int]) -> Claimed:
     if not text.startswith("~"):
+        angle = angle_number(text, values)
+        if angle is not None:
+            return Claimed(text, count, angle=angle)
         exact = exact_number(text, values)
         return Claimed(text if exact.is_Rational is False and not values else sp.sstr(exact), count, exact=exact)
     rounded = _ROUNDED.fullmatch(text)

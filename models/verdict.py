@@ -11,6 +11,7 @@ import sympy as sp
 from flint import acb, arb, fmpq
 
 from .algebraic import ComplexRoot, RealRoot
+from .angle_sums import AngleSum, read
 from .balls import enclose, precision
 from .claims import Claim, Claimed
 from .separation import equal
@@ -21,16 +22,21 @@ __all__ = ["Verdict", "verify"]
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What is wrong with a claim, in sentences, and its graph's spectrum in the words of a claims file."""
+    """What is wrong with a claim, in sentences, and the eigenvalues of its graph."""
 
     claim: Claim
     problems: tuple[str, ...]
-    expected: str
+    eigenvalues: Sequence[Eigenvalue]
 
     @property
     def right(self) -> bool:
         """True where the claim is exactly the spectrum (to its digits where it is approximate)."""
         return not self.problems
+
+    @property
+    def expected(self) -> str:
+        """The spectrum of the graph in the words of a claims file."""
+        return ", ".join(_entry(e) for e in self.eigenvalues)
 
 
 def verify(claim: Claim) -> Verdict:
@@ -40,15 +46,18 @@ def verify(claim: Claim) -> Verdict:
     """
     found = spectrum(claim.graph, prove=True).eigenvalues
     tally, problems = [0] * len(found), []
-    middles = [_middle(e.number) for e in found]
+    known = _angles(found) if any(c.angle is not None for c in claim.numbers) else {}
+    middles: list[complex] = []
     for claimed in claim.numbers:
-        if claimed.exact is not None:
-            place = _find(claimed.exact, found, middles)
+        place = known.get(claimed.angle.folded) if claimed.angle is not None else None
+        if place is None and claimed.interval is None and claimed.number is not None:
+            middles = middles or [_middle(e.number) for e in found]
+            place = _find(claimed.number, found, middles)
             if place is None:
-                near = found[_nearest(_middle(claimed.exact), middles)]
-                problems.append(f"claimed {claimed.text}: no eigenvalue; the nearest is {_words(near)}")
-            else:
-                tally[place] += claimed.count
+                near = found[_nearest(_middle(claimed.number), middles)]
+                problems.append(f"claimed {claimed.words}: no eigenvalue; the nearest is {_words(near)}")
+        if place is not None:
+            tally[place] += claimed.count
     exact = tuple(tally)
     problems += _assign([c for c in claim.numbers if c.interval is not None], found, tally)
     for e, before, count in zip(found, exact, tally, strict=True):
@@ -57,7 +66,15 @@ def verify(claim: Claim) -> Verdict:
         elif count != e.multiplicity:
             how = "claimed" if before else "claimed (approximately)"
             problems.append(f"{how} {_words(e)} {_times(count)}; it occurs {_times(e.multiplicity)}")
-    return Verdict(claim, tuple(problems), ", ".join(_entry(e) for e in found))
+    return Verdict(claim, tuple(problems), found)
+
+
+def _angles(found: Sequence[Eigenvalue]) -> dict[AngleSum, int]:
+    """The places of the eigenvalues that are sums of cosines; equal sums are equal numbers, not the other way round."""
+    forms = (
+        (None if isinstance(e.number, (RealRoot, ComplexRoot)) else read(e.number), i) for i, e in enumerate(found)
+    )
+    return {form.folded: i for form, i in forms if form is not None}
 
 
 def _find(number: sp.Expr, found: Sequence[Eigenvalue], middles: Sequence[complex]) -> int | None:
