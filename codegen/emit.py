@@ -116,7 +116,7 @@ def _module(
         SCALED,
         *([PAIR, skeletons.text("sparse")] if looped else []),
         *(_step(name, writer.lines, looped) for name, writer in steps.items()),
-        write_pushes(plain, names),
+        write_pushes(plain, names, looped),
         _section(equations, plain, section),
         *(skeletons.text(name) for name in ("recording", "cells", "control", *sticking, "sweep")),
     ]
@@ -125,10 +125,6 @@ def _module(
 
 def _for_many(method: Integrator, equations: Equations) -> Integrator:
     """The method as looped kernels have it; ValueError for what only written-out kernels can."""
-    if equations.node.contact is not None:
-        raise ValueError(
-            f"set-valued friction of {equations.n} oscillators; expected at most {LARGEST_UNROLLED}: use contact 'atan'"
-        )
     if method.inexact:
         raise ValueError(
             f"integrator {method.name}: steps at most {LARGEST_UNROLLED} nodes, found {equations.n}; use rodas5p"

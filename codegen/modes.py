@@ -9,7 +9,7 @@ for each of LANES modes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import sympy as sp
 
@@ -19,7 +19,7 @@ from synchain.models.tangent import Variation
 
 from . import lanes, skeletons
 from .blocks import Body, Names, analyse
-from .contacts import write_pushes
+from .contacts import event_constants, write_events
 from .elimination import plan, write_factors, write_solve
 from .emit import LARGEST_UNROLLED, KernelSource, describe, imports, node_functions
 from .integrators import Integrator, integrator
@@ -34,7 +34,7 @@ METHOD = "rodas5p"
 HEAD = 3
 """First entries of the shared array: rate = 1/h, shift = 1/(gamma h), reach = gamma h."""
 
-Entry = tuple[int, int]
+Place = tuple[int, int]
 
 
 def emit_modes(variation: Variation, width: int | None = None) -> KernelSource:
@@ -52,7 +52,8 @@ def emit_modes(variation: Variation, width: int | None = None) -> KernelSource:
     plain = tidy(equations)
     names = Names([*plain.state, *plain.parameters, *(s.name for s in plain.node.state)])
     blocks = analyse(plain.node, names)
-    parts = Parts.of(variation, plain, method.stages)
+    variation = _renamed(variation, plain)
+    parts = Parts.of(variation, method.stages)
     writer = StepWriter(plain, blocks, method)
     functions = _functions(parts, plain.state, names)
     write_rosenbrock(writer, lambda i: _note(writer, parts, functions, method, i))
@@ -62,12 +63,14 @@ def emit_modes(variation: Variation, width: int | None = None) -> KernelSource:
     return KernelSource(text, equations, method.name, (), width, "modes")
 
 
-def _renamed(variation: Variation, plain: Equations) -> dict[Entry, sp.Expr]:
-    """The matrix in the names that the kernel uses."""
+def _renamed(variation: Variation, plain: Equations) -> Variation:
+    """The matrix and the events in the names that the kernel uses."""
     old = (*variation.orbit.state, *variation.orbit.parameters)
     new = (*plain.state, *plain.parameters)
     swap = {sp.Symbol(a, real=True): sp.Symbol(b, real=True) for a, b in zip(old, new, strict=True)}
-    return {key: e.xreplace(swap) for key, e in variation.matrix}
+    matrix = tuple((key, e.xreplace(swap)) for key, e in variation.matrix)
+    events = None if variation.events is None else variation.events.map(lambda e: e.xreplace(swap))
+    return replace(variation, orbit=plain, matrix=matrix, events=events)
 
 
 @dataclass(slots=True)
@@ -78,16 +81,16 @@ class Parts:
     """
 
     stages: int
-    rows: dict[Entry, list[tuple[sp.Expr, sp.Expr]]] = field(default_factory=dict)
+    rows: dict[Place, list[tuple[sp.Expr, sp.Expr]]] = field(default_factory=dict)
     steady: dict[sp.Expr, str] = field(default_factory=dict)
     moving: dict[sp.Expr, int] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, variation: Variation, plain: Equations, stages: int) -> Parts:
-        """The parts of a variation whose orbit has the names of `plain`."""
+    def of(cls, variation: Variation, stages: int) -> Parts:
+        """The parts of a variation."""
         made = cls(stages)
-        states = {sp.Symbol(name, real=True) for name in plain.state} | {TIME}
-        for key, e in _renamed(variation, plain).items():
+        states = {sp.Symbol(name, real=True) for name in variation.orbit.state} | {TIME}
+        for key, e in variation.matrix:
             rest = e.xreplace(dict.fromkeys(variation.parameters, sp.S.Zero))
             terms = [(rest, sp.S.One), *((e.diff(s), s) for s in variation.parameters)]
             made.rows[key] = [(made.slot(c, states), s) for c, s in terms if c != 0]
@@ -203,7 +206,7 @@ def _moves(coefficient: sp.Expr) -> bool:
     return coefficient.is_Symbol and coefficient.name.startswith("a")
 
 
-def _at_stage(parts: Parts, fixed: Mapping[Entry, str], i: int) -> dict[Entry, sp.Expr]:
+def _at_stage(parts: Parts, fixed: Mapping[Place, str], i: int) -> dict[Place, sp.Expr]:
     """The entries of A at a stage: numbers, names of steady entries, and sums with the stage's moving coefficients."""
     swap = {sp.Symbol(f"a{k}"): sp.Symbol(f"a{i + 1}_{k}") for k in parts.moving.values()}
     made = {}
@@ -213,7 +216,7 @@ def _at_stage(parts: Parts, fixed: Mapping[Entry, str], i: int) -> dict[Entry, s
     return made
 
 
-def _mode_stage(parts: Parts, entries: Mapping[Entry, sp.Expr], method: Integrator, i: int, size: int) -> list[str]:
+def _mode_stage(parts: Parts, entries: Mapping[Place, sp.Expr], method: Integrator, i: int, size: int) -> list[str]:
     """Stage state, A times it, and what the moving Jacobian adds."""
     lines = [f"# stage {i + 1}"]
     if i > 0:
@@ -274,7 +277,7 @@ def _module(
         SCALED,
         "\n".join(orbit),
         "\n".join(modes),
-        *([write_pushes(plain, names)] if sticking else []),
+        *write_events(variation, names),
         *(skeletons.text(name) for name in ("recording", "cells", "control", *sticking, "modes")),
     ]
     return "\n\n\n".join(made) + "\n"
@@ -290,4 +293,4 @@ def _constants(variation: Variation, plain: Equations, method: Integrator, width
         "DENSE": sticking, "LOOPED": False, "REPEATS": False,
         "MODE_SIZE": variation.size, "STRENGTHS": len(variation.parameters), "SHARED": shared,
     }  # fmt: skip
-    return "\n".join(f"{name} = {value!r}" for name, value in constants.items())
+    return "\n".join([*(f"{name} = {value!r}" for name, value in constants.items()), *event_constants(variation)])

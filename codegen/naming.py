@@ -24,7 +24,8 @@ RESERVED = frozenset(
      "node_local", "bound", "bank", "step", "step_smooth", "section", "theta", "now",
      "njit", "p", "drive", "scaled", "inside", "total", "e3", "e5", "np", "math",
      "WIDTH", "DENSE", "LANES", "MODE_SIZE", "STRENGTHS", "SHARED", "shared", "steady", "moving", "bent", "lag",
-     "strengths", "which", "mode_step", "march", "pushes", "out"}
+     "strengths", "which", "mode_step", "march", "pushes", "out", "network", "release",
+     "after", "modes"}
     | set(NAMES)
     | set(keyword.kwlist) | set(dir(builtins)) | set(elementary.__all__) | set(lanes.__all__)
 )  # fmt: skip

@@ -15,6 +15,7 @@ import sympy as sp
 from .calculus import derivative
 from .equations import TIME, Edge, Equations, Node
 from .reduction import collapse
+from .saltation import Entry, Events, of_blocks, of_mode, of_network
 
 if TYPE_CHECKING:
     from .clusters import Block, Clusters
@@ -45,20 +46,24 @@ class Variation:
     """A linear system d' = A d along an orbit: what small deviations from it do.
 
     `matrix` holds the non-zero entries ((row, column), expression) of A, in the symbols of the whole orbit (x_1 …), its
-    parameters, t, and `parameters`, numbers that differ from mode to mode and enter A linearly.
+    parameters, t, and `parameters`, numbers that differ from mode to mode and enter A linearly.  `events` say what stick and
+    slip do to a deviation; modes of contacts themselves do not deviate.
     Raises ValueError for an entry outside the matrix or with an unknown symbol, or one that is not linear in `parameters`.
     """
 
     orbit: Equations
     size: int
-    matrix: tuple[tuple[tuple[int, int], sp.Expr], ...]
+    matrix: tuple[Entry, ...]
     parameters: tuple[sp.Symbol, ...] = ()
+    events: Events | None = None
 
     def __post_init__(self) -> None:
         names = {*self.orbit.state, *self.orbit.parameters, "t"}
         taken = names & {s.name for s in self.parameters}
         if taken:
             raise ValueError(f"the symbol {min(taken)!r} is needed for the strength of a mode; rename it in the model")
+        if (self.events is None) != (self.orbit.node.contact is None):
+            raise ValueError("variation: events belong to set-valued friction, and to nothing else")
         for (row, column), e in self.matrix:
             if not (0 <= row < self.size and 0 <= column < self.size):
                 raise ValueError(f"variation: entry ({row}, {column}) is outside the {self.size} x {self.size} matrix")
@@ -80,20 +85,27 @@ def mode(equations: Equations, plane: bool = False) -> Variation:
     node = equations.node
     orbit = Equations(node, None, 1)
     here = orbit.at_node(0)
-    size = 2 if node.contact is not None else len(node.state)  # a mode does not deviate
+    size = _deviating(node)
     own = sp.Matrix(node.jacobian())[:size, :size].xreplace(here)
     push = slope[:size, :size].xreplace(here)
     alpha, beta = MODE
-    real = own - alpha * push
+    real, aside = own - alpha * push, beta * push
     if not plane:
-        return Variation(orbit, size, _entries(real), (alpha,))
-    both = sp.Matrix(sp.BlockMatrix([[real, beta * push], [-beta * push, real]]))
-    return Variation(orbit, 2 * size, _entries(both), (alpha, beta))
+        return Variation(orbit, size, _entries(real), (alpha,), of_mode(equations, orbit, slope, MODE, plane))
+    both = sp.Matrix(sp.BlockMatrix([[real, aside], [-aside, real]]))
+    return Variation(orbit, 2 * size, _entries(both), (alpha, beta), of_mode(equations, orbit, slope, MODE, plane))
+
+
+def _deviating(node: Node) -> int:
+    """The components of a node that deviate: all but the mode of a contact."""
+    return 2 if node.contact is not None else len(node.state)
 
 
 def whole(equations: Equations) -> Variation:
-    """Return the variational equation of the whole network, d' = J d, in state order."""
-    return Variation(equations, equations.dimension, tuple(equations.jacobian().items()))
+    """Return the variational equation of the whole network, d' = J d, in state order (without the modes of contacts)."""
+    size = equations.n * _deviating(equations.node)
+    matrix = tuple((key, e) for key, e in equations.jacobian().items() if max(key) < size)
+    return Variation(equations, size, matrix, (), of_network(equations))
 
 
 def clustered(equations: Equations, found: Clusters) -> Variation:
@@ -103,33 +115,34 @@ def clustered(equations: Equations, found: Clusters) -> Variation:
     d_k' = J(s_c) d_k + sigma sum_l B_kl H d_l, B the block's matrix and `STRENGTH` the place of sigma; a block of b
     coordinates has b rows for each component (Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014)).
 
-    Raises ValueError as `transversal` does, for a link whose derivative depends on the state, for a partition that is not
-    balanced, and for set-valued friction.
+    Raises ValueError as `transversal` does, for a link whose derivative depends on the state, and for a partition that is
+    not balanced.
     """
-    _check_smooth(equations)
     slope = _constant_slope(equations)
     orbit = collapse(equations, found.classes)
-    entries = dict(orbit.jacobian())
-    first = orbit.dimension
+    components = _deviating(orbit.node)
+    first = orbit.n * components
+    entries = {key: e for key, e in orbit.jacobian().items() if max(key) < first}
     for block in found.blocks:
         for (row, column), e in _of_block(block, orbit, slope):
             key = (first + row, first + column)
             entries[key] = entries.get(key, sp.S.Zero) + e
-        first += len(block.nodes) * len(orbit.node.state)
+        first += len(block.nodes) * components
     kept = tuple((key, e) for key, e in sorted(entries.items()) if e != 0)
-    return Variation(orbit, first, kept, (STRENGTH,))
+    return Variation(orbit, first, kept, (STRENGTH,), of_blocks(equations, found.blocks, orbit, slope, STRENGTH))
 
 
 def _of_block(block: Block, orbit: Equations, slope: sp.Matrix) -> Iterator[tuple[tuple[int, int], sp.Expr]]:
     """Yield ((row, column), entry) of one block, component by component; keys repeat."""
-    size, own = len(block.nodes), orbit.node.jacobian()
-    for r, line in enumerate(own):
-        for c, entry in enumerate(line):
+    size, own, components = len(block.nodes), orbit.node.jacobian(), _deviating(orbit.node)
+    for r, line in enumerate(own[:components]):
+        for c, entry in enumerate(line[:components]):
             for k, cluster in enumerate(block.nodes):
                 yield (r * size + k, c * size + k), entry.xreplace(orbit.at_node(cluster))
                 for j, weight in enumerate(block.matrix[k]):
                     factor = sp.Rational(weight.numerator, weight.denominator)
-                    yield (r * size + k, c * size + j), STRENGTH * factor * slope[r, c]
+                    push = slope[r, c].xreplace(orbit.at_node(cluster))
+                    yield (r * size + k, c * size + j), STRENGTH * factor * push
 
 
 def _constant_slope(equations: Equations) -> sp.Matrix:
@@ -138,7 +151,11 @@ def _constant_slope(equations: Equations) -> sp.Matrix:
     edge = equations.edge
     if edge is None:
         raise ValueError("these equations have no coupling; differences within clusters need links")
-    here, there = sp.Matrix(edge.jacobian_here()), sp.Matrix(edge.jacobian_there())
+    size = len(edge.here) if equations.node.contact is None else 2
+    slips = dict.fromkeys(edge.here[size:], sp.S.One)
+    here, there = (
+        sp.Matrix(block)[:size, :size].xreplace(slips) for block in (edge.jacobian_here(), edge.jacobian_there())
+    )
     if there.has(*edge.here, *edge.there) or (here + there).applyfunc(sp.simplify) != sp.zeros(*here.shape):
         raise ValueError(
             f"a link {', '.join(map(str, edge.rhs))} has a derivative that depends on the states it joins; cluster states "
@@ -152,18 +169,22 @@ def phased(variation: Variation) -> Variation:
     later = {TIME: TIME + PHASE}
     orbit = variation.orbit
     rates = tuple(e.xreplace(later) for e in orbit.node.rhs)
-    node = Node(orbit.node.state, rates, (*orbit.node.parameters, PHASE))
+    contact = None if orbit.node.contact is None else orbit.node.contact.map(lambda e: e.xreplace(later))
+    node = Node(orbit.node.state, rates, (*orbit.node.parameters, PHASE), contact)
     matrix = tuple((key, e.xreplace(later)) for key, e in variation.matrix)
-    return Variation(Equations(node, orbit.edge, orbit.n, orbit.links), variation.size, matrix, variation.parameters)
+    events = None if variation.events is None else variation.events.map(lambda e: e.xreplace(later))
+    moved = Equations(node, orbit.edge, orbit.n, orbit.links)
+    return Variation(moved, variation.size, matrix, variation.parameters, events)
 
 
 def with_volume(equations: Equations) -> Equations:
     """Return the equations with one more state of each oscillator, `LOG_VOLUME`, its share of the divergence summed up.
 
     The sum over the oscillators is the logarithm of a volume of states carried along (Liouville's formula).
-    Raises ValueError for set-valued friction.
+    Raises ValueError for set-valued friction, under which volumes vanish in stick.
     """
-    _check_smooth(equations)
+    if equations.node.contact is not None:
+        raise ValueError("volumes of states: found set-valued friction, whose stick makes them zero")
     node = equations.node
     rate = sp.Add(*(derivative(e, s) for e, s in zip(node.rhs, node.state, strict=True)))
     single = Node((*node.state, LOG_VOLUME), (*node.rhs, rate), node.parameters)
@@ -176,15 +197,7 @@ def with_volume(equations: Equations) -> Equations:
     return Equations(single, edge, equations.n, equations.links)
 
 
-def _check_smooth(equations: Equations) -> None:
-    if equations.node.contact is not None:
-        raise ValueError(
-            "tangent dynamics of a whole network: found set-valued friction, whose events are not smooth; expected contact "
-            "'atan'"
-        )
-
-
-def _entries(matrix: sp.Matrix) -> tuple[tuple[tuple[int, int], sp.Expr], ...]:
+def _entries(matrix: sp.Matrix) -> tuple[Entry, ...]:
     rows, columns = matrix.shape
     return tuple(((r, c), matrix[r, c]) for r in range(rows) for c in range(columns) if matrix[r, c] != 0)
 

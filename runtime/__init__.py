@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .basin import Basin, basin
+    from .branches import Branch, follow, skeleton
     from .cluster_states import ClusterExponents, cluster_exponents
     from .exponent import Exponents, exponents
     from .lyapunov import Lyapunov, lyapunov_spectrum
     from .msf import MSF, Plane, msf, plane
-    from .periodic import PeriodicOrbit, follow, periodic_orbit
+    from .periodic import PeriodicOrbit, periodic_orbit
     from .probe import Probe, universal_probe
     from .result import Result, open_result
     from .status import Status
@@ -21,18 +22,20 @@ if TYPE_CHECKING:
     from .threshold import Thresholds, thresholds
 
 __all__ = [
-    "MSF", "Basin", "ClusterExponents", "Exponents", "Lyapunov", "PeriodicOrbit", "Plane", "Probe", "Result", "Status",
-    "SweepInterrupted", "Thresholds", "basin", "cluster_exponents", "exponents", "follow", "kernel", "lyapunov_spectrum",
-    "msf", "open_result", "periodic_orbit", "plane", "run", "thresholds", "universal_probe",
+    "MSF", "Basin", "Branch", "ClusterExponents", "Exponents", "Lyapunov", "PeriodicOrbit", "Plane", "Probe", "Result",
+    "Status", "SweepInterrupted", "Thresholds", "basin", "cluster_exponents", "exponents", "follow", "kernel",
+    "lyapunov_spectrum", "msf", "open_result", "periodic_orbit", "plane", "run", "skeleton", "thresholds",
+    "universal_probe",
 ]  # fmt: skip
 
 _HOME = {
     "ClusterExponents": "cluster_states", "cluster_exponents": "cluster_states", "PeriodicOrbit": "periodic",
-    "periodic_orbit": "periodic", "follow": "periodic", "Lyapunov": "lyapunov", "lyapunov_spectrum": "lyapunov",
-    "Basin": "basin", "basin": "basin", "Exponents": "exponent", "exponents": "exponent", "MSF": "msf",
-    "Plane": "msf", "msf": "msf", "plane": "msf", "Probe": "probe", "universal_probe": "probe", "Result": "result",
-    "open_result": "result", "SweepInterrupted": "sweep", "kernel": "sweep", "run": "sweep", "Status": "status",
-    "Thresholds": "threshold", "thresholds": "threshold",
+    "periodic_orbit": "periodic", "Branch": "branches", "follow": "branches", "skeleton": "branches",
+    "Lyapunov": "lyapunov", "lyapunov_spectrum": "lyapunov", "Basin": "basin", "basin": "basin",
+    "Exponents": "exponent", "exponents": "exponent", "MSF": "msf", "Plane": "msf", "msf": "msf", "plane": "msf",
+    "Probe": "probe", "universal_probe": "probe", "Result": "result", "open_result": "result",
+    "SweepInterrupted": "sweep", "kernel": "sweep", "run": "sweep", "Status": "status", "Thresholds": "threshold",
+    "thresholds": "threshold",
 }  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from synchain.codegen.modes import emit_modes
 from synchain.models.scene import Scene
 from synchain.models.tangent import Variation
 
+from .contact_modes import local_clock
 from .plan import CANCEL, control_array, periods, tolerances
 from .status import Status
 from .threads import worker_count
@@ -26,9 +27,9 @@ __all__ = ["Carrier"]
 class Carrier:
     """Orbits (cells) with deviations, `modes` of them each, which differ in their strengths.
 
-    state (cells, dimension), numbers (cells, parameters), period (cells,): that of the equations, 0 for none; strengths
-    (number of strengths, padded modes) sorted by size, order (modes,): where each mode of the caller stands; vectors
-    (cells, size, padded modes).
+    state (cells, dimension), numbers (cells, parameters), period (cells,): after which the clock starts anew, 0 for none;
+    strengths (number of strengths, padded modes) sorted by size, order (modes,): where each mode of the caller stands;
+    vectors (cells, size, padded modes).
     """
 
     kernel: Kernel
@@ -73,7 +74,8 @@ class Carrier:
         kept = np.ascontiguousarray(strengths[:, chosen], dtype=float)
         kept = kept if len(kept) else np.zeros((1, padded))
         rows = np.ascontiguousarray(state, dtype=float).copy()
-        return cls(kernel, rows, np.ascontiguousarray(numbers, dtype=float), repeat, control, kept, where, vectors,
+        clock = local_clock(kernel.equations, repeat)
+        return cls(kernel, rows, np.ascontiguousarray(numbers, dtype=float), clock, control, kept, where, vectors,
                    worker_count(workers))  # fmt: skip
 
     @property

@@ -19,6 +19,7 @@ from synchain.models.scene import Scene
 from synchain.models.tangent import Variation, clustered
 
 from .carrier import Carrier
+from .contact_modes import with_modes
 from .exponent import Batches
 from .orbits import unit_of_time
 
@@ -113,7 +114,8 @@ def cluster_exponents(
     with tqdm(total=math.ceil(periods), unit="period", disable=not show_progress and show_progress is not None) as bar:
         while batches.blocks < periods:
             batches.add(carrier.advance(unit))
-            apart = np.maximum(apart, _differences(carrier.state[0], found.quotient.n))
+            moving = carrier.state[0, : found.quotient.n * _deviating(variation)]
+            apart = np.maximum(apart, _differences(moving, found.quotient.n))
             bar.update(1)
             if batches.due and np.all(batches.error() <= precision):
                 break
@@ -139,7 +141,9 @@ def _carrier(scene: Scene, found: Clusters, variation: Variation, seed: int) -> 
     firsts = [members[0] for members in found.members]
     state = np.array([[values[i] for values in scene.initial.values() for i in firsts]])
     numbers = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])
-    parts = list(_parts(found, variation, len(scene.components)))
+    state = with_modes(variation.orbit, state, numbers)
+    components = _deviating(variation)
+    parts = list(_parts(found, components))
     carrier = Carrier.make(scene, variation, state, numbers, np.full((1, len(parts)), scene.parameters["sigma"]), 1)
     random = np.random.default_rng(seed)
     deviations = np.zeros((1, variation.size, len(parts)))
@@ -149,9 +153,14 @@ def _carrier(scene: Scene, found: Clusters, variation: Variation, seed: int) -> 
     return carrier
 
 
-def _parts(found: Clusters, variation: Variation, components: int) -> Iterator[slice]:
+def _deviating(variation: Variation) -> int:
+    """Components of an oscillator that deviate: all but the mode of a contact."""
+    return len(variation.orbit.node.state) if variation.events is None else 2
+
+
+def _parts(found: Clusters, components: int) -> Iterator[slice]:
     """Where the clusters' motion and each block stand among the coordinates of the variational equation."""
-    first, last = 0, variation.orbit.dimension
+    first, last = 0, found.quotient.n * components
     yield slice(first, last)
     for block in found.blocks:
         first, last = last, last + len(block.nodes) * components

@@ -1,13 +1,16 @@
-"""Whether each oscillator sticks or slips at its start."""
+"""Whether each oscillator sticks or slips at its start, and the clock by which its events are timed."""
 
 from __future__ import annotations
 
 import numpy as np
 import sympy as sp
 
-from synchain.models.equations import Equations
+from synchain.models.equations import TIME, Equations
 
-__all__ = ["with_modes"]
+__all__ = ["CLOCK", "local_clock", "with_modes"]
+
+CLOCK = 8.0
+"""After so much time the clock of an oscillator without a drive starts anew: a power of two, so that no digit is lost."""
 
 
 def with_modes(equations: Equations, start: np.ndarray, numbers: np.ndarray) -> np.ndarray:
@@ -15,22 +18,53 @@ def with_modes(equations: Equations, start: np.ndarray, numbers: np.ndarray) -> 
 
     An oscillator at exactly the ground's velocity sticks where static friction can hold it.
     """
-    if equations.node.contact is None:
+    contact, n = equations.node.contact, equations.n
+    if contact is None:
         return start
-    names = [*equations.state, *equations.parameters, "t"]
-    symbols = [sp.Symbol(name, real=True) for name in names]
     made = np.array(start, dtype=float)
-    columns = [*made.T, *numbers.T, np.zeros(len(made))]
-    for i in range(equations.n):
-        contact = equations.contact_at(i)
-        if contact is None:
-            continue
-        sliding, up, down = (_at(e, symbols, columns) for e in (contact.sliding, contact.up, contact.down))
-        stuck = np.where(up < 0.0, 1.0, np.where(down > 0.0, -1.0, 0.0))
-        made[:, 2 * equations.n + i] = np.where(sliding == 0.0, stuck, np.sign(sliding))
+    given = {sp.Symbol(p, real=True): c[:, None] for p, c in zip(equations.parameters, numbers.T, strict=True)}
+    given[TIME] = np.zeros((len(made), 1))
+    own = given | {s: made[:, k * n : (k + 1) * n] for k, s in enumerate(equations.node.state)}
+    sliding, up, down = (_at(e, own, (len(made), n)) for e in (contact.sliding, contact.up, contact.down))
+    push = _link_forces(equations, contact.speed, made, given)
+    stuck = np.where(up + push < 0.0, 1.0, np.where(down + push > 0.0, -1.0, 0.0))
+    made[:, 2 * n :] = np.where(sliding == 0.0, stuck, np.sign(sliding))
     return made
 
 
-def _at(e: sp.Expr, symbols: list[sp.Symbol], columns: list[np.ndarray]) -> np.ndarray:
-    value = sp.lambdify(symbols, e, "numpy")(*columns)
-    return np.broadcast_to(np.asarray(value, dtype=float), columns[0].shape)
+def _link_forces(
+    equations: Equations, speed: sp.Expr, state: np.ndarray, given: dict[sp.Symbol, np.ndarray]
+) -> np.ndarray:
+    """What the links push each oscillator with, if it moves with the ground (cells, n)."""
+    edge, n = equations.edge, equations.n
+    total = np.zeros((len(state), n))
+    if edge is None or not equations.links:
+        return total
+    target, source = (np.array([link[side] for link in equations.links]) for side in (0, 1))
+    given = {**given, edge.weight: np.array([float(link[2]) for link in equations.links])}
+    for symbols, nodes in ((edge.here, target), (edge.there, source)):
+        given |= {s: state[:, k * n + nodes] for k, s in enumerate(symbols)}
+    force = edge.rhs[1].xreplace({edge.here[2]: sp.S.One, edge.here[1]: speed})
+    np.add.at(total, (slice(None), target), _at(force, given, (len(state), len(target))))
+    return total
+
+
+def local_clock(equations: Equations, period: np.ndarray) -> np.ndarray:
+    """The times after which the clocks of cells start anew: their `period` (cells,), 0 for none.
+
+    Events are located on the clock, to rounding.  Where time does not enter the equations any length is a period, and a
+    short one keeps the digits of events in long runs.
+    """
+    if equations.node.contact is None or any(e.has(TIME) for e in (*equations.node.rhs, *_conditions(equations))):
+        return period
+    return np.full(len(period), CLOCK)
+
+
+def _conditions(equations: Equations) -> tuple[sp.Expr, ...]:
+    contact = equations.node.contact
+    return () if contact is None else contact.expressions
+
+
+def _at(e: sp.Expr, given: dict[sp.Symbol, np.ndarray], shape: tuple[int, int]) -> np.ndarray:
+    value = sp.lambdify(list(given), e, "numpy")(*given.values())
+    return np.array(np.broadcast_to(value, shape), dtype=float)

@@ -5,6 +5,9 @@ Meccanica 15, 9 (1980)).  A block is short enough where every direction stands o
 smoothed friction law oscillators that stick lose their velocity deviations so fast that no block is, and exponents lost
 in this error are not reported as numbers.  Their sum is known all the same: the sum of all exponents is the mean
 divergence of the equations, which is integrated along the orbit by itself.
+
+Under set-valued friction stick makes the velocity of a deviation zero, so that directions vanish within finite time: their
+exponent is -inf by rule, and so is the sum.  Such a direction comes out of a block with the length of a rounding.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from synchain.models.scene import Scene
 from synchain.models.tangent import PHASE, Variation, phased, whole, with_volume
 
 from .carrier import Carrier
+from .contact_modes import with_modes
 from .exponent import Batches
 from .orbits import unit_of_time
 
@@ -40,7 +44,9 @@ class Lyapunov:
     """Exponents (count,) per unit of non-dimensional time, from the largest down, with their standard errors.
 
     resolved (count,): False where a direction decays faster than can be followed; its exponent is -inf, without error.
-    divergence: mean of the divergence along the same orbit, the sum of all exponents of the network, with its error.
+    divergence: mean of the divergence along the same orbit, the sum of all exponents of the network, with its error.  With
+    set-valued friction it is that sum itself: -inf where an oscillator has stuck, nan where not all exponents are asked
+    for.
     `time` is the length averaged over, `block` the time between two orthogonalisations, `components` the number of all
     exponents.  Exponents that differ by less than about 1/time have not parted yet: they share their sum, and the errors do
     not say so.
@@ -117,13 +123,16 @@ def _report(walk: Walk, batches: Batches, lost: np.ndarray) -> Lyapunov:
     mean, error = batches.mean()[0], batches.error_by_start()[0]
     found, spread = np.where(resolved, mean[:-1], -np.inf), np.where(resolved, error[:-1], 0.0)
     order = np.argsort(-found, kind="stable")
-    time = batches.blocks * batches.length
-    return Lyapunov(found[order], spread[order], resolved[order], float(mean[-1]), float(error[-1]), time,
-                    walk.unit / walk.parts, walk.variation.size)  # fmt: skip
+    time, volume = batches.blocks * batches.length, (float(mean[-1]), float(error[-1]))
+    if walk.variation.events is not None:
+        known = len(found) == walk.variation.size
+        volume = (float(found.sum()), float(np.hypot.reduce(spread))) if known else (math.nan, math.nan)
+    return Lyapunov(found[order], spread[order], resolved[order], *volume, time, walk.unit / walk.parts,
+                    walk.variation.size)  # fmt: skip
 
 
 def _counted(scene: Scene, count: int | None) -> int:
-    dimension = scene.equations.dimension
+    dimension = scene.n * (len(scene.components) if scene.equations.node.contact is None else 2)
     if count is None:
         return dimension
     if not 1 <= count <= dimension:
@@ -148,11 +157,13 @@ class Walk:
         """At the scene's start, with random directions; ValueError where time enters without a known period."""
         unit = unit_of_time(scene)
         own = whole(scene.equations)
-        variation = Variation(with_volume(own.orbit), own.size, own.matrix)
+        sticks = own.events is not None
+        variation = own if sticks else Variation(with_volume(own.orbit), own.size, own.matrix)
         variation = phased(variation) if scene.forced else variation
         values = {**scene.parameters, PHASE.name: 0.0}
         numbers = np.array([[values[name] for name in variation.orbit.parameters]])
-        state = np.array([[*scene.y0, *(0.0 for _ in range(scene.n))]])
+        state = np.array([[*scene.y0, *(0.0 for _ in range(0 if sticks else scene.n))]])
+        state = with_modes(variation.orbit, state, numbers)
         carrier = Carrier.make(scene, variation, state, numbers, np.zeros((0, count)), 1)
         basis = np.linalg.qr(np.random.default_rng(seed).normal(size=(own.size, count)))[0]
         return cls(scene, variation, carrier, basis, unit)
@@ -171,7 +182,8 @@ class Walk:
         """Advance by one block.
 
         Returns the logarithms of the growth in each direction (count,), the length of each direction after the block over
-        the longest that its deviation has been (count,), and the logarithm of the growth of volumes.
+        the longest that its deviation has been (count,), and the logarithm of the growth of volumes (nan with set-valued
+        friction).
         """
         names = self.variation.orbit.parameters
         if PHASE.name in names:
@@ -181,9 +193,11 @@ class Walk:
         whole_growth = self.carrier.advance(self.unit / self.parts)[0]
         self.basis, triangle = np.linalg.qr(self.carrier.deviations[0])
         own = np.abs(np.diagonal(triangle))
-        shares = self.carrier.state[:, -self.scene.n :]
-        volume = float(shares.sum())
-        shares[:] = 0.0
+        volume = np.nan
+        if self.variation.events is None:
+            shares = self.carrier.state[:, -self.scene.n :]
+            volume = float(shares.sum())
+            shares[:] = 0.0
         with np.errstate(divide="ignore"):
             return whole_growth + np.log(own), own * np.exp(np.minimum(whole_growth, 0.0)), volume
 

@@ -48,11 +48,6 @@ class Orbits:
         """Orbits at the start of their transient; ValueError where time enters without a known period."""
         variation = mode(scene.equations, plane=bool(np.iscomplexobj(strengths)))
         unit = unit_of_time(scene)
-        contact = variation.orbit.node.contact
-        if contact is not None and contact.jumps:
-            raise ValueError(
-                "exponents: slip begins with a jump of acceleration under this friction law; expected f(0+) = mu_s"
-            )
         row = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])
         state = with_modes(variation.orbit, state, np.repeat(row, len(state), axis=0))
         return cls(scene, variation, strengths, state, workers, unit)

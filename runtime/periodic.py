@@ -1,5 +1,4 @@
-"""Periodic orbits of one driven oscillator by Newton's method on its stroboscopic map, their stability, and their
-branches.
+"""Periodic orbits of one driven oscillator by Newton's method on its stroboscopic map, and their stability.
 
 The derivative of the map is the propagator of a deviation along the orbit (`synchain.runtime.orbits`), through stick and
 slip where friction is set-valued, so Newton's method converges quadratically for both forms of the law.
@@ -21,8 +20,9 @@ from synchain.models.scene import Scene
 from .attractor import over_one_cycle
 from .exponent import single
 from .orbits import Orbits
+from .phases import Phases, phases_of
 
-__all__ = ["Branch", "PeriodicOrbit", "follow", "periodic_orbit", "stability_end"]
+__all__ = ["PeriodicOrbit", "periodic_orbit", "stability_end"]
 
 TOLERANCE = 1e-12
 """Relative tolerance of the integration."""
@@ -50,22 +50,14 @@ class PeriodicOrbit:
         """True where every multiplier lies inside the unit circle."""
         return bool(abs(self.multipliers[0]) < 1.0)
 
+    @property
+    def phases(self) -> Phases | None:
+        """The phases of stick and slip of one cycle (`synchain.runtime.phases`), None for friction without them."""
+        return phases_of(self.scene, self.state, self.periods)
+
     def transversal(self, alpha: float) -> np.ndarray:
         """The multipliers of a transversal mode of strength alpha along the orbit, the largest first."""
         return _sorted(_strobe(self.scene, self.state, self.periods, alpha)[1])
-
-
-@dataclass(frozen=True, slots=True)
-class Branch:
-    """Periodic orbits along a parameter: values (k,), an orbit for each, and the bifurcations between them.
-
-    bifurcations: (value of the parameter, "period doubling" or "fold").  The branch ends where Newton's method fails.
-    """
-
-    name: str
-    values: np.ndarray
-    orbits: tuple[PeriodicOrbit, ...]
-    bifurcations: tuple[tuple[float, str], ...]
 
 
 def periodic_orbit(
@@ -102,34 +94,16 @@ def periodic_orbit(
         best, kept, found = residual, state, matrix
         if residual == 0.0:
             break
-        state = state + np.linalg.solve(np.eye(size) - matrix, gap)
+        try:
+            state = state + np.linalg.solve(np.eye(size) - matrix, gap)
+        except np.linalg.LinAlgError:
+            raise ArithmeticError(
+                f"orbit of {periods} drive periods: a multiplier is 1, so it is not isolated"
+            ) from None
         steps += 1
     if not best < 1e-9 * max(1.0, float(np.abs(kept).max())):
         raise ArithmeticError(f"no orbit of {periods} drive periods near the start: the best residual was {best:.1e}")
     return PeriodicOrbit(scene, periods, kept, _sorted(found), best, steps)
-
-
-def follow(scene: Scene, name: str, values: Sequence[float], first: PeriodicOrbit) -> Branch:
-    """Follow a periodic orbit along a parameter, from `first` at values[0] on, and locate where it loses its stability.
-
-    Raises ValueError for an unknown parameter.
-    """
-    if name not in first.scene.parameters:
-        raise ValueError(f"unknown parameter {name!r}; known: {', '.join(first.scene.parameters)}")
-    orbits: list[PeriodicOrbit] = []
-    bifurcations = []
-    for k, value in enumerate(values):
-        guess = first.state if k == 0 else orbits[-1].state
-        if k > 1 and orbits[-1].state.shape == orbits[-2].state.shape:
-            slope = (orbits[-1].state - orbits[-2].state) / (values[k - 1] - values[k - 2])
-            guess = guess + slope * (value - values[k - 1])
-        try:
-            orbits.append(periodic_orbit(scene, first.periods, guess, **{name: float(value)}))
-        except ArithmeticError:
-            break
-        if k > 0:
-            bifurcations += _between(scene, name, float(values[k - 1]), float(value), orbits[-2], orbits[-1])
-    return Branch(name, np.asarray(values[: len(orbits)], dtype=float), tuple(orbits), tuple(bifurcations))
 
 
 def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
@@ -158,28 +132,3 @@ def _strobe(scene: Scene, state: np.ndarray, periods: int, alpha: float) -> tupl
 def _sorted(matrix: np.ndarray) -> np.ndarray:
     found = np.linalg.eigvals(matrix)
     return np.asarray(found[np.argsort(-np.abs(found), kind="stable")])
-
-
-def _between(
-    scene: Scene, name: str, low: float, high: float, before: PeriodicOrbit, after: PeriodicOrbit
-) -> list[tuple[float, str]]:
-    """The crossing of a real multiplier through -1 or 1 between two neighbours on a branch."""
-    found = []
-    for at, words in ((-1.0, "period doubling"), (1.0, "fold")):
-        ends = [_nearest(orbit, at) for orbit in (before, after)]
-        if None in ends or ends[0] * ends[1] > 0.0:  # type: ignore[operator]
-            continue
-
-        def distance(value: float, at: float = at) -> float:
-            share = (value - low) / (high - low)
-            guess = before.state + share * (after.state - before.state)
-            return _nearest(periodic_orbit(scene, before.periods, guess, **{name: value}), at) or 0.0
-
-        found.append((float(brentq(distance, low, high, xtol=1e-12)), words))
-    return found
-
-
-def _nearest(orbit: PeriodicOrbit, at: float) -> float | None:
-    """How far the largest multiplier is from a point of the real axis; None where it is complex."""
-    value = complex(orbit.multipliers[0])
-    return value.real - at if value.imag == 0.0 else None

@@ -12,7 +12,7 @@ from synchain.models.equations import Equations
 from synchain.models.periodicity import angular_frequency
 from synchain.models.scene import Scene
 
-from .contact_modes import with_modes
+from .contact_modes import local_clock, with_modes
 
 __all__ = ["CANCEL", "Plan", "control_array", "plan", "tolerances"]
 
@@ -61,7 +61,8 @@ def plan(scene: Scene, near: np.ndarray | None = None) -> Plan:
             start[:, state.index(name)] = values
     start = with_modes(scene.equations, start, numbers)
     last = np.zeros(scene.cells) if near is None else near
-    spans = np.column_stack([_spans(scene, columns), periods(scene.equations, numbers), last])
+    clock = local_clock(scene.equations, periods(scene.equations, numbers))
+    spans = np.column_stack([_spans(scene, columns), clock, last])
     return Plan(start, numbers, np.ascontiguousarray(spans))
 
 

@@ -123,8 +123,3 @@ def test_slip_that_begins_slower_than_a_step_can_tell_does_not_chatter() -> None
     tight = run(s.replace(rtol=1e-12, integrator="auto"), show_progress=False, **start)
     assert loose.success
     assert np.abs(loose.end.values - tight.end.values).max() < 1e-3
-
-
-def test_large_networks_are_refused_in_words() -> None:
-    with pytest.raises(ValueError, match="set-valued friction of 9 oscillators; expected at most 8"):
-        run(scene(9), show_progress=False)

@@ -7,7 +7,8 @@ import pytest
 
 from synchain.models.scene import Scene
 from synchain.models.topology import topology
-from synchain.runtime.periodic import follow, periodic_orbit, stability_end
+from synchain.runtime.branches import follow
+from synchain.runtime.periodic import periodic_orbit, stability_end
 
 PAIR = topology("chain", 2)
 

@@ -20,7 +20,8 @@ from synchain.codegen.skeletons.cells import SLOTS, aligned, fill, outcome, turn
 from synchain.codegen.skeletons.contacts import change_modes, take_back
 from synchain.codegen.skeletons.control import advance, aim, arrive, judge, pause
 from synchain.codegen.skeletons.names import (
-    CONTACTS, DENSE_ROWS, DIMENSION, ERROR_ORDER, LANES, MODE_SIZE, NODES, SHARED, STRENGTHS, WIDTH, mode_step, step,
+    CONTACTS, DENSE_ROWS, DIMENSION, ERROR_ORDER, JUMPS, LANES, MODE_SIZE, NODES, OWNERS, SHARED, STRENGTHS, WIDTH,
+    mode_step, release, step,
 )  # fmt: skip
 from synchain.codegen.skeletons.recording import (
     ACCEPTED, ATOL, BASE, N_ACCEPTED, N_REJECTED, PERIOD, REJECTED, RTOL, STATUS, STOPPED_AT, TIME,
@@ -62,23 +63,25 @@ def scale(modes, powers, registers):
 
 
 @njit(error_model="numpy")
-def saltate(before, after, out, modes, registers):
-    """What an event of a single contact does to deviations (position, velocity, …): it multiplies the velocity.
-
-    Landing in stick makes it 0, the start of slip leaves it, for both fields agree there, and a turn without stick
-    multiplies it by the ratio of the accelerations.  In general S = I + (F+ - F-) n / (n F-), n the gradient of the
-    sliding velocity.  Source: Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer,
-    2004), chapter 7.
-    """
-    if after == 0.0:
-        factor = 0.0
-    elif before == 0.0:
-        factor = 1.0
-    else:
-        factor = out[4 * NODES] / out[5 * NODES] if after > 0.0 else out[5 * NODES] / out[4 * NODES]
+def brake(i, factor, modes, registers):
+    """Multiply the velocities of deviations at contact i."""
     for which in range(registers):
-        for c in range(1, MODE_SIZE, 2):
-            store(modes, MODE_SIZE * which + c, factor * load(modes, MODE_SIZE * which + c, LANES))
+        for c in range(MODE_SIZE):
+            if OWNERS[c] == i:
+                store(modes, MODE_SIZE * which + c, factor * load(modes, MODE_SIZE * which + c, LANES))
+
+
+@njit(error_model="numpy")
+def saltate(i, before, bank, out, strengths, modes, registers):
+    """What an event of contact i does to deviations: see `synchain.models.saltation`; `before` is its mode before."""
+    after = bank[2 * NODES + i]
+    if before == 0.0:
+        if JUMPS:
+            for which in range(registers):
+                release(i, after, bank[TIME], bank, strengths, modes, which)
+        return
+    pushed, pulled = out[4 * NODES + i], out[5 * NODES + i]
+    brake(i, 0.0 if after == 0.0 else pushed / pulled if after > 0.0 else pulled / pushed, modes, registers)
 
 
 @njit(error_model="numpy")
@@ -118,7 +121,8 @@ def march(first, last, start, numbers, spans, control, strengths, vectors, growt
     registers = growth.shape[1] // LANES
     y_new, bank, shared = aligned(DIMENSION), aligned(SLOTS), aligned(SHARED)
     old, new = aligned(registers * MODE_SIZE * LANES), aligned(registers * MODE_SIZE * LANES)
-    dense, middle, out = aligned(DENSE_ROWS * DIMENSION), aligned(DIMENSION), aligned(6 * NODES)
+    dense, middle, out = aligned(DENSE_ROWS * DIMENSION), aligned(DIMENSION), aligned(9 * NODES)
+    slips = np.zeros(NODES)
     powers, strong = aligned(registers * LANES), aligned(registers * max(1, STRENGTHS) * LANES)
     for which in range(registers):
         for k in range(STRENGTHS):
@@ -128,6 +132,10 @@ def march(first, last, start, numbers, spans, control, strengths, vectors, growt
     for cell in range(first, last):
         fill(0, cell, start, numbers, spans, control, bank, samples)
         take_in(vectors[cell], old, registers)
+        if CONTACTS:
+            for i in range(NODES):
+                if bank[2 * NODES + i] == 0.0:
+                    brake(i, 0.0, old, registers)  # a velocity beside that of the ground is lost at once
         powers[:] = 0.0
         status, taken = outcome(0, bank, control), 0
         while status == 0:
@@ -141,7 +149,7 @@ def march(first, last, start, numbers, spans, control, strengths, vectors, growt
             t_new = arrive(bank, t, h)
             accept = judge(bank, h, error, 1.0 / (ERROR_ORDER + 1.0))
             if CONTACTS:
-                accept = take_back(accept, t, h, bank, y_new, dense, middle, out)
+                accept = take_back(accept, t, h, bank, y_new, dense, middle, out, ())
             if any_lane(accept):
                 for which in range(1, registers - 1):
                     mode_step(shared, strong, old, new, which)
@@ -151,10 +159,12 @@ def march(first, last, start, numbers, spans, control, strengths, vectors, growt
                     scale(old, powers, registers)
             advance(bank, t, t_new, accept, y_new)
             if CONTACTS:
-                before = bank[2 * NODES]
-                change_modes(accept, t_new, bank, out)
-                if bank[2 * NODES] != before:
-                    saltate(before, bank[2 * NODES], out, old, registers)
+                for i in range(NODES):
+                    slips[i] = bank[2 * NODES + i]
+                change_modes(accept, t_new, bank, out, ())
+                for i in range(NODES):
+                    if bank[2 * NODES + i] != slips[i]:
+                        saltate(i, slips[i], bank, out, strong, old, registers)
             if lane_bits(pause(bank, control)) != 0:
                 status = outcome(0, bank, control)
                 if status == 0 and bank[TIME] >= bank[PERIOD]:

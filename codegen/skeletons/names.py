@@ -39,6 +39,11 @@ SECTION = False
 TRAJECTORY = False
 """Records of this kernel; what is False costs nothing."""
 
+JUMPS = False
+"""True where slip begins with a jump of acceleration."""
+OWNERS = np.zeros(1, np.int64)
+"""The contact that each component of a deviation is a velocity of, -1 for the others; used where CONTACTS."""
+
 LANES = 1
 """Modes in one register of a kernel that carries deviations along an orbit."""
 MODE_SIZE = 2
@@ -65,5 +70,9 @@ def mode_step(shared: Any, strengths: Any, old: Any, new: Any, which: Any) -> An
     """The orbit's last step, taken by the modes of one register: writes them, returns their error and their size."""
 
 
-def pushes(t: Any, y: Any, p: Any, out: Any) -> Any:
+def pushes(t: Any, y: Any, p: Any, out: Any, network: Any) -> Any:
     """For each contact: sliding velocity, ground's velocity, accelerations under static friction both ways, in slip."""
+
+
+def release(i: Any, after: Any, t: Any, y: Any, strengths: Any, modes: Any, which: Any) -> Any:
+    """Where a contact begins to slip and friction drops at once, deviations that let go early have gained a velocity."""

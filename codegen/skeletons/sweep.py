@@ -124,7 +124,7 @@ def attempt(mode, bank, dense, y_new, middle, out, cell, spans, control, counts,
     t_new = arrive(bank, t, h)
     accept = judge(bank, h, error, power)
     if CONTACTS:
-        accept = take_back(accept, t, h, bank, y_new, dense, middle, out)
+        accept = take_back(accept, t, h, bank, y_new, dense, middle, out, (graph, weights))
     counted = accept & (t >= load(bank, START, WIDTH))
     if SYNC_ERROR:
         observe(bank, h, counted, accept, y_new, dense, middle)
@@ -135,7 +135,7 @@ def attempt(mode, bank, dense, y_new, middle, out, cell, spans, control, counts,
         sample(bank, t_new, h, lane_bits(accept), y_new, dense, cell, spans, samples)
     advance(bank, t, t_new, accept, y_new)
     if CONTACTS:
-        change_modes(accept, t_new, bank, out)
+        change_modes(accept, t_new, bank, out, (graph, weights))
     flips = 0
     if SWITCHING:
         flips = lane_bits(turned(bank, accept, rate, mode))
@@ -157,7 +157,7 @@ def drive(first, last, start, numbers, spans, control, end, sums, counts, points
     size = SLOTS * WIDTH if SWITCHING else 0
     away_bank, away_dense, away_cell = aligned(size), aligned(DENSE_ROWS * DIMENSION * WIDTH), np.full(WIDTH, -1)
     lot_bank, lot_cell = aligned(size), np.full(WIDTH, -1)
-    out = aligned(6 * NODES * WIDTH if CONTACTS else 0)
+    out = aligned(9 * NODES * WIDTH if CONTACTS else 0)
     for which in range(WIDTH):
         fill(which, -1, start, numbers, spans, control, bank, samples)
         if SWITCHING:

@@ -1,0 +1,79 @@
+"""Set-valued friction of more oscillators than are written out: the looped kernel does what the written-out one does."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import synchain.codegen.emit as emit_module
+import synchain.codegen.load as load_module
+from synchain.models.scene import Scene
+from synchain.models.topology import topology
+from synchain.runtime import Status, run
+
+NINE = topology("chain", 9)
+WIDTH = 4
+"""One width for all runs of the nine, so that they share a kernel."""
+
+
+def nine(x: list[float], v: list[float], window: float, **more: float) -> Scene:
+    return Scene(
+        topology=NINE, contact="set-valued", transient=0.0, window=window, rtol=1e-10, initial={"x": x, "v": v},
+        parameters={"omega": 1.4, **more},
+    )  # fmt: skip
+
+
+def ran(scene: Scene, **more: Any) -> np.ndarray:
+    """The states (component, oscillator) at the end of the only cell."""
+    result = run(scene, skip=False, show_progress=False, width=WIDTH, **more)
+    assert np.all(result.status == Status.FINISHED)
+    return np.asarray(result.end.values.reshape(3, -1))
+
+
+@pytest.mark.parametrize("coupling", ["spring", "damper"])
+def test_looped_events_are_those_of_the_kernel_that_is_written_out(
+    coupling: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the tolerance: sums of forces are fused differently, and a step that differs by a rounding differs for good."""
+    scene = Scene(
+        topology=topology("ring", 3), contact="set-valued", transient=0.0, window=20.0, rtol=1e-12, record=(),
+        coupling=coupling, initial={"x": [0.3, -0.2, 0.1], "v": [0.0, 0.2, -0.1]}, parameters={"sigma": 0.3},
+    )  # fmt: skip
+    plain = run(scene, skip=False, show_progress=False)
+    for module in (emit_module, load_module):
+        monkeypatch.setattr(module, "LARGEST_UNROLLED", 0)
+    load_module._load.cache_clear()
+    looped = run(scene, skip=False, show_progress=False)
+    load_module._load.cache_clear()
+    np.testing.assert_allclose(looped.end.values, plain.end.values, rtol=0, atol=1e-10)
+    np.testing.assert_array_equal(looped.end.values[6:], plain.end.values[6:])
+    assert abs(int(looped.steps) - int(plain.steps)) <= 0.1 * int(plain.steps)
+
+
+def test_equal_starts_stay_equal_bit_for_bit_and_fire_at_once() -> None:
+    """Coupled where synchrony is unstable, and free: three of nine that start equal stay so, whatever the others do."""
+    end = ran(nine([0.3] * 9, [0.0] * 9, 100.0, sigma=0.01))
+    assert np.ptp(end, axis=1).max() == 0.0
+    x = [0.3, -0.2, 0.3, 0.1, 0.3, 0.0, -0.4, 0.2, 0.4]
+    free = ran(nine(x, [0.0] * 9, 40.0, sigma=0.0))
+    assert np.ptp(free[:, [0, 2, 4]], axis=1).max() == 0.0
+    assert np.ptp(free[0]) > 0.01
+
+
+def test_a_mirrored_chain_has_the_mirrored_end() -> None:
+    x, v = np.random.default_rng(1).uniform(-0.5, 0.5, (2, 9))
+    there = ran(nine(x.tolist(), v.tolist(), 10.0, sigma=0.2))
+    back = ran(nine(x[::-1].tolist(), v[::-1].tolist(), 10.0, sigma=0.2))
+    np.testing.assert_allclose(back[:, ::-1], there, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(back[2, ::-1], there[2])
+
+
+def test_a_sweep_finds_the_end_of_the_synchronous_range() -> None:
+    """omega = 1.15: the largest mode of nine, sigma (2 + 2 cos(pi/9)) = 0.465, leaves the stable range at 0.1199."""
+    x = [0.3 + 1e-6 * i for i in range(9)]
+    scene = nine(x, [0.0] * 9, 20.0, omega=1.15).replace(transient=300.0, rtol=1e-8)
+    result = run(scene, skip=False, show_progress=False, width=WIDTH, sigma=[0.1, 0.11, 0.13, 0.14])
+    assert np.all(result.status == Status.FINISHED)
+    assert list(result.sync_error.values < 1e-6) == [True, True, False, False]
