@@ -8,6 +8,7 @@ from typing import Any
 from .coupling_matrix import canonical, is_matrix
 from .plugins import load
 from .scene_checks import Frozen, choice, integer, number, shown, table, text
+from .scene_friction import check_friction
 from .scene_model import check_links, check_state, components, in_range, model_parameters, node, unknown
 from .scene_section import Section
 from .scene_start import SEED_LIMIT, start
@@ -34,6 +35,7 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     _times(made)
     _numerics(made)
     check_sweep(made)
+    check_friction(made)
     return made
 
 

@@ -94,16 +94,19 @@ def periodic_orbit(
         best, kept, found = residual, state, matrix
         if residual == 0.0:
             break
-        try:
-            state = state + np.linalg.solve(np.eye(size) - matrix, gap)
-        except np.linalg.LinAlgError:
-            raise ArithmeticError(
-                f"orbit of {periods} drive periods: a multiplier is 1, so it is not isolated"
-            ) from None
+        state = state + _correction(matrix, gap)
         steps += 1
     if not best < 1e-9 * max(1.0, float(np.abs(kept).max())):
         raise ArithmeticError(f"no orbit of {periods} drive periods near the start: the best residual was {best:.1e}")
     return PeriodicOrbit(scene, periods, kept, _sorted(found), best, steps)
+
+
+def _correction(matrix: np.ndarray, gap: np.ndarray) -> np.ndarray:
+    """The step of Newton's method; ArithmeticError where the orbit is not isolated."""
+    try:
+        return np.asarray(np.linalg.solve(np.eye(len(gap)) - matrix, gap))
+    except np.linalg.LinAlgError:
+        raise ArithmeticError("Newton's method: a multiplier is 1 to rounding, so the orbit is not isolated") from None
 
 
 def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:

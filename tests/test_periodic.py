@@ -7,7 +7,7 @@ import pytest
 
 from synchain.models.scene import Scene
 from synchain.models.topology import topology
-from synchain.runtime.branches import follow
+from synchain.runtime.branches import follow, skeleton
 from synchain.runtime.periodic import periodic_orbit, stability_end
 
 PAIR = topology("chain", 2)
@@ -83,6 +83,42 @@ def test_a_period_doubling_is_found_where_the_double_period_is_born() -> None:
     below, above = gaps
     assert below < 1e-9  # the period of four is that of two below, and another motion above
     assert above > 1e-3
+
+
+def coulomb(drive: float) -> Scene:
+    """The exponential law without a fall is Coulomb's; a block on ground at rest."""
+    numbers = {"theta_b": 0.0, "epsilon": 1.0, "mu_s": 0.3, "mu_k": 0.3, "omega": 1.4, "u": drive}
+    return scene(parameters=numbers, transient=100.0)
+
+
+def test_stops_begin_where_den_hartogs_motion_ends() -> None:
+    """No stops while X beta^2 >= r: V beta^2 = r sqrt(1 + U^2 beta^4)/P, P the drive (Phil. Mag. 9, 801 (1930))."""
+    beta, r = 1.4, 0.3
+    v, u = 1 / (1 - beta**2), np.sin(np.pi / beta) / (beta * (1 + np.cos(np.pi / beta)))
+    last = r * np.sqrt(1 + u**2 * beta**4) / (abs(v) * beta**2)
+    first = periodic_orbit(coulomb(1.2 * last))
+    assert first.phases is not None
+    assert first.phases.modes == (-1, 1)
+    branch = follow(coulomb(1.2 * last), "u", np.linspace(1.2 * last, 0.9 * last, 4), first)
+    ((at, words),) = branch.bifurcations
+    assert words == "stick loss"
+    assert at == pytest.approx(last, abs=1e-8)
+    assert branch.residuals[0] < 1e-8
+    assert [len(phases.modes) for phases in branch.phases] == [2, 2, 2, 4]
+    load = np.sqrt((v * branch.values[0]) ** 2 - (r * u) ** 2) * beta**2  # at the turning point
+    assert branch.phases[0].landing == pytest.approx(r - load, abs=1e-9)
+
+
+def test_the_skeleton_of_a_diagram_has_stable_and_unstable_orbits() -> None:
+    """Period two loses its stability between 1.2 and 1.24 and lives on; the orbit of period one is followed both ways."""
+    found = skeleton(scene(transient=1000.0), "omega", [1.2, 1.22, 1.24], periods=(2,))
+    (branch,) = found
+    assert [orbit.periods for orbit in branch.orbits] == [2, 2, 2]
+    assert [orbit.stable for orbit in branch.orbits] == [True, True, False]
+    assert [words for _, words in branch.bifurcations] == ["period doubling"]
+    assert branch.residuals[0] < 1e-9
+    assert {phases.modes for phases in branch.phases} == {(0, 1)}
+    assert {phases.words for phases in branch.phases} == {"stick, slip +"}
 
 
 def test_what_is_refused() -> None:

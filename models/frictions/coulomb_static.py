@@ -13,6 +13,7 @@ PARAMETERS = {
         0.3, "1", "static friction coefficient, not below mu_k; other contacts know only mu_k", minimum=0
     ),
 }
+ORDER = (("mu_k", "mu_s"),)
 
 
 def force(w: sp.Expr, mu_k: sp.Expr, mu_s: sp.Expr) -> sp.Expr:
