@@ -102,7 +102,7 @@ def skeleton(
 def _seed(scene: Scene, name: str, value: float, periods: int) -> PeriodicOrbit | None:
     """The orbit that the scene settles on, if it has this number of periods and no fewer."""
     try:
-        found = periodic_orbit(scene, periods, **{name: value})
+        found = periodic_orbit(scene, periods, None, **{name: value})
         shorter = [k for k in range(1, periods) if periods % k == 0]
         return None if any(_repeats(found, k) for k in shorter) else found
     except ArithmeticError:

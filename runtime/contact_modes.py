@@ -45,7 +45,7 @@ def _link_forces(
     for symbols, nodes in ((edge.here, target), (edge.there, source)):
         given |= {s: state[:, k * n + nodes] for k, s in enumerate(symbols)}
     force = edge.rhs[1].xreplace({edge.here[2]: sp.S.One, edge.here[1]: speed})
-    np.add.at(total, (slice(None), target), _at(force, given, (len(state), len(target))))
+    np.add.at(total.T, target, _at(force, given, (len(state), len(target))).T)
     return total
 
 

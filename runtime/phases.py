@@ -1,7 +1,8 @@
 """The phases of stick and slip that a periodic orbit passes through, and how far it is from having others.
 
 Phases are read off samples of one cycle, and distances between them from polynomials through neighbouring samples, whose
-error is far below that of the orbit.  A phase shorter than the distance of two samples is not seen.
+error is far below that of the orbit.  A stick shorter than the distance of two samples is known by the load where it begins;
+a slip as short as that is not seen.
 
 Source: di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth Dynamical Systems (Springer, 2008), chapters 7-8.
 """
@@ -64,16 +65,23 @@ def phases_of(scene: Scene, state: np.ndarray, periods: int) -> Phases | None:
     )  # fmt: skip
     once = np.asarray(run(one, show_progress=False, workers=1).trajectory.values, dtype=float)[:-1]
     path = np.concatenate([once, once])  # two cycles, so that each phase is seen whole
-    t, slip = np.arange(len(path)) * (scene.period / SAMPLES), np.round(path[:, 2]).astype(int)
+    t, slip = np.arange(len(path)) * ((scene.period or 0.0) / SAMPLES), np.round(path[:, 2]).astype(int)
     held, slides = _margins(scene, contact)
     values = np.where(slip == 0, held(path[:, 0], t), slip * slides(path[:, 1]))
     changes = np.flatnonzero(slip[1:] != slip[:-1]) + 1
     if len(changes) == 0:
         return Phases((int(slip[0]),), _least(np.concatenate([values[-1:], values])), math.inf)
-    pieces = [(a, b) for a, b in pairwise(changes) if a <= len(once)]
-    landings = [_landing(slice(a, b), t, path, slides, held) for a, b in pieces if slip[a] != 0]
-    gap = min(_least(values[a:b]) for a, b in pieces)
-    return Phases(_canonical([int(slip[a]) for a, _ in pieces]), gap, min(landings, key=abs, default=math.inf))
+    modes, gaps, landings = [], [math.inf], [math.inf]
+    for a, b in pairwise(changes.tolist()):
+        if a > len(once):
+            break
+        modes.append(int(slip[a]))
+        gaps.append(_least(values[a:b]))
+        if slip[a] != 0:
+            landings.append(_landing(slice(a, b), t, path, slides, held))
+            if landings[-1] > 0.0 and slip[b] != 0:
+                modes.append(0)  # it sticks for less than the distance of two samples
+    return Phases(_canonical(modes), min(gaps), min(landings, key=abs))
 
 
 Function = Callable[..., np.ndarray]
@@ -96,7 +104,7 @@ def _least(values: np.ndarray) -> float:
     """The least of the minima inside a row of equally spaced values, each from a polynomial through its neighbours."""
     inner = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] < values[2:])) + 1
     found = math.inf
-    for k in inner:
+    for k in map(int, inner):
         a = min(max(k - REACH, 0), max(len(values) - 2 * REACH - 1, 0))
         near = values[a : a + 2 * REACH + 1]
         bent = Polynomial.fit(np.arange(len(near)) - float(k - a), near, len(near) - 1)
@@ -111,7 +119,8 @@ def _landing(piece: slice, t: np.ndarray, path: np.ndarray, slides: Function, he
     steps = np.arange(first, piece.stop) - (piece.stop - 1.0)
     sliding = Polynomial.fit(steps, slides(path[first : piece.stop, 1]), len(steps) - 1)
     place = Polynomial.fit(steps, path[first : piece.stop, 0], len(steps) - 1)
-    roots = [r.real for r in sliding.roots() if abs(r.imag) < 1e-6 and -1e-9 <= r.real <= 1.0 + 1e-9]
+    zeros = [(float(r.real), float(r.imag)) for r in sliding.roots()]
+    roots = [real for real, imaginary in zeros if abs(imaginary) < 1e-6 and -1e-9 <= real <= 1.0 + 1e-9]
     at = min(roots, default=0.5)
     return float(held(place(at), t[piece.stop - 1] + at * (t[1] - t[0])))
 

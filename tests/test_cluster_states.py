@@ -161,8 +161,6 @@ def test_what_is_refused() -> None:
         cluster_exponents(damped(STAR, 0.1), (0, 0, 1, 1))
     with pytest.raises(ValueError, match=r"belongs to another graph than ring\(4\)"):
         cluster_exponents(damped(RING, 0.1), clusters(topology("complete", 4), (0, 1, 0, 1)))
-    with pytest.raises(ValueError, match="found set-valued friction, whose events are not smooth"):
-        cluster_exponents(Scene(contact="set-valued", topology=PAIR), (0, 0))
     with pytest.raises(ValueError, match="found 2 classes for 4 nodes"):
         cluster_exponents(damped(RING, 0.1), (0, 0))
 

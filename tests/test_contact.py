@@ -8,6 +8,7 @@ import sympy as sp
 
 from synchain.models.contact import SLIP, set_valued
 from synchain.models.network import node
+from synchain.models.reduction import fold
 from synchain.models.scene import Scene
 from synchain.models.topology import topology
 from synchain.runtime import run
@@ -123,3 +124,23 @@ def test_slip_that_begins_slower_than_a_step_can_tell_does_not_chatter() -> None
     tight = run(s.replace(rtol=1e-12, integrator="auto"), show_progress=False, **start)
     assert loose.success
     assert np.abs(loose.end.values - tight.end.values).max() < 1e-3
+
+
+def test_a_static_coefficient_below_the_kinetic_one_is_refused() -> None:
+    words = "friction coulomb_static: found mu_s = 0.1 below mu_k = 0.2; expected mu_k <= mu_s"
+    with pytest.raises(ValueError, match=words):
+        scene(friction="coulomb_static", parameters={"mu_s": 0.1})
+    with pytest.raises(ValueError, match=words):
+        scene(friction="coulomb_static", axes={"mu_s": [0.1, 0.5]})
+    scene(friction="coulomb_static", axes={"mu_s": [0.1, 0.5], "mu_k": [0.05, 0.5]}, zipped=True)
+    scene(friction="coulomb_static", contact="atan", parameters={"mu_s": 0.1})
+
+
+def test_the_clock_starts_anew_where_there_is_no_drive() -> None:
+    from synchain.runtime.contact_modes import CLOCK, local_clock
+
+    driven, rows = scene().equations, np.zeros(3)
+    alone = fold(driven, {"u": 0})
+    np.testing.assert_array_equal(local_clock(driven, rows + 5.0), rows + 5.0)
+    np.testing.assert_array_equal(local_clock(alone, rows), rows + CLOCK)
+    assert np.frexp(CLOCK)[0] == 0.5
