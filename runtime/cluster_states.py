@@ -114,8 +114,7 @@ def cluster_exponents(
     with tqdm(total=math.ceil(periods), unit="period", disable=not show_progress and show_progress is not None) as bar:
         while batches.blocks < periods:
             batches.add(carrier.advance(unit))
-            moving = carrier.state[0, : found.quotient.n * _deviating(variation)]
-            apart = np.maximum(apart, _differences(moving, found.quotient.n))
+            apart = np.maximum(apart, _differences(carrier.state[0], found.quotient.n, _deviating(variation)))
             bar.update(1)
             if batches.due and np.all(batches.error() <= precision):
                 break
@@ -167,7 +166,7 @@ def _parts(found: Clusters, components: int) -> Iterator[slice]:
         yield slice(first, last)
 
 
-def _differences(state: np.ndarray, count: int) -> np.ndarray:
-    """Largest difference between the components of every two of `count` clusters."""
-    rows = state.reshape(-1, count)
+def _differences(state: np.ndarray, count: int, components: int) -> np.ndarray:
+    """Largest difference between the first components of every two of `count` clusters."""
+    rows = state.reshape(-1, count)[:components]
     return np.asarray(np.abs(rows[:, :, None] - rows[:, None, :]).max(axis=0))
