@@ -9,6 +9,7 @@ import sympy as sp
 
 from .calculus import derivative
 from .equations import TIME
+from .mass_solve import solve_masses
 
 __all__ = ["Mechanics", "energy_rate", "equations_of_motion", "mass_matrix", "total_derivative"]
 
@@ -56,8 +57,8 @@ def equations_of_motion(
 ) -> tuple[sp.Expr, ...]:
     """Solve d/dt dL/dv - dL/dq = Q with L = T - V for the accelerations dv/dt.
 
-    A diagonal mass matrix is divided by, entry by entry.  Raises ValueError where the numbers of coordinates, velocities
-    and forces differ, or where the mass matrix is singular: some velocity then has no kinetic energy.
+    The mass matrix is solved by its structure (`synchain.models.mass_solve`).  Raises ValueError where the numbers of
+    coordinates, velocities and forces differ, or where the mass matrix is singular: some velocity has no kinetic energy.
     Source: Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. (Addison-Wesley, 2002), sect. 1.4.
     """
     _one_each(q, v, forces)
@@ -67,15 +68,7 @@ def equations_of_motion(
     for x, rate, force in zip(q, v, forces, strict=True):
         momentum = derivative(lagrangian, rate)
         rest.append(derivative(lagrangian, x) + force - total_derivative(momentum, q, v, at_rest, time))
-    masses = mass_matrix(lagrangian, v)
-    if masses.is_diagonal():
-        idle = [str(rate) for i, rate in enumerate(v) if masses[i, i] == 0]
-        if idle:
-            raise ValueError(f"no kinetic energy in the velocity {idle[0]}; expected T to grow with every velocity")
-        return tuple(value / masses[i, i] for i, value in enumerate(rest))
-    if sp.simplify(masses.det()) == 0:
-        raise ValueError(f"the mass matrix of {', '.join(map(str, v))} is singular; expected an invertible one")
-    return tuple(masses.LUsolve(sp.Matrix(rest)))
+    return solve_masses(mass_matrix(lagrangian, v), rest, v)
 
 
 def energy_rate(

@@ -15,11 +15,15 @@ from types import ModuleType
 import sympy as sp
 
 from . import coupling_matrix
+from .calculus import derivative
 from .contact import SLIP, set_valued
+from .coupling_name import coordinates_of, split
 from .equations import TIME, Edge, Equations, Node
 from .frictions import CONTACTS, KAPPA
-from .lagrangian import Mechanics, equations_of_motion, mass_matrix
+from .lagrangian import Mechanics, mass_matrix
+from .mass_solve import solve_masses
 from .nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
+from .orientation import drawn, is_oriented, link_energy
 from .parameter import Parameter
 from .plugins import call, load, names
 from .topology import Topology
@@ -42,7 +46,7 @@ def parameters(
         if contact == "atan" and friction_coefficient(law, "sign")(sp.Symbol("w", real=True)).has(sp.sign):
             _join(table, {"kappa": KAPPA}, f"contact {contact!r}")
     if coupling is not None:
-        own = coupling_matrix if coupling_matrix.is_matrix(coupling) else load("coupling", coupling)
+        own = coupling_matrix if coupling_matrix.is_matrix(coupling) else load("coupling", split(coupling)[0])
         _join(table, own.PARAMETERS, f"coupling {coupling!r}")
     return {name: replace(p, scale=str(scale(model, p.unit))) for name, p in table.items()}
 
@@ -117,16 +121,18 @@ def check_coupling(coupling: str, single: Node) -> None:
     if coupling_matrix.is_matrix(coupling):
         coupling_matrix.entries(coupling, tuple(s.name for s in single.state))
         return
-    load("coupling", coupling)
-    half = len(single.state) // 2
+    load("coupling", split(coupling)[0])
     if single.contact is not None:
+        coordinates_of(coupling, (single.state[0].name,))
         return
+    half = len(single.state) // 2
     if single.rhs[:half] != single.state[half:]:
         name = single.state[0].name
         raise ValueError(
             f"coupling {coupling!r} joins coordinates with velocities; found a node of {single.state} without them; "
             f"name the components that a link joins, e.g. coupling = '{name}->{name}'"
         )
+    coordinates_of(coupling, tuple(s.name for s in single.state[:half]))
 
 
 @lru_cache(maxsize=64)
@@ -134,9 +140,9 @@ def edge(coupling: str, single: Node, oscillator: str | None = None) -> Edge:
     """Derive what one link adds to the rates of its target.
 
     A text of entries such as "x->x, 1/2 y->z" adds sigma w factor (a_j - a_i) to the rate of its second component, whatever
-    the node is.  A spring or damper acts on coordinates followed by their velocities, by the Euler-Lagrange equations of a
-    pair with that link alone; `oscillator` names the model whose masses the accelerations are divided by, without it they
-    are 1, as they are in the units of every oscillator with one mass.
+    the node is.  A spring or damper acts on coordinates followed by their velocities, on all of them or, as in "spring on
+    x", on those it names.  `oscillator` names the model whose mass matrix, at the target, turns forces into accelerations;
+    without it the masses are 1, as they are in the units of every oscillator with one mass.
     The force is kept as a function of differences, sigma w (x_j - x_i), so that equal states feel exactly nothing.
 
     An undirected edge is two links, and the template is symmetric, so the two forces are those of the potential.  A one-way
@@ -146,7 +152,8 @@ def edge(coupling: str, single: Node, oscillator: str | None = None) -> Edge:
     Raises ValueError as `check_coupling` does.
     """
     if single.contact is not None:
-        return _on_sliding(edge(coupling, Node(single.state[:2], (single.state[1], sp.S.Zero), ()), oscillator))
+        plain = Node(single.state[:2], (single.state[1], sp.S.Zero), single.parameters)
+        return _on_sliding(edge(coupling, plain, oscillator))
     check_coupling(coupling, single)
     here = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in single.state)
     there = tuple(sp.Symbol(f"{s.name}_j", real=True) for s in single.state)
@@ -155,16 +162,18 @@ def edge(coupling: str, single: Node, oscillator: str | None = None) -> Edge:
         sigma = sp.Symbol("sigma", real=True)
         rates = _entry_rates(coupling, [s.name for s in single.state], sigma * weight, here, there)
         return Edge(here, there, weight, rates, (sigma,))
-    model, half = load("coupling", coupling), len(single.state) // 2
+    model, half = load("coupling", split(coupling)[0]), len(single.state) // 2
     strengths = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
-    potential, dissipation = _pair(model, here, there, {"weight": weight, **strengths})
-    masses = _masses(oscillator, half)
-    moving = (*here[half:], *there[half:])
-    kinetic = sp.Add(*(m * v**2 / 2 for m, v in zip((*masses, *masses), moving, strict=True)))
-    forces = tuple(-dissipation.diff(v) for v in moving)
-    found = equations_of_motion(kinetic, potential, forces, (*here[:half], *there[:half]), moving)
-    rates = tuple(_in_differences(e, here, there) for e in found[:half])
-    return Edge(here, there, weight, (*[sp.S.Zero] * half, *rates), tuple(strengths.values()))
+    chosen = coordinates_of(coupling, tuple(s.name for s in single.state[:half]))
+    potential, dissipation = _pair(model, here, there, weight, strengths, chosen)
+    forces = []
+    for q, v in zip(here[:half], here[half:], strict=True):
+        force = -derivative(potential, q) - derivative(dissipation, v)
+        forces.append(_in_differences(force, here, there))
+    masses = _masses(oscillator, here)
+    rates = solve_masses(masses, forces, here[half:])
+    taken = (*strengths.values(), *(s for s in single.parameters if any(e.has(s) for e in rates)))
+    return Edge(here, there, weight, (*[sp.S.Zero] * half, *rates), taken)
 
 
 def _on_sliding(plain: Edge) -> Edge:
@@ -189,16 +198,22 @@ def _entry_rates(
 
 
 def _pair(
-    model: ModuleType, here: tuple[sp.Symbol, ...], there: tuple[sp.Symbol, ...], given: dict[str, sp.Symbol]
+    model: ModuleType,
+    here: tuple[sp.Symbol, ...],
+    there: tuple[sp.Symbol, ...],
+    weight: sp.Symbol,
+    given: Mapping[str, sp.Symbol],
+    chosen: tuple[int, ...],
 ) -> tuple[sp.Expr, sp.Expr]:
-    """The potential and the Rayleigh function of a link, summed over the coordinates."""
+    """The potential and the Rayleigh function of a link, summed over the coordinates that it joins."""
     half = len(here) // 2
     potential = dissipation = sp.S.Zero
-    for k in range(half):
+    for k in chosen:
         if hasattr(model, "potential"):
-            potential += call(model.potential, {"q_i": here[k], "q_j": there[k], **given})
+            potential += link_energy(model.potential, {"q_i": here[k], "q_j": there[k]}, weight, given)
         if hasattr(model, "dissipation"):
-            dissipation += call(model.dissipation, {"v_i": here[half + k], "v_j": there[half + k], **given})
+            speeds = {"v_i": here[half + k], "v_j": there[half + k]}
+            dissipation += link_energy(model.dissipation, speeds, weight, given)
     return potential, dissipation
 
 
@@ -211,19 +226,28 @@ def _in_differences(e: sp.Expr, here: tuple[sp.Symbol, ...], there: tuple[sp.Sym
     return sp.factor_terms(shifted).xreplace({d: q - p for p, q, d in zip(here, there, gaps, strict=True)})
 
 
-def _masses(oscillator: str | None, count: int) -> tuple[sp.Expr, ...]:
+def _masses(oscillator: str | None, here: tuple[sp.Symbol, ...]) -> sp.Matrix:
+    """The mass matrix of a node at the target of a link."""
+    half = len(here) // 2
     if oscillator is None or hasattr(load("oscillator", oscillator), "field"):
-        return (sp.S.One,) * count
+        return sp.eye(half)
     system = nondimensional(load("oscillator", oscillator))
     masses = mass_matrix(system.kinetic, system.velocities)
-    if not masses.is_diagonal() or masses.free_symbols & {TIME, *system.coordinates, *system.velocities}:
-        raise ValueError(f"oscillator {oscillator!r}: a coupling needs a constant diagonal mass matrix, found {masses}")
-    return tuple(masses[i, i] for i in range(count))
+    if masses.has(TIME):
+        raise ValueError(
+            f"oscillator {oscillator!r}: a coupling needs masses that do not depend on time, found {masses}"
+        )
+    return masses.xreplace(dict(zip((*system.coordinates, *system.velocities), here, strict=True)))
 
 
 def network(single: Node, link: Edge | None, graph: Topology) -> Equations:
-    """Join copies of a node by the links of a graph; without an edge the nodes stay uncoupled."""
-    return Equations(single, link, graph.n, graph.links if link is not None else ())
+    """Join copies of a node by the links of a graph; without an edge the nodes stay uncoupled.
+
+    Where a link tells its ends apart, its weight becomes the sign of its direction (`synchain.models.orientation`).
+    """
+    if link is None:
+        return Equations(single, None, graph.n)
+    return Equations(single, link, graph.n, drawn(graph) if graph.links and is_oriented(link) else graph.links)
 
 
 def connectivity(coupling: str, graph: Topology) -> tuple[tuple[Fraction, ...], ...]:
@@ -232,7 +256,8 @@ def connectivity(coupling: str, graph: Topology) -> tuple[tuple[Fraction, ...], 
     The Hessian of one edge is derived once and added up over the links, so that a thousand nodes take no algebra.  For a
     damper the Rayleigh function takes the potential's place; for a one-way link the row is read off the force on its target.
     Of entries such as "1/2 x->y" the factor belongs to H, so that G holds the weights alone.
-    Raises ValueError for a coupling whose Hessian is not sigma times weight times a number: it has no matrix G.
+    Raises ValueError for a coupling whose Hessian between equal states is not sigma times weight times a number: it has no
+    matrix G.
     """
     if coupling_matrix.is_matrix(coupling):
         coupling_matrix.entries(coupling)
@@ -247,13 +272,19 @@ def connectivity(coupling: str, graph: Topology) -> tuple[tuple[Fraction, ...], 
 
 
 def _hessian(coupling: str) -> tuple[Fraction, Fraction]:
-    """Minus the second derivatives of one edge's energy over sigma and weight: twice by one end, and by both."""
-    model = load("coupling", coupling)
+    """Minus the second derivatives of one edge's energy over sigma and weight: twice by one end, and by both.
+
+    Of a non-linear coupling they are taken between equal states, where its links are those of its linear part.
+    """
+    model = load("coupling", split(coupling)[0])
     q_i, q_j, weight = (sp.Symbol(name, real=True) for name in ("q_i", "q_j", "weight"))
     given = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
     function = getattr(model, "potential", None) or model.dissipation
     energy = call(function, {"q_i": q_i, "q_j": q_j, "v_i": q_i, "v_j": q_j, "weight": weight, **given})
-    own, other = (sp.simplify(-energy.diff(q_i, q) / (given["sigma"] * weight)) for q in (q_i, q_j))
-    if not (own.is_Rational and other.is_Rational):
-        raise ValueError(f"coupling {coupling!r}: Hessian over sigma and weight is {own}, {other}; expected numbers")
+    slopes = (-energy.diff(q_i, q).xreplace({q_j: q_i}) for q in (q_i, q_j))
+    own, other = (sp.simplify(slope / (given["sigma"] * weight)) for slope in slopes)
+    if not (own.is_Rational and other.is_Rational) or own == 0:
+        raise ValueError(
+            f"coupling {coupling!r}: Hessian over sigma and weight is {own}, {other}; expected numbers other than 0"
+        )
     return Fraction(int(own.p), int(own.q)), Fraction(int(other.p), int(other.q))

@@ -12,6 +12,7 @@ from typing import Any
 
 import sympy as sp
 
+from .calculus import derivative
 from .equations import TIME
 from .frictions import CONTACTS, regularise
 from .lagrangian import Mechanics
@@ -95,13 +96,25 @@ def mechanics(model: ModuleType, given: Mapping[str, Any]) -> Mechanics:
     """Return the energies and forces of an oscillator with `given` expressions put in for the names that it uses."""
     units = coordinates(model)
     force = call(model.force, given) if hasattr(model, "force") else (sp.S.Zero,) * len(units)
+    forces = tuple(force) if isinstance(force, tuple | list) else (force,)
+    if hasattr(model, "dissipation"):
+        lost = _damping(model, given, [speed for speed, _ in units.values()])
+        forces = tuple(sp.sympify(own) - rate for own, rate in zip(forces, lost, strict=True))
     return Mechanics(
         tuple(given[name] for name in units),
         tuple(given[speed] for speed, _ in units.values()),
         call(model.kinetic, given),
         call(model.potential, given),
-        tuple(force) if isinstance(force, tuple | list) else (force,),
+        forces,
     )
+
+
+def _damping(model: ModuleType, given: Mapping[str, Any], speeds: list[str]) -> tuple[sp.Expr, ...]:
+    """The derivatives of Rayleigh's function by the velocities, whatever expressions stand for these."""
+    moving = {name: sp.Dummy(name, real=True) for name in speeds}
+    function = sp.sympify(call(model.dissipation, {**given, **moving}))
+    values = {moving[name]: given[name] for name in speeds}
+    return tuple(derivative(function, symbol).xreplace(values) for symbol in moving.values())
 
 
 def friction_coefficient(law: ModuleType, contact: str) -> Callable[[sp.Expr], sp.Expr]:

@@ -6,10 +6,21 @@ from collections.abc import Mapping
 from typing import Any
 
 from .coupling_matrix import canonical, is_matrix
+from .coupling_name import canonical as chosen_coordinates
+from .coupling_name import split
 from .plugins import load
 from .scene_checks import Frozen, choice, integer, number, shown, table, text
 from .scene_friction import check_friction
-from .scene_model import check_links, check_state, components, in_range, model_parameters, node, unknown
+from .scene_model import (
+    check_links,
+    check_state,
+    components,
+    coordinate_names,
+    in_range,
+    model_parameters,
+    node,
+    unknown,
+)
 from .scene_section import Section
 from .scene_start import SEED_LIMIT, start
 from .scene_sweep import check_sweep
@@ -48,9 +59,11 @@ def _model(made: dict[str, Any]) -> None:
         if made[name] is not None:
             made[name] = None if text(name, made[name]) == "none" else str(made[name])
         if made[name] is not None and not (name == "coupling" and is_matrix(made[name])):
-            load(name, made[name])  # an unknown name is refused even where nothing uses it
+            load(name, split(made[name])[0])  # an unknown name is refused even where nothing uses it
     if made["coupling"] is not None and is_matrix(made["coupling"]):
         made["coupling"] = canonical(made["coupling"], components(made))
+    elif made["coupling"] is not None and split(made["coupling"])[1] is not None:
+        made["coupling"] = chosen_coordinates(made["coupling"], coordinate_names(made))
     graph = made["topology"] = topology("chain", 1) if made["topology"] is None else made["topology"]
     if not isinstance(graph, Topology):
         raise TypeError(f"topology: found {shown(graph)} ({type(graph).__name__}); expected a graph, e.g. chain(4)")

@@ -17,6 +17,7 @@ __all__ = [
     "check_links",
     "check_state",
     "components",
+    "coordinate_names",
     "derived",
     "in_range",
     "known_parameters",
@@ -63,6 +64,15 @@ def check_links(made: Mapping[str, Any]) -> None:
 def components(made: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names of the state components of one oscillator, such as ("x", "v")."""
     return tuple(s.name for s in node(made["oscillator"], made["friction"], made["contact"]).state)
+
+
+def coordinate_names(made: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the names of the coordinates of one oscillator, those components that have a velocity."""
+    from .nondimensional import coordinates
+    from .plugins import load
+
+    model = load("oscillator", made["oscillator"])
+    return () if hasattr(model, "field") else tuple(coordinates(model))
 
 
 def model_parameters(made: Mapping[str, Any]) -> Frozen[Parameter]:

@@ -236,14 +236,19 @@ def coupling_slope(equations: Equations) -> sp.Matrix:
         raise ValueError("these equations have no coupling; a transversal mode needs links")
     if not edge.diffusive:
         raise ValueError("a link acts between equal states, so complete synchronisation is no solution of this network")
-    if [s.name for s in edge.parameters] != ["sigma"]:
+    strength = next((s for s in edge.parameters if s.name == "sigma"), None)
+    if strength is None:
         raise ValueError(f"links depend on {', '.join(s.name for s in edge.parameters)}; expected sigma alone")
-    strength = edge.parameters[0]
     equal = dict(zip((*edge.here, *edge.there), equations.node.state * 2, strict=True))
     matrix = sp.Matrix(edge.jacobian_there()).xreplace({edge.weight: sp.S.One}).xreplace(equal)
     slope = matrix.diff(strength)
     if (matrix - strength * slope).applyfunc(sp.simplify) != sp.zeros(*matrix.shape):
         raise ValueError("links are not proportional to sigma; a mode has no single strength alpha")
+    more = {s.name for s in slope.free_symbols} - {s.name for s in (*equations.node.state, *equations.node.parameters)}
+    if more:
+        raise ValueError(
+            f"between equal states links depend on {', '.join(sorted(more))} as well; expected sigma alone"
+        )
     return slope
 
 

@@ -7,12 +7,15 @@ import math
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.integrate import solve_ivp
 
-from synchain.models import Scene, Section, chain
+from synchain.models import Scene, Section, chain, from_matrix, ring, star
 from synchain.models.equations import TIME
 from synchain.models.network import node
+from synchain.models.orientation import drawn
 from synchain.models.plugins import load, names
 from synchain.models.scene_start import default_start
+from synchain.models.tangent import coupling_slope
 from synchain.runtime import run
 
 X, Y, Z, V = sp.symbols("x y z v", real=True)
@@ -132,7 +135,7 @@ def test_chua_visits_both_scrolls() -> None:
 
 @pytest.mark.parametrize("name", names("oscillator"))
 def test_names_leave_room_for_modes_and_couplings(name: str) -> None:
-    states = node(name, "exponential" if name == "friction" else None).state
+    states = node(name, "exponential" if load("oscillator", name).FRICTION else None).state
     taken = {s.name for s in states} | set(load("oscillator", name).PARAMETERS)
     assert not taken & RESERVED
     assert not [word for word in taken if word.startswith("d_")]
@@ -171,3 +174,78 @@ def test_an_unknown_state_in_initial_is_refused(monkeypatch: pytest.MonkeyPatch)
 def test_the_default_section_is_crossed_by_the_first_state(name: str) -> None:
     assert Scene(oscillator=name).section == Section("x_1", "falling")
     assert Scene(oscillator=name, topology=chain(2), coupling="x->x").time_unit == "time"
+
+
+# -- several coordinates, links with a direction ---------------------------------------------------------------
+
+
+def test_the_fermi_pasta_ulam_ring_is_that_of_the_report() -> None:
+    """x_i'' = (x_{i+1} - 2 x_i + x_{i-1}) + alpha [(x_{i+1} - x_i)^2 - (x_i - x_{i-1})^2] + beta [cubes], sigma = 1."""
+    n, alpha, beta = 5, *sp.symbols("fput_alpha fput_beta", real=True)
+    made = Scene(oscillator="mass", coupling="fput", topology=ring(n)).equations
+    x = sp.symbols(f"x_1:{n + 1}", real=True)
+    for i, found in enumerate(made.rhs()[n:]):
+        right, left = x[(i + 1) % n] - x[i], x[i] - x[i - 1]
+        written = right - left + alpha * (right**2 - left**2) + beta * (right**3 - left**3)
+        assert sp.expand(found.subs(sp.Symbol("sigma", real=True), 1) - written) == 0
+
+
+def test_a_chain_is_drawn_from_its_first_node_and_a_star_from_its_hub() -> None:
+    assert [(i, j, int(w)) for i, j, w in drawn(chain(3))] == [(0, 1, 1), (1, 0, -1), (1, 2, 1), (2, 1, -1)]
+    assert {(i, j): int(w) for i, j, w in drawn(star(4))} == {(0, 1): 1, (0, 2): 1, (0, 3): 1,
+                                                              (1, 0): -1, (2, 0): -1, (3, 0): -1}  # fmt: skip
+    assert {(i, j) for i, j, w in drawn(ring(4)) if w > 0} == {(0, 1), (1, 2), (2, 3), (3, 0)}
+    for graph in (from_matrix([[-2, 2], [2, -2]]), from_matrix([[0, 0], [1, -1]])):
+        with pytest.raises(ValueError, match="found one-way links or weights other than 1; expected neither"):
+            Scene(oscillator="mass", coupling="fput", topology=graph).equations  # noqa: B018
+
+
+def test_a_coupling_on_one_coordinate_leaves_the_others_alone() -> None:
+    scene = Scene(oscillator="double_pendulum", coupling="spring on  psi ", topology=chain(2))
+    assert scene.coupling == "spring on psi"
+    slopes = scene.equations.jacobian()
+    names_of = scene.equations.state
+    felt = {names_of[column] for (row, column) in slopes if names_of[row] == "w_psi_1"}
+    assert "psi_2" in felt
+    assert "phi_2" not in felt
+    both = scene.replace(coupling="spring on psi, phi")
+    assert both.coupling == "spring"
+    with pytest.raises(ValueError, match="coupling 'spring on fi': unknown coordinate 'fi'; known: phi, psi"):
+        scene.replace(coupling="spring on fi")
+    with pytest.raises(ValueError, match="found a coordinate twice"):
+        scene.replace(coupling="spring on phi, phi")
+    with pytest.raises(ValueError, match="unknown coordinate 'v'; known: x; name coordinates"):
+        Scene(topology=chain(2), coupling="spring on v", contact="set-valued")
+
+
+def test_a_full_mass_matrix_reaches_the_master_stability_function() -> None:
+    """H of a spring between double pendulums is the inverse mass matrix at the synchronous state."""
+    made = Scene(oscillator="double_pendulum", topology=chain(2)).equations
+    slope = coupling_slope(made)
+    ratio, rod, phi, psi = sp.symbols("mass_ratio length_ratio phi psi", real=True)
+    off = ratio * rod * sp.cos(phi - psi)
+    masses = sp.Matrix([[1 + ratio, off], [off, ratio * rod**2]])
+    assert (masses * slope[2:, :2] - sp.eye(2)).applyfunc(sp.simplify) == sp.zeros(2)
+
+
+@pytest.mark.parametrize("coupling", ["cubic_spring", "fput", "torsion", "friction_damper"])
+def test_non_linear_couplings_are_linear_between_equal_states(coupling: str) -> None:
+    made = Scene(oscillator="duffing", coupling=coupling, topology=chain(2)).equations
+    plain = Scene(oscillator="duffing", coupling="damper" if "damper" in coupling else "spring", topology=chain(2))
+    assert coupling_slope(made) == coupling_slope(plain.equations)
+
+
+def test_two_double_pendulums_in_a_kernel_follow_scipy() -> None:
+    """Exported Python right-hand side under SciPy's DOP853 beside our kernel: full mass matrix and links on angles."""
+    scene = Scene(oscillator="double_pendulum", topology=chain(2), coupling="spring on phi", parameters={"sigma": 0.3},
+                  initial={"phi": [0.6, 0.2], "psi": [-0.3, 0.5]}, transient=0, window=12, record=("sync_error",),
+                  rtol=1e-11, integrator="dop853")  # fmt: skip
+    found = run(scene, workers=1, show_progress=False)
+    assert found.success
+    values = [scene.parameters[name] for name in scene.equations.parameters]
+    rate = sp.lambdify([sp.symbols(scene.equations.state, real=True),
+                        sp.symbols(scene.equations.parameters, real=True)], scene.equations.rhs())  # fmt: skip
+    there = solve_ivp(lambda _, y: rate(y, values), (0, 12), scene.y0, method="DOP853", rtol=1e-12, atol=1e-13)
+    assert np.abs(found.end.values - there.y[:, -1]).max() < 1e-8
+    phi = there.y[:2]
+    assert np.abs(phi[0] - phi[1]).max() > 0.1

@@ -230,7 +230,7 @@ def test_a_force_turned_round_keeps_its_sign() -> None:
 @pytest.mark.parametrize("oscillator", names("oscillator"))
 @pytest.mark.parametrize("n", [1, 3, 8])
 def test_latex_of_every_oscillator_balances(oscillator: str, n: int) -> None:
-    law = "stribeck" if oscillator == "friction" else None
+    law = "stribeck" if load("oscillator", oscillator).FRICTION else None
     coupling = "spring"
     if hasattr(load("oscillator", oscillator), "field"):
         own = [s.name for s in node(oscillator).state]

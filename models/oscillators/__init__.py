@@ -13,7 +13,10 @@ where it takes a friction law).  The model itself is one of three kinds:
 A function receives what its signature names: the coordinate ``x``, the velocity ``v``, the time ``t``, parameters,
 and ``friction``, the friction coefficient as a function of the sliding velocity.  COORDINATES (name -> (name of its
 velocity, unit)) is ``{"x": ("v", "m")}`` unless the file says otherwise; with several coordinates ``force`` returns
-one entry for each.
+one entry for each.  Damping may be written as a Rayleigh function ``dissipation`` of the velocities, half the
+power lost; its negative derivatives are added to the forces.  Where the mass matrix is full or depends on the state,
+``particles`` returns (mass, across, upward) of each mass as functions of the coordinates; the kinetic energy is proved
+from it.
 
 INITIAL (state -> number, states left out are 0) may say around which state oscillators start unless told otherwise.
 """

@@ -1,0 +1,150 @@
+"""Equations of whole networks by sympy.physics.mechanics, and the exact zero test that compares them with ours.
+
+Everything here starts from the energies, forces and particles of the plug-in files and from nothing that the templates do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import sympy as sp
+from sympy.physics import mechanics
+
+from synchain.models.equations import TIME
+from synchain.models.nondimensional import magnitude, nondimensional
+from synchain.models.plugins import call, load
+from synchain.models.topology import Topology
+
+T = mechanics.dynamicsymbols._t
+
+
+def vanishes(e: sp.Expr) -> bool:
+    """Whether an expression is zero, proved: sines and cosines become letters with s^2 + c^2 = 1, all else is rational."""
+    e = sp.expand_trig(e.replace(sp.tanh, lambda a: _odd(sp.tanh, sp.expand(a))))
+    inner = sorted({f.args[0] for f in e.atoms(sp.sin, sp.cos)}, key=sp.default_sort_key)
+    letters = {a: (sp.Dummy(f"s{k}"), sp.Dummy(f"c{k}")) for k, a in enumerate(inner)}
+    e = e.xreplace({sp.sin(a): s for a, (s, _) in letters.items()} | {sp.cos(a): c for a, (_, c) in letters.items()})
+    others = sorted(e.atoms(sp.tanh, sp.log, sp.Function, sp.Abs, sp.sign), key=sp.default_sort_key)
+    e = e.xreplace({f: sp.Dummy(f"f{k}") for k, f in enumerate(others)})
+    top = sp.expand(sp.fraction(sp.together(e))[0])
+    for s, c in letters.values():
+        top = sp.expand(sp.rem(top, s**2 + c**2 - 1, s)) if top.has(s) else top
+    return bool(top == 0)
+
+
+def _odd(function: type[sp.Function], a: sp.Expr) -> sp.Expr:
+    return -function(-a) if a.could_extract_minus_sign() else function(a)
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """The Lagrangian of a network in one piece: q and q' as functions of time, T, V and one force for each coordinate.
+
+    `particles` are (mass, across, upward) of every mass; node by node, coordinate by coordinate.
+    """
+
+    q: tuple[sp.Expr, ...]
+    rates: tuple[sp.Expr, ...]
+    kinetic: sp.Expr
+    potential: sp.Expr
+    forces: tuple[sp.Expr, ...]
+    particles: tuple[tuple[sp.Expr, ...], ...]
+
+
+def whole(oscillator: str, coupling: str | None, graph: Topology, chosen: tuple[str, ...] | None = None) -> Whole:
+    """Sum up nodes and links; a link of a coupling with a direction runs from the smaller to the larger number."""
+    module = load("oscillator", oscillator)
+    system = nondimensional(module)
+    names = [s.name for s in system.coordinates]
+    q = [[mechanics.dynamicsymbols(f"{name}_{i + 1}") for name in names] for i in range(graph.n)]
+    rates = [[x.diff(T) for x in row] for row in q]
+    at = [
+        {**dict(zip(system.velocities, r, strict=True)), **dict(zip(system.coordinates, x, strict=True)), TIME: T}
+        for x, r in zip(q, rates, strict=True)
+    ]
+    kinetic = sp.Add(*(system.kinetic.xreplace(values) for values in at))
+    potential = sp.Add(*(system.potential.xreplace(values) for values in at))
+    forces = [force.xreplace(values) for values in at for force in system.forces]
+    flat = [r for row in rates for r in row]
+    for i, j, weight in graph.links:
+        if i > j or coupling is None:
+            continue
+        law = load("coupling", coupling)
+        given = {**{p: sp.Symbol(p, real=True) for p in law.PARAMETERS}, "weight": sp.Rational(str(weight))}
+        for k in range(len(names)):
+            if chosen is not None and names[k] not in chosen:
+                continue
+            if hasattr(law, "potential"):
+                potential += call(law.potential, {"q_i": q[i][k], "q_j": q[j][k], **given})
+            if hasattr(law, "dissipation"):
+                lost = call(law.dissipation, {"v_i": rates[i][k], "v_j": rates[j][k], **given})
+                forces = [force - lost.diff(r) for force, r in zip(forces, flat, strict=True)]
+    masses = tuple(entry for values in at for entry in particles(module, values))
+    return Whole(tuple(x for row in q for x in row), tuple(flat), kinetic, potential, tuple(forces), masses)
+
+
+def particles(module: object, values: dict) -> Iterable[tuple[sp.Expr, ...]]:
+    """(mass, across, upward) of the masses of one node, non-dimensional: its own, or one on a line for each coordinate."""
+    system = nondimensional(module)
+    if not hasattr(module, "particles"):
+        for x, v in zip(system.coordinates, system.velocities, strict=True):
+            mass = system.kinetic.diff(v, 2)
+            if mass.free_symbols & {*system.coordinates, *system.velocities, TIME} or system.kinetic.diff(v, x) != 0:
+                raise ValueError(f"{module.__name__}: the masses depend on the state; give particles(…)")
+            yield mass, values[x], sp.S.Zero
+        return
+    physical = hasattr(module, "scales")
+    unit = magnitude if physical else lambda _: sp.S.One
+    given = {name: unit(u) for name, u in getattr(module, "UNITS", {}).items()}
+    for name, p in module.PARAMETERS.items():
+        given[getattr(module, "PHYSICAL", {}).get(name, name)] = sp.Symbol(name, real=True) * unit(p.unit)
+    for x, (_, u) in zip(system.coordinates, module.COORDINATES.values(), strict=True):
+        given[x.name] = values[x] * unit(u)
+    for mass, across, upward in call(module.particles, given):
+        found = (sp.sympify(mass) / unit("kg"), sp.sympify(across) / unit("m"), sp.sympify(upward) / unit("m"))
+        yield tuple(sp.factor_terms(sp.expand(e)) for e in found)
+
+
+def by_lagrange(system: Whole) -> tuple[sp.Matrix, sp.Matrix]:
+    """Mass matrix and forcing by LagrangesMethod; each force acts on a point that moves with its coordinate."""
+    frame, loads = _loads(system, system.rates, system.forces)
+    method = mechanics.LagrangesMethod(system.kinetic - system.potential, list(system.q), forcelist=loads, frame=frame)
+    method.form_lagranges_equations()
+    return method.mass_matrix, method.forcing
+
+
+def by_kane(system: Whole) -> tuple[sp.Matrix, sp.Matrix]:
+    """Mass matrix and forcing by KanesMethod, from the particles; forces and -dV/dq act on points as above."""
+    u = [mechanics.dynamicsymbols(f"u_{k}") for k in range(len(system.q))]
+    swap = dict(zip(system.rates, u, strict=True))
+    pulls = [(f - system.potential.diff(x)).xreplace(swap) for f, x in zip(system.forces, system.q, strict=True)]
+    frame, loads = _loads(system, u, pulls)
+    bodies = []
+    for k, (mass, across, upward) in enumerate(system.particles):
+        point = mechanics.Point(f"B{k}")
+        speed = [e.diff(T).xreplace(swap) for e in (across, upward)]
+        point.set_vel(frame, speed[0] * frame.x + speed[1] * frame.y)
+        bodies.append(mechanics.Particle(f"M{k}", point, mass))
+    kinematic = [a - b for a, b in zip(u, system.rates, strict=True)]
+    method = mechanics.KanesMethod(frame, list(system.q), u, kinematic)
+    method.kanes_equations(bodies, loads)
+    back = {b: a for a, b in swap.items()}
+    return method.mass_matrix.xreplace(back), method.forcing.xreplace(back)
+
+
+def _loads(system: Whole, speeds: Iterable[sp.Expr], forces: Iterable[sp.Expr]) -> tuple[object, list]:
+    frame, loads = mechanics.ReferenceFrame("N"), []
+    for k, (speed, force) in enumerate(zip(speeds, forces, strict=True)):
+        point = mechanics.Point(f"P{k}")
+        point.set_vel(frame, speed * frame.x)
+        loads.append((point, force * frame.x))
+    return frame, loads
+
+
+def residual(system: Whole, found: tuple[sp.Matrix, sp.Matrix], ours: dict[str, sp.Expr]) -> list[sp.Expr]:
+    """Their mass matrix times our accelerations, keyed by coordinate such as "phi_2", less their forcing."""
+    plain = {r: sp.Symbol(f"rate_{x.func.__name__}", real=True) for r, x in zip(system.rates, system.q, strict=True)}
+    plain |= {x: sp.Symbol(x.func.__name__, real=True) for x in system.q}
+    masses, forcing = (m.xreplace(plain).xreplace({T: TIME}) for m in found)
+    return list(masses * sp.Matrix([ours[x.func.__name__] for x in system.q]) - forcing)
