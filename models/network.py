@@ -28,7 +28,7 @@ from .parameter import Parameter
 from .plugins import call, load, names
 from .topology import Topology
 
-__all__ = ["check_coupling", "connectivity", "edge", "network", "node", "parameters"]
+__all__ = ["check_coupling", "connectivity", "edge", "network", "node", "pair_energy", "parameters"]
 
 
 def parameters(
@@ -165,7 +165,7 @@ def edge(coupling: str, single: Node, oscillator: str | None = None) -> Edge:
     model, half = load("coupling", split(coupling)[0]), len(single.state) // 2
     strengths = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
     chosen = coordinates_of(coupling, tuple(s.name for s in single.state[:half]))
-    potential, dissipation = _pair(model, here, there, weight, strengths, chosen)
+    potential, dissipation = pair_energy(model, here, there, weight, strengths, chosen)
     forces = []
     for q, v in zip(here[:half], here[half:], strict=True):
         force = -derivative(potential, q) - derivative(dissipation, v)
@@ -197,7 +197,7 @@ def _entry_rates(
     return tuple(rates)
 
 
-def _pair(
+def pair_energy(
     model: ModuleType,
     here: tuple[sp.Symbol, ...],
     there: tuple[sp.Symbol, ...],
@@ -205,7 +205,10 @@ def _pair(
     given: Mapping[str, sp.Symbol],
     chosen: tuple[int, ...],
 ) -> tuple[sp.Expr, sp.Expr]:
-    """The potential and the Rayleigh function of a link, summed over the coordinates that it joins."""
+    """Return the potential and the Rayleigh function of a link, summed over the coordinates of number `chosen`.
+
+    `here` and `there` are the states at the target and the source, coordinates followed by their velocities.
+    """
     half = len(here) // 2
     potential = dissipation = sp.S.Zero
     for k in chosen:

@@ -1,7 +1,7 @@
 """Froude's pendulum: it hangs by a sleeve from a rotating shaft, whose dry friction drags it along and can make it swing.
 
-In units of the pendulum's own mass, length and sqrt(length/g): x'' = -sin x - damping x' + epsilon f(shaft - x'), epsilon the
-radial load times the radius of the shaft over the largest torque of the weight.
+In units of the pendulum's own mass, length and sqrt(length/g): x'' = -sin x - damping x' + epsilon f(shaft - x'), epsilon
+the radial load times the radius of the shaft over the largest torque of the weight.
 """
 
 import sympy as sp

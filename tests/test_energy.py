@@ -1,0 +1,117 @@
+"""Energy and power of every conservative and damped network along its exact equations, and of trajectories."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+from mechanics_proof import vanishes
+
+from synchain.models import Scene, chain, from_matrix, ring
+from synchain.models.energy import energy
+from synchain.models.equations import TIME
+from synchain.models.lagrangian import total_derivative
+from synchain.models.plugins import load, names
+from synchain.runtime.energy import energy_function
+
+LAGRANGIAN = [name for name in names("oscillator") if not hasattr(load("oscillator", name), "field")]
+
+
+def scene_of(oscillator: str, coupling: str, n: int = 2, **more: object) -> Scene:
+    friction = "viscous" if load("oscillator", oscillator).FRICTION else None
+    return Scene(oscillator=oscillator, friction=friction, coupling=coupling, topology=chain(n), **more)
+
+
+def balance(scene: Scene) -> sp.Expr:
+    """dE/dt along the equations of the whole network less the power, in state symbols."""
+    equations = scene.equations
+    found, power = energy(scene).whole()
+    state, half = sp.symbols(equations.state, real=True), equations.dimension // 2
+    rates = equations.rhs()
+    return total_derivative(found, state[:half], state[half:], rates[half:], TIME) - power
+
+
+@pytest.mark.parametrize("coupling", names("coupling"))
+@pytest.mark.parametrize("oscillator", ["duffing", "pendulum", "friction"])
+def test_the_power_is_the_rate_of_the_energy(oscillator: str, coupling: str) -> None:
+    assert vanishes(balance(scene_of(oscillator, coupling, 3)))
+
+
+@pytest.mark.parametrize("oscillator", [name for name in LAGRANGIAN if "belt" not in name])
+def test_the_power_of_every_oscillator_with_a_spring(oscillator: str) -> None:
+    assert vanishes(balance(scene_of(oscillator, "spring")))
+
+
+def test_the_power_of_a_cart_with_pendulums_that_is_joined_to_another() -> None:
+    """In numbers: the symbolic proof of one of them alone is in test_lagrangian.py, and two would take minutes."""
+    scene = scene_of("belt_double_pendulum", "spring on x", parameters={"sigma": 0.4, "damping": 0.2})
+    found, power = energy(scene).whole()
+    state, half = sp.symbols(scene.equations.state, real=True), scene.equations.dimension // 2
+    at = dict(zip(state, np.random.default_rng(3).uniform(-1, 1, 2 * half), strict=True))
+    at |= {sp.Symbol(name, real=True): value for name, value in scene.parameters.items()}
+    rates = sp.lambdify(list(at), scene.equations.rhs(), cse=True)(*at.values())
+    slopes = sp.lambdify(list(at), [found.diff(s) for s in state])(*at.values())
+    gained = float(power.xreplace(at))
+    assert float(np.dot(slopes, rates)) == pytest.approx(gained, rel=1e-12)
+    assert abs(gained) > 1e-3
+
+
+@pytest.mark.parametrize("coupling", names("coupling"))
+def test_what_conserves_energy(coupling: str) -> None:
+    assert energy(scene_of("harmonic", coupling)).conservative == ("damper" not in coupling)
+    assert not energy(scene_of("duffing", coupling)).conservative
+
+
+def test_what_has_no_energy() -> None:
+    one_way = from_matrix([[0, 0], [1, -1]])
+    for given, message in (
+        ({"oscillator": "lorenz", "coupling": "x->x", "topology": chain(2)}, "'lorenz' is a vector field"),
+        ({"oscillator": "harmonic", "coupling": "x->v", "topology": chain(2)}, "the coupling 'x->v' has none"),
+        ({"oscillator": "harmonic", "topology": one_way}, "has one-way links"),
+        ({"contact": "set-valued"}, "set-valued friction does work that is no function of the state"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            energy(Scene(**given))
+
+
+def test_arrays_have_the_energy_of_the_exact_expression() -> None:
+    """Weighted, with two coordinates, for a stack of states: the same numbers as the expression of the whole network."""
+    graph = from_matrix([["-5/2", 2, "1/2"], [2, -2, 0], ["1/2", 0, "-1/2"]])
+    scene = Scene(oscillator="double_pendulum", coupling="torsion", topology=graph,
+                  parameters={"sigma": 0.7, "delta": 0.3, "mass_ratio": 1.5})  # fmt: skip
+    function = energy_function(scene)
+    states = np.random.default_rng(1).normal(size=(2, 5, 12))
+    symbols = [*sp.symbols(scene.equations.state, real=True), *sp.symbols(scene.equations.parameters, real=True)]
+    numbers = [scene.parameters[name] for name in scene.equations.parameters]
+    for found, exact in zip((function(states), function.power(states)), function.exact.whole(), strict=True):
+        written = sp.lambdify(symbols, exact)(*np.moveaxis(states, -1, 0), *numbers)
+        assert found.shape == (2, 5)
+        assert np.allclose(found, written, rtol=1e-13, atol=1e-13)
+    other = function(states, parameters={"sigma": 0.0})
+    assert np.abs(other - function(states)).max() > 0.1
+
+
+def test_the_imbalance_of_an_exact_solution_is_that_of_the_rule() -> None:
+    """x = sin t under v' = -x: E is constant; with x = e^-t sin t and the damping left out the loss is all imbalance."""
+    scene = Scene(oscillator="harmonic")
+    t = np.linspace(0, 6, 601)
+    function = energy_function(scene)
+    assert np.abs(function.imbalance(t, np.stack([np.sin(t), np.cos(t)], axis=1))).max() < 1e-15
+    damped = np.exp(-t) * np.stack([np.sin(t), np.cos(t) - np.sin(t)])
+    assert function.imbalance(t, damped.T)[-1] == pytest.approx(-0.5, abs=1e-4)
+    duffing = Scene(oscillator="duffing", parameters={"delta": 2.0, "beta": 0.0, "u": 0.0})
+    critical = np.stack([np.exp(-t) * (1 + t), -t * np.exp(-t)], axis=1)  # x'' = -2 x' - x from rest at 1
+    rest = np.abs(energy_function(duffing).imbalance(t, critical))
+    assert rest[::2].max() < 5e-10  # whole pairs of intervals, where Simpson's rule has order four
+    assert rest.max() < 2e-8
+    with pytest.raises(ValueError, match="found 2 samples; expected at least three"):
+        function.imbalance(t[:2], damped.T[:2])
+
+
+def test_a_ring_of_fput_springs_keeps_what_its_report_keeps() -> None:
+    """E = sum v^2/2 + r^2/2 + alpha r^3/3 over the springs of the ring, each with its extension."""
+    scene = Scene(oscillator="mass", coupling="fput", topology=ring(6))
+    y = np.random.default_rng(2).normal(size=12)
+    r = np.roll(y[:6], -1) - y[:6]
+    written = (y[6:] ** 2 / 2).sum() + (r**2 / 2 + r**3 / 12).sum()
+    assert energy_function(scene)(y) == pytest.approx(written, rel=1e-14)
