@@ -1,7 +1,8 @@
 """The energy of a network and the power that changes it, as exact expressions for one node and one link.
 
-E = sum over nodes of sum v dL/dv - L, plus the potentials of the links; dE/dt = sum v Q - (partial) dL/dt, plus what Rayleigh
-functions of the links take away.  Source: Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. (Addison-Wesley, 2002), sect. 2.7.
+E = sum over nodes of sum v dL/dv - L, plus the potentials of the links; dE/dt = sum v Q - (partial) dL/dt, plus what
+Rayleigh functions of the links take away.
+Source: Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. (Addison-Wesley, 2002), sect. 2.7.
 """
 
 from __future__ import annotations

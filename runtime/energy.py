@@ -43,8 +43,8 @@ class EnergyFunction:
     def imbalance(self, t: Array, states: Array, parameters: Mapping[str, float] | None = None) -> Array:
         """Return E(t) - E(t_0) - (integral of the power) of a trajectory: states (samples, dimension) at times t (samples).
 
-        The integral is Simpson's rule on the samples, so its own error falls with the third power of their distance, at every
-        other sample with the fourth.  Raises ValueError for fewer than three samples.
+        The integral is Simpson's rule on the samples, so its own error falls with the third power of their distance, at
+        every other sample with the fourth.  Raises ValueError for fewer than three samples.
         """
         if len(t) < 3:
             raise ValueError(f"imbalance: found {len(t)} samples; expected at least three; raise samples")

@@ -1,7 +1,8 @@
 """Benchmarks, one file each: cases as data, `measure(quick) -> list of rows`, and `COLUMNS`; run by `synchain bench`.
 
 Optional: `summary(rows) -> str`, more tables in Markdown; `notes() -> list of lines`, what is left out here and why;
-`draw(rows)`, a Matplotlib figure of the rows, called within the style of `synchain.runtime.figures.style`.
+`measure_long() -> list of rows` for runs of hours; `draw(rows)`, a Matplotlib figure of the rows, called within the style
+of `synchain.runtime.figures.style`.
 """
 
 from __future__ import annotations

@@ -85,7 +85,8 @@ def drift(case: Case, integrator: str, rtol: float, periods: int) -> tuple[float
     result = run(scene, workers=1, show_progress=False, skip=False)
     if not result.success:
         raise RuntimeError(f"{case.name}, {integrator}: {result.message}")
-    found = energy_function(scene)(result.trajectory.values)
+    states = np.vstack([result.trajectory.values[:-1], result.end.values])
+    found = energy_function(scene)(states)
     relative = np.abs(found - found[0]) / abs(found[0])
     steps = float(result.steps.values + result.rejected.values) / periods
     early = relative[: 1 + (SAMPLES - 1) // 10]

@@ -15,7 +15,9 @@ EXAMPLES = ("synchain bench precision --quick", "synchain bench precision --out 
 def configure(parser: ArgumentParser) -> None:
     """Add names, folder and effort."""
     parser.add_argument("names", metavar="NAME", nargs="*", help="benchmarks to run, e.g. precision (default: all)")
-    parser.add_argument("--quick", action="store_true", help="fewer repetitions and shorter runs")
+    effort = parser.add_mutually_exclusive_group()
+    effort.add_argument("--quick", action="store_true", help="fewer repetitions and shorter runs")
+    effort.add_argument("--long", action="store_true", help="runs of hours, of benchmarks that have them (energy)")
     parser.add_argument(
         "--out", metavar="DIR", type=folder, help="folder for each table as CSV and Markdown, and for its figure"
     )
@@ -29,12 +31,15 @@ def execute(arguments: Namespace) -> int:
 
     with wrong_use():
         chosen = [(name, load(name)) for name in arguments.names or known()]
+        short = [name for name, module in chosen if arguments.long and not hasattr(module, "measure_long")]
+        if short:
+            raise ValueError(f"benchmark {short[0]!r} has no long form; leave out --long or name others")
         target = None if arguments.out is None else output_folder(arguments.out)
     print(machine())
     for name, module in chosen:
         for line in module.notes() if hasattr(module, "notes") else ():
             print(line, file=sys.stderr)
-        rows = module.measure(arguments.quick)
+        rows = module.measure_long() if arguments.long else module.measure(arguments.quick)
         print(f"\n{name}\n\n{text(module, rows)}", flush=True)
         for path in () if target is None else write(name, module, rows, target):
             print(path)
