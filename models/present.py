@@ -14,6 +14,7 @@ import sympy as sp
 from .equations import TIME, Edge, Equations, Node
 from .frictions import CONTACTS
 from .nondimensional import FRICTION, friction_coefficient
+from .orientation import is_oriented
 from .plugins import load, names
 from .typeset import Latex, Style, Text, Writer
 
@@ -109,6 +110,8 @@ def _lines(equations: Equations, style: Style) -> Iterator[str]:
     if equations.n > LARGEST:
         count, weights = len(equations.links), style.letter("G", "ij")
         meaning = f", {weights}" + style.words(f" the weights of the {count} links") if count else ""
+        if equations.edge is not None and count and is_oriented(equations.edge):
+            meaning += style.words(", -1 where a link runs from j to i")
         yield ("i, j" if count else "i") + f" = 1, {style.dots}, {equations.n}{meaning}"
 
 
@@ -157,7 +160,8 @@ def _generic(equations: Equations, named: _Named, style: Style) -> Iterator[str]
     for c in _shown(equations):
         line = writer.total([term.xreplace(here) for term in _ordered(named.rhs[c], node)])
         if edge is not None and edge.rhs[c] != 0:
-            line += _sum_over_links(edge, c, writer)
+            summed = _sum_over_links(edge, c, writer)
+            line = line + summed if line != "0" else summed.removeprefix(" + ").lstrip()
         yield f"{_left(equations, writer, c, here)} = {line}"
 
 
