@@ -6,12 +6,12 @@ this package, and of the CPU: whatever could change the machine code changes the
 
 from __future__ import annotations
 
+import atexit
 import functools
 import hashlib
 import importlib.metadata
-import importlib.util
-import os
 import platform
+import shutil
 import sys
 import tempfile
 import threading
@@ -29,7 +29,7 @@ from numba import types
 from synchain.models.equations import Equations
 
 from . import elementary, lane_types, lanes
-from .cache import cache_folder, open_folder
+from .cache import cache_folder, discard, is_sound, open_folder, seal, write_whole
 from .emit import LARGEST_UNROLLED, KernelSource
 from .sparse import EMPTY, NAMES, program
 
@@ -100,26 +100,35 @@ def load(source: KernelSource) -> Kernel:
 
 @functools.lru_cache(maxsize=256)
 def _load(source: KernelSource) -> Kernel:
+    name = f"kernel_{_fingerprint(source)[:32]}"
     try:
         folder = open_folder(cache_folder())
+        if not is_sound(folder, name):
+            discard(folder, name)
+        return _kept(source, name, folder)
     except (OSError, RuntimeError) as problem:  # RuntimeError: no home folder
         warnings.warn(f"kernels are not kept on disk: {problem}", RuntimeWarning, stacklevel=3)
-        folder = Path(tempfile.mkdtemp(prefix="synchain-"))
-    name = f"kernel_{_fingerprint(source)[:32]}"
-    path = folder / f"{name}.py"
+    folder = Path(tempfile.mkdtemp(prefix="synchain-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return _compile(source, name, folder)
+
+
+def _kept(source: KernelSource, name: str, folder: Path) -> Kernel:
+    """The kernel from the folder, or compiled into it; what cannot be loaded is deleted and compiled anew."""
     try:
-        return _compile(source, name, path)
+        found = _compile(source, name, folder)
     except Exception:
-        leftovers = [path, *(folder / "__pycache__").glob(f"{name}*")]
-        if not any(p.exists() for p in leftovers):
-            raise
-        for p in leftovers:
-            p.unlink(missing_ok=True)
         sys.modules.pop(name, None)
-        return _compile(source, name, path)
+        if not discard(folder, name):
+            raise
+        found = _compile(source, name, folder)
+    if not found.from_cache:
+        seal(folder, name)
+    return found
 
 
-def _compile(source: KernelSource, name: str, path: Path) -> Kernel:
+def _compile(source: KernelSource, name: str, folder: Path) -> Kernel:
+    path = folder / f"{name}.py"
     module = _module(source.text, name, path)
     entry, signature = (module.march, MODES) if source.kind == "modes" else (module.drive, SIGNATURE)
     entry.compile(signature)
@@ -132,18 +141,21 @@ def _compile(source: KernelSource, name: str, path: Path) -> Kernel:
 
 
 def _module(text: str, name: str, path: Path) -> ModuleType:
-    """Write the module file where it is missing and import it."""
+    """Write the module file where it is missing, and run its text.
+
+    The text comes from memory, not from the file and not from what Python would keep of it in `__pycache__`; the file is
+    there for Numba, which puts machine code beside it, and for readers.
+    """
     if not path.exists() or path.read_text(encoding="utf-8") != text:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=name, suffix=".tmp")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        os.replace(temporary, path)
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ImportError(f"cannot import the kernel module {path}")
-    module = importlib.util.module_from_spec(spec)
+        write_whole(path, text)
+    module = ModuleType(name)
+    module.__file__ = str(path)
     sys.modules[name] = module  # before execution: Numba looks its functions up there
-    spec.loader.exec_module(module)
+    elsewhere, numba.config.CACHE_DIR = numba.config.CACHE_DIR, ""  # code comes from the folder that was checked
+    try:
+        exec(compile(text, str(path), "exec"), module.__dict__)
+    finally:
+        numba.config.CACHE_DIR = elsewhere
     return module
 
 

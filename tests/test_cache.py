@@ -48,9 +48,11 @@ def test_clearing_leaves_other_files_alone(folder):
         ("kernel_a.py", "12"),
         ("kernel_b.py", "345"),
         ("__pycache__/kernel_a.nbi", "6"),
+        ("kernel_a.sha256", "7"),
+        ("kernel_b8.tmp", "8"),
         ("notes.txt", ""),
     ):
         (folder / name).write_text(text)
-    assert cache.describe() == {"folder": str(folder), "kernels": 2, "bytes": 6}
+    assert cache.describe() == {"folder": str(folder), "kernels": 2, "bytes": 8}
     assert cache.clear() == 2
     assert [p.name for p in folder.iterdir()] == ["notes.txt"]

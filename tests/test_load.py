@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
+import importlib.util
 import json
 import math
 import os
+import py_compile
 import shutil
 import stat
 import subprocess
@@ -14,6 +17,7 @@ import textwrap
 import warnings
 from pathlib import Path
 
+import numba
 import pytest
 import sympy as sp
 from samples import drive, friction_chain, harmonic_chain, real
@@ -219,6 +223,87 @@ def test_a_missing_index_is_no_problem(compiled_folder, folder):
     assert works(fresh())
 
 
+def test_one_wrong_bit_in_machine_code_is_not_run(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    path = next(p for p in machine_code(folder) if p.suffix == ".nbc")
+    content = bytearray(path.read_bytes())
+    content[2 * len(content) // 3] ^= 4
+    path.write_bytes(content)
+    compiled = fresh()
+    assert not compiled.from_cache
+    assert works(compiled)
+    assert fresh().from_cache
+
+
+def test_machine_code_without_a_checksum_is_not_run(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    next(folder.glob("kernel_*.sha256")).unlink()
+    assert not fresh().from_cache
+    assert fresh().from_cache
+
+
+def test_machine_code_of_another_kernel_is_not_run(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    other = dataclasses.replace(SOURCE, text=TINY.replace("2.0", "5.0"))
+    wrong = next(folder.glob("kernel_*.sha256")).stem
+    name = Path(fresh(other).path).stem
+    pairs = zip(sorted(folder.rglob(f"{name}*.nb*")), sorted(folder.rglob(f"{wrong}*.nb*")), strict=True)
+    for mine, theirs in pairs:
+        shutil.copyfile(theirs, mine)
+    again = fresh(other)
+    assert drive(again, [[1.0, 2.0]], [[]], [(0.0, 1.0)], 1e-9).end[0].tolist() == [5.0, 6.0]
+
+
+def test_what_python_keeps_beside_a_module_is_not_run(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    path = next(folder.glob("kernel_*.py"))
+    status = path.stat()
+    evil = folder / "evil.py"
+    evil.write_text("raise SystemExit('not ours')")
+    py_compile.compile(str(evil), importlib.util.cache_from_source(path))
+    stale = Path(importlib.util.cache_from_source(path))
+    head = stale.read_bytes()
+    stamp = (int(status.st_mtime) & 0xFFFFFFFF).to_bytes(4, "little") + status.st_size.to_bytes(4, "little")
+    stale.write_bytes(head[:8] + stamp + head[16:])
+    assert works(fresh())
+
+
+def test_a_cache_of_numba_elsewhere_is_not_used(folder, tmp_path, monkeypatch):
+    elsewhere = tmp_path / "elsewhere"
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(elsewhere))
+    assert works(fresh())
+    assert not elsewhere.exists()
+    assert machine_code(folder)
+    assert str(elsewhere) == numba.config.CACHE_DIR
+
+
+def test_another_processor_compiles_its_own(compiled_folder, folder, monkeypatch):
+    copied(compiled_folder, folder)
+    monkeypatch.setattr(loading.llvm, "get_host_cpu_name", lambda: "abacus")
+    loading._surroundings.cache_clear()
+    try:
+        compiled = fresh()
+        assert not compiled.from_cache
+        assert works(compiled)
+    finally:
+        monkeypatch.undo()
+        loading._surroundings.cache_clear()
+    assert len(list(folder.glob("kernel_*.py"))) == 2
+
+
+def test_a_full_disk_is_no_problem(folder, monkeypatch):
+    def full(path: Path, text: str) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+
+    ready = cache.write_whole
+
+    def some(path: Path, text: str) -> None:
+        (full if path.parent == folder else ready)(path, text)
+
+    monkeypatch.setattr(loading, "write_whole", some)
+    warned("No space left on device")
+
+
 def test_a_kernel_that_cannot_be_compiled_is_an_error(folder):
     broken = dataclasses.replace(SOURCE, text=TINY.replace("2.0", "undefined_name"))
     with pytest.raises(Exception, match="undefined_name"):
@@ -252,6 +337,26 @@ def test_machine_code_that_others_can_write_is_refused(compiled_folder, folder):
     copied(compiled_folder, folder)
     (folder / "__pycache__").chmod(0o777)
     assert not warned("can be written by others").from_cache
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs POSIX permissions")
+@pytest.mark.parametrize("suffix", ["nbc", "nbi", "sha256"])
+def test_a_file_that_others_can_write_is_refused(compiled_folder, folder, suffix):
+    copied(compiled_folder, folder)
+    next(folder.rglob(f"kernel_*.{suffix}")).chmod(0o666)
+    assert not warned("can be written by others; run: chmod go-w").from_cache
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs POSIX permissions")
+def test_a_folder_that_others_can_replace_is_refused(tmp_path, monkeypatch):
+    (tmp_path / "open").mkdir()
+    (tmp_path / "open").chmod(0o777)
+    monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path / "open" / "kernels"))
+    warned("which everybody can write")
+    (tmp_path / "open").chmod(0o1777)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert works(fresh())
 
 
 def test_a_read_only_folder_is_no_problem(folder, monkeypatch):
