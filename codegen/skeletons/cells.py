@@ -24,10 +24,11 @@ from synchain.codegen.skeletons.names import (
     WIDTH,
 )
 from synchain.codegen.skeletons.recording import (
-    ACCEPTED, BASE, BUDGET, CANCEL, CHANGE, CHATTERING, CYCLE, DIVERGED, END, FINISHED, FIRST_STEP, INTERRUPTED, LAG, LAST,
-    LEFT, LONGEST_RUSH, MAX_STEPS, MEAN, MEMORY, MODE, N_ACCEPTED, N_REJECTED, N_SKIPPED, N_SMOOTH, NEXT_SAMPLE, NO_JUMPS,
-    PEAK, PERIOD, PERIODS, POWER, REJECTED, RUSH, SAMPLE_GAP, SAVED, SKIPPED, SMOOTH_STEPS, START, STATUS, STEP, STOP,
-    STOPPED_AT, SUM_BEFORE, SYNC, SYNC_PEAK, SYNC_SUM, TIME, UNDERFLOW, spread,
+    ACCEPTED, BASE, BUDGET, CANCEL, CHANGE, CHATTERING, CYCLE, DIVERGED, END, FAR, FINISHED, FIRST_STEP,
+    INTERRUPTED, LAG, LAST, LEFT, LONGEST_RUSH, MAX_STEPS, MEAN, MEMORY, MODE, N_ACCEPTED, N_REJECTED, N_SKIPPED,
+    N_SMOOTH, NEXT_SAMPLE, NO_JUMPS, PEAK, PERIOD, PERIODS, POWER, REJECTED, RUSH, SAMPLE_GAP, SAVED, SKIPPED,
+    SMOOTH_STEPS, START, STATUS, STEP, STOP, STOPPED_AT, SUM_BEFORE, SYNC, SYNC_PEAK, SYNC_SUM, TIME, UNDERFLOW,
+    spread,
 )  # fmt: skip
 
 # --- kernel text below ---
@@ -194,16 +195,16 @@ def leap(which, periods, bank):
 def outcome(which, bank, control):
     """Status of the cell in a lane, 0 while it runs."""
     t = bank[TIME * WIDTH + which]
+    largest = 0.0
+    for c in range(DIMENSION):
+        size = abs(bank[c * WIDTH + which])
+        if not size < FAR:  # NaN too
+            return DIVERGED
+        largest = max(largest, size)
     if t >= bank[END * WIDTH + which]:
         return FINISHED
     if control[CANCEL] != 0.0:
         return INTERRUPTED
-    largest = 0.0
-    for c in range(DIMENSION):
-        size = abs(bank[c * WIDTH + which])
-        if not size < 1e100:  # NaN too
-            return DIVERGED
-        largest = max(largest, size)
     if bank[ACCEPTED * WIDTH + which] + bank[REJECTED * WIDTH + which] >= control[MAX_STEPS]:
         return BUDGET
     if CONTACTS and bank[RUSH * WIDTH + which] >= LONGEST_RUSH:

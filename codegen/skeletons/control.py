@@ -11,7 +11,7 @@ from synchain.codegen.elementary import exp, log
 from synchain.codegen.lanes import absolute, load, maximum, minimum, select, store, truncated
 from synchain.codegen.skeletons.names import CONTACTS, DIMENSION, WIDTH
 from synchain.codegen.skeletons.recording import (
-    ACCEPTED, CHANGE, END, LONGEST_RUSH, MAX_STEP, MAX_STEPS, MEMORY, PERIOD, REJECTED, RUSH, SMOOTH, START, STEP, STOP,
+    ACCEPTED, CHANGE, END, FAR, LONGEST_RUSH, MAX_STEP, MAX_STEPS, MEMORY, PERIOD, REJECTED, RUSH, SMOOTH, START, STEP, STOP,
     TIME,
 )  # fmt: skip
 
@@ -85,7 +85,7 @@ def pause(bank, control):
     for c in range(1, DIMENSION):
         largest = maximum(largest, absolute(load(bank, c, WIDTH)))
     stopped = (t >= load(bank, END, WIDTH)) | (t >= load(bank, PERIOD, WIDTH))
-    found = stopped | spent | (h <= 4e-16 * maximum(t, 1.0)) | (largest >= 1e100)
+    found = stopped | spent | (h <= 4e-16 * maximum(t, 1.0)) | (largest >= FAR)
     return found | (load(bank, RUSH, WIDTH) >= LONGEST_RUSH) if CONTACTS else found
 
 

@@ -37,6 +37,8 @@ MEAN, PEAK, LAST, STOPPED_AT = 0, 1, 2, 3
 STATUS, N_ACCEPTED, N_REJECTED, N_POINTS, N_SKIPPED, N_SMOOTH = 0, 1, 2, 3, 4, 5
 # So many events in a row without time passing are chattering.
 LONGEST_RUSH = 200.0
+# A state of this size, 2^53, has diverged: its neighbours are further apart than anything that happens at size one.
+FAR = 9007199254740992.0
 # The two ways to step.
 STIFF, SMOOTH = 0, 1
 ALL = (1 << WIDTH) - 1
