@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -9,6 +10,9 @@ if TYPE_CHECKING:
     from .topology import Topology
 
 __all__ = ["warnings", "zero_multiplicity"]
+
+STIFF = 100.0
+"""Frequency of a mode and number of its swings above which springs are called stiff."""
 
 
 def zero_multiplicity(graph: Topology) -> int:
@@ -21,6 +25,39 @@ def zero_multiplicity(graph: Topology) -> int:
         return graph.components
     zero = [eigenvalue.multiplicity for eigenvalue in graph.spectrum.eigenvalues if eigenvalue.exact == 0]
     return sum(zero)
+
+
+def _stiff_springs(scene: Scene) -> list[str]:
+    """A sentence where a mode of the springs swings so often that its phase error adds up to more than is asked for.
+
+    The frequency of the fastest mode is at most sqrt(1 + 2 sigma d), d the largest weight at a node (Gershgorin).
+    """
+    if scene.coupling != "spring" or not scene.topology.links:
+        return []
+    sigma = max([scene.parameters["sigma"], *(v for axis in scene.axes if axis.name == "sigma" for v in axis.values)])
+    weights = [0.0] * scene.n
+    for target, _, weight in scene.topology.links:
+        weights[target] += abs(float(weight))
+    fastest = math.sqrt(1.0 + 2.0 * sigma * max(weights))
+    length = (scene.transient + scene.window) * (scene.period or 1.0 if scene.time_unit == "period" else 1.0)
+    swings = fastest * length / (2.0 * math.pi)
+    if fastest < STIFF or swings < STIFF:
+        return []
+    return [
+        f"stiff springs: a mode of frequency {fastest:.3g} swings {swings:.3g} times, and the errors of its phase add up "
+        "to more than rtol; tighten rtol until the result no longer changes"
+    ]
+
+
+def _vanishes(scene: Scene) -> bool:
+    from .coupling_matrix import is_matrix
+    from .network import edge
+    from .scene_model import node
+
+    if scene.coupling is None or is_matrix(scene.coupling):
+        return True
+    single = node(scene.oscillator, scene.friction, scene.contact)
+    return edge(scene.coupling, single, scene.oscillator).diffusive
 
 
 def warnings(scene: Scene) -> tuple[str, ...]:
@@ -41,6 +78,12 @@ def warnings(scene: Scene) -> tuple[str, ...]:
             f"topology {graph.name}({graph.n}) has negative weights, which drive oscillators apart; if its matrix is a "
             "Laplacian D - A, negate it: the connectivity matrix is A - D"
         )
+    if graph.links and scene.coupling is not None and not _vanishes(scene):
+        found.append(
+            f"coupling {scene.coupling!r} does not vanish between oscillators in equal states, so that equal motion of all "
+            "is no solution: there is no complete synchronisation; make it a function of differences"
+        )
+    found += _stiff_springs(scene)
     moved = {axis.name.rpartition("_")[0] for axis in scene.axes} & set(scene.initial)
     if "sync_error" in scene.record and not moved and all(len(set(x)) == 1 for x in scene.initial.values()):
         found.append(
