@@ -47,7 +47,20 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     _numerics(made)
     check_sweep(made)
     check_friction(made)
+    _physics(made)
     return made
+
+
+def _physics(made: Mapping[str, Any]) -> None:
+    """Refuse wrong physics at the scene's parameters and at the ends of its axes."""
+    from .physics import check_friction, check_masses
+
+    for ends in (min, max):
+        swept = {axis.name: ends(axis.values) for axis in made["axes"]}
+        values = {name: swept.get(name, value) for name, value in made["parameters"].items()}
+        check_masses(made["oscillator"], values)
+        if made["friction"] is not None:
+            check_friction(made["friction"], values)
 
 
 def _model(made: dict[str, Any]) -> None:

@@ -15,6 +15,8 @@ __all__ = ["check_sweep"]
 
 CONTINUATIONS = ("none", "up", "down")
 CELL_LIMIT = 10**9
+SAMPLE_LIMIT = 10**9
+"""Most numbers in the trajectories of all cells, 8 GB."""
 
 
 def check_sweep(made: dict[str, Any]) -> None:
@@ -38,7 +40,20 @@ def check_sweep(made: dict[str, Any]) -> None:
             f"sweep: found {cells} cells; expected at most {CELL_LIMIT}, the results must fit into memory; "
             "use fewer values or split the sweep"
         )
+    _samples(made, cells)
     _continuation(made)
+
+
+def _samples(made: Mapping[str, Any], cells: int) -> None:
+    """Refuse trajectories that fit into no memory."""
+    if "trajectory" not in made["record"]:
+        return
+    numbers = cells * made["samples"] * len(components(made)) * made["topology"].n
+    if numbers > SAMPLE_LIMIT:
+        raise ValueError(
+            f"trajectory: found {numbers} numbers in {cells} cells of {made['samples']} samples; expected at most "
+            f"{SAMPLE_LIMIT}, the results must fit into memory; take fewer samples or cells"
+        )
 
 
 def _axes(given: object) -> tuple[Axis, ...]:

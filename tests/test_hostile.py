@@ -1,0 +1,225 @@
+"""Hostile files and surroundings, and wrong physics: one clear line each, nothing run, nothing touched, no time lost."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from synchain.models import network, plugins
+from synchain.models.scene import Scene
+from synchain.models.scene_file import load_scene
+from synchain.models.topology import topology
+from synchain.runtime.cli import main
+
+SECONDS = float(os.environ.get("SYNCHAIN_FUZZ_SECONDS", "0"))
+"""How long to feed random scene files; 0 feeds a fixed number of them."""
+
+
+def law(folder: Path, body: str, name: str = "law.py") -> str:
+    """The path of a friction law of one's own, allowed to run."""
+    head = (
+        'import sympy as sp\nfrom synchain.models.parameter import Parameter\nSUMMARY = "s"\nSOURCE = "s"\nODD = True\n'
+    )
+    path = folder / name
+    path.write_text(head + textwrap.dedent(body))
+    plugins.allow_code(path)
+    return str(path)
+
+
+# -- wrong physics -------------------------------------------------------------------------------------------
+
+AGAINST = """
+    PARAMETERS = {"c": Parameter(0.3, "s/m", "growth")}
+    def force(w, c):
+        return -c * w
+"""
+
+
+def test_friction_that_feeds_energy_is_refused_unless_it_says_so(tmp_path: Path) -> None:
+    wrong = law(tmp_path, AGAINST)
+    with pytest.raises(ValueError, match=r"feeds energy; expected w f\(w\) >= 0; turn the sign of `force`"):
+        Scene(friction=wrong)
+    Scene(friction=wrong, parameters={"c": -0.3})
+    with pytest.raises(ValueError, match="feeds energy"):
+        Scene(friction=wrong, parameters={"c": -0.3}, axes={"c": [-0.3, 0.1]})
+    declared = law(tmp_path, AGAINST + "    SELF_EXCITING = True\n", "declared.py")
+    assert Scene(friction=declared).parameters["c"] == 0.3
+
+
+def test_a_law_with_the_wrong_unit_is_refused(tmp_path: Path) -> None:
+    wrong = law(tmp_path, AGAINST.replace('"s/m"', '"s"').replace("-c", "c"))
+    with pytest.raises(ValueError, match=r"does not cancel in .*; check the units of the parameters"):
+        Scene(friction=wrong)
+
+
+def test_a_law_with_an_unknown_symbol_is_refused(tmp_path: Path) -> None:
+    wrong = law(tmp_path, AGAINST.replace("-c * w", 'c * w * sp.Symbol("q", real=True)'))
+    with pytest.raises(ValueError, match="undeclared symbol 'q'"):
+        Scene(friction=wrong)
+
+
+MASS = """
+    FRICTION = False
+    PARAMETERS = {"mass": Parameter(1.0, "1", "mass")}
+    def kinetic(v, mass):
+        return mass * v**2 / 2
+    def potential(x):
+        return x**2 / 2
+"""
+
+
+def test_masses_must_be_positive(tmp_path: Path) -> None:
+    body = law(tmp_path, MASS, "body.py")
+    assert Scene(oscillator=body).parameters["mass"] == 1.0
+    for value in (0.0, -1.0):
+        with pytest.raises(ValueError, match="kinetic energy not positive"):
+            Scene(oscillator=body, parameters={"mass": value})
+    with pytest.raises(ValueError, match="kinetic energy not positive"):
+        Scene(oscillator=body, axes={"mass": [1.0, -0.5]})
+
+
+PULL = """
+    PARAMETERS = {"sigma": Parameter(0.1, "N/m", "stiffness")}
+    def potential(q_i, q_j, weight, sigma):
+        return sigma * weight * (q_i + q_j) ** 2 / 2
+"""
+
+
+def test_a_coupling_that_does_not_vanish_between_equals_is_said(tmp_path: Path) -> None:
+    pull = law(tmp_path, PULL, "pull.py")
+    found = Scene(topology=topology("ring", 4), coupling=pull).warnings
+    assert any("does not vanish between oscillators in equal states" in words for words in found)
+    assert not network.edge(pull, Scene().equations.node, "friction").diffusive
+    assert Scene(topology=topology("ring", 4)).warnings == ()
+
+
+# -- files ---------------------------------------------------------------------------------------------------
+
+HUGE = {
+    "cells": ("[sweep]\nsigma = {from = 0, to = 1, count = 10000}\nomega = {from = 1, to = 2, count = 10000}\n"
+        "u = {from = 0, to = 1, count = 10000}",
+              "at most 1000000000"),
+    "samples": ('record = ["trajectory"]\nsamples = 1000000\n[sweep]\nomega = {from = 1, to = 2, count = 10000}',
+                "trajectory: found"),
+    "nodes": ("[topology]\nname = 'chain'\nn = 1000000000000", "100000"),
+    "links": ("[topology]\nname = 'complete'\nn = 100000", "too many links"),
+    "power": ("[parameters]\nomega = '9**9**9'", "expected"),
+    "digits": ("[parameters]\nomega = " + "9" * 5000, "too long a value"),
+    "depth": ("[parameters]\nomega = " + "[" * 20000 + "]" * 20000, "too deep"),
+    "not a number": ("[parameters]\nomega = nan", "finite"),
+    "infinite": ("[initial]\nx = inf", "finite"),
+    "twice": ("rtol = 1e-8\nrtol = 1e-9", "not TOML"),
+    "code": ("[parameters]\nomega = \"__import__('os').system('touch here')\"", "expected"),
+    "a file of code": ("oscillator = './evil.py'", "allow"),
+    "a device": ("[topology]\nfile = '/dev/zero'", "device"),
+    "a pipe": ("[topology]\nfile = 'pipe'", "device"),
+    "a folder": ("[topology]\nfile = '.'", "folder"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", HUGE)
+def test_too_much_is_refused_at_once(name: str, tmp_path: Path, monkeypatch, capsys) -> None:
+    words, part = HUGE[name]
+    top, _, rest = words.partition("[sweep]")
+    first = top if "topology" in words or "sigma" not in words else "[topology]\nname = 'chain'\nn = 2\n" + top
+    path = tmp_path / "scene.toml"
+    path.write_text(first + (f"[sweep]{rest}" if rest else ""))
+    (tmp_path / "evil.py").write_text("open('here', 'w')")
+    os.mkfifo(tmp_path / "pipe")
+    monkeypatch.chdir(tmp_path)
+    before = sorted(p.name for p in tmp_path.iterdir())
+    assert main(["run", str(path), "--out", "out"]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert len(lines[0]) < 1000
+    assert part in lines[0]
+    assert sorted(p.name for p in tmp_path.iterdir()) == before
+
+
+VALUES = st.one_of(
+    st.integers(-(10**20), 10**20).map(str), st.floats().map(lambda x: repr(x).replace("Infinity", "inf")),
+    st.text(max_size=20).map(lambda s: repr(s)), st.sampled_from(["true", "[]", "{}", "[1, 2]", "'9**9**9'", "'2*pi'"]),
+    st.text("0123456789+-*/().eEpisqrt ", max_size=40).map(lambda s: f"'{s}'"),
+)  # fmt: skip
+KEYS = st.sampled_from(
+    ["n", "name", "omega", "sigma", "x", "v", "rtol", "window", "samples", "record", "from", "to", "count", "file"]
+)
+LINES = st.one_of(
+    st.tuples(KEYS, VALUES).map(" = ".join),
+    st.sampled_from(["[topology]", "[parameters]", "[initial]", "[sweep]", "[sweep.sigma]", "[[sweep]]", "\ufeff"]),
+    st.text(max_size=30),
+)
+FILES = st.one_of(st.binary(max_size=200), st.lists(LINES, max_size=12).map(lambda rows: "\n".join(rows).encode()))
+
+
+def refusal(path: Path) -> str:
+    """Why a file is no scene, empty where it is one; anything but ValueError and TypeError goes through."""
+    try:
+        load_scene(path)
+    except (ValueError, TypeError) as error:
+        return str(error)
+    return ""
+
+
+def feed(folder: Path, examples: int) -> None:
+    path = folder / "scene.toml"
+
+    @settings(max_examples=examples, deadline=None, derandomize=SECONDS == 0, database=None,
+              suppress_health_check=[HealthCheck.too_slow])  # fmt: skip
+    @given(FILES)
+    def check(content: bytes) -> None:
+        path.write_bytes(content)
+        line = refusal(path)
+        assert line.startswith("scene.toml: ") or not line
+        assert "\n" not in line
+        assert len(line) < 1000
+        assert [p.name for p in folder.iterdir()] == ["scene.toml"]
+
+    check()
+
+
+def test_any_file_is_a_scene_or_one_line(tmp_path: Path) -> None:
+    end = time.monotonic() + SECONDS
+    feed(tmp_path, 300)
+    while time.monotonic() < end:
+        feed(tmp_path, 1000)
+
+
+# -- surroundings --------------------------------------------------------------------------------------------
+
+
+def test_locale_time_zone_and_odd_paths_change_nothing(tmp_path: Path) -> None:
+    place = tmp_path / "a place with ünïcode"
+    place.mkdir()
+    scene = place / "my scène.toml"
+    scene.write_text("title = 'ω'\nwindow = 0.5\ntransient = 0\nrecord = []\n", encoding="utf-8")
+    found = []
+    for name, zone in (("C", "UTC"), ("tr_TR.UTF-8", "Asia/Kathmandu")):
+        environment = {**os.environ, "LC_ALL": name, "LANG": name, "TZ": zone, "PYTHONUTF8": "0"}
+        words = [sys.executable, "-m", "synchain.runtime", "run", str(scene), "--out", str(place / name)]
+        done = subprocess.run(words, env=environment, capture_output=True, timeout=240, check=False)
+        assert done.returncode == 0, done.stderr
+        (made,) = (place / name).glob("*.nc")
+        found.append(made.read_bytes())
+    assert found[0] == found[1]
+
+
+def test_nothing_asks_the_network(tmp_path: Path, monkeypatch, capsys) -> None:
+    def refuse(*arguments: object, **more: object) -> None:
+        raise AssertionError("a socket was opened")
+
+    monkeypatch.setattr(socket, "socket", refuse)
+    monkeypatch.setattr(socket, "getaddrinfo", refuse)
+    path = tmp_path / "scene.toml"
+    path.write_text("window = 0.5\ntransient = 0\nrecord = []\n")
+    assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
+    assert main(["spectrum", "chain", "4"]) == 0
