@@ -26,6 +26,9 @@ __all__ = ["Branch", "follow", "skeleton"]
 CLOSE = 1e-9
 """How closely a change of phases is located, relative to the parameter."""
 
+CLOSED = 1e-6
+"""A gap this small has closed: the branch ends by grazing."""
+
 Found = tuple[float, str, float]
 """Value of the parameter, what happens there, and how far the test function is from zero."""
 
@@ -65,6 +68,9 @@ def follow(scene: Scene, name: str, values: Sequence[float], first: PeriodicOrbi
         try:
             orbits.append(periodic_orbit(scene, first.periods, guess, **{name: float(value)}))
         except ArithmeticError:
+            if phases:
+                search = Search(scene, name, (float(values[k - 1]), float(value)), (orbits[-1], orbits[-1]))
+                found += search.end(phases[-1])
             break
         own = orbits[-1].phases
         phases += [] if own is None else [own]
@@ -155,23 +161,37 @@ class Search:
         test = _test(before, after)
         few = before if len(before.modes) <= len(after.modes) else after
         low, high = self.ends if few is before else self.ends[::-1]
-        known = [(low, test(few))]
-        while abs(high - low) > CLOSE * max(1.0, abs(low)):
-            value = _propose(known, high)
-            own = self._at(value)
-            if own is None or own.modes != few.modes:
-                high = value
-            else:
-                low = value
-                known.append((low, test(own)))
-        words = "stick loss" if test is _landing else "grazing"
-        return [(0.5 * (low + high), words, abs(known[-1][1]))]
+        at, residual = _close_in(self._at, few, low, high, test)
+        return [(at, "stick loss" if test is _landing else "grazing", residual)]
+
+    def end(self, last: Phases) -> list[Found]:
+        """The grazing at which the branch ends, where Newton's method fails at the second end and `last` are the phases at
+        the first; nothing where no gap has closed."""
+        at, residual = _close_in(self._at, last, *self.ends, _gap)
+        return [(at, "grazing", residual)] if residual < CLOSED else []
 
     def _at(self, value: float) -> Phases | None:
         try:
             return self.orbit(value).phases
         except ArithmeticError:
             return None
+
+
+def _close_in(
+    at: Callable[[float], Phases | None], few: Phases, low: float, high: float, test: Callable[[Phases], float]
+) -> tuple[float, float]:
+    """Where the phases `few` at `low` are lost on the way to `high`, and the test function at the last value that has
+    them."""
+    known = [(low, test(few))]
+    while abs(high - low) > CLOSE * max(1.0, abs(low)):
+        value = _propose(known, high)
+        own = at(value)
+        if own is None or own.modes != few.modes:
+            high = value
+        else:
+            low = value
+            known.append((low, test(own)))
+    return 0.5 * (low + high), abs(known[-1][1])
 
 
 def _propose(known: list[tuple[float, float]], high: float) -> float:

@@ -109,6 +109,19 @@ def test_stops_begin_where_den_hartogs_motion_ends() -> None:
     assert branch.phases[0].landing == pytest.approx(r - load, abs=1e-9)
 
 
+def test_a_branch_that_ends_by_grazing_says_where() -> None:
+    """omega = 0.7: as the drive grows the slip of period one slows down to the belt's speed in its middle, at the rate at
+    which its gap has fallen."""
+    made = scene(transient=60.0, parameters={"omega": 0.7, "u": 0.15})
+    branch = follow(made, "u", [0.15, 0.25, 0.35, 0.45, 0.5, 0.55], periodic_orbit(made))
+    assert [words for _, words in branch.bifurcations] == ["period doubling", "grazing"]
+    assert len(branch.orbits) == 5
+    gaps = [phases.gap for phases in branch.phases[-2:]]
+    at = branch.bifurcations[-1][0]
+    assert at == pytest.approx(0.5 + 0.05 * gaps[1] / (gaps[0] - gaps[1]), abs=2e-4)
+    assert max(branch.residuals) < 5e-7  # Newton's method finds orbits up to there
+
+
 def test_the_skeleton_of_a_diagram_has_stable_and_unstable_orbits() -> None:
     """Period two loses its stability between 1.2 and 1.24 and lives on; the orbit of period one is followed both ways."""
     found = skeleton(scene(transient=1000.0), "omega", [1.2, 1.22, 1.24], periods=(2,))
