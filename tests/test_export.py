@@ -91,6 +91,10 @@ NETWORKS: dict[str, Equations] = {
     "chua matrix": Scene(
         oscillator="chua", topology=from_matrix([["-2/3", "2/3"], ["1/7", "-1/7"]]), coupling="x->x"
     ).equations,
+    "double pendulum 2": Scene(
+        oscillator="double_pendulum", topology=chain(2), coupling="friction_damper on phi"
+    ).equations,
+    "fput 10": Scene(oscillator="mass", topology=ring(10), coupling="fput").equations,
     "one way 4": one_way(4),
     "one way 11": one_way(11),
     "names 2": ill_named(2),

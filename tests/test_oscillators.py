@@ -10,13 +10,14 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from synchain.models import Scene, Section, chain, from_matrix, ring, star
+from synchain.models.energy import energy
 from synchain.models.equations import TIME
 from synchain.models.network import node
 from synchain.models.orientation import drawn
 from synchain.models.plugins import load, names
 from synchain.models.scene_start import default_start
 from synchain.models.tangent import coupling_slope
-from synchain.runtime import run
+from synchain.runtime import exponents, run
 
 X, Y, Z, V = sp.symbols("x y z v", real=True)
 A, B, C, P, Q, MU, U = sp.symbols("a b c p q mu u", real=True)
@@ -249,3 +250,40 @@ def test_two_double_pendulums_in_a_kernel_follow_scipy() -> None:
     assert np.abs(found.end.values - there.y[:, -1]).max() < 1e-8
     phi = there.y[:2]
     assert np.abs(phi[0] - phi[1]).max() > 0.1
+
+
+WRITTEN = {
+    ("pendulum", None): "-sin(x) - delta*v + torque",
+    ("rotor", None): "power - delta*v",
+    ("mass", None): "0",
+    ("froude", "coulomb"): "-sin(x) - damping*v + epsilon*mu*sign(shaft - v)",
+    ("spring_block", "hyperbolic"): "-x + mu_s*sign(nu - v)/(1 + delta*Abs(nu - v))",
+}
+
+
+@pytest.mark.parametrize(("oscillator", "friction"), WRITTEN)
+def test_equations_written_by_hand(oscillator: str, friction: str | None) -> None:
+    found = node(oscillator, friction, "sign")
+    known = {s.name: s for s in (*found.state, *found.parameters)}
+    assert sp.expand(found.rhs[1] - sp.sympify(WRITTEN[oscillator, friction], locals=known)) == 0
+
+
+def test_joints_of_double_pendulums_lose_energy() -> None:
+    power = energy(Scene(oscillator="double_pendulum")).node_power
+    delta, one, two = sp.symbols("delta w_phi w_psi", real=True)
+    assert sp.expand(power + delta * (one**2 + (two - one) ** 2)) == 0
+
+
+@pytest.mark.long
+def test_the_exponents_of_damped_double_pendulums_at_rest_are_eigenvalues() -> None:
+    """Modes with a state-dependent mass matrix: M a = -(K + alpha e e^T) q - D v about the hanging position, e = (1, 0)."""
+    scene = Scene(oscillator="double_pendulum", topology=chain(2), coupling="spring on phi",
+                  initial={"phi": 0.3, "psi": 0.2}, parameters={"delta": 0.4})  # fmt: skip
+    alpha = np.array([0.0, 0.5, 3.0])
+    found = exponents(scene, alpha, starts=1, transient=100, periods=2000, workers=1)
+    masses, damping = np.array([[2.0, 1.0], [1.0, 1.0]]), 0.4 * np.array([[2.0, -1.0], [-1.0, 1.0]])
+    for strength, exponent, error in zip(alpha, found.exponent, found.stderr, strict=True):
+        stiffness = np.diag([2.0 + strength, 1.0])
+        lower = -np.linalg.solve(masses, np.hstack([stiffness, damping]))
+        largest = np.linalg.eigvals(np.vstack([np.hstack([np.zeros((2, 2)), np.eye(2)]), lower])).real.max()
+        assert exponent == pytest.approx(largest, abs=max(3 * error, 1e-3))
