@@ -20,7 +20,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-__all__ = ["allow_code", "call", "load", "located", "names"]
+__all__ = ["allow_code", "allowed_code", "call", "load", "located", "names"]
 
 OTHERWISE = {"coupling": ", or components such as 'x->x'"}
 """What a kind can be besides the name of a file, for the message that refuses a name."""
@@ -48,6 +48,11 @@ def allow_code(*paths: str | Path) -> None:
         if place.suffix != ".py" or not place.is_file():
             raise ValueError(f"plug-in {str(path)!r} is no file that ends in .py; check the path")
         _allowed.add(place.resolve())
+
+
+def allowed_code() -> tuple[str, ...]:
+    """The files outside the package that may be run as plug-ins, sorted."""
+    return tuple(sorted(map(str, _allowed)))
 
 
 def load(kind: str, name: str) -> ModuleType:

@@ -16,16 +16,19 @@ if TYPE_CHECKING:
     from .msf import MSF, Plane, msf, plane
     from .periodic import PeriodicOrbit, periodic_orbit
     from .probe import Probe, universal_probe
+    from .progress import Progress
     from .result import Result, open_result
+    from .sitting import SweepFailed, SweepInterrupted
     from .status import Status
-    from .sweep import SweepInterrupted, kernel, run
+    from .streaming import Streamed, stream
+    from .sweep import kernel, run
     from .threshold import Thresholds, thresholds
 
 __all__ = [
-    "MSF", "Basin", "Branch", "ClusterExponents", "Exponents", "Lyapunov", "PeriodicOrbit", "Plane", "Probe", "Result",
-    "Status", "SweepInterrupted", "Thresholds", "basin", "cluster_exponents", "exponents", "follow", "kernel",
-    "lyapunov_spectrum", "msf", "open_result", "periodic_orbit", "plane", "run", "skeleton", "thresholds",
-    "universal_probe",
+    "MSF", "Basin", "Branch", "ClusterExponents", "Exponents", "Lyapunov", "PeriodicOrbit", "Plane", "Probe",
+    "Progress", "Result", "Status", "Streamed", "SweepFailed", "SweepInterrupted", "Thresholds", "basin",
+    "cluster_exponents", "exponents", "follow", "kernel", "lyapunov_spectrum", "msf", "open_result", "periodic_orbit",
+    "plane", "run", "skeleton", "stream", "thresholds", "universal_probe",
 ]  # fmt: skip
 
 _HOME = {
@@ -34,7 +37,8 @@ _HOME = {
     "Lyapunov": "lyapunov", "lyapunov_spectrum": "lyapunov", "Basin": "basin", "basin": "basin",
     "Exponents": "exponent", "exponents": "exponent", "MSF": "msf", "Plane": "msf", "msf": "msf", "plane": "msf",
     "Probe": "probe", "universal_probe": "probe", "Result": "result", "open_result": "result",
-    "SweepInterrupted": "sweep", "kernel": "sweep", "run": "sweep", "Status": "status", "Thresholds": "threshold",
+    "SweepInterrupted": "sitting", "SweepFailed": "sitting", "Progress": "progress", "Streamed": "streaming",
+    "stream": "streaming", "kernel": "sweep", "run": "sweep", "Status": "status", "Thresholds": "threshold",
     "thresholds": "threshold",
 }  # fmt: skip
 

@@ -66,6 +66,10 @@ class Certificate:
         rare = -2.0 * climb * self.exponent > -math.log(CHANCE) * self.diffusion
         return np.where((self.exponent + ERRORS * self.stderr < 0.0) & rare, NEAR, 0.0)
 
+    def take(self, cells: np.ndarray) -> Certificate:
+        """The part for some cells."""
+        return Certificate(self.exponent[cells], self.stderr[cells], self.diffusion[cells])
+
     def verdicts(self, finished: np.ndarray, error: np.ndarray) -> np.ndarray:
         """Index into VERDICTS for each cell, from whether it finished and its mean synchronisation error."""
         sign = np.where(self.exponent + 2 * self.stderr < 0.0, -1, np.where(self.exponent > 2 * self.stderr, 1, 0))

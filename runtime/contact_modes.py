@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import lru_cache
+
 import numpy as np
 import sympy as sp
 
@@ -66,5 +69,12 @@ def _conditions(equations: Equations) -> tuple[sp.Expr, ...]:
 
 
 def _at(e: sp.Expr, given: dict[sp.Symbol, np.ndarray], shape: tuple[int, int]) -> np.ndarray:
-    value = sp.lambdify(list(given), e, "numpy")(*given.values())
+    value = _function(e, tuple(given))(*given.values())
     return np.array(np.broadcast_to(value, shape), dtype=float)
+
+
+@lru_cache(maxsize=64)
+def _function(e: sp.Expr, symbols: tuple[sp.Symbol, ...]) -> Callable[..., np.ndarray]:
+    """An expression as a function: the blocks of a sweep share it."""
+    made: Callable[..., np.ndarray] = sp.lambdify(list(symbols), e, "numpy")
+    return made

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import sympy as sp
@@ -14,7 +16,7 @@ from synchain.models.scene import Scene
 
 from .contact_modes import local_clock, with_modes
 
-__all__ = ["CANCEL", "Plan", "control_array", "plan", "tolerances"]
+__all__ = ["CANCEL", "Plan", "Planner", "control_array", "plan", "tolerances"]
 
 FIRST_STEP = 1e-4
 """Step tried first in every cell; the step control enlarges it sixfold at a time."""
@@ -42,54 +44,94 @@ class Plan:
 
 
 def plan(scene: Scene, near: np.ndarray | None = None) -> Plan:
-    """Lay out the cells of a scene; `near` (cells,) is the last column of the spans (default: 0).
+    """Lay out all cells of a scene; `near` (cells,) is the last column of the spans (default: 0).
 
     Raises ValueError where a window in drive periods meets a drive of frequency 0, or is too long for double precision.
     """
-    cells = scene.cells
-    names = scene.equations.parameters
-    numbers = np.empty((cells, len(names)))
-    numbers[:] = [scene.parameters[name] for name in names]
-    start = np.empty((cells, len(scene.y0)))
-    start[:] = scene.y0
-    columns = axis_columns(scene)
-    state = scene.equations.state
-    for name, values in columns.items():
-        if name in names:
-            numbers[:, names.index(name)] = values
-        else:
-            start[:, state.index(name)] = values
-    start = with_modes(scene.equations, start, numbers)
-    last = np.zeros(scene.cells) if near is None else near
-    clock = local_clock(scene.equations, periods(scene.equations, numbers))
-    spans = np.column_stack([_spans(scene, columns), clock, last])
-    return Plan(start, numbers, np.ascontiguousarray(spans))
+    return Planner(scene).rows(np.arange(scene.cells), near)
+
+
+class Planner:
+    """Lays out any of a scene's cells, so that nobody need hold all of them; the axes are arrays once and for all."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.values = {axis.name: np.array(axis.values) for axis in scene.axes}
+
+    def columns(self, cells: np.ndarray) -> dict[str, np.ndarray]:
+        """The value of each axis in each of these cells."""
+        if self.scene.zipped or not self.values:
+            return {name: values[cells] for name, values in self.values.items()}
+        places = np.unravel_index(cells, self.scene.shape)
+        return {name: values[place] for (name, values), place in zip(self.values.items(), places, strict=True)}
+
+    def rows(self, cells: np.ndarray, near: np.ndarray | None = None) -> Plan:
+        """The rows of these cells; `near`, one for each of them, is the last column of the spans (default: 0)."""
+        scene, equations = self.scene, self.scene.equations
+        names = equations.parameters
+        numbers = np.empty((len(cells), len(names)))
+        numbers[:] = [scene.parameters[name] for name in names]
+        start = np.empty((len(cells), len(scene.y0)))
+        start[:] = scene.y0
+        columns = self.columns(cells)
+        state = equations.state
+        for name, values in columns.items():
+            if name in names:
+                numbers[:, names.index(name)] = values
+            else:
+                start[:, state.index(name)] = values
+        start = with_modes(equations, start, numbers)
+        last = np.zeros(len(cells)) if near is None else near
+        clock = local_clock(equations, periods(equations, numbers))
+        spans = np.column_stack([_spans(scene, columns, len(cells)), clock, last])
+        return Plan(start, numbers, np.ascontiguousarray(spans))
+
+    def extremes(self) -> Plan:
+        """The rows of a few cells in which every axis takes its smallest, its largest and its value nearest to 0."""
+        ends = [(v.argmin(), v.argmax(), np.abs(v).argmin()) for v in self.values.values()]
+        if not ends:
+            return self.rows(np.arange(1))
+        if self.scene.zipped:
+            return self.rows(np.unique(ends))
+        return self.rows(
+            np.unique([np.ravel_multi_index(places, self.scene.shape) for places in zip(*ends, strict=True)])
+        )
 
 
 def periods(equations: Equations, numbers: np.ndarray) -> np.ndarray:
     """The period of the equations for each row of parameters; 0 where time does not enter or no period is known."""
-    frequency = angular_frequency(equations)
-    if frequency is None or len(numbers) == 0:
+    if len(numbers) == 0:
+        return np.zeros(0)
+    value = _frequency(equations)
+    if value is None:
         return np.zeros(len(numbers))
-    value = sp.lambdify([sp.Symbol(name, real=True) for name in equations.parameters], frequency, "numpy")
     size = np.abs(np.broadcast_to(np.asarray(value(*numbers.T), dtype=float), len(numbers)))
     with np.errstate(divide="ignore"):
         found = 2.0 * math.pi / size
     return np.where(np.isfinite(found), found, 0.0)
 
 
+@lru_cache(maxsize=16)
+def _frequency(equations: Equations) -> Callable[..., np.ndarray] | None:
+    """The angular frequency of the equations as a function of their parameters; None where no period is known."""
+    frequency = angular_frequency(equations)
+    if frequency is None:
+        return None
+    made: Callable[..., np.ndarray] = sp.lambdify(
+        [sp.Symbol(name, real=True) for name in equations.parameters], frequency, "numpy"
+    )
+    return made
+
+
 def axis_columns(scene: Scene) -> dict[str, np.ndarray]:
     """The value of each axis in each cell."""
-    if scene.zipped:
-        return {axis.name: np.array(axis.values) for axis in scene.axes}
-    grid = np.meshgrid(*(np.array(axis.values) for axis in scene.axes), indexing="ij")
-    return {axis.name: values.reshape(-1) for axis, values in zip(scene.axes, grid, strict=True)}
+    return Planner(scene).columns(np.arange(scene.cells))
 
 
-def _spans(scene: Scene, columns: dict[str, np.ndarray]) -> np.ndarray:
-    unit = np.ones(scene.cells)
+def _spans(scene: Scene, columns: dict[str, np.ndarray], cells: int) -> np.ndarray:
+    unit = np.ones(cells)
     if scene.time_unit == "period":
-        omega = columns.get("omega", np.full(scene.cells, scene.omega or 0.0))
+        omega = columns.get("omega", np.full(cells, scene.omega or 0.0))
         if np.any(omega == 0.0):
             raise ValueError("a window in drive periods needs omega > 0, found 0; set time_unit = 'time'")
         unit = 2.0 * math.pi / np.abs(omega)

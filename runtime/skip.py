@@ -20,13 +20,42 @@ from synchain.models.scene import Scene
 from .plan import Plan
 from .result import Buffers
 
-__all__ = ["Skip", "decide", "explain"]
+__all__ = ["Merged", "Skip", "decide", "explain"]
 
 DIVERGED = "diverged: the cell ends as soon as its state is out of bounds"
 PERIODIC = (
     "periodic: a cell that repeats itself bit for bit from one period of the drive to a later one jumps over whole cycles, "
     "before the window always, inside it where neither section nor trajectory is recorded"
 )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Merged:
+    """Which oscillators were stepped as one: `states` and `places` of a Skip; `together` where all of them were."""
+
+    states: np.ndarray
+    places: np.ndarray
+    together: bool
+
+    def expand(self, buffers: Buffers) -> Buffers:
+        """What the kernel wrote, for the whole network; the same arrays where nothing was merged."""
+        made = self.take(buffers, self.places)
+        if self.together:
+            made = replace(made, sums=made.sums.copy())
+            made.sums[made.counts[:, 0] != 0, :3] = 0.0  # oscillators that are one have no distance
+        return made
+
+    def take(self, buffers: Buffers, columns: np.ndarray) -> Buffers:
+        """The buffers of a network whose states are these columns of another one's."""
+        if len(self.states) == len(self.places):
+            return buffers
+        points = np.concatenate([[0], columns + 1])  # the time of the point comes first
+        return replace(
+            buffers,
+            end=np.take(buffers.end, columns, axis=1),
+            points=np.take(buffers.points, points, axis=2),
+            samples=np.take(buffers.samples, columns, axis=2),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,28 +94,19 @@ class Skip:
             numbers = np.take(numbers, self.numbers, axis=1)
         return replace(whole, start=start, numbers=numbers)
 
+    @property
+    def merged(self) -> Merged:
+        """How the reduced network's results become those of the whole one."""
+        together = "sync_error" in self.scene.record and "sync_error" not in self.records
+        return Merged(self.states, self.places, together)
+
     def expand(self, buffers: Buffers) -> Buffers:
         """What the kernel wrote, for the whole network; the same arrays where nothing was merged."""
-        made = self._take(buffers, self.places)
-        if "sync_error" in self.scene.record and "sync_error" not in self.records:
-            made = replace(made, sums=made.sums.copy())
-            made.sums[made.counts[:, 0] != 0, :3] = 0.0  # oscillators that are one have no distance
-        return made
+        return self.merged.expand(buffers)
 
     def contract(self, buffers: Buffers) -> Buffers:
         """The way back: the part of the whole network's results that the reduced network has."""
-        return self._take(buffers, self.states)
-
-    def _take(self, buffers: Buffers, columns: np.ndarray) -> Buffers:
-        if len(self.states) == len(self.places):
-            return buffers
-        points = np.concatenate([[0], columns + 1])  # the time of the point comes first
-        return replace(
-            buffers,
-            end=np.take(buffers.end, columns, axis=1),
-            points=np.take(buffers.points, points, axis=2),
-            samples=np.take(buffers.samples, columns, axis=2),
-        )
+        return self.merged.take(buffers, self.states)
 
 
 def decide(scene: Scene, skip: bool = True, fold_all: bool = False) -> Skip:

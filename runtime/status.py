@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = ["Status"]
+import numpy as np
+
+__all__ = ["CODES", "Status", "tally"]
+
+CODES = 16
+"""Room for codes where they are counted, also in files: more than there are, so that new ones find a place."""
 
 
 class Status(IntEnum):
@@ -35,3 +40,8 @@ _MESSAGES = {
     "check the friction law",
     Status.INTERRUPTED: "stopped by the user before the end; run again with resume",
 }
+
+
+def tally(codes: np.ndarray) -> np.ndarray:
+    """How many cells (CODES,) ended with each code."""
+    return np.bincount(codes, minlength=CODES)

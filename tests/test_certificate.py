@@ -83,21 +83,21 @@ def test_when_an_early_end_is_safe() -> None:
 
 
 def test_an_interrupted_run_is_resumed_with_its_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import synchain.runtime.sweep as sweep
+    from synchain.runtime.work import Workshop
 
-    drive, calls = sweep.Job.drive, []
+    work, calls = Workshop.run, []
 
-    def stop(job: object, first: int, last: int) -> int:
-        calls.append(first)
+    def stop(shop: Workshop, cells: np.ndarray, *more: np.ndarray) -> object:
+        calls.append(cells)
         if len(calls) > 1:
             raise KeyboardInterrupt
-        return drive(job, first, last)  # type: ignore[arg-type]
+        return work(shop, cells, *more)
 
     grid = np.linspace(0.02, 0.2, 40)
-    monkeypatch.setattr(sweep.Job, "drive", stop)
+    monkeypatch.setattr(Workshop, "run", stop)
     with pytest.raises(SweepInterrupted) as caught:
         run(scene(transient=60.0, window=5.0), sigma=grid, certified=True, workers=1, show_progress=False)
-    monkeypatch.setattr(sweep.Job, "drive", drive)
+    monkeypatch.setattr(Workshop, "run", work)
     caught.value.result.save(tmp_path / "part.nc")
     part = open_result(tmp_path / "part.nc")
     assert 0 < (part.status.values == 1).sum() < 40

@@ -16,7 +16,7 @@ import sympy as sp
 
 from synchain.models import chain, load_scene, scene_names
 from synchain.models.topology import names as families
-from synchain.runtime import commands, open_result, sweep, threshold
+from synchain.runtime import commands, kernels, open_result, streaming, sweep, threshold, work
 from synchain.runtime.cli import main
 from synchain.runtime.commands._outcome import print_json
 
@@ -169,7 +169,7 @@ def test_equations_in_three_forms(capsys: pytest.CaptureFixture[str]) -> None:
 def test_kernel_prints_the_source_without_compiling(
     scene: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delattr(sweep, "load")
+    monkeypatch.delattr(kernels, "load")
     assert main(["kernel", scene]) == 0
     out = capsys.readouterr().out
     assert out == sweep.kernel_source(load_scene(scene)).text
@@ -216,15 +216,15 @@ def test_cells_that_fail_are_said_and_the_file_is_still_written(
 
 def interrupt_after(monkeypatch: pytest.MonkeyPatch, chunks: int) -> list[int]:
     """Press Ctrl-C when so many chunks of cells have run; the list counts the cells that were driven."""
-    real, driven = sweep.Job.drive, []
+    real, driven = work.Workshop.run, []
 
-    def drive(job: sweep.Job, first: int, last: int) -> int:
+    def run(shop: work.Workshop, cells: np.ndarray, *more: Any) -> Any:
         if len(driven) == chunks:
             raise KeyboardInterrupt
-        driven.append(last - first)
-        return real(job, first, last)
+        driven.append(len(cells))
+        return real(shop, cells, *more)
 
-    monkeypatch.setattr(sweep.Job, "drive", drive)
+    monkeypatch.setattr(work.Workshop, "run", run)
     return driven
 
 
@@ -239,7 +239,7 @@ def test_an_interrupted_run_is_kept_and_resumed(
     done = driven[0]
     assert 0 < done < 20
     assert f"interrupted with {done} of 20 cells finished" in err
-    assert [path.name for path in (tmp_path / "cut").iterdir()] == ["short.partial.nc"]
+    assert [path.name for path in (tmp_path / "cut").iterdir()] == ["short.partial"]
     again = err.rpartition("continue with: synchain ")[2].split()
     assert again == [*words, "--resume"]
     with monkeypatch.context() as patch:
@@ -508,7 +508,7 @@ def test_a_scene_in_separate_parts_is_allowed_but_said(
     def stop(*words: Any, **options: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sweep, "run", stop)
+    monkeypatch.setattr(streaming, "stream", stop)
     matrix(tmp_path, SEPARATE)
     Path(scene).write_text(SCENE.replace('name = "chain"\nn = 2', 'file = "G.txt"'))
     assert main(["run", scene, "--out", str(tmp_path / "out")]) == 1

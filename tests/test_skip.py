@@ -282,7 +282,7 @@ def test_explain_runs_where_there_is_a_folder_and_no_skip_runs_everything(tmp_pa
         assert data.sizes["state"] == 6
     assert main([*words, "--no-skip", "--resume"]) == 2
     assert "left out other parts of its scene: forcing: u = 0" in capsys.readouterr().err
-    assert main([*words, "--no-skip"]) == 0
+    assert main([*words, "--no-skip", "--overwrite"]) == 0
     with xr.open_dataset(tmp_path / "out" / "mirror.nc") as data:
         assert data.attrs["skipped"] == "nothing"
 

@@ -11,8 +11,7 @@ import pytest
 import xarray as xr
 
 from synchain.models import Scene, chain
-from synchain.runtime import Status, SweepInterrupted, kernel, open_result, run
-from synchain.runtime import sweep as sweep_module
+from synchain.runtime import Status, SweepInterrupted, crew, kernel, open_result, run, work
 from synchain.runtime.plan import plan, tolerances
 
 PAIR = Scene(topology=chain(2), transient=5, window=10, parameters={"sigma": 0.1})
@@ -82,7 +81,7 @@ def test_every_status_has_a_sentence():
 def test_section_room_grows_to_what_a_cell_needs(monkeypatch):
     whole = run(SECTIONS, sigma=[0.0, 0.1, 0.2])
     assert int(whole.section_count.min()) > 3
-    monkeypatch.setattr(sweep_module, "_room", lambda scene: 2)
+    monkeypatch.setattr(work, "_room", lambda scene: 2)
     grown = run(SECTIONS, sigma=[0.0, 0.1, 0.2])
     assert grown.data.identical(whole.data)
 
@@ -103,7 +102,7 @@ def test_continuation_starts_from_the_neighbour(direction):
 def test_continuation_keeps_its_states_where_room_grows(monkeypatch):
     scene = SECTIONS.replace(axes={"sigma": [0.02, 0.05, 0.08]}, continuation="up")
     whole = run(scene)
-    monkeypatch.setattr(sweep_module, "_room", lambda scene: 2)
+    monkeypatch.setattr(work, "_room", lambda scene: 2)
     assert run(scene).data.identical(whole.data)
 
 
@@ -161,17 +160,17 @@ def interruptible():
 
 def test_interrupt_keeps_finished_cells_and_resume_completes_them(monkeypatch, interruptible):
     scene = SECTIONS.replace(transient=50, window=50, axes={"sigma": list(np.linspace(0, 0.3, 200))})
-    collect = sweep_module._collect
+    following = crew._next
 
-    def collect_then_interrupt(running, advance):
-        left = collect(running, advance)
+    def next_then_interrupt(arrived):
+        future = following(arrived)
         os.kill(os.getpid(), signal.SIGINT)
-        return left
+        return future
 
-    monkeypatch.setattr(sweep_module, "_collect", collect_then_interrupt)
-    with pytest.raises(SweepInterrupted) as caught:
-        run(scene, workers=1)
-    monkeypatch.setattr(sweep_module, "_collect", collect)
+    with monkeypatch.context() as patch:
+        patch.setattr(crew, "_next", next_then_interrupt)
+        with pytest.raises(SweepInterrupted) as caught:
+            run(scene, workers=1)
     partial = caught.value.result
     finished = partial.status.values == Status.FINISHED
     assert 0 < finished.sum() < 200

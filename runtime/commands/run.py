@@ -3,27 +3,34 @@
 from __future__ import annotations
 
 import shlex
+import signal
 import sys
-import time
+import threading
 from argparse import ArgumentParser, Namespace
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..files import output_folder, whole_file
 from ._arguments import add_scene, add_workers, folder, setting, tolerance
 from ._outcome import FAILED, FINE, Failed, WrongUse, warn, wrong_use
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from synchain.models.scene import Scene
 
-    from ..result import Result
+    from ..sitting import SweepFailed, SweepInterrupted
     from ..skip import Skip
+    from ..streaming import Streamed
 
 SUMMARY = "run a scene; write its results (netCDF) and a figure"
 EXAMPLES = (
     "synchain run figure_4a --out results",
     "synchain run two_oscillators --out results --set sigma=0:0.6:61 omega=1.4 --rtol 1e-9",
     "synchain run figure_4a --out results --resume",
+    "synchain run figure_4a --out results --dask tcp://192.168.0.1:8786",
     "synchain run figure_4a --explain",
 )
 
@@ -34,8 +41,8 @@ SETTINGS = ("transient", "window", "samples", "atol", "max_steps")
 def configure(parser: ArgumentParser) -> None:
     """Add scene, folder and changes to the scene."""
     parser.usage = (
-        "synchain run SCENE --out DIR [--rtol X] [--workers N] [--set NAME=VALUE ...] [--resume]\n"
-        "                    [--certify] [--no-skip] [--explain]\n"
+        "synchain run SCENE --out DIR [--rtol X] [--workers N] [--set NAME=VALUE ...]\n"
+        "                    [--resume | --overwrite] [--dask ADDRESS] [--certify] [--no-skip] [--explain]\n"
         "       synchain run SCENE --explain [--rtol X] [--set NAME=VALUE ...] [--no-skip]"
     )
     add_scene(parser)
@@ -55,6 +62,10 @@ def configure(parser: ArgumentParser) -> None:
         + "; a,b,c or LO:HI:N sweeps a parameter or an initial state",
     )
     parser.add_argument("--resume", action="store_true", help="continue an interrupted run; finished cells are kept")
+    parser.add_argument("--overwrite", action="store_true", help="replace a result that is there already")
+    parser.add_argument(
+        "--dask", metavar="ADDRESS", help="run on the workers of a Dask scheduler, e.g. tcp://192.168.0.1:8786"
+    )
     parser.add_argument(
         "--explain", action="store_true", help="print what is left out of the scene and why; runs only with --out"
     )
@@ -68,14 +79,12 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Explain the scene where asked to; run it, save, draw, and say how the cells ended."""
-    from synchain.codegen.integrators import integrator
-
-    from ..certificate import check_certifiable
+    """Explain the scene where asked to; run it to a file, draw, and say how the cells ended."""
+    from ..sitting import SweepFailed, SweepInterrupted
     from ..skip import decide, explain
-    from ..sweep import SweepInterrupted, run
+    from ..streaming import claim, stream
 
-    if arguments.out is None and (arguments.resume or not arguments.explain):
+    if arguments.out is None and (arguments.resume or arguments.overwrite or not arguments.explain):
         raise WrongUse("the following arguments are required: --out\nsee: synchain run --help")
     with wrong_use():
         scene = changed_scene(arguments)
@@ -83,26 +92,22 @@ def execute(arguments: Namespace) -> int:
         name = Path(arguments.scene).stem if arguments.scene.endswith(".toml") else arguments.scene
         if arguments.explain:
             print(f"{name}: {_count(scene.cells, 'cell')} of {_count(scene.n, 'oscillator')}\n{explain(skip)}")
-        if scene.integrator != "auto":
-            integrator(scene.integrator)
-        if arguments.out is None:
+        target = None if arguments.out is None else Path(arguments.out, f"{name}.nc")
+        _check(skip, arguments)
+        if target is None:
             return FINE
-        target = Path(arguments.out, f"{name}.nc")
-        earlier = _earlier(skip, target) if arguments.resume else None
-        _prepare(skip, target)
-        if arguments.certify:
-            check_certifiable(scene)
+        given = {"resume": arguments.resume, "overwrite": arguments.overwrite, "certified": arguments.certify}
+        if claim(skip, target, **given) == "complete":
+            return _nothing_to_do(target)
+        output_folder(target.parent)
     warn(scene.warnings)
-    began = time.perf_counter()
-    try:
-        result = run(scene, workers=arguments.workers, resume=earlier, skip=skip, certified=arguments.certify)
-    except SweepInterrupted as stop:
-        raise _partial(stop.result, target, arguments) from None
-    result.save(target)
-    _drop_unfinished(scene, target)
-    files = (target, _draw(result, target.with_suffix(".png")))
-    _summary(name, result, time.perf_counter() - began, files)
-    return FINE if result.success else FAILED
+    with stopped_by_signals(), _executor(arguments.dask) as executor:
+        try:
+            done = stream(scene, target, skip=skip, workers=arguments.workers, executor=executor, **given)
+        except (SweepInterrupted, SweepFailed) as stop:
+            raise _stopped(stop, target, arguments) from None
+    _summary(name, scene, done, (target, _draw(target)))
+    return FINE if done.success else FAILED
 
 
 def changed_scene(arguments: Namespace) -> Scene:
@@ -142,104 +147,123 @@ def _fitting(scene: Scene, name: str, value: float | tuple[float, ...]) -> Any:
     return int(value) if name in ("samples", "max_steps") and value.is_integer() else value
 
 
-def _prepare(skip: Skip, target: Path) -> None:
-    """Find out whatever can go wrong before the first cell runs, then make the folder."""
-    from ..files import output_folder
-    from ..plan import plan
-    from ..sweep import kernel_source
+def _check(skip: Skip, arguments: Namespace) -> None:
+    """Find out whatever can go wrong before the first cell runs."""
+    from synchain.codegen.integrators import integrator
 
-    plan(skip.scene)
+    from ..certificate import check_certifiable
+    from ..kernels import kernel_source
+    from ..plan import Planner
+
+    if skip.scene.integrator != "auto":
+        integrator(skip.scene.integrator)
+    if arguments.out is None:
+        return
+    Planner(skip.scene).extremes()
     kernel_source(skip.scene, skip=skip)
-    output_folder(target.parent)
-    if target.is_dir():
-        raise WrongUse(f"{target} is a folder; expected a file or nothing there; choose another --out")
+    if arguments.certify:
+        check_certifiable(skip.scene)
 
 
-def _unfinished(target: Path) -> Path:
-    """Where an interrupted run is kept: beside the result, which may be an earlier, complete one."""
-    return target.with_suffix(".partial.nc")
-
-
-def _drop_unfinished(scene: Scene, target: Path) -> None:
-    """Delete the interrupted run that this one has replaced; one of another scene stays."""
+def _nothing_to_do(target: Path) -> int:
+    """Say that the result is there already; the exit code of the run that made it."""
     from ..result import open_result
 
-    kept = _unfinished(target)
-    if kept.exists():
-        with suppress(OSError, ValueError):
-            if open_result(kept).belongs_to(scene):
-                kept.unlink()
+    kept = open_result(target)
+    print(f"{target} holds the result of this scene already; nothing was run (--overwrite runs it again)")
+    print(f"  made with {kept.data.attrs['versions']}\n  {kept.message}")
+    return FINE if kept.success else FAILED
 
 
-def _earlier(skip: Skip, target: Path) -> Result:
-    """The result to resume; ValueError where it belongs to another scene or left out other parts of it."""
-    from ..result import open_result
-
-    found = next((path for path in (_unfinished(target), target) if path.exists()), None)
-    if found is None:
-        raise WrongUse(f"nothing to resume: {target} does not exist; run without --resume")
-    earlier = open_result(found)
-    if not earlier.belongs_to(skip.scene):
-        raise WrongUse(f"{found} belongs to another scene; repeat the options of that run, or run without --resume")
-    if not earlier.stepped(skip.equations):
-        raise WrongUse(
-            f"{found} left out other parts of its scene: {earlier.data.attrs.get('skipped', 'nothing')}; "
-            "repeat that run's --no-skip (or its absence), or run without --resume"
-        )
-    return earlier
+@contextmanager
+def stopped_by_signals() -> Iterator[None]:
+    """SIGTERM, with which batch systems announce the end, stops like Ctrl-C."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
-def _partial(result: Result, target: Path, arguments: Namespace) -> Failed:
-    """Save what an interrupted run has done; what to say about it."""
-    from ..status import Status
+@contextmanager
+def _executor(address: str | None) -> Iterator[Executor | None]:
+    """The workers of a Dask scheduler; None, for threads, where no address is given."""
+    if address is None:
+        yield None
+        return
+    try:
+        from distributed import Client
+    except ModuleNotFoundError:
+        raise Failed(
+            '--dask needs the package distributed; install it: python -m pip install "synchain[dask]"'
+        ) from None
+    try:
+        client = Client(address, timeout=10)
+    except (OSError, ValueError, TypeError) as problem:
+        raise Failed(f"no Dask scheduler answers at {address}: {problem}") from None
+    try:
+        if not client.nthreads():
+            raise Failed(f"the Dask scheduler at {address} has no workers; start some: dask worker {address}")
+        yield client.get_executor()
+    finally:
+        client.close()
 
-    done = int((result.status == Status.FINISHED).sum())
-    if done == 0:
-        return Failed("interrupted before any cell had finished; nothing was written")
-    kept = _unfinished(target)
-    result.save(kept)
-    again = shlex.join([*arguments.command_line, *(() if arguments.resume else ("--resume",))])
-    return Failed(
-        f"interrupted with {done} of {result.scene.cells} cells finished, kept in {kept}\ncontinue with: {again}"
-    )
+
+def _stopped(stop: SweepInterrupted | SweepFailed, target: Path, arguments: Namespace) -> Failed:
+    """What to say about a run that did not come to its end, and how to go on."""
+    from ..unfinished import partial_path
+
+    words = [word for word in arguments.command_line if word != "--overwrite"]
+    again = shlex.join([*words, *(() if arguments.resume else ("--resume",))])
+    partial = partial_path(target)
+    kept = f"{stop.finished} of {stop.cells} cells finished, kept in {partial}\ncontinue with: {again}"
+    if stop.finished == 0:
+        partial.unlink(missing_ok=True)
+        kept = "no cell had finished; nothing was written"
+    return Failed(f"interrupted with {kept}" if isinstance(stop, KeyboardInterrupt) else f"{stop.reason}; {kept}")
 
 
-def _draw(result: Result, path: Path) -> Path:
-    """Write the figure of a result."""
+def _draw(target: Path) -> Path:
+    """Write the figure of a result, which is read from its file as far as it is drawn."""
     import matplotlib
+    import xarray as xr
 
     matplotlib.use("Agg")
     from ..figures.result_plot import draw_result
-    from ..files import whole_file
+    from ..labels import scene_of
+    from ..result import Result
 
-    axes = draw_result(result)
-    with whole_file(path) as temporary:
-        axes.figure.savefig(temporary, dpi=150)
+    path = target.with_suffix(".png")
+    with xr.open_dataset(target, engine="scipy") as data:
+        axes = draw_result(Result(data, scene_of(data.attrs)))
+        with whole_file(path) as temporary:
+            axes.figure.savefig(temporary, dpi=150)
     return path
 
 
-def _summary(name: str, result: Result, seconds: float, files: tuple[Path, ...]) -> None:
+def _summary(name: str, scene: Scene, done: Streamed, files: tuple[Path, ...]) -> None:
     """Say how many cells ended how, failures on stderr, and where the files are."""
-    import numpy as np
-
-    from ..certificate import VERDICTS
     from ..status import Status
 
-    scene = result.scene
-    print(f"{name}: {_count(scene.cells, 'cell')} of {_count(scene.n, 'oscillator')} in {seconds:.1f} s")
-    codes, counts = np.unique(result.status.values, return_counts=True)
-    for code, count in zip(codes, counts.tolist(), strict=True):
-        status = Status(int(code))
+    progress = done.progress
+    times = f"{progress.running:.1f} s, after {progress.compiling:.1f} s for the kernel"
+    earlier = f", {progress.kept} of them in an earlier run" if progress.kept else ""
+    print(f"{name}: {_count(scene.cells, 'cell')} of {_count(scene.n, 'oscillator')} in {times}{earlier}")
+    for status, count in progress.statuses.items():
         words = f"{_count(count, 'cell')}: {status.message}"
         if status == Status.FINISHED:
             print(f"  {words}")
         else:
             print(f"synchain run: {words}", file=sys.stderr)
-    if "verdict" in result.data:
-        early = int((result.data.ended_early.values != 0).sum())
+    early = done.verdicts.get("ended early")
+    if early is not None:
         print(f"  {_count(early, 'cell')} of these ended early, certain to stay synchronous")
-        for code, count in zip(*np.unique(result.data.verdict.values, return_counts=True), strict=True):
-            print(f"  {_count(int(count), 'cell')} {VERDICTS[code]}")
+    for verdict, count in done.verdicts.items():
+        if verdict != "ended early":
+            print(f"  {_count(count, 'cell')} {verdict}")
     for file in files:
         print(f"  {file}")
 

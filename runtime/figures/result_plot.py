@@ -16,6 +16,8 @@ __all__ = ["KINDS", "draw_result"]
 KINDS = ("error", "section", "map", "phase", "end")
 CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
 SIZE = (4.8, 3.4)
+FINEST = 1000
+"""Values of each axis of a map that are drawn; a figure has fewer points than that."""
 MARKED = 60
 """Up to so many cells are marked by a dot each."""
 
@@ -71,6 +73,10 @@ def _cut(result: Result, keep: int) -> tuple[xr.Dataset, str]:
     leading = data.status.dims[: max(data.status.ndim - keep, 0)]
     words = ", ".join(f"{name} = {float(data[name][0]):.4g}" for name in leading)
     data = data.isel({name: 0 for name in leading})
+    steps = {str(d): -(-data.sizes[d] // FINEST) for d in data.status.dims if keep > 1}
+    data = data.isel({name: slice(None, None, step) for name, step in steps.items()})
+    thinned = ", ".join(f"every {step}th {name}" for name, step in steps.items() if step > 1)
+    words = "; ".join(filter(None, [words, thinned]))
     good = data.status == Status.FINISHED
     numbers = [name for name, values in data.items() if values.dtype.kind == "f"]
     return data.assign({name: data[name].where(good) for name in numbers}), words

@@ -1,0 +1,50 @@
+"""Which kernel a scene needs: its text, or the text compiled."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from synchain.codegen.emit import AUTO, KernelSource, emit
+from synchain.codegen.load import Kernel, load
+from synchain.models.scene import Scene
+
+from .skip import Skip, decide
+
+__all__ = ["best_integrator", "chosen_skip", "kernel", "kernel_source"]
+
+
+def kernel(scene: Scene, width: int | None = None, skip: bool | Skip = False) -> Kernel:
+    """Return the compiled kernel of a scene; scenes that differ only in numbers share it.
+
+    With `skip` it is the one that `run` uses, which leaves out what the scene does not need (see
+    `synchain.runtime.skip`).
+    """
+    return load(kernel_source(scene, width, skip))
+
+
+def kernel_source(scene: Scene, width: int | None = None, skip: bool | Skip = False) -> KernelSource:
+    """Return the text of a scene's kernel without compiling it."""
+    chosen = chosen_skip(scene, skip)
+    section = None
+    if "section" in scene.record:
+        section = sp.Symbol(chosen.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
+    sticking = scene.equations.node.contact is not None
+    best = "dop853" if sticking else best_integrator(scene.n, scene.rtol)
+    method = best if scene.integrator == "auto" else scene.integrator
+    return emit(chosen.equations, method, chosen.records, section, width, chosen.multiplicity)
+
+
+def best_integrator(n: int, rtol: float) -> str:
+    """What "auto" stands for: the fastest at equal error (docs/performance.md).
+
+    Two oscillators at a tight tolerance gain from DOP853 while none of them sticks; of more, some nearly always stick.
+    """
+    return "switching" if n == 2 and rtol <= 1e-9 else AUTO
+
+
+def chosen_skip(scene: Scene, skip: bool | Skip) -> Skip:
+    """What is left out of a scene: as decided, or as given; ValueError where that is of another scene."""
+    chosen = skip if isinstance(skip, Skip) else decide(scene, skip)
+    if chosen.scene != scene:
+        raise ValueError("skip: found the reductions of another scene; make them with decide(scene)")
+    return chosen

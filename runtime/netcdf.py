@@ -1,0 +1,117 @@
+"""A netCDF file written piece by piece: as large as the disk, with no more in memory than one piece.
+
+The form is that of netCDF "64-bit offset" files, as SciPy writes it for `Result.save`, byte for byte: the header says where
+each variable begins, then the variables follow, whole, big endian (NetCDF Classic Format Specification, Unidata).
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+from collections.abc import Mapping
+from math import prod
+from typing import Any, BinaryIO
+
+import numpy as np
+import xarray as xr
+from scipy.io import netcdf_file
+
+__all__ = ["Sheet"]
+
+DIMENSION, VARIABLE, ATTRIBUTE, ABSENT = (struct.pack(">i", tag) for tag in (10, 11, 12, 0))
+TYPES = {"b": 1, "c": 2, "h": 3, "i": 4, "l": 4, "f": 5, "d": 6}
+LARGEST = 2**32 - 4
+"""Bytes of the largest variable whose size the header can hold; of a larger one it says 2^32 - 1, and readers count."""
+
+
+class Sheet:
+    """A file for data shaped like `template` but for other lengths of some dimensions; written by `put`.
+
+    The template holds the variables, dimensions and attributes; where a length is given the template's own is not used.
+    """
+
+    def __init__(self, file: BinaryIO, template: xr.Dataset, lengths: Mapping[str, int]) -> None:
+        self.file = file
+        with netcdf_file(io.BytesIO(_bytes(template)), mmap=False) as made:
+            self.sizes = {name: lengths.get(name, size) for name, size in made.dimensions.items()}
+            shapes = {name: tuple(self.sizes[d] for d in v.dimensions) for name, v in made.variables.items()}
+            order = sorted(made.variables, key=lambda name: shapes[name], reverse=True)
+            variables = {name: made.variables[name] for name in order}
+            self.types = {name: np.dtype(v.typecode()).newbyteorder(">") for name, v in variables.items()}
+            heads = [self._head(name, v, shapes[name]) for name, v in variables.items()]
+            first = b"CDF\2" + ABSENT + _dimensions(self.sizes) + _attributes(made._attributes)
+            fixed = {name: np.array(v.data) for name, v in variables.items() if not set(v.dimensions) & set(lengths)}
+        first += VARIABLE + struct.pack(">i", len(heads))
+        place = len(first) + sum(len(head) + 8 for head in heads)
+        self.shapes, self.begins = shapes, {}
+        for name, head in zip(order, heads, strict=True):
+            first += head + struct.pack(">q", place)
+            self.begins[name] = place
+            place += -(-self._bytes(name) // 4) * 4
+        file.write(first)
+        file.truncate(place)
+        for name, values in fixed.items():
+            self._write(self.begins[name], np.asarray(values, dtype=self.types[name]))
+
+    def put(self, name: str, rows: np.ndarray, values: np.ndarray) -> None:
+        """Write rows of a variable, numbered over its leading dimensions together; values (rows, …)."""
+        values = np.ascontiguousarray(values, dtype=self.types[name])
+        length = values.nbytes // max(len(rows), 1)
+        for run in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows) != 1) + 1):
+            if len(run):
+                self._write(self.begins[name] + int(rows[run[0]]) * length, values[run[0] : run[-1] + 1])
+
+    def _write(self, place: int, values: np.ndarray) -> None:
+        self.file.seek(place)
+        self.file.write(values.tobytes())
+
+    def _bytes(self, name: str) -> int:
+        return prod(self.shapes[name]) * self.types[name].itemsize
+
+    def _head(self, name: str, variable: Any, shape: tuple[int, ...]) -> bytes:
+        """All that the header says of a variable but its place."""
+        numbers = [list(self.sizes).index(d) for d in variable.dimensions]
+        size = -(-prod(shape) * variable.itemsize() // 4) * 4
+        size = size if size <= LARGEST else 2**32 - 1
+        parts = [
+            _text(name),
+            struct.pack(f">i{len(numbers)}i", len(numbers), *numbers),
+            _attributes(variable._attributes),
+        ]
+        return b"".join([*parts, struct.pack(">iI", TYPES[variable.typecode()], size)])
+
+
+def _bytes(template: xr.Dataset) -> bytes:
+    return bytes(template.to_netcdf(engine="scipy", format="NETCDF3_64BIT"))
+
+
+def _padded(data: bytes) -> bytes:
+    return data + b"\0" * (-len(data) % 4)
+
+
+def _text(name: str) -> bytes:
+    data = name.encode()
+    return struct.pack(">i", len(data)) + _padded(data)
+
+
+def _dimensions(sizes: Mapping[str, int]) -> bytes:
+    if not sizes:
+        return ABSENT + ABSENT
+    return (
+        DIMENSION + struct.pack(">i", len(sizes)) + b"".join(_text(n) + struct.pack(">i", s) for n, s in sizes.items())
+    )
+
+
+def _attributes(values: Mapping[str, Any]) -> bytes:
+    if not values:
+        return ABSENT + ABSENT
+    return ATTRIBUTE + struct.pack(">i", len(values)) + b"".join(_text(name) + _value(v) for name, v in values.items())
+
+
+def _value(value: Any) -> bytes:
+    """An attribute: text as bytes, or numbers of any of the types."""
+    if isinstance(value, bytes):
+        return struct.pack(">ii", TYPES["c"], len(value)) + _padded(value)
+    numbers = np.atleast_1d(np.asarray(value))
+    kind = numbers.dtype.newbyteorder(">")
+    return struct.pack(">ii", TYPES[numbers.dtype.char], numbers.size) + _padded(numbers.astype(kind).tobytes())

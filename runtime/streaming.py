@@ -1,0 +1,219 @@
+"""Runs a scene to a file: blocks go to disk as they end, so that nothing that happens costs more than those in flight."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from synchain.models.scene import Scene
+
+from .crew import Task, worker_lost
+from .kernels import chosen_skip
+from .labels import provenance, scene_of
+from .layout import Layout
+from .progress import Hook, Progress, Reporter
+from .result import Buffers
+from .sitting import Prepared, Sitting, SweepFailed, SweepInterrupted, prepare
+from .skip import Skip
+from .status import Status
+from .store import Store
+from .sweep import with_axes
+from .unfinished import about, certificate_of, finish_file, layout_of, partial_path
+from .work import Start, whole
+
+__all__ = ["Streamed", "claim", "stream"]
+
+
+@dataclass(frozen=True, slots=True)
+class Streamed:
+    """A finished run: its file, how its cells ended, and how many have which verdict (only certified runs have some)."""
+
+    path: Path
+    progress: Progress
+    verdicts: Mapping[str, int]
+
+    @property
+    def success(self) -> bool:
+        """True where every cell reached the end of its window."""
+        return self.progress.statuses.get(Status.FINISHED, 0) == self.progress.cells
+
+
+def stream(
+    scene: Scene,
+    path: str | os.PathLike[str],
+    *,
+    resume: bool = False,
+    overwrite: bool = False,
+    workers: int | None = None,
+    show_progress: bool | None = None,
+    width: int | None = None,
+    skip: bool | Skip = True,
+    certified: bool = False,
+    executor: Executor | None = None,
+    progress: Hook | None = None,
+    **axes: Any,
+) -> Streamed:
+    """Run every cell of a scene and write its result to a netCDF file, block by block; memory does not grow with the sweep.
+
+    Until all cells have ended, their blocks are kept beside `path` in a file ".partial", which `open_result` opens too.
+    With `resume` such a run goes on; its result is, byte for byte, that of a run without interruption.  What is there already is
+    replaced only with `overwrite`.  The other keywords are those of `run`.
+
+    Raises the errors of `claim` where the files do not allow it, SweepInterrupted on Ctrl-C, SweepFailed where the workers
+    are lost or the disk is full.
+    """
+    chosen = chosen_skip(scene := with_axes(scene, axes), skip)
+    reporter = Reporter(scene.cells, show_progress, progress)
+    state = claim(chosen, path, resume=resume, overwrite=overwrite, certified=certified)
+    if state == "complete":
+        raise FileExistsError(
+            f"{os.fspath(path)} holds the result of this scene already; give overwrite to run it again"
+        )
+    prepared = _prepared(chosen, partial_path(path), state, certified, width=width, workers=workers, executor=executor)
+    store = Store.open(partial_path(path), writing=True)
+    try:
+        verdicts = _fill(prepared, store, executor, reporter, path)
+    finally:
+        store.close()
+        reporter.close()
+    partial_path(path).unlink()
+    return Streamed(Path(path), reporter.now, verdicts)
+
+
+def _prepared(chosen: Skip, partial: Path, state: str, certified: bool, **given: Any) -> Prepared:
+    """The kernel, the certificate (made or kept) and, of a new run, the store."""
+    if state == "continue":
+        return prepare(chosen.scene, chosen, **given, certificate=certificate_of(Store.describe(partial)) or False)
+    prepared = prepare(chosen.scene, chosen, **given, certificate=certified)
+    attributes = provenance(
+        chosen.scene, prepared.shop.kernel, prepared.limits, chosen.skipped, prepared.shop.recipe.versions
+    )
+    layout = Layout.of(chosen.scene, prepared.size())
+    Store.create(partial, about(chosen, layout, prepared.shop.samples, attributes, prepared.certificate))
+    return prepared
+
+
+def claim(
+    chosen: Skip,
+    path: str | os.PathLike[str],
+    *,
+    resume: bool = False,
+    overwrite: bool = False,
+    certified: bool = False,
+) -> str:
+    """What can be done about a result at `path`: "begin", "continue", or nothing because it is "complete".
+
+    Raises ValueError where a file there belongs to another run, FileExistsError where a run there was not finished and
+    `resume` is not given, FileNotFoundError where it is given and there is none.
+    """
+    target, partial = Path(path), partial_path(path)
+    if resume and overwrite:
+        raise ValueError("found both resume and overwrite; expected one of them")
+    if target.is_dir():
+        raise IsADirectoryError(f"{target} is a folder; expected a file or nothing there; choose another --out")
+    if overwrite:
+        return "begin"
+    if partial.exists() and (resume or not target.exists()):
+        _check_same(chosen, certified, partial, Store.describe(partial))
+        if not resume:
+            raise FileExistsError(
+                f"{partial} keeps a run of this scene that was not finished; "
+                "continue it with --resume, or start again with --overwrite"
+            )
+        return "continue"
+    if target.exists():
+        _check_same(chosen, certified, target, _described(target))
+        return "complete"
+    if resume:
+        raise FileNotFoundError(f"nothing to resume: {target} does not exist; run without --resume")
+    return "begin"
+
+
+def _described(target: Path) -> dict[str, Any]:
+    """Of a finished result what a store says of an unfinished one."""
+    try:
+        with xr.open_dataset(target, engine="scipy") as file:
+            attributes, certified = dict(file.attrs), "transversal_exponent" in file
+    except (OSError, ValueError, TypeError, KeyError) as problem:
+        raise OSError(f"cannot read {target} as a netCDF result: {problem}; choose another --out") from problem
+    if "scene" not in attributes:
+        raise ValueError(f"{target} is no synchain result; choose another --out, or replace it with --overwrite")
+    return {"attributes": attributes, "certificate": certified or None}
+
+
+def _check_same(chosen: Skip, certified: bool, path: Path, told: Mapping[str, Any]) -> None:
+    """Raise ValueError where a file is not that of this run."""
+    kept = told["attributes"]
+    again = "repeat the options of that run, choose another --out, or replace it with --overwrite"
+    if scene_of(kept).replace(title="") != chosen.scene.replace(title=""):
+        raise ValueError(f"{path} belongs to another scene ({kept['title']}); {again}")
+    if kept["equations"] != chosen.equations.digest:
+        raise ValueError(
+            f"{path} left out other parts of its scene: {kept.get('skipped', 'nothing')}; "
+            f"{again.replace('the options of that run', 'its --no-skip (or the absence of it)')}"
+        )
+    if (told["certificate"] is not None) != certified:
+        found = "with" if told["certificate"] is not None else "without"
+        raise ValueError(f"{path} was run {found} --certify; {again}")
+
+
+@dataclass(slots=True)
+class _Disk:
+    """Keeps the blocks of a sweep in a store."""
+
+    layout: Layout
+    store: Store
+
+    def missing(self, block: int) -> np.ndarray:
+        return self.layout.rows(block)
+
+    def ends(self, block: int) -> Start:
+        made = self.store.read(block)
+        return made.end, made.counts[:, 0] == Status.FINISHED
+
+    def put(self, task: Task, made: Buffers) -> None:
+        if whole(made):
+            self.store.append(task.block, made)
+
+
+def _fill(
+    prepared: Prepared, store: Store, executor: Executor | None, reporter: Reporter, path: str | os.PathLike[str]
+) -> dict[str, int]:
+    """Run what the store lacks, then write the result; returns the verdicts."""
+    scene = prepared.shop.recipe.chosen.scene
+    _check_kernel(prepared, store)
+    layout = layout_of(store.about, scene)
+    reporter.start(store.counts)
+    sitting = Sitting(layout, store.done, _Disk(layout, store), reporter, prepared.certificate)
+    try:
+        sitting.run(prepared.shop, executor, prepared.workers)
+        return finish_file(store, path)
+    except KeyboardInterrupt:
+        raise SweepInterrupted(int(store.counts.sum()), scene.cells) from None
+    except Exception as problem:
+        if not (worker_lost(problem) or isinstance(problem, OSError)):
+            raise
+        reason = f"the workers are lost ({problem})"
+        if isinstance(problem, OSError) and not worker_lost(problem):
+            where = problem.filename or store.path
+            reason = f"cannot write {where}: {problem.strerror}" if problem.strerror else str(problem)
+        raise SweepFailed(reason, int(store.counts.sum()), scene.cells) from problem
+
+
+def _check_kernel(prepared: Prepared, store: Store) -> None:
+    """Raise ValueError where a store's cells were run by another kernel, or another version of what it is made with."""
+    recipe, kept = prepared.shop.recipe, store.about["attributes"]
+    if kept["lanes"] == recipe.width and kept["kernel"] != recipe.digest:
+        raise ValueError(f"{store.path} was begun with another kernel; replace it with --overwrite")
+    if kept["versions"] != recipe.versions:
+        raise ValueError(
+            f"{store.path} was begun with {kept['versions']}; found {recipe.versions}: the two parts of the sweep might "
+            "differ; install those versions, or replace it with --overwrite"
+        )

@@ -1,0 +1,150 @@
+"""From the blocks of a sweep on disk to a result: of all cells so far in memory, or of all cells in a netCDF file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from synchain.models.scene import Scene
+
+from .certificate import VERDICTS, Certificate
+from .files import whole_file
+from .labels import MEANINGS, Variable, coordinates, dimensions, scene_of, variables
+from .layout import Layout
+from .netcdf import Sheet
+from .plan import Planner
+from .result import Buffers, Result, gather
+from .skip import Merged, Skip
+from .store import Store
+
+__all__ = ["about", "certificate_of", "finish_file", "layout_of", "open_unfinished", "partial_path"]
+
+
+def about(
+    chosen: Skip, layout: Layout, samples: int, attributes: Mapping[str, Any], certificate: Certificate | None
+) -> dict[str, Any]:
+    """What a store has to say of its sweep, in JSON types, so that it can be read without the kernel."""
+    merged = chosen.merged
+    few = len(merged.states) < len(merged.places)
+    return {
+        "attributes": dict(attributes),
+        "blocks": layout.blocks,
+        "size": layout.size,
+        "dimension": len(merged.states),
+        "samples": samples,
+        "merged": [merged.states.tolist(), merged.places.tolist()] if few else None,
+        "together": merged.together,
+        "certificate": None if certificate is None else [
+            part.tolist() for part in (certificate.exponent, certificate.stderr, certificate.diffusion)
+        ],
+    }  # fmt: skip
+
+
+def layout_of(told: Mapping[str, Any], scene: Scene) -> Layout:
+    """The blocks of a store."""
+    return Layout.of(scene, int(told["size"]))
+
+
+def certificate_of(told: Mapping[str, Any]) -> Certificate | None:
+    """The certificate of a store's cells, None where they are not certified."""
+    found = told["certificate"]
+    return None if found is None else Certificate(*(np.array(part, dtype=float) for part in found))
+
+
+class _Reader:
+    """Reads blocks of a store as those of the whole network."""
+
+    def __init__(self, store: Store) -> None:
+        told = store.about
+        self.store, self.scene = store, scene_of(told["attributes"])
+        self.layout, self.certificate = layout_of(told, self.scene), certificate_of(told)
+        self.planner = Planner(self.scene)
+        same = np.arange(int(told["dimension"]))
+        states, places = (same, same) if told["merged"] is None else map(np.array, told["merged"])
+        self.merged = Merged(states, places, bool(told["together"]))
+
+    def buffers(self, block: int) -> Buffers:
+        return self.merged.expand(self.store.read(block))
+
+    def variables(self, rows: np.ndarray, buffers: Buffers) -> Iterator[Variable]:
+        own = None if self.certificate is None else self.certificate.take(rows)
+        return variables(self.scene, self.planner.rows(rows).spans, buffers, own, self.store.most)
+
+
+def open_unfinished(path: str | os.PathLike[str]) -> Result:
+    """The cells so far of a sweep on disk; the others have the status NOT_RUN."""
+    store = Store.open(path)
+    try:
+        reader = _Reader(store)
+        scene = reader.scene
+        whole = Buffers.empty(scene.cells, len(reader.merged.places), store.most, int(store.about["samples"]))
+        for block in np.flatnonzero(store.done).tolist():
+            rows, made = reader.layout.rows(block), reader.buffers(block)
+            for target, source in zip(whole.arrays(), made.arrays(), strict=True):
+                target[(rows, slice(source.shape[1]))] = source
+        spans = reader.planner.rows(np.arange(scene.cells)).spans
+        return gather(scene, store.about["attributes"], spans, whole, reader.certificate)
+    finally:
+        store.close()
+
+
+def finish_file(store: Store, path: str | os.PathLike[str]) -> dict[str, int]:
+    """Write the netCDF file of a store whose blocks are all there, one block in memory at a time.
+
+    Returns how many cells have which verdict, and how many "ended early"; empty where the cells are not certified.
+    """
+    reader = _Reader(store)
+    scene = reader.scene
+    told: dict[str, int] = {}
+    axes = {axis.name: len(axis) for axis in scene.axes}
+    lengths = {"cell": scene.cells} if scene.zipped else axes
+    with whole_file(path) as temporary, open(temporary, "wb") as file:
+        sheet = Sheet(file, _template(reader), lengths)
+        for axis in scene.axes:
+            sheet.put(axis.name, np.arange(len(axis)), np.array(axis.values))
+        for block in range(reader.layout.blocks):
+            rows = reader.layout.rows(block)
+            for name, _, values in reader.variables(rows, reader.buffers(block)):
+                sheet.put(name, rows, values)
+                for word, count in _words(name, values):
+                    told[word] = told.get(word, 0) + count
+        file.flush()
+        os.fsync(file.fileno())
+    return told
+
+
+def _template(reader: _Reader) -> xr.Dataset:
+    """The result of the first cell alone."""
+    scene = reader.scene
+    one = np.arange(1)
+    first = Buffers(*(array[:1] for array in reader.buffers(0).arrays()))
+    dims, ones = dimensions(scene), (1,) * len(scene.shape)
+    data = {
+        name: ((*dims, *more), values[:1].reshape((*ones, *values.shape[1:])), {"long_name": MEANINGS[name]})
+        for name, more, values in reader.variables(one, first)
+    }
+    made = coordinates(scene)
+    for axis in scene.axes:
+        dim, values = made[axis.name]
+        made[axis.name] = (dim, values[:1])
+    return xr.Dataset(data, made, reader.store.about["attributes"])
+
+
+def _words(name: str, values: np.ndarray) -> list[tuple[str, int]]:
+    """What a block adds to the count of verdicts."""
+    if name == "ended_early":
+        return [("ended early", int(np.count_nonzero(values)))]
+    if name == "verdict":
+        codes, counts = np.unique(values, return_counts=True)
+        return [(VERDICTS[code], int(count)) for code, count in zip(codes, counts, strict=True)]
+    return []
+
+
+def partial_path(path: str | os.PathLike[str]) -> Path:
+    """Where the blocks of a run are kept until its result is written: beside the result."""
+    return Path(path).with_suffix(".partial")

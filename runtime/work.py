@@ -1,0 +1,204 @@
+"""What a worker does: from a recipe it makes the kernel, then it runs the blocks that it is given.
+
+A worker is a thread, another process or another machine.  Where it does not share our memory it gets the recipe of a sweep
+once, packed, and makes the kernel itself, from its own installation and through its own cache; of a block it gets the
+numbers of the cells.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import io
+import math
+import pickle
+import threading
+from collections import OrderedDict
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from synchain.codegen.load import Kernel
+from synchain.models.plugins import allow_code, allowed_code
+from synchain.models.scene import Scene
+from synchain.models.topology import Topology
+
+from .kernels import kernel, kernel_source
+from .plan import CANCEL, Plan, Planner, control_array, tolerances
+from .result import Buffers
+from .skip import Skip
+from .status import Status
+
+__all__ = ["Recipe", "Start", "Workshop", "forget", "run_block", "versions"]
+
+DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
+KEPT = 8
+"""Sweeps that a worker process remembers; an older one is sent to it again."""
+
+Start = tuple[np.ndarray, np.ndarray]
+"""States (cells, dimension) to start from in place of the scene's, and for which cells (cells,) they are good."""
+
+_shops: OrderedDict[str, Workshop] = OrderedDict()
+_lock = threading.Lock()
+
+
+class _Pickler(pickle.Pickler):
+    """Leaves behind how a graph's spectrum is found, which may be a function without a name and which no worker needs."""
+
+    def reducer_override(self, value: Any) -> Any:
+        if isinstance(value, Topology):
+            return Topology, (value.name, value.n, value.links, value.options)
+        return NotImplemented
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """What all blocks of a sweep have in common; `digest` is that of the kernel's text, `code` are files allowed to run."""
+
+    chosen: Skip
+    width: int
+    digest: str
+    versions: str
+    code: tuple[str, ...]
+
+    @classmethod
+    def of(cls, chosen: Skip, source_width: int, digest: str) -> Recipe:
+        """The recipe of a sweep in this process."""
+        return cls(chosen, source_width, digest, versions(), allowed_code())
+
+    def packed(self) -> bytes:
+        """As bytes, for a worker elsewhere."""
+        target = io.BytesIO()
+        head = {"versions": self.versions, "code": self.code, "width": self.width, "digest": self.digest}
+        pickle.dump(head, target)
+        _Pickler(target).dump(self.chosen)
+        return target.getvalue()
+
+    @classmethod
+    def unpacked(cls, data: bytes) -> Recipe:
+        """From bytes; RuntimeError where this worker has other versions than who packed them."""
+        source = io.BytesIO(data)
+        head = pickle.load(source)
+        if head["versions"] != versions():
+            raise RuntimeError(
+                f"this worker has {versions()}; expected the versions of the main program, {head['versions']}: "
+                "a sweep needs the same installation everywhere"
+            )
+        allow_code(*head["code"])
+        return cls(pickle.load(source), **head)
+
+
+@dataclass(slots=True)
+class Workshop:
+    """A kernel, ready to run any cells of its sweep."""
+
+    recipe: Recipe
+    kernel: Kernel = field(init=False)
+    planner: Planner = field(init=False)
+    control: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        chosen, scene = self.recipe.chosen, self.recipe.chosen.scene
+        source = kernel_source(scene, self.recipe.width, chosen)
+        if source.digest != self.recipe.digest:
+            raise RuntimeError(
+                f"this worker makes the kernel {source.digest[:12]}; expected that of the main program, "
+                f"{self.recipe.digest[:12]}: a sweep needs the same installation everywhere"
+            )
+        self.kernel = kernel(scene, self.recipe.width, chosen)
+        self.planner = Planner(scene)
+        limits = tolerances(scene, self.planner.extremes().numbers)
+        direction = DIRECTIONS[scene.section.direction]
+        self.control = control_array(*limits, _max_step(scene), scene.max_steps, direction, chosen.jumps)
+
+    @property
+    def samples(self) -> int:
+        """Points of a trajectory, 0 where none is recorded."""
+        scene = self.recipe.chosen.scene
+        return scene.samples if "trajectory" in scene.record else 0
+
+    def cancel(self) -> None:
+        """End all cells that run in this process."""
+        self.control[CANCEL] = 1.0
+
+    def blank(self, cells: int, room: int | None = None) -> Buffers:
+        """Buffers for so many cells, with the room for section points that they have at first."""
+        chosen = self.recipe.chosen
+        return Buffers.empty(cells, len(chosen.states), _room(chosen.scene) if room is None else room, self.samples)
+
+    def run(self, cells: np.ndarray, start: Start | None = None, near: np.ndarray | None = None) -> Buffers:
+        """Run these cells; `near` (cells,) is the last column of their spans."""
+        rows = self.recipe.chosen.cells(self.planner.rows(cells, near))
+        if start is not None:
+            rows = replace(rows, start=np.where(start[1][:, None], start[0], rows.start))
+        made = self.blank(len(cells))
+        self._drive(rows, made)
+        room = made.points.shape[1]
+        short = np.flatnonzero(made.counts[:, 3] > room)
+        if len(short):
+            self._again(rows, made, short)
+        most = int(made.counts[:, 3].max(initial=0))
+        made.points = np.ascontiguousarray(made.points[:, :most])
+        return made
+
+    def _drive(self, rows: Plan, made: Buffers) -> None:
+        cells = len(rows.start)
+        self.kernel.drive(0, cells, rows.start, rows.numbers, rows.spans, self.control, *made.arrays())
+
+    def _again(self, rows: Plan, made: Buffers, short: np.ndarray) -> None:
+        """Run cells with more section points than there was room for again, with the room they need."""
+        most = int(made.counts[:, 3].max())
+        wide = np.full((len(made.counts), most, made.points.shape[2]), np.nan)
+        wide[:, : made.points.shape[1]] = made.points
+        made.points = wide
+        part = self.blank(len(short), most)
+        self._drive(Plan(rows.start[short], rows.numbers[short], rows.spans[short]), part)
+        for whole, piece in zip(made.arrays(), part.arrays(), strict=True):
+            whole[short] = piece
+
+
+def run_block(key: str, recipe: bytes | None, *block: Any) -> Buffers | None:
+    """Run a block in a worker that does not share our memory; None where it does not know the sweep and needs the recipe."""
+    with _lock:
+        shop = _shops.get(key)
+        if shop is None and recipe is not None:
+            shop = _shops[key] = Workshop(Recipe.unpacked(recipe))
+            while len(_shops) > KEPT:
+                _shops.popitem(last=False)
+    return None if shop is None else shop.run(*block)
+
+
+def forget(key: str) -> None:
+    """Drop a sweep that ran in this process; its cells that still run end."""
+    with _lock:
+        shop = _shops.pop(key, None)
+    if shop is not None:
+        shop.cancel()
+
+
+def whole(made: Buffers) -> bool:
+    """True where every cell has come to its end, good or bad."""
+    return not bool(np.isin(made.counts[:, 0], (Status.NOT_RUN, Status.INTERRUPTED)).any())
+
+
+def versions() -> str:
+    """The versions that a result depends on."""
+    names = ("synchain", "numba", "numpy", "sympy")
+    return ", ".join(f"{name} {importlib.metadata.version(name)}" for name in names)
+
+
+def _max_step(scene: Scene) -> float:
+    """Half a drive period at most, so that no step can miss a whole swing of the drive."""
+    if not scene.forced:
+        return math.inf
+    fastest = max((abs(v) for axis in scene.axes if axis.name == "omega" for v in axis.values), default=0.0)
+    fastest = max(fastest, abs(scene.omega or 0.0))
+    return math.pi / fastest if fastest > 0.0 else math.inf
+
+
+def _room(scene: Scene) -> int:
+    """Section points to make room for at first: two a period; cells with more are run again with what they need."""
+    if "section" not in scene.record:
+        return 0
+    periods = scene.window if scene.time_unit == "period" else scene.window / math.pi
+    return int(min(2.0 * periods, 1e6)) + 8
