@@ -6,9 +6,10 @@ import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 
-__all__ = ["output_folder", "whole_file", "write_text"]
+__all__ = ["drop_leftovers", "output_folder", "whole_file", "write_text"]
 
 
 @contextmanager
@@ -27,6 +28,13 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def drop_leftovers(path: str | os.PathLike[str]) -> None:
+    """Delete the temporary files of processes that were killed while they wrote `path`; only for who alone writes it."""
+    target = Path(path)
+    for leftover in target.parent.glob(f".{escape(target.stem)}-*{escape(target.suffix)}"):
+        leftover.unlink(missing_ok=True)
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

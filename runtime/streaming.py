@@ -15,6 +15,7 @@ import xarray as xr
 from synchain.models.scene import Scene
 
 from .crew import Task, worker_lost
+from .files import drop_leftovers
 from .kernels import chosen_skip
 from .labels import provenance, scene_of
 from .layout import Layout
@@ -63,8 +64,8 @@ def stream(
     """Run every cell of a scene and write its result to a netCDF file, block by block; memory does not grow with the sweep.
 
     Until all cells have ended, their blocks are kept beside `path` in a file ".partial", which `open_result` opens too.
-    With `resume` such a run goes on; its result is, byte for byte, that of a run without interruption.  What is there already is
-    replaced only with `overwrite`.  The other keywords are those of `run`.
+    With `resume` such a run goes on; its result is, byte for byte, that of a run without interruption.  What is there
+    already is replaced only with `overwrite`.  The other keywords are those of `run`.
 
     Raises the errors of `claim` where the files do not allow it, SweepInterrupted on Ctrl-C, SweepFailed where the workers
     are lost or the disk is full.
@@ -190,9 +191,10 @@ def _fill(
     scene = prepared.shop.recipe.chosen.scene
     _check_kernel(prepared, store)
     layout = layout_of(store.about, scene)
-    reporter.start(store.counts)
     sitting = Sitting(layout, store.done, _Disk(layout, store), reporter, prepared.certificate)
     try:
+        drop_leftovers(path)
+        reporter.start(store.counts)
         sitting.run(prepared.shop, executor, prepared.workers)
         return finish_file(store, path)
     except KeyboardInterrupt:

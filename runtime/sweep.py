@@ -65,8 +65,8 @@ def run(
 def _work(memory: Memory, prepared: Prepared, executor: Executor | None, reporter: Reporter) -> None:
     """Run what is missing; whoever stops it gets the cells that have finished."""
     sitting = Sitting(memory.layout, memory.done(), memory, reporter, prepared.certificate)
-    reporter.start(tally(memory.buffers.counts[:, 0]) * (np.arange(CODES) == Status.FINISHED))
     try:
+        reporter.start(tally(memory.buffers.counts[:, 0]) * (np.arange(CODES) == Status.FINISHED))
         sitting.run(prepared.shop, executor, prepared.workers)
     except (Exception, KeyboardInterrupt) as problem:
         if not (isinstance(problem, KeyboardInterrupt) or worker_lost(problem)):

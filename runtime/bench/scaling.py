@@ -27,7 +27,7 @@ from ..sweep import kernel, run
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["COLUMNS", "FAMILIES", "draw", "measure", "network_row", "sweep_row"]
+__all__ = ["COLUMNS", "FAMILIES", "apart", "draw", "measure", "network_row", "peak_memory", "sweep_row"]
 
 COLUMNS = (
     "network", "n", "cells", "lanes", "threads", "steps per cell", "seconds", "nanoseconds per step and oscillator",
@@ -51,14 +51,14 @@ def measure(quick: bool = False) -> list[Row]:
     for name in ("chain",) if quick else FAMILIES:
         for n in nodes:
             if n >= family(name).MINIMUM:
-                rows.append(_apart(network_row, name, n, 1, work))
+                rows.append(apart(network_row, name, n, 1, work))
     lanes = native_width()
-    rows += [_apart(network_row, "chain", n, lanes, work) for n in nodes if lanes > 1]
-    rows += [_apart(sweep_row, c, threads) for c in (CELLS[:2] if quick else CELLS) for threads in THREADS]
+    rows += [apart(network_row, "chain", n, lanes, work) for n in nodes if lanes > 1]
+    rows += [apart(sweep_row, c, threads) for c in (CELLS[:2] if quick else CELLS) for threads in THREADS]
     return rows
 
 
-def _apart(function: Any, *arguments: object) -> Row:
+def apart(function: Any, *arguments: object) -> Row:
     """Call a function in a process of its own."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         row: Row = pool.submit(function, *arguments).result()

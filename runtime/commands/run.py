@@ -37,6 +37,9 @@ EXAMPLES = (
 SETTINGS = ("transient", "window", "samples", "atol", "max_steps")
 """Numbers of a scene besides parameters and initial states that --set can change."""
 
+PATIENCE = 10
+"""Seconds that a Dask scheduler has to answer."""
+
 
 def configure(parser: ArgumentParser) -> None:
     """Add scene, folder and changes to the scene."""
@@ -201,7 +204,7 @@ def _executor(address: str | None) -> Iterator[Executor | None]:
             '--dask needs the package distributed; install it: python -m pip install "synchain[dask]"'
         ) from None
     try:
-        client = Client(address, timeout=10)
+        client = Client(address, timeout=PATIENCE)
     except (OSError, ValueError, TypeError) as problem:
         raise Failed(f"no Dask scheduler answers at {address}: {problem}") from None
     try:

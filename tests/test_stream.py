@@ -1,0 +1,384 @@
+"""Sweeps on disk: whatever stops them costs the blocks in flight, and the file is that of a run that nothing stopped."""
+
+from __future__ import annotations
+
+import errno
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import Executor, Future
+from pathlib import Path
+
+import numpy as np
+import pytest
+from streams import MAP, PAIR, UP, kill_again_and_again, partial, warm
+from test_skip import MIRRORED
+
+from synchain.runtime import Status, SweepFailed, SweepInterrupted, open_result, run, stream
+from synchain.runtime.figures.result_plot import draw_result
+from synchain.runtime.netcdf import Sheet
+from synchain.runtime.result import Buffers
+from synchain.runtime.skip import decide
+from synchain.runtime.store import Store
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of Unix")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _kernel():
+    warm()
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Bytes of the finished file of each scene."""
+    folder = tmp_path_factory.mktemp("whole")
+    found = {}
+    for name, scene in (("map", MAP), ("up", UP)):
+        run(scene, workers=1, show_progress=False).save(folder / f"{name}.nc")
+        found[scene] = (folder / f"{name}.nc").read_bytes()
+    return found
+
+
+@pytest.fixture
+def interruptible():
+    """Ctrl-C raises KeyboardInterrupt even where the test run was started with that signal ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def interrupt_at(cells: int):
+    """A hook that presses Ctrl-C once when so many cells are done."""
+    pressed = []
+
+    def press(progress):
+        if progress.done >= cells and not pressed:
+            pressed.append(progress)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    return press
+
+
+# -- the file ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+@pytest.mark.parametrize("scene", [MAP, UP], ids=["map", "up"])
+def test_the_file_is_that_of_a_run_in_memory(scene, workers, files, tmp_path):
+    done = stream(scene, tmp_path / "a.nc", workers=workers, show_progress=False)
+    assert (tmp_path / "a.nc").read_bytes() == files[scene]
+    assert done.success
+    assert done.progress.statuses == {Status.FINISHED: scene.cells}
+    assert [p.name for p in tmp_path.iterdir()] == ["a.nc"]
+
+
+@pytest.mark.parametrize(
+    "axes", [{}, {"sigma": [0.05, 0.1, 0.2, 0.4]}, {"sigma": [0.05, 0.1], "x_1": [0.1, 0.2], "zipped": True}], ids=str
+)
+def test_every_shape_of_a_sweep_streams_as_it_saves(axes, tmp_path):
+    zipped = {"zipped": axes.pop("zipped")} if "zipped" in axes else {}
+    scene = PAIR.replace(axes=axes, title="Größe σ", **zipped)
+    run(scene, width=8, show_progress=False).save(tmp_path / "a.nc")
+    stream(scene, tmp_path / "b.nc", width=8, show_progress=False)
+    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
+
+
+def test_a_merged_network_streams_as_it_saves(tmp_path):
+    """Oscillators that are stepped as one are kept as one and come back as all of them."""
+    scene = MIRRORED.replace(axes={"sigma": [0.1, 0.2]})
+    assert len(decide(scene).states) < len(scene.y0)
+    run(scene, width=1, show_progress=False).save(tmp_path / "a.nc")
+    stream(scene, tmp_path / "b.nc", width=1, show_progress=False)
+    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
+
+
+def test_a_large_variable_is_laid_out_past_four_gigabytes(tmp_path):
+    """Only the header and one row are written: the file is as large as its holes."""
+    import xarray as xr
+
+    template = xr.Dataset({"a": (("x", "y"), np.zeros((1, 3))), "b": ("x", np.zeros(1))})
+    with open(tmp_path / "large.nc", "wb") as file:
+        sheet = Sheet(file, template, {"x": 250_000_000})
+        sheet.put("a", np.array([249_999_999]), np.array([[1.0, 2.0, 3.0]]))
+        sheet.put("b", np.array([7]), np.array([5.0]))
+    with xr.open_dataset(tmp_path / "large.nc", engine="scipy") as data:
+        assert data.a[-1].values.tolist() == [1.0, 2.0, 3.0]
+        assert float(data.b[7]) == 5.0
+
+
+# -- the store -----------------------------------------------------------------------------------------------
+
+
+def block(cells: int, value: float) -> Buffers:
+    made = Buffers.empty(cells, 2, 3, 1)
+    made.end[:], made.sums[:], made.samples[:] = value, value, value
+    made.counts[:, 0], made.counts[:, 3] = 1, np.arange(cells) % 4
+    made.points[np.arange(3) < made.counts[:, 3:4]] = value
+    return made
+
+
+ABOUT = {"blocks": 4, "dimension": 2, "samples": 1}
+
+
+@pytest.fixture
+def store(tmp_path):
+    path = tmp_path / "x.partial"
+    Store.create(path, ABOUT)
+    made = Store.open(path, writing=True)
+    for number in range(3):
+        made.append(number, block(5, number + 0.5))
+    made.close()
+    return path
+
+
+def test_blocks_come_back_as_they_went(store):
+    found = Store.open(store)
+    assert found.done.tolist() == [True, True, True, False]
+    assert (found.counts[1], found.most) == (15, 3)
+    for number in range(3):
+        for a, b in zip(found.read(number).arrays(), block(5, number + 0.5).arrays(), strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+def test_a_torn_end_loses_the_last_block_wherever_it_is_torn(store):
+    whole = store.read_bytes()
+    size = (len(whole) - store.read_bytes().index(b"blk\0")) // 3
+    for missing in (1, 7, size - 20, size - 1):
+        store.write_bytes(whole[:-missing])
+        found = Store.open(store, writing=True)
+        assert found.done.tolist() == [True, True, False, False]
+        found.append(2, block(5, 2.5))
+        found.close()
+        assert store.read_bytes() == whole
+
+
+def test_a_damaged_block_is_none(store):
+    whole = bytearray(store.read_bytes())
+    whole[whole.index(b"blk\0") + 400] ^= 1
+    store.write_bytes(whole)
+    found = Store.open(store, writing=True)
+    assert found.done.tolist() == [False, True, True, False]
+    assert found.counts[1] == 10
+    found.append(0, block(5, 0.5))
+    found.close()
+    assert Store.open(store).done.tolist() == [True, True, True, False]
+
+
+def test_a_damaged_first_line_is_an_error_that_says_so(store):
+    whole = bytearray(store.read_bytes())
+    whole[40] ^= 1
+    store.write_bytes(whole)
+    with pytest.raises(ValueError, match="first line is damaged"):
+        Store.open(store)
+    store.write_bytes(b"something else")
+    with pytest.raises(ValueError, match="no unfinished run"):
+        Store.open(store)
+
+
+def test_two_processes_do_not_write_to_one_store(store):
+    code = f"from synchain.runtime.store import Store\nStore.open({str(store)!r}, writing=True)"
+    held = Store.open(store, writing=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    held.close()
+    assert "is being written by another run" in done.stderr
+
+
+# -- what stops a sweep --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scene", [MAP, UP], ids=["map", "up"])
+def test_ctrl_c_keeps_blocks_and_resume_goes_on(scene, files, tmp_path, interruptible):
+    path = tmp_path / "a.nc"
+    with pytest.raises(SweepInterrupted) as caught:
+        stream(scene, path, workers=2, show_progress=False, progress=interrupt_at(20))
+    assert 20 <= caught.value.finished < scene.cells
+    part = open_result(partial(path))
+    assert int((part.status == Status.FINISHED).sum()) == caught.value.finished
+    assert np.isnan(part.sync_error.values[part.status.values == Status.NOT_RUN]).all()
+    assert draw_result(part) is not None
+    seen = []
+    stream(scene, path, resume=True, workers=1, show_progress=False, progress=seen.append)
+    assert seen[0].kept == seen[0].done == caught.value.finished
+    assert path.read_bytes() == files[scene]
+    assert not partial(path).exists()
+
+
+def test_ctrl_c_in_a_continued_sweep_in_memory_goes_on_where_it_was(files, tmp_path, interruptible):
+    with pytest.raises(SweepInterrupted) as caught:
+        run(UP, workers=2, show_progress=False, progress=interrupt_at(20))
+    seen = []
+    run(UP, resume=caught.value.result, show_progress=False, progress=seen.append).save(tmp_path / "a.nc")
+    assert 0 < seen[0].kept < UP.cells
+    assert (tmp_path / "a.nc").read_bytes() == files[UP]
+
+
+def test_a_disk_that_fills_up(files, tmp_path):
+    """A limit on the size of files in a process of its own stands for the disk."""
+    path = tmp_path / "a.nc"
+    child = os.fork() if threading.active_count() == 1 else None
+    if child is None:
+        pytest.skip("this process has threads")
+    if child == 0:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
+        try:
+            stream(MAP, path, workers=1, show_progress=False)
+        except SweepFailed as problem:
+            good = problem.__cause__.errno == errno.EFBIG and 0 < problem.finished < MAP.cells
+            os._exit(7 if good and str(partial(path)) in str(problem) else 1)
+        os._exit(2)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+    assert 0 < int((open_result(partial(path)).status == Status.FINISHED).sum()) < MAP.cells
+    stream(MAP, path, resume=True, show_progress=False)
+    assert path.read_bytes() == files[MAP]
+
+
+def test_a_disk_that_is_full_when_the_result_is_written(files, tmp_path, monkeypatch):
+    path = tmp_path / "a.nc"
+
+    def full(*arguments):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Sheet, "put", full)
+        with pytest.raises(SweepFailed, match="No space left on device; 400 of 400 cells"):
+            stream(MAP, path, show_progress=False)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.partial"]
+    stream(MAP, path, resume=True, show_progress=False)
+    assert path.read_bytes() == files[MAP]
+
+
+class Stuck(Executor):
+    """Starts everything and finishes nothing."""
+
+    def submit(self, function, /, *arguments, **more):
+        future: Future = Future()
+        future.set_running_or_notify_cancel()
+        return future
+
+
+def test_a_second_ctrl_c_leaves_blocks_that_do_not_end(tmp_path, interruptible):
+    def press():
+        for _ in range(2):
+            time.sleep(0.7)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    presses = threading.Thread(target=press)
+    presses.start()
+    with pytest.raises(SweepInterrupted) as caught:
+        stream(MAP, tmp_path / "a.nc", executor=Stuck(), workers=1, show_progress=False)
+    presses.join()
+    assert caught.value.finished == 0
+
+
+SLOW = """
+transient = 200
+window = 20
+[topology]
+name = "chain"
+n = 2
+[sweep]
+sigma = { from = 0.0, to = 0.3, count = 300 }
+"""
+
+
+@pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda sign: sign.name)
+def test_the_real_program_is_stopped_and_goes_on(sign, tmp_path):
+    scene = tmp_path / "slow.toml"
+    scene.write_text(SLOW)
+    words = [sys.executable, "-m", "synchain.runtime", "run", str(scene), "--out", str(tmp_path), "--workers", "1"]
+    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, preexec_fn=restore_interrupt)
+    store = tmp_path / "slow.partial"
+    give_up = time.monotonic() + 120
+    while process.poll() is None and not (store.exists() and Store.open(store).done.sum() >= 2):
+        assert time.monotonic() < give_up
+        time.sleep(0.05)
+    process.send_signal(sign)
+    _, err = process.communicate(timeout=60)
+    stored = int(Store.open(store).counts.sum())
+    if sign == signal.SIGKILL:
+        assert process.returncode == -9
+    else:
+        assert process.returncode == 1
+        assert f"interrupted with {stored} of 300 cells finished, kept in {store}\ncontinue with: synchain run" in err
+        assert err.count("\n") == 2
+    from synchain.models import load_scene
+
+    done = stream(load_scene(str(scene)), tmp_path / "slow.nc", resume=True, show_progress=False)
+    assert done.progress.kept == stored > 0
+
+
+def restore_interrupt() -> None:
+    """A shell may have started us with Ctrl-C ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def test_five_kills(tmp_path):
+    kept, _ = kill_again_and_again(MAP, tmp_path, 5, seed=1)
+    assert kept > 0
+
+
+# -- files that are there already ----------------------------------------------------------------------------
+
+
+def test_nothing_is_overwritten_silently(tmp_path):
+    path = tmp_path / "a.nc"
+    small = PAIR.replace(axes={"sigma": [0.05, 0.1]})
+    stream(small, path, width=8, show_progress=False)
+    before = path.read_bytes()
+    with pytest.raises(FileExistsError, match="holds the result of this scene already"):
+        stream(small, path, width=8, show_progress=False)
+    other = small.replace(omega=1.4)
+    for options in ({}, {"resume": True}):
+        with pytest.raises(ValueError, match="belongs to another scene"):
+            stream(other, path, width=8, show_progress=False, **options)
+    with pytest.raises(ValueError, match="was run without --certify"):
+        stream(small, path, certified=True, show_progress=False)
+    assert path.read_bytes() == before
+    stream(other, path, overwrite=True, width=8, show_progress=False)
+    assert open_result(path).scene == other
+    with pytest.raises(ValueError, match="both resume and overwrite"):
+        stream(other, path, overwrite=True, resume=True)
+    with pytest.raises(FileNotFoundError, match="nothing to resume"):
+        stream(other, tmp_path / "b.nc", resume=True)
+
+
+def test_an_unfinished_run_is_not_begun_again_silently(tmp_path, interruptible):
+    path = tmp_path / "a.nc"
+    with pytest.raises(SweepInterrupted):
+        stream(MAP, path, show_progress=False, progress=interrupt_at(1))
+    kept = partial(path).read_bytes()
+    with pytest.raises(FileExistsError, match="continue it with --resume"):
+        stream(MAP, path, show_progress=False)
+    with pytest.raises(ValueError, match="belongs to another scene"):
+        stream(MAP.replace(rtol=1e-6), path, resume=True, show_progress=False)
+    assert partial(path).read_bytes() == kept
+
+
+def test_other_versions_do_not_go_on_with_a_run(tmp_path, monkeypatch, interruptible):
+    path = tmp_path / "a.nc"
+    with pytest.raises(SweepInterrupted):
+        stream(MAP, path, show_progress=False, progress=interrupt_at(1))
+    monkeypatch.setattr("synchain.runtime.work.versions", lambda: "synchain 0.0.1")
+    with pytest.raises(ValueError, match=r"was begun with synchain .*; found synchain 0\.0\.1"):
+        stream(MAP, path, resume=True, show_progress=False)
+
+
+def test_the_command_says_that_there_is_nothing_to_do(tmp_path, capsys):
+    from synchain.runtime.cli import main
+
+    words = ["run", "two_oscillators", "--out", str(tmp_path), "--set", "sigma=0.1,0.2", "transient=1", "window=2"]
+    assert main(words) == 0
+    first = (tmp_path / "two_oscillators.nc").stat()
+    capsys.readouterr()
+    assert main(words) == 0
+    assert "nothing was run (--overwrite runs it again)" in capsys.readouterr().out
+    assert (tmp_path / "two_oscillators.nc").stat().st_mtime_ns == first.st_mtime_ns
+    assert main([*words, "omega=1.3"]) == 2
+    assert "belongs to another scene" in capsys.readouterr().err
+    assert main([*words, "omega=1.3", "--overwrite"]) == 0
+    assert Path(tmp_path, "two_oscillators.nc").stat().st_mtime_ns > first.st_mtime_ns
