@@ -158,6 +158,17 @@ def test_errors_of_ours_are_not_taken_for_lost_workers():
 # -- Dask and MPI --------------------------------------------------------------------------------------------
 
 
+TOML = """
+transient = 2
+window = 4
+samples = 5
+record = ["sync_error", "section", "trajectory"]
+topology = { name = "chain", n = 2 }
+sweep = { sigma = { from = 0.0, to = 0.3, count = 40 } }
+"""
+"""A sweep with the kernel of the others: to compile one would stop the scheduler, which lives in this process."""
+
+
 @pytest.fixture(scope="module")
 def cluster():
     distributed = pytest.importorskip("distributed", reason="the extra dask is not installed")
@@ -191,11 +202,12 @@ def test_dask_survives_a_killed_worker(cluster, alone, tmp_path):
 def test_the_command_runs_on_dask(cluster, tmp_path, capsys):
     from synchain.runtime.cli import main
 
-    words = ["run", "two_oscillators", "--set", "sigma=0:0.3:40", "transient=1", "window=2"]
-    assert main([*words, "--out", str(tmp_path / "a"), "--dask", cluster.scheduler_address]) == 0
-    assert main([*words, "--out", str(tmp_path / "b")]) == 0
+    scene = tmp_path / "map.toml"
+    scene.write_text(TOML)
+    assert main(["run", str(scene), "--out", str(tmp_path / "a"), "--dask", cluster.scheduler_address]) == 0
+    assert main(["run", str(scene), "--out", str(tmp_path / "b")]) == 0
     capsys.readouterr()
-    a, b = (Path(tmp_path, name, "two_oscillators.nc").read_bytes() for name in "ab")
+    a, b = (Path(tmp_path, name, "map.nc").read_bytes() for name in "ab")
     assert a == b
 
 

@@ -83,6 +83,7 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Explain the scene where asked to; run it to a file, draw, and say how the cells ended."""
+    from ..kernels import kernel
     from ..sitting import SweepFailed, SweepInterrupted
     from ..skip import decide, explain
     from ..streaming import claim, stream
@@ -104,6 +105,8 @@ def execute(arguments: Namespace) -> int:
             return _nothing_to_do(target)
         output_folder(target.parent)
     warn(scene.warnings)
+    if arguments.dask:
+        kernel(scene, skip=skip)  # before the connection is there, which would not be answered while it compiles
     with stopped_by_signals(), _executor(arguments.dask) as executor:
         try:
             done = stream(scene, target, skip=skip, workers=arguments.workers, executor=executor, **given)
