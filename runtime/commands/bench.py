@@ -17,7 +17,9 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument("names", metavar="NAME", nargs="*", help="benchmarks to run, e.g. precision (default: all)")
     effort = parser.add_mutually_exclusive_group()
     effort.add_argument("--quick", action="store_true", help="fewer repetitions and shorter runs")
-    effort.add_argument("--long", action="store_true", help="runs of hours, of benchmarks that have them (energy, scale)")
+    effort.add_argument(
+        "--long", action="store_true", help="runs of hours, of benchmarks that have them (energy, scale)"
+    )
     parser.add_argument(
         "--out", metavar="DIR", type=folder, help="folder for each table as CSV and Markdown, and for its figure"
     )
