@@ -11,13 +11,13 @@ from .lagrangian import mass_matrix
 from .nondimensional import friction_coefficient, nondimensional
 from .plugins import load
 
-__all__ = ["check_friction", "check_masses"]
+__all__ = ["check_masses", "check_power"]
 
 SPEEDS = tuple(side * 10.0 ** (k / 4) for k in range(-24, 9) for side in (1.0, -1.0))
 """Sliding velocities at which a law is looked at, from 1e-6 to 100 and both ways."""
 
 
-def check_friction(law: str, values: Mapping[str, float]) -> None:
+def check_power(law: str, values: Mapping[str, float]) -> None:
     """Raise ValueError where friction pushes against the ground's motion, w f(w) < 0, and so feeds energy.
 
     A law that is meant to do so has SELF_EXCITING = True.

@@ -53,14 +53,14 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
 
 def _physics(made: Mapping[str, Any]) -> None:
     """Refuse wrong physics at the scene's parameters and at the ends of its axes."""
-    from .physics import check_friction, check_masses
+    from .physics import check_masses, check_power
 
     for ends in (min, max):
         swept = {axis.name: ends(axis.values) for axis in made["axes"]}
         values = {name: swept.get(name, value) for name, value in made["parameters"].items()}
         check_masses(made["oscillator"], values)
         if made["friction"] is not None:
-            check_friction(made["friction"], values)
+            check_power(made["friction"], values)
 
 
 def _model(made: dict[str, Any]) -> None:
