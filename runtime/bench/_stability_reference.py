@@ -17,7 +17,7 @@ from ._cases import normal_modes
 __all__ = ["FLOOR", "REFERENCES", "end_state"]
 
 RTOL, ATOL = 1e-11, 1e-13
-FLOOR = {"radau": 1e-11, "smooth": 1e-4, "modes": 1e-13, "growth": 1e-13, "wave": 1e-13, "steady": 1e-10}
+FLOOR = {"radau": 1e-11, "smooth": 1e-6, "modes": 1e-13, "growth": 1e-13, "wave": 1e-13, "steady": 1e-10}
 """How far a reference itself may be off, relative to the size of the state; "smooth" is another law, O(kappa^-1/2) away."""
 
 

@@ -102,7 +102,7 @@ def summary(rows: list[Row]) -> str:
 
 
 def draw(rows: list[Row]) -> Figure:
-    """Error against tolerance, one mark a case, with the line of what is allowed at size one."""
+    """Error and, for one group, energy residual against what is allowed, one mark a case."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.0, 3.6), layout="constrained")
@@ -111,7 +111,8 @@ def draw(rows: list[Row]) -> Figure:
         own = [r for r in rows if r[0] == group and r[3] == "FINISHED"]
         marks = {"marker": "osvD^<>pX"[k % 9], "linestyle": "", "markersize": 4, "label": group}
         error.loglog([r[7] for r in own], [max(r[6], 1e-18) for r in own], **marks)
-        energy.loglog([r[7] for r in own], [max(abs(r[8]), 1e-18) for r in own], **marks)
+        if group == "steepness":  # elsewhere energies are of all sizes
+            energy.loglog([r[7] for r in own], [max(abs(r[8]), 1e-18) for r in own], **marks)
     ends = np.array([1e-13, 1e9])
     for axes, name in ((error, "error"), (energy, "energy residual")):
         axes.loglog(ends, ends, color="black", linewidth=0.8)
