@@ -215,10 +215,13 @@ def test_locale_time_zone_and_odd_paths_change_nothing(tmp_path: Path) -> None:
 
 def test_nothing_asks_the_network(tmp_path: Path, monkeypatch, capsys) -> None:
     def refuse(*arguments: object, **more: object) -> None:
-        raise AssertionError("a socket was opened")
+        raise AssertionError("the network was asked")
 
-    monkeypatch.setattr(socket, "socket", refuse)
+    for name in ("connect", "connect_ex", "sendto"):
+        monkeypatch.setattr(socket.socket, name, refuse)
     monkeypatch.setattr(socket, "getaddrinfo", refuse)
+    with pytest.raises(AssertionError, match="the network was asked"):
+        socket.create_connection(("localhost", 9))
     path = tmp_path / "scene.toml"
     path.write_text("window = 0.5\ntransient = 0\nrecord = []\n")
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
