@@ -9,6 +9,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from .axis import Axis
+from .contact import SLIP
 from .scene_checks import Frozen
 from .scene_complete import complete
 from .scene_model import derived, known_parameters, node
@@ -164,6 +165,10 @@ class Scene:
             given["oscillator"] != self.oscillator or getattr(given["topology"], "n", None) != self.n
         ):
             given["initial"] = None
+        elif "initial" not in changes and given["initial"] and ("contact" in changes or "friction" in changes):
+            given["initial"] = {
+                name: at for name, at in given["initial"].items() if name != SLIP.name
+            }  # follows from x, v
         return Scene(**given)
 
     def as_dict(self) -> dict[str, Any]:

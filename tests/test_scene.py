@@ -358,6 +358,13 @@ def test_replace_checks_again_and_keeps_the_rest() -> None:
     assert scene.replace() == scene
 
 
+def test_another_contact_keeps_the_start_and_finds_the_modes_anew() -> None:
+    exact = Scene(topology=chain(2), contact="set-valued", initial={"x": [0.3, 0.2], "v": 0.1})
+    smooth = exact.replace(contact="atan")
+    assert smooth.initial == {"x": (0.3, 0.2), "v": (0.1, 0.1)}
+    assert smooth.replace(contact="set-valued").initial == exact.initial
+
+
 def test_replace_topology_starts_anew() -> None:
     scene = two(initial={"x": [1, 2]})
     assert scene.replace(topology=star(5)).initial == Scene(topology=star(5)).initial

@@ -202,3 +202,16 @@ def test_loose_tolerance_is_not_silently_wrong():
     loose, tight = (run(PAIR.replace(rtol=rtol, window=40)) for rtol in (1e-3, 1e-9))
     assert loose.data.attrs["rtol_used"] == pytest.approx(1e-5)
     assert float(np.abs(loose.end - tight.end).max()) < 1e-4
+
+
+@pytest.mark.parametrize("periods", [50, 147, 244])
+def test_a_window_of_whole_periods_has_its_last_sample(periods: int) -> None:
+    """2 pi N and N times 2 pi differ by rounding, so the run ends at the end of a period or a hair before or behind it."""
+    scene = Scene(
+        oscillator="duffing", topology=chain(1), record=("trajectory",), samples=5, transient=0, rtol=1e-3,
+        time_unit="time", parameters={"delta": 0.5},
+    )  # fmt: skip
+    for window in (2 * np.pi * periods, np.nextafter(2 * np.pi * periods, 0), np.nextafter(2 * np.pi * periods, 1e9)):
+        result = run(scene.replace(window=float(window)), skip=False, width=1)
+        assert np.isfinite(result.trajectory.values).all(), window
+        np.testing.assert_allclose(result.trajectory.values[-1], result.end.values, rtol=1e-11)

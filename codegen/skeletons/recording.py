@@ -164,8 +164,9 @@ def sample(bank, t_new, h, accepted, y_new, dense, cell, spans, samples):
         if not (accepted >> which) & 1:
             continue
         begin, end = spans[cell[which], 0], spans[cell[which], 1]
-        arrived = ends[which] >= bank[END * WIDTH + which]
-        reached = end if arrived else bank[BASE * WIDTH + which] + ends[which]
+        reached = bank[BASE * WIDTH + which] + ends[which]
+        if ends[which] >= bank[END * WIDTH + which] or reached >= end - 4e-16 * abs(end):  # the end of the last period
+            reached = end
         gap = bank[SAMPLE_GAP * WIDTH + which]
         while bank[NEXT_SAMPLE * WIDTH + which] <= reached:
             wanted = bank[NEXT_SAMPLE * WIDTH + which]

@@ -17,7 +17,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from synchain.codegen.emit import LARGEST_UNROLLED
 from synchain.models.scene import Scene
 from synchain.models.topology import Topology, topology
 
@@ -27,7 +26,7 @@ from ..synchronisability import Verdict, verdict
 from ..threshold import Criterion, simulate
 from . import markdown
 
-__all__ = ["CASES", "COLUMNS", "GRAPHS", "function_of", "measure", "notes", "sigma_of", "summary"]
+__all__ = ["CASES", "COLUMNS", "GRAPHS", "function_of", "measure", "sigma_of", "summary"]
 
 COLUMNS = (
     "omega", "contact", "ranges of alpha", "graph", "eigenratio", "allowed", "predicted", "window of sigma", "sigma",
@@ -44,22 +43,13 @@ GRAPHS = (
 Row = tuple[object, ...]
 
 
-def notes() -> list[str]:
-    """What is not simulated."""
-    large = [f"{name}({n})" for name, n in GRAPHS if n > LARGEST_UNROLLED]
-    return [
-        f"not simulated with set-valued friction, which is for {LARGEST_UNROLLED} oscillators at most: {', '.join(large)}"
-    ]
-
-
 def measure(quick: bool = False) -> list[Row]:
     """Return the rows of the table, in the order of COLUMNS; `quick` takes one frequency, two graphs and a short run."""
     rows = []
     for omega, contact in CASES[2:3] if quick else CASES:
         found = function_of(omega, contact)
         for name, n in GRAPHS[:2] if quick else GRAPHS:
-            if contact == "atan" or n <= LARGEST_UNROLLED:
-                rows.append(_row(omega, contact, found, topology(name, n), quick))
+            rows.append(_row(omega, contact, found, topology(name, n), quick))
     return rows
 
 
