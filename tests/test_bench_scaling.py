@@ -7,6 +7,8 @@ import pytest
 from synchain.codegen.lanes import native_width
 from synchain.runtime.bench import scaling
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def rows():

@@ -85,6 +85,7 @@ def test_an_interpolation_is_as_good_as_its_check_says() -> None:
         assert errors[-1] < 1e-6
 
 
+@pytest.mark.long
 def test_published_zeros_of_the_rossler_function() -> None:
     """a = b = 0.2, c = 9, x -> x: 0.186 and 4.614 (Huang, Chen, Lai & Pecora, Phys. Rev. E 80, 036204 (2009))."""
     found = msf(scene("rossler", "x->x"), np.linspace(0.0, 6.0, 61), periods=400, precision=5e-3, starts=4)

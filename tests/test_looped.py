@@ -29,8 +29,11 @@ def always_looped(monkeypatch):
 
 @pytest.mark.parametrize(
     ("graph", "integrator"),
-    [(GRAPHS[1], "rodas5p"), (GRAPHS[3], "rodas5p"), (GRAPHS[3], "dop853")],
-    ids=["star5-rodas5p", "matrix3-rodas5p", "matrix3-dop853"],
+    [
+        pytest.param(GRAPHS[1], "rodas5p", marks=pytest.mark.long, id="star5-rodas5p"),
+        pytest.param(GRAPHS[3], "rodas5p", id="matrix3-rodas5p"),
+        pytest.param(GRAPHS[3], "dop853", id="matrix3-dop853"),
+    ],
 )
 def test_looped_step_equals_the_unrolled_one(graph, integrator, request):
     scene = Scene(
@@ -137,6 +140,7 @@ def test_large_fill_is_not_built(name, n):
     assert made.entries == 4 * n + 2 * len(graph.links)
 
 
+@pytest.mark.long
 def test_incomplete_elimination_changes_no_result(incomplete, request):
     scene = Scene(topology=grid(12), transient=0, window=1, rtol=1e-9, parameters={"sigma": 0.3})
     refined = run(scene)
@@ -149,6 +153,7 @@ def test_incomplete_elimination_changes_no_result(incomplete, request):
     assert abs(int(refined.steps) - int(exact.steps)) <= 0.02 * int(exact.steps)
 
 
+@pytest.mark.long
 def test_lanes_are_refined_independently(incomplete):
     """A lane with strong coupling needs more corrections than its neighbours, and changes nothing in them."""
     scene = Scene(topology=grid(12), transient=0, window=0.2)

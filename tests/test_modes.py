@@ -59,7 +59,11 @@ def test_complex_strengths_of_a_linear_node() -> None:
 
 @pytest.mark.parametrize(
     ("name", "coupling", "state"),
-    [("friction", "spring", [0.3, 0.0]), ("duffing", "damper", [1.0, 0.2]), ("rossler", "x->x", [1.0, -2.0, 0.1])],
+    [
+        ("friction", "spring", [0.3, 0.0]),
+        pytest.param("duffing", "damper", [1.0, 0.2], marks=pytest.mark.long),
+        pytest.param("rossler", "x->x", [1.0, -2.0, 0.1], marks=pytest.mark.long),
+    ],
 )
 def test_modes_are_those_of_the_extended_system(name: str, coupling: str, state: list[float]) -> None:
     """Orbit and deviation as one state in an ordinary kernel, whose Jacobian SymPy derives anew."""
@@ -81,6 +85,7 @@ def test_modes_are_those_of_the_extended_system(name: str, coupling: str, state:
     np.testing.assert_allclose(found.T, buffers.end[:, size:], rtol=0, atol=2e-6 * np.abs(found).max())
 
 
+@pytest.mark.long
 def test_the_whole_network_follows_differences_of_its_trajectories() -> None:
     s = scene("duffing", "spring", 2, parameters={"sigma": 0.3})
     y0 = np.array([1.0, 0.7, 0.1, -0.2])
@@ -133,6 +138,7 @@ def test_modes_do_not_depend_on_their_order_or_their_neighbours() -> None:
     np.testing.assert_array_equal(moved(one, s.period or 0.0), moved(other, s.period or 0.0)[:, ::-1])
 
 
+@pytest.mark.long
 def test_names_of_the_model_cannot_collide_with_those_of_the_kernel() -> None:
     x, lag, value = (sp.Symbol(n, real=True) for n in ("x", "lag", "value_1_0"))
     orbit = Equations(Node((x,), (-lag * x + value * sp.sin(x),), (lag, value)), None, 1)

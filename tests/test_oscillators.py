@@ -110,6 +110,7 @@ def pair(name: str, sigma: list[float], **changes: object) -> np.ndarray:
     return result.sync_error.values
 
 
+@pytest.mark.long
 def test_two_roessler_oscillators_synchronise_where_the_master_stability_function_is_negative() -> None:
     """alpha = 2 sigma from 0.186 to 4.614: Huang, Chen, Lai & Pecora, Phys. Rev. E 80, 036204 (2009)."""
     below, low, high, above = pair("rossler", [0.08, 0.11, 2.2, 2.36])
@@ -117,6 +118,7 @@ def test_two_roessler_oscillators_synchronise_where_the_master_stability_functio
     assert min(below, above) > 1e-2
 
 
+@pytest.mark.long
 def test_two_lorenz_oscillators_synchronise_above_one_threshold() -> None:
     """b = 2, x -> x: alpha = 2 sigma above 7.3, Huang, Chen, Lai & Pecora, Phys. Rev. E 80, 036204 (2009)."""
     below, above = pair("lorenz", [3.4, 3.9], parameters={"b": 2.0})
@@ -124,6 +126,7 @@ def test_two_lorenz_oscillators_synchronise_above_one_threshold() -> None:
     assert below > 1e-2
 
 
+@pytest.mark.long
 def test_chua_visits_both_scrolls() -> None:
     scene = Scene(oscillator="chua", transient=50, window=400, record=("trajectory",), samples=4001)
     x = run(scene, workers=1, show_progress=False).trajectory.values[:, 0]

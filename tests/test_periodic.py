@@ -17,6 +17,7 @@ def scene(**more: object) -> Scene:
     return Scene(**{"topology": PAIR, "contact": "set-valued", **more})  # type: ignore[arg-type]
 
 
+@pytest.mark.long
 def test_den_hartogs_motion() -> None:
     """x'' + x + r sgn x' = cos(beta t), no stops: amplitude sqrt(V^2 - r^2 U^2) (Phil. Mag. 9, 801 (1930))."""
     beta, r = 1.4, 0.3

@@ -72,6 +72,7 @@ def test_linear_nodes_with_dampers_synchronise_in_the_right_half_plane():
     assert np.array_equal(found.beta[:, 0], beta[:, 0])
 
 
+@pytest.mark.long
 def test_without_an_imaginary_part_it_says_what_two_oscillators_say():
     """Friction, omega = 1.15: synchronous up to alpha = 2 * 0.233 (Marszal et al., Eur. Phys. J. Special Topics, 2016)."""
     criterion = Criterion(transient=150, window=20, starts=2)
@@ -82,6 +83,7 @@ def test_without_an_imaginary_part_it_says_what_two_oscillators_say():
     assert found.synchronous.tolist() == [True, True, False, False]
 
 
+@pytest.mark.long
 def test_a_one_way_ring_is_one_point_of_the_plane():
     """a = sigma and b = 0 are alpha = 3 sigma/2 and beta = sqrt(3) sigma/2: the same three oscillators, the same error."""
     sigma = 0.4

@@ -101,6 +101,7 @@ def test_mirrored_start_of_a_chain_with_its_synchronisation_error():
     assert np.abs(result.trajectory.sel(state="x_1") - result.trajectory.sel(state="x_2")).max() > 0.01
 
 
+@pytest.mark.long
 def test_synchronisation_error_and_section_of_a_star():
     ends = DUFFING.replace(topology=ring(4), initial={"x": [0.5, 0.1, 0.5, 0.1]})
     assert decide(ends).multiplicity == (2, 2)
@@ -116,12 +117,14 @@ def test_synchronisation_error_and_section_of_a_star():
     np.testing.assert_allclose(points, 0.01, atol=1e-9)
 
 
+@pytest.mark.long
 def test_large_networks_with_few_different_starts_are_small():
     start = [0.5 if i % 3 else 0.1 for i in range(30)]
     scene = DUFFING.replace(topology=ring(30), initial={"x": start}, record=("trajectory",), samples=5)
     compare(scene, nodes=2)
 
 
+@pytest.mark.long
 def test_random_graph_with_weights_and_one_way_links():
     """Two of the nodes feel the same whole from different sources."""
     matrix = [[-3, 1, "1/2", "3/2"], [1, -2, 0, 1], [1, 1, -2, 0], [0, "1/3", "1/3", "-2/3"]]
@@ -160,6 +163,7 @@ def test_continued_sweeps_stay_symmetric():
 # -- mistakes are caught -------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_wrong_partition_is_caught(monkeypatch):
     scene = DUFFING.replace(initial={"x": [0.5, 0.5, 0.1]})
     assert decide(scene).equations.n == 3
