@@ -101,12 +101,15 @@ class NodeBlocks:
     local: Body
 
 
-def analyse(node: Node, names: Names) -> NodeBlocks:
-    """Part the equations of a node into constants, time terms and state terms."""
+def analyse(node: Node, names: Names, varied: Iterable[str] = ()) -> NodeBlocks:
+    """Part the equations of a node into constants, time terms and state terms.
+
+    What depends on parameters with a value for each node, `varied`, is computed with the state.
+    """
     size = len(node.state)
     entries = [e for row in node.jacobian() for e in row]
     outputs = [*node.rhs, *entries, *node.time_derivative()]
-    moving = frozenset(node.state)
+    moving = frozenset(node.state) | {sp.Symbol(name, real=True) for name in varied}
     waves = Hoist(moving, names.fresh("hoisted_"))
     outputs = [waves.apply(e) for e in outputs]
     steady = Hoist(moving | {TIME} | set(waves.table.values()), names.fresh("fixed_"))

@@ -14,7 +14,7 @@ import sympy as sp
 
 from .printer import show
 
-__all__ = ["Plan", "plan", "write_factors", "write_solve"]
+__all__ = ["Plan", "plan", "write_elimination", "write_factors", "write_solve"]
 
 Entry = tuple[int, int]
 
@@ -94,14 +94,28 @@ class Factors:
     inverse: dict[int, str]
 
 
-def write_factors(steps: Plan, jacobian: Mapping[Entry, sp.Expr], labels: tuple[str, ...]) -> Factors:
-    """Write the elimination of (shift - J); `reach` is 1/shift, the pivot's inverse where J has no diagonal entry."""
+def write_factors(
+    steps: Plan, jacobian: Mapping[Entry, sp.Expr], labels: tuple[str, ...], mass: Mapping[Entry, sp.Expr] | None = None
+) -> Factors:
+    """Write the elimination of (shift M - J), `mass` the entries of M, None or empty where it is the identity.
+
+    `reach` is 1/shift, the inverse of the pivot shift where J has no diagonal entry.
+    """
+    shift = sp.Symbol("shift")
+    scaled = {(k, k): shift for k in steps.order} if not mass else {key: shift * e for key, e in mass.items()}
+    return write_elimination(steps, scaled, jacobian, labels)
+
+
+def write_elimination(
+    steps: Plan, matrix: Mapping[Entry, sp.Expr], taken: Mapping[Entry, sp.Expr], labels: tuple[str, ...]
+) -> Factors:
+    """Write the elimination of `matrix` minus `taken`."""
     writer = _Writer(labels)
-    value: dict[Entry, str] = {}
-    for (r, c), e in sorted(jacobian.items()):
-        if r != c:
-            value[r, c] = _atomic(writer, writer.entry("m", r, c), -e)
-    diagonal = {k: show(sp.Symbol("shift") - jacobian[k, k]) if (k, k) in jacobian else "shift" for k in steps.order}
+    entries = {key: matrix.get(key, sp.S.Zero) - taken.get(key, sp.S.Zero) for key in sorted({*matrix, *taken})}
+    value = {
+        key: _atomic(writer, writer.entry("m", *key), e) for key, e in entries.items() if key[0] != key[1] and e != 0
+    }
+    diagonal = {k: show(entries[k, k]) for k in steps.order}
     lower: dict[Entry, str] = {}
     inverse: dict[int, str] = {}
     for k, down, right in zip(steps.order, steps.below, steps.after, strict=True):

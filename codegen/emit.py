@@ -16,12 +16,13 @@ from .blocks import Names, NodeBlocks, analyse
 from .contacts import write_pushes
 from .explicit import write_explicit
 from .integrators import Integrator, integrator
-from .looped import LoopWriter, workspace
+from .looped import LoopWriter
+from .mass import Mass
 from .naming import tidy
 from .printer import FUNCTIONS, show
 from .rosenbrock import write_rosenbrock
-from .sparse import program
-from .step import PAIR, SCALED, StepWriter, write_function
+from .sparse import program, workspace
+from .step import PAIR, SCALED, StepWriter, function_name, write_function
 
 __all__ = ["RECORDS", "KernelSource", "describe", "emit", "imports", "node_functions"]
 
@@ -79,6 +80,8 @@ def emit(
     width = lanes.native_width(2 if equations.dimension <= 2 else 1) if width is None else width
     ordered = tuple(r for r in RECORDS if r in records)
     weights = tuple(multiplicity) if multiplicity is not None and "sync_error" in ordered else None
+    if "sync_error" in ordered and not equations.common:
+        raise ValueError("the record 'sync_error' compares states of one name, and these nodes have none in common")
     if weights is not None and len(weights) != equations.n:
         raise ValueError(f"multiplicity has {len(weights)} entries; expected one for each of {equations.n} nodes")
     text = _module(equations, method, ordered, section if "section" in ordered else None, width, weights)
@@ -94,17 +97,19 @@ def _module(
     multiplicity: tuple[int, ...] | None,
 ) -> str:
     plain = tidy(equations)
-    weight = [plain.edge.weight.name] if plain.edge is not None else []
-    names = Names([*plain.state, *plain.parameters, *(s.name for s in plain.node.state), *weight])
-    blocks = analyse(plain.node, names)
+    weight = [edge.weight.name for edge in plain.edges]
+    states = [s.name for node in plain.nodes for s in node.state]
+    names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
+    blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
     looped = equations.n > LARGEST_UNROLLED
     sticking = ("contacts",) if plain.node.contact is not None else ()
     if looped:
         method = _for_many(method, equations)
-    steps = _steps(equations, plain, blocks, method, looped)
+    steps = _steps(plain, blocks, method, looped)
     lines = [line for writer in steps.values() for line in writer.lines]
-    functions = node_functions(list(steps.values()), blocks)
-    entries = program(equations).entries if looped and method.kind == "rosenbrock" else 0
+    functions = [f for k in range(len(blocks)) for f in node_functions(list(steps.values()), blocks[k], k)]
+    solves = method.kind == "rosenbrock" or equations.inertial
+    entries = program(equations).entries if looped and solves else 0
     scratch = workspace(steps["step"], entries) if looped else 0
     parts = [
         describe(equations, plain, method, records, lines),
@@ -125,6 +130,15 @@ def _module(
 
 def _for_many(method: Integrator, equations: Equations) -> Integrator:
     """The method as looped kernels have it; ValueError for what only written-out kernels can."""
+    if equations.mixed:
+        raise ValueError(
+            f"nodes of several kinds: a kernel steps at most {LARGEST_UNROLLED} nodes, found {equations.n}; export the "
+            "equations for another solver, or take fewer nodes"
+        )
+    if not Mass(equations).constant:
+        raise ValueError(
+            f"links whose inertia depends on the state: a kernel steps at most {LARGEST_UNROLLED} nodes, found {equations.n}"
+        )
     if method.inexact:
         raise ValueError(
             f"integrator {method.name}: steps at most {LARGEST_UNROLLED} nodes, found {equations.n}; use rodas5p"
@@ -132,12 +146,12 @@ def _for_many(method: Integrator, equations: Equations) -> Integrator:
     return replace(method, smooth=None)
 
 
-def _steps(
-    equations: Equations, plain: Equations, blocks: NodeBlocks, method: Integrator, looped: bool
-) -> dict[str, StepWriter]:
+def _steps(plain: Equations, blocks: Sequence[NodeBlocks], method: Integrator, looped: bool) -> dict[str, StepWriter]:
     """The steps of a kernel by the name of their function, written."""
     methods = {"step": method} if method.smooth is None else {"step": method, "step_smooth": method.smooth}
-    steps = {name: StepWriter(plain, blocks, m, bounded=len(methods) > 1) for name, m in methods.items()}
+    first, *more = blocks
+    bounded = len(methods) > 1
+    steps = {name: StepWriter(plain, first, m, bounded, more) for name, m in methods.items()}
     for writer in steps.values():
         if looped:
             LoopWriter(writer).lines()
@@ -146,10 +160,10 @@ def _steps(
     return steps
 
 
-def node_functions(steps: list[StepWriter], blocks: NodeBlocks) -> list[list[str]]:
-    """The right-hand side of one node, and its linearisations where a step wants one."""
+def node_functions(steps: list[StepWriter], blocks: NodeBlocks, kind: int = 0) -> list[list[str]]:
+    """The right-hand side of one node of some kind, and its linearisations where a step wants one."""
     made = []
-    first = [writer.first_body for writer in steps]
+    first = [writer.first_of(blocks) for writer in steps]
     for name, doc, body in (
         ("node", "Right-hand side of one oscillator.", blocks.rhs),
         ("node_linear", "Right-hand side of one oscillator and the parts of its Jacobian that move.", blocks.linear),
@@ -158,7 +172,7 @@ def node_functions(steps: list[StepWriter], blocks: NodeBlocks) -> list[list[str
         results = [e for e in body.results if not steps[0].is_plain(e)]
         if results and (name == "node" or any(body is b for b in first)):
             arguments = [s.name for s in steps[0].arguments(body, results)]
-            made.append(write_function(name, doc, body, arguments, results))
+            made.append(write_function(function_name(name, kind), doc, body, arguments, results))
     return made
 
 
@@ -178,7 +192,7 @@ def describe(
         f"Equations   {equations.digest[:16]}",
         f"Integrator  {method.name}, order {method.order}: {method.source}",
         f"State       {_listed(equations.state)}",
-        f"Parameters  {', '.join(equations.parameters) or 'none'}",
+        f"Parameters  {_listed(equations.parameters) or 'none'}",
         f"Records     {', '.join(('final state', *records))}",
         *([f"Modes       {more}"] if more else []),
         f"Step        {_operations(lines)} operations outside the node functions",
@@ -232,7 +246,7 @@ def _constants(
     rows = {
         "WIDTH": width,
         "NODES": equations.n,
-        "COMPONENTS": 2 if equations.node.contact is not None else len(equations.node.state),
+        "COMPONENTS": 2 if equations.node.contact is not None else len(equations.common),
         "DIMENSION": equations.dimension,
         "PARAMETERS": len(equations.parameters),
         "DENSE_ROWS": max(len(m.dense) for m in (method, method.smooth) if m is not None),

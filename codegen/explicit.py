@@ -51,4 +51,6 @@ def stage(w: StepWriter, i: int) -> None:
         w.put(f"u_{name} = " + (f"n_{name}" if i >= m.stages and m.a[i] == m.b else
                                 f"{name} + h*({combine(m.a[i], w.stages(name, i))})"))  # fmt: skip
     w.stage_time(i, first=0)
-    w.slopes("u_" if i else "", f"k{i + 1}_")
+    prefix = "u_" if i else ""
+    w.slopes(prefix, f"k{i + 1}_")
+    w.mass.explicit(w, prefix, f"k{i + 1}_", first=i == 0)

@@ -15,24 +15,24 @@ def linearise(w: StepWriter) -> list[dict[str, sp.Expr]]:
 
     Returns what stands for each, by node.
     """
-    eq, body = w.equations, w.first_body
-    implicit = body is w.blocks.linear
-    state = [s.name for s in eq.node.state]
-    kinds = [f"f_{r}" for r in state] + [entry(r, c) for r in eq.node.state for c in eq.node.state]
-    kinds += [f"ft_{r}" for r in state] if implicit else []
-    coded = [e for e in body.results if not w.is_plain(e)]
+    eq = w.equations
+    implicit = w.method.kind == "rosenbrock"
     w.put(f"# right-hand side{', Jacobian and time derivative' if implicit else ' and Jacobian'} at the start")
     function = "node_linear" if implicit else "node_local"
-    w.timed("t", w.wanted(body.results, body))
+    w.timed("t", w.wanted([w.first_of(blocks) for blocks in w.kinds]))
     own: list[dict[str, sp.Expr]] = []
     for i in range(eq.n):
-        at = {s: sp.Symbol(f"{s.name}_{i + 1}", real=True) for s in eq.node.state}
+        states, body = eq.node_at(i).state, w.first_of(w.of(i))
+        kinds = [f"f_{r}" for r in states] + [entry(r, c) for r in states for c in states]
+        kinds += [f"ft_{r}" for r in states] if implicit else []
+        coded = [e for e in body.results if not w.is_plain(e)]
         named = {kind: sp.Symbol(f"{kind}_{i + 1}", real=True) for kind in kinds}
+        at = w.at(i, "")
         plain = {kind: e.xreplace(at) for kind, e in zip(kinds, body.results, strict=True) if w.is_plain(e)}
         if coded:
             left = ", ".join(named[kind].name for kind in kinds if kind not in plain)
             w.put(f"{left} = {w.call(function, body, coded, i, '')}")
-        w.put(*(f"{named[kind]} = {show(plain[kind])}" for kind in kinds[: len(state)] if kind in plain))
+        w.put(*(f"{named[kind]} = {show(plain[kind])}" for kind in kinds[: len(states)] if kind in plain))
         own.append({kind: plain.get(kind, named[kind]) for kind in kinds})
     w.links("", "f_")
     return own
@@ -49,21 +49,26 @@ def write_bound(w: StepWriter, own: list[dict[str, sp.Expr]]) -> None:
     In second-order form (rates of positions are the velocities) an eigenvalue solves z**2 = z D + K, hence
     |z| <= |D| + sqrt|K| in any norm; otherwise the largest row sum is taken.
     """
-    state, n = w.equations.node.state, w.equations.n
-    half = len(state) // 2
-    second_order = len(state) % 2 == 0 and tuple(w.equations.node.rhs[:half]) == tuple(state[half:])
+    eq = w.equations
+    w.mass.refuse("a step that bounds the eigenvalues")
+    half = len(eq.node.state) // 2
+    second_order = not eq.mixed and len(eq.node.state) % 2 == 0 and eq.node.rhs[:half] == eq.node.state[half:]
     slow: list[list[str]] = []
     fast: list[list[str]] = []
-    links = list(w.equations.link_jacobian())
-    for a, r in enumerate(state[half:] if second_order else state, start=half if second_order else 0):
-        for i in range(n):
-            parts = {b: [size(own[i][entry(r, c)])] for b, c in enumerate(state)}
-            for (row, column), e in links:
-                if row == a * n + i:
-                    parts[column // n].append(size(e))
-            columns = list(parts.items())
-            slow.append([t for b, texts in columns if second_order and b < half for t in texts if t])
-            fast.append([t for b, texts in columns if not second_order or b >= half for t in texts if t])
+    links, places, rows = list(eq.link_jacobian()), eq.places(), []
+    for i in range(eq.n):
+        state = eq.node_at(i).state
+        first = half if second_order else 0
+        rows += [(places[i][a], i, a, r) for a, r in enumerate(state[first:], start=first)]
+    for row, i, _, r in sorted(rows, key=lambda found: found[0]):
+        state = eq.node_at(i).state
+        parts = {b: [size(own[i][entry(r, c)])] for b, c in enumerate(state)}
+        for (at, column), e in links:
+            if at == row:
+                parts[0 if eq.mixed else column // eq.n].append(size(e))
+        columns = list(parts.items())
+        slow.append([t for b, texts in columns if second_order and b < half for t in texts if t])
+        fast.append([t for b, texts in columns if not second_order or b >= half for t in texts if t])
     w.put("# a bound of the eigenvalues")
     damping, stiffness = largest(fast), largest(slow)
     w.put(f"bound = {damping or 'broadcast(0.0, WIDTH)'}")

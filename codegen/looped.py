@@ -9,6 +9,8 @@ from collections.abc import Sequence
 
 import sympy as sp
 
+from synchain.models.equations import Edge
+
 from .blocks import Body
 from .linearise import entry
 from .printer import show
@@ -16,18 +18,7 @@ from .rosenbrock import term
 from .sparse import NAMES, program
 from .step import StepWriter, combine
 
-__all__ = ["LoopWriter", "workspace"]
-
-
-def workspace(w: StepWriter, entries: int) -> int:
-    """Groups of scratch memory: stages, stage state, slopes, time slopes and, for implicit methods, the matrix.
-
-    Factors of an incomplete elimination stand beside the matrix, exact ones replace it.
-    """
-    vectors = (len(w.method.c) + 3) * w.equations.dimension
-    if w.method.kind != "rosenbrock":
-        return vectors
-    return vectors + (entries if program(w.equations).exact else 2 * entries)
+__all__ = ["LoopWriter"]
 
 
 class LoopWriter:
@@ -45,7 +36,7 @@ class LoopWriter:
         w = self.w
         w.put(*(f"{name} = {text}" for name, text in self.base.items()))
         w.put(f"{', '.join(NAMES)} = graph")
-        w.parameters()
+        w.parameters(but={f"{name}_{i + 1}" for name in w.equations.varied for i in range(w.equations.n)})
         if self.method.kind == "rosenbrock":
             self.rosenbrock()
         else:
@@ -65,6 +56,13 @@ class LoopWriter:
             f"{name}{suffix} = load({array}, {offset}{c}*NODES + {index}, WIDTH)" for c, name in enumerate(self.state)
         ]
 
+    def own(self, body: Body) -> list[str]:
+        """Load the parameters that a node has for itself, those that a body uses."""
+        eq = self.w.equations
+        used = {s.name for s in body.symbols}
+        slots = {name: eq.dimension + eq.parameters.index(f"{name}_1") for name in eq.varied if name in used}
+        return [f"{name} = load(p, {slot} + i, WIDTH)" for name, slot in slots.items()]
+
     def node_call(self, function: str, body: Body) -> tuple[str, list[sp.Expr]]:
         """The call of a node function on the symbols of the template, and which results it returns."""
         coded = [e for e in body.results if not self.w.is_plain(e)]
@@ -74,7 +72,7 @@ class LoopWriter:
         """The right-hand side of all nodes at a state, links included."""
         body = self.w.blocks.rhs
         call, coded = self.node_call("node", body)
-        lines = self.read(base)
+        lines = self.read(base) + self.own(body)
         names = [f"f_{name}" for name in self.state]
         if coded:
             left = ", ".join(n for n, e in zip(names, body.results, strict=True) if not self.w.is_plain(e))
@@ -92,7 +90,8 @@ class LoopWriter:
             return
         names = {**dict(zip(edge.here, self._suffixed("_here"), strict=True))}
         names |= dict(zip(edge.there, self._suffixed("_there"), strict=True))
-        lines = ["i, j = target[e], source[e]", f"{edge.weight.name} = weights[e]"]
+        lines = self.ends(edge)
+        lines += self.own(Body((), edge.rhs))
         lines += self.read(base, "_here", "i") + self.read(base, "_there", "j")
         for c, e in enumerate(edge.rhs):
             if e != 0:
@@ -101,22 +100,66 @@ class LoopWriter:
         if jacobian:
             for block, slot in ((edge.jacobian_here(), "here_slot"), (edge.jacobian_there(), "there_slot")):
                 lines += self._entries(block, slot, "target.size", "e", names)
+            for block, slot in zip(edge.inertia, ("here_slot", "there_slot"), strict=False):
+                lines += self._entries(block, slot, "target.size", "e", names, "+ shift*")
+        self.loop("for e in range(target.size):", lines)
+
+    def ends(self, edge: Edge) -> list[str]:
+        """The two ends of a link and its weight."""
+        return ["i, j = target[e], source[e]", f"{edge.weight.name} = weights[e]"]
+
+    def masses(self, edge: Edge) -> None:
+        """M as the matrix, factorised: what an explicit step solves with."""
+        self.loop("for k in range(DIMENSION):", ["store(dense, MATRIX + k, 1.0 + 0.0*h)"])
+        self.loop("for k in range(DIMENSION, ENTRIES):", ["store(dense, MATRIX + k, 0.0*h)"])
+        lines = self.ends(edge) + self.own(_inertia(edge))
+        for block, slot in zip(edge.inertia, ("here_slot", "there_slot"), strict=True):
+            lines += self._entries(block, slot, "target.size", "e", {}, "+ ")
+        self.loop("for e in range(target.size):", lines)
+        self.factorise()
+
+    def factorise(self) -> None:
+        """Factorise the matrix."""
+        self.apart = "0" if program(self.w.equations).exact else "ENTRIES"
+        self.w.put(f"factorise(dense, MATRIX, {self.apart}, STATE, order, place, row_start, after_start, column)")
+
+    def solve(self, i: int) -> None:
+        """Solve for the values of stage i in place."""
+        self.w.put(f"solve(dense, MATRIX, {self.apart}, K{i + 1}, SLOPE, STATE, order, row_start, after_start, column)")
+
+    def carried(self, edge: Edge, i: int) -> None:
+        """Add rate (M - 1) s to stage i, s the sum of earlier stages in STATE."""
+        lines = self.ends(edge) + self.own(_inertia(edge))
+        for block, index in zip(edge.inertia, "ij", strict=True):
+            for a, row in enumerate(block):
+                place = f"K{i + 1} + {a}*NODES + i"
+                for b, e in enumerate(row):
+                    if e != 0:
+                        term = f"rate*({show(e)})*load(dense, STATE + {b}*NODES + {index}, WIDTH)"
+                        lines.append(f"store(dense, {place}, load(dense, {place}, WIDTH) + {term})")
         self.loop("for e in range(target.size):", lines)
 
     def _suffixed(self, suffix: str) -> list[sp.Symbol]:
         return [sp.Symbol(f"{name}{suffix}", real=True) for name in self.state]
 
     def _entries(
-        self, block: Sequence[Sequence[sp.Expr]], slot: str, length: str, index: str, names: dict[sp.Symbol, sp.Symbol]
+        self,
+        block: Sequence[Sequence[sp.Expr]],
+        slot: str,
+        length: str,
+        index: str,
+        names: dict[sp.Symbol, sp.Symbol],
+        sign: str = "- ",
     ) -> list[str]:
-        """Statements that subtract the entries of a block from the matrix."""
+        """Statements that subtract the entries of a block from the matrix, or add them by another `sign`."""
         lines = []
         for a, row in enumerate(block):
             for b, e in enumerate(row):
                 if e != 0:
                     place = f"MATRIX + {slot}[{a * len(self.state) + b}*{length} + {index}]"
                     value = show(e.xreplace(names))
-                    lines.append(f"store(dense, {place}, load(dense, {place}, WIDTH) - {value})")
+                    value = f"({value})" if sign.endswith("*") and e.is_Add else value
+                    lines.append(f"store(dense, {place}, load(dense, {place}, WIDTH) {sign}{value})")
         return lines
 
     # -- Rosenbrock -------------------------------------------------------------------------------------------
@@ -126,8 +169,7 @@ class LoopWriter:
         w, m = self.w, self.method
         w.put(f"reach = h*{m.gamma!r}", "shift = 1.0/reach", f"rate = shift*{m.gamma!r}")
         self.linearise()
-        self.apart = "0" if program(w.equations).exact else "ENTRIES"
-        w.put(f"factorise(dense, MATRIX, {self.apart}, STATE, order, place, row_start, after_start, column)")
+        self.factorise()
         for i in range(m.stages):
             self.stage(i)
         self.finish(m.b, [combine(row, self.stages(m.stages)) for row in m.e], m.a[-1])
@@ -141,13 +183,13 @@ class LoopWriter:
         w, body = self.w, self.w.blocks.linear
         size = len(self.state)
         w.put("# right-hand side, shift - J and time derivative at the start")
-        w.timed("t", w.wanted(body.results, body))
+        w.timed("t", w.wanted([body]))
         self.loop("for k in range(DIMENSION):", ["store(dense, MATRIX + k, shift)"])
         self.loop("for k in range(DIMENSION, ENTRIES):", ["store(dense, MATRIX + k, 0.0*h)"])
         call, coded = self.node_call("node_linear", body)
         kinds = [f"f_{r}" for r in self.state] + [entry(r, c) for r in self.node.state for c in self.node.state]
         kinds += [f"ft_{r}" for r in self.state]
-        lines = self.read("y")
+        lines = self.read("y") + self.own(body)
         if coded:
             left = [kind for kind, e in zip(kinds, body.results, strict=True) if not w.is_plain(e)]
             lines.append(f"{', '.join(left)} = {call}")
@@ -170,15 +212,21 @@ class LoopWriter:
             self.state_of(m.a[i], "", "")
             w.stage_time(i, first=1)
             self.slopes("STATE", "SLOPE")
+        heavy = w.equations.edge if w.equations.inertial and i > 0 else None
         for c in range(len(self.state)):
             lines, text = [], f"load(dense, SLOPE + {c}*NODES + i, WIDTH)"
             if i > 0:
                 lines += self.load_stages(c, m.big_c[i])
-                text += f" + rate*({combine(m.big_c[i], self.stages(i))})"
+                total = f"({combine(m.big_c[i], self.stages(i))})"
+                if heavy is not None:
+                    lines.append(f"store(dense, STATE + {c}*NODES + i, {total})")
+                text += f" + rate*{total}"
             if m.d[i] != 0.0 and c in self.timed_rows:
                 text += term(m.d[i], f"load(dense, TIME_SLOPE + {c}*NODES + i, WIDTH)", tidy=False)
             self.loop("for i in range(NODES):", [*lines, f"store(dense, K{i + 1} + {c}*NODES + i, {text})"])
-        w.put(f"solve(dense, MATRIX, {self.apart}, K{i + 1}, SLOPE, STATE, order, row_start, after_start, column)")
+        if heavy is not None:
+            self.carried(heavy, i)
+        self.solve(i)
 
     def load_stages(self, c: int, row: Sequence[float]) -> list[str]:
         """Load the stage values of state variable c that a row of coefficients uses."""
@@ -228,13 +276,23 @@ class LoopWriter:
     def explicit(self) -> None:
         """Stages, and those that serve the dense output alone under their flag."""
         w, m = self.w, self.method
+        heavy = w.equations.edge if w.equations.inertial else None
+        if heavy is not None:
+            self.masses(heavy)
         for i in range(len(m.c)):
             w.put(f"# stage {i + 1}")
             if i > 0:
                 self.state_of(m.a[i], "h*", "")
             w.stage_time(i, first=0)
             self.slopes("STATE" if i else "y", f"K{i + 1}")
+            if heavy is not None:
+                self.solve(i)
         self.finish(m.b, [combine(row, self.stages(len(row))) for row in m.e], (), "h*")
+
+
+def _inertia(edge: Edge) -> Body:
+    """The entries of a link's inertia as results."""
+    return Body((), tuple(e for block in edge.inertia for row in block for e in row))
 
 
 def _lane(e: sp.Expr) -> str:

@@ -6,6 +6,7 @@ import builtins
 import keyword
 import re
 import unicodedata
+from dataclasses import replace
 
 import sympy as sp
 
@@ -33,7 +34,7 @@ RESERVED = frozenset(
 
 PREFIXES = (
     "m_", "l_", "inv_", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "u_", "f_", "r_", "at_", "ft_", "n_", "j_",
-    "e_", "_", "along_", "value_", "bend_", "steady_",
+    "e_", "_", "along_", "value_", "bend_", "steady_", "g_", "mass_", *(f"node{k}" for k in range(2, 10)),
 )  # fmt: skip
 SUFFIXES = ("_here", "_there")
 NUMBERED = re.compile(r"_\d+$")
@@ -42,26 +43,45 @@ NUMBERED = re.compile(r"_\d+$")
 
 def tidy(equations: Equations) -> Equations:
     """Return the same equations with symbols that the generated code can use as names."""
-    node, edge = equations.node, equations.edge
-    own = {*node.state, *node.parameters}
-    shown = own | ({*edge.parameters, edge.weight} if edge is not None else set())
-    taken = {s.name for s in (*shown, *(edge.here + edge.there if edge is not None else ()))}
+    nodes, edges = equations.nodes, equations.edges
+    weights = {edge.weight for edge in edges}
+    own = {s for node in nodes for s in (*node.state, *node.parameters)}
+    states = {s for node in nodes for s in node.state}
+    shown = own | weights | {s for edge in edges for s in edge.parameters}
+    taken = {s.name for s in shown} | {s.name for edge in edges for s in (*edge.here, *edge.there)}
     swap: dict[sp.Symbol, sp.Symbol] = {}
     for s in sorted(shown, key=str):
-        if _clashes(s.name) or (s in node.state and NUMBERED.search(s.name)):
+        numbered = s in states or s.name in equations.varied
+        if _clashes(s.name) or (numbered and NUMBERED.search(s.name)):
             name = _free(s.name, taken)
             taken.add(name)
             swap[s] = sp.Symbol(name, real=True)
+    node, *others = (_node(node, swap) for node in nodes)
+    for weight in sorted(weights & own, key=str):  # within the edge this name means the weight
+        swap[weight] = sp.Symbol(_free(f"{weight.name}_of_link", taken), real=True)
+    if not swap:
+        return equations
+    return replace(
+        equations,
+        node=node,
+        others=tuple(others),
+        edge=None if equations.edge is None else _edge(equations.edge, swap),
+        joints=tuple((pair, _edge(edge, swap)) for pair, edge in equations.joints),
+        varied=tuple(swap.get(s, s).name for s in (sp.Symbol(name, real=True) for name in equations.varied)),
+    )
+
+
+def _node(node: Node, swap: dict[sp.Symbol, sp.Symbol]) -> Node:
     contact = None if node.contact is None else node.contact.map(lambda e: e.xreplace(swap))
-    node = Node(_all(node.state, swap), _all(node.rhs, swap), _all(node.parameters, swap), contact)
-    if edge is not None:
-        if edge.weight in own:  # within the edge this name means the weight
-            swap[edge.weight] = sp.Symbol(_free(f"{edge.weight.name}_of_link", taken), real=True)
-        edge = Edge(
-            _all(edge.here, swap), _all(edge.there, swap), edge.weight.xreplace(swap),
-            _all(edge.rhs, swap), _all(edge.parameters, swap),
-        )  # fmt: skip
-    return Equations(node, edge, equations.n, equations.links) if swap else equations
+    return Node(_all(node.state, swap), _all(node.rhs, swap), _all(node.parameters, swap), contact)
+
+
+def _edge(edge: Edge, swap: dict[sp.Symbol, sp.Symbol]) -> Edge:
+    return Edge(
+        _all(edge.here, swap), _all(edge.there, swap), edge.weight.xreplace(swap),
+        _all(edge.rhs, swap), _all(edge.parameters, swap),
+        tuple(tuple(_all(row, swap) for row in block) for block in edge.inertia),
+    )  # fmt: skip
 
 
 def _all(expressions: tuple, swap: dict) -> tuple:

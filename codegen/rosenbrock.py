@@ -25,10 +25,13 @@ def write_rosenbrock(w: StepWriter, note: Callable[[int], None] | None = None) -
     if w.bounded:
         write_bound(w, own)
     entries = gather(w, own)
-    steps = plan(len(w.state), set(entries))
-    factors = write_factors(steps, entries, tuple(w.state))
-    w.put("# factors of shift - J", *factors.lines)
-    slopes = [show(values[f"ft_{s.name}"]) for s in w.equations.node.state for values in own]
+    entries = w.mass.at_start(w, entries)
+    steps = plan(len(w.state), set(entries) | w.mass.coupled)
+    factors = write_factors(steps, entries, tuple(w.state), w.mass.entries)
+    w.put(f"# factors of {'shift*M - J' if w.mass.entries else 'shift - J'}", *factors.lines)
+    places = [(k, i, s) for i, own_places in enumerate(w.equations.places())
+              for k, s in zip(own_places, w.equations.node_at(i).state, strict=True)]  # fmt: skip
+    slopes = [show(own[i][f"ft_{s.name}"]) for _, i, s in sorted(places, key=lambda place: place[0])]
     for i in range(w.method.stages):
         stage(w, i, steps, factors, slopes)
         if note is not None:
@@ -39,14 +42,18 @@ def write_rosenbrock(w: StepWriter, note: Callable[[int], None] | None = None) -
 
 def gather(w: StepWriter, own: list[dict[str, sp.Expr]]) -> Entries:
     """Entries of the whole Jacobian: those of the nodes by name, plus what the links add."""
-    eq, n = w.equations, w.equations.n
+    eq = w.equations
+    if w.method.inexact:
+        w.mass.refuse(f"integrator {w.method.name}")
     entries: Entries = {}
-    for a, r in enumerate(eq.node.state):
-        for b, c in enumerate(eq.node.state):
-            for i in range(n):
-                entries[a * n + i, b * n + i] = own[i][entry(r, c)]
+    for i, places in enumerate(eq.places()):
+        state = eq.node_at(i).state
+        for row, r in zip(places, state, strict=True):
+            for column, c in zip(places, state, strict=True):
+                entries[row, column] = own[i][entry(r, c)]
+    node = {k: i for i, places in enumerate(eq.places()) for k in places}
     for key, e in eq.link_jacobian():
-        if w.method.inexact and key[0] % n != key[1] % n:
+        if w.method.inexact and node[key[0]] != node[key[1]]:
             continue
         entries[key] = entries.get(key, sp.S.Zero) + e
     return {key: e for key, e in entries.items() if e != 0}
@@ -62,10 +69,12 @@ def stage(w: StepWriter, i: int, steps: Plan, factors: Factors, time_slopes: Seq
         w.stage_time(i, first=1)
         w.slopes("u_", "f_")
     rights, results = {}, {}
+    sums = {name: combine(m.big_c[i], w.stages(name, i)) for name in w.state} if i > 0 else {}
+    known = w.mass.known(w, sums, i)
     for slot, name in enumerate(w.state):
-        text = f"f_{name}"
-        if i > 0:
-            text += f" + rate*({combine(m.big_c[i], w.stages(name, i))})"
+        text = known.get(name, f"f_{name}")
+        if i > 0 and name not in known:
+            text += f" + rate*({sums[name]})"
         if m.d[i] != 0.0 and time_slopes[slot] != "0.0":
             text += term(m.d[i], time_slopes[slot])
         w.put(f"r_{name} = {text}")

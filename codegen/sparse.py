@@ -13,14 +13,18 @@ import heapq
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from synchain.models.equations import Equations, Link
+from synchain.models.equations import Edge, Equations, Link
 
 from .elimination import Entry, Plan
 
-__all__ = ["EMPTY", "FILL_LIMIT", "NAMES", "Program", "block_pattern", "program"]
+if TYPE_CHECKING:
+    from .step import StepWriter
+
+__all__ = ["EMPTY", "FILL_LIMIT", "NAMES", "Program", "block_pattern", "program", "workspace"]
 
 NAMES = (
     "target", "source", "node_slot", "here_slot", "there_slot", "order", "place", "row_start", "after_start", "column",
@@ -64,9 +68,18 @@ def program(equations: Equations) -> Program:
     """
     edge = equations.edge if equations.links else None
     own = block_pattern(equations.node.jacobian())
-    here = block_pattern(edge.jacobian_here()) if edge else ()
-    there = block_pattern(edge.jacobian_there()) if edge else ()
+    here, there = (tuple(sorted(pattern)) for pattern in _link_patterns(edge))
     return _program(equations.n, len(equations.node.state), own, here, there, equations.links)
+
+
+def _link_patterns(edge: Edge | None) -> tuple[set[Entry], set[Entry]]:
+    """Where a link has entries of the Jacobian or of the mass matrix, by its target and by its source."""
+    if edge is None:
+        return set(), set()
+    here, there = set(block_pattern(edge.jacobian_here())), set(block_pattern(edge.jacobian_there()))
+    for pattern, block in zip((here, there), edge.inertia, strict=False):
+        pattern.update(block_pattern(block))
+    return here, there
 
 
 @lru_cache(maxsize=4)
@@ -201,3 +214,14 @@ def _eliminate(k: int, rows: list[set[int]], columns: list[set[int]], near: list
     for j in near[k]:
         near[j].discard(k)
     return fill
+
+
+def workspace(w: StepWriter, entries: int) -> int:
+    """Groups of scratch memory: stages, stage state, slopes, time slopes and, for implicit methods, the matrix.
+
+    Factors of an incomplete elimination stand beside the matrix, exact ones replace it.
+    """
+    vectors = (len(w.method.c) + 3) * w.equations.dimension
+    if w.method.kind != "rosenbrock" and not w.equations.inertial:
+        return vectors
+    return vectors + (entries if program(w.equations).exact else 2 * entries)

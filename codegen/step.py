@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from contextlib import contextmanager
 
 import sympy as sp
@@ -11,9 +11,10 @@ from synchain.models.equations import TIME, Equations
 
 from .blocks import Body, NodeBlocks
 from .integrators import Integrator
+from .mass import Mass
 from .printer import show
 
-__all__ = ["PAIR", "SCALED", "StepWriter", "combine", "indent_from", "write_function"]
+__all__ = ["PAIR", "SCALED", "StepWriter", "combine", "function_name", "indent_from", "write_function"]
 
 PAIR = '''
 @njit(error_model="numpy", forceinline=True)
@@ -28,6 +29,11 @@ def scaled(error, old, new, rtol, atol):
     """The error estimate of one state variable in units of its tolerance."""
     return absolute(error)/(atol + rtol*maximum(absolute(old), absolute(new)))
 '''.strip()
+
+
+def function_name(name: str, kind: int) -> str:
+    """The name of a node function for nodes of some kind: node, node2, node2_linear."""
+    return name if kind == 0 else name.replace("node", f"node{kind + 1}", 1)
 
 
 def write_function(name: str, doc: str, body: Body, arguments: Sequence[str], results: Sequence[sp.Expr]) -> list[str]:
@@ -55,14 +61,23 @@ def combine(row: Sequence[float], names: Sequence[str], start: str = "") -> str:
 class StepWriter:
     """Writes the statements of one step of `method` for `equations`, whose node was analysed into `blocks`.
 
-    A `bounded` step returns a bound of the eigenvalues at its start beside the error.
+    Nodes of further kinds were analysed into `more`.  A `bounded` step returns a bound of the eigenvalues at its start
+    beside the error.
     """
 
-    def __init__(self, equations: Equations, blocks: NodeBlocks, method: Integrator, bounded: bool = False) -> None:
+    def __init__(
+        self,
+        equations: Equations,
+        blocks: NodeBlocks,
+        method: Integrator,
+        bounded: bool = False,
+        more: Sequence[NodeBlocks] = (),
+    ) -> None:
         self.equations, self.blocks, self.method, self.bounded = equations, blocks, method, bounded
+        self.kinds = (blocks, *more)
         self.state = equations.state
         self.lines: list[str] = []
-        self.timed_names = {s for s, _ in blocks.timed}
+        self.mass = Mass(equations)
 
     def put(self, *lines: str) -> None:
         """Append statements."""
@@ -75,36 +90,59 @@ class StepWriter:
     @property
     def first_body(self) -> Body:
         """What is evaluated of a node at the start of a step."""
+        return self.first_of(self.blocks)
+
+    def first_of(self, blocks: NodeBlocks) -> Body:
+        """What is evaluated of a node of some kind at the start of a step."""
         if self.method.kind == "rosenbrock":
-            return self.blocks.linear
-        return self.blocks.local if self.bounded else self.blocks.rhs
+            return blocks.linear
+        return blocks.local if self.bounded else blocks.rhs
+
+    def of(self, i: int) -> NodeBlocks:
+        """The blocks of node i."""
+        return self.kinds[self.equations.kind(i)]
 
     # -- pieces of the right-hand side ------------------------------------------------------------------------
 
     def is_plain(self, e: sp.Expr) -> bool:
         """True where a result needs no function: a number, a parameter term, or one bare state symbol."""
-        inner = set(self.equations.node.state) | self.inner
+        own = {s for node in self.equations.nodes for s in node.state}
+        inner = own | self.inner | self.varied
         return (e.is_Symbol and e not in self.inner) or not e.free_symbols & inner
 
     @property
     def inner(self) -> set[sp.Symbol]:
         """Symbols defined inside the node functions."""
-        return {s for body in (self.blocks.rhs, self.blocks.linear, self.blocks.local) for s, _ in body.statements}
+        bodies = (body for blocks in self.kinds for body in (blocks.rhs, blocks.linear, blocks.local))
+        return {s for body in bodies for s, _ in body.statements}
+
+    @property
+    def varied(self) -> set[sp.Symbol]:
+        """The parameters of the template that have a value for each node."""
+        return {sp.Symbol(name, real=True) for name in self.equations.varied}
 
     def arguments(self, body: Body, results: Sequence[sp.Expr]) -> list[sp.Symbol]:
         """What a node function must be given: state first, then the rest by name."""
         used = Body(body.statements, tuple(results)).symbols
-        own = [s for s in self.equations.node.state if s in used]
+        states = dict.fromkeys(s for node in self.equations.nodes for s in node.state)
+        own = [s for s in states if s in used]
         return own + sorted((s for s in used if s not in own), key=lambda s: s.name)
+
+    def at(self, i: int, prefix: str) -> dict[sp.Symbol, sp.Symbol]:
+        """The names of the states of node i in a stage, and of the parameters that it has for itself."""
+        states = self.equations.node_at(i).state
+        found = {s: sp.Symbol(f"{prefix}{s.name}_{i + 1}", real=True) for s in states}
+        return {**self.equations.at_node(i), **found}
 
     def call(self, function: str, body: Body, results: Sequence[sp.Expr], i: int, prefix: str) -> str:
         """The call of a node function for node i with the state names of a stage."""
-        at = {s: f"{prefix}{s.name}_{i + 1}" for s in self.equations.node.state}
-        return f"{function}({', '.join(at.get(s, s.name) for s in self.arguments(body, results))})"
+        at, kind = self.at(i, prefix), self.equations.kind(i)
+        names = (at.get(s, s).name for s in self.arguments(body, results))
+        return f"{function_name(function, kind)}({', '.join(names)})"
 
     def timed(self, time: str, wanted: set[sp.Symbol]) -> None:
         """Statements for the time terms in use, at the time of that name."""
-        for symbol, e in self.blocks.timed:
+        for symbol, e in (pair for blocks in self.kinds for pair in blocks.timed):
             if symbol in wanted:
                 self.put(f"{symbol} = {show(e.xreplace({TIME: sp.Symbol(time)}))}")
 
@@ -116,42 +154,43 @@ class StepWriter:
         c = self.method.c
         if i == first or c[i] != c[i - 1]:
             self.put(f"now = {combine((c[i],), ['h'], 't')}")
-            self.timed("now", self.wanted(self.blocks.rhs.results, self.blocks.rhs))
+            self.timed("now", self.wanted([blocks.rhs for blocks in self.kinds]))
 
-    def wanted(self, results: Sequence[sp.Expr], body: Body) -> set[sp.Symbol]:
-        """Time terms that some results use."""
-        return Body(body.statements, tuple(results)).symbols & self.timed_names
+    def wanted(self, bodies: Sequence[Body]) -> set[sp.Symbol]:
+        """Time terms that some bodies use."""
+        return {s for blocks in self.kinds for s, _ in blocks.timed} & {s for body in bodies for s in body.symbols}
 
     def slopes(self, prefix: str, out: str) -> None:
         """Statements that give the right-hand side at the state `prefix`x_1 … under the names `out`x_1 …"""
-        node, body = self.equations.node, self.blocks.rhs
-        coded = [e for e in body.results if not self.is_plain(e)]
         for i in range(self.equations.n):
-            names = {s: f"{prefix}{s.name}_{i + 1}" for s in node.state}
-            targets = [f"{out}{s.name}_{i + 1}" for s in node.state]
+            body, names = self.of(i).rhs, self.at(i, prefix)
+            coded = [e for e in body.results if not self.is_plain(e)]
+            targets = [f"{out}{s.name}_{i + 1}" for s in self.equations.node_at(i).state]
             if coded:
                 left = [t for t, e in zip(targets, body.results, strict=True) if not self.is_plain(e)]
                 self.put(f"{', '.join(left)} = {self.call('node', body, coded, i, prefix)}")
             for target, e in zip(targets, body.results, strict=True):
                 if self.is_plain(e):
-                    text = show(e.xreplace({s: sp.Symbol(n) for s, n in names.items()}))
+                    text = show(e.xreplace(names))
                     self.put(f"{target} = broadcast({text}, WIDTH)" if e.is_number else f"{target} = {text}")
         self.links(prefix, out)
 
     def links(self, prefix: str, out: str) -> None:
         """Add what the links contribute to the right-hand side."""
-        edge = self.equations.edge
-        if edge is None:
-            return
+        eq = self.equations
         terms: dict[str, list[sp.Expr]] = {}
-        stage = {sp.Symbol(n, real=True): sp.Symbol(prefix + n, real=True) for n in self.state}
-        for link in self.equations.links:
-            for s, e in zip(self.equations.node.state, edge.rhs, strict=True):
-                term = e.xreplace(self.equations.at_link(link)).xreplace(stage)
+        stage = self.staged(prefix)
+        for link in eq.links:
+            for s, e in zip(eq.node_at(link[0]).state, eq.edge_at(link).rhs, strict=True):
+                term = e.xreplace(eq.at_link(link)).xreplace(stage)
                 if term != 0:
                     terms.setdefault(f"{out}{s.name}_{link[0] + 1}", []).append(term)
         for target, parts in terms.items():
             self.put(f"{target} = {target} + " + " + ".join(show(p) for p in parts))
+
+    def staged(self, prefix: str) -> dict[sp.Symbol, sp.Symbol]:
+        """The names of all states in a stage."""
+        return {sp.Symbol(n, real=True): sp.Symbol(prefix + n, real=True) for n in self.state}
 
     # -- beginning and end ------------------------------------------------------------------------------------
 
@@ -161,13 +200,15 @@ class StepWriter:
             self.put(f"{name} = load(y, {slot}, WIDTH)")
         self.parameters()
 
-    def parameters(self) -> None:
-        """Load the parameters and compute what depends on them alone."""
+    def parameters(self, but: Container[str] = ()) -> None:
+        """Load the parameters, `but` some, and compute what depends on them alone."""
         for slot, name in enumerate(self.equations.parameters):
-            self.put(f"{name} = load(p, {len(self.state) + slot}, WIDTH)")
-        body = self.first_body
-        wanted = body.symbols.union(*(e.free_symbols for s, e in self.blocks.timed if s in body.symbols))
-        self.put(*(f"{symbol} = {show(e)}" for symbol, e in self.blocks.constants if symbol in wanted))
+            if name not in but:
+                self.put(f"{name} = load(p, {len(self.state) + slot}, WIDTH)")
+        for blocks in self.kinds:
+            used = self.first_of(blocks).symbols
+            wanted = used.union(*(e.free_symbols for s, e in blocks.timed if s in used))
+            self.put(*(f"{symbol} = {show(e)}" for symbol, e in blocks.constants if symbol in wanted))
 
     def closing(self, errors: Sequence[str]) -> None:
         """Store the new state and reduce the error to one number a lane."""

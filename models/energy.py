@@ -17,7 +17,7 @@ from .calculus import derivative
 from .coupling_matrix import is_matrix
 from .coupling_name import coordinates_of, split
 from .equations import TIME, Equations, Link
-from .network import pair_energy
+from .link import pair_energy
 from .nondimensional import FRICTION, friction_coefficient, nondimensional
 from .plugins import load
 
@@ -71,6 +71,8 @@ def energy(scene: Scene) -> Energy:
     equations = scene.equations
     if equations.node.contact is not None:
         raise ValueError("energy: set-valued friction does work that is no function of the state; use contact 'atan'")
+    if equations.mixed or equations.inertial:
+        equations.expect_alike("energy")
     system = nondimensional(module)
     lagrangian = system.kinetic - system.potential
     momenta = [derivative(lagrangian, v) for v in system.velocities]

@@ -1,7 +1,8 @@
 """The checked product of a derivation: node and edge equations, and the network they make on a graph.
 
 Everything downstream (printing, code generation, spectra, tangent dynamics) reads these values and nothing else.
-A network is stored as a template (one node, one edge) and a list of links, so its size costs no algebra.
+A network is stored as templates (one node, one edge; several where its nodes are of several kinds) and a list of links,
+so its size costs no algebra.
 """
 
 from __future__ import annotations
@@ -9,211 +10,221 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 
 import sympy as sp
 
-from .calculus import derivative
-from .contact import SLIP, Contact
+from .contact import Contact
+from .equation_checks import check
+from .template import TIME, Edge, Link, Node
 
 __all__ = ["TIME", "Edge", "Equations", "Link", "Node"]
 
-TIME = sp.Symbol("t", real=True)
-"""Non-dimensional time, the one time symbol of all equations."""
-
-Link = tuple[int, int, Fraction]
-"""(target, source, weight): node `target` feels node `source`; indices start at 0."""
-
-
-@dataclass(frozen=True, slots=True)
-class Node:
-    """One uncoupled oscillator: d(state)/dt = rhs(state, t; parameters).
-
-    Raises ValueError where the right-hand side uses a symbol that is not declared, contains a floating-point number
-    (numbers are parameters or rationals), has not one entry for each state symbol, or where two names are the same.
-    With set-valued friction (`contact`) the third state is the mode, which only events change.
-    """
-
-    state: tuple[sp.Symbol, ...]
-    rhs: tuple[sp.Expr, ...]
-    parameters: tuple[sp.Symbol, ...]
-    contact: Contact | None = None
-
-    def __post_init__(self) -> None:
-        _differ("node", (TIME, *self.state, *self.parameters))
-        known = {TIME, *self.state, *self.parameters}
-        _check("node", self.rhs, len(self.state), known)
-        if self.contact is not None:
-            if len(self.state) != 3 or self.state[2] != SLIP:
-                raise ValueError(f"a node with set-valued friction has the states x, v, slip; found {self.state}")
-            _check("contact", self.contact.expressions, len(self.contact.expressions), known)
-
-    @property
-    def forced(self) -> bool:
-        """True where time occurs explicitly."""
-        return any(e.has(TIME) for e in self.rhs)
-
-    def jacobian(self) -> tuple[tuple[sp.Expr, ...], ...]:
-        """d(rhs)/d(state), one-sided at kinks (see `synchain.models.calculus`)."""
-        return tuple(tuple(derivative(e, s) for s in self.state) for e in self.rhs)
-
-    def time_derivative(self) -> tuple[sp.Expr, ...]:
-        """The partial derivative of rhs with respect to time."""
-        return tuple(derivative(e, TIME) for e in self.rhs)
-
-
-@dataclass(frozen=True, slots=True)
-class Edge:
-    """What one link adds to the right-hand side of its target: rhs(here, there; weight, parameters).
-
-    `here` are the state symbols of the target, `there` those of the source, both in the order of Node.state.
-    """
-
-    here: tuple[sp.Symbol, ...]
-    there: tuple[sp.Symbol, ...]
-    weight: sp.Symbol
-    rhs: tuple[sp.Expr, ...]
-    parameters: tuple[sp.Symbol, ...]
-
-    def __post_init__(self) -> None:
-        if len(self.here) != len(self.there):
-            raise ValueError(f"edge: {len(self.here)} symbols at the target but {len(self.there)} at the source")
-        _differ("edge", (TIME, self.weight, *self.here, *self.there, *self.parameters))
-        known = {self.weight, *self.here, *self.there, *self.parameters}
-        _check("edge", self.rhs, len(self.here), known)
-
-    def jacobian_here(self) -> tuple[tuple[sp.Expr, ...], ...]:
-        """d(rhs)/d(here)."""
-        return tuple(tuple(derivative(e, s) for s in self.here) for e in self.rhs)
-
-    def jacobian_there(self) -> tuple[tuple[sp.Expr, ...], ...]:
-        """d(rhs)/d(there)."""
-        return tuple(tuple(derivative(e, s) for s in self.there) for e in self.rhs)
-
-    @property
-    def diffusive(self) -> bool:
-        """True where the link vanishes between equal states, so that synchronous motion solves the network."""
-        equal = dict(zip(self.there, self.here, strict=True))
-        return all(sp.simplify(e.xreplace(equal)) == 0 for e in self.rhs)
+Entry = tuple[tuple[int, int], sp.Expr]
+Block = tuple[tuple[sp.Expr, ...], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Equations:
-    """The equations of motion of `n` equal nodes joined by `links`.
+    """The equations of motion of `n` nodes joined by `links`: M d(state)/dt = rhs, M the identity unless links have inertia.
 
-    State order is component by component: x_1 … x_n, v_1 … v_n.  Raises ValueError on a link outside the nodes,
-    a link from a node to itself, a repeated link, links without an edge, or a parameter named like a state variable.
+    State order is component by component: x_1 … x_n, v_1 … v_n.  The parameters named in `varied` have one value for each
+    node: a_1 … a_n.  Nodes of several kinds: `kinds` says for each node which of (node, *others) it is, and `joints` holds
+    ((kind of the target, kind of the source), edge) in place of `edge`; first come the components that all kinds have.
+    Raises ValueError on a link outside the nodes, a link from a node to itself, a repeated link, links without an edge,
+    or one name for two things.
     """
 
     node: Node
     edge: Edge | None
     n: int
     links: tuple[Link, ...] = ()
+    varied: tuple[str, ...] = ()
+    others: tuple[Node, ...] = ()
+    kinds: tuple[int, ...] = ()
+    joints: tuple[tuple[tuple[int, int], Edge], ...] = ()
 
     def __post_init__(self) -> None:
-        if self.n < 1:
-            raise ValueError(f"a network needs at least one node, found n = {self.n}")
-        if self.links and self.edge is None:
-            raise ValueError(f"{len(self.links)} links but no edge equations; give a coupling")
-        if self.edge is not None and len(self.edge.here) != len(self.node.state):
-            raise ValueError(
-                f"the edge joins nodes of {len(self.edge.here)} states, the node has {len(self.node.state)}"
-            )
-        seen = set()
-        for target, source, _ in self.links:
-            if not (0 <= target < self.n and 0 <= source < self.n) or target == source:
-                raise ValueError(f"link {target} <- {source}: expected two different nodes of 0 … {self.n - 1}")
-            if (target, source) in seen:
-                raise ValueError(f"link {target} <- {source} occurs twice; add the weights up")
-            seen.add((target, source))
-        states = {*self.state, *(s.name for s in self.node.state)}
-        taken = sorted(states.intersection(self.parameters))
-        if taken:
-            raise ValueError(f"the parameter {taken[0]!r} has the name of a state variable; rename it")
+        check(self)
+
+    @property
+    def mixed(self) -> bool:
+        """True where the nodes are of several kinds."""
+        return bool(self.kinds)
+
+    @property
+    def edges(self) -> tuple[Edge, ...]:
+        """The edge templates that links use."""
+        if not self.links:
+            return ()
+        return tuple(edge for _, edge in self.joints) if self.mixed else () if self.edge is None else (self.edge,)
+
+    @property
+    def nodes(self) -> tuple[Node, ...]:
+        """The node templates, by kind."""
+        return (self.node, *self.others)
+
+    def kind(self, i: int) -> int:
+        """The kind of node `i` (0-based)."""
+        return self.kinds[i] if self.kinds else 0
+
+    def node_at(self, i: int) -> Node:
+        """The template of node `i` (0-based)."""
+        return self.nodes[self.kind(i)]
+
+    def edge_at(self, link: Link) -> Edge:
+        """The template of a link."""
+        found = dict(self.joints).get((self.kind(link[0]), self.kind(link[1]))) if self.mixed else self.edge
+        if found is None:
+            raise ValueError("these equations have no edge")
+        return found
+
+    def expect_alike(self, what: str) -> None:
+        """Raise ValueError where nodes differ in parameters or kind, or links have inertia: `what` is for others."""
+        found = f"nodes that differ in {', '.join(self.varied)}" if self.varied else ""
+        found = "nodes of several kinds" if self.mixed else found or ("links with inertia" if self.inertial else "")
+        if found:
+            raise ValueError(f"{what}: found {found}; expected equal nodes with links that have no inertia")
+
+    @property
+    def inertial(self) -> bool:
+        """True where links have inertia, so that M is not the identity."""
+        return any(edge.inertia for edge in self.edges)
+
+    @property
+    def plain(self) -> bool:
+        """True where all nodes are of one kind and M is the identity."""
+        return not (self.mixed or self.inertial)
 
     @property
     def dimension(self) -> int:
         """Number of state variables of the whole network."""
-        return self.n * len(self.node.state)
+        if not self.mixed:
+            return self.n * len(self.node.state)
+        return sum(len(self.node_at(i).state) for i in range(self.n))
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names of all parameters, node first, in a fixed order."""
-        names = [s.name for s in self.node.parameters]
-        if self.links and self.edge is not None:
-            names += [s.name for s in self.edge.parameters if s.name not in names]
+        """Names of all parameters, node first, in a fixed order; a parameter in `varied` is a_1 … a_n."""
+        names: list[str] = []
+        for name in dict.fromkeys(s.name for node in self.nodes for s in node.parameters):
+            names += [f"{name}_{i + 1}" for i in self.holders(name)] if name in self.varied else [name]
+        for edge in self.edges:
+            names += [s.name for s in edge.parameters if s.name not in (*names, *self.varied)]
         return tuple(names)
+
+    def holders(self, name: str) -> tuple[int, ...]:
+        """The nodes (0-based) that have a parameter or a state of that name."""
+        has = [any(s.name == name for s in (*node.state, *node.parameters)) for node in self.nodes]
+        return tuple(i for i in range(self.n) if has[self.kind(i)])
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the states of the nodes, such as ("x", "v"): first those that all kinds have."""
+        names = dict.fromkeys(s.name for node in self.nodes for s in node.state)
+        return tuple(sorted(names, key=lambda name: name not in self.common)) if self.mixed else tuple(names)
+
+    @property
+    def common(self) -> frozenset[str]:
+        """The components that nodes of all kinds have."""
+        first, *rest = ({s.name for s in node.state} for node in self.nodes)
+        return frozenset(first.intersection(*rest))
 
     @property
     def state(self) -> tuple[str, ...]:
         """Names of the state variables: x_1 … x_n, v_1 … v_n."""
-        return tuple(f"{s.name}_{i + 1}" for s in self.node.state for i in range(self.n))
+        return tuple(f"{name}_{i + 1}" for name in self.components for i in self.holders(name))
+
+    def places(self) -> tuple[tuple[int, ...], ...]:
+        """For each node where its states stand in the whole state, in the order of its template."""
+        if not self.mixed:
+            return tuple(tuple(c * self.n + i for c in range(len(self.node.state))) for i in range(self.n))
+        index = {name: k for k, name in enumerate(self.state)}
+        return tuple(tuple(index[f"{s.name}_{i + 1}"] for s in self.node_at(i).state) for i in range(self.n))
 
     def symbols(self, i: int) -> tuple[sp.Symbol, ...]:
         """The state symbols of node `i` (0-based)."""
-        return tuple(sp.Symbol(f"{s.name}_{i + 1}", real=True) for s in self.node.state)
+        return tuple(_numbered(s, i) for s in self.node_at(i).state)
 
     def at_node(self, i: int) -> dict[sp.Symbol, sp.Symbol]:
         """The substitution that turns the node template into node `i`."""
-        return dict(zip(self.node.state, self.symbols(i), strict=True))
+        node = self.node_at(i)
+        found = dict(zip(node.state, self.symbols(i), strict=True))
+        return found | {s: _numbered(s, i) for s in node.parameters if s.name in self.varied}
 
     def at_link(self, link: Link) -> dict[sp.Symbol, sp.Expr]:
         """The substitution that turns the edge template into one link."""
-        if self.edge is None:
-            raise ValueError("these equations have no edge")
         target, source, weight = link
-        here = dict(zip(self.edge.here, self.symbols(target), strict=True))
-        there = dict(zip(self.edge.there, self.symbols(source), strict=True))
-        return {**here, **there, self.edge.weight: sp.Rational(weight.numerator, weight.denominator)}
+        edge = self.edge_at(link)
+        here = dict(zip(edge.here, self.symbols(target), strict=True))
+        there = dict(zip(edge.there, self.symbols(source), strict=True))
+        own = {s: _numbered(s, target) for s in edge.parameters if s.name in self.varied}
+        return {**here, **there, **own, edge.weight: sp.Rational(weight.numerator, weight.denominator)}
 
     def contact_at(self, i: int) -> Contact | None:
         """What decides between stick and slip for node `i`, with the forces of its links; None without a contact."""
-        contact = self.node.contact
+        contact = self.node_at(i).contact
         if contact is None:
             return None
         _, velocity, mode = self.symbols(i)
         own = contact.map(lambda e: e.xreplace(self.at_node(i)))
-        links = sp.S.Zero
-        if self.edge is not None:
-            links = sp.Add(*(self.edge.rhs[1].xreplace(self.at_link(link)) for link in self.links if link[0] == i))
+        felt = [link for link in self.links if link[0] == i]
+        links = sp.Add(*(self.edge_at(link).rhs[1].xreplace(self.at_link(link)) for link in felt))
         links = links.xreplace({mode: sp.S.One, velocity: own.speed})
         return own.under(links)
 
     def rhs(self) -> tuple[sp.Expr, ...]:
-        """The whole right-hand side, in state order (algebra grows with n: meant for small n)."""
-        table = [[e.xreplace(self.at_node(i)) for e in self.node.rhs] for i in range(self.n)]
-        if self.edge is not None:
-            for link in self.links:
-                values = self.at_link(link)
-                for c, e in enumerate(self.edge.rhs):
-                    table[link[0]][c] += e.xreplace(values)
-        return tuple(table[i][c] for c in range(len(self.node.state)) for i in range(self.n))
+        """The right-hand side of M d(state)/dt = rhs, in state order (algebra grows with n: meant for small n)."""
+        places, found = self.places(), [sp.S.Zero] * self.dimension
+        for i in range(self.n):
+            for k, e in zip(places[i], self.node_at(i).rhs, strict=True):
+                found[k] = e.xreplace(self.at_node(i))
+        for link in self.links:
+            values = self.at_link(link)
+            for k, e in zip(places[link[0]], self.edge_at(link).rhs, strict=True):
+                found[k] += e.xreplace(values)
+        return tuple(found)
+
+    def mass(self) -> dict[tuple[int, int], sp.Expr]:
+        """The non-zero entries (row, column) of M in M d(state)/dt = rhs; empty where M is the identity."""
+        if not self.inertial:
+            return {}
+        places = self.places()
+        found: dict[tuple[int, int], sp.Expr] = {(k, k): sp.S.One for k in range(self.dimension)}
+        for link in self.links:
+            inertia, values = self.edge_at(link).inertia, self.at_link(link)
+            for block, end in zip(inertia, link[:2], strict=False):
+                for key, e in _block(block, places[link[0]], places[end], values):
+                    found[key] = found.get(key, sp.S.Zero) + e
+        return {key: found[key] for key in sorted(found) if found[key] != 0}
 
     def jacobian(self) -> dict[tuple[int, int], sp.Expr]:
         """The non-zero entries (row, column) of d(rhs)/d(state), rows and columns in state order."""
         entries: dict[tuple[int, int], sp.Expr] = {}
-        own = self.node.jacobian()
+        own, places = [node.jacobian() for node in self.nodes], self.places()
         for i in range(self.n):
-            for key, value in _block(own, i, i, self.n, self.at_node(i)):
-                entries[key] = value
+            entries.update(_block(own[self.kind(i)], places[i], places[i], self.at_node(i)))
         for key, value in self.link_jacobian():
             entries[key] = entries.get(key, sp.S.Zero) + value
         return {key: entries[key] for key in sorted(entries) if entries[key] != 0}
 
-    def link_jacobian(self) -> Iterator[tuple[tuple[int, int], sp.Expr]]:
+    def link_jacobian(self) -> Iterator[Entry]:
         """Yield ((row, column), entry) for each link's share of the Jacobian; keys repeat where links meet."""
-        if self.edge is None or not self.links:
-            return
-        here, there = self.edge.jacobian_here(), self.edge.jacobian_there()
+        places = self.places()
+        blocks = {edge: (edge.jacobian_here(), edge.jacobian_there()) for edge in self.edges}
         for link in self.links:
+            here, there = blocks[self.edge_at(link)]
             values = self.at_link(link)
-            yield from _block(here, link[0], link[0], self.n, values)
-            yield from _block(there, link[0], link[1], self.n, values)
+            yield from _block(here, places[link[0]], places[link[0]], values)
+            yield from _block(there, places[link[0]], places[link[1]], values)
 
     def time_derivative(self) -> tuple[sp.Expr, ...]:
         """The partial derivative of the right-hand side with respect to time, in state order."""
-        own = self.node.time_derivative()
-        return tuple(e.xreplace(self.at_node(i)) for e in own for i in range(self.n))
+        own = [node.time_derivative() for node in self.nodes]
+        found: dict[int, sp.Expr] = {}
+        for i, places in enumerate(self.places()):
+            rows = zip(places, own[self.kind(i)], strict=True)
+            found |= {k: e.xreplace(self.at_node(i)) for k, e in rows}
+        return tuple(found[k] for k in range(self.dimension))
 
     def latex(self) -> str:
         """The equations in LaTeX (see `synchain.models.present`)."""
@@ -230,46 +241,31 @@ class Equations:
     @property
     def digest(self) -> str:
         """Hexadecimal SHA-256 of the equations: equal equations have equal digests, whatever made them."""
-        edge = self.edge if self.links else None
         parts = [_text(self.node.state, self.node.rhs, self.node.parameters), str(self.n), repr(self.links)]
         if self.node.contact is not None:
             parts.append("; ".join(map(sp.srepr, self.node.contact.expressions)))
-        if edge is not None:
+        parts += [f"varied {' '.join(self.varied)}"] if self.varied else []
+        if self.mixed:
+            parts += [repr(self.kinds), *(_text(node.state, node.rhs, node.parameters) for node in self.others)]
+            parts += [repr(pair) for pair, _ in self.joints]
+        for edge in self.edges:
             parts.append(_text((*edge.here, *edge.there, edge.weight), edge.rhs, edge.parameters))
+            parts += [sp.srepr(sp.Matrix(block)) for block in edge.inertia]
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
+def _numbered(s: sp.Symbol, i: int) -> sp.Symbol:
+    """The symbol of a template at node `i` (0-based)."""
+    return sp.Symbol(f"{s.name}_{i + 1}", real=True)
+
+
 def _block(
-    block: tuple[tuple[sp.Expr, ...], ...], row: int, column: int, n: int, values: Mapping[sp.Symbol, sp.Expr]
-) -> Iterator[tuple[tuple[int, int], sp.Expr]]:
-    for r, line in enumerate(block):
-        for c, entry in enumerate(line):
+    block: Block, rows: tuple[int, ...], columns: tuple[int, ...], values: Mapping[sp.Symbol, sp.Expr]
+) -> Iterator[Entry]:
+    for r, line in zip(rows, block, strict=True):
+        for c, entry in zip(columns, line, strict=True):
             if entry != 0:
-                yield (r * n + row, c * n + column), entry.xreplace(dict(values))
-
-
-def _differ(what: str, symbols: tuple[sp.Symbol, ...]) -> None:
-    names = [s.name for s in symbols]
-    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
-    if twice is not None:
-        meaning = "is the time" if twice == TIME.name else "stands for two things"
-        raise ValueError(f"{what}: the name {twice!r} {meaning}; rename that state or parameter")
-
-
-def _check(what: str, rhs: tuple[sp.Expr, ...], size: int, known: set[sp.Symbol]) -> None:
-    if len(rhs) != size:
-        raise ValueError(f"{what}: {len(rhs)} equations for {size} states; expected one each")
-    for expression in rhs:
-        unknown = sorted(s.name for s in expression.free_symbols - known)
-        if unknown:
-            raise ValueError(
-                f"{what}: undeclared symbol {unknown[0]!r} in {expression}; declare it as a state or parameter"
-            )
-        floats = sorted(expression.atoms(sp.Float), key=str)
-        if floats:
-            raise ValueError(
-                f"{what}: floating-point number {floats[0]} in {expression}; use a parameter or a Rational"
-            )
+                yield (r, c), entry.xreplace(dict(values))
 
 
 def _text(state: tuple[sp.Symbol, ...], rhs: tuple[sp.Expr, ...], parameters: tuple[sp.Symbol, ...]) -> str:

@@ -6,10 +6,10 @@ import re
 from collections.abc import Mapping
 
 from .equations import Equations
-from .export_body import Syntax, link_places, node_places, weights, wrapped
+from .export_body import Syntax, check_inertia, constant_mass, link_places, node_places, weights, wrapped
 from .export_expression import C
 from .export_header import given_values, header
-from .export_loops import is_unrolled, jacobian_lines, rhs_lines
+from .export_loops import is_unrolled, jacobian_lines, mass_lines, rhs_lines
 from .export_names import portable
 
 __all__ = ["to_c"]
@@ -27,6 +27,38 @@ ARGUMENTS = "double t, const double *state, const double *numbers, double *"
 SIGN = ["static double sign(double x)", "{", "    return (double)((x > 0.0) - (x < 0.0));", "}", ""]
 
 
+SOLVE = """static void solve(double *mass, double *right, int columns)
+{
+    for (int k = 0; k < DIMENSION; k++) { /* Gaussian elimination with row exchanges */
+        int pivot = k;
+        for (int i = k + 1; i < DIMENSION; i++)
+            if (fabs(mass[i*DIMENSION + k]) > fabs(mass[pivot*DIMENSION + k])) pivot = i;
+        for (int j = 0; j < DIMENSION; j++) {
+            const double old = mass[k*DIMENSION + j];
+            mass[k*DIMENSION + j] = mass[pivot*DIMENSION + j];
+            mass[pivot*DIMENSION + j] = old;
+        }
+        for (int j = 0; j < columns; j++) {
+            const double old = right[k*columns + j];
+            right[k*columns + j] = right[pivot*columns + j];
+            right[pivot*columns + j] = old;
+        }
+        for (int i = k + 1; i < DIMENSION; i++) {
+            const double factor = mass[i*DIMENSION + k]/mass[k*DIMENSION + k];
+            for (int j = k; j < DIMENSION; j++) mass[i*DIMENSION + j] -= factor*mass[k*DIMENSION + j];
+            for (int j = 0; j < columns; j++) right[i*columns + j] -= factor*right[k*columns + j];
+        }
+    }
+    for (int k = DIMENSION - 1; k >= 0; k--)
+        for (int j = 0; j < columns; j++) {
+            for (int i = k + 1; i < DIMENSION; i++) right[k*columns + j] -= mass[k*DIMENSION + i]*right[i*columns + j];
+            right[k*columns + j] /= mass[k*DIMENSION + k];
+        }
+}
+"""
+"""Solves a dense system of DIMENSION equations for several right-hand sides in place."""
+
+
 def to_c(equations: Equations, values: Mapping[str, float] | None = None) -> str:
     """Return a C99 source with `rhs` and `jacobian`; up to eight nodes are written out, more are loops.
 
@@ -37,6 +69,7 @@ def to_c(equations: Equations, values: Mapping[str, float] | None = None) -> str
     model, changed = portable(equations)
     known = dict(zip(model.parameters, known.values(), strict=bool(known)))
     small = is_unrolled(model)
+    check_inertia(model, "c")
     functions = [*_rhs(model), "", *_jacobian(model, small)]
     lines = [
         "/*",
@@ -50,6 +83,7 @@ def to_c(equations: Equations, values: Mapping[str, float] | None = None) -> str
     if known:
         lines += ["/* values of the scene, in the order of `numbers` */"]
         lines += ["const double defaults[PARAMETERS] = {", *wrapped(map(repr, known.values())), "};", ""]
+    lines += [*SOLVE.splitlines(), ""] if model.inertial else []
     lines += [*(SIGN if _occurs("sign", "\n".join(functions)) else []), *functions]
     return "\n".join(lines) + "\n"
 
@@ -103,13 +137,25 @@ def _occurs(name: str, text: str) -> bool:
 
 
 def _rhs(model: Equations) -> list[str]:
-    return _function(f"void rhs({ARGUMENTS}rates)", rhs_lines(model, SYNTAX))
+    return _function(f"void rhs({ARGUMENTS}rates)", [*rhs_lines(model, SYNTAX), *_solved(model, "rates", 1)])
+
+
+def _solved(model: Equations, name: str, columns: int) -> list[str]:
+    """Statements that multiply by the inverse of the mass matrix where it is not the identity."""
+    if not model.inertial:
+        return []
+    lines = ["double mass[DIMENSION*DIMENSION] = {0.0};"]
+    lines += ["for (int k = 0; k < DIMENSION; k++) mass[k*DIMENSION + k] = 1.0;", *mass_lines(model, SYNTAX)]
+    return [*lines, f"solve(mass, {name}, {columns if columns == 1 else 'DIMENSION'});"]
 
 
 def _jacobian(model: Equations, small: bool) -> list[str]:
     lines = jacobian_lines(model, SYNTAX)
     if small:
         lines.insert(0, "memset(matrix, 0, sizeof(double)*DIMENSION*DIMENSION);")
+        if model.inertial and not constant_mass(model):
+            lines[:0] = ["double rates[DIMENSION];", "rhs(t, state, numbers, rates);"]
+        lines += _solved(model, "matrix", model.dimension)
         return _function(f"void jacobian({ARGUMENTS}matrix)", lines)
     return [*_function(f"void jacobian({ARGUMENTS}values)", lines), "", *_places(model)]
 

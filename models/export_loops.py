@@ -7,30 +7,42 @@ from typing import Any
 
 import sympy as sp
 
-from .equations import Equations
-from .export_body import LARGEST_UNROLLED, Store, Syntax, link_body, link_places, node_body, node_places, parameters
+from .equations import Equations, Link
+from .export_body import (
+    LARGEST_UNROLLED,
+    Store,
+    Syntax,
+    link_body,
+    link_places,
+    mass_body,
+    node_body,
+    node_places,
+    own_parameters,
+    parameters,
+    rate_symbols,
+)
 
-__all__ = ["is_unrolled", "jacobian_lines", "rhs_lines"]
+__all__ = ["is_unrolled", "jacobian_lines", "mass_lines", "rhs_lines"]
 
 
 def is_unrolled(equations: Equations) -> bool:
     """True where every node is written out."""
-    return equations.n <= LARGEST_UNROLLED
+    return equations.mixed or equations.n <= LARGEST_UNROLLED
 
 
 def rhs_lines(equations: Equations, syntax: Syntax) -> list[str]:
     """The statements that write the right-hand side of the whole network to `rates`."""
     lines = _parameters(equations, syntax, False)
     if is_unrolled(equations):
+        places = equations.places()
         for i, begin in enumerate(_nodes(equations, syntax)):
-            lines += _block(syntax, begin, _node(equations, syntax, str(i), _literal(equations.n, i)))
-        for (i, j, weight), begin in zip(equations.links, _links(equations, syntax), strict=True):
-            body = link_body(equations, sp.Rational(weight.numerator, weight.denominator))
-            loads = _pair(equations, _literal(equations.n, i), _literal(equations.n, j))
-            place = _literal(equations.n, i)
-            lines += _block(syntax, begin, syntax.body(body, loads, _adding(syntax, place)))
+            lines += _block(syntax, begin, _node(equations, syntax, i, _literal(places[i])))
+        for link, begin in zip(equations.links, _links(equations, syntax), strict=True):
+            at, other = _literal(places[link[0]]), _literal(places[link[1]])
+            loads = _pair(equations, at, other, link, syntax.reads)
+            lines += _block(syntax, begin, syntax.body(link_body(equations, link), loads, _adding(syntax, at)))
         return lines
-    lines += _loop(syntax, "i", "NODES", _node(equations, syntax, "i", _indexed("i")))
+    lines += _loop(syntax, "i", "NODES", _node(equations, syntax, None, _indexed("i")))
     if equations.links:
         loads = _pair(equations, _indexed("i"), _indexed("j"))
         inner = syntax.body(link_body(equations), loads, _adding(syntax, _indexed("i")))
@@ -49,7 +61,7 @@ def jacobian_lines(equations: Equations, syntax: Syntax) -> list[str]:
         return syntax.assign.format(f"values[{_index(own.index(place), 'NODES', 'i')}]", "=", text)
 
     body = node_body(equations, True)
-    loads = dict(zip(equations.node.state, _states(equations, _indexed("i")), strict=True))
+    loads = _loads(equations, syntax, None, _indexed("i"))
     lines += _loop(syntax, "i", "NODES", syntax.body(body, loads, place_own))
     if equations.links:
         here, there = link_places(equations)
@@ -67,21 +79,37 @@ def jacobian_lines(equations: Equations, syntax: Syntax) -> list[str]:
 
 
 def _dense(equations: Equations, syntax: Syntax) -> list[str]:
-    n, lines = equations.n, list[str]()
-    body = node_body(equations, True)
+    places, lines = equations.places(), list[str]()
     for i, begin in enumerate(_nodes(equations, syntax)):
-        at = _literal(n, i)
-        loads = dict(zip(equations.node.state, _states(equations, at), strict=True))
+        at, body = _literal(places[i]), node_body(equations, True, i)
+        loads = _loads(equations, syntax, i, at)
         lines += _block(syntax, begin, syntax.body(body, loads, _entry(syntax, at, at, "=")))
-    for (i, j, weight), begin in zip(equations.links, _links(equations, syntax), strict=True):
-        at, other = _literal(n, i), _literal(n, j)
-        body = link_body(equations, sp.Rational(weight.numerator, weight.denominator), True)
+    for link, begin in zip(equations.links, _links(equations, syntax), strict=True):
+        at, other = _literal(places[link[0]]), _literal(places[link[1]])
+        body = link_body(equations, link, True)
 
         def store(place: Any, text: str, at: Callable[[int], str] = at, other: Callable[[int], str] = other) -> str:
             there, inner = place
             return _entry(syntax, at, other if there else at, "+=")(inner, text)
 
-        lines += _block(syntax, begin, syntax.body(body, _pair(equations, at, other), store))
+        lines += _block(syntax, begin, syntax.body(body, _pair(equations, at, other, link, syntax.reads), store))
+    return lines
+
+
+def mass_lines(equations: Equations, syntax: Syntax) -> list[str]:
+    """The statements that add what the links contribute to the mass matrix, for networks that are written out."""
+    places, lines = equations.places(), list[str]()
+    for link, begin in zip(equations.links, _links(equations, syntax), strict=True):
+        at, other = _literal(places[link[0]]), _literal(places[link[1]])
+        body = mass_body(equations, link)
+
+        def store(place: Any, text: str, at: Callable[[int], str] = at, other: Callable[[int], str] = other) -> str:
+            there, (r, c) = place
+            name = syntax.entry.format(at(r), (other if there else at)(c)).replace("matrix", "mass", 1)
+            return syntax.assign.format(name, "+=", text)
+
+        if body.results:
+            lines += _block(syntax, begin, syntax.body(body, _pair(equations, at, other, link, syntax.reads), store))
     return lines
 
 
@@ -95,34 +123,56 @@ def _entry(syntax: Syntax, row: Callable[[int], str], column: Callable[[int], st
 
 def _parameters(equations: Equations, syntax: Syntax, jacobian: bool) -> list[str]:
     """Read the parameters that are used from `numbers`; nothing where the language has them as arguments."""
-    bodies = [node_body(equations, jacobian), link_body(equations, None, jacobian)]
+    firsts = {equations.kind(i): i for i in range(equations.n)}.values()
+    ends = {(equations.kind(link[0]), equations.kind(link[1])): link for link in equations.links}.values()
+    bodies = [node_body(equations, jacobian, i) for i in firsts]
+    bodies += [link_body(equations, link, jacobian) for link in ends]
+    bodies += [mass_body(equations, link) for link in ends]
     if not syntax.reads:
         return []
     return [syntax.declare.format(equations.parameters[k], f"numbers[{k}]") for k in parameters(equations, bodies)]
 
 
-def _node(equations: Equations, syntax: Syntax, i: str, at: Callable[[int], str]) -> list[str]:
-    loads = dict(zip(equations.node.state, _states(equations, at), strict=True))
-    return syntax.body(node_body(equations), loads, lambda c, text: syntax.assign.format(f"rates[{at(c)}]", "=", text))
+def _node(equations: Equations, syntax: Syntax, i: int | None, at: Callable[[int], str]) -> list[str]:
+    body, loads = node_body(equations, i=i or 0), _loads(equations, syntax, i, at)
+    return syntax.body(body, loads, lambda c, text: syntax.assign.format(f"rates[{at(c)}]", "=", text))
+
+
+def _loads(equations: Equations, syntax: Syntax, i: int | None, at: Callable[[int], str]) -> dict[sp.Symbol, str]:
+    """Where the states of a node are and the parameters that it has for itself; node None is the one of a loop."""
+    state = equations.node_at(i or 0).state
+    found = dict(zip(state, (f"state[{at(c)}]" for c in range(len(state))), strict=True))
+    for s, k in own_parameters(equations, i or 0).items():
+        found[s] = f"numbers[{k}{' + i' if i is None else ''}]" if syntax.reads else equations.parameters[k]
+    return found
 
 
 def _adding(syntax: Syntax, at: Callable[[int], str]) -> Store:
     return lambda c, text: syntax.assign.format(f"rates[{at(c)}]", "+=", text)
 
 
-def _states(equations: Equations, at: Callable[[int], str]) -> list[str]:
-    return [f"state[{at(c)}]" for c in range(len(equations.node.state))]
-
-
-def _pair(equations: Equations, here: Callable[[int], str], there: Callable[[int], str]) -> dict[sp.Symbol, str]:
-    edge = equations.edge
+def _pair(
+    equations: Equations,
+    here: Callable[[int], str],
+    there: Callable[[int], str],
+    link: Link | None = None,
+    reads: bool = True,
+) -> dict[sp.Symbol, str]:
+    """Where the states at both ends of a link are, the parameters of its target, and the rates."""
+    edge = equations.edge if link is None else equations.edge_at(link)
     if edge is None:
         return {}
-    return dict(zip((*edge.here, *edge.there), (*_states(equations, here), *_states(equations, there)), strict=True))
+    places = [*map(here, range(len(edge.here))), *map(there, range(len(edge.there)))]
+    found = {s: f"state[{place}]" for s, place in zip((*edge.here, *edge.there), places, strict=True)}
+    if link is not None:  # a mass of the target that differs from node to node
+        own = own_parameters(equations, link[0])
+        found |= {s: f"numbers[{k}]" if reads else equations.parameters[k] for s, k in own.items()}
+    rates = zip(rate_symbols(edge), places, strict=True)
+    return found | {s: f"rates[{place}]" for s, place in rates}
 
 
-def _literal(n: int, i: int) -> Callable[[int], str]:
-    return lambda c: str(c * n + i)
+def _literal(places: tuple[int, ...]) -> Callable[[int], str]:
+    return lambda c: str(places[c])
 
 
 def _indexed(name: str) -> Callable[[int], str]:

@@ -6,6 +6,7 @@ import builtins
 import keyword
 import re
 import unicodedata
+from dataclasses import replace
 
 import sympy as sp
 
@@ -24,29 +25,38 @@ fma fmax fmin fmod frexp gamma hypot ilogb ldexp lgamma llrint llround log log10
 nearbyint nextafter nexttoward pow pow10 remainder remquo rint round scalb scalbln scalbn significand sin sinh sqrt tan tanh
 tgamma trunc drem finite isinf isnan isfinite isnormal signbit fpclassify signgam j0 j1 jn y0 y1 yn float_t double_t"""
 _OWN = """np math types cfunc carray csc_matrix lsoda_sig address rhs jac jacobian jacobian_places sparsity state rates
-numbers matrix values rows columns entry sign i j k link weight NODES DIMENSION PARAMETERS LINKS ENTRIES TARGET SOURCE WEIGHT
-ROWS COLUMNS STATE NODE defaults memset"""
+numbers matrix mass solve right pivot factor values rows columns entry sign i j k link weight NODES DIMENSION PARAMETERS
+LINKS ENTRIES TARGET SOURCE WEIGHT ROWS COLUMNS STATE NODE defaults memset"""
 RESERVED = {*f"{_C} {_MATH} {_OWN}".split(), *keyword.kwlist, *keyword.softkwlist, *dir(builtins)}
 """Words of the languages, of their mathematics and of the exported text; a symbol of that name gets an underscore."""
 
 _MACRO = re.compile(r"(M|FP|MATH)_\w+")
-_LATER = re.compile(r"w[0-9]+")
+_LATER = re.compile(r"w[0-9]+|rate_[ij][0-9]+")
 
 
 def portable(equations: Equations) -> tuple[Equations, dict[str, str]]:
     """Return the same equations in names that every exported language accepts, and the names that changed."""
-    node, edge = equations.node, equations.edge if equations.links else None
-    shown = [*node.state, *node.parameters]
     swap: dict[sp.Symbol, sp.Symbol] = {}
+    shown = dict.fromkeys(s for node in equations.nodes for s in (*node.state, *node.parameters))
     taken = {s.name for s in shown if _fine(s.name)} | {"t"}
     for s in shown:
         swap[s] = _renamed(s, taken)
-    node = Node(_all(node.state, swap), _all(node.rhs, swap), _all(node.parameters, swap))
+    first, *others = (Node(_all(n.state, swap), _all(n.rhs, swap), _all(n.parameters, swap)) for n in equations.nodes)
     changed = {s.name: new.name for s, new in swap.items() if s.name != new.name}
-    if edge is not None:
-        edge, more = _edge(edge, swap, taken)
+    edges = {}
+    for edge in equations.edges:
+        edges[edge], more = _edge(edge, swap, taken)
+        swap |= dict(zip(edge.parameters, edges[edge].parameters, strict=True))  # other links share them
         changed |= more
-    return Equations(node, edge, equations.n, equations.links), changed
+    made = replace(
+        equations,
+        node=first,
+        others=tuple(others),
+        edge=edges.get(equations.edge) if equations.edge is not None else None,
+        joints=tuple((pair, edges[edge]) for pair, edge in equations.joints),
+        varied=tuple(swap[sp.Symbol(name, real=True)].name for name in equations.varied),
+    )
+    return made, changed
 
 
 def _edge(edge: Edge, outer: dict[sp.Symbol, sp.Symbol], taken: set[str]) -> tuple[Edge, dict[str, str]]:
@@ -72,6 +82,7 @@ def _edge(edge: Edge, outer: dict[sp.Symbol, sp.Symbol], taken: set[str]) -> tup
         swap[edge.weight],
         _all(edge.rhs, swap),
         _all(edge.parameters, swap),
+        tuple(tuple(_all(row, swap) for row in block) for block in edge.inertia),
     ), changed
 
 

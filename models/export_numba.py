@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from .equations import Equations
-from .export_body import Syntax, weights, wrapped
+from .export_body import Syntax, check_inertia, weights, wrapped
 from .export_expression import NUMBA
 from .export_header import given_values, header
-from .export_loops import is_unrolled, rhs_lines
+from .export_loops import is_unrolled, mass_lines, rhs_lines
 from .export_names import portable
 
 __all__ = ["to_numba"]
@@ -40,6 +40,12 @@ def to_numba(equations: Equations, values: Mapping[str, float] | None = None) ->
             lines += [f"{name} = np.array([", *wrapped(table), "])"]
     pointer = "types.CPointer(types.double)"
     lines += [f"lsoda_sig = types.void(types.double, {pointer}, {pointer}, {pointer})", "", ""]
+    check_inertia(model, "numba")
     lines += ["@cfunc(lsoda_sig)", "def rhs(t, state, rates, numbers):"]
-    lines += ['    """Write d(state)/dt to `rates`."""', *(f"    {line}" for line in rhs_lines(model, SYNTAX))]
+    inner = rhs_lines(model, SYNTAX)
+    if model.inertial:
+        inner += ["mass = np.eye(DIMENSION)", *mass_lines(model, SYNTAX), "right = np.empty(DIMENSION)"]
+        inner += ["for k in range(DIMENSION):", "    right[k] = rates[k]", "right = np.linalg.solve(mass, right)"]
+        inner += ["for k in range(DIMENSION):", "    rates[k] = right[k]"]
+    lines += ['    """Write d(state)/dt to `rates`."""', *(f"    {line}" for line in inner)]
     return "\n".join(lines) + "\n"

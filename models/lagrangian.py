@@ -11,7 +11,7 @@ from .calculus import derivative
 from .equations import TIME
 from .mass_solve import solve_masses
 
-__all__ = ["Mechanics", "energy_rate", "equations_of_motion", "mass_matrix", "total_derivative"]
+__all__ = ["Mechanics", "balance", "energy_rate", "equations_of_motion", "mass_matrix", "total_derivative"]
 
 Symbols = Sequence[sp.Symbol]
 
@@ -61,6 +61,17 @@ def equations_of_motion(
     coordinates, velocities and forces differ, or where the mass matrix is singular: some velocity has no kinetic energy.
     Source: Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. (Addison-Wesley, 2002), sect. 1.4.
     """
+    rest, masses = balance(kinetic, potential, forces, q, v, time)
+    return solve_masses(masses, rest, v)
+
+
+def balance(
+    kinetic: sp.Expr, potential: sp.Expr, forces: Sequence[sp.Expr], q: Symbols, v: Symbols, time: sp.Symbol = TIME
+) -> tuple[list[sp.Expr], sp.Matrix]:
+    """Return r and M of M dv/dt = r, the Euler-Lagrange equations before they are solved; M may be singular.
+
+    Raises ValueError where the numbers of coordinates, velocities and forces differ.
+    """
     _one_each(q, v, forces)
     lagrangian = kinetic - potential
     at_rest = [sp.S.Zero] * len(q)
@@ -68,7 +79,7 @@ def equations_of_motion(
     for x, rate, force in zip(q, v, forces, strict=True):
         momentum = derivative(lagrangian, rate)
         rest.append(derivative(lagrangian, x) + force - total_derivative(momentum, q, v, at_rest, time))
-    return solve_masses(mass_matrix(lagrangian, v), rest, v)
+    return rest, mass_matrix(lagrangian, v)
 
 
 def energy_rate(

@@ -6,7 +6,7 @@ equations of a node are those of the single oscillator plus one force for each e
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
@@ -15,20 +15,19 @@ from types import ModuleType
 import sympy as sp
 
 from . import coupling_matrix
-from .calculus import derivative
 from .contact import SLIP, set_valued
-from .coupling_name import coordinates_of, split
+from .coupling_name import split
 from .equations import TIME, Edge, Equations, Node
 from .frictions import CONTACTS, KAPPA
-from .lagrangian import Mechanics, mass_matrix
-from .mass_solve import solve_masses
+from .lagrangian import Mechanics
+from .link import check_coupling, edge
 from .nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
-from .orientation import drawn, is_oriented, link_energy
+from .orientation import drawn, is_oriented
 from .parameter import Parameter
 from .plugins import call, load, names
 from .topology import Topology
 
-__all__ = ["check_coupling", "connectivity", "edge", "network", "node", "pair_energy", "parameters"]
+__all__ = ["check_coupling", "connectivity", "edge", "mixed_network", "network", "node", "parameters"]
 
 
 def parameters(
@@ -116,141 +115,38 @@ def _model(oscillator: str, friction: str | None, contact: str) -> tuple[ModuleT
     return model, law
 
 
-def check_coupling(coupling: str, single: Node) -> None:
-    """Raise ValueError where a coupling cannot join nodes: an unknown name or component, a spring without velocities."""
-    if coupling_matrix.is_matrix(coupling):
-        coupling_matrix.entries(coupling, tuple(s.name for s in single.state))
-        return
-    load("coupling", split(coupling)[0])
-    if single.contact is not None:
-        coordinates_of(coupling, (single.state[0].name,))
-        return
-    half = len(single.state) // 2
-    if single.rhs[:half] != single.state[half:]:
-        name = single.state[0].name
-        raise ValueError(
-            f"coupling {coupling!r} joins coordinates with velocities; found a node of {single.state} without them; "
-            f"name the components that a link joins, e.g. coupling = '{name}->{name}'"
-        )
-    coordinates_of(coupling, tuple(s.name for s in single.state[:half]))
-
-
-@lru_cache(maxsize=64)
-def edge(coupling: str, single: Node, oscillator: str | None = None) -> Edge:
-    """Derive what one link adds to the rates of its target.
-
-    A text of entries such as "x->x, 1/2 y->z" adds sigma w factor (a_j - a_i) to the rate of its second component, whatever
-    the node is.  A spring or damper acts on coordinates followed by their velocities, on all of them or, as in "spring on
-    x", on those it names.  `oscillator` names the model whose mass matrix, at the target, turns forces into accelerations;
-    without it the masses are 1, as they are in the units of every oscillator with one mass.
-    The force is kept as a function of differences, sigma w (x_j - x_i), so that equal states feel exactly nothing.
-
-    An undirected edge is two links, and the template is symmetric, so the two forces are those of the potential.  A one-way
-    link has no potential: the force that the template gives its target acts there, and nothing acts back on the source.
-
-    Set-valued friction takes up the force of a link while its target sticks.
-    Raises ValueError as `check_coupling` does.
-    """
-    if single.contact is not None:
-        plain = Node(single.state[:2], (single.state[1], sp.S.Zero), single.parameters)
-        return _on_sliding(edge(coupling, plain, oscillator))
-    check_coupling(coupling, single)
-    here = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in single.state)
-    there = tuple(sp.Symbol(f"{s.name}_j", real=True) for s in single.state)
-    weight = sp.Symbol("weight", real=True)
-    if coupling_matrix.is_matrix(coupling):
-        sigma = sp.Symbol("sigma", real=True)
-        rates = _entry_rates(coupling, [s.name for s in single.state], sigma * weight, here, there)
-        return Edge(here, there, weight, rates, (sigma,))
-    model, half = load("coupling", split(coupling)[0]), len(single.state) // 2
-    strengths = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
-    chosen = coordinates_of(coupling, tuple(s.name for s in single.state[:half]))
-    potential, dissipation = pair_energy(model, here, there, weight, strengths, chosen)
-    forces = []
-    for q, v in zip(here[:half], here[half:], strict=True):
-        force = -derivative(potential, q) - derivative(dissipation, v)
-        forces.append(_in_differences(force, here, there))
-    masses = _masses(oscillator, here)
-    rates = solve_masses(masses, forces, here[half:])
-    taken = (*strengths.values(), *(s for s in single.parameters if any(e.has(s) for e in rates)))
-    return Edge(here, there, weight, (*[sp.S.Zero] * half, *rates), taken)
-
-
-def _on_sliding(plain: Edge) -> Edge:
-    """A link between nodes with a mode: it acts on the velocity of a target that slips."""
-    if plain.rhs[0] != 0:
-        raise ValueError("set-valued contact: a link acts on the rate of the position; expected forces alone")
-    modes = (sp.Symbol(f"{SLIP.name}_i", real=True), sp.Symbol(f"{SLIP.name}_j", real=True))
-    here, there = (*plain.here, modes[0]), (*plain.there, modes[1])
-    return Edge(here, there, plain.weight, (sp.S.Zero, modes[0] ** 2 * plain.rhs[1], sp.S.Zero), plain.parameters)
-
-
-def _entry_rates(
-    coupling: str, names: list[str], strength: sp.Expr, here: tuple[sp.Symbol, ...], there: tuple[sp.Symbol, ...]
-) -> tuple[sp.Expr, ...]:
-    """strength H (there - here), each difference a factor of its own: a sum over all of them would feel round-off."""
-    rates = [sp.S.Zero] * len(names)
-    for (source, target), factor in coupling_matrix.entries(coupling).items():
-        k = names.index(source)
-        share = sp.Rational(factor.numerator, factor.denominator)
-        rates[names.index(target)] += sp.Mul(share, *strength.args, there[k] - here[k])
-    return tuple(rates)
-
-
-def pair_energy(
-    model: ModuleType,
-    here: tuple[sp.Symbol, ...],
-    there: tuple[sp.Symbol, ...],
-    weight: sp.Symbol,
-    given: Mapping[str, sp.Symbol],
-    chosen: tuple[int, ...],
-) -> tuple[sp.Expr, sp.Expr]:
-    """Return the potential and the Rayleigh function of a link, summed over the coordinates of number `chosen`.
-
-    `here` and `there` are the states at the target and the source, coordinates followed by their velocities.
-    """
-    half = len(here) // 2
-    potential = dissipation = sp.S.Zero
-    for k in chosen:
-        if hasattr(model, "potential"):
-            potential += link_energy(model.potential, {"q_i": here[k], "q_j": there[k]}, weight, given)
-        if hasattr(model, "dissipation"):
-            speeds = {"v_i": here[half + k], "v_j": there[half + k]}
-            dissipation += link_energy(model.dissipation, speeds, weight, given)
-    return potential, dissipation
-
-
-def _in_differences(e: sp.Expr, here: tuple[sp.Symbol, ...], there: tuple[sp.Symbol, ...]) -> sp.Expr:
-    """The expression in terms of `there` - `here` where it depends on nothing else of both, unchanged otherwise."""
-    gaps = [sp.Dummy(f"d{k}", real=True) for k in range(len(here))]
-    shifted = sp.expand(e.xreplace({q: p + d for p, q, d in zip(here, there, gaps, strict=True)}))
-    if shifted.free_symbols & set(here):
-        return e
-    return sp.factor_terms(shifted).xreplace({d: q - p for p, q, d in zip(here, there, gaps, strict=True)})
-
-
-def _masses(oscillator: str | None, here: tuple[sp.Symbol, ...]) -> sp.Matrix:
-    """The mass matrix of a node at the target of a link."""
-    half = len(here) // 2
-    if oscillator is None or hasattr(load("oscillator", oscillator), "field"):
-        return sp.eye(half)
-    system = nondimensional(load("oscillator", oscillator))
-    masses = mass_matrix(system.kinetic, system.velocities)
-    if masses.has(TIME):
-        raise ValueError(
-            f"oscillator {oscillator!r}: a coupling needs masses that do not depend on time, found {masses}"
-        )
-    return masses.xreplace(dict(zip((*system.coordinates, *system.velocities), here, strict=True)))
-
-
-def network(single: Node, link: Edge | None, graph: Topology) -> Equations:
+def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str, ...] = ()) -> Equations:
     """Join copies of a node by the links of a graph; without an edge the nodes stay uncoupled.
 
+    The node's parameters named in `varied` get a value for each node.
     Where a link tells its ends apart, its weight becomes the sign of its direction (`synchain.models.orientation`).
     """
     if link is None:
-        return Equations(single, None, graph.n)
-    return Equations(single, link, graph.n, drawn(graph) if graph.links and is_oriented(link) else graph.links)
+        return Equations(single, None, graph.n, (), varied)
+    oriented = graph.links and is_oriented(link)
+    return Equations(single, link, graph.n, drawn(graph) if oriented else graph.links, varied)
+
+
+def mixed_network(
+    oscillators: Sequence[str],
+    singles: Sequence[Node],
+    kinds: Sequence[int],
+    coupling: str | None,
+    graph: Topology,
+    varied: tuple[str, ...] = (),
+) -> Equations:
+    """Join nodes of several kinds by the links of a graph: `kinds` says of which oscillator each node is.
+
+    Every pair of kinds that a link joins gets its own edge.  Raises ValueError where a coupling does not fit a pair.
+    """
+    links = graph.links if coupling is not None else ()
+    pairs = sorted({(kinds[target], kinds[source]) for target, source, _ in links})
+    joints = tuple(
+        ((a, b), edge(str(coupling), singles[a], oscillators[a], singles[b], oscillators[b])) for a, b in pairs
+    )
+    if any(a == b and is_oriented(link) for (a, b), link in joints):
+        raise ValueError(f"coupling {coupling!r} tells the ends of a link apart; expected nodes of one kind")
+    return Equations(singles[0], None, graph.n, links, varied, tuple(singles[1:]), tuple(kinds), joints)
 
 
 def connectivity(coupling: str, graph: Topology) -> tuple[tuple[Fraction, ...], ...]:
@@ -282,7 +178,11 @@ def _hessian(coupling: str) -> tuple[Fraction, Fraction]:
     model = load("coupling", split(coupling)[0])
     q_i, q_j, weight = (sp.Symbol(name, real=True) for name in ("q_i", "q_j", "weight"))
     given = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
-    function = getattr(model, "potential", None) or model.dissipation
+    if hasattr(model, "BETWEEN"):
+        raise ValueError(
+            f"coupling {coupling!r} joins {' and '.join(model.BETWEEN)}; it has no matrix of one coordinate"
+        )
+    function = next(getattr(model, name) for name in ("potential", "dissipation", "kinetic") if hasattr(model, name))
     energy = call(function, {"q_i": q_i, "q_j": q_j, "v_i": q_i, "v_j": q_j, "weight": weight, **given})
     slopes = (-energy.diff(q_i, q).xreplace({q_j: q_i}) for q in (q_i, q_j))
     own, other = (sp.simplify(slope / (given["sigma"] * weight)) for slope in slopes)

@@ -13,14 +13,17 @@ def angular_frequency(equations: Equations) -> sp.Expr | None:
     """The angular frequency of the drive: the right-hand side has the period 2 pi over its absolute value.
 
     None where time does not occur, or occurs other than in sines and cosines whose frequencies are whole multiples of one
-    among them.  Time may also not occur in the coupling.
+    among them, or where nodes have frequencies of their own.  Time may also not occur in the coupling.
     """
     found: set[sp.Expr] = set()
-    for e in equations.node.rhs:
+    for e in (e for node in equations.nodes for e in node.rhs):
         rest = e.replace(lambda a: isinstance(a, sp.sin | sp.cos) and a.has(TIME), lambda a: _note(a, found))
         if rest.has(TIME):
             return None
-    if equations.edge is not None and any(e.has(TIME) for e in equations.edge.rhs):
+    if any(e.has(TIME) for edge in equations.edges for e in edge.rhs):
+        return None
+    own = {sp.Symbol(name, real=True) for name in equations.varied}
+    if any(frequency.free_symbols & own for frequency in found):
         return None
     for candidate in sorted(found, key=sp.default_sort_key):
         if all(sp.cancel(other / candidate).is_Integer for other in found):

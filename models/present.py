@@ -6,8 +6,8 @@ Marszal et al., Eur. Phys. J. Special Topics (2016), eqs. 3-6: chi for the displ
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
@@ -41,16 +41,18 @@ def text(equations: Equations) -> str:
 def as_dict(equations: Equations) -> dict[str, object]:
     """Return names, right-hand sides and derivatives as text that SymPy reads, and the digest.
 
-    `jacobian` has the non-zero entries only, under keys such as "v_1,x_1" (row, column); time is called t.
+    `jacobian` has the non-zero entries only, under keys such as "v_1,x_1" (row, column); time is called t.  Where links
+    have inertia `mass` has the entries of M in M d(state)/dt = rhs in the same way.
     """
     state = equations.state
-    entries = equations.jacobian().items()
+    entries, mass = equations.jacobian().items(), equations.mass()
     return {
         "state": list(state),
         "parameters": list(equations.parameters),
         "rhs": [str(e) for e in equations.rhs()],
         "jacobian": {f"{state[row]},{state[column]}": str(e) for (row, column), e in entries},
         "time_derivative": [str(e) for e in equations.time_derivative()],
+        **({"mass": {f"{state[r]},{state[c]}": str(e) for (r, c), e in mass.items()}} if mass else {}),
         "digest": equations.digest,
     }
 
@@ -94,20 +96,20 @@ def _with_law(e: sp.Expr, law: sp.Expr, state: tuple[sp.Symbol, ...]) -> sp.Expr
 
 
 def _lines(equations: Equations, style: Style) -> Iterator[str]:
-    """Equation by equation, then the law, then what the indices of a large network mean."""
+    """Equation by equation, then the laws, then what the indices of a large network mean."""
     sticks, equations = equations.node.contact is not None, _in_slip(equations)
-    named = _name_law(equations.node)
-    if equations.n > LARGEST:
-        yield from _generic(equations, named, style)
+    named = tuple(_name_law(node) for node in equations.nodes)
+    if equations.n > LARGEST and not equations.mixed:
+        yield from _generic(equations, named[0], style)
     else:
         for i in range(equations.n):
             yield from _at_node(equations, named, style, i)
-    if named.law is not None:
-        writer = Writer(style, {}, frozenset((SLIDING,)))
-        yield f"{writer.write(FRICTION(SLIDING))} = {writer.write(named.law)}"
+    for kind, one in enumerate(named):
+        if one.law is not None:
+            yield _law(equations, one.law, style, kind)
     if sticks:
         yield style.words("at zero sliding velocity f is what holds the body, up to the static coefficient")
-    if equations.n > LARGEST:
+    if equations.n > LARGEST and not equations.mixed:
         count, weights = len(equations.links), style.letter("G", "ij")
         meaning = f", {weights}" + style.words(f" the weights of the {count} links") if count else ""
         if equations.edge is not None and count and is_oriented(equations.edge):
@@ -115,10 +117,26 @@ def _lines(equations: Equations, style: Style) -> Iterator[str]:
         yield ("i, j" if count else "i") + f" = 1, {style.dots}, {equations.n}{meaning}"
 
 
+def _law(equations: Equations, law: sp.Expr, style: Style, kind: int) -> str:
+    """The friction law of nodes of some kind; i is the node whose parameters they are."""
+    own = {s: style.letter(s.name, "i") for s in _varied(equations) if law.has(s)}
+    writer = Writer(style, own, frozenset((SLIDING,)))
+    text = f"{writer.write(FRICTION(SLIDING))} = {writer.write(law)}"
+    nodes = [str(i + 1) for i, k in enumerate(equations.kinds) if k == kind]
+    about = [f"of node{'s' * (len(nodes) > 1)} {', '.join(nodes)}"] if equations.mixed else []
+    about += ["of node i"] if own and not equations.mixed else []
+    return text + "".join(style.words(f", {words}") for words in about)
+
+
+def _varied(equations: Equations) -> list[sp.Symbol]:
+    """The parameters of the templates that have a value for each node."""
+    return [sp.Symbol(name, real=True) for name in equations.varied]
+
+
 def _in_slip(equations: Equations) -> Equations:
     """Equations with set-valued friction as they are in slip, without the modes."""
     node, edge = equations.node, equations.edge
-    if node.contact is None:
+    if node.contact is None or equations.mixed:
         return equations
     plain = Node(node.state[:2], (node.rhs[0], node.contact.shown), node.parameters)
     if edge is not None:
@@ -126,24 +144,45 @@ def _in_slip(equations: Equations) -> Equations:
         edge = Edge(
             edge.here[:2], edge.there[:2], edge.weight, tuple(e.xreplace(one) for e in edge.rhs[:2]), edge.parameters
         )
-    return Equations(plain, edge, equations.n, equations.links)
+    return replace(equations, node=plain, edge=edge)
 
 
-def _at_node(equations: Equations, named: _Named, style: Style, i: int) -> Iterator[str]:
+def _at_node(equations: Equations, named: tuple[_Named, ...], style: Style, i: int) -> Iterator[str]:
     """The equations of node i with all its links."""
-    here = equations.at_node(i)
+    here, node, own = equations.at_node(i), equations.node_at(i), named[equations.kind(i)]
     letters: dict[sp.Symbol, str] = {}
     for j in range(equations.n):
         index = str(j + 1) if equations.n > 1 else ""
-        letters |= _letters(equations, named, style, equations.symbols(j), index)
+        letters |= _letters(equations, named[equations.kind(j)], style, equations.symbols(j), index, j)
     writer = Writer(style, letters, frozenset((*letters, TIME)))
-    edge, links = equations.edge, [link for link in equations.links if link[0] == i]
-    for c in _shown(equations):
-        terms = [term.xreplace(here) for term in _ordered(named.rhs[c], equations.node)]
-        if edge is not None:
-            felt = sp.factor_terms(sp.Add(*(edge.rhs[c].xreplace(equations.at_link(link)) for link in links)))
-            terms += [term for term in sp.Add.make_args(felt) if term != 0]
-        yield f"{_left(equations, writer, c, here)} = {writer.total(terms)}"
+    links = [link for link in equations.links if link[0] == i]
+    for c in _shown(equations, i):
+        terms = [term.xreplace(here) for term in _ordered(own.rhs[c], node)]
+        parts = (equations.edge_at(link).rhs[c].xreplace(equations.at_link(link)) for link in links)
+        felt = sp.factor_terms(sp.Add(*parts))
+        terms += [term for term in sp.Add.make_args(felt) if term != 0]
+        yield f"{_left(equations, writer, c, i)} = {writer.total(terms)}"
+
+
+def _left(equations: Equations, writer: Writer, c: int, i: int) -> str:
+    """The left side: the rate of component c of node i, chi'' where it is the velocity of chi, times masses of links."""
+    own = writer.write(equations.symbols(i)[c]) + "'"
+    rates: dict[sp.Symbol, str] = {}
+    terms: list[sp.Expr] = []
+    for link in equations.links if equations.inertial else ():
+        if link[0] == i:
+            for block, end in zip(equations.edge_at(link).inertia, link[:2], strict=False):
+                values = equations.at_link(link)
+                for symbol, e in zip(equations.symbols(end), block[c], strict=True):
+                    rate = sp.Symbol(f"{symbol.name}'", real=True)
+                    rates[rate] = writer.write(symbol) + "'"
+                    terms.append(e.xreplace(values) * rate)
+    added = sp.collect(sp.expand(sp.Add(*terms)), list(rates))
+    if added == 0:
+        return own
+    full = Writer(writer.style, {**writer.letters, **rates}, frozenset((*writer.letters, *rates, TIME)))
+    more = full.total([sp.factor_terms(term) for term in sp.Add.make_args(added)])
+    return f"{own} {'- ' + more[1:] if more.startswith('-') else '+ ' + more}"
 
 
 def _generic(equations: Equations, named: _Named, style: Style) -> Iterator[str]:
@@ -152,6 +191,7 @@ def _generic(equations: Equations, named: _Named, style: Style) -> Iterator[str]
     own = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in node.state)
     here = dict(zip(node.state, own, strict=True))
     letters = _letters(equations, named, style, own, "i")
+    letters |= {s: style.letter(s.name, "i") for s in _varied(equations)}
     if edge is not None:
         letters |= _letters(equations, named, style, edge.here, "i")
         letters |= _letters(equations, named, style, edge.there, "j")
@@ -162,49 +202,64 @@ def _generic(equations: Equations, named: _Named, style: Style) -> Iterator[str]
         if edge is not None and edge.rhs[c] != 0:
             summed = _sum_over_links(edge, c, writer)
             line = line + summed if line != "0" else summed.removeprefix(" + ").lstrip()
-        yield f"{_left(equations, writer, c, here)} = {line}"
+        left = writer.write(here[node.state[c]]) + "'"
+        if edge is not None and edge.inertia:
+            left += _summed_inertia(edge, c, writer)
+        yield f"{left} = {line}"
+
+
+def _summed_inertia(edge: Edge, c: int, writer: Writer) -> str:
+    """What the links of node i add to the left side of component c: masses times rates."""
+    ends = (*edge.here, *edge.there)
+    rates = {sp.Symbol(f"{s.name}'", real=True): writer.write(s) + "'" for s in ends}
+    masses = (e for block in edge.inertia for e in block[c])
+    term = sp.factor(sp.Add(*(e * rate for e, rate in zip(masses, rates, strict=True))))
+    if term == 0:
+        return ""
+    full = Writer(writer.style, {**writer.letters, **rates}, frozenset((*writer.letters, *rates, TIME)) - {WEIGHT})
+    return _summed(term.xreplace({edge.weight: WEIGHT}), (WEIGHT, *ends, *rates), full)
 
 
 def _sum_over_links(edge: Edge, c: int, writer: Writer) -> str:
     """The links of node i: what all of them share stands before the sum sign."""
-    term = edge.rhs[c].xreplace({edge.weight: WEIGHT})
+    return _summed(edge.rhs[c].xreplace({edge.weight: WEIGHT}), (WEIGHT, *edge.here, *edge.there), writer)
+
+
+def _summed(term: sp.Expr, inside: tuple[sp.Symbol, ...], writer: Writer) -> str:
+    """A sum over j with its sign in front; what does not depend on symbols `inside` stands before the sum sign."""
     term = sp.factor_terms(term) if term.is_Add else term
     negative = term.as_coeff_Mul()[0].is_negative
-    outer, inner = (-term if negative else term).as_independent(WEIGHT, *edge.here, *edge.there, as_Add=False)
+    outer, inner = (-term if negative else term).as_independent(*inside, as_Add=False)
     front = [writer.write(outer)] if outer.is_Mul else writer.factors(outer) if outer != 1 else []
     summed = writer.style.product([*front, writer.style.sum_over_j, *writer.factors(inner)])
     return (" - " if negative else " + ") + summed
 
 
-def _pairs(equations: Equations) -> dict[int, int]:
-    """Component -> component that is its velocity: its rate is that state alone, links add nothing."""
-    node, edge = equations.node, equations.edge if equations.links else None
+def _pairs(equations: Equations, i: int = 0) -> dict[int, int]:
+    """Component -> component that is its velocity, of node i: its rate is that state alone, links add nothing."""
+    node, kind = equations.node_at(i), equations.kind(i)
+    edges = [edge for pair, edge in equations.joints if pair[0] == kind] if equations.mixed else equations.edges
     found: dict[int, int] = {}
     for c, rate in enumerate(node.rhs):
-        free = edge is None or edge.rhs[c] == 0
+        free = all(edge.rhs[c] == 0 for edge in edges)
         if free and rate in node.state and rate != node.state[c] and node.state.index(rate) not in found.values():
             found[c] = node.state.index(rate)
     return found if not set(found) & set(found.values()) else {}
 
 
-def _shown(equations: Equations) -> list[int]:
+def _shown(equations: Equations, i: int = 0) -> list[int]:
     """The components whose rate gets an equation: all but coordinates, whose second derivative stands for them."""
-    pairs = _pairs(equations)
-    return [c for c in range(len(equations.node.state)) if c not in pairs]
-
-
-def _left(equations: Equations, writer: Writer, c: int, here: Mapping[sp.Symbol, sp.Symbol]) -> str:
-    """The left side: the rate of component c, chi'' where it is the velocity of chi."""
-    return writer.write(here[equations.node.state[c]]) + "'"
+    pairs = _pairs(equations, i)
+    return [c for c in range(len(equations.node_at(i).state)) if c not in pairs]
 
 
 def _letters(
-    equations: Equations, named: _Named, style: Style, symbols: tuple[sp.Symbol, ...], index: str
+    equations: Equations, named: _Named, style: Style, symbols: tuple[sp.Symbol, ...], index: str, i: int = 0
 ) -> dict[sp.Symbol, str]:
     """How the states of a node and the time are written: chi and tau beside a friction law, velocities with a prime."""
-    node = equations.node
+    node = equations.node_at(i)
     plain = named.law is None or {"chi", "tau"} & {s.name for s in (*node.state, *node.parameters)}
-    speeds = {velocity: c for c, velocity in _pairs(equations).items()}
+    speeds = {velocity: c for c, velocity in _pairs(equations, i).items()}
     letters = {} if plain else {TIME: style.letter("tau")}
     for c, symbol in enumerate(symbols):
         name = node.state[speeds.get(c, c)].name

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 
@@ -40,21 +41,30 @@ def fold(equations: Equations, values: Mapping[str, int | Fraction]) -> Equation
             raise TypeError(f"fold {name}: found {value!r} ({type(value).__name__}); expected an int or a Fraction")
         if name not in equations.parameters:
             raise ValueError(f"fold: unknown parameter {name!r}; known: {', '.join(equations.parameters) or 'none'}")
+        if any(name in (f"{own}_{i + 1}" for i in range(equations.n)) for own in equations.varied):
+            raise ValueError(f"fold {name}: the nodes have different values of it; it stays a parameter")
     if not values:
         return equations
+    if equations.mixed:
+        raise ValueError(f"fold {', '.join(values)}: found nodes of several kinds; they stay parameters")
     numbers = {sp.Symbol(name, real=True): sp.Rational(v.numerator, v.denominator) for name, v in values.items()}
     node = equations.node
     rates = _folded("node", node.rhs, numbers)
     conditions = () if node.contact is None else _folded("contact", node.contact.expressions, numbers)
     contact = Contact(*conditions) if conditions else None
     single = Node(node.state, rates, _occurring(node.parameters, (*rates, *conditions)), contact)
+    left = {s.name for s in single.parameters}
+    made = replace(equations, node=single, varied=tuple(name for name in equations.varied if name in left))
     edge = equations.edge
     if edge is not None:
         pushes = _folded("edge", edge.rhs, numbers)
-        edge = Edge(edge.here, edge.there, edge.weight, pushes, _occurring(edge.parameters, pushes))
-    if edge is None or not equations.links or not any(edge.rhs):
-        return Equations(single, None, equations.n)
-    return Equations(single, edge, equations.n, equations.links)
+        inertia = tuple(tuple(_folded("edge", row, numbers) for row in block) for block in edge.inertia)
+        inertia = inertia if any(e != 0 for block in inertia for row in block for e in row) else ()
+        used = _occurring(edge.parameters, (*pushes, *(e for block in inertia for row in block for e in row)))
+        edge = Edge(edge.here, edge.there, edge.weight, pushes, used, inertia)
+    if edge is None or not equations.links or not (any(edge.rhs) or edge.inertia):
+        return replace(made, edge=None, links=())
+    return replace(made, edge=edge)
 
 
 def _folded(what: str, rhs: Iterable[sp.Expr], numbers: Mapping[sp.Symbol, sp.Rational]) -> tuple[sp.Expr, ...]:
@@ -95,10 +105,12 @@ def collapse(equations: Equations, classes: Sequence[int]) -> Equations:
         raise ValueError(f"partition: found the classes {sorted(set(classes))}; expected 0 … {count - 1}")
     if count == equations.n and list(classes) == list(range(count)):
         return equations
+    if equations.mixed or equations.inertial:
+        raise NoQuotient("quotient: nodes of several kinds or links with inertia are stepped one by one")
     if equations.edge is not None and equations.links:
         _check_coupling(equations.edge)
     links = _class_links(equations, classes)
-    return Equations(equations.node, equations.edge if links else None, count, links)
+    return replace(equations, edge=equations.edge if links else None, n=count, links=links)
 
 
 def _class_links(equations: Equations, classes: Sequence[int]) -> tuple[Link, ...]:

@@ -12,7 +12,9 @@ from .axis import Axis
 from .contact import SLIP
 from .scene_checks import Frozen
 from .scene_complete import complete
-from .scene_model import derived, known_parameters, node
+from .scene_model import bare, derived, model_parameters
+from .scene_nodes import Group, by_kind
+from .scene_parameters import known_name, varied, without
 from .scene_section import Section
 from .topology import Topology
 
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Axis", "Scene", "Section"]
 
-_MODEL = ("oscillator", "friction", "contact", "coupling")
+_MODEL = ("oscillator", "friction", "contact", "coupling", "nodes")
 
 
 @dataclass(frozen=True, slots=True, init=False, repr=False)
@@ -41,6 +43,7 @@ class Scene:
     friction: str | None
     contact: str
     coupling: str | None
+    nodes: tuple[Group, ...]
     topology: Topology
     parameters: Frozen[float]
     initial: Frozen[tuple[float, ...]]
@@ -67,6 +70,7 @@ class Scene:
         friction: str | None = "default",
         contact: str = "atan",
         coupling: str | None = "spring",
+        nodes: Iterable[Group | Mapping[str, Any]] | None = None,
         topology: Topology | None = None,
         parameters: Mapping[str, Any] | None = None,
         initial: Mapping[str, Any] | None = None,
@@ -103,7 +107,13 @@ class Scene:
     @property
     def equations(self) -> Equations:
         """The derived equations of motion of the network."""
-        return derived(self.oscillator, self.friction, self.contact, self.coupling, self.topology)
+        templates, kinds = by_kind(self.oscillator, self.friction, self.nodes, self.n)
+        return derived(templates, kinds, self.contact, self.coupling, self.topology, self.varied)
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Names of the parameters that have a value for each node: `parameters` has them as a_1 … a_n."""
+        return varied(self.parameters, model_parameters(self.model()))
 
     @property
     def spectrum(self) -> Spectrum:
@@ -113,7 +123,7 @@ class Scene:
     @property
     def forced(self) -> bool:
         """True where time occurs explicitly in the equations."""
-        return node(self.oscillator, self.friction, self.contact).forced
+        return any(node.forced for node in bare(self.model()).nodes)
 
     @property
     def omega(self) -> float | None:
@@ -149,6 +159,10 @@ class Scene:
 
         return warnings(self)
 
+    def takes(self, name: str) -> bool:
+        """True for the name of a parameter, "a", and for that of a parameter of one node, "a_2"."""
+        return known_name(self.model(), name) is not None
+
     def replace(self, **changes: Any) -> Scene:
         """Return a scene with some keywords changed, checked anew: replace(rtol=1e-6, sigma=0.2).
 
@@ -158,11 +172,16 @@ class Scene:
         """
         given = {field.name: getattr(self, field.name) for field in fields(self)}
         given.update(_defaulted(self))
-        single = {name: changes.pop(name) for name in tuple(changes) if name not in given and name in self.parameters}
+        taken = [name for name in tuple(changes) if name not in given and self.takes(name)]
+        single = {name: changes.pop(name) for name in taken}
         given.update(changes)
-        given["parameters"] = {**(given["parameters"] or {}), **single}
+        if self.varied and "parameters" not in changes and getattr(given["topology"], "n", None) != self.n:
+            raise ValueError(f"{self.varied[0]} has values for {self.n} nodes; give `parameters` for another number")
+        given["parameters"] = {**without(given["parameters"] or {}, single, self.varied), **single}
         if "initial" not in changes and (
-            given["oscillator"] != self.oscillator or getattr(given["topology"], "n", None) != self.n
+            given["oscillator"] != self.oscillator
+            or "nodes" in changes
+            or getattr(given["topology"], "n", None) != self.n
         ):
             given["initial"] = None
         elif "initial" not in changes and given["initial"] and ("contact" in changes or "friction" in changes):
@@ -170,6 +189,10 @@ class Scene:
                 name: at for name, at in given["initial"].items() if name != SLIP.name
             }  # follows from x, v
         return Scene(**given)
+
+    def model(self) -> dict[str, Any]:
+        """What decides on the equations, by the names of the keywords."""
+        return {name: getattr(self, name) for name in (*_MODEL, "topology")}
 
     def as_dict(self) -> dict[str, Any]:
         """Return the whole scene in JSON types; `Scene.from_dict` makes an equal scene of it."""
@@ -185,7 +208,8 @@ class Scene:
         return from_dict(values)
 
     def __repr__(self) -> str:
-        names = [self.oscillator, self.friction, self.coupling if self.topology.links else None]
+        kinds = {oscillator: None for oscillator, _ in by_kind(self.oscillator, self.friction, self.nodes, self.n)[0]}
+        names = [" and ".join(kinds), self.friction, self.coupling if self.topology.links else None]
         words = [repr(self.title)] if self.title else []
         words += [
             "/".join(name for name in names if name),
@@ -201,12 +225,9 @@ def _spectrum(graph: Topology) -> Spectrum:
 
 
 def _defaulted(scene: Scene) -> dict[str, Any]:
-    coupling = scene.coupling if scene.topology.links else None
-    known = known_parameters(scene.oscillator, scene.friction, scene.contact, coupling)
-    changed: dict[str, Any] = {
-        "parameters": {name: value for name, value in scene.parameters.items() if value != known[name].default}
-    }
-    default = Scene(**{name: getattr(scene, name) for name in _MODEL}, topology=scene.topology)
+    default = Scene(**scene.model())
+    values = {name: v for name, v in scene.parameters.items() if v != default.parameters.get(name)}
+    changed: dict[str, Any] = {"parameters": values}
     if scene.atol == scene.rtol / 10:
         changed["atol"] = None
     for name in ("record", "section", "time_unit"):

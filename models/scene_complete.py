@@ -9,21 +9,14 @@ from .coupling_matrix import canonical, is_matrix
 from .coupling_name import canonical as chosen_coordinates
 from .coupling_name import split
 from .plugins import load
-from .scene_checks import Frozen, choice, integer, number, shown, table, text
+from .scene_checks import Frozen, choice, integer, number, shown, text
 from .scene_friction import check_friction
-from .scene_model import (
-    check_links,
-    check_state,
-    components,
-    coordinate_names,
-    in_range,
-    model_parameters,
-    node,
-    unknown,
-)
+from .scene_model import bare, check_links, check_state, components, coordinate_names
+from .scene_nodes import by_kind, default_friction, groups
+from .scene_parameters import at_nodes, parameters
 from .scene_section import Section
-from .scene_start import SEED_LIMIT, start
-from .scene_sweep import check_sweep
+from .scene_start import SEED_LIMIT, chosen_start, default_start, start
+from .scene_sweep import check_sweep, read_axes
 from .topology import Topology, topology
 
 __all__ = ["complete"]
@@ -39,9 +32,9 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     made["title"] = text("title", made["title"])
     made["seed"] = integer("seed", made["seed"], 0, SEED_LIMIT)
     _model(made)
-    made["parameters"] = _parameters(made)
-    centre = getattr(load("oscillator", made["oscillator"]), "INITIAL", None)
-    made["initial"] = start(made["initial"], components(made), made["topology"].n, made["seed"], centre)
+    made["axes"] = read_axes(made["axes"])
+    made["parameters"] = parameters(made)
+    made["initial"] = _start(made)
     _records(made)
     _times(made)
     _numerics(made)
@@ -58,28 +51,28 @@ def _physics(made: Mapping[str, Any]) -> None:
     for ends in (min, max):
         swept = {axis.name: ends(axis.values) for axis in made["axes"]}
         values = {name: swept.get(name, value) for name, value in made["parameters"].items()}
-        check_masses(made["oscillator"], values)
-        if made["friction"] is not None:
-            check_power(made["friction"], values)
+        for oscillator, friction, own in at_nodes(made, values):
+            check_masses(oscillator, own)
+            if friction is not None:
+                check_power(friction, own)
 
 
 def _model(made: dict[str, Any]) -> None:
     made["oscillator"] = text("oscillator", made["oscillator"])
     made["contact"] = text("contact", made["contact"])
-    if made["friction"] == "default":
-        made["friction"] = "exponential" if load("oscillator", made["oscillator"]).FRICTION else None
-    for name in ("friction", "coupling"):
-        if made[name] is not None:
-            made[name] = None if text(name, made[name]) == "none" else str(made[name])
-        if made[name] is not None and not (name == "coupling" and is_matrix(made[name])):
-            load(name, split(made[name])[0])  # an unknown name is refused even where nothing uses it
+    graph = made["topology"] = topology("chain", 1) if made["topology"] is None else made["topology"]
+    if not isinstance(graph, Topology):
+        raise TypeError(f"topology: found {shown(graph)} ({type(graph).__name__}); expected a graph, e.g. chain(4)")
+    made["friction"] = default_friction(made["oscillator"], made["friction"])
+    made["nodes"] = groups(made["nodes"], graph.n)
+    if made["coupling"] is not None:
+        made["coupling"] = None if text("coupling", made["coupling"]) == "none" else str(made["coupling"])
+    if made["coupling"] is not None and not is_matrix(made["coupling"]):
+        load("coupling", split(made["coupling"])[0])  # an unknown name is refused even where nothing uses it
     if made["coupling"] is not None and is_matrix(made["coupling"]):
         made["coupling"] = canonical(made["coupling"], components(made))
     elif made["coupling"] is not None and split(made["coupling"])[1] is not None:
         made["coupling"] = chosen_coordinates(made["coupling"], coordinate_names(made))
-    graph = made["topology"] = topology("chain", 1) if made["topology"] is None else made["topology"]
-    if not isinstance(graph, Topology):
-        raise TypeError(f"topology: found {shown(graph)} ({type(graph).__name__}); expected a graph, e.g. chain(4)")
     if graph.links and made["coupling"] is None:
         raise ValueError(
             f"coupling: found none for {graph.name}({graph.n}), which has links; "
@@ -88,23 +81,26 @@ def _model(made: dict[str, Any]) -> None:
     check_links(made)
 
 
-def _parameters(made: Mapping[str, Any]) -> Frozen[float]:
-    known = model_parameters(made)
-    given = table("parameters", {} if made["parameters"] is None else made["parameters"])
-    for name in given:
-        if not isinstance(name, str):
-            raise TypeError(f"parameters: key {shown(name)} is a {type(name).__name__}; expected text")
-        if name not in known:
-            raise ValueError(unknown(made, name, "parameter", known))
-    values = {name: in_range(name, given[name], known[name]) for name in known if name in given}
-    return Frozen({name: values.get(name, float(known[name].default)) for name in known})
+def _start(made: Mapping[str, Any]) -> Frozen[tuple[float, ...]]:
+    """The initial states, component by component, those of each kind of node around its own centre."""
+    graph, names = made["topology"], components(made)
+    templates, kinds = by_kind(made["oscillator"], made["friction"], made["nodes"], graph.n)
+    centres = [getattr(load("oscillator", oscillator), "INITIAL", None) for oscillator, _ in templates]
+    if not kinds:
+        return start(made["initial"], names, graph.n, made["seed"], centres[0])
+    nodes = bare(made)
+    own = [
+        default_start(tuple(s.name for s in one.state), graph.n, c) for one, c in zip(nodes.nodes, centres, strict=True)
+    ]
+    defaults = {name: tuple(own[kinds[i]][name][i] for i in nodes.holders(name)) for name in names}
+    return chosen_start(made["initial"], defaults, made["seed"])
 
 
 def _records(made: dict[str, Any]) -> None:
     n = made["topology"].n
     found = made["record"]
     if found is None:
-        found = ("sync_error",) if n > 1 else ()
+        found = ("sync_error",) if n > 1 and bare(made).common else ()
     if not isinstance(found, (list, tuple)):
         raise TypeError(f"record: found {shown(found)}; expected a list out of {', '.join(RECORDS)}")
     names = [choice("record", name, RECORDS) for name in found]
@@ -115,15 +111,18 @@ def _records(made: dict[str, Any]) -> None:
             "record: found 'sync_error' for one oscillator; expected at least two to compare; take it out of record"
         )
     made["record"] = tuple(name for name in RECORDS if name in names)
-    own = components(made)
-    crossed = own[0] if hasattr(load("oscillator", made["oscillator"]), "field") else own[-1]
+    if "sync_error" in names and not bare(made).common:
+        raise ValueError("record: found 'sync_error', but these oscillators have no states of one name to compare")
+    templates, kinds = by_kind(made["oscillator"], made["friction"], made["nodes"], n)
+    own = tuple(s.name for s in bare(made).node_at(0).state)
+    crossed = own[0] if hasattr(load("oscillator", templates[kinds[0] if kinds else 0][0]), "field") else own[-1]
     default = f"{'v' if 'v' in own else crossed}_1 falling"
     made["section"] = Section.parse(default if made["section"] is None else made["section"])
-    check_state(made["section"].variable, own, n, "section variable")
+    check_state(made, made["section"].variable, "section variable")
 
 
 def _times(made: dict[str, Any]) -> None:
-    forced = node(made["oscillator"], made["friction"], made["contact"]).forced and "omega" in made["parameters"]
+    forced = any(node.forced for node in bare(made).nodes) and "omega" in made["parameters"]
     if made["time_unit"] is None:
         made["time_unit"] = "period" if forced else "time"
     made["time_unit"] = choice("time_unit", made["time_unit"], TIME_UNITS)

@@ -13,6 +13,7 @@ from typing import Any
 from .family_options import defaults
 from .scene import Scene
 from .scene_checks import integer, known_keys, shown, suggestion, table, text
+from .scene_parameters import collected
 from .topology import Topology, family, from_matrix, names, read_matrix, topology
 
 __all__ = ["as_dict", "from_dict", "load_scene", "scene_names"]
@@ -144,7 +145,8 @@ def as_dict(scene: Scene) -> dict[str, Any]:
     made["friction"] = "none" if scene.friction is None else scene.friction
     made["coupling"] = "none" if scene.coupling is None else scene.coupling
     made["topology"] = _graph(scene.topology)
-    made["parameters"] = dict(scene.parameters)
+    made["nodes"] = [group.as_dict() for group in scene.nodes]
+    made["parameters"] = collected(scene.parameters, scene.varied)
     made["initial"] = {name: list(values) for name, values in scene.initial.items()}
     made["record"] = list(scene.record)
     made["section"] = str(scene.section)

@@ -17,7 +17,7 @@ def check_friction(made: Mapping[str, Any]) -> None:
         return
     axes = {axis.name: axis.values for axis in made["axes"]}
     for low, high in getattr(load("friction", made["friction"]), "ORDER", ()):
-        lows, highs = (axes.get(name, (made["parameters"][name],)) for name in (low, high))
+        lows, highs = (_values(made, axes, name) for name in (low, high))
         together = made["zipped"] and low in axes and high in axes
         pairs = zip(lows, highs, strict=True) if together else ((max(lows), min(highs)),)
         for a, b in pairs:
@@ -25,3 +25,9 @@ def check_friction(made: Mapping[str, Any]) -> None:
                 raise ValueError(
                     f"friction {made['friction']}: found {high} = {b!r} below {low} = {a!r}; expected {low} <= {high}"
                 )
+
+
+def _values(made: Mapping[str, Any], axes: Mapping[str, tuple[float, ...]], name: str) -> tuple[float, ...]:
+    """The values of a parameter in all cells, and at all nodes where these differ."""
+    own = (key for key in made["parameters"] if key == name or key.rpartition("_")[0] == name)
+    return tuple(value for key in own for value in axes.get(key, (made["parameters"][key],)))

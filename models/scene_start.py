@@ -9,7 +9,7 @@ from typing import Any
 
 from .scene_checks import Frozen, integer, known_keys, number, shown, table
 
-__all__ = ["default_start", "start"]
+__all__ = ["chosen_start", "default_start", "start"]
 
 SEED_LIMIT = 2**63 - 1
 
@@ -47,12 +47,17 @@ def start(
     given: object, components: tuple[str, ...], n: int, seed: int, centre: Mapping[Any, float] | None = None
 ) -> Frozen[tuple[float, ...]]:
     """Return {component: n floats} from what the user gave for some or all components; `centre` as in `default_start`."""
+    return chosen_start(given, default_start(components, n, centre), seed)
+
+
+def chosen_start(given: object, defaults: Mapping[str, tuple[float, ...]], seed: int) -> Frozen[tuple[float, ...]]:
+    """Return {component: floats} from what the user gave for some or all components, the rest as in `defaults`."""
     found = table("initial", {} if given is None else given)
-    known_keys("initial", found, components)
-    states = default_start(components, n, centre)
-    for name in components:
+    known_keys("initial", found, tuple(defaults))
+    states = dict(defaults)
+    for name, values in defaults.items():
         if name in found:
-            states[name] = _component(f"initial {name}", found[name], name, n, seed)
+            states[name] = _component(f"initial {name}", found[name], name, len(values), seed)
     return Frozen(states)
 
 

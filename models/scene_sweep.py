@@ -9,9 +9,10 @@ from typing import Any
 
 from .axis import Axis
 from .scene_checks import choice, shown
-from .scene_model import check_state, components, in_range, model_parameters, unknown
+from .scene_model import bare, check_state, components, in_range, model_parameters, unknown
+from .scene_parameters import known_name
 
-__all__ = ["check_sweep"]
+__all__ = ["check_sweep", "read_axes"]
 
 CONTINUATIONS = ("none", "up", "down")
 CELL_LIMIT = 10**9
@@ -20,10 +21,10 @@ SAMPLE_LIMIT = 10**9
 
 
 def check_sweep(made: dict[str, Any]) -> None:
-    """Check `axes`, `zipped` and `continuation`, and store the axes as a tuple."""
+    """Check `axes` (a tuple), `zipped` and `continuation`."""
     if not isinstance(made["zipped"], bool):
         raise TypeError(f"zipped: found {shown(made['zipped'])}; expected true or false")
-    axes = made["axes"] = _axes(made["axes"])
+    axes = made["axes"]
     names = [axis.name for axis in axes]
     for i, axis in enumerate(axes):
         _axis(made, axis)
@@ -48,7 +49,7 @@ def _samples(made: Mapping[str, Any], cells: int) -> None:
     """Refuse trajectories that fit into no memory."""
     if "trajectory" not in made["record"]:
         return
-    numbers = cells * made["samples"] * len(components(made)) * made["topology"].n
+    numbers = cells * made["samples"] * bare(made).dimension
     if numbers > SAMPLE_LIMIT:
         raise ValueError(
             f"trajectory: found {numbers} numbers in {cells} cells of {made['samples']} samples; expected at most "
@@ -56,7 +57,8 @@ def _samples(made: Mapping[str, Any], cells: int) -> None:
         )
 
 
-def _axes(given: object) -> tuple[Axis, ...]:
+def read_axes(given: object) -> tuple[Axis, ...]:
+    """Return the axes of a list of Axis objects or of a table of names and values."""
     if isinstance(given, Mapping):
         return tuple(Axis.from_table(name, values) for name, values in given.items())
     if isinstance(given, (str, bytes)) or not isinstance(given, Iterable):
@@ -70,16 +72,21 @@ def _axes(given: object) -> tuple[Axis, ...]:
 
 
 def _axis(made: Mapping[str, Any], axis: Axis) -> None:
-    known = model_parameters(made)
-    if axis.name in known:
+    known, parameter = model_parameters(made), known_name(made, axis.name)
+    if parameter is not None:
         for value in (min(axis.values), max(axis.values)):
-            in_range(f"axis {axis.name}", value, known[axis.name])
+            in_range(f"axis {axis.name}", value, parameter)
+        if axis.name not in made["parameters"]:
+            raise ValueError(
+                f"axis {axis.name!r}: the nodes have different values of it; expected the parameter of one node, e.g. "
+                f"{axis.name}_1"
+            )
     else:
         own = components(made)
         if axis.name.rpartition("_")[0] not in own:
             states = tuple(f"{c}_1" for c in own)
             raise ValueError(unknown(made, axis.name, "axis", (*known, *states)))
-        check_state(axis.name, own, made["topology"].n, "axis")
+        check_state(made, axis.name, "axis")
     if axis.name == "omega" and made["time_unit"] == "period" and 0.0 in axis.values:
         raise ValueError('axis omega: found 0, which has no period; expected other values or time_unit = "time"')
 
@@ -88,11 +95,11 @@ def _continuation(made: dict[str, Any]) -> None:
     made["continuation"] = choice("continuation", made["continuation"], CONTINUATIONS)
     if made["continuation"] == "none":
         return
-    axes, known = made["axes"], model_parameters(made)
+    axes = made["axes"]
     if not axes:
         raise ValueError(f"continuation: found {made['continuation']!r} without axes; expected a sweep; add an axis")
     for axis in axes if made["zipped"] else axes[-1:]:
-        if axis.name not in known:
+        if known_name(made, axis.name) is None:
             raise ValueError(
                 f"continuation along the initial state {axis.name!r}: a continued cell starts where its "
                 "neighbour ended; expected a parameter as the last axis; reorder the axes"

@@ -54,7 +54,7 @@ def _vanishes(scene: Scene) -> bool:
     from .network import edge
     from .scene_model import node
 
-    if scene.coupling is None or is_matrix(scene.coupling):
+    if scene.coupling is None or is_matrix(scene.coupling) or scene.equations.mixed:
         return True
     single = node(scene.oscillator, scene.friction, scene.contact)
     return edge(scene.coupling, single, scene.oscillator).diffusive
@@ -77,6 +77,11 @@ def warnings(scene: Scene) -> tuple[str, ...]:
         found.append(
             f"topology {graph.name}({graph.n}) has negative weights, which drive oscillators apart; if its matrix is a "
             "Laplacian D - A, negate it: the connectivity matrix is A - D"
+        )
+    if scene.varied and graph.links:
+        found.append(
+            f"the nodes differ in {', '.join(scene.varied)}: equal states are no solution of this network, so there is no "
+            "complete synchronisation; the synchronisation error stays above 0"
         )
     if graph.links and scene.coupling is not None and not _vanishes(scene):
         found.append(

@@ -7,7 +7,7 @@ number of them; `tangent` and `transversal` return equations like any others, or
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import sympy as sp
@@ -102,7 +102,12 @@ def _deviating(node: Node) -> int:
 
 
 def whole(equations: Equations) -> Variation:
-    """Return the variational equation of the whole network, d' = J d, in state order (without the modes of contacts)."""
+    """Return the variational equation of the whole network, d' = J d, in state order (without the modes of contacts).
+
+    Raises ValueError for nodes of several kinds and for links with inertia.
+    """
+    if equations.mixed or equations.inertial:
+        equations.expect_alike("variational equation of the whole network")
     size = equations.n * _deviating(equations.node)
     matrix = tuple((key, e) for key, e in equations.jacobian().items() if max(key) < size)
     return Variation(equations, size, matrix, (), of_network(equations))
@@ -173,7 +178,7 @@ def phased(variation: Variation) -> Variation:
     node = Node(orbit.node.state, rates, (*orbit.node.parameters, PHASE), contact)
     matrix = tuple((key, e.xreplace(later)) for key, e in variation.matrix)
     events = None if variation.events is None else variation.events.map(lambda e: e.xreplace(later))
-    moved = Equations(node, orbit.edge, orbit.n, orbit.links)
+    moved = replace(orbit, node=node)
     return Variation(moved, variation.size, matrix, variation.parameters, events)
 
 
@@ -185,6 +190,8 @@ def with_volume(equations: Equations) -> Equations:
     """
     if equations.node.contact is not None:
         raise ValueError("volumes of states: found set-valued friction, whose stick makes them zero")
+    if equations.mixed or equations.inertial:
+        equations.expect_alike("volumes of states")
     node = equations.node
     rate = sp.Add(*(derivative(e, s) for e, s in zip(node.rhs, node.state, strict=True)))
     single = Node((*node.state, LOG_VOLUME), (*node.rhs, rate), node.parameters)
@@ -194,7 +201,7 @@ def with_volume(equations: Equations) -> Equations:
         ends = (sp.Symbol(f"{LOG_VOLUME}_here", real=True), sp.Symbol(f"{LOG_VOLUME}_there", real=True))
         here, there = (*edge.here, ends[0]), (*edge.there, ends[1])
         edge = Edge(here, there, edge.weight, (*edge.rhs, share), edge.parameters)
-    return Equations(single, edge, equations.n, equations.links)
+    return replace(equations, node=single, edge=edge)
 
 
 def _entries(matrix: sp.Matrix) -> tuple[Entry, ...]:
@@ -231,6 +238,7 @@ def coupling_slope(equations: Equations) -> sp.Matrix:
 
     Raises ValueError as `transversal` does.
     """
+    equations.expect_alike("transversal modes of complete synchronisation")
     edge = equations.edge
     if edge is None:
         raise ValueError("these equations have no coupling; a transversal mode needs links")

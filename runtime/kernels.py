@@ -6,6 +6,7 @@ import sympy as sp
 
 from synchain.codegen.emit import AUTO, KernelSource, emit
 from synchain.codegen.load import Kernel, load
+from synchain.models.equations import Equations
 from synchain.models.scene import Scene
 
 from .skip import Skip, decide
@@ -28,18 +29,17 @@ def kernel_source(scene: Scene, width: int | None = None, skip: bool | Skip = Fa
     section = None
     if "section" in scene.record:
         section = sp.Symbol(chosen.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
-    sticking = scene.equations.node.contact is not None
-    best = "dop853" if sticking else best_integrator(scene.n, scene.rtol)
-    method = best if scene.integrator == "auto" else scene.integrator
+    method = best_integrator(scene.equations, scene.rtol) if scene.integrator == "auto" else scene.integrator
     return emit(chosen.equations, method, chosen.records, section, width, chosen.multiplicity)
 
 
-def best_integrator(n: int, rtol: float) -> str:
+def best_integrator(equations: Equations, rtol: float) -> str:
     """What "auto" stands for: the fastest at equal error (docs/performance.md).
 
     Two oscillators at a tight tolerance gain from DOP853 while none of them sticks; of more, some nearly always stick.
     """
-    return "switching" if n == 2 and rtol <= 1e-9 else AUTO
+    pair = equations.n == 2 and equations.plain and rtol <= 1e-9
+    return "dop853" if equations.node.contact is not None else "switching" if pair else AUTO
 
 
 def chosen_skip(scene: Scene, skip: bool | Skip) -> Skip:

@@ -16,7 +16,7 @@ from synchain.models.scene import Scene
 
 from .contact_modes import local_clock, with_modes
 
-__all__ = ["CANCEL", "Plan", "Planner", "control_array", "plan", "tolerances"]
+__all__ = ["CANCEL", "Plan", "Planner", "control_array", "parameter_names", "plan", "tolerances"]
 
 FIRST_STEP = 1e-4
 """Step tried first in every cell; the step control enlarges it sixfold at a time."""
@@ -128,6 +128,13 @@ def axis_columns(scene: Scene) -> dict[str, np.ndarray]:
     return Planner(scene).columns(np.arange(scene.cells))
 
 
+def parameter_names(scene: Scene, name: str) -> tuple[str, ...]:
+    """The names under which a scene has a parameter: one, a_1 … a_n where nodes differ, none where it has no such."""
+    if name not in scene.varied:
+        return (name,) if name in scene.parameters else ()
+    return tuple(found for found in scene.parameters if found.rpartition("_")[0] == name)
+
+
 def _spans(scene: Scene, columns: dict[str, np.ndarray], cells: int) -> np.ndarray:
     unit = np.ones(cells)
     if scene.time_unit == "period":
@@ -161,9 +168,10 @@ def tolerances(scene: Scene, numbers: np.ndarray) -> tuple[float, float]:
     1e-13), for the largest kappa of the sweep.
     """
     rtol, atol = scene.rtol, scene.atol
-    names = scene.equations.parameters
-    if scene.contact == "atan" and "kappa" in names:
-        steepest = numbers[:, names.index("kappa")].max() if numbers.size else scene.parameters["kappa"]
+    columns = [k for k, name in enumerate(scene.equations.parameters) if name in parameter_names(scene, "kappa")]
+    if scene.contact == "atan" and columns:
+        fixed = (scene.parameters[name] for name in parameter_names(scene, "kappa"))
+        steepest = numbers[:, columns].max() if numbers.size else max(fixed)
         width = 1.0 / max(float(steepest), 1e-300)
         rtol, atol = min(rtol, max(width, 1e-13)), min(atol, max(0.1 * width, 1e-13))
     return rtol, atol

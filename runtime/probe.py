@@ -99,6 +99,7 @@ def ring_of_three(equations: Equations) -> Equations:
     Raises ValueError where there is no coupling, where a link is not proportional to sigma and to its weight or does not
     vanish between equal states, and where the model uses one of the two names itself.
     """
+    equations.expect_alike("the three-oscillator probe")
     edge = equations.edge
     if edge is None:
         raise ValueError("these equations have no coupling; the probe needs links")

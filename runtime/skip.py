@@ -130,19 +130,26 @@ def decide(scene: Scene, skip: bool = True, fold_all: bool = False) -> Skip:
     for node, k in enumerate(classes):
         seen.setdefault(k, node)
     first = [seen[k] for k in range(equations.n)]
-    components = range(len(whole.node.state))
+    components = range(whole.dimension // scene.n)
+    alone = np.arange(whole.dimension)
     return Skip(
         scene,
         equations,
         tuple(r for r in scene.record if not (together and r == "sync_error")),
-        np.array([c * scene.n + i for c in components for i in first]),
-        np.array([c * equations.n + k for c in components for k in classes]),
-        np.array([whole.parameters.index(name) for name in equations.parameters], dtype=int),
+        alone if whole.mixed else np.array([c * scene.n + i for c in components for i in first]),
+        alone if whole.mixed else np.array([c * equations.n + k for c in components for k in classes]),
+        np.array([whole.parameters.index(_column(name, equations, first)) for name in equations.parameters], dtype=int),
         _multiplicity(scene, classes),
         tuple(skipped),
         tuple(kept),
         skip,
     )
+
+
+def _column(name: str, equations: Equations, first: list[int]) -> str:
+    """The name in the whole network of a parameter of the reduced one, whose node k stands for node first[k]."""
+    base, _, number = name.rpartition("_")
+    return f"{base}_{first[int(number) - 1] + 1}" if base in equations.varied else name
 
 
 def _fixed(scene: Scene) -> dict[str, float]:
@@ -170,10 +177,10 @@ def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> 
 
 def _present(scene: Scene, equations: Equations) -> list[str]:
     """What has to be integrated, in words."""
-    found = ["forcing: time occurs in the equations"] if equations.node.forced else []
-    if equations.links and equations.edge is not None:
+    found = ["forcing: time occurs in the equations"] if any(node.forced for node in equations.nodes) else []
+    if equations.links:
         fixed = _fixed(scene)
-        names = [symbol.name for symbol in equations.edge.parameters]
+        names = [*dict.fromkeys(symbol.name for edge in equations.edges for symbol in edge.parameters)]
         strengths = [f"{name} = {fixed[name]:g}" if name in fixed else f"{name} is swept" for name in names]
         found.append(f"coupling: {', '.join([f'{len(equations.links)} links', *strengths])}")
     return found
@@ -195,6 +202,9 @@ def _merge(
 ) -> tuple[Equations, tuple[int, ...]]:
     """Make one node of oscillators that move as one in every cell; returns the class of each oscillator."""
     n, alone = scene.n, tuple(range(scene.n))
+    if equations.mixed:
+        kept.append("quotient: nodes of several kinds are stepped one by one")
+        return equations, alone
     colours = _colours(scene)
     different = len(set(colours))
     words = f"quotient: {n} oscillators with {different} different starts"
@@ -217,14 +227,15 @@ def _merge(
 
 
 def _colours(scene: Scene) -> list[Hashable]:
-    """For each oscillator its start in all cells; equal where and only where it starts equal in every cell."""
+    """For each oscillator its start and its own parameters in all cells; equal where these are equal in every cell."""
     swept = {axis.name: axis.values for axis in scene.axes}
     colours: list[Hashable] = []
     for i in range(scene.n):
         own: list[Hashable] = []
-        for component, values in scene.initial.items():
-            name = f"{component}_{i + 1}"
-            found = swept.get(name, (values[i],))
+        starts = {f"{component}_{i + 1}": values[i] for component, values in scene.initial.items()}
+        numbers = {f"{name}_{i + 1}": scene.parameters[f"{name}_{i + 1}"] for name in scene.varied}
+        for name, value in (starts | numbers).items():
+            found = swept.get(name, (value,))
             if min(found) == max(found):
                 own.append(found[0])
             else:

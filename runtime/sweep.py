@@ -155,13 +155,13 @@ def with_axes(scene: Scene, axes: dict[str, Any]) -> Scene:
             swept[name] = tuple(float(v) for v in value)
         elif name in scene.equations.state:
             component, number = name.rsplit("_", 1)
-            start[component][int(number) - 1] = float(value)
+            start[component][scene.equations.holders(component).index(int(number) - 1)] = float(value)
             swept.pop(name, None)
         else:
             fixed[name] = value
             swept.pop(name, None)
     settings = {setting.name for setting in fields(Scene)}
-    unknown = [name for name in fixed if name not in scene.parameters and name not in settings]
+    unknown = [name for name in fixed if not scene.takes(name) and name not in settings]
     if unknown:
         known = ", ".join((*scene.parameters, *scene.equations.state))
         raise ValueError(f"unknown parameter or initial state {unknown[0]!r}; known: {known}")

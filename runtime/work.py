@@ -24,7 +24,7 @@ from synchain.models.scene import Scene
 from synchain.models.topology import Topology
 
 from .kernels import kernel, kernel_source
-from .plan import CANCEL, Plan, Planner, control_array, tolerances
+from .plan import CANCEL, Plan, Planner, control_array, parameter_names, tolerances
 from .result import Buffers
 from .skip import Skip
 from .status import Status
@@ -189,10 +189,9 @@ def versions() -> str:
 
 def _max_step(scene: Scene) -> float:
     """Half a drive period at most, so that no step can miss a whole swing of the drive."""
-    if not scene.forced:
-        return math.inf
-    fastest = max((abs(v) for axis in scene.axes if axis.name == "omega" for v in axis.values), default=0.0)
-    fastest = max(fastest, abs(scene.omega or 0.0))
+    names = parameter_names(scene, "omega") if scene.forced else ()
+    swept = (v for axis in scene.axes if axis.name in names for v in axis.values)
+    fastest = max(map(abs, (*swept, *(scene.parameters[name] for name in names))), default=0.0)
     return math.pi / fastest if fastest > 0.0 else math.inf
 
 

@@ -15,6 +15,7 @@ import sympy as sp
 
 from synchain.codegen.emit import emit
 from synchain.codegen.load import Kernel, load
+from synchain.models import Scene, from_matrix, ring, star
 from synchain.models.equations import TIME, Edge, Equations, Node
 
 TABLE = {"theta_b": 0.1, "mu_s": 0.3, "mu_k": 0.15, "a": 2.5, "kappa": 1e5, "epsilon": 2.0, "u": 0.1, "omega": 1.15,
@@ -93,6 +94,41 @@ CASES: dict[str, Equations] = {
     "friction 1": friction_chain(1), "friction 3": friction_chain(3), "harmonic": harmonic_chain(2), "looped": looped(),
     "third order": third_order(), "tanh pair": tanh_pair(), "waving": waving(),
 }  # fmt: skip
+
+
+def varied() -> Equations:
+    """Driven Duffing oscillators on a one-way ring, with dampings and frequencies of their own."""
+    graph = from_matrix([[-1, "2/3", "1/3"], [0, -1, 1], [2, 0, -2]])
+    unequal = {"delta": [0.1, 0.2, 0.3], "omega": [1, 1.5, 2], "u": [0.1, 0.2, 0.4]}
+    return Scene(oscillator="duffing", topology=graph, parameters=unequal).equations
+
+
+def inertial() -> Equations:
+    """Inerters on a one-way graph whose weights are no units, dampings of their own."""
+    graph = from_matrix([[-1, "2/3", "1/3"], [0, -1, 1], ["1/2", 0, "-1/2"]])
+    scene = Scene(
+        oscillator="duffing", coupling="inerter", topology=graph, parameters={"delta": [0.1, 0.2, 0.3]}
+    )  # fmt: skip
+    return scene.equations
+
+
+def clocks(n: int = 2) -> Equations:
+    """Clocks on a beam: an arrow of a mass matrix that depends on the state, nodes of two kinds, masses of two kinds."""
+    beam = [{"oscillator": "beam", "at": [1]}]
+    return Scene(oscillator="clock", nodes=beam, coupling="hanging", topology=star(n + 1)).equations
+
+
+def two_kinds() -> Equations:
+    """Nodes of two and of three states that share a name, some with parameters of their own."""
+    kinds = [{"oscillator": "lorenz", "at": [2, 3]}]
+    scene = Scene(oscillator="van_der_pol", nodes=kinds, topology=ring(4), coupling="x->x", parameters={"b": [1, 2]})
+    return scene.equations
+
+
+UNEQUAL: dict[str, Equations] = {
+    "varied": varied(), "inertial": inertial(), "clocks": clocks(), "two kinds": two_kinds(),
+}  # fmt: skip
+"""Networks whose nodes differ or whose links have inertia."""
 
 
 def numbers(equations: Equations, **changed: float) -> list[float]:

@@ -14,6 +14,9 @@ from synchain.models.lagrangian import total_derivative
 from synchain.models.plugins import load, names
 from synchain.runtime.energy import energy_function
 
+FORCES = [c for c in names("coupling") if not hasattr(load("coupling", c), "kinetic")]
+"""The couplings without inertia; tests/test_inertia.py has the others."""
+
 LAGRANGIAN = [name for name in names("oscillator") if not hasattr(load("oscillator", name), "field")]
 
 
@@ -31,7 +34,7 @@ def balance(scene: Scene) -> sp.Expr:
     return total_derivative(found, state[:half], state[half:], rates[half:], TIME) - power
 
 
-@pytest.mark.parametrize("coupling", names("coupling"))
+@pytest.mark.parametrize("coupling", FORCES)
 @pytest.mark.parametrize("oscillator", ["duffing", "pendulum", "friction"])
 def test_the_power_is_the_rate_of_the_energy(oscillator: str, coupling: str) -> None:
     assert vanishes(balance(scene_of(oscillator, coupling, 3)))
@@ -56,7 +59,7 @@ def test_the_power_of_a_cart_with_pendulums_that_is_joined_to_another() -> None:
     assert abs(gained) > 1e-3
 
 
-@pytest.mark.parametrize("coupling", names("coupling"))
+@pytest.mark.parametrize("coupling", FORCES)
 def test_what_conserves_energy(coupling: str) -> None:
     assert energy(scene_of("harmonic", coupling)).conservative == ("damper" not in coupling)
     assert not energy(scene_of("duffing", coupling)).conservative

@@ -15,6 +15,9 @@ from synchain.models.nondimensional import FRICTION, friction_coefficient, nondi
 from synchain.models.plugins import load, names
 from synchain.models.topology import Topology, from_matrix, topology
 
+FORCES = [c for c in names("coupling") if not hasattr(load("coupling", c), "kinetic")]
+"""The couplings without inertia; tests/test_inertia.py has the others."""
+
 LAGRANGIAN = [name for name in names("oscillator") if not hasattr(load("oscillator", name), "field")]
 PLAIN = [name for name in LAGRANGIAN if len(nondimensional(load("oscillator", name)).coordinates) == 1]
 WEIGHTED = from_matrix([["-5/2", 2, "1/2"], [2, -2, 0], ["1/2", 0, "-1/2"]], "weighted")
@@ -59,14 +62,14 @@ def test_every_oscillator_alone(oscillator: str, method: object) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("coupling", names("coupling"))
+@pytest.mark.parametrize("coupling", FORCES)
 @pytest.mark.parametrize("oscillator", PLAIN)
 def test_every_coupling_between_two_of_every_oscillator(oscillator: str, coupling: str, method: object) -> None:
     check(method, oscillator, coupling, topology("chain", 2))
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("coupling", names("coupling"))
+@pytest.mark.parametrize("coupling", FORCES)
 def test_every_coupling_among_three(coupling: str, method: object) -> None:
     check(method, "duffing", coupling, topology("chain", 3))
     if coupling != "fput":

@@ -18,6 +18,9 @@ from synchain.models.plugins import call, load, names
 from synchain.models.topology import Topology, from_matrix, topology
 from synchain.models.topology import names as families
 
+FORCES = [c for c in names("coupling") if not hasattr(load("coupling", c), "kinetic")]
+"""The couplings without inertia; tests/test_inertia.py has the others."""
+
 SPRING = load("coupling", "spring")
 WEIGHTED = from_matrix([["-5/2", 2, "1/2"], [2, -2, 0], ["1/2", 0, "-1/2"]], "weighted")
 CUT = from_matrix([[-1, 1, 0], [1, -1, 0], [0, 0, 0]], "cut")
@@ -128,7 +131,7 @@ def test_connectivity_of_the_papers_chain() -> None:
     assert connectivity("spring", topology("chain", 4)) == ((-1, 1, 0, 0), (1, -2, 1, 0), (0, 1, -2, 1), (0, 0, 1, -1))
 
 
-@pytest.mark.parametrize("coupling", [name for name in names("coupling") if name != "fput"])
+@pytest.mark.parametrize("coupling", [name for name in FORCES if name != "fput"])
 def test_connectivity_of_one_way_links_is_the_jacobian_of_the_forces(coupling: str) -> None:
     equations = assemble("harmonic", None, coupling, ONE_WAY)
     sigma = sp.Symbol("sigma", real=True)
@@ -160,7 +163,7 @@ def test_a_coupling_without_a_matrix_is_refused(monkeypatch: pytest.MonkeyPatch)
 # -- edges ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("coupling", names("coupling"))
+@pytest.mark.parametrize("coupling", FORCES)
 def test_couplings_are_symmetric_and_called_sigma(coupling: str) -> None:
     module = load("coupling", coupling)
     assert next(iter(module.PARAMETERS)) == "sigma"
@@ -247,7 +250,7 @@ def test_parameters_are_those_of_the_equations(oscillator: str, friction: str | 
     used = set().union(*(e.free_symbols for e in (*single.rhs, *conditions)))
     assert {s.name for s in single.parameters} == {s.name for s in used} - {s.name for s in single.state} - {"t"}
     first, last = single.state[0].name, single.state[-1 if single.contact is None else 1].name
-    springs = () if hasattr(load("oscillator", oscillator), "field") else names("coupling")
+    springs = () if hasattr(load("oscillator", oscillator), "field") else FORCES
     for coupling in (*springs, f"{first}->{last}"):
         joined = network(single, edge(coupling, single, oscillator), topology("chain", 2))
         assert joined.parameters == tuple(parameters(oscillator, friction, contact, coupling))

@@ -138,14 +138,14 @@ def _fitting(scene: Scene, name: str, value: float | tuple[float, ...]) -> Any:
     """The value of a setting as the scene wants it."""
     from synchain.models.scene_model import check_state, unknown
 
-    if name in scene.parameters or name in scene.equations.state:
+    if scene.takes(name) or name in scene.equations.state:
         return value
     if name == "rtol":
         raise WrongUse("--set cannot change rtol; use --rtol")
     if name.rpartition("_")[0] in scene.components:
-        check_state(name, scene.components, scene.n, "initial state")
+        check_state(scene.model(), name, "initial state")
     if name not in SETTINGS:
-        made = {key: getattr(scene, key) for key in ("oscillator", "friction", "contact", "coupling", "topology")}
+        made = scene.model()
         states = (f"{component}_1" for component in scene.components)
         raise WrongUse(f"--set: {unknown(made, name, 'parameter', (*scene.parameters, *states, *SETTINGS))}")
     if isinstance(value, tuple):
