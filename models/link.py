@@ -45,11 +45,7 @@ def check_coupling(coupling: str, single: Node, other: Node | None = None) -> No
 
 @lru_cache(maxsize=64)
 def edge(
-    coupling: str,
-    single: Node,
-    oscillator: str | None = None,
-    other: Node | None = None,
-    partner: str | None = None,
+    coupling: str, single: Node, oscillator: str | None = None, other: Node | None = None, partner: str | None = None
 ) -> Edge:
     """Derive what one link adds to the rates of its target.
 

@@ -45,6 +45,7 @@ def test_the_power_of_every_oscillator_with_a_spring(oscillator: str) -> None:
     assert vanishes(balance(scene_of(oscillator, "spring")))
 
 
+@pytest.mark.long
 def test_the_power_of_a_cart_with_pendulums_that_is_joined_to_another() -> None:
     """In numbers: the symbolic proof of one of them alone is in test_lagrangian.py, and two would take minutes."""
     scene = scene_of("belt_double_pendulum", "spring on x", parameters={"sigma": 0.4, "damping": 0.2})

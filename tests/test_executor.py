@@ -178,6 +178,7 @@ def cluster():
         yield made
 
 
+@pytest.mark.long
 def test_dask_survives_a_killed_worker(cluster, alone, tmp_path):
     from distributed import Client
 
@@ -199,6 +200,7 @@ def test_dask_survives_a_killed_worker(cluster, alone, tmp_path):
     assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
 
 
+@pytest.mark.long
 def test_the_command_runs_on_dask(cluster, tmp_path, capsys):
     from synchain.runtime.cli import main
 
@@ -234,6 +236,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.long
 def test_mpi(alone, tmp_path):
     beside = Path(sys.executable).with_name("mpiexec")
     launcher = str(beside) if beside.exists() else shutil.which("mpiexec")

@@ -577,7 +577,7 @@ def test_the_manuals_python_and_file_say_the_same(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("words", blocks("toml"))
 def test_the_manuals_files_are_scenes(tmp_path: Path, words: str) -> None:
-    assert load_scene(write(tmp_path, words)).cells > 1
+    assert load_scene(write(tmp_path, words)).n > 1
 
 
 def test_the_manuals_message_is_the_real_one(tmp_path: Path) -> None:

@@ -88,6 +88,7 @@ def test_every_shape_of_a_sweep_streams_as_it_saves(axes, tmp_path):
     assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
 
 
+@pytest.mark.long
 def test_a_merged_network_streams_as_it_saves(tmp_path):
     """Oscillators that are stepped as one are kept as one and come back as all of them."""
     scene = MIRRORED.replace(axes={"sigma": [0.1, 0.2]})
@@ -261,6 +262,7 @@ class Stuck(Executor):
         return future
 
 
+@pytest.mark.long
 def test_a_second_ctrl_c_leaves_blocks_that_do_not_end(tmp_path, interruptible):
     def press():
         for _ in range(2):
@@ -317,6 +319,7 @@ def restore_interrupt() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+@pytest.mark.long
 def test_five_kills(tmp_path):
     kept, _ = kill_again_and_again(MAP, tmp_path, 5, seed=1)
     assert kept > 0
