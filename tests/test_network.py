@@ -244,7 +244,7 @@ def models() -> list[tuple[str, str | None]]:
 @pytest.mark.parametrize("contact", CONTACTS)
 def test_parameters_are_those_of_the_equations(oscillator: str, friction: str | None, contact: str) -> None:
     if contact == "set-valued" and friction and len(getattr(load("oscillator", oscillator), "COORDINATES", "x")) > 1:
-        with pytest.raises(ValueError, match="set-valued contact: .* coordinates; expected one"):
+        with pytest.raises(ValueError, match=r"set-valued contact: .* coordinates; expected one"):
             node(oscillator, friction, contact)
         return
     single = node(oscillator, friction, contact)
