@@ -45,6 +45,7 @@ def pretend(scene: Scene, failed: tuple[int, ...] = (), **options: Any) -> Resul
         data["section"] = ((*dims, "point", "state"), points.reshape(*shape, 2, dimension))
     if "trajectory" in scene.record:
         waves = np.sin(np.linspace(0, 6, 20)[:, None] + np.arange(dimension))
+        data["trajectory_time"] = (("sample",), np.linspace(0, 6, 20))
         data["trajectory"] = ((*dims, "sample", "state"), np.broadcast_to(waves, (*shape, *waves.shape)))
     coordinates: dict[str, Any] = {"state": list(scene.equations.state)}
     for axis in scene.axes:

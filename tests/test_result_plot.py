@@ -11,6 +11,7 @@ import pytest
 from figure_samples import pretend, words
 
 from synchain.models import Scene, chain
+from synchain.models.scene_file import load_scene
 from synchain.runtime.figures import result_plot, style
 from synchain.runtime.result import Result
 
@@ -84,3 +85,26 @@ def test_plots_that_cannot_be_made_are_refused(pair: Callable[..., Result]) -> N
     with pytest.raises(ValueError, match="no numbers for the plot 'map'; it has them for: section, end"):
         result_plot.draw_result(pair(), kind="map")
     assert not plt.get_fignums()
+
+
+def test_oscillators_of_several_kinds_show_states_of_their_own() -> None:
+    clocks = load_scene("huygens")
+    axes = result_plot.draw_result(pretend(clocks.replace(record=("trajectory",), axes=())))
+    assert [line.get_label() for line in axes.lines] == ["oscillator 1", "2", "3"]
+    assert axes.get_xlabel() == "x, theta"
+    ends = result_plot.draw_result(pretend(clocks.replace(record=(), axes=())))
+    assert ends.get_ylabel() == "v, theta_rate at the end"
+
+
+def test_many_oscillators_are_shown_over_time(pair: Callable[..., Result]) -> None:
+    axes = result_plot.draw_result(pair(topology=chain(9), record=("trajectory",), samples=20))
+    (mesh,) = axes.collections
+    assert mesh.get_array().shape == (9, 20)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time", "oscillator")
+
+
+def test_rounding_is_drawn_as_zero(pair: Callable[..., Result]) -> None:
+    result = pair(axes=SWEPT["error"])
+    assert result_plot.draw_result(result).get_ylim()[1] > 0.01
+    result.data["sync_error"] = result.data.sync_error * 0.0 + 1e-14
+    assert result_plot.draw_result(result).get_ylim() == pytest.approx((-5e-11, 1e-9))

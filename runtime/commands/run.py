@@ -146,7 +146,7 @@ def _fitting(scene: Scene, name: str, value: float | tuple[float, ...]) -> Any:
         check_state(scene.model(), name, "initial state")
     if name not in SETTINGS:
         made = scene.model()
-        states = (f"{component}_1" for component in scene.components)
+        states = {name.rpartition("_")[0]: name for name in reversed(scene.equations.state)}.values()
         raise WrongUse(f"--set: {unknown(made, name, 'parameter', (*scene.parameters, *states, *SETTINGS))}")
     if isinstance(value, tuple):
         raise WrongUse(f"--set {name}: found {len(value)} values; only parameters and initial states can be swept")
@@ -228,7 +228,7 @@ def _stopped(stop: SweepInterrupted | SweepFailed, target: Path, arguments: Name
     kept = f"{stop.finished} of {stop.cells} cells finished, kept in {partial}\ncontinue with: {again}"
     if stop.finished == 0:
         partial.unlink(missing_ok=True)
-        kept = "no cell had finished; nothing was written"
+        kept = "no cell finished; nothing was written"
     return Failed(f"interrupted with {kept}" if isinstance(stop, KeyboardInterrupt) else f"{stop.reason}; {kept}")
 
 

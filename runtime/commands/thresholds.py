@@ -103,6 +103,8 @@ def _scene(arguments: Namespace) -> Scene:
 
     scene = None if arguments.scene is None else load_scene(arguments.scene)
     graph = _graph(arguments, scene)
+    if scene is not None:
+        scene.equations.expect_alike("thresholds")
     if scene is None:
         scene = Scene(topology=graph)
     elif graph != scene.topology:

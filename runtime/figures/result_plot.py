@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
 SIZE = (4.8, 3.4)
 FINEST = 1000
 """Values of each axis of a map that are drawn; a figure has fewer points than that."""
+ROUNDING = 1e-9
+"""Synchronisation errors below this are drawn as zero."""
 MARKED = 60
 """Up to so many cells are marked by a dot each."""
 
@@ -94,6 +97,8 @@ def _error(axes: Any, data: xr.Dataset, result: Result) -> Any:
     marker = "." if len(x) <= MARKED else None
     axes.plot(x[order], data.sync_error.values[order], color=BLUE, marker=marker)
     axes.set(xlabel=name, ylabel="average synchronisation error")
+    if np.nanmax(data.sync_error.values, initial=0.0) < ROUNDING:  # nothing but rounding: no landscape of it
+        axes.set_ylim(-0.05 * ROUNDING, ROUNDING)
     return axes
 
 
@@ -131,28 +136,48 @@ def _map(axes: Any, data: xr.Dataset, result: Result) -> Any:
 
 
 def _phase(axes: Any, data: xr.Dataset, result: Result) -> Any:
-    """Velocity against position of every oscillator, in the first cell."""
+    """Velocity against position of every oscillator, in the first cell; of many the first state over time, in colours."""
     data = data.isel({name: 0 for name in data.status.dims})
-    first, second = (*result.scene.components, result.scene.components[0])[:2]
-    for i in range(1, result.scene.n + 1):
-        x, y = (data.trajectory.sel(state=f"{name}_{i}") for name in (first, second))
-        axes.plot(x, y, color=CYCLE[(i - 1) % len(CYCLE)], linewidth=0.7, label="oscillator " * (i == 1) + str(i))
-    axes.set(xlabel=first, ylabel=second)
+    own = [_own(data, i) for i in range(1, result.scene.n + 1)]
+    if len(own) > len(CYCLE):
+        values = data.trajectory.sel(state=[names[0] for names in own])
+        time = data.trajectory_time.values
+        painted = axes.pcolormesh(time, np.arange(1, len(own) + 1), values.T, shading="nearest", cmap="cividis",
+                                  rasterized=True)  # fmt: skip
+        axes.set(xlabel="time", ylabel="oscillator")
+        axes.figure.colorbar(painted, ax=axes, label=_common(names[0] for names in own))
+        return axes
+    for i, names in enumerate(own):
+        x, y = (data.trajectory.sel(state=name) for name in names)
+        axes.plot(x, y, color=CYCLE[i % len(CYCLE)], linewidth=0.7, label="oscillator " * (i == 0) + str(i + 1))
+    axes.set(xlabel=_common(names[0] for names in own), ylabel=_common(names[1] for names in own))
     return _legend(axes, result)
+
+
+def _own(data: xr.Dataset, i: int) -> tuple[str, str]:
+    """The first two states of oscillator `i` (from 1); the first one twice where it has no other."""
+    names = [str(name) for name in data.state.values if str(name).rpartition("_")[2] == str(i)]
+    return names[0], names[min(1, len(names) - 1)]
+
+
+def _common(states: Iterable[str]) -> str:
+    """What states of several oscillators are called without their numbers: one name, or several with commas."""
+    return ", ".join(dict.fromkeys(name.rpartition("_")[0] for name in states))
 
 
 def _end(axes: Any, data: xr.Dataset, result: Result) -> Any:
     """Final state: of every oscillator against the axis, or against one another."""
-    first, second = (*result.scene.components, result.scene.components[0])[:2]
+    own = [_own(data, i) for i in range(1, result.scene.n + 1)]
+    first, second = (_common(names[k] for names in own) for k in (0, 1))
     along = _along(data, result) if data.status.ndim else None
-    for i in range(1, result.scene.n + 1):
-        end = data.end.sel(state=f"{first}_{i}")
+    for i, names in enumerate(own, start=1):
+        end = data.end.sel(state=names[0])
         x = end if along is None else along[0]
-        y = data.end.sel(state=f"{second}_{i}") if along is None else end
+        y = data.end.sel(state=names[1]) if along is None else end
         color = CYCLE[(i - 1) % len(CYCLE)]
         axes.plot(x, y, linestyle="none", marker=".", color=color, label="oscillator " * (i == 1) + str(i))
-    names = (f"{first} at the end", f"{second} at the end") if along is None else (along[1], f"{first} at the end")
-    axes.set(xlabel=names[0], ylabel=names[1])
+    labels = (f"{first} at the end", f"{second} at the end") if along is None else (along[1], f"{first} at the end")
+    axes.set(xlabel=labels[0], ylabel=labels[1])
     return _legend(_widen(axes), result)
 
 
