@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import sympy as sp
 
+from synchain.codegen import emit as emitting
+from synchain.codegen import sparse
 from synchain.codegen.emit import AUTO, KernelSource, emit
+from synchain.codegen.lanes import native_width
 from synchain.codegen.load import Kernel, load
 from synchain.models.equations import Equations
 from synchain.models.scene import Scene
@@ -30,7 +35,17 @@ def kernel_source(scene: Scene, width: int | None = None, skip: bool | Skip = Fa
     if "section" in scene.record:
         section = sp.Symbol(chosen.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
     method = best_integrator(scene.equations, scene.rtol) if scene.integrator == "auto" else scene.integrator
-    return emit(chosen.equations, method, chosen.records, section, width, chosen.multiplicity)
+    limits = (emitting.LARGEST_UNROLLED, sparse.FILL_LIMIT, native_width(1))
+    return _written(chosen.equations, method, tuple(chosen.records), section, width, chosen.multiplicity, limits)
+
+
+@lru_cache(maxsize=32)
+def _written(
+    equations: Equations, method: str, records: tuple[str, ...], section: sp.Expr | None, width: int | None,
+    multiplicity: tuple[int, ...] | None, limits: tuple[float, ...],
+) -> KernelSource:  # fmt: skip
+    """The text of a kernel, kept for runs that differ in numbers alone; `limits` are what else decides its form."""
+    return emit(equations, method, records, section, width, multiplicity)
 
 
 def best_integrator(equations: Equations, rtol: float) -> str:

@@ -28,6 +28,8 @@ TOLERANCE = 1e-12
 """Relative tolerance of the integration."""
 
 MOST_STEPS = 30
+LONGEST = 10_000
+"""Most drive periods that an orbit is looked for over; far shorter unstable ones lose all their digits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,16 +67,16 @@ def periodic_orbit(
 ) -> PeriodicOrbit:
     """Find a periodic orbit of a scene's oscillator near `start` (default: the scene's, after its transient).
 
-    Raises ValueError for an oscillator that is not driven or a number of periods below 1, ArithmeticError where Newton's
-    method does not converge.
+    Raises ValueError for an oscillator that is not driven or periods out of range, ArithmeticError where Newton's method
+    does not converge.
     """
     scene = single(scene, TOLERANCE, parameters)
     if not scene.period:
         raise ValueError(
             "periodic orbits are looked for on the stroboscopic map of a drive; found an oscillator without one"
         )
-    if periods < 1:
-        raise ValueError(f"periods = {periods}; expected at least 1")
+    if periods not in range(1, LONGEST + 1):
+        raise ValueError(f"periods = {periods!r}; expected a whole number, at least 1, at most {LONGEST}")
     state = np.zeros(len(scene.initial))
     given = [values[0] for values in scene.initial.values()] if start is None else start
     state[: len(given)] = given

@@ -138,7 +138,7 @@ def test_the_skeleton_of_a_diagram_has_stable_and_unstable_orbits() -> None:
 def test_what_is_refused() -> None:
     with pytest.raises(ValueError, match="an oscillator without one"):
         periodic_orbit(Scene(oscillator="lorenz", coupling="x->x", topology=PAIR))
-    with pytest.raises(ValueError, match="periods = 0; expected at least 1"):
+    with pytest.raises(ValueError, match="periods = 0; expected a whole number, at least 1"):
         periodic_orbit(scene(), 0)
     with pytest.raises(ArithmeticError, match="no orbit of 1 drive periods near the start"):
         periodic_orbit(scene(), 1, start=[50.0, -40.0], omega=1.55)
