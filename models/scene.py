@@ -9,7 +9,6 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from .axis import Axis
-from .contact import SLIP
 from .scene_checks import Frozen
 from .scene_complete import complete
 from .scene_model import bare, derived, model_parameters
@@ -185,9 +184,10 @@ class Scene:
         ):
             given["initial"] = None
         elif "initial" not in changes and given["initial"] and ("contact" in changes or "friction" in changes):
-            given["initial"] = {
-                name: at for name, at in given["initial"].items() if name != SLIP.name
-            }  # follows from x, v
+            from .contact import SLIP
+
+            own = {name: at for name, at in given["initial"].items() if name != SLIP.name}  # modes follow from x and v
+            given["initial"] = own
         return Scene(**given)
 
     def model(self) -> dict[str, Any]:

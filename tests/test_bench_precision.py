@@ -86,6 +86,7 @@ def test_the_printed_jacobian_is_the_derivative_of_the_printed_right_hand_side(n
         assert np.abs((high - low) / 2e-6 - exact[:, column]).max() < 1e-5
 
 
+@pytest.mark.long
 def test_the_paper_method_is_held_back_by_stability():
     """Cash-Karp at 1e-15/1e-12 needs 15 thousand steps a period, more than a hundred times those of a stiff method."""
     case = read_case(STIFF)
@@ -223,6 +224,7 @@ def test_ratios_are_to_the_fastest_own_method_with_full_lanes():
     assert table([], own=set()) == ""
 
 
+@pytest.mark.long
 def test_every_case_runs_and_its_table_and_figure_are_written(monkeypatch, tmp_path):
     methods = (precision.Method("rodas5p", True, ((1e-5, 1e-6), (1e-6, 1e-7)), longest=10),)
     monkeypatch.setattr(precision, "METHODS", methods)

@@ -7,6 +7,7 @@ import pytest
 from synchain.runtime.bench import start
 
 
+@pytest.mark.long
 def test_a_row_for_each_stage():
     rows = start.measure(quick=True)
     names = [row[0] for row in rows]

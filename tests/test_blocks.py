@@ -183,7 +183,7 @@ m_v_1_x_1 l_v_1_x_1 inv_v_1 x_here v_there hoisted_0 fixed_0 _ __name__ __debug_
 """.split()  # noqa: SIM905
 
 
-@pytest.mark.parametrize("chunk", range(6))
+@pytest.mark.parametrize("chunk", [0, *(pytest.param(k, marks=pytest.mark.long) for k in range(1, 6))])
 def test_parameters_may_have_any_name(chunk, same_numbers):
     size = len(WORDS) // 6 + 1
     words = WORDS[chunk * size : (chunk + 1) * size]

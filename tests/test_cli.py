@@ -423,7 +423,7 @@ WRONG = [
     ("spectrum chain 4 --matrix {own}", "expected one of them"),
     ("spectrum --matrix {folder}/none.txt", "does not exist"),
     ("spectrum --matrix {folder}", "is a folder"),
-    ("kernel nope", "unknown scene 'nope'; known: duffing_chain"),
+    ("kernel nope", "unknown scene 'nope'; known: burridge_knopoff"),
     ("equations {folder}/none.toml", "no such file"),
     ("equations figure_4a --latex --json", "not allowed with"),
     ("run {scene}", "the following arguments are required: --out"),

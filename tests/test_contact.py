@@ -68,6 +68,7 @@ def test_the_smooth_law_tends_to_the_exact_one() -> None:
     assert all(8.0 < ratio < 30.0 for ratio in ratios)
 
 
+@pytest.mark.long
 def test_results_converge_with_the_tolerance_and_stick_is_exact() -> None:
     ends = [
         run(scene(2, rtol=rtol, parameters={"sigma": 0.1}), show_progress=False).end.values
@@ -90,7 +91,7 @@ def test_equal_oscillators_stay_equal_although_the_state_is_unstable() -> None:
     assert np.ptp(whole.end.values.reshape(3, 3), axis=1).max() == 0.0
 
 
-@pytest.mark.parametrize("width", [1, 2, 4])
+@pytest.mark.parametrize("width", [1, pytest.param(2, marks=pytest.mark.long), 4])
 def test_lanes_do_not_change_a_bit(width: int) -> None:
     cells = {"sigma": np.linspace(0.0, 0.4, 11), "show_progress": False}
     s = scene(2, rtol=1e-8, window=50.0)

@@ -130,6 +130,7 @@ def test_the_spectrum_of_a_synchronous_pair_is_that_of_its_periodic_orbit() -> N
     assert found.components == 4
 
 
+@pytest.mark.long
 def test_a_cluster_of_two_has_the_exponent_of_its_mode() -> None:
     scene = Scene(topology=PAIR, contact="set-valued", parameters={"omega": 1.15, "sigma": 0.2})
     found = cluster_exponents(scene, (0, 0), transient=400, periods=64)

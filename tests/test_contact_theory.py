@@ -188,6 +188,7 @@ def test_hopf_point(damped: str) -> None:
         assert math.log((ends[0] - ends[1]) / 2e-4) / turns == pytest.approx(rate, abs=2e-8)
 
 
+@pytest.mark.long
 def test_share_of_starts_at_rest(damped: str) -> None:
     """Stender & Hoffmann's bSTAB: 0.3040 ± 0.0065 of [-2, 2] x [0, 2] at v_d = 1.5; three sigma allowed."""
     numbers, count = np.random.default_rng(1), 2000

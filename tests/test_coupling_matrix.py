@@ -114,7 +114,10 @@ def test_the_difference_of_the_first_enters_the_rate_of_the_second() -> None:
     assert link.diffusive
 
 
-@pytest.mark.parametrize("oscillator", [name for name in names("oscillator") if "double" not in name])
+OTHER_MASSES = ("beam", "belt_double_pendulum", "clock", "double_pendulum")
+
+
+@pytest.mark.parametrize("oscillator", [name for name in names("oscillator") if name not in OTHER_MASSES])
 def test_springs_and_dampers_of_mass_one_are_entries(oscillator: str) -> None:
     single = node(oscillator, "coulomb" if load("oscillator", oscillator).FRICTION else None)
     if hasattr(load("oscillator", oscillator), "field"):
@@ -234,7 +237,7 @@ def test_entries_between_lagrangian_oscillators() -> None:
 # -- runs ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("n", [3, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("n", [3, pytest.param(40, marks=pytest.mark.long)])
 def test_a_run_agrees_with_a_network_written_by_hand(n: int) -> None:
     """A few nodes are written out in the kernel, many are looped over; SciPy integrates L s and H as matrices."""
     graph, sigma = ring(n), 0.3

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
@@ -118,7 +119,8 @@ def test_spawned_processes_and_one_that_crashes(alone, tmp_path):
 
         def crash(progress):
             if progress.done >= 100:
-                os.kill(next(iter(executor._processes)), signal.SIGKILL)
+                with suppress(ProcessLookupError):  # the hook may be called again after it has died
+                    os.kill(next(iter(executor._processes)), signal.SIGKILL)
 
         with pytest.raises(SweepFailed, match="the workers are lost") as caught:
             stream(MAP, path, executor=executor, show_progress=False, progress=crash)

@@ -32,7 +32,7 @@ def always_looped(monkeypatch):
     [
         pytest.param(GRAPHS[1], "rodas5p", marks=pytest.mark.long, id="star5-rodas5p"),
         pytest.param(GRAPHS[3], "rodas5p", id="matrix3-rodas5p"),
-        pytest.param(GRAPHS[3], "dop853", id="matrix3-dop853"),
+        pytest.param(GRAPHS[3], "dop853", marks=pytest.mark.long, id="matrix3-dop853"),
     ],
 )
 def test_looped_step_equals_the_unrolled_one(graph, integrator, request):

@@ -92,6 +92,7 @@ def coulomb(drive: float) -> Scene:
     return scene(parameters=numbers, transient=100.0)
 
 
+@pytest.mark.long
 def test_stops_begin_where_den_hartogs_motion_ends() -> None:
     """No stops while X beta^2 >= r: V beta^2 = r sqrt(1 + U^2 beta^4)/P, P the drive (Phil. Mag. 9, 801 (1930))."""
     beta, r = 1.4, 0.3
@@ -123,6 +124,7 @@ def test_a_branch_that_ends_by_grazing_says_where() -> None:
     assert max(branch.residuals) < 5e-7  # Newton's method finds orbits up to there
 
 
+@pytest.mark.long
 def test_the_skeleton_of_a_diagram_has_stable_and_unstable_orbits() -> None:
     """Period two loses its stability between 1.2 and 1.24 and lives on; the orbit of period one is followed both ways."""
     found = skeleton(scene(transient=1000.0), "omega", [1.2, 1.22, 1.24], periods=(2,))

@@ -275,6 +275,7 @@ def test_explain_prints_and_does_not_run(tmp_path, capsys):
     assert "required: --out" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_explain_runs_where_there_is_a_folder_and_no_skip_runs_everything(tmp_path, capsys):
     path = tmp_path / "mirror.toml"
     path.write_text(SCENE)
@@ -319,6 +320,7 @@ def test_every_case_of_the_benchmark_skips_something(case):
     assert counts[0] < counts[1] or case.fold_all
 
 
+@pytest.mark.long
 def test_benchmark_rows_have_what_the_columns_say(monkeypatch):
     given = {"oscillator": "duffing", "parameters": {"sigma": 0.3}, "record": (), "initial": {"x": [0.5, 0.1, 0.5]}}
     monkeypatch.setattr(bench, "CASES", (bench.Case("mirror", 3, given),))
