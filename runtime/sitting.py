@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from synchain.models.scene import Scene
 from .certificate import Certificate, certify
 from .crew import Crew, Task, crew_size, feed
 from .kernels import chosen_skip, kernel_source
+from .labels import provenance
 from .layout import Layout, block_size
 from .progress import Reporter
 from .result import Buffers, Result
@@ -117,6 +118,12 @@ class Prepared:
     def limits(self) -> tuple[float, float]:
         """The tolerances (rtol, atol) that are integrated with."""
         return float(self.shop.control[0]), float(self.shop.control[1])
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """What a result says about how it came about."""
+        recipe = self.shop.recipe
+        return provenance(recipe.chosen.scene, self.shop.kernel, self.limits, recipe.chosen.skipped, recipe.versions)
 
     def size(self) -> int:
         """Cells of a block."""

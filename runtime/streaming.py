@@ -17,7 +17,7 @@ from synchain.models.scene import Scene
 from .crew import Task, worker_lost
 from .files import drop_leftovers
 from .kernels import chosen_skip
-from .labels import provenance, scene_of
+from .labels import scene_of
 from .layout import Layout
 from .progress import Hook, Progress, Reporter
 from .result import Buffers
@@ -93,11 +93,8 @@ def _prepared(chosen: Skip, partial: Path, state: str, certified: bool, **given:
     if state == "continue":
         return prepare(chosen.scene, chosen, **given, certificate=certificate_of(Store.describe(partial)) or False)
     prepared = prepare(chosen.scene, chosen, **given, certificate=certified)
-    attributes = provenance(
-        chosen.scene, prepared.shop.kernel, prepared.limits, chosen.skipped, prepared.shop.recipe.versions
-    )
     layout = Layout.of(chosen.scene, prepared.size())
-    Store.create(partial, about(chosen, layout, prepared.shop.samples, attributes, prepared.certificate))
+    Store.create(partial, about(chosen, layout, prepared.shop.samples, prepared.attributes, prepared.certificate))
     return prepared
 
 

@@ -12,7 +12,6 @@ from synchain.models.scene import Scene
 
 from .crew import Task, worker_lost
 from .kernels import kernel, kernel_source
-from .labels import provenance
 from .layout import Layout
 from .plan import plan
 from .progress import Hook, Reporter
@@ -126,11 +125,8 @@ class Memory:
     def result(self, prepared: Prepared) -> Result:
         """The cells so far as a result."""
         chosen = prepared.shop.recipe.chosen
-        attributes = provenance(
-            chosen.scene, prepared.shop.kernel, prepared.limits, chosen.skipped, prepared.shop.recipe.versions
-        )
         spans = plan(chosen.scene).spans
-        return gather(chosen.scene, attributes, spans, chosen.expand(self.buffers), prepared.certificate)
+        return gather(chosen.scene, prepared.attributes, spans, chosen.expand(self.buffers), prepared.certificate)
 
 
 def _memory(prepared: Prepared, earlier: Result | None) -> Memory:
