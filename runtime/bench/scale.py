@@ -1,8 +1,8 @@
 """Sweeps that stream to disk: a map over omega and sigma of 100 … 100 000 cells, or a million with `--long`.
 
-Two oscillators, 100 periods of the drive and a window of 20, for a million cells 20 and a window of 10, on two threads; the time is that of the cells without the
-kernel, the memory is the peak of a fresh process, program included, and the file is the finished result.  Memory that
-does not grow with the number of cells is what this is for.
+Two oscillators, 100 periods of the drive and a window of 20 (for a million cells 20 and a window of 10), on two threads;
+the time is that of the cells without the kernel, the memory is the peak of a fresh process, program included, and the
+file is the finished result.  Memory that does not grow with the number of cells is what this is for.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 
 __all__ = ["COLUMNS", "draw", "measure", "measure_long", "row"]
 
-COLUMNS = ("cells", "periods", "threads", "seconds", "cells per second", "steps per cell", "peak MB", "file MB", "bytes per cell")
+COLUMNS = (
+    *("cells", "periods", "threads", "seconds", "cells per second", "steps per cell"),
+    *("peak MB", "file MB", "bytes per cell"),
+)
 SIDES = (10, 32, 100, 316)
 """Values of each of the two axes."""
 LONG = (*SIDES, 1000)
