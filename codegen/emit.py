@@ -228,9 +228,9 @@ def imports(functions: list[list[str]], lines: list[str], section: sp.Expr | Non
         "import math",
         "",
         "import numpy as np",
-        "from numba import njit",
         "",
         f"from synchain.codegen.elementary import {', '.join(smooth)}",
+        "from synchain.codegen.inner import njit",
         f"from synchain.codegen.lanes import {', '.join(sorted(primitive))}",
     ])  # fmt: skip
 

@@ -28,6 +28,12 @@ __all__ = [
 
 CONTRACT = ("contract",)
 
+FIRST = {"target": "cpu"}
+"""Metadata of the operators of lanes: Numba tries what is made for the CPU before its own, which are for any target.
+
+The other way round it asks some dozen operators of arrays, texts and dates first, every time two lanes are added.
+"""
+
 PAIRS = [(Lane, Lane), (Lane, types.Float), (types.Float, Lane), (Lane, types.Integer), (types.Integer, Lane)]
 
 
@@ -36,6 +42,8 @@ def _define_operator(function: Callable, emit: Callable, result: type) -> None:
 
     @infer_global(function)
     class _Typing(AbstractTemplate):
+        metadata = FIRST
+
         def generic(self, args: Any, kws: Any) -> Any:
             width = common_width(args) if len(args) == 2 else None
             return signature(result(width), *args) if width else None
@@ -61,6 +69,8 @@ for _function, _name in (
 
 @infer_global(operator.neg)
 class _NegTyping(AbstractTemplate):
+    metadata = FIRST
+
     def generic(self, args: Any, kws: Any) -> Any:
         return signature(args[0], *args) if isinstance(args[0], Lane) else None
 
@@ -73,6 +83,8 @@ def _lower_neg(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 def _define_logic(function: Callable, name: str) -> None:
     @infer_global(function)
     class _Typing(AbstractTemplate):
+        metadata = FIRST
+
         def generic(self, args: Any, kws: Any) -> Any:
             same = len(args) == 2 and isinstance(args[0], Mask) and args[0] == args[1]
             return signature(args[0], *args) if same else None
@@ -88,6 +100,8 @@ _define_logic(operator.or_, "or_")
 
 @infer_global(operator.invert)
 class _InvertTyping(AbstractTemplate):
+    metadata = FIRST
+
     def generic(self, args: Any, kws: Any) -> Any:
         return signature(args[0], *args) if isinstance(args[0], Mask) else None
 

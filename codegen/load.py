@@ -28,7 +28,7 @@ from numba import types
 
 from synchain.models.equations import Equations
 
-from . import elementary, lane_types, lanes
+from . import elementary, inner, lane_types, lanes
 from .cache import cache_folder, discard, is_sound, open_folder, seal, write_whole
 from .emit import LARGEST_UNROLLED, KernelSource
 from .sparse import EMPTY, NAMES, program
@@ -162,7 +162,7 @@ def _module(text: str, name: str, path: Path) -> ModuleType:
 @functools.cache
 def _surroundings() -> str:
     """Everything besides the text that the machine code depends on."""
-    here = [Path(m.__file__).read_text(encoding="utf-8") for m in (lane_types, lanes, elementary) if m.__file__]
+    here = [Path(m.__file__).read_text(encoding="utf-8") for m in (inner, lane_types, lanes, elementary) if m.__file__]
     features = ",".join(f"{k}{int(v)}" for k, v in sorted(llvm.get_host_cpu_features().items()))
     versions = [sys.version, numba.__version__, importlib.metadata.version("llvmlite"), platform.machine()]
     return "\n".join([*here, *versions, llvm.get_host_cpu_name(), features])
