@@ -10,6 +10,7 @@ import atexit
 import functools
 import hashlib
 import importlib.metadata
+import logging
 import platform
 import shutil
 import sys
@@ -49,6 +50,9 @@ MODES = types.void(
     _counts, _cube,
 )  # fmt: skip
 """first, last, start, numbers, spans, control, strengths, vectors, growth, end, sums, counts, samples."""
+
+LOG = logging.getLogger(__name__)
+"""Says at the level INFO when something is compiled, which takes seconds."""
 
 _lock = threading.Lock()
 
@@ -105,6 +109,8 @@ def _load(source: KernelSource) -> Kernel:
         folder = open_folder(cache_folder())
         if not is_sound(folder, name):
             discard(folder, name)
+            count = f"{source.equations.n} oscillator{'s' * (source.equations.n != 1)}"
+            LOG.info("compiling a kernel for %s (%s), kept for later runs", count, source.integrator)
         return _kept(source, name, folder)
     except (OSError, RuntimeError) as problem:  # RuntimeError: no home folder
         warnings.warn(f"kernels are not kept on disk: {problem}", RuntimeWarning, stacklevel=3)

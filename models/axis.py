@@ -70,6 +70,9 @@ def _spaced(first: Fraction, last: Fraction, count: int) -> Iterator[float]:
 
 def _values(name: str, values: object) -> tuple[float, ...]:
     what = f"axis {name}"
+    if getattr(values, "ndim", 1) > 1:
+        shape = getattr(values, "shape", "")
+        raise ValueError(f"{what}: found an array of shape {shape}; expected one row of numbers, e.g. its ravel()")
     listed = values.tolist() if hasattr(values, "tolist") else values
     if isinstance(listed, (str, bytes, Mapping)) or not isinstance(listed, Iterable):
         raise TypeError(f"{what}: found {shown(values)}; expected a list of numbers, e.g. [0.1, 0.2]")

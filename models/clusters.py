@@ -11,7 +11,7 @@ isolated desynchronisation; Golubitsky & Stewart, Bull. Amer. Math. Soc. 43, 305
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -20,8 +20,10 @@ from flint import fmpq, fmpq_mat, fmpq_poly
 
 from .automorphisms import automorphisms
 from .equations import Edge, Equations, Node
+from .expect import a_graph
 from .proof import ProofError
 from .reduction import collapse
+from .scene_checks import typed
 from .topology import Topology
 
 __all__ = ["Block", "Clusters", "clusters", "orbital_partitions"]
@@ -72,7 +74,7 @@ def orbital_partitions(graph: Topology, limit: int = 20_000) -> tuple[Clusters, 
     The orbits of one symmetry are its cycles; the orbits of a group are the join of those of its elements.
     Raises ValueError for more than NODE_LIMIT nodes, `limit` automorphisms or PARTITION_LIMIT partitions.
     """
-    if graph.n > NODE_LIMIT:
+    if a_graph("orbital_partitions", graph).n > NODE_LIMIT:
         raise ValueError(
             f"{graph.name}({graph.n}): expected at most {NODE_LIMIT} nodes to look for symmetries; describe single "
             "partitions with `clusters`"
@@ -96,6 +98,9 @@ def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
 
     Raises ValueError where the partition is not balanced, or has not one class for each node.
     """
+    a_graph("clusters", graph)
+    if not isinstance(classes, Collection) or isinstance(classes, Set | Mapping):
+        raise TypeError(f"partition: found {typed(classes)}; expected the cluster of each node, e.g. [0, 0, 1]")
     if len(classes) != graph.n:
         raise ValueError(f"partition: found {len(classes)} classes for {graph.n} nodes; expected one for each node")
     order: dict[int, int] = {}

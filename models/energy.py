@@ -17,6 +17,7 @@ from .calculus import derivative
 from .coupling_matrix import is_matrix
 from .coupling_name import coordinates_of, split
 from .equations import TIME, Equations, Link
+from .expect import a_scene
 from .link import pair_energy
 from .nondimensional import FRICTION, friction_coefficient, nondimensional
 from .plugins import load
@@ -65,7 +66,7 @@ def energy(scene: Scene) -> Energy:
     Raises ValueError for a vector field or a coupling by components, which have no energy, for one-way links, which have no
     potential, and for set-valued friction, whose force in stick is no function of the state.
     """
-    module = load("oscillator", scene.oscillator)
+    module = load("oscillator", a_scene(scene).oscillator)
     if hasattr(module, "field"):
         raise ValueError(f"energy: oscillator {scene.oscillator!r} is a vector field; expected one with a Lagrangian")
     equations = scene.equations

@@ -6,12 +6,14 @@ feels u: it becomes the link v <- u.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence, Set
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from .rationals import FILE_LIMIT, rational
+from .expect import flag, whole
+from .rationals import file_text, rational
+from .scene_checks import shown, typed
 from .topology import LINK_LIMIT, Topology
 
 __all__ = ["from_edges", "from_graph", "from_sparse", "read_edges", "read_graphml"]
@@ -27,8 +29,11 @@ def from_edges(
     Without `n` the largest node is the last.  Raises ValueError on a wrong node, a loop, a repeated edge, a weight that
     is not rational or 0, and TypeError on nodes that are no whole numbers.
     """
+    if isinstance(edges, str | bytes | Mapping) or not isinstance(edges, Iterable):
+        raise TypeError(f"{name}: found {typed(edges)}; expected a list of edges, e.g. [(0, 1), (1, 2, 0.5)]")
+    flag("directed", directed)
     found = [_edge(edge, f"{name}: edge {k + 1}") for k, edge in enumerate(edges)]
-    size = 1 + max((max(i, j) for i, j, _ in found), default=-1) if n is None else _whole(n, f"{name}: n")
+    size = 1 + max((max(i, j) for i, j, _ in found), default=-1) if n is None else whole(f"{name}: n", n, 1)
     weights: Weights = {}
     for i, j, weight in found:
         _put(weights, j, i, weight, directed, name, lambda k: str(k))
@@ -62,6 +67,8 @@ def from_sparse(matrix: Any, adjacency: bool = False, name: str = "matrix") -> T
     if not hasattr(matrix, "tocoo"):
         raise TypeError(f"{name} is a {type(matrix).__name__}; expected a SciPy sparse matrix (one that has tocoo)")
     entries = matrix.tocoo()
+    if len(entries.shape) != 2:
+        raise ValueError(f"{name} has the shape {entries.shape}; expected a square matrix")
     rows, columns = entries.shape
     if rows != columns:
         raise ValueError(f"{name} has {rows} rows and {columns} columns; expected a square matrix")
@@ -128,22 +135,6 @@ def assembled(nodes: Sequence[Hashable], edges: Iterable[tuple[Hashable, Hashabl
     return _graph(name, len(nodes), weights)
 
 
-def file_text(path: str | Path, what: str) -> tuple[str, str]:
-    """The text of a file of at most FILE_LIMIT bytes, and its name."""
-    place = Path(path)
-    if not place.exists():
-        raise FileNotFoundError(f"{what} {str(place)!r} does not exist; check the path")
-    if not place.is_file():
-        raise ValueError(f"{what} {str(place)!r} is a folder or device; expected a text file")
-    size = place.stat().st_size
-    if size > FILE_LIMIT:
-        raise ValueError(f"{what} {str(place)!r} has {size} bytes; expected at most {FILE_LIMIT}")
-    try:
-        return place.read_text(encoding="utf-8-sig"), place.name
-    except UnicodeDecodeError:
-        raise ValueError(f"{what} {str(place)!r} is not UTF-8; save it in that encoding") from None
-
-
 def _put(
     weights: Weights, target: int, source: int, value: Fraction, directed: bool, name: str,
     called: Callable[[int], str], many: bool = False,
@@ -161,19 +152,11 @@ def _put(
 
 
 def _edge(edge: Sequence[Any], where: str) -> tuple[int, int, Fraction]:
-    if isinstance(edge, str) or not hasattr(edge, "__len__") or len(edge) not in (2, 3):
-        raise ValueError(f"{where} is {edge!r}; expected (i, j) or (i, j, weight)")
-    i, j = (_whole(node, where) for node in edge[:2])
+    unordered = isinstance(edge, str | bytes | Set | Mapping)
+    if unordered or not hasattr(edge, "__len__") or len(edge) not in (2, 3):
+        raise ValueError(f"{where} is {shown(edge)}; expected (i, j) or (i, j, weight)")
+    i, j = (whole(f"{where}: node", node, 0) for node in edge[:2])
     return i, j, rational(edge[2], where) if len(edge) == 3 else Fraction(1)
-
-
-def _whole(value: Any, where: str) -> int:
-    if isinstance(value, bool) or not hasattr(value, "__index__"):
-        raise TypeError(f"{where}: {value!r} is a {type(value).__name__}; expected a whole number")
-    number = int(value.__index__())
-    if number < 0:
-        raise ValueError(f"{where}: {number}; expected 0 or more: nodes are counted from 0")
-    return number
 
 
 def _graph(name: str, n: int, weights: Weights) -> Topology:

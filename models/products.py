@@ -13,6 +13,7 @@ from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from .expect import a_graph
 from .rationals import rational
 from .topology import LINK_LIMIT, Rule, Topology, ruled
 
@@ -33,7 +34,8 @@ def cartesian(first: Topology, second: Topology) -> Topology:
 
     Every eigenvalue is a sum of one of each graph.  Raises ValueError on more than LINK_LIMIT links.
     """
-    n = second.n
+    a_graph("cartesian: first", first)
+    n = a_graph("cartesian: second", second).n
     name = f"cartesian({_named(first)}, {_named(second)})"
     _small(name, first.n * second.link_count + n * first.link_count)
     links = [(i * n + k, j * n + k, w) for i, j, w in first.links for k in range(n)]
@@ -47,7 +49,8 @@ def kronecker(first: Topology, second: Topology) -> Topology:
     Where all nodes of each graph have one in-degree, d and e, the eigenvalues are (a + d)(b + e) - d e.  Raises
     ValueError on more than LINK_LIMIT links.
     """
-    n = second.n
+    a_graph("kronecker: first", first)
+    n = a_graph("kronecker: second", second).n
     name = f"kronecker({_named(first)}, {_named(second)})"
     _small(name, first.link_count * second.link_count)
     links = [(i * n + k, j * n + m, v * w) for i, j, v in first.links for k, m, w in second.links]
@@ -58,7 +61,8 @@ def kronecker(first: Topology, second: Topology) -> Topology:
 
 def union(first: Topology, second: Topology) -> Topology:
     """Both graphs side by side, without links between them: the eigenvalues of both."""
-    n = first.n
+    n = a_graph("union: first", first).n
+    a_graph("union: second", second)
     links = [*first.links, *((i + n, j + n, w) for i, j, w in second.links)]
     return _made(f"union({_named(first)}, {_named(second)})", n + second.n, links, partial(_both, first, second))
 
@@ -68,7 +72,8 @@ def complement(graph: Topology) -> Topology:
 
     Raises ValueError where a link is one-way or has a weight other than 1, or on more than LINK_LIMIT links.
     """
-    name, n = f"complement({_named(graph)})", graph.n
+    n = a_graph("complement", graph).n
+    name = f"complement({_named(graph)})"
     odd = next((link for link in graph.links if link[2] != 1), None)
     if odd is not None or not graph.symmetric:
         found = f"a link of weight {odd[2]}" if odd is not None else "one-way links"
@@ -81,6 +86,7 @@ def complement(graph: Topology) -> Topology:
 
 def weighted(graph: Topology, factor: Any) -> Topology:
     """The graph with all weights times a rational number other than 0 (a float means its shortest decimal)."""
+    a_graph("weighted", graph)
     by = rational(factor, "factor")
     if not by:
         raise ValueError(f"weighted({_named(graph)}): factor = 0; expected another number: no link would be left")

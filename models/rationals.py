@@ -7,9 +7,12 @@ from collections.abc import Iterable
 from decimal import Decimal
 from fractions import Fraction
 from numbers import Complex, Integral, Rational, Real
+from pathlib import Path
 from typing import Any
 
-__all__ = ["FILE_LIMIT", "parse_rows", "rational", "rational_rows"]
+from .expect import a_path
+
+__all__ = ["FILE_LIMIT", "file_text", "parse_rows", "rational", "rational_rows", "square"]
 
 FILE_LIMIT = 32 * 2**20
 """Largest matrix file that is read, in bytes."""
@@ -54,10 +57,19 @@ def _from_text(text: str, where: str) -> Fraction:
 
 def rational_rows(rows: Any, name: str) -> list[list[Fraction]]:
     """A square table of fractions; ValueError where it is empty or not square, TypeError for no table."""
+    return [
+        [rational(entry, f"{name}: entry ({i + 1}, {j + 1})") for j, entry in enumerate(line)]
+        for i, line in enumerate(square(rows, name))
+    ]
+
+
+def square(rows: Any, name: str) -> list[list[Any]]:
+    """A table with as many columns as rows; ValueError where it is empty or not square, TypeError for no table."""
     symbolic = hasattr(rows, "tolist") and not hasattr(rows, "dtype")  # SymPy lists a matrix entry by entry
     listed = rows.tolist() if symbolic else rows
-    if isinstance(listed, (str, bytes)) or not isinstance(listed, Iterable):
-        raise TypeError(f"{name} is a {type(rows).__name__}; expected rows of numbers: [[-1, 1], [1, -1]]")
+    if isinstance(listed, (str, bytes)) or not isinstance(listed, Iterable) or hasattr(rows, "tocoo"):
+        hint = "; a sparse matrix is read by from_sparse" if hasattr(rows, "tocoo") else ""
+        raise TypeError(f"{name} is a {type(rows).__name__}; expected rows of numbers: [[-1, 1], [1, -1]]{hint}")
     lines = []
     for i, line in enumerate(listed):
         if isinstance(line, (str, bytes)) or not isinstance(line, Iterable):
@@ -71,10 +83,25 @@ def rational_rows(rows: Any, name: str) -> list[list[Fraction]]:
                 f"{name}: row {i + 1} has {len(line)} entries; expected {len(lines)}, as many as there are "
                 "rows: a connectivity matrix is square"
             )
-    return [
-        [rational(entry, f"{name}: entry ({i + 1}, {j + 1})") for j, entry in enumerate(line)]
-        for i, line in enumerate(lines)
-    ]
+    return lines
+
+
+def file_text(path: str | Path, what: str, expected: str = "a text file") -> tuple[str, str]:
+    """The text of a file of at most FILE_LIMIT bytes, and its name; FileNotFoundError, TypeError or ValueError else."""
+    place = a_path(what, path)
+    if not place.exists():
+        raise FileNotFoundError(f"{what} {str(place)!r} does not exist; expected {expected}: check the path")
+    if not place.is_file():
+        raise ValueError(f"{what} {str(place)!r} is a folder or device; expected {expected}")
+    size = place.stat().st_size
+    if size > FILE_LIMIT:
+        raise ValueError(
+            f"{what} {str(place)!r} has {size} bytes; expected at most {FILE_LIMIT}: larger graphs are made from lists"
+        )
+    try:
+        return place.read_text(encoding="utf-8-sig"), place.name
+    except UnicodeDecodeError:
+        raise ValueError(f"{what} {str(place)!r} is not UTF-8; expected {expected} in that encoding") from None
 
 
 def parse_rows(text: str, name: str) -> list[list[str]]:

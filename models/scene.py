@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from .axis import Axis
-from .scene_checks import Frozen
+from .scene_checks import Frozen, suggestion, table, text
 from .scene_complete import complete
 from .scene_model import bare, derived, model_parameters
 from .scene_nodes import Group, by_kind
@@ -160,7 +160,7 @@ class Scene:
 
     def takes(self, name: str) -> bool:
         """True for the name of a parameter, "a", and for that of a parameter of one node, "a_2"."""
-        return known_name(self.model(), name) is not None
+        return known_name(self.model(), text("name", name)) is not None
 
     def replace(self, **changes: Any) -> Scene:
         """Return a scene with some keywords changed, checked anew: replace(rtol=1e-6, sigma=0.2).
@@ -172,6 +172,14 @@ class Scene:
         given = {field.name: getattr(self, field.name) for field in fields(self)}
         given.update(_defaulted(self))
         taken = [name for name in tuple(changes) if name not in given and self.takes(name)]
+        strange = next((name for name in changes if name not in given and name not in taken), None)
+        if strange is not None:
+            names = (*self.parameters, *given)
+            raise TypeError(
+                f"unknown parameter or keyword {strange!r}; known: {', '.join(names)}{suggestion(strange, names)}"
+            )
+        if changes.get("parameters") is not None:
+            table("parameters", changes["parameters"])
         single = {name: changes.pop(name) for name in taken}
         given.update(changes)
         if self.varied and "parameters" not in changes and getattr(given["topology"], "n", None) != self.n:

@@ -12,7 +12,7 @@ from typing import Generic, TypeVar
 
 from .expressions import constant
 
-__all__ = ["Frozen", "choice", "integer", "known_keys", "number", "shown", "suggestion", "table", "text"]
+__all__ = ["Frozen", "choice", "integer", "known_keys", "number", "shown", "suggestion", "table", "text", "typed"]
 
 T = TypeVar("T")
 
@@ -80,14 +80,14 @@ def known_keys(what: str, given: Mapping[object, object], known: Iterable[str]) 
 def table(what: str, value: object) -> Mapping[object, object]:
     """Return the value where it is a mapping, else raise TypeError."""
     if not isinstance(value, Mapping):
-        raise TypeError(f"{what}: found {_typed(value)}; expected a table of names and values")
+        raise TypeError(f"{what}: found {typed(value)}; expected a table of names and values")
     return value
 
 
 def text(what: str, value: object, limit: int = 200) -> str:
     """Return the value where it is text of at most `limit` characters."""
     if not isinstance(value, str):
-        raise TypeError(f"{what}: found {_typed(value)}; expected text in quotation marks")
+        raise TypeError(f"{what}: found {typed(value)}; expected text in quotation marks")
     if len(value) > limit:
         raise ValueError(f"{what}: found {len(value)} characters; expected at most {limit}; shorten it")
     return str(value)
@@ -109,7 +109,7 @@ def number(what: str, value: object, low: float | None = None, high: float | Non
         except ValueError as error:
             raise ValueError(f"{what}: {error}") from None
     elif isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise TypeError(f'{what}: found {_typed(value)}; expected a number, e.g. 0.1 or "2*pi/1.15"')
+        raise TypeError(f'{what}: found {typed(value)}; expected a number, e.g. 0.1 or "2*pi/1.15"')
     else:
         try:
             result = float(value)
@@ -125,7 +125,7 @@ def number(what: str, value: object, low: float | None = None, high: float | Non
 def integer(what: str, value: object, low: int, high: int) -> int:
     """Return an int within [low, high]; a float is refused even where it is whole."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-        raise TypeError(f"{what}: found {_typed(value)}; expected a whole number, e.g. {low}")
+        raise TypeError(f"{what}: found {typed(value)}; expected a whole number, e.g. {low}")
     result = operator.index(value)
     if not low <= result <= high:
         raise ValueError(f"{what}: found {shown(result)}; expected a whole number from {low} to {high}; correct it")
@@ -139,7 +139,8 @@ def span(low: float | None, high: float | None) -> str:
     return f"a number of at most {high:g}" if low is None else f"a number from {low:g} to {high:g}"
 
 
-def _typed(value: object) -> str:
+def typed(value: object) -> str:
+    """Return a short text of any value with its type, for an error message."""
     name = type(value).__name__
     words = shown(value)
     return words if name in words or value is None else f"{words} ({name})"

@@ -16,6 +16,7 @@ __all__ = ["check_sweep", "read_axes"]
 
 CONTINUATIONS = ("none", "up", "down")
 CELL_LIMIT = 10**9
+"""Most cells of a sweep; results of as many go to a file, block by block (`synchain.runtime.stream`)."""
 SAMPLE_LIMIT = 10**9
 """Most numbers in the trajectories of all cells, 8 GB."""
 
@@ -38,8 +39,7 @@ def check_sweep(made: dict[str, Any]) -> None:
             raise ValueError(f"zipped axes have different lengths ({lengths}); expected one length for all")
     if cells > CELL_LIMIT:
         raise ValueError(
-            f"sweep: found {cells} cells; expected at most {CELL_LIMIT}, the results must fit into memory; "
-            "use fewer values or split the sweep"
+            f"sweep: found {cells} cells; expected at most {CELL_LIMIT}; use fewer values or split the sweep"
         )
     _samples(made, cells)
     _continuation(made)

@@ -21,6 +21,7 @@ from .balls import precision
 from .continuant import banded, cyclic
 from .descending import Descending
 from .eigenvalue import Eigenvalue, ordered
+from .expect import instance
 from .jordan import blocks, semisimple
 from .proof import ProofError, check, minimal_polynomial
 from .radicals import written
@@ -52,6 +53,9 @@ class Spectrum:
     verified: bool = False
 
     def __post_init__(self) -> None:
+        if not isinstance(self.eigenvalues, Descending):
+            for e in instance("spectrum", self.eigenvalues, (tuple, list), "Eigenvalues; take the spectrum of a graph"):
+                instance("spectrum", e, Eigenvalue, "an Eigenvalue; take the spectrum of a graph")
         if not self.eigenvalues:
             raise ValueError("a spectrum without eigenvalues; expected at least one")
 

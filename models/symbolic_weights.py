@@ -16,9 +16,8 @@ from typing import Any
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
 
-from .graph_readers import file_text
 from .proof import ProofError
-from .rationals import parse_rows, rational
+from .rationals import file_text, parse_rows, rational, square
 from .topology import Topology, from_matrix
 
 __all__ = ["SymbolicSpectrum", "SymbolicTopology", "from_symbols", "read_symbols", "weight"]
@@ -129,12 +128,10 @@ def from_symbols(rows: Iterable[Iterable[Any]] | sp.MatrixBase, name: str = "mat
     Every row must sum to zero.  Raises ValueError on another shape, a row sum that is not 0, more than LARGEST nodes and
     an entry that is no rational function.
     """
-    table = [list(row) for row in (rows.tolist() if isinstance(rows, sp.MatrixBase) else rows)]
+    table = square(rows, name)
     n = len(table)
-    if not 0 < n <= LARGEST or any(len(row) != n for row in table):
-        raise ValueError(
-            f"{name}: found {n} rows of {sorted({*map(len, table)})}; expected a square of up to {LARGEST}"
-        )
+    if n > LARGEST:
+        raise ValueError(f"{name}: found {n} rows; expected a square of up to {LARGEST}")
     entries = [[weight(x, f"{name}: entry ({i + 1}, {j + 1})") for j, x in enumerate(r)] for i, r in enumerate(table)]
     for i, row in enumerate(entries):
         total = sp.cancel(sp.Add(*row))

@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from . import plugins
 from .family_options import Options, settled
-from .rationals import FILE_LIMIT, parse_rows, rational_rows
+from .link_checks import check_links
+from .rationals import file_text, parse_rows, rational_rows
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -62,25 +63,7 @@ class Topology:
             return made.links
 
     def __post_init__(self) -> None:
-        if self.n < 1:
-            raise ValueError(f"topology {self.name}: n = {self.n}; expected at least one node")
-        last = (-1, -1)
-        for target, source, weight in self.links:
-            if not (0 <= target < self.n and 0 <= source < self.n) or target == source:
-                raise ValueError(
-                    f"topology {self.name}: link {target} <- {source}; expected two different nodes of 0 … {self.n - 1}"
-                )
-            if (target, source) <= last:
-                raise ValueError(
-                    f"topology {self.name}: link {target} <- {source} is repeated or out of order; "
-                    "expected each pair once, sorted: add the weights up and sort"
-                )
-            if not isinstance(weight, Fraction) or not weight:
-                raise ValueError(
-                    f"topology {self.name}: link {target} <- {source} has weight {weight!r}; "
-                    "expected a Fraction other than 0: leave the link out or give it a weight"
-                )
-            last = (target, source)
+        check_links(self.name, self.n, self.links)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Topology):
@@ -279,21 +262,5 @@ def read_matrix(path: str | Path) -> Topology:
     file is evaluated.  Raises FileNotFoundError, and ValueError on a folder, on more than FILE_LIMIT bytes,
     on text that is no number and on whatever `from_matrix` refuses.
     """
-    place = Path(path)
-    if not place.exists():
-        raise FileNotFoundError(
-            f"matrix file {str(place)!r} does not exist; expected a text file of rows: check the path"
-        )
-    if not place.is_file():
-        raise ValueError(f"matrix file {str(place)!r} is a folder or device; expected a text file of rows")
-    size = place.stat().st_size
-    if size > FILE_LIMIT:
-        raise ValueError(
-            f"matrix file {str(place)!r} has {size} bytes; expected at most {FILE_LIMIT}: exact spectra of "
-            "dense matrices end near 1000 nodes"
-        )
-    try:
-        text = place.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise ValueError(f"matrix file {str(place)!r} is not UTF-8; expected rows of rationals") from None
-    return from_matrix(parse_rows(text, place.name), place.name)
+    text, name = file_text(path, "matrix file", "a text file of rows")
+    return from_matrix(parse_rows(text, name), name)

@@ -81,12 +81,18 @@ class Latex:
         return rf"\text{{{text}}}"
 
     def letter(self, name: str, index: str = "", primes: int = 0) -> str:
-        base, _, own = name.partition("_")
-        head = VARIANTS[base][0] if base in VARIANTS else sp.latex(sp.Symbol(base))
-        if len(head) > 1 and head.isalpha():
-            head = rf"\mathrm{{{head}}}"
-        below = ",".join(filter(None, (own.replace("_", ","), index)))
+        base, *own = filter(None, re.sub(r"(?<=[A-Za-z])(?=\d+(_|$))", "_", name).split("_"))
+        below = ",".join([*map(self._word, own), *filter(None, [index])])
+        head = self._word(base)
         return head + (f"_{below}" if len(below) == 1 else f"_{{{below}}}" if below else "") + "'" * primes
+
+    def _word(self, name: str) -> str:
+        """A Greek letter, a letter or a number as it is, and a word upright."""
+        if name in VARIANTS:
+            return VARIANTS[name][0]
+        if name in greek_unicode:
+            return str(sp.latex(sp.Symbol(name)))
+        return rf"\mathrm{{{name}}}" if len(name) > 1 and not name.isdigit() else name
 
     def product(self, factors: Sequence[str]) -> str:
         text = ""

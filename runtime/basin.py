@@ -7,23 +7,28 @@ Sources: Menck, Heitzig, Marwan & Kurths, Nature Phys. 9, 89 (2013); Clopper & P
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from synchain.models.expect import a_scene, whole
 from synchain.models.scene import Scene
+from synchain.models.scene_checks import number, table
 
 from .plan import Plan, plan
 from .probe import integrate
+from .rows import row
 from .status import Status
 from .sweep import kernel
 
 __all__ = ["Basin", "basin"]
 
 Range = tuple[float, float]
+
+SAMPLE_LIMIT = 10_000_000
+"""Most starts of one call."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,7 +114,7 @@ def basin(
     Raises ValueError for an unknown component, an empty range, fewer than one sample or two oscillators, and a tolerance,
     confidence or time that makes no sense; TypeError for a number of samples that is not whole.
     """
-    _check(scene, samples, tolerance, confidence)
+    _check(scene, samples, tolerance, confidence, seed)
     scene = scene.replace(
         axes=(), zipped=False, continuation="none", record=("sync_error",), transient=transient, window=window,
         **parameters,
@@ -125,16 +130,14 @@ def basin(
     return Basin(scene, tolerance, confidence, start, error, status)
 
 
-def _check(scene: Scene, samples: Any, tolerance: float, confidence: float) -> None:
-    if scene.n < 2:
+def _check(scene: Scene, samples: Any, tolerance: Any, confidence: Any, seed: Any) -> None:
+    if a_scene(scene).n < 2:
         raise ValueError(f"basin: found {scene.n} oscillator; expected at least two, which can synchronise")
-    if isinstance(samples, bool) or not isinstance(samples, int | np.integer):
-        raise TypeError(f"basin: samples = {samples!r}; expected a whole number")
-    if samples < 1:
-        raise ValueError(f"basin: samples = {samples}; expected at least 1")
-    if not (tolerance > 0 and math.isfinite(tolerance)):
+    whole("basin: samples", samples, 1, SAMPLE_LIMIT)
+    whole("basin: seed", seed, 0)
+    if not number("basin: tolerance", tolerance) > 0:
         raise ValueError(f"basin: tolerance = {tolerance}; expected a positive number")
-    if not 0 < confidence < 1:
+    if not 0 < number("basin: confidence", confidence) < 1:
         raise ValueError(f"basin: confidence = {confidence}; expected a number between 0 and 1, e.g. 0.95")
 
 
@@ -142,7 +145,7 @@ def _box(scene: Scene, ranges: Mapping[str, Range] | None) -> dict[str, Range]:
     """The ranges in the order of the components, checked."""
     if ranges is None:
         return dict.fromkeys(scene.components, (-1.0, 1.0))
-    unknown = [name for name in ranges if name not in scene.components]
+    unknown = [name for name in table("basin: ranges", ranges) if name not in scene.components]
     if unknown:
         raise ValueError(f"basin: unknown component {unknown[0]!r}; known: {', '.join(scene.components)}")
     if not ranges:
@@ -151,8 +154,9 @@ def _box(scene: Scene, ranges: Mapping[str, Range] | None) -> dict[str, Range]:
     for name in scene.components:
         if name not in ranges:
             continue
-        low, high = map(float, ranges[name])
-        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        ends = row(f"basin: the range of {name}", ranges[name], 2)
+        low, high = float(ends[0]), float(ends[-1])
+        if not (len(ends) == 2 and low < high):
             raise ValueError(
                 f"basin: the range of {name} is {low:g} … {high:g}; expected two numbers, the lower one first "
                 "(for a fixed value leave the component out and set it in the scene's initial state)"

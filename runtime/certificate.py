@@ -33,6 +33,9 @@ BURST, SYNCHRONOUS = 1e-6, 1e-3
 """Synchronisation error that a certified cell must not reach again; mean error below which a cell counts as synchronous,
 as in `synchain.runtime.threshold`."""
 
+MOST = 10**7
+"""Cells of the largest certified sweep: exponents and verdicts of all of them are held in memory."""
+
 VERDICTS = (
     "did not finish",
     "synchronous, certified by the exponent",
@@ -110,6 +113,8 @@ def check_certifiable(scene: Scene) -> None:
     """Raise ValueError where the synchronous state of a scene has no transversal exponents."""
     if not scene.equations.links:
         raise ValueError("a certificate needs coupled oscillators; found a scene without links")
+    if scene.cells > MOST:
+        raise ValueError(f"a certificate needs memory for every cell; found {scene.cells}, expected at most {MOST}")
     mode(scene.equations)
     if scene.forced and any(v == 0.0 for axis in scene.axes if axis.name == "omega" for v in axis.values):
         raise ValueError("a certificate needs a drive with a period; found omega = 0 in the sweep")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import sys
@@ -67,7 +68,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     name = f"synchain {words[0]}" if words and words[0] in names() else "synchain"
     _readable(sys.stdout)
     try:
-        with _short_warnings():
+        with _short_warnings(), _news(name):
             code = _dispatch(words)
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -183,6 +184,21 @@ def _short_warnings() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.showwarning = show
         yield
+
+
+@contextmanager
+def _news(name: str) -> Iterator[None]:
+    """What the package tells of its own accord, such as that it compiles, as lines on stderr."""
+    handler, logger = logging.StreamHandler(sys.stderr), logging.getLogger("synchain")
+    handler.setFormatter(logging.Formatter(f"{name}: %(message)s"))
+    before = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
+        logger.removeHandler(handler)
 
 
 def _readable(stream: Any) -> None:

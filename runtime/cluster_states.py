@@ -20,8 +20,9 @@ from synchain.models.tangent import Variation, clustered
 
 from .carrier import Carrier
 from .contact_modes import with_modes
-from .exponent import Batches
+from .exponent import Batches, one_cell
 from .orbits import unit_of_time
+from .rows import averaging
 
 __all__ = ["ClusterExponents", "cluster_exponents"]
 
@@ -103,10 +104,10 @@ def cluster_exponents(
     difference of states, more than eight clusters, and time dependence without a known period; FloatingPointError where
     an integration fails.
     """
-    scene = scene.replace(axes=(), zipped=False, continuation="none", record=(), rtol=rtol, atol=None, **parameters)
+    precision, periods, transient, seed = averaging(precision, periods, transient, seed)
+    scene = one_cell(scene, rtol, parameters)
     found = _of_graph(scene, state)
-    variation = clustered(scene.equations, found)
-    unit = unit_of_time(scene)
+    variation, unit = clustered(scene.equations, found), unit_of_time(scene)
     carrier = _carrier(scene, found, variation, seed)
     for _ in range(round(transient)):
         carrier.advance(unit)
@@ -124,7 +125,7 @@ def cluster_exponents(
 
 def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
     """The partition with its blocks, proved to belong to the scene's graph."""
-    classes = state.classes if isinstance(state, Clusters) else tuple(state)
+    classes = state.classes if isinstance(state, Clusters) else state
     found = clusters(scene.topology, classes)
     if isinstance(state, Clusters) and (found.quotient.links, found.blocks) != (state.quotient.links, state.blocks):
         graph = scene.topology

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from synchain.models.expect import instance
+
 from .result import Buffers
 from .threads import worker_count
 from .work import Start, Workshop, forget, run_block
@@ -73,6 +75,8 @@ class Crew:
 
 def crew_size(executor: Executor | None, workers: int | None) -> int:
     """How many blocks can run at a time: as given, else as far as the executor tells, else all cores."""
+    if executor is not None:
+        instance("executor", executor, Executor, "a concurrent.futures.Executor, e.g. ProcessPoolExecutor(2)")
     if executor is None or workers is not None:
         return worker_count(workers)
     client = getattr(executor, "_client", None)  # of dask.distributed

@@ -13,6 +13,9 @@ from scipy.integrate import cumulative_simpson
 from synchain.models.energy import Energy, energy
 from synchain.models.equations import TIME
 from synchain.models.scene import Scene
+from synchain.models.scene_checks import known_keys, number, table
+
+from .rows import numbers
 
 __all__ = ["EnergyFunction", "energy_function"]
 
@@ -46,8 +49,8 @@ class EnergyFunction:
         The integral is Simpson's rule on the samples, so its own error falls with the third power of their distance, at
         every other sample with the fourth.  Raises ValueError for fewer than three samples.
         """
-        if len(t) < 3:
-            raise ValueError(f"imbalance: found {len(t)} samples; expected at least three; raise samples")
+        if np.ndim(t) != 1 or len(t) < 3:
+            raise ValueError(f"imbalance: found {np.size(t)} samples; expected at least three; raise samples")
         found = self(states, t, parameters)
         work = cumulative_simpson(self.power(states, t, parameters), x=t, initial=0.0)
         return np.asarray(found - found[0] - work)
@@ -55,19 +58,25 @@ class EnergyFunction:
     def _sum(
         self, node: Formula, link: Formula, states: Array, t: Array | float, parameters: Mapping[str, float] | None
     ) -> Array:
-        n, values = self.scene.n, {**self.scene.parameters, **(parameters or {})}
-        numbers = [values[name] for name in self.exact.equations.parameters]
-        parts = np.asarray(states, dtype=float)
+        n, values = self.scene.n, dict(self.scene.parameters)
+        if parameters is not None:
+            known_keys("parameters", table("parameters", parameters), values)
+            values |= {name: number(name, value) for name, value in parameters.items()}
+        constants = [values[name] for name in self.exact.equations.parameters]
+        parts = numbers("states", states)
+        size = len(self.scene.y0)
+        if parts.ndim < 1 or parts.shape[-1] != size:
+            raise ValueError(f"states: found an array of shape {parts.shape}; expected rows of {size} numbers")
         parts = parts.reshape(*parts.shape[:-1], -1, n)
         components = [parts[..., c, :] for c in range(parts.shape[-2])]
-        time = np.asarray(t, dtype=float)[..., None]
-        total = np.broadcast_to(node(time, *components, *numbers), components[0].shape).sum(axis=-1)
+        time = numbers("t", t)[..., None]
+        total = np.broadcast_to(node(time, *components, *constants), components[0].shape).sum(axis=-1)
         pairs = self.exact.pairs
         if pairs:
             here, there = (np.array([pair[end] for pair in pairs]) for end in (0, 1))
             ends = [part[..., end] for end in (here, there) for part in components]
             weights = np.array([float(pair[2]) for pair in pairs])
-            total = total + np.broadcast_to(link(weights, *ends, *numbers), ends[0].shape).sum(axis=-1)
+            total = total + np.broadcast_to(link(weights, *ends, *constants), ends[0].shape).sum(axis=-1)
         return np.asarray(total)
 
 
@@ -75,11 +84,11 @@ def energy_function(scene: Scene) -> EnergyFunction:
     """Return the compiled energy of a scene's network; ValueError as `synchain.models.energy.energy`."""
     exact = energy(scene)
     equations = exact.equations
-    numbers = sp.symbols(equations.parameters, real=True)
-    states = (TIME, *equations.node.state, *numbers)
-    ends: tuple[sp.Symbol, ...] = numbers
+    symbols = sp.symbols(equations.parameters, real=True)
+    states = (TIME, *equations.node.state, *symbols)
+    ends: tuple[sp.Symbol, ...] = symbols
     if equations.edge is not None:
-        ends = (equations.edge.weight, *equations.edge.here, *equations.edge.there, *numbers)
+        ends = (equations.edge.weight, *equations.edge.here, *equations.edge.there, *symbols)
     made = [
         sp.lambdify(arguments, e, modules="numpy", cse=True)
         for arguments, e in (

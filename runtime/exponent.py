@@ -18,14 +18,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from tqdm import tqdm
 
+from synchain.models.expect import a_scene, whole
 from synchain.models.scene import Scene
 from synchain.models.topology import topology
 
 from .attractor import Attractor, find_attractor
 from .intervals import Interval
 from .orbits import Orbits
+from .rows import averaging
+from .rows import row as row_of
+from .threads import worker_count
 
-__all__ = ["Exponents", "exponents", "group", "single"]
+__all__ = ["Batches", "Exponents", "exponents", "group", "one_cell", "single"]
 
 BATCHES = 64
 
@@ -107,22 +111,15 @@ def exponents(
     Raises ValueError for a network without coupling or a coupling without synchronous state, and for time dependence
     without a known period; FloatingPointError where an integration fails.
     """
-    scene = single(scene, rtol, parameters)
-    orbits = Orbits.make(scene, _strengths(alpha), _starts(scene, starts, seed), workers)
+    scene, strengths = single(scene, rtol, parameters), row_of("alpha", alpha, complex_too=True)
+    precision, periods, transient, seed = averaging(precision, periods, transient, seed)
+    orbits = Orbits.make(scene, strengths, _starts(scene, starts, seed), worker_count(workers))
     orbits.settle(transient)
     attractors = tuple(find_attractor(orbits, row, transient) for row in range(starts))
     by_start, error, length = _by_start(orbits, attractors, precision, periods, show_progress)
     chosen = max(group(attractors, by_start), key=len)
     mean, spread = by_start[chosen].mean(axis=0), np.sqrt((error[chosen] ** 2).sum(axis=0)) / len(chosen)
     return Exponents(orbits.strengths, mean, spread, length, starts, by_start, attractors)
-
-
-def _strengths(alpha: Sequence[float] | Sequence[complex] | np.ndarray) -> np.ndarray:
-    found = np.atleast_1d(np.asarray(alpha))
-    found = found if np.iscomplexobj(found) else found.astype(float)
-    if not np.all(np.isfinite(found)):
-        raise ValueError("alpha: found a number that is not finite; expected finite strengths")
-    return found
 
 
 def _by_start(
@@ -145,15 +142,20 @@ def _by_start(
 def single(scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
     """The scene with fixed parameters and without records; a lone oscillator gets a partner, so that it has a
     coupling."""
-    graph = scene.topology if scene.topology.links else topology("chain", 2)
-    scene = scene.replace(topology=graph, axes=(), zipped=False, continuation="none", record=())
-    return scene.replace(rtol=rtol, atol=None, **parameters)
+    graph = scene.topology if a_scene(scene).topology.links else topology("chain", 2)
+    return one_cell(scene.replace(topology=graph, axes=(), zipped=False, continuation="none"), rtol, parameters)
+
+
+def one_cell(scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
+    """A single cell of the scene without records, with fixed parameters; TypeError where it is no Scene."""
+    return a_scene(scene).replace(
+        axes=(), zipped=False, continuation="none", record=(), rtol=rtol, atol=None, **parameters
+    )
 
 
 def _starts(scene: Scene, starts: int, seed: int) -> np.ndarray:
     """Initial states (starts, components): the first oscillator's, and copies moved in the first component."""
-    if starts < 1:
-        raise ValueError(f"starts = {starts}; expected at least 1")
+    starts = whole("starts", starts, 1)
     state = np.tile([values[0] for values in scene.initial.values()], (starts, 1))
     state[1:, 0] += np.random.default_rng(seed).uniform(-0.4, 0.4, starts - 1)
     return state

@@ -8,8 +8,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from glob import escape
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-__all__ = ["drop_leftovers", "output_folder", "whole_file", "write_text"]
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["drop_leftovers", "netcdf_data", "output_folder", "whole_file", "write_text"]
 
 
 @contextmanager
@@ -37,6 +41,28 @@ def drop_leftovers(path: str | os.PathLike[str]) -> None:
         leftover.unlink(missing_ok=True)
 
 
+@contextmanager
+def netcdf_data(path: Path) -> Iterator[xr.Dataset]:
+    """The open data of a netCDF file; OSError in one line where there is none, or where it is damaged."""
+    import xarray as xr
+
+    if not path.exists():
+        raise FileNotFoundError(f"{path} does not exist; expected a netCDF result: check the path")
+    if path.is_dir():
+        raise IsADirectoryError(f"{path} is a folder; expected a netCDF result: name the file in it")
+    try:
+        with path.open("rb") as file:
+            start = file.read(4)
+        if start[:3] != b"CDF":
+            kind = "an HDF5 or netCDF4 file" if start == b"\x89HDF" else "no netCDF file"
+            raise OSError(f"{path} is {kind}; expected a netCDF 3 result, as Result.save and stream write it")
+        with xr.open_dataset(path, engine="scipy") as data:
+            yield data
+    except (ValueError, TypeError, KeyError, IndexError) as problem:
+        words = " ".join(str(problem).split())
+        raise OSError(f"cannot read {path} as a netCDF result, the file is damaged: {words}") from problem
+
+
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write a text file in UTF-8, whole or not at all."""
     with whole_file(path) as temporary:
@@ -49,9 +75,11 @@ def output_folder(path: str | os.PathLike[str]) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
-        raise OSError(f"cannot make the folder {folder}: {problem.strerror}; choose another --out") from problem
+        raise OSError(
+            f"cannot make the folder {folder}: {problem.strerror}; choose another folder (--out)"
+        ) from problem
     if not os.access(folder, os.W_OK):
-        raise OSError(f"the folder {folder} cannot be written to; choose another --out")
+        raise OSError(f"the folder {folder} cannot be written to; choose another folder (--out)")
     return folder
 
 

@@ -9,9 +9,10 @@ import sympy as sp
 from synchain.codegen import emit as emitting
 from synchain.codegen import sparse
 from synchain.codegen.emit import AUTO, KernelSource, emit
-from synchain.codegen.lanes import native_width
+from synchain.codegen.lane_types import WIDTHS, native_width
 from synchain.codegen.load import Kernel, load
 from synchain.models.equations import Equations
+from synchain.models.expect import a_scene, flag, whole
 from synchain.models.scene import Scene
 
 from .skip import Skip, decide
@@ -31,6 +32,8 @@ def kernel(scene: Scene, width: int | None = None, skip: bool | Skip = False) ->
 def kernel_source(scene: Scene, width: int | None = None, skip: bool | Skip = False) -> KernelSource:
     """Return the text of a scene's kernel without compiling it."""
     chosen = chosen_skip(scene, skip)
+    if width is not None and whole("width", width, 1) not in WIDTHS:
+        raise ValueError(f"width = {width}; expected one of {', '.join(map(str, WIDTHS))}")
     section = None
     if "section" in scene.record:
         section = sp.Symbol(chosen.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
@@ -59,7 +62,8 @@ def best_integrator(equations: Equations, rtol: float) -> str:
 
 def chosen_skip(scene: Scene, skip: bool | Skip) -> Skip:
     """What is left out of a scene: as decided, or as given; ValueError where that is of another scene."""
-    chosen = skip if isinstance(skip, Skip) else decide(scene, skip)
+    a_scene(scene)
+    chosen = skip if isinstance(skip, Skip) else decide(scene, flag("skip", skip))
     if chosen.scene != scene:
         raise ValueError("skip: found the reductions of another scene; make them with decide(scene)")
     return chosen

@@ -18,13 +18,16 @@ from dataclasses import dataclass
 import numpy as np
 from tqdm import tqdm
 
+from synchain.models.expect import whole
 from synchain.models.scene import Scene
-from synchain.models.tangent import PHASE, Variation, phased, whole, with_volume
+from synchain.models.tangent import PHASE, Variation, phased, with_volume
+from synchain.models.tangent import whole as whole_network
 
 from .carrier import Carrier
 from .contact_modes import with_modes
-from .exponent import Batches
+from .exponent import Batches, one_cell
 from .orbits import unit_of_time
+from .rows import averaging
 
 __all__ = ["Lyapunov", "lyapunov_spectrum"]
 
@@ -99,7 +102,8 @@ def lyapunov_spectrum(
     Raises ValueError for more than eight oscillators, a count that the network does not have, and for time dependence
     without a known period; FloatingPointError where an integration fails.
     """
-    scene = scene.replace(axes=(), zipped=False, continuation="none", record=(), rtol=rtol, atol=None, **parameters)
+    precision, periods, transient, seed = averaging(precision, periods, transient, seed)
+    scene = one_cell(scene, rtol, parameters)
     walk = Walk.make(scene, _counted(scene, count), seed)
     for _ in range(round(transient)):
         walk.advance()
@@ -135,7 +139,7 @@ def _counted(scene: Scene, count: int | None) -> int:
     dimension = scene.n * (len(scene.components) if scene.equations.node.contact is None else 2)
     if count is None:
         return dimension
-    if not 1 <= count <= dimension:
+    if not 1 <= whole("count", count, -dimension) <= dimension:
         raise ValueError(f"count = {count}; expected 1 … {dimension}, the components of the network's state")
     return count
 
@@ -156,7 +160,7 @@ class Walk:
     def make(cls, scene: Scene, count: int, seed: int) -> Walk:
         """At the scene's start, with random directions; ValueError where time enters without a known period."""
         unit = unit_of_time(scene)
-        own = whole(scene.equations)
+        own = whole_network(scene.equations)
         sticks = own.events is not None
         variation = own if sticks else Variation(with_volume(own.orbit), own.size, own.matrix)
         variation = phased(variation) if scene.forced else variation

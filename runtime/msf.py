@@ -16,6 +16,7 @@ from synchain.models.scene import Scene
 
 from .exponent import Exponents, exponents
 from .intervals import Interval
+from .rows import row
 from .synchronisability import Window, windows
 
 __all__ = ["MSF", "Plane", "classify", "msf", "plane"]
@@ -134,7 +135,7 @@ def msf(scene: Scene, alpha: Sequence[float] | np.ndarray, **options: Any) -> MS
     alpha = -sigma gamma; `alpha` must increase.  Options as for `exponents`.  Raises ValueError as `exponents` does, and
     for strengths that do not increase.
     """
-    line = _increasing("alpha", alpha)
+    line = row("alpha", alpha, 2, rising=True)
     fine = np.union1d(line, np.linspace(line[0], line[-1], FINE))
     return MSF(scene, line, exponents(scene, fine, **options))
 
@@ -147,27 +148,12 @@ def plane(
     The function takes the same value at conjugate strengths, so only |beta| is integrated.
     Raises ValueError as `exponents` does, and for rows that do not increase.
     """
-    across, up = _increasing("alpha", alpha), _increasing("beta", beta)
+    across, up = row("alpha", alpha, 2, rising=True), row("beta", beta, 2, rising=True)
     heights, place = np.unique(np.abs(up), return_inverse=True)
     found = exponents(scene, (across[:, None] + 1j * heights).reshape(-1), **options)
     table, error = (row.reshape(len(across), -1)[:, place] for row in (found.exponent, found.stderr))
     kinds = tuple(a.kind for a in found.attractors)
     return Plane(scene, across, up, table, error, kinds, found.time)
-
-
-def _increasing(name: str, values: Any) -> np.ndarray:
-    """The values as an array (m,) of increasing numbers, m > 1; ValueError where they are not."""
-    try:
-        row = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name}: found {values!r}; expected real numbers") from None
-    if row.ndim != 1 or len(row) < 2:
-        raise ValueError(f"{name}: found an array of shape {row.shape}; expected a row of at least two numbers")
-    if not np.all(np.isfinite(row)):
-        raise ValueError(f"{name}: found {row[~np.isfinite(row)][0]}; expected finite numbers")
-    if not np.all(np.diff(row) > 0.0):
-        raise ValueError(f"{name}: found numbers that do not increase; expected them from low to high")
-    return row
 
 
 def classify(intervals: Sequence[Interval], end: float, begin: float = 0.0) -> str:

@@ -22,13 +22,15 @@ from tqdm import tqdm
 from synchain.codegen.emit import emit
 from synchain.codegen.load import Kernel, load
 from synchain.models.equations import Edge, Equations
+from synchain.models.expect import a_scene
 from synchain.models.scene import Scene
 from synchain.models.topology import topology
 
 from .plan import CANCEL, Plan, control_array, plan, tolerances
+from .rows import numbers
 from .status import Status
 from .sweep import Buffers, worker_count
-from .threshold import Criterion, offsets
+from .threshold import Criterion, checked, offsets
 
 __all__ = ["MODE_ALPHA", "MODE_BETA", "Probe", "integrate", "ring_of_three", "universal_probe"]
 
@@ -77,9 +79,9 @@ def universal_probe(
     Raises ValueError for strengths that are not finite or none at all, for a scene without coupling, and for a coupling that
     is not proportional to sigma and to the weight of a link.
     """
-    criterion = criterion or Criterion()
-    real, imaginary = (np.array(part) for part in np.broadcast_arrays(*(_strengths(x) for x in (alpha, beta))))
-    three = scene.replace(
+    criterion = checked(criterion)
+    real, imaginary = _broadcast(alpha, beta)
+    three = a_scene(scene).replace(
         topology=topology("ring", 3), initial=None, axes=(), zipped=False, continuation="none", record=("sync_error",),
         transient=criterion.transient, window=criterion.window, rtol=criterion.rtol,
     )  # fmt: skip
@@ -137,13 +139,20 @@ def _sigma(edge: Edge) -> sp.Symbol:
     return found[0]
 
 
-def _strengths(given: ArrayLike) -> np.ndarray:
-    values = np.asarray(given, dtype=float)
-    if values.size == 0:
-        raise ValueError("alpha and beta: found no values; expected at least one of each")
-    if not np.isfinite(values).all():
-        raise ValueError("alpha and beta: found a value that is not finite; expected numbers")
-    return values
+def _broadcast(alpha: ArrayLike, beta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Both parts of the strengths in one shape; ValueError where they have none, are empty or not finite."""
+    parts = numbers("alpha", alpha), numbers("beta", beta)
+    for part in parts:
+        if part.size == 0:
+            raise ValueError("alpha and beta: found no values; expected at least one of each")
+        if not np.isfinite(part).all():
+            raise ValueError("alpha and beta: found a value that is not finite; expected numbers")
+    try:
+        real, imaginary = np.broadcast_arrays(*parts)
+    except ValueError:
+        shapes = " and ".join(str(part.shape) for part in parts)
+        raise ValueError(f"alpha and beta: found the shapes {shapes}; expected shapes that fit together") from None
+    return np.array(real), np.array(imaginary)
 
 
 def _cells(scene: Scene, names: tuple[str, ...], alpha: np.ndarray, beta: np.ndarray, criterion: Criterion) -> Plan:

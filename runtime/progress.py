@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from synchain.models.expect import a_callable, flag
+
 from .status import CODES, Status
 
 __all__ = ["Hook", "Progress", "Reporter", "duration"]
@@ -81,6 +83,12 @@ class Reporter:
     began: float = field(default_factory=time.perf_counter)
     _said: float = 0.0
     _bar: Any = None
+
+    def __post_init__(self) -> None:
+        if self.hook is not None:
+            a_callable("progress", self.hook)
+        if self.show is not None:
+            flag("show_progress", self.show)
 
     def start(self, counts: np.ndarray) -> None:
         """The kernel is there and the first cell runs; `counts` (CODES,) are the cells kept from before."""

@@ -17,6 +17,9 @@ import numpy as np
 
 __all__ = ["Interpolation", "exact", "interpolation"]
 
+SINGLE = 2**18
+"""Multiplications of one matrix product; OpenBLAS takes more threads than one, whatever `workers` says, above this."""
+
 Panel = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 """Rows of the strengths on the panel, nodes, their barycentric weights, strengths to compare at."""
 
@@ -127,5 +130,7 @@ def _barycentric(x: np.ndarray, nodes: np.ndarray, signs: np.ndarray) -> np.ndar
 
 def _combine(weights: np.ndarray, found: np.ndarray) -> np.ndarray:
     cells, count, p, _ = found.shape
-    made = weights @ found.transpose(1, 0, 2, 3).reshape(count, -1)
+    table = found.transpose(1, 0, 2, 3).reshape(count, -1)
+    rows = max(1, SINGLE // table.size)
+    made = np.concatenate([weights[i : i + rows] @ table for i in range(0, max(len(weights), 1), rows)])
     return np.asarray(made.reshape(len(weights), cells, p, p).transpose(1, 0, 2, 3))

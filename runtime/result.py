@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from synchain.models.expect import a_path, a_scene, instance
 from synchain.models.scene import Scene
 
 from .certificate import Certificate
-from .files import whole_file
+from .files import netcdf_data, whole_file
 from .labels import MEANINGS, coordinates, dimensions, scene_of, variables
 from .status import Status
 
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
     from synchain.models.equations import Equations
 
 __all__ = ["Buffers", "Result", "gather", "open_result"]
+
+
+SUMS, COUNTS = 4, 6
+"""Columns of the numbers and of the counts that a kernel writes for each cell."""
 
 
 @dataclass(slots=True)
@@ -38,8 +43,8 @@ class Buffers:
         """Buffers in which nothing has run: numbers NaN, counts zero."""
         return cls(
             end=np.full((cells, dimension), np.nan),
-            sums=np.full((cells, 4), np.nan),
-            counts=np.zeros((cells, 6), np.int64),
+            sums=np.full((cells, SUMS), np.nan),
+            counts=np.zeros((cells, COUNTS), np.int64),
             points=np.full((cells, room, dimension + 1), np.nan),
             samples=np.full((cells, samples, dimension), np.nan),
         )
@@ -58,6 +63,10 @@ class Result:
 
     data: xr.Dataset
     scene: Scene
+
+    def __post_init__(self) -> None:
+        instance("data", self.data, xr.Dataset, "an xarray.Dataset; open_result reads one from a file")
+        a_scene(self.scene)
 
     def __getattr__(self, name: str) -> xr.DataArray:
         if name.startswith("_") or name not in self.data:
@@ -129,17 +138,15 @@ def open_result(path: str | os.PathLike[str]) -> Result:
     """
     from .store import is_store
 
+    path = a_path("result", path)
     if is_store(path):
         from .unfinished import open_unfinished
 
         return open_unfinished(path)
-    try:
-        with xr.open_dataset(path, engine="scipy") as file:
-            data = file.load()
-    except (OSError, ValueError, TypeError, KeyError) as problem:
-        raise OSError(f"cannot read {os.fspath(path)} as a netCDF result: {problem}") from problem
+    with netcdf_data(path) as file:
+        data = file.load()
     if "scene" not in data.attrs:
-        raise ValueError(f"{os.fspath(path)} is no synchain result: it has no attribute 'scene'")
+        raise ValueError(f"{path} is no synchain result: it has no attribute 'scene'")
     return Result(data, scene_of(data.attrs))
 
 

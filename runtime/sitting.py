@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -9,6 +10,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from synchain.codegen.integrators import integrator
+from synchain.models.expect import flag
 from synchain.models.scene import Scene
 
 from .certificate import Certificate, certify
@@ -140,10 +143,25 @@ def prepare(
 ) -> Prepared:
     """Compile the kernel of a scene and, with `certificate` True, find the exponents of its cells."""
     chosen = chosen_skip(scene, skip)
+    if not isinstance(certificate, Certificate):
+        flag("certified", certificate)
     source = kernel_source(scene, 1 if width is None and scene.cells == 1 else width, chosen)
+    _warn_of_chords(scene, source.integrator)
     count = crew_size(executor, workers)
     if isinstance(certificate, bool):
         found = certify(scene, workers=None if executor is not None else count) if certificate else None
     else:
         found = certificate
     return Prepared(Workshop(Recipe.of(chosen, source.width, source.digest)), found, count)
+
+
+def _warn_of_chords(scene: Scene, name: str) -> None:
+    """Warn where states between steps are recorded by an integrator that has only straight lines there."""
+    between = [record for record in ("trajectory", "section") if record in scene.record]
+    if between and integrator(name).dense_order < 2:
+        warnings.warn(
+            f"{name} draws straight lines between its steps, so errors of {' and '.join(between)} are not bounded by rtol; "
+            "take another integrator for these records, e.g. rodas5p",
+            RuntimeWarning,
+            stacklevel=4,
+        )

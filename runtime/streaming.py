@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
+from synchain.models.expect import a_path, flag
 from synchain.models.scene import Scene
 
-from .crew import Task, worker_lost
-from .files import drop_leftovers
+from .crew import Task, crew_size, worker_lost
+from .files import drop_leftovers, netcdf_data
 from .kernels import chosen_skip
 from .labels import scene_of
 from .layout import Layout
@@ -72,10 +72,10 @@ def stream(
     """
     chosen = chosen_skip(scene := with_axes(scene, axes), skip)
     reporter = Reporter(scene.cells, show_progress, progress)
-    state = claim(chosen, path, resume=resume, overwrite=overwrite, certified=certified)
-    if state == "complete":
+    crew_size(executor, workers)  # refuses what is no executor before there is a file
+    if (state := claim(chosen, path, resume=resume, overwrite=overwrite, certified=certified)) == "complete":
         raise FileExistsError(
-            f"{os.fspath(path)} holds the result of this scene already; give overwrite to run it again"
+            f"{os.fspath(path)} holds the result of this scene already; give overwrite (--overwrite) to run it again"
         )
     prepared = _prepared(chosen, partial_path(path), state, certified, width=width, workers=workers, executor=executor)
     store = Store.open(partial_path(path), writing=True)
@@ -111,11 +111,14 @@ def claim(
     Raises ValueError where a file there belongs to another run, FileExistsError where a run there was not finished and
     `resume` is not given, FileNotFoundError where it is given and there is none.
     """
-    target, partial = Path(path), partial_path(path)
+    for name, value in (("resume", resume), ("overwrite", overwrite), ("certified", certified)):
+        flag(name, value)
+    target = a_path("path", path)
+    partial = partial_path(target)
     if resume and overwrite:
         raise ValueError("found both resume and overwrite; expected one of them")
     if target.is_dir():
-        raise IsADirectoryError(f"{target} is a folder; expected a file or nothing there; choose another --out")
+        raise IsADirectoryError(f"{target} is a folder; expected a file or nothing there; choose another path (--out)")
     if overwrite:
         return "begin"
     if partial.exists() and (resume or not target.exists()):
@@ -123,43 +126,42 @@ def claim(
         if not resume:
             raise FileExistsError(
                 f"{partial} keeps a run of this scene that was not finished; "
-                "continue it with --resume, or start again with --overwrite"
+                "continue it with resume (--resume), or start again with overwrite (--overwrite)"
             )
         return "continue"
     if target.exists():
         _check_same(chosen, certified, target, _described(target))
         return "complete"
     if resume:
-        raise FileNotFoundError(f"nothing to resume: {target} does not exist; run without --resume")
+        raise FileNotFoundError(f"nothing to resume: {target} does not exist; run without resume (--resume)")
     return "begin"
 
 
 def _described(target: Path) -> dict[str, Any]:
     """Of a finished result what a store says of an unfinished one."""
-    try:
-        with xr.open_dataset(target, engine="scipy") as file:
-            attributes, certified = dict(file.attrs), "transversal_exponent" in file
-    except (OSError, ValueError, TypeError, KeyError) as problem:
-        raise OSError(f"cannot read {target} as a netCDF result: {problem}; choose another --out") from problem
+    with netcdf_data(target) as file:
+        attributes, certified = dict(file.attrs), "transversal_exponent" in file
     if "scene" not in attributes:
-        raise ValueError(f"{target} is no synchain result; choose another --out, or replace it with --overwrite")
+        raise ValueError(
+            f"{target} is no synchain result; choose another path (--out), or replace it with overwrite (--overwrite)"
+        )
     return {"attributes": attributes, "certificate": certified or None}
 
 
 def _check_same(chosen: Skip, certified: bool, path: Path, told: Mapping[str, Any]) -> None:
     """Raise ValueError where a file is not that of this run."""
     kept = told["attributes"]
-    again = "repeat the options of that run, choose another --out, or replace it with --overwrite"
+    again = "repeat the options of that run, choose another path (--out), or replace it with overwrite (--overwrite)"
     if scene_of(kept).replace(title="") != chosen.scene.replace(title=""):
         raise ValueError(f"{path} belongs to another scene ({kept['title']}); {again}")
     if kept["equations"] != chosen.equations.digest:
         raise ValueError(
             f"{path} left out other parts of its scene: {kept.get('skipped', 'nothing')}; "
-            f"{again.replace('the options of that run', 'its --no-skip (or the absence of it)')}"
+            f"{again.replace('the options of that run', 'its skip (--no-skip, or the absence of it)')}"
         )
     if (told["certificate"] is not None) != certified:
         found = "with" if told["certificate"] is not None else "without"
-        raise ValueError(f"{path} was run {found} --certify; {again}")
+        raise ValueError(f"{path} was run {found} certified (--certify); {again}")
 
 
 @dataclass(slots=True)
@@ -210,9 +212,9 @@ def _check_kernel(prepared: Prepared, store: Store) -> None:
     """Raise ValueError where a store's cells were run by another kernel, or another version of what it is made with."""
     recipe, kept = prepared.shop.recipe, store.about["attributes"]
     if kept["lanes"] == recipe.width and kept["kernel"] != recipe.digest:
-        raise ValueError(f"{store.path} was begun with another kernel; replace it with --overwrite")
+        raise ValueError(f"{store.path} was begun with another kernel; replace it with overwrite (--overwrite)")
     if kept["versions"] != recipe.versions:
         raise ValueError(
             f"{store.path} was begun with {kept['versions']}; found {recipe.versions}: the two parts of the sweep might "
-            "differ; install those versions, or replace it with --overwrite"
+            "differ; install those versions, or replace it with overwrite (--overwrite)"
         )

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
+from synchain.models.expect import a_scene, instance
 from synchain.models.scene import Scene
+from synchain.models.scene_checks import number, suggestion
 
 from .crew import Task, worker_lost
 from .kernels import kernel, kernel_source
 from .layout import Layout
 from .plan import plan
 from .progress import Hook, Reporter
-from .result import Buffers, Result, gather
+from .result import COUNTS, SUMS, Buffers, Result, gather
 from .sitting import Prepared, Sitting, SweepFailed, SweepInterrupted, prepare
 from .skip import Skip
 from .status import CODES, Status, tally
@@ -23,6 +26,10 @@ from .threads import worker_count
 from .work import Start
 
 __all__ = ["Buffers", "SweepFailed", "SweepInterrupted", "kernel", "kernel_source", "run", "with_axes", "worker_count"]
+
+
+IN_MEMORY = 10**9
+"""Numbers of the largest result that `run` keeps in memory, 8 GB."""
 
 
 def run(
@@ -54,6 +61,8 @@ def run(
     where the workers are lost.
     """
     scene = with_axes(scene, axes)
+    if resume is not None:
+        instance("resume", resume, Result, "an earlier Result, e.g. from open_result")
     reporter = Reporter(scene.cells, show_progress, progress)
     prepared = prepare(scene, skip, width, workers, executor, certified)
     memory = _memory(prepared, resume)
@@ -133,6 +142,7 @@ def _memory(prepared: Prepared, earlier: Result | None) -> Memory:
     """Arrays for all cells, with those of an earlier result that finished."""
     chosen = prepared.shop.recipe.chosen
     scene = chosen.scene
+    _fits(scene, len(chosen.places) + prepared.shop.samples * len(chosen.places))
     layout = Layout.of(scene, prepared.size())
     if earlier is None:
         return Memory(layout, prepared.shop.blank(scene.cells, 0))
@@ -141,17 +151,28 @@ def _memory(prepared: Prepared, earlier: Result | None) -> Memory:
     return Memory(layout, chosen.contract(finished))
 
 
+def _fits(scene: Scene, numbers: int) -> None:
+    """Raise ValueError where the cells do not fit into memory; `numbers` are the states that are kept of each."""
+    row = numbers + SUMS + COUNTS
+    if scene.cells * row > IN_MEMORY:
+        size = scene.cells * row * 8 / 1e9
+        raise ValueError(
+            f"sweep: found {scene.cells} cells, {size:.0f} GB in memory; expected at most {IN_MEMORY * 8 / 1e9:.0f} GB; "
+            "write it to a file with stream, whose memory does not grow with the sweep, or take fewer cells"
+        )
+
+
 def with_axes(scene: Scene, axes: dict[str, Any]) -> Scene:
     """The scene with parameters fixed by numbers and axes set by sequences."""
     fixed: dict[str, Any] = {}
-    swept = {axis.name: axis.values for axis in scene.axes}
+    swept: dict[str, Any] = {axis.name: axis.values for axis in a_scene(scene).axes}
     start = {name: list(values) for name, values in scene.initial.items()}
     for name, value in axes.items():
-        if np.ndim(value) > 0:
-            swept[name] = tuple(float(v) for v in value)
+        if isinstance(value, Iterable) and not isinstance(value, str | bytes) and getattr(value, "ndim", 1) > 0:
+            swept[name] = value
         elif name in scene.equations.state:
-            component, number = name.rsplit("_", 1)
-            start[component][scene.equations.holders(component).index(int(number) - 1)] = float(value)
+            component, place = name.rsplit("_", 1)
+            start[component][scene.equations.holders(component).index(int(place) - 1)] = number(name, value)
             swept.pop(name, None)
         else:
             fixed[name] = value
@@ -159,8 +180,9 @@ def with_axes(scene: Scene, axes: dict[str, Any]) -> Scene:
     settings = {setting.name for setting in fields(Scene)}
     unknown = [name for name in fixed if not scene.takes(name) and name not in settings]
     if unknown:
-        known = ", ".join((*scene.parameters, *scene.equations.state))
-        raise ValueError(f"unknown parameter or initial state {unknown[0]!r}; known: {known}")
+        known = (*scene.parameters, *scene.equations.state)
+        close = suggestion(unknown[0], known)
+        raise ValueError(f"unknown parameter or initial state {unknown[0]!r}; known: {', '.join(known)}{close}")
     if axes:
         scene = scene.replace(axes=swept, initial=start, **fixed)
     return scene

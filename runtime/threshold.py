@@ -14,11 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from synchain.models.expect import a_scene, instance, positive, whole
 from synchain.models.scene import Scene
 from synchain.models.spectrum import Spectrum
 from synchain.models.topology import Topology, topology
 
 from .intervals import Interval, find, intersect, scale
+from .rows import row
 from .status import Status
 from .sweep import run
 
@@ -55,11 +57,17 @@ class Criterion:
 
     def __post_init__(self) -> None:
         for name in ("tolerance", "transient", "window", "rtol"):
-            value = getattr(self, name)
-            if not (value > 0 and math.isfinite(value)):
-                raise ValueError(f"criterion: {name} = {value}; expected a positive number")
-        if self.starts < 1:
-            raise ValueError(f"criterion: starts = {self.starts}; expected at least 1")
+            object.__setattr__(self, name, positive(f"criterion: {name}", getattr(self, name)))
+        object.__setattr__(self, "reach", positive("criterion: reach", self.reach, zero=True))
+        whole("criterion: starts", self.starts, 1)
+        whole("criterion: seed", self.seed, 0)
+
+
+def checked(criterion: Criterion | None) -> Criterion:
+    """The criterion that was given, or the usual one; TypeError where it is none."""
+    if criterion is None:
+        return Criterion()
+    return instance("criterion", criterion, Criterion, "a Criterion, e.g. Criterion(starts=4)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,11 +126,13 @@ def thresholds(
 
     Raises ValueError for a network without links, or with one-way links whose eigenvalues are complex.
     """
-    scene = scene.replace(axes=(), zipped=False, continuation="none", record=("sync_error",), **parameters)
-    criterion = criterion or Criterion()
+    scene = a_scene(scene).replace(axes=(), zipped=False, continuation="none", record=(), **parameters)
+    criterion = checked(criterion)
     spectrum = scene.topology.spectrum
     check_probe(scene.topology, spectrum)
-    grid = default_grid(spectrum) if sigma is None else np.asarray(sigma, dtype=float)
+    scene = scene.replace(record=("sync_error",))
+    grid = default_grid(spectrum) if sigma is None else row("sigma", sigma, 2, rising=True)
+    resolution = positive("resolution", resolution)
     options: dict[str, Any] = {"workers": workers, "show_progress": show_progress}
     found = probe(scene, _probe_grid(grid, spectrum), resolution=2.0 * resolution, criterion=criterion, **options)
     direct = simulate(scene, grid, resolution=resolution, criterion=criterion, **options)
@@ -181,7 +191,7 @@ def simulate(
     show_progress: bool | None = None,
 ) -> Sweep:
     """Sweep sigma by direct simulation and return errors, shares and refined synchronous intervals."""
-    criterion = criterion or Criterion()
+    criterion = checked(criterion)
     moves = offsets(criterion)
     seen: dict[str, np.ndarray] = {}
 
@@ -192,7 +202,7 @@ def simulate(
         seen.setdefault("share", share)
         return share >= 0.5
 
-    x = np.asarray(sigma, dtype=float)
+    x = row("sigma", sigma, rising=True)
     intervals, _ = find(judge, x, resolution)
     return Sweep(x, seen["error"], seen["share"], tuple(intervals))
 

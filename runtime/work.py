@@ -35,6 +35,9 @@ DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
 KEPT = 8
 """Sweeps that a worker process remembers; an older one is sent to it again."""
 
+LARGEST = 2**25
+"""Numbers that the room for section points of a block has at first, 268 MB."""
+
 Start = tuple[np.ndarray, np.ndarray]
 """States (cells, dimension) to start from in place of the scene's, and for which cells (cells,) they are good."""
 
@@ -124,7 +127,9 @@ class Workshop:
     def blank(self, cells: int, room: int | None = None) -> Buffers:
         """Buffers for so many cells, with the room for section points that they have at first."""
         chosen = self.recipe.chosen
-        return Buffers.empty(cells, len(chosen.states), _room(chosen.scene) if room is None else room, self.samples)
+        dimension = len(chosen.states)
+        room = _room(chosen.scene, cells * (dimension + 1)) if room is None else room
+        return Buffers.empty(cells, dimension, room, self.samples)
 
     def run(self, cells: np.ndarray, start: Start | None = None, near: np.ndarray | None = None) -> Buffers:
         """Run these cells; `near` (cells,) is the last column of their spans."""
@@ -195,9 +200,12 @@ def _max_step(scene: Scene) -> float:
     return math.pi / fastest if fastest > 0.0 else math.inf
 
 
-def _room(scene: Scene) -> int:
-    """Section points to make room for at first: two a period; cells with more are run again with what they need."""
+def _room(scene: Scene, row: int) -> int:
+    """Section points to make room for at first: two a period, as far as LARGEST allows where one more needs `row` numbers.
+
+    Cells with more are run again with what they need.
+    """
     if "section" not in scene.record:
         return 0
     periods = scene.window if scene.time_unit == "period" else scene.window / math.pi
-    return int(min(2.0 * periods, 1e6)) + 8
+    return int(min(2.0 * periods, 1e6, LARGEST // row)) + 8

@@ -64,7 +64,7 @@ def test_a_folder_that_cannot_be_made_is_an_error_before_anything_is_done(
     tmp_path: Path, simulation: Simulation
 ) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(OSError, match=r"cannot make the folder .*file.*choose another --out"):
+    with pytest.raises(OSError, match=r"cannot make the folder .*file.*choose another folder \(--out\)"):
         make(["figure_4a"], tmp_path / "file" / "out")
     assert not simulation.runs
 

@@ -31,7 +31,7 @@ def test_an_error_curve_is_sorted_and_leaves_failures_out(pair: Callable[..., Re
     x, y = axes.lines[0].get_data()
     assert list(x) == [0.1, 0.2, 0.3]
     assert np.isnan(y).tolist() == [True, False, False]
-    assert axes.get_xlabel() == "sigma"
+    assert axes.get_xlabel() == r"$\sigma$"
     assert words(axes) == ["1 of 3 cells failed and are left out"]
 
 
@@ -41,7 +41,7 @@ def test_two_axes_make_a_map(pair: Callable[..., Result]) -> None:
     (mesh,) = axes.collections
     assert mesh.get_array().shape == (2, 3)
     assert np.ma.getmaskarray(np.ma.masked_invalid(mesh.get_array())).sum() == 1
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("sigma", "omega")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (r"$\sigma$", r"$\omega$")
     first = result_plot.draw_result(result, kind="error")
     assert words(first) == ["omega = 1; 1 of 6 cells failed and are left out"]
 
@@ -49,16 +49,16 @@ def test_two_axes_make_a_map(pair: Callable[..., Result]) -> None:
 def test_zipped_axes_run_along_the_first(pair: Callable[..., Result]) -> None:
     result = pair(axes={"sigma": (0.1, 0.2), "omega": (1.0, 1.2)}, zipped=True)
     axes = result_plot.draw_result(result)
-    assert axes.get_xlabel() == "sigma"
+    assert axes.get_xlabel() == r"$\sigma$"
     assert list(axes.lines[0].get_xdata()) == [0.1, 0.2]
 
 
 def test_section_points_against_the_axis_and_against_the_next(pair: Callable[..., Result]) -> None:
     axes = result_plot.draw_result(pair(axes=SWEPT["error"]), kind="section")
-    assert axes.get_ylabel() == "x_1 at v_1 falling"
+    assert axes.get_ylabel() == "$x_1$ at $v_1$ falling"
     assert np.isfinite(axes.lines[0].get_ydata()).sum() == 0 + 1 + 2
     alone = result_plot.draw_result(pair())
-    assert alone.get_ylabel() == "x_1 the next time"
+    assert alone.get_ylabel() == "$x_1$ the next time"
     low, high = alone.get_xlim()
     assert high - low >= 1e-5 * 0.99
 
@@ -76,7 +76,7 @@ def test_a_result_with_nothing_but_end_states_is_drawn(pair: Callable[..., Resul
     alone = result_plot.draw_result(pair(record=()), kind="end")
     assert [line.get_xydata().tolist() for line in alone.lines] == [[[0.0, 2.0]], [[1.0, 3.0]]]
     swept = result_plot.draw_result(pair(record=(), axes=SWEPT["error"]), kind="end")
-    assert swept.get_ylabel() == "x at the end"
+    assert swept.get_ylabel() == "$x$ at the end"
 
 
 def test_plots_that_cannot_be_made_are_refused(pair: Callable[..., Result]) -> None:
@@ -91,9 +91,9 @@ def test_oscillators_of_several_kinds_show_states_of_their_own() -> None:
     clocks = load_scene("huygens")
     axes = result_plot.draw_result(pretend(clocks.replace(record=("trajectory",), axes=())))
     assert [line.get_label() for line in axes.lines] == ["oscillator 1", "2", "3"]
-    assert axes.get_xlabel() == "x, theta"
+    assert axes.get_xlabel() == r"$x$, $\vartheta$"
     ends = result_plot.draw_result(pretend(clocks.replace(record=(), axes=())))
-    assert ends.get_ylabel() == "v, theta_rate at the end"
+    assert ends.get_ylabel() == r"$v$, $\vartheta_{\mathrm{rate}}$ at the end"
 
 
 def test_many_oscillators_are_shown_over_time(pair: Callable[..., Result]) -> None:

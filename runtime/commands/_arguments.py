@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from argparse import ArgumentParser, ArgumentTypeError
 
+from synchain.models.axis import LIMIT as AXIS_LIMIT
 from synchain.models.axis import Axis
 from synchain.models.expressions import constant
 from synchain.models.scene_checks import shown
@@ -26,18 +27,18 @@ NODES = 100_000
 """Largest number of oscillators that can be asked for."""
 
 
-def whole(text: str) -> int:
-    """A whole number of at most NODES."""
+def whole(text: str, most: int = NODES) -> int:
+    """A whole number of at most NODES, or of at most another limit."""
     if not re.fullmatch(r"[+-]?[0-9]+", text):
         raise ArgumentTypeError(f"found {shown(text)}; expected a whole number")
-    if len(text) > 9 or int(text) > NODES:
-        raise ArgumentTypeError(f"found {shown(text)}; expected at most {NODES}")
+    if len(text) > 9 or int(text) > most:
+        raise ArgumentTypeError(f"found {shown(text)}; expected at most {most}")
     return int(text)
 
 
-def positive(text: str) -> int:
+def positive(text: str, most: int = NODES) -> int:
     """A whole number of at least 1."""
-    value = whole(text)
+    value = whole(text, most)
     if value < 1:
         raise ArgumentTypeError(f"found {value}; expected at least 1")
     return value
@@ -79,7 +80,7 @@ def spaced(text: str) -> tuple[float, ...]:
     parts = text.split(":")
     if len(parts) != 3:
         raise ArgumentTypeError(f"found {shown(text)}; expected LO:HI:N, e.g. 0:0.6:241")
-    low, high, count = number(parts[0]), number(parts[1]), positive(parts[2])
+    low, high, count = number(parts[0]), number(parts[1]), positive(parts[2], AXIS_LIMIT)
     if count < 2 or not low < high:
         raise ArgumentTypeError(f"found {shown(text)}; expected LO below HI and at least 2 values")
     return Axis.between("grid", low, high, count).values

@@ -178,6 +178,8 @@ def _nothing_to_do(target: Path) -> int:
     kept = open_result(target)
     print(f"{target} holds the result of this scene already; nothing was run (--overwrite runs it again)")
     print(f"  made with {kept.data.attrs['versions']}\n  {kept.message}")
+    if not target.with_suffix(".png").exists():
+        print(f"  {_draw(target)}")
     return FINE if kept.success else FAILED
 
 

@@ -146,7 +146,8 @@ def _options(given: list[str], flag: str = "--option") -> dict[str, str]:
     for text in given:
         name, equals, value = text.partition("=")
         if not equals or not name.isidentifier():
-            raise WrongUse(f"{flag}: found {text!r}; expected NAME=VALUE, e.g. offsets=1,3")
+            example = "NAME=NUMBER, e.g. a=1/2" if flag == "--value" else "NAME=VALUE, e.g. offsets=1,3"
+            raise WrongUse(f"{flag}: found {text!r}; expected {example}")
         if name in found:
             raise WrongUse(f"{flag} {name} is given twice; expected it once")
         found[name] = value

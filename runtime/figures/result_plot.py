@@ -10,7 +10,7 @@ import xarray as xr
 
 from ..result import Result
 from ..status import Status
-from .style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, context, failures, new_figure, note
+from .style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, context, failures, new_figure, note, symbol
 
 __all__ = ["KINDS", "draw_result"]
 
@@ -74,11 +74,11 @@ def _cut(result: Result, keep: int) -> tuple[xr.Dataset, str]:
     """The last `keep` axes of a result with the others at their first value, unfinished cells set to NaN."""
     data = result.data
     leading = data.status.dims[: max(data.status.ndim - keep, 0)]
-    words = ", ".join(f"{name} = {float(data[name][0]):.4g}" for name in leading)
+    words = ", ".join(f"{symbol(str(name))} = {float(data[name][0]):.4g}" for name in leading)
     data = data.isel({name: 0 for name in leading})
     steps = {str(d): -(-data.sizes[d] // FINEST) for d in data.status.dims if keep > 1}
     data = data.isel({name: slice(None, None, step) for name, step in steps.items()})
-    thinned = ", ".join(f"every {step}th {name}" for name, step in steps.items() if step > 1)
+    thinned = ", ".join(f"every {step}th {symbol(name)}" for name, step in steps.items() if step > 1)
     words = "; ".join(filter(None, [words, thinned]))
     good = data.status == Status.FINISHED
     numbers = [name for name, values in data.items() if values.dtype.kind == "f"]
@@ -96,7 +96,7 @@ def _error(axes: Any, data: xr.Dataset, result: Result) -> Any:
     order = np.argsort(x, kind="stable")
     marker = "." if len(x) <= MARKED else None
     axes.plot(x[order], data.sync_error.values[order], color=BLUE, marker=marker)
-    axes.set(xlabel=name, ylabel="average synchronisation error")
+    axes.set(xlabel=symbol(name), ylabel="average synchronisation error")
     if np.nanmax(data.sync_error.values, initial=0.0) < ROUNDING:  # nothing but rounding: no landscape of it
         axes.set_ylim(-0.05 * ROUNDING, ROUNDING)
     return axes
@@ -111,12 +111,18 @@ def _section(axes: Any, data: xr.Dataset, result: Result) -> Any:
     dots = {"linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "color": BLACK, "rasterized": True}
     if data.status.ndim == 0:
         axes.plot(y[:-1], y[1:], markersize=3.0, **dots)
-        axes.set(xlabel=f"{state} at {result.scene.section}", ylabel=f"{state} the next time")
+        axes.set(xlabel=f"{symbol(state)} at {_section_words(result)}", ylabel=f"{symbol(state)} the next time")
         return _widen(axes)
     x, name = _along(data, result)
     axes.plot(np.repeat(x, y.shape[1]), y.reshape(-1), markersize=float(np.clip(700.0 / len(x), 1.0, 3.0)), **dots)
-    axes.set(xlabel=name, ylabel=f"{state} at {result.scene.section}")
+    axes.set(xlabel=symbol(name), ylabel=f"{symbol(state)} at {_section_words(result)}")
     return axes
+
+
+def _section_words(result: Result) -> str:
+    """The section as the axis labels have it: its state as a formula, the direction and a level other than 0."""
+    section = result.scene.section
+    return f"{symbol(section.variable)}{str(section).removeprefix(section.variable)}"
 
 
 def _map(axes: Any, data: xr.Dataset, result: Result) -> Any:
@@ -126,11 +132,11 @@ def _map(axes: Any, data: xr.Dataset, result: Result) -> Any:
     elif "section_count" in data:
         values, label = data.section_count.where(data.status == Status.FINISHED), "section points"
     else:
-        values, label = data.end.isel(state=0), f"{data.state.values[0]} at the end"
+        values, label = data.end.isel(state=0), f"{symbol(str(data.state.values[0]))} at the end"
     down, along = (str(name) for name in values.dims)
     values = values.sortby([down, along])
     painted = axes.pcolormesh(values[along], values[down], values, shading="nearest", cmap="cividis", rasterized=True)
-    axes.set(xlabel=along, ylabel=down, facecolor="0.8")
+    axes.set(xlabel=symbol(along), ylabel=symbol(down), facecolor="0.8")
     axes.figure.colorbar(painted, ax=axes, label=label)
     return axes
 
@@ -162,7 +168,7 @@ def _own(data: xr.Dataset, i: int) -> tuple[str, str]:
 
 def _common(states: Iterable[str]) -> str:
     """What states of several oscillators are called without their numbers: one name, or several with commas."""
-    return ", ".join(dict.fromkeys(name.rpartition("_")[0] for name in states))
+    return ", ".join(dict.fromkeys(symbol(name.rpartition("_")[0]) for name in states))
 
 
 def _end(axes: Any, data: xr.Dataset, result: Result) -> Any:
@@ -176,7 +182,9 @@ def _end(axes: Any, data: xr.Dataset, result: Result) -> Any:
         y = data.end.sel(state=names[1]) if along is None else end
         color = CYCLE[(i - 1) % len(CYCLE)]
         axes.plot(x, y, linestyle="none", marker=".", color=color, label="oscillator " * (i == 1) + str(i))
-    labels = (f"{first} at the end", f"{second} at the end") if along is None else (along[1], f"{first} at the end")
+    labels = (
+        (f"{first} at the end", f"{second} at the end") if along is None else (symbol(along[1]), f"{first} at the end")
+    )
     axes.set(xlabel=labels[0], ylabel=labels[1])
     return _legend(_widen(axes), result)
 

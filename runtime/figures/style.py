@@ -18,6 +18,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from synchain.models.typeset import Latex
+
 from ..files import whole_file
 from ..intervals import Interval
 
@@ -34,6 +36,7 @@ __all__ = [
     "new_figure",
     "note",
     "save",
+    "symbol",
 ]
 
 BLACK, BLUE, ORANGE, GREEN, PURPLE, SKY = "#1a1a1a", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
@@ -62,6 +65,11 @@ def context() -> Iterator[None]:
         mpl.rcdefaults()
         mpl.rcParams.update(SETTINGS)
         yield
+
+
+def symbol(name: str) -> str:
+    """A parameter or a state as a formula: sigma as the Greek letter, x_1 with its subscript."""
+    return f"${Latex().letter(name)}$"
 
 
 def new_figure(size: tuple[float, float]) -> Figure:

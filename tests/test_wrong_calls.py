@@ -1,0 +1,183 @@
+"""Wrong arguments of public functions: TypeError, ValueError or OSError in one line of words, before anything is run."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+from pathlib import Path
+
+import networkx
+import numpy as np
+import pytest
+import scipy.sparse
+
+from synchain import models, runtime
+from synchain.models import Scene, Section, Spectrum, Topology, chain, star
+from synchain.models.clusters import clusters, orbital_partitions
+from synchain.models.energy import energy
+from synchain.runtime.energy import energy_function
+from synchain.runtime.sweep import with_axes, worker_count
+from synchain.runtime.threshold import Criterion
+
+ONE = Scene(oscillator="harmonic", transient=1, window=1)
+PAIR = Scene(oscillator="harmonic", topology=chain(2), transient=1, window=1)
+ENERGY = energy_function(PAIR)
+THREADS = ThreadPoolExecutor
+NAN = math.nan
+
+A_SCENE = "expected a Scene, e.g. load_scene"
+A_GRAPH = r"expected a graph, e.g. chain\(4\)"
+
+CALLS = [
+    # models
+    (lambda: models.Axis("a", np.ones((2, 2))), r"array of shape \(2, 2\); expected one row"),
+    (lambda: models.Axis("a", [NAN]), "found nan; expected a finite number"),
+    (lambda: PAIR.replace(parameters=3), r"parameters: found 3 \(int\); expected a table"),
+    (lambda: PAIR.replace(simga=3), "unknown parameter or keyword 'simga'.*did you mean 'sigma'"),
+    (lambda: PAIR.takes(3), "name: found 3"),
+    (lambda: Section(3), "section variable: found 3"),
+    (lambda: Spectrum(3), "spectrum: found 3"),
+    (lambda: Spectrum([3]), "expected an Eigenvalue"),
+    (lambda: Topology("a", 2.5, ()), r"n = 2\.5; expected a whole number"),
+    (lambda: Topology("a", True, ()), "n = True; expected a whole number"),
+    (lambda: Topology("a", 3, 3), "links: found 3"),
+    (lambda: Topology("a", 3, ((0, 1),)), r"link \(0, 1\); expected \(target, source, weight\)"),
+    (lambda: Topology("a", 2, (("a", "b", Fraction(1)),)), r"expected \(target, source, weight\)"),
+    (lambda: Topology(3, 2, ()), "topology name: found 3"),
+    (lambda: models.cartesian(3, 4), f"cartesian: first: found 3.*{A_GRAPH}"),
+    (lambda: models.cartesian(chain(3), "ring"), f"cartesian: second: found 'ring'.*{A_GRAPH}"),
+    (lambda: models.kronecker(chain(3), None), f"kronecker: second: found None; {A_GRAPH}"),
+    (lambda: models.union(3, chain(3)), f"union: first: found 3.*{A_GRAPH}"),
+    (lambda: models.complement(networkx.path_graph(3)), "make it with from_graph"),
+    (lambda: models.weighted("chain", 2), f"weighted: found 'chain'.*{A_GRAPH}"),
+    (lambda: models.from_edges(3), "expected a list of edges"),
+    (lambda: models.from_edges([{0, 1}]), r"edge 1 is \{0, 1\}; expected \(i, j\)"),
+    (lambda: models.from_edges([{"a": 1, "b": 2}]), "edge 1 is"),
+    (lambda: models.from_edges([(0, 1)], directed="no"), "directed: found 'no'"),
+    (lambda: models.from_edges([(0.0, 1)]), r"node = 0\.0; expected a whole number"),
+    (lambda: models.from_matrix(scipy.sparse.eye(3)), "read by from_sparse"),
+    (lambda: models.from_sparse(scipy.sparse.coo_array(np.ones(3))), "expected a square matrix"),
+    (lambda: models.from_symbols(3), "is a int; expected rows"),
+    (lambda: models.from_symbols([3]), "row 1 is 3"),
+    (lambda: models.read_edges(3), "edge file: found 3"),
+    (lambda: models.read_graphml(None), "GraphML file: found None"),
+    (lambda: models.read_matrix(""), "matrix file: found ''"),
+    (lambda: chain(2.5), r"n = 2\.5 is a float; expected an integer"),
+    (lambda: chain(True), "n = True is a bool"),
+    (lambda: clusters(chain(2), 3), "partition: found 3"),
+    (lambda: clusters("chain", [0]), f"clusters: found 'chain'.*{A_GRAPH}"),
+    (lambda: orbital_partitions(4), A_GRAPH),
+    (lambda: energy(None), A_SCENE),
+    # sweeps
+    (lambda: runtime.run("figure_4a"), f"found 'figure_4a'.*{A_SCENE}"),
+    (lambda: runtime.run(Scene), A_SCENE),
+    (lambda: runtime.run(PAIR, sigma=np.ones((2, 2))), "axis sigma: found an array of shape"),
+    (lambda: runtime.run(PAIR, sigma=["a"]), "axis sigma: 'a'"),
+    (lambda: runtime.run(PAIR, sigma=[NAN]), "axis sigma: found nan"),
+    (lambda: runtime.run(PAIR, sigma=[None]), "axis sigma: found None"),
+    (lambda: runtime.run(PAIR, sigma=[[1, 2], [3]]), r"axis sigma: found \[1, 2\]"),
+    (lambda: runtime.run(PAIR, sigma={1, 2}), "found a set, which has no order"),
+    (lambda: runtime.run(PAIR, x_1=None), "x_1: found None"),
+    (lambda: runtime.run(PAIR, lanes=4), "unknown parameter or initial state 'lanes'"),
+    (lambda: runtime.run(PAIR, workers=1.5), r"workers = 1\.5; expected a whole number"),
+    (lambda: runtime.run(PAIR, workers="2"), "workers = '2'"),
+    (lambda: runtime.run(PAIR, workers=True), "workers = True"),
+    (lambda: runtime.run(PAIR, workers=-1), "workers = -1; expected at least 1"),
+    (lambda: runtime.run(PAIR, width=3), "width = 3; expected one of 1, 2, 4, 8, 16"),
+    (lambda: runtime.run(PAIR, width="a"), "width = 'a'"),
+    (lambda: runtime.run(PAIR, skip="no"), "skip: found 'no'"),
+    (lambda: runtime.run(PAIR, certified="yes"), "certified: found 'yes'"),
+    (lambda: runtime.run(PAIR, resume="file.nc"), "resume: found 'file.nc'"),
+    (lambda: runtime.run(PAIR, executor=THREADS), "executor: found <class"),
+    (lambda: runtime.run(PAIR, progress=3), "progress: found 3"),
+    (lambda: runtime.run(PAIR, show_progress="x"), "show_progress: found 'x'"),
+    (lambda: runtime.stream("x", "y.nc"), A_SCENE),
+    (lambda: runtime.stream(PAIR, 3), "path: found 3"),
+    (lambda: runtime.stream(PAIR, ""), "path: found ''"),
+    (lambda: runtime.stream(PAIR, "a\0b"), "path: found"),
+    (lambda: runtime.stream(PAIR, "a.nc", resume="yes"), "resume: found 'yes'"),
+    (lambda: runtime.stream(PAIR, "a.nc", executor=3), "executor: found 3"),
+    (lambda: runtime.stream(PAIR, "a.nc", progress=3), "progress: found 3"),
+    (lambda: runtime.kernel("figure_4a"), A_SCENE),
+    (lambda: runtime.kernel(PAIR, width=0), "width = 0; expected at least 1"),
+    (lambda: runtime.open_result(3), "result: found 3"),
+    (lambda: runtime.open_result("no/such/file.nc"), "does not exist; expected a netCDF result: check the path"),
+    (lambda: runtime.open_result(Path(__file__).parent), "is a folder; expected a netCDF result"),
+    (lambda: runtime.open_result(__file__), "is no netCDF file; expected a netCDF 3 result"),
+    (lambda: runtime.Result(None, None), r"data: found None; expected an xarray\.Dataset"),
+    # starts, thresholds, probe
+    (lambda: runtime.basin("a"), A_SCENE),
+    (lambda: runtime.basin(PAIR, ranges=3), "ranges: found 3"),
+    (lambda: runtime.basin(PAIR, ranges={"x": 3}), "range of x"),
+    (lambda: runtime.basin(PAIR, ranges={"x": ("a", "b")}), "range of x: found"),
+    (lambda: runtime.basin(PAIR, tolerance="a"), "tolerance: 'a'"),
+    (lambda: runtime.basin(PAIR, seed=-1), "seed = -1"),
+    (lambda: runtime.basin(PAIR, samples=10**12), "samples = 1000000000000; expected at most 10000000"),
+    (lambda: runtime.basin(PAIR, smaples=3), "unknown parameter or keyword 'smaples'"),
+    (lambda: runtime.thresholds(None), A_SCENE),
+    (lambda: runtime.thresholds(ONE), "has no links"),
+    (lambda: runtime.thresholds(PAIR, sigma="a"), "sigma: found 'a'; expected real numbers"),
+    (lambda: runtime.thresholds(PAIR, sigma=3), r"array of shape \(\); expected a row of at least 2"),
+    (lambda: runtime.thresholds(PAIR, sigma=[0.2, 0.1]), "do not increase"),
+    (lambda: runtime.thresholds(PAIR, sigma=[NAN, 1]), "sigma: found nan"),
+    (lambda: runtime.thresholds(PAIR, resolution="a"), "resolution: 'a'"),
+    (lambda: runtime.thresholds(PAIR, criterion={"starts": 2}), "criterion: found {'starts': 2}"),
+    (lambda: Criterion(starts=1.5), r"starts = 1\.5; expected a whole number"),
+    (lambda: Criterion(tolerance=None), "tolerance: found None"),
+    (lambda: Criterion(reach=NAN), "reach: found nan"),
+    (lambda: Criterion(seed="a"), "seed = 'a'"),
+    (lambda: runtime.universal_probe(3, 0, 0), A_SCENE),
+    (lambda: runtime.universal_probe(PAIR, "a", 0), "alpha: found 'a'; expected real numbers"),
+    (lambda: runtime.universal_probe(PAIR, 1j, 0), "alpha: found 1j"),
+    (lambda: runtime.universal_probe(PAIR, [1, 2], [1, 2, 3]), r"shapes \(2,\) and \(3,\)"),
+    # exponents
+    (lambda: runtime.exponents(None, [0.1]), A_SCENE),
+    (lambda: runtime.exponents(PAIR, "a"), "alpha: found 'a'; expected numbers"),
+    (lambda: runtime.exponents(PAIR, []), "expected a row of at least 1 number"),
+    (lambda: runtime.exponents(PAIR, [[1, 2], [3, 4]]), r"array of shape \(2, 2\)"),
+    (lambda: runtime.exponents(PAIR, {1, 2}), "alpha: found {1, 2}"),
+    (lambda: runtime.exponents(PAIR, 0.1, starts=1.5), r"starts = 1\.5"),
+    (lambda: runtime.exponents(PAIR, 0.1, periods=0), "periods: found 0; expected a number above 0"),
+    (lambda: runtime.exponents(PAIR, 0.1, periods=math.inf), "periods: found inf"),
+    (lambda: runtime.exponents(PAIR, 0.1, transient=-1), "transient: found -1"),
+    (lambda: runtime.exponents(PAIR, 0.1, precision="a"), "precision: 'a'"),
+    (lambda: runtime.exponents(PAIR, 0.1, seed="a"), "seed = 'a'"),
+    (lambda: runtime.exponents(PAIR, 0.1, workers="a"), "workers = 'a'"),
+    (lambda: runtime.msf("a", [0, 1]), A_SCENE),
+    (lambda: runtime.msf(PAIR, None), "alpha: found None"),
+    (lambda: runtime.plane(PAIR, [0, 1], 3), "beta: found an array of shape"),
+    (lambda: runtime.lyapunov_spectrum("a"), A_SCENE),
+    (lambda: runtime.lyapunov_spectrum(PAIR, count=1.5), r"count = 1\.5"),
+    (lambda: runtime.lyapunov_spectrum(PAIR, periods="a"), "periods: 'a'"),
+    (lambda: runtime.cluster_exponents(None, [0, 0]), A_SCENE),
+    (lambda: runtime.cluster_exponents(PAIR, 3), "partition: found 3"),
+    (lambda: runtime.cluster_exponents(PAIR, [0, 0], periods=0), "periods: found 0"),
+    (lambda: runtime.periodic_orbit("a"), A_SCENE),
+    # energy
+    (lambda: energy_function("a"), A_SCENE),
+    (lambda: ENERGY([1, 2]), "expected rows of 4 numbers"),
+    (lambda: ENERGY("abc"), "states: found 'abc'"),
+    (lambda: ENERGY(np.zeros(4), "a"), "t: found 'a'"),
+    (lambda: ENERGY(np.zeros(4), 0.0, {"nope": 1}), "unknown key 'nope'"),
+    (lambda: ENERGY.imbalance(3, np.zeros((2, 4))), "found 1 samples; expected at least three"),
+]
+
+
+@pytest.mark.parametrize(("call", "words"), CALLS, ids=range(len(CALLS)))
+def test_a_wrong_argument_is_refused_in_one_line(call, words, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises((TypeError, ValueError, OSError), match=words) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_right_is_taken():
+    """Numbers of other types, and what only looks wrong."""
+    assert with_axes(PAIR, {"sigma": range(2), "x_1": "sqrt(4)"}).axes[0].values == (0.0, 1.0)
+    assert worker_count(np.int64(2)) == 2
+    assert models.from_edges([[0, 1], (1, 2, "1/2"), np.array([2, 3])]).n == 4
+    assert clusters(star(5), "hpppp").quotient.n == 2
+    assert Criterion(tolerance=1).tolerance == 1.0
+    assert float(ENERGY([0, 1, 0, 0], parameters={"sigma": 0})) == 0.5
