@@ -8,20 +8,23 @@ Sources: Menck, Heitzig, Marwan & Kurths, Nature Phys. 9, 89 (2013); Clopper & P
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from synchain.models.contact import SLIP
 from synchain.models.expect import a_scene, whole
 from synchain.models.scene import Scene
 from synchain.models.scene_checks import number, table
 
-from .plan import Plan, plan
-from .probe import integrate
+from .plan import Planner
+from .progress import Hook
 from .rows import row
+from .skip import decide
 from .status import Status
-from .sweep import kernel
+from .sweep import run
 
 __all__ = ["Basin", "basin"]
 
@@ -101,7 +104,9 @@ def basin(
     seed: int = 0,
     confidence: float = 0.95,
     workers: int | None = None,
+    executor: Executor | None = None,
     show_progress: bool | None = None,
+    progress: Hook | None = None,
     **parameters: float,
 ) -> Basin:
     """Start a scene's network from random states and count those that synchronise; `parameters` override the scene's.
@@ -109,7 +114,8 @@ def basin(
     Every oscillator has a state of its own, uniform in `ranges` (component -> lowest, highest; default -1 … 1 for all
     components); a component that is not named starts as in the scene.  A start is synchronous where the mean error over
     `window` after `transient`, both in the scene's unit of time, is below `tolerance`.  The result depends on the seed and
-    not on the workers, and the first starts of a larger sample are those of a smaller one.
+    not on the workers, and the first starts of a larger sample are those of a smaller one.  `workers`, `executor`,
+    `show_progress` and `progress` are those of `run`.
 
     Raises ValueError for an unknown component, an empty range, fewer than one sample or two oscillators, and a tolerance,
     confidence or time that makes no sense; TypeError for a number of samples that is not whole.
@@ -120,14 +126,17 @@ def basin(
         **parameters,
     )  # fmt: skip
     box = _box(scene, ranges)
-    one = plan(scene)
-    start = np.tile(one.start, (samples, 1))
-    columns = [scene.components.index(name) * scene.n + i for name in box for i in range(scene.n)]
-    low, high = (np.repeat([ends[k] for ends in box.values()], scene.n) for k in (0, 1))
-    start[:, columns] = low + (high - low) * np.random.default_rng(seed).random((samples, len(columns)))
-    cells = Plan(start, np.tile(one.numbers, (samples, 1)), np.tile(one.spans, (samples, 1)))
-    error, status = integrate(scene, kernel(scene), cells, workers=workers, show_progress=show_progress)
-    return Basin(scene, tolerance, confidence, start, error, status)
+    names = [f"{component}_{i + 1}" for component in box for i in scene.equations.holders(component)]
+    low, high = (
+        np.repeat([ends[k] for ends in box.values()], [len(scene.initial[name]) for name in box]) for k in (0, 1)
+    )
+    values = low + (high - low) * np.random.default_rng(seed).random((samples, len(names)))
+    cells = scene.replace(axes=dict(zip(names, values.T, strict=True)), zipped=True)
+    chosen = replace(decide(cells, skip=False), jumps=True)
+    result = run(cells, skip=chosen, workers=workers, executor=executor, show_progress=show_progress, progress=progress)
+    status = result.status.values
+    error = np.where(status == Status.FINISHED, result.sync_error.values, np.inf)
+    return Basin(scene, tolerance, confidence, Planner(cells).rows(np.arange(samples)).start, error, status)
 
 
 def _check(scene: Scene, samples: Any, tolerance: Any, confidence: Any, seed: Any) -> None:
@@ -142,16 +151,17 @@ def _check(scene: Scene, samples: Any, tolerance: Any, confidence: Any, seed: An
 
 
 def _box(scene: Scene, ranges: Mapping[str, Range] | None) -> dict[str, Range]:
-    """The ranges in the order of the components, checked."""
+    """The ranges in the order of the components, checked; the mode of a contact follows from the other states."""
+    known = tuple(name for name in scene.components if name != SLIP.name)
     if ranges is None:
-        return dict.fromkeys(scene.components, (-1.0, 1.0))
-    unknown = [name for name in table("basin: ranges", ranges) if name not in scene.components]
+        return dict.fromkeys(known, (-1.0, 1.0))
+    unknown = [name for name in table("basin: ranges", ranges) if name not in known]
     if unknown:
-        raise ValueError(f"basin: unknown component {unknown[0]!r}; known: {', '.join(scene.components)}")
+        raise ValueError(f"basin: unknown component {unknown[0]!r}; known: {', '.join(known)}")
     if not ranges:
-        raise ValueError(f"basin: no ranges; name at least one component of {', '.join(scene.components)}")
+        raise ValueError(f"basin: no ranges; name at least one component of {', '.join(known)}")
     box = {}
-    for name in scene.components:
+    for name in known:
         if name not in ranges:
             continue
         ends = row(f"basin: the range of {name}", ranges[name], 2)

@@ -16,7 +16,7 @@ from synchain.models.expect import instance
 
 from .result import Buffers
 from .threads import worker_count
-from .work import Start, Workshop, forget, run_block
+from .work import Given, Start, Workshop, forget, run_block
 
 __all__ = ["Crew", "Task", "crew_size", "feed", "worker_lost"]
 
@@ -40,7 +40,7 @@ class Task:
 class Crew:
     """Workers and the sweep that they work on; `limit` tasks are with them at a time, two for each."""
 
-    def __init__(self, shop: Workshop, executor: Executor | None, workers: int) -> None:
+    def __init__(self, shop: Workshop | Given, executor: Executor | None, workers: int) -> None:
         self.shop = shop
         self.limit = 2 * workers
         self.executor = ThreadPoolExecutor(workers) if executor is None else executor

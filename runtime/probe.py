@@ -10,27 +10,28 @@ the three synchronise should synchronise too, one-way links included (Fink, John
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from fractions import Fraction
 
 import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
-from tqdm import tqdm
 
 from synchain.codegen.emit import emit
-from synchain.codegen.load import Kernel, load
 from synchain.models.equations import Edge, Equations
 from synchain.models.expect import a_scene
 from synchain.models.scene import Scene
 from synchain.models.topology import topology
 
-from .plan import CANCEL, Plan, control_array, plan, tolerances
+from .crew import Crew, Task, crew_size, feed
+from .plan import Plan, control_array, plan, tolerances
+from .progress import Hook, Reporter
+from .result import Buffers
 from .rows import numbers
-from .status import Status
-from .sweep import Buffers, worker_count
+from .status import CODES, Status, tally
 from .threshold import Criterion, checked, offsets
+from .work import Recipe, Rows
 
 __all__ = ["MODE_ALPHA", "MODE_BETA", "Probe", "integrate", "ring_of_three", "universal_probe"]
 
@@ -69,12 +70,14 @@ def universal_probe(
     *,
     criterion: Criterion | None = None,
     workers: int | None = None,
+    executor: Executor | None = None,
     show_progress: bool | None = None,
+    progress: Hook | None = None,
 ) -> Probe:
     """Simulate three oscillators at the mode strengths alpha + i beta: arrays that are broadcast, negative numbers allowed.
 
     Oscillator, coupling and parameters are those of the scene; its network, axes, start and sigma are not used.  The starts
-    are those of `synchain.runtime.threshold`.
+    are those of `synchain.runtime.threshold`; `workers`, `executor`, `show_progress` and `progress` those of `run`.
 
     Raises ValueError for strengths that are not finite or none at all, for a scene without coupling, and for a coupling that
     is not proportional to sigma and to the weight of a link.
@@ -85,9 +88,14 @@ def universal_probe(
         topology=topology("ring", 3), initial=None, axes=(), zipped=False, continuation="none", record=("sync_error",),
         transient=criterion.transient, window=criterion.window, rtol=criterion.rtol,
     )  # fmt: skip
-    compiled = load(emit(ring_of_three(three.equations), three.integrator, ("sync_error",)))
-    cells = _cells(three, compiled.equations.parameters, real.reshape(-1), imaginary.reshape(-1), criterion)
-    error, status = integrate(three, compiled, cells, workers=workers, show_progress=show_progress)
+    equations = ring_of_three(three.equations)
+    cells = _cells(three, equations.parameters, real.reshape(-1), imaginary.reshape(-1), criterion)
+    limits = tolerances(three, np.empty((0, 0)))
+    control = control_array(*limits, 0.5 * (three.period or math.inf), three.max_steps)
+    error, status = integrate(
+        Rows(equations, three.integrator, cells, control), workers=workers, executor=executor, show_progress=show_progress,
+        progress=progress,
+    )  # fmt: skip
     shape = (*real.shape, criterion.starts)
     error, status = error.reshape(shape), status.reshape(shape)
     share = np.asarray((error < criterion.tolerance).mean(axis=-1))
@@ -169,32 +177,29 @@ def _cells(scene: Scene, names: tuple[str, ...], alpha: np.ndarray, beta: np.nda
 
 
 def integrate(
-    scene: Scene, compiled: Kernel, cells: Plan, *, workers: int | None = None, show_progress: bool | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Run cells of a kernel on threads; returns mean synchronisation error (cells,) and status (cells,).
+    rows: Rows, width: int | None = None, *, workers: int | None = None, executor: Executor | None = None,
+    show_progress: bool | None = None, progress: Hook | None = None,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Run all rows; returns mean synchronisation error (cells,), infinite where unfinished, and status (cells,)."""
+    count, threads = len(rows.plan.start), crew_size(executor, workers)
+    reporter = Reporter(count, show_progress, progress)
+    source = emit(rows.equations, rows.integrator, ("sync_error",), width=width)
+    crew = Crew(Recipe.of(rows, source.width, source.digest).opened(), executor, threads)
+    error, status = np.full(count, np.inf), np.full(count, int(Status.NOT_RUN))
+    size = source.width * min(
+        16, math.ceil(count / (8 * threads * source.width))
+    )  # whole lanes, enough blocks to share
 
-    The error is infinite where a cell did not finish.  Tolerances and the drive that bounds the steps are the scene's.
-    """
-    workers, count = worker_count(workers), len(cells.start)
-    control = control_array(*tolerances(scene, np.empty((0, 0))), 0.5 * (scene.period or math.inf), scene.max_steps)
-    buffers = Buffers.empty(count, cells.start.shape[1], room=0, samples=0)
-    fixed = (cells.start, cells.numbers, cells.spans, control, *buffers.arrays())
-    width = compiled.origin.width
-    size = width * min(16, math.ceil(count / (8 * workers * width)))  # whole lanes, and enough chunks to share out
-    with (
-        tqdm(total=count, unit="cell", disable=None if show_progress is None else not show_progress) as bar,
-        ThreadPoolExecutor(workers) as pool,
-    ):
-        chunks = {
-            pool.submit(compiled.drive, i, min(i + size, count), *fixed): min(size, count - i)
-            for i in range(0, count, size)
-        }
-        try:
-            for done in as_completed(chunks):
-                done.result()
-                bar.update(chunks[done])
-        except BaseException:
-            control[CANCEL] = 1.0  # the kernels look at it and end
-            raise
-    status = buffers.counts[:, 0].copy()
-    return np.where(status == Status.FINISHED, buffers.sums[:, 0], np.inf), status
+    def finish(task: Task, made: Buffers) -> None:
+        status[task.cells] = made.counts[:, 0]
+        error[task.cells] = np.where(made.counts[:, 0] == Status.FINISHED, made.sums[:, 0], np.inf)
+        reporter.add(tally(made.counts[:, 0]))
+
+    try:
+        reporter.start(np.zeros(CODES, dtype=np.int64))
+        cells = (np.arange(first, min(first + size, count)) for first in range(0, count, size))
+        feed(crew, (Task(block, own) for block, own in enumerate(cells)), finish)
+    finally:
+        crew.close()
+        reporter.close()
+    return error, status

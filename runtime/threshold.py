@@ -8,7 +8,8 @@ non-zero eigenvalue is -2.  Any other network synchronises where every non-zero 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,6 +21,7 @@ from synchain.models.spectrum import Spectrum
 from synchain.models.topology import Topology, topology
 
 from .intervals import Interval, find, intersect, scale
+from .progress import Hook
 from .rows import row
 from .status import Status
 from .sweep import run
@@ -115,14 +117,16 @@ def thresholds(
     resolution: float = 5e-4,
     criterion: Criterion | None = None,
     workers: int | None = None,
+    executor: Executor | None = None,
     show_progress: bool | None = None,
+    progress: Hook | None = None,
     **parameters: float,
 ) -> Thresholds:
     """Return probe, prediction and direct simulation of a scene's network; `parameters` override the scene's.
 
     `sigma` is the grid on which ranges are looked for (default: `default_grid`); narrower ranges are not seen.  The probe's
     grid in alpha covers every sigma |gamma|.  Ends are refined to `resolution` in sigma.  A network in several parts is
-    allowed; its warnings say so.
+    allowed; its warnings say so.  `workers`, `executor`, `show_progress` and `progress` are those of `run`.
 
     Raises ValueError for a network without links, or with one-way links whose eigenvalues are complex.
     """
@@ -133,7 +137,7 @@ def thresholds(
     scene = scene.replace(record=("sync_error",))
     grid = default_grid(spectrum) if sigma is None else row("sigma", sigma, 2, rising=True)
     resolution = positive("resolution", resolution)
-    options: dict[str, Any] = {"workers": workers, "show_progress": show_progress}
+    options = {"workers": workers, "executor": executor, "show_progress": show_progress, "progress": progress}
     found = probe(scene, _probe_grid(grid, spectrum), resolution=2.0 * resolution, criterion=criterion, **options)
     direct = simulate(scene, grid, resolution=resolution, criterion=criterion, **options)
     predicted = project(found.intervals, spectrum, float(grid[-1]))
@@ -187,16 +191,15 @@ def simulate(
     *,
     resolution: float = 5e-4,
     criterion: Criterion | None = None,
-    workers: int | None = None,
-    show_progress: bool | None = None,
+    **options: Any,
 ) -> Sweep:
-    """Sweep sigma by direct simulation and return errors, shares and refined synchronous intervals."""
+    """Sweep sigma by direct simulation and return errors, shares and refined synchronous intervals; options as for `run`."""
     criterion = checked(criterion)
     moves = offsets(criterion)
     seen: dict[str, np.ndarray] = {}
 
     def judge(points: np.ndarray) -> np.ndarray:
-        errors = _errors(scene, points, moves, criterion, workers, show_progress)
+        errors = _errors(scene, points, moves, criterion, options)
         seen.setdefault("error", np.median(errors, axis=1))
         share = (errors < criterion.tolerance).mean(axis=1)
         seen.setdefault("share", share)
@@ -218,8 +221,7 @@ def _errors(
     sigma: np.ndarray,
     offsets: np.ndarray,
     criterion: Criterion,
-    workers: int | None,
-    show_progress: bool | None,
+    options: Mapping[str, Any],
 ) -> np.ndarray:
     """Mean synchronisation error (points, starts); infinite where a cell did not finish."""
     position = scene.components[0]
@@ -230,7 +232,7 @@ def _errors(
         axes={name: tuple(values) for name, values in axes.items()}, zipped=True, record=("sync_error",),
         transient=criterion.transient, window=criterion.window, rtol=criterion.rtol,
     )  # fmt: skip
-    result = run(cells, workers=workers, show_progress=show_progress)
+    result = run(cells, **options)
     errors = np.where(result.status == Status.FINISHED, result.sync_error, np.inf)
     return errors.reshape(len(sigma), len(offsets))
 

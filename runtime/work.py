@@ -18,7 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from synchain.codegen.load import Kernel
+from synchain.codegen.emit import KernelSource, emit
+from synchain.codegen.load import Kernel, load
+from synchain.models.equations import Equations
 from synchain.models.plugins import allow_code, allowed_code
 from synchain.models.scene import Scene
 from synchain.models.topology import Topology
@@ -26,10 +28,9 @@ from synchain.models.topology import Topology
 from .kernels import kernel, kernel_source
 from .plan import CANCEL, Plan, Planner, control_array, parameter_names, tolerances
 from .result import Buffers
-from .skip import Skip
 from .status import Status
 
-__all__ = ["Recipe", "Start", "Workshop", "forget", "run_block", "versions"]
+__all__ = ["Given", "Recipe", "Rows", "Start", "Workshop", "forget", "run_block", "versions"]
 
 DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
 KEPT = 8
@@ -41,7 +42,7 @@ LARGEST = 2**25
 Start = tuple[np.ndarray, np.ndarray]
 """States (cells, dimension) to start from in place of the scene's, and for which cells (cells,) they are good."""
 
-_shops: OrderedDict[str, Workshop] = OrderedDict()
+_shops: OrderedDict[str, Workshop | Given] = OrderedDict()
 _lock = threading.Lock()
 
 
@@ -56,16 +57,19 @@ class _Pickler(pickle.Pickler):
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """What all blocks of a sweep have in common; `digest` is that of the kernel's text, `code` are files allowed to run."""
+    """What all blocks of a sweep have in common; `digest` is that of the kernel's text, `code` are files allowed to run.
 
-    chosen: Skip
+    `chosen` is what is left of a scene to integrate (a Skip), or cells of a kernel that no scene has (Rows).
+    """
+
+    chosen: Any
     width: int
     digest: str
     versions: str
     code: tuple[str, ...]
 
     @classmethod
-    def of(cls, chosen: Skip, source_width: int, digest: str) -> Recipe:
+    def of(cls, chosen: Any, source_width: int, digest: str) -> Recipe:
         """The recipe of a sweep in this process."""
         return cls(chosen, source_width, digest, versions(), allowed_code())
 
@@ -90,6 +94,55 @@ class Recipe:
         allow_code(*head["code"])
         return cls(pickle.load(source), **head)
 
+    def check(self, source: KernelSource) -> None:
+        """Raise RuntimeError where this worker has written another kernel than who made the recipe."""
+        if source.digest != self.digest:
+            raise RuntimeError(
+                f"this worker makes the kernel {source.digest[:12]}; expected that of the main program, "
+                f"{self.digest[:12]}: a sweep needs the same installation everywhere"
+            )
+
+    def opened(self) -> Workshop | Given:
+        """The kernel with all that it needs to run."""
+        return Given(self) if isinstance(self.chosen, Rows) else Workshop(self)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """Cells of equations that no scene has: their rows, integrator and control array; only the error is recorded."""
+
+    equations: Equations
+    integrator: str
+    plan: Plan
+    control: np.ndarray
+
+
+@dataclass(slots=True)
+class Given:
+    """A kernel, ready to run any of the given rows."""
+
+    recipe: Recipe
+    kernel: Kernel = field(init=False)
+    control: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        rows: Rows = self.recipe.chosen
+        source = emit(rows.equations, rows.integrator, ("sync_error",), width=self.recipe.width)
+        self.recipe.check(source)
+        self.kernel, self.control = load(source), rows.control.copy()
+
+    def cancel(self) -> None:
+        """End all cells that run in this process."""
+        self.control[CANCEL] = 1.0
+
+    def run(self, cells: np.ndarray, start: Start | None = None, near: np.ndarray | None = None) -> Buffers:
+        """Run these cells; they start as their rows say."""
+        plan: Plan = self.recipe.chosen.plan
+        rows = plan.start[cells], plan.numbers[cells], plan.spans[cells]
+        made = Buffers.empty(len(cells), plan.start.shape[1], room=0, samples=0)
+        self.kernel.drive(0, len(cells), *rows, self.control, *made.arrays())
+        return made
+
 
 @dataclass(slots=True)
 class Workshop:
@@ -103,11 +156,7 @@ class Workshop:
     def __post_init__(self) -> None:
         chosen, scene = self.recipe.chosen, self.recipe.chosen.scene
         source = kernel_source(scene, self.recipe.width, chosen)
-        if source.digest != self.recipe.digest:
-            raise RuntimeError(
-                f"this worker makes the kernel {source.digest[:12]}; expected that of the main program, "
-                f"{self.recipe.digest[:12]}: a sweep needs the same installation everywhere"
-            )
+        self.recipe.check(source)
         self.kernel = kernel(scene, self.recipe.width, chosen)
         self.planner = Planner(scene)
         limits = tolerances(scene, self.planner.extremes().numbers)
@@ -167,7 +216,7 @@ def run_block(key: str, recipe: bytes | None, *block: Any) -> Buffers | None:
     with _lock:
         shop = _shops.get(key)
         if shop is None and recipe is not None:
-            shop = _shops[key] = Workshop(Recipe.unpacked(recipe))
+            shop = _shops[key] = Recipe.unpacked(recipe).opened()
             while len(_shops) > KEPT:
                 _shops.popitem(last=False)
     return None if shop is None else shop.run(*block)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+import pickle
+from concurrent.futures import Executor, Future
 
 import numpy as np
 import pytest
@@ -10,6 +13,10 @@ import pytest
 from synchain.models import Scene, chain
 from synchain.runtime import Status
 from synchain.runtime.basin import Basin, basin
+from synchain.runtime.probe import Probe, universal_probe
+from synchain.runtime.threshold import Criterion
+
+basin_module = importlib.import_module("synchain.runtime.basin")
 
 FREE = Scene(oscillator="harmonic", topology=chain(2), parameters={"sigma": 0.0})
 DAMPED = Scene(oscillator="harmonic", topology=chain(3), coupling="damper", parameters={"sigma": 0.5})
@@ -136,3 +143,58 @@ def test_one_oscillator_and_half_a_sample_are_refused():
         basin(Scene(oscillator="harmonic", topology=chain(1)))
     with pytest.raises(TypeError, match=r"samples = 2\.5; expected a whole number"):
         basin(FREE, samples=2.5)
+
+
+class Elsewhere(Executor):
+    """An executor that is no kind of threads, so that a worker gets the packed recipe; it counts what it is given."""
+
+    def __init__(self) -> None:
+        self.given = 0
+
+    def submit(self, function, /, *arguments):
+        self.given += 1
+        future: Future = Future()
+        future.set_result(function(*pickle.loads(pickle.dumps(arguments))))
+        return future
+
+
+def starts(**more) -> Basin:
+    return basin(FREE, samples=40, tolerance=1.0, **SHORT, **more)
+
+
+def plane(**more) -> Probe:
+    short = Criterion(starts=5, transient=1.0, window=1.0)
+    return universal_probe(DAMPED, np.linspace(0.1, 1.0, 8), 0.1, criterion=short, **more)
+
+
+@pytest.mark.parametrize("found", [starts, plane])
+def test_starts_run_on_any_executor_and_tell_how_far_they_are(found):
+    here, elsewhere, seen = found(workers=1), Elsewhere(), []
+    there = found(workers=2, executor=elsewhere, progress=seen.append, show_progress=False)
+    assert elsewhere.given > 1
+    assert np.array_equal(here.error, there.error)
+    assert len(np.unique(here.error)) > 5
+    assert np.array_equal(here.status, there.status)
+    assert (seen[0].done, seen[-1].done, seen[-1].cells) == (0, 40, 40)
+
+
+@pytest.mark.parametrize("found", [starts, plane])
+def test_ctrl_c_ends_the_sweep(found):
+    def stop(progress):
+        if progress.done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        found(workers=1, progress=stop, show_progress=False)
+
+
+def test_the_mode_of_a_contact_is_no_random_number(monkeypatch):
+    """It follows from the velocities; what is not named starts as in the scene."""
+    stick = Scene(topology=chain(2), contact="set-valued", parameters={"theta_b": 0.1})
+    taken = {}
+    monkeypatch.setattr(basin_module, "run", lambda scene, **more: taken.update(scene=scene) or 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        basin(stick, samples=5)
+    assert [axis.name for axis in taken["scene"].axes] == ["x_1", "x_2", "v_1", "v_2"]
+    with pytest.raises(ValueError, match="unknown component 'slip'; known: x, v"):
+        basin(stick, ranges={"slip": (0, 1)})

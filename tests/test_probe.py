@@ -10,8 +10,7 @@ import sympy as sp
 
 from synchain.models import Scene, chain, from_matrix
 from synchain.models.equations import Edge, Equations, Node
-from synchain.runtime import Status, run
-from synchain.runtime import probe as module
+from synchain.runtime import Status, run, work
 from synchain.runtime.probe import MODE_ALPHA, MODE_BETA, ring_of_three, universal_probe
 from synchain.runtime.threshold import Criterion, probe
 
@@ -104,7 +103,7 @@ def test_a_one_way_ring_is_one_point_of_the_plane():
 
 def test_a_plane_needs_one_kernel_and_the_workers_do_not_matter(monkeypatch):
     loaded = []
-    monkeypatch.setattr(module, "load", lambda source, load=module.load: loaded.append(source.digest) or load(source))
+    monkeypatch.setattr(work, "load", lambda source, load=work.load: loaded.append(source.digest) or load(source))
     criterion = Criterion(transient=5, window=2, starts=3)
     alpha, beta = np.linspace(-0.5, 2.0, 30), np.linspace(-1.0, 1.0, 30)
     one, two = (universal_probe(SPRINGS, alpha, beta, criterion=criterion, workers=workers) for workers in (1, 2))
