@@ -109,14 +109,19 @@ def _load(source: KernelSource) -> Kernel:
         folder = open_folder(cache_folder())
         if not is_sound(folder, name):
             discard(folder, name)
-            count = f"{source.equations.n} oscillator{'s' * (source.equations.n != 1)}"
-            LOG.info("compiling a kernel for %s (%s), kept for later runs", count, source.integrator)
+            _tell(source, "kept for later runs")
         return _kept(source, name, folder)
     except (OSError, RuntimeError) as problem:  # RuntimeError: no home folder
         warnings.warn(f"kernels are not kept on disk: {problem}", RuntimeWarning, stacklevel=3)
+    _tell(source, "for this process alone")
     folder = Path(tempfile.mkdtemp(prefix="synchain-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return _compile(source, name, folder)
+
+
+def _tell(source: KernelSource, how: str) -> None:
+    n = source.equations.n
+    LOG.info("compiling a kernel for %d oscillator%s (%s), %s", n, "s" * (n != 1), source.integrator, how)
 
 
 def _kept(source: KernelSource, name: str, folder: Path) -> Kernel:
