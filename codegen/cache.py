@@ -14,7 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-__all__ = ["cache_folder", "clear", "describe", "discard", "is_sound", "open_folder", "seal", "write_whole"]
+__all__ = ["cache_folder", "clear", "describe", "discard", "has_code", "is_sound", "open_folder", "seal", "write_whole"]
 
 
 def cache_folder() -> Path:
@@ -76,6 +76,11 @@ def _checksum(files: list[Path]) -> str:
     for path in files:
         total.update(f"{path.name}\n".encode() + hashlib.sha256(path.read_bytes()).digest())
     return total.hexdigest()
+
+
+def has_code(folder: Path, name: str) -> bool:
+    """True where there is machine code of the kernel `name`."""
+    return bool(_machine_code(folder, name))
 
 
 def is_sound(folder: Path, name: str) -> bool:

@@ -30,7 +30,7 @@ from numba import types
 from synchain.models.equations import Equations
 
 from . import elementary, inner, lane_types, lanes
-from .cache import cache_folder, discard, is_sound, open_folder, seal, write_whole
+from .cache import cache_folder, discard, has_code, is_sound, open_folder, seal, write_whole
 from .emit import LARGEST_UNROLLED, KernelSource
 from .sparse import EMPTY, NAMES, program
 
@@ -109,6 +109,7 @@ def _load(source: KernelSource) -> Kernel:
         folder = open_folder(cache_folder())
         if not is_sound(folder, name):
             discard(folder, name)
+        if not has_code(folder, name):
             _tell(source, "kept for later runs")
         return _kept(source, name, folder)
     except (OSError, RuntimeError) as problem:  # RuntimeError: no home folder

@@ -38,7 +38,7 @@ def test_compiling_is_told_and_loading_is_not(tmp_path, monkeypatch, caplog):
         assert [record.getMessage() for record in caplog.records] == [
             "compiling a kernel for 2 oscillators (dop853), kept for later runs"
         ]
-        monkeypatch.setattr(loading, "is_sound", lambda *given: True)
+        monkeypatch.setattr(loading, "has_code", lambda *given: True)
         loading._load.__wrapped__(source)
         assert len(caplog.records) == 1
         monkeypatch.setattr(loading, "_compile", lambda *given: given)
