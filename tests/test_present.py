@@ -172,7 +172,7 @@ def test_tangent_equations_are_written_too() -> None:
         (sp.sin(A * X**2 - 1), "sin(a x² - 1)", r"\sin(ax^2 - 1)"),
         (3 * sp.pi * X / 7, "(3 π/7) x", r"\frac{3\pi}{7}x"),
         (sp.Max(X, 0), "Max(0, x)", r"\max(0, x)"),
-        (sp.Symbol("mass_left", real=True) * X, "mass_left x", r"\mathrm{mass}_{left}x"),
+        (sp.Symbol("mass_left", real=True) * X, "mass_left x", r"\mathrm{mass}_{\mathrm{left}}x"),
         (2 * 3**A, "2 3^(a)", r"2\cdot 3^a"),
     ],
 )

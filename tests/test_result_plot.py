@@ -43,7 +43,7 @@ def test_two_axes_make_a_map(pair: Callable[..., Result]) -> None:
     assert np.ma.getmaskarray(np.ma.masked_invalid(mesh.get_array())).sum() == 1
     assert (axes.get_xlabel(), axes.get_ylabel()) == (r"$\sigma$", r"$\omega$")
     first = result_plot.draw_result(result, kind="error")
-    assert words(first) == ["omega = 1; 1 of 6 cells failed and are left out"]
+    assert words(first) == [r"$\omega$ = 1; 1 of 6 cells failed and are left out"]
 
 
 def test_zipped_axes_run_along_the_first(pair: Callable[..., Result]) -> None:
