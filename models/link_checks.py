@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Any
 
 from .expect import instance, whole
 from .scene_checks import shown
@@ -16,21 +17,25 @@ def check_links(name: object, n: object, links: object) -> None:
     size = whole(f"{what}: n", n, -(10**18))
     if size < 1:
         raise ValueError(f"{what}: n = {size}; expected at least one node")
-    last = (-1, -1)
+    before = (-1, -1)
     for link in instance(f"{what}: links", links, tuple, "a tuple of (target, source, weight)"):
-        last = _check(what, size, link, last)
-
-
-def _check(what: str, n: int, link: object, last: tuple[int, int]) -> tuple[int, int]:
-    """The two nodes of a link that comes after `last`."""
-    match link:
-        case (int() as target, int() as source, weight):
-            pass
-        case _:
+        if not isinstance(link, tuple) or len(link) != 3:
             raise TypeError(f"{what}: found the link {shown(link)}; expected (target, source, weight)")
+        target, source, weight = link
+        sound = type(target) is int and type(source) is int and type(weight) is Fraction and weight
+        if not (sound and 0 <= target < size and 0 <= source < size and target != source and before < (target, source)):
+            _refuse(what, size, before, link)
+        before = (target, source)
+
+
+def _refuse(what: str, n: int, before: tuple[int, int], link: tuple[Any, Any, Any]) -> None:
+    """Raise TypeError or ValueError that says what is wrong with a link."""
+    target, source, weight = link
+    if not isinstance(target, int) or not isinstance(source, int):
+        raise TypeError(f"{what}: found the link {shown(link)}; expected (target, source, weight)")
     if not (0 <= target < n and 0 <= source < n) or target == source:
         raise ValueError(f"{what}: link {target} <- {source}; expected two different nodes of 0 … {n - 1}")
-    if (target, source) <= last:
+    if (target, source) <= before:
         raise ValueError(
             f"{what}: link {target} <- {source} is repeated or out of order; "
             "expected each pair once, sorted: add the weights up and sort"
@@ -40,4 +45,3 @@ def _check(what: str, n: int, link: object, last: tuple[int, int]) -> tuple[int,
             f"{what}: link {target} <- {source} has weight {weight!r}; "
             "expected a Fraction other than 0: leave the link out or give it a weight"
         )
-    return target, source
