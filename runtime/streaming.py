@@ -161,7 +161,7 @@ def _check_same(chosen: Skip, certified: bool, path: Path, told: Mapping[str, An
         )
     if (told["certificate"] is not None) != certified:
         found = "with" if told["certificate"] is not None else "without"
-        raise ValueError(f"{path} was run {found} certified (--certify); {again}")
+        raise ValueError(f"{path} was run {found} a certificate (certified, --certify); {again}")
 
 
 @dataclass(slots=True)

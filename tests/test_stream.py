@@ -339,7 +339,7 @@ def test_nothing_is_overwritten_silently(tmp_path):
     for options in ({}, {"resume": True}):
         with pytest.raises(ValueError, match="belongs to another scene"):
             stream(other, path, width=8, show_progress=False, **options)
-    with pytest.raises(ValueError, match="was run without --certify"):
+    with pytest.raises(ValueError, match="was run without a certificate"):
         stream(small, path, certified=True, show_progress=False)
     assert path.read_bytes() == before
     stream(other, path, overwrite=True, width=8, show_progress=False)
@@ -355,7 +355,7 @@ def test_an_unfinished_run_is_not_begun_again_silently(tmp_path, interruptible):
     with pytest.raises(SweepInterrupted):
         stream(MAP, path, show_progress=False, progress=interrupt_at(1))
     kept = partial(path).read_bytes()
-    with pytest.raises(FileExistsError, match="continue it with --resume"):
+    with pytest.raises(FileExistsError, match="continue it with resume"):
         stream(MAP, path, show_progress=False)
     with pytest.raises(ValueError, match="belongs to another scene"):
         stream(MAP.replace(rtol=1e-6), path, resume=True, show_progress=False)

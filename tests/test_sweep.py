@@ -81,7 +81,7 @@ def test_every_status_has_a_sentence():
 def test_section_room_grows_to_what_a_cell_needs(monkeypatch):
     whole = run(SECTIONS, sigma=[0.0, 0.1, 0.2])
     assert int(whole.section_count.min()) > 3
-    monkeypatch.setattr(work, "_room", lambda scene: 2)
+    monkeypatch.setattr(work, "_room", lambda *given: 2)
     grown = run(SECTIONS, sigma=[0.0, 0.1, 0.2])
     assert grown.data.identical(whole.data)
 
@@ -102,7 +102,7 @@ def test_continuation_starts_from_the_neighbour(direction):
 def test_continuation_keeps_its_states_where_room_grows(monkeypatch):
     scene = SECTIONS.replace(axes={"sigma": [0.02, 0.05, 0.08]}, continuation="up")
     whole = run(scene)
-    monkeypatch.setattr(work, "_room", lambda scene: 2)
+    monkeypatch.setattr(work, "_room", lambda *given: 2)
     assert run(scene).data.identical(whole.data)
 
 
