@@ -125,18 +125,21 @@ def basin(
         axes=(), zipped=False, continuation="none", record=("sync_error",), transient=transient, window=window,
         **parameters,
     )  # fmt: skip
-    box = _box(scene, ranges)
-    names = [f"{component}_{i + 1}" for component in box for i in scene.equations.holders(component)]
-    low, high = (
-        np.repeat([ends[k] for ends in box.values()], [len(scene.initial[name]) for name in box]) for k in (0, 1)
-    )
-    values = low + (high - low) * np.random.default_rng(seed).random((samples, len(names)))
-    cells = scene.replace(axes=dict(zip(names, values.T, strict=True)), zipped=True)
+    cells = _started(scene, _box(scene, ranges), samples, seed)
     chosen = replace(decide(cells, skip=False), jumps=True)
     result = run(cells, skip=chosen, workers=workers, executor=executor, show_progress=show_progress, progress=progress)
     status = result.status.values
     error = np.where(status == Status.FINISHED, result.sync_error.values, np.inf)
     return Basin(scene, tolerance, confidence, Planner(cells).rows(np.arange(samples)).start, error, status)
+
+
+def _started(scene: Scene, box: Mapping[str, Range], samples: int, seed: int) -> Scene:
+    """The scene with a cell for each random start."""
+    names = [f"{component}_{i + 1}" for component in box for i in scene.equations.holders(component)]
+    counts = [len(scene.initial[component]) for component in box]
+    low, high = (np.repeat([ends[k] for ends in box.values()], counts) for k in (0, 1))
+    values = low + (high - low) * np.random.default_rng(seed).random((samples, len(names)))
+    return scene.replace(axes=dict(zip(names, values.T, strict=True)), zipped=True)
 
 
 def _check(scene: Scene, samples: Any, tolerance: Any, confidence: Any, seed: Any) -> None:
