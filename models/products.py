@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .angle_sums import AngleSum
     from .equations import Link
 
-__all__ = ["cartesian", "complement", "kronecker", "union", "weighted"]
+__all__ = ["cartesian", "complement", "factors", "kronecker", "union", "weighted"]
 
 Listed: TypeAlias = "list[tuple[AngleSum, int]]"
 Closed: TypeAlias = "list[tuple[sp.Expr, int]] | None"
@@ -57,6 +57,14 @@ def kronecker(first: Topology, second: Topology) -> Topology:
     d, e = _degree(first), _degree(second)
     rule = None if d is None or e is None else partial(_products, first, second, (d, e))
     return _made(name, first.n * n, links, rule)
+
+
+def factors(graph: Topology) -> tuple[Topology, Topology] | None:
+    """The two graphs of which `cartesian` made a graph; None for any other."""
+    rule = graph.rule
+    if isinstance(rule, partial) and rule.func is _products and rule.args[2] is None:
+        return rule.args[0], rule.args[1]
+    return None
 
 
 def union(first: Topology, second: Topology) -> Topology:

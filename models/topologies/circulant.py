@@ -54,13 +54,26 @@ def spectrum(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> list[tuple[sp.Expr
     return [(expression(number), times) for number, times in merged(numbers)]
 
 
-def formula() -> ClosedForm:
-    """Sums of -4 sin²(ksπ/n) over the distances s = 1 and 2."""
-    from sympy import I, S, exp, pi, sin
+def formula(offsets: Any = (1, 2)) -> ClosedForm:
+    """Sums of -4 sin²(ksπ/n) over the distances s: whole numbers or letters, each below n/2."""
+    from itertools import combinations
 
-    from ..closed_forms import NODE, ClosedForm, K, N, Term
+    from sympy import Add, And, I, Integer, Ne, S, exp, pi, sin, true
 
-    value = -4 * sin(pi * K / N) ** 2 - 4 * sin(2 * pi * K / N) ** 2
+    from ..closed_forms import NODE, ClosedForm, K, N, Term, entries
+
+    chosen = tuple(dict.fromkeys(entries("offsets", offsets)))
+    if any(s == 0 or s in (N, K) for s in chosen):
+        raise ValueError(f"offsets = {offsets}; expected numbers from 1 and letters other than n and k")
+    value = Add(*(-4 * sin(pi * K * s / N) ** 2 for s in chosen))
     wave = exp(2 * pi * I * NODE * K / N)
-    note = "for the distances 1 and 2; each distance s adds -4 sin²(pi k s/n), half of it where s = n/2"
-    return ClosedForm((Term(value, S.One, ((K, S.Zero, N - 1),), wave),), least=5, note=note)
+    letters = any(s.is_Symbol for s in chosen)
+    limits = [2 * s < N for s in chosen] + [Ne(s, t) for s, t in combinations(chosen, 2)]
+    shown = "each below n/2" + ", no two equal" * letters
+    note = f"for the distances {', '.join(map(str, chosen))}, {shown}; a distance n/2 adds half of its -4 sin²"
+    least = max([1, *(int(s) for s in chosen if s.is_Integer)]) * 2 + 1
+    return ClosedForm(
+        (Term(value, S.One, ((K, S.Zero, N - 1),), wave),), options={"offsets": chosen}, least=1 if letters else least,
+        note=note, degree=Integer(2 * len(chosen)), where=And(*limits) if letters else true,
+        lowest={N: least},
+    )  # fmt: skip

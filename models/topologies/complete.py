@@ -35,8 +35,10 @@ def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
 
 def formula() -> ClosedForm:
     """0, -n."""
-    from sympy import S
+    from sympy import KroneckerDelta, S
 
-    from ..closed_forms import ClosedForm, N, Term
+    from ..closed_forms import NODE, ClosedForm, M, N, Term
 
-    return ClosedForm((Term(S.Zero, vector=S.One), Term(-N, N - 1)))
+    pairs = KroneckerDelta(NODE, 0) - KroneckerDelta(NODE, M)
+    terms = (Term(S.Zero, vector=S.One), Term(-N, N - 1, (), pairs, ((M, S.One, N - 1),)))
+    return ClosedForm(terms, degree=N - 1)

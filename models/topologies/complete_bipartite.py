@@ -52,10 +52,17 @@ def spectrum(n: int, *, left: int | None = None) -> list[tuple[sp.Expr, int]]:
 
 
 def formula() -> ClosedForm:
-    """0, -p, -q, -(p + q)."""
-    from sympy import S
+    """0, -p, -q, -(p + q); the first p nodes are one group."""
+    from sympy import KroneckerDelta, Piecewise, S
 
-    from ..closed_forms import ClosedForm, P, Q, Term
+    from ..closed_forms import NODE, ClosedForm, M, P, Q, Term
 
-    terms = (Term(S.Zero, vector=S.One), Term(-P, Q - 1), Term(-Q, P - 1), Term(-P - Q))
+    left = KroneckerDelta(NODE, 0) - KroneckerDelta(NODE, M)
+    right = KroneckerDelta(NODE, P) - KroneckerDelta(NODE, P + M)
+    terms = (
+        Term(S.Zero, vector=S.One),
+        Term(-P, Q - 1, (), right, ((M, S.One, Q - 1),)),
+        Term(-Q, P - 1, (), left, ((M, S.One, P - 1),)),
+        Term(-P - Q, vector=Piecewise((Q, NODE < P), (-P, True))),
+    )
     return ClosedForm(terms, P + Q, {"left": P}, note="p and q nodes in the two groups")

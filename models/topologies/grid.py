@@ -60,15 +60,13 @@ def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> list[tuple[sp.E
     return box(sizes, (False,) * len(sizes))
 
 
-def formula() -> ClosedForm:
-    """Sums of -4 sin² of each direction; node i is in row i // q and column i % q."""
-    from sympy import Mod, S, cos, floor, pi, sin
+def formula(shape: Any = ("p", "q")) -> ClosedForm:
+    """Sums of -4 sin² of each direction, of sizes that are letters or whole numbers; the last direction varies fastest."""
+    from dataclasses import replace
 
-    from ..closed_forms import NODE, ClosedForm, J, K, P, Q, Term
+    from ..closed_forms import entries
+    from ..closed_products import box, counters
+    from .chain import formula as one
 
-    value = -4 * sin(pi * J / (2 * P)) ** 2 - 4 * sin(pi * K / (2 * Q)) ** 2
-    wave = cos(pi * J * (2 * floor(NODE / Q) + 1) / (2 * P)) * cos(pi * K * (2 * Mod(NODE, Q) + 1) / (2 * Q))
-    term = Term(value, S.One, ((J, S.Zero, P - 1), (K, S.Zero, Q - 1)), wave)
-    return ClosedForm(
-        (term,), P * Q, {"shape": (P, Q)}, note="p rows and q columns; another direction adds its own -4 sin²"
-    )
+    sizes = entries("shape", shape)
+    return replace(box(one(), sizes, counters(sizes)), options={"shape": sizes})

@@ -63,9 +63,13 @@ def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
 
 
 def formula() -> ClosedForm:
-    """-2 k, C(d, k) times."""
-    from sympy import S, binomial
+    """-2 k, C(d, k) times, and the Walsh functions (J. L. Walsh, Am. J. Math. 45, 5, 1923) as eigenvectors."""
+    from sympy import Eq, Mod, Product, S, Sum, binomial, floor
 
-    from ..closed_forms import ClosedForm, D, K, Term
+    from ..closed_forms import NODE, ClosedForm, D, J, K, M, Term
 
-    return ClosedForm((Term(-2 * K, binomial(D, K), ((K, S.Zero, D),)),), 2**D, note="d dimensions")
+    both = Mod(floor(NODE / 2**J), 2) * Mod(floor(M / 2**J), 2)
+    digits = Eq(Sum(Mod(floor(M / 2**J), 2), (J, 0, D - 1)), K)
+    walsh = Product((-1) ** both, (J, 0, D - 1))
+    term = Term(-2 * K, binomial(D, K), ((K, S.Zero, D),), walsh, ((M, S.Zero, 2**D - 1),), digits)
+    return ClosedForm((term,), 2**D, note="d dimensions; m has k binary digits 1", degree=D)

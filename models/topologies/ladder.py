@@ -41,10 +41,12 @@ def spectrum(n: int) -> list[tuple[sp.Expr, int]] | None:
 
 
 def formula() -> ClosedForm:
-    """-4 sin²(kπ/2p), and 2 less."""
-    from sympy import S, pi, sin
+    """-4 sin²(kπ/2p), and 2 less; both rails move alike, or against each other."""
+    from sympy import S, cos, floor, pi, sin
 
-    from ..closed_forms import ClosedForm, K, P, Term
+    from ..closed_forms import NODE, ClosedForm, K, P, Term
 
-    wave, rungs = -4 * sin(pi * K / (2 * P)) ** 2, ((K, S.Zero, P - 1),)
-    return ClosedForm((Term(wave, S.One, rungs), Term(wave - 2, S.One, rungs)), 2 * P, note="p rungs")
+    value, rungs = -4 * sin(pi * K / (2 * P)) ** 2, ((K, S.Zero, P - 1),)
+    wave = cos(pi * K * (2 * floor(NODE / 2) + 1) / (2 * P))
+    terms = (Term(value, S.One, rungs, wave), Term(value - 2, S.One, rungs, (-1) ** NODE * wave))
+    return ClosedForm(terms, 2 * P, note="p rungs")

@@ -41,4 +41,4 @@ def formula() -> ClosedForm:
     from ..closed_forms import NODE, ClosedForm, K, N, Term
 
     value, wave = exp(2 * pi * I * K / N) - 1, exp(2 * pi * I * NODE * K / N)
-    return ClosedForm((Term(value, S.One, ((K, S.Zero, N - 1),), wave),), least=2)
+    return ClosedForm((Term(value, S.One, ((K, S.Zero, N - 1),), wave),), least=2, degree=S.One)

@@ -37,9 +37,10 @@ def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
 
 def formula() -> ClosedForm:
     """-4 sin²(kπ/n) and its wave."""
-    from sympy import I, S, exp, pi, sin
+    from sympy import I, Integer, S, exp, pi, sin
 
     from ..closed_forms import NODE, ClosedForm, K, N, Term
 
     wave = exp(2 * pi * I * NODE * K / N)
-    return ClosedForm((Term(-4 * sin(pi * K / N) ** 2, S.One, ((K, S.Zero, N - 1),), wave),), least=3)
+    term = Term(-4 * sin(pi * K / N) ** 2, S.One, ((K, S.Zero, N - 1),), wave)
+    return ClosedForm((term,), least=3, degree=Integer(2))

@@ -37,9 +37,11 @@ def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
 
 def formula() -> ClosedForm:
     """0, -1, -n."""
-    from sympy import KroneckerDelta, S
+    from sympy import Integer, KroneckerDelta, S
 
-    from ..closed_forms import NODE, ClosedForm, N, Term
+    from ..closed_forms import NODE, ClosedForm, M, N, Term
 
     hub = N * KroneckerDelta(NODE, 0) - 1
-    return ClosedForm((Term(S.Zero, vector=S.One), Term(S.NegativeOne, N - 2), Term(-N, vector=hub)), least=2)
+    leaves = KroneckerDelta(NODE, 1) - KroneckerDelta(NODE, M)
+    middle = Term(S.NegativeOne, N - 2, (), leaves, ((M, Integer(2), N - 1),))
+    return ClosedForm((Term(S.Zero, vector=S.One), middle, Term(-N, vector=hub)), least=2)

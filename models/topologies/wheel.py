@@ -41,10 +41,11 @@ def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
 
 def formula() -> ClosedForm:
     """0, -n, -1 - 4 sin²(kπ/(n - 1))."""
-    from sympy import KroneckerDelta, S, pi, sin
+    from sympy import I, KroneckerDelta, S, exp, pi, sin
 
     from ..closed_forms import NODE, ClosedForm, K, N, Term
 
-    rim = Term(-1 - 4 * sin(pi * K / (N - 1)) ** 2, S.One, ((K, S.One, N - 2),))
+    wave = (1 - KroneckerDelta(NODE, 0)) * exp(2 * pi * I * K * (NODE - 1) / (N - 1))
+    rim = Term(-1 - 4 * sin(pi * K / (N - 1)) ** 2, S.One, ((K, S.One, N - 2),), wave)
     hub = N * KroneckerDelta(NODE, 0) - 1
     return ClosedForm((Term(S.Zero, vector=S.One), Term(-N, vector=hub), rim), least=4)

@@ -16,7 +16,9 @@ EXAMPLES = (
     "synchain spectrum chain 4",
     "synchain spectrum star 6 --json",
     "synchain spectrum circulant 10 --option offsets=1,3",
-    "synchain spectrum chain --symbolic",
+    "synchain spectrum 'cartesian(chain(4), ring(5))'",
+    "synchain spectrum torus --symbolic --option shape=pxqxr",
+    "synchain spectrum 'cartesian(chain, star)' --symbolic",
     "synchain spectrum --matrix G.txt",
     "synchain spectrum --edges friends.txt",
     "synchain spectrum --graphml network.graphml",
@@ -30,7 +32,9 @@ PROVED = 500
 
 def configure(parser: ArgumentParser) -> None:
     """Add topology, size and options, or a file."""
-    parser.add_argument("topology", metavar="TOPOLOGY", nargs="?", help="a family of graphs (see: synchain topologies)")
+    parser.add_argument(
+        "topology", metavar="TOPOLOGY", nargs="?", help="a family of graphs (see: synchain topologies), or a product"
+    )
     parser.add_argument("n", metavar="N", nargs="?", type=whole, help="number of nodes")
     parser.add_argument(
         "--option", metavar="NAME=VALUE", action="append", default=[],
@@ -82,18 +86,22 @@ def execute(arguments: Namespace) -> int:
 def _symbolic(arguments: Namespace) -> int:
     """Print the closed form of a family with symbols for its size, or the spectrum of a matrix of letters."""
     from synchain.models.closed_forms import closed_form
+    from synchain.models.graph_text import is_composed, read_form
 
     if arguments.matrix is not None and arguments.topology is None:
         return _letters(arguments)
     given = [key for key in FILES if getattr(arguments, key) is not None]
-    if arguments.topology is None or arguments.n is not None or arguments.option or given:
-        raise WrongUse("--symbolic: expected a family alone, e.g. synchain spectrum chain --symbolic")
+    if arguments.topology is None or arguments.n is not None or given:
+        raise WrongUse("--symbolic: expected a family without its size, e.g. synchain spectrum chain --symbolic")
+    name, options = arguments.topology, _options(arguments.option)
+    if is_composed(name) and options:
+        raise WrongUse("--option: expected in the text of a product, e.g. 'cartesian(chain, torus(shape=(p, q)))'")
     with wrong_use():
-        found = closed_form(arguments.topology)
+        found = read_form(name) if is_composed(name) else closed_form(name, **options)
     if arguments.json:
-        print_json({"topology": arguments.topology, **found.as_dict()})
+        print_json({"topology": found.name, **found.as_dict()})
     else:
-        print(found.text(arguments.topology))
+        print(found.text)
     return FINE
 
 
@@ -120,6 +128,7 @@ def _letters(arguments: Namespace) -> int:
 def graph(arguments: Namespace) -> Topology:
     """The graph that the arguments ask for: of a family or of one of the files."""
     from synchain.models.graph_readers import read_edges, read_graphml
+    from synchain.models.graph_text import is_composed, read_graph
     from synchain.models.topology import read_matrix, topology
 
     files = [key for key in FILES if getattr(arguments, key) is not None]
@@ -135,6 +144,12 @@ def graph(arguments: Namespace) -> Topology:
         return read_edges(arguments.edges, directed=arguments.directed)
     if arguments.graphml is not None:
         return read_graphml(arguments.graphml)
+    if arguments.topology is not None and is_composed(arguments.topology):
+        if arguments.n is not None or arguments.option:
+            raise WrongUse(
+                "found a product with N or --option; expected both in its text: 'cartesian(chain(4), ring(5))'"
+            )
+        return read_graph(arguments.topology)
     if arguments.topology is None or arguments.n is None:
         files_text = ", ".join(f"--{key} FILE" for key in FILES)
         raise WrongUse(f"expected TOPOLOGY and N, e.g. synchain spectrum chain 4, or one of {files_text}")
