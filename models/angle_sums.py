@@ -20,7 +20,7 @@ from flint import arb, arb_poly, fmpq, fmpq_poly, fmpz_poly
 from . import angles
 from .balls import Ball, precision
 
-__all__ = ["AngleSum", "box", "expression", "merged", "minimal_polynomial", "read"]
+__all__ = ["AngleSum", "box", "expression", "folded_sum", "merged", "minimal_polynomial", "read"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +82,21 @@ class AngleSum:
         """The least m such that all angles are multiples of 2π/m."""
         return lcm(*(t.denominator for t, _ in self.terms))
 
+    def sign(self) -> int:
+        """-1, 0 or 1, decided exactly: by certified balls, and where these hold 0 by the cyclotomic polynomial."""
+        number = self.folded
+        if not number.terms:
+            return (number.shift > 0) - (number.shift < 0)
+        bits = 64
+        while True:
+            with precision(bits):
+                ball = _conjugate(number, 1, 1)
+                if ball > 0 or ball < 0:
+                    return 1 if ball > 0 else -1
+            if bits == 256 and number.vanishes():
+                return 0
+            bits *= 2
+
     def vanishes(self) -> bool:
         """True where the number is 0, decided exactly."""
         if not self.terms:
@@ -99,14 +114,20 @@ class AngleSum:
 
 def _collected(shift: Fraction, parts: Iterable[tuple[Fraction, Fraction]]) -> AngleSum:
     """Bring all angles into the first half turn, those with rational cosines into the shift, and add up."""
+    turns = [(turn, b) for turn, b in parts]
+    unit = lcm(*(turn.denominator for turn, _ in turns))
+    return folded_sum(shift, [(int(turn * unit) % unit, b) for turn, b in turns], unit)
+
+
+def folded_sum(shift: Fraction, parts: Iterable[tuple[int, Fraction]], unit: int) -> AngleSum:
+    """shift + Σ 2 b cos(2πr/unit) over (r, b), 0 <= r < unit."""
     counts: dict[Fraction, Fraction] = {}
-    for turn, b in parts:
-        t = turn % 1
-        t = min(t, 1 - t)
+    for r, b in parts:
+        t = Fraction(min(r, unit - r), unit)
         if t.denominator in _RATIONAL:
             shift += b * _RATIONAL[t.denominator]
         else:
-            counts[t] = counts.get(t, Fraction(0)) + b
+            counts[t] = counts[t] + b if t in counts else b
     return AngleSum(shift, tuple(sorted((t, b) for t, b in counts.items() if b)))
 
 

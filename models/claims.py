@@ -6,6 +6,8 @@ star n=3..12: 0, -1^(n-2), -n               # every n of a range
 torus 9 shape=3x3: 0, -3^4, -6^4            # options of the family: name=value, without blanks
 ring n=3..9: -4*sin(k*pi/n)**2 for k=0..n-1
 matrix G.txt: ~-3.414, -2, ~-0.586, 0       # ~: an approximation, right if it is the value rounded to its digits
+chain 1000000: largest = -4*cos(pi/(2*n))**2, distinct = n   # parts, of graphs of any size: see `part_claims`
+cartesian(chain(2), ring(5)): ratio < 10    # products and unions of families: see `graph_text`
 """
 
 from __future__ import annotations
@@ -13,29 +15,29 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 
 import sympy as sp
 
 from .angle_sums import AngleSum, expression
-from .angle_text import angle_number
+from .angle_text import angle_number, angle_wave
 from .exact_text import exact_number, whole_number
+from .graph_text import is_composed, read_graph
+from .part_claims import WORDS, Part, interval, is_part, read_part
 from .scene_checks import shown
 from .topology import Topology, read_matrix, topology
 
 __all__ = ["Claim", "Claimed", "read_claims"]
 
 LARGEST = 500
-"""Largest graph of a claim: above it, closed forms take long to prove."""
+"""Largest graph of a claim about all eigenvalues: above it, closed forms take long to prove."""
 
 BYTES, REPETITIONS = 1_000_000, 100_000
 _OPTIONS = r"((?:\s+[A-Za-z_]\w*=\S+)*)"
 _RANGE = re.compile(r"(\w+)\s+n\s*=\s*([0-9]{1,6})\s*\.\.\s*([0-9]{1,6})" + _OPTIONS)
-_ONE = re.compile(r"(\w+)\s+([0-9]{1,6})" + _OPTIONS)
+_ONE = re.compile(r"(\w+)\s+([0-9]{1,9})" + _OPTIONS)
 _FOR = re.compile(r"(.*\S)\s+for\s+([A-Za-z])\s*=\s*(.+?)\s*\.\.\s*(.+)")
-_ROUNDED = re.compile(r"~\s*([+-]?[0-9]{1,40}(?:\.[0-9]{1,60})?(?:[eE][+-]?[0-9]{1,3})?)")
 _FORMS = "expected 'chain 4: …', 'star n=3..12: …', 'torus 9 shape=3x3: …' or 'matrix FILE: …'"
 
 
@@ -55,6 +57,13 @@ class Claimed:
         return self.exact if self.angle is None else expression(self.angle.risen)
 
     @property
+    def sum(self) -> AngleSum | None:
+        """The number as a sum of cosines; None where it is not read as one."""
+        if self.exact is not None and self.exact.is_Rational:
+            return AngleSum.rational(Fraction(int(self.exact.p), int(self.exact.q)))
+        return self.angle
+
+    @property
     def words(self) -> str:
         """The number as a sentence names it."""
         return self.text if self.angle is None else sp.sstr(self.number)
@@ -62,13 +71,14 @@ class Claimed:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """The claimed spectrum of one graph; `n` is the size where the line is about a range of sizes, else None."""
+    """The claimed spectrum of one graph, or parts of it; `n` is the size where the line has a range of sizes, else None."""
 
     line: int
     text: str
     graph: Topology
     numbers: tuple[Claimed, ...]
     n: int | None = None
+    parts: tuple[Part, ...] = ()
 
 
 def read_claims(path: str | Path) -> list[tuple[Claim, ...]]:
@@ -104,42 +114,50 @@ def _line(number: int, text: str, folder: Path) -> tuple[Claim, ...]:
     head, colon, listed = (part.strip() for part in text.rpartition(":"))
     if not colon or not head:
         raise ValueError(f"found {shown(text)}; {_FORMS}")
-    if head.split()[0] == "matrix":
-        return (Claim(number, text, _small(read_matrix(folder / head[6:].strip())), _numbers(listed, {})),)
     one, many = _ONE.fullmatch(head), _RANGE.fullmatch(head)
-    if one:
-        size = int(one[2])
-        return (Claim(number, text, _small(_family(one[1], size, one[3])), _numbers(listed, {"n": size})),)
-    if not many:
+    largest = None if is_part(listed) else LARGEST
+    if many:
+        low, high = int(many[2]), int(many[3])
+        if not low <= high <= LARGEST:
+            raise ValueError(f"found n = {low} … {high}; expected a range that rises and ends at {LARGEST} or before")
+        return tuple(_claim(number, text, _family(many[1], n, many[4], None), listed, n) for n in range(low, high + 1))
+    if head.split()[0] == "matrix":
+        graph = read_matrix(folder / head[6:].strip())
+    elif is_composed(head):
+        graph = read_graph(head, largest)
+    elif one:
+        graph = _family(one[1], int(one[2]), one[3], largest)
+    else:
         raise ValueError(f"found {shown(head)} before the colon; {_FORMS}")
-    low, high = int(many[2]), int(many[3])
-    if not low <= high <= LARGEST:
-        raise ValueError(f"found n = {low} … {high}; expected a range that rises and ends at {LARGEST} or before")
-    return tuple(
-        Claim(number, text, _family(many[1], n, many[4]), _numbers(listed, {"n": n}), n) for n in range(low, high + 1)
-    )
+    if largest is not None and graph.n > largest:
+        raise ValueError(
+            f"{graph.name} has {graph.n} nodes; expected at most {largest}; spectra are proved up to there"
+        )
+    return (_claim(number, text, graph, listed),)
 
 
-def _family(name: str, n: int, written: str) -> Topology:
+def _claim(number: int, text: str, graph: Topology, listed: str, n: int | None = None) -> Claim:
+    """The claim of a line for one graph; the letter n has its size, but for a matrix."""
+    values = {} if text.startswith("matrix") else {"n": graph.n}
+    if is_part(listed):
+        parts = tuple(read_part(part, values) for part in _split(listed, ","))
+        return Claim(number, text, graph, (), n, parts)
+    return Claim(number, text, graph, _numbers(listed, values), n)
+
+
+def _family(name: str, n: int, written: str, largest: int | None) -> Topology:
     options: dict[str, str] = {}
     for word in written.split():
         key, _, value = word.partition("=")
         if key in options:
             raise ValueError(f"option {key} is given twice; expected it once")
         options[key] = value
-    if n > LARGEST:
+    if largest is not None and n > largest:
         raise ValueError(
-            f"{name} {n}: expected at most {LARGEST} nodes; claims about larger graphs are not proved here"
+            f"{name} {n}: expected at most {largest} nodes; claims about all eigenvalues of larger graphs are not proved "
+            f"here, but those about parts of them: {', '.join(WORDS)}"
         )
     return topology(name, n, **options)
-
-
-def _small(graph: Topology) -> Topology:
-    if graph.n > LARGEST:
-        raise ValueError(
-            f"{graph.name} has {graph.n} nodes; expected at most {LARGEST}; spectra are proved up to there"
-        )
-    return graph
 
 
 def _numbers(listed: str, values: dict[str, int]) -> tuple[Claimed, ...]:
@@ -174,8 +192,7 @@ def _entry(part: str, values: dict[str, int]) -> Iterator[Claimed]:
             raise ValueError(
                 f"{shown(part)}: found {high - low + 1} values of {letter}; expected at most {LARGEST + 1}"
             )
-        for k in range(low, high + 1):
-            yield from _entry(body, {**values, letter: k})
+        yield from _each(body, values, letter, range(low, high + 1))
         return
     pieces = list(_split(part, "^"))
     if len(pieces) > 2:
@@ -189,6 +206,16 @@ def _entry(part: str, values: dict[str, int]) -> Iterator[Claimed]:
         yield _number(pieces[0], count, values)
 
 
+def _each(body: str, values: dict[str, int], letter: str, places: range) -> Iterator[Claimed]:
+    """An entry for each value of a letter; sums of cosines without a multiplicity are read once for all."""
+    wave = angle_wave(body, values, letter) if places else None
+    if wave is None:
+        for k in places:
+            yield from _entry(body, {**values, letter: k})
+    else:
+        yield from (Claimed(body, 1, angle=number) for number in wave.at(places[0], places[-1]))
+
+
 def _where(values: dict[str, int]) -> str:
     return f" for {', '.join(f'{name} = {value}' for name, value in values.items())}" if values else ""
 
@@ -200,9 +227,4 @@ def _number(text: str, count: int, values: dict[str, int]) -> Claimed:
             return Claimed(text, count, angle=angle)
         exact = exact_number(text, values)
         return Claimed(text if exact.is_Rational is False and not values else sp.sstr(exact), count, exact=exact)
-    rounded = _ROUNDED.fullmatch(text)
-    if not rounded:
-        raise ValueError(f"unreadable approximation {shown(text)}; expected ~ and a real decimal, e.g. ~-3.414")
-    value = Decimal(rounded[1])
-    half = Fraction(10) ** int(value.as_tuple().exponent) / 2
-    return Claimed(text, count, interval=(Fraction(value) - half, Fraction(value) + half))
+    return Claimed(text, count, interval=interval(text))

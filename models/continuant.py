@@ -1,20 +1,24 @@
-"""Characteristic polynomials of chains and rings in their natural order, by a recurrence instead of a dense matrix.
+"""Characteristic polynomials of chains and rings in their natural order, by transfer matrices instead of a dense matrix.
 
-det(z - G) of a tridiagonal matrix obeys K_j = (z - a_j) K_(j-1) - b_(j-1) c_(j-1) K_(j-2); entries in the two corners add
-three terms (F. R. Gantmacher, M. G. Krein, Oscillation Matrices and Kernels, AMS Chelsea, 2002, chapter II).  n = 500 takes
-milliseconds where the dense matrix takes a second.
+det(z - G) of a tridiagonal matrix obeys K_j = (z - a_j) K_(j-1) - b_(j-1) c_(j-1) K_(j-2); with entries in the two corners
+it is the trace of the product of the transfer matrices less two products (F. R. Gantmacher, M. G. Krein, Oscillation
+Matrices and Kernels, AMS Chelsea, 2002, chapter II; L. G. Molinari, Linear Algebra Appl. 429, 2221, 2008).  Multiplied in
+pairs, n = 500 takes milliseconds where the dense matrix takes a second.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import prod
+from typing import Any
 
 from flint import fmpz_poly
 
 __all__ = ["banded", "cyclic"]
 
 Entries = Mapping[tuple[int, int], int]
+Transfer = tuple[Any, Any, Any, Any]
+"""A 2 x 2 matrix of polynomials, row by row."""
 
 
 def banded(n: int, entries: Entries) -> bool:
@@ -22,24 +26,30 @@ def banded(n: int, entries: Entries) -> bool:
     return n >= 3 and all(abs(i - j) in (0, 1, n - 1) for i, j in entries)
 
 
-def cyclic(n: int, entries: Entries) -> fmpz_poly:
-    """The characteristic polynomial of such a matrix of whole numbers."""
+def cyclic(n: int, entries: Entries, polynomial: Callable[[list[int]], Any] = fmpz_poly) -> Any:
+    """The characteristic polynomial of such a matrix of whole numbers; `polynomial` makes one from its coefficients."""
 
     def at(i: int, j: int) -> int:
-        return entries.get((i, j), 0)
+        return entries.get((i % n, j % n), 0)
 
-    corner, other = at(0, n - 1), at(n - 1, 0)
-    found = _continuant(entries, range(n))
-    if corner * other:
-        found -= corner * other * _continuant(entries, range(1, n - 1))
-    down = corner * prod(at(i + 1, i) for i in range(n - 1))
-    up = other * prod(at(i, i + 1) for i in range(n - 1))
-    return found - (down + up)
+    one, zero = polynomial([1]), polynomial([0])
+    steps: list[Transfer] = [
+        (polynomial([-at(j, j), 1]), polynomial([-at(j - 1, j) * at(j, j - 1)]), one, zero) for j in range(n)
+    ]
+    whole = _product(steps)
+    down, up = prod(at(i, i - 1) for i in range(n)), prod(at(i - 1, i) for i in range(n))
+    return whole[0] + whole[3] - polynomial([down + up])
 
 
-def _continuant(entries: Entries, nodes: range) -> fmpz_poly:
-    before, last = fmpz_poly([0]), fmpz_poly([1])
-    for j in nodes:
-        both = entries.get((j - 1, j), 0) * entries.get((j, j - 1), 0) if j > nodes.start else 0
-        before, last = last, last * fmpz_poly([-entries.get((j, j), 0), 1]) - both * before
-    return last
+def _product(steps: list[Transfer]) -> Transfer:
+    """The last times … times the first, neighbours multiplied first: long factors meet only near the end."""
+    while len(steps) > 1:
+        odd = steps[-1:] if len(steps) % 2 else []
+        steps = [_times(b, a) for a, b in zip(steps[::2], steps[1::2], strict=False)] + odd
+    return steps[0]
+
+
+def _times(x: Transfer, y: Transfer) -> Transfer:
+    a, b, c, d = x
+    e, f, g, h = y
+    return a * e + b * g, a * f + b * h, c * e + d * g, c * f + d * h

@@ -19,7 +19,7 @@ from flint import acb, arb
 from .algebraic import ComplexRoot, RealRoot
 from .balls import Ball, enclose, precision
 
-__all__ = ["Number", "check_size", "equal"]
+__all__ = ["Number", "check_size", "equal", "sign"]
 
 Number: TypeAlias = sp.Expr | RealRoot | ComplexRoot
 """Rationals, roots, I, sin and cos of rational multiples of pi, exp of those of I*pi and what is made of them."""
@@ -49,36 +49,67 @@ def equal(a: Number, b: Number) -> bool:
     """
     if a is b or (isinstance(a, sp.Expr) and isinstance(b, sp.Expr) and a == b):
         return True
+    return _compared((a,), (b,)) == 0
+
+
+def sign(a: tuple[Number, ...], b: tuple[Number, ...]) -> int:
+    """The sign of one product of real algebraic numbers less another: 0 where they are equal, without any tolerance.
+
+    Raises ValueError and TypeError as `equal`.
+    """
+    gap = _compared(a, b)
+    if isinstance(gap, acb) and not gap.imag.contains(0):
+        raise ValueError(f"{_shown(a[0])} or {_shown(b[0])} is complex; expected real numbers")
+    return 0 if gap == 0 else 1 if gap.real > 0 else -1
+
+
+def _compared(a: tuple[Number, ...], b: tuple[Number, ...]) -> Ball:
+    """A ball around the difference of two products that does not hold 0, or 0 where they are equal."""
     needed = _bits((a, b))
     bits = 64
     while True:
         with precision(bits):
-            gap = abs(acb(_ball(a, bits)) - acb(_ball(b, bits)))
-            if gap.lower() > 0:
-                return False
-            if gap.upper() < arb(2) ** (-needed):
-                return True
+            gap = _product_ball(a, bits) - _product_ball(b, bits)
+            if abs(gap).lower() > 0:
+                return gap
+            if abs(gap).upper() < arb(2) ** (-needed):
+                return 0
         if bits > 4 * MOST_BITS:
-            raise ValueError(f"{_shown(a)} and {_shown(b)} cannot be told apart at {bits} bits; write them simpler")
+            raise ValueError(
+                f"{_shown(a[0])} and {_shown(b[0])} cannot be told apart at {bits} bits; write them simpler"
+            )
         bits = min(4 * bits, 2 * bits + needed)
+
+
+def _product_ball(factors: tuple[Number, ...], bits: int) -> acb:
+    found = acb(1)
+    for factor in factors:
+        found = found * acb(_ball(factor, bits))
+    return found
 
 
 def check_size(number: sp.Expr) -> None:
     """Raise ValueError where a number is too involved to be compared, TypeError where it is of another kind."""
-    _bits((number,))
+    _bits(((number,),))
 
 
-def _bits(numbers: tuple[Number, ...]) -> int:
-    """So many bits that a sum or difference of these numbers below 2**-bits is 0."""
+def _bits(products: tuple[tuple[Number, ...], ...]) -> int:
+    """So many bits that a sum or difference of these products below 2**-bits is 0."""
     generated = _Field()
-    up, low = _sum([_measure(x, generated) for x in numbers])
+    up, low = _sum([_measured(factors, generated) for factors in products])
     needed = (generated.degree - 1) * up + low
     if needed > MOST_BITS:
         raise ValueError(
-            f"{_shown(numbers[0])} needs {needed:.3g} bits to be compared exactly; expected at most {MOST_BITS}; "
+            f"{_shown(products[0][0])} needs {needed:.3g} bits to be compared exactly; expected at most {MOST_BITS}; "
             "write it simpler, or as an approximation such as ~-3.414"
         )
     return math.ceil(needed * (1 + 1e-9)) + 8
+
+
+def _measured(factors: tuple[Number, ...], generated: _Field) -> tuple[float, float]:
+    """(log2 u, log2 l) of a product."""
+    parts = [_measure(x, generated) for x in factors]
+    return sum(up for up, _ in parts), sum(low for _, low in parts)
 
 
 def _measure(x: Number, generated: _Field) -> tuple[float, float]:

@@ -109,15 +109,7 @@ class Spectrum:
         """The eigenvalue of largest modulus; of several, the first in the order of the spectrum."""
         if isinstance(self.eigenvalues, Descending):  # all real, none positive
             return self.eigenvalues[-1].exact
-        near = max(abs(value) for value in self.values) * (1 - 1e-12)
-        best, bits = [e for e in self.eigenvalues if abs(e.value) >= near], 64
-        while len(best) > 1 and bits <= 1024:
-            with precision(bits + 64):
-                sizes = [abs(e.enclosure(bits)) for e in best]
-                top = reduce(lambda a, b: b if b > a else a, sizes)
-                best = [e for e, size in zip(best, sizes, strict=True) if not size < top]
-            bits *= 4
-        return best[0].exact
+        return _farthest(self.eigenvalues, 1)
 
     @property
     def slowest(self) -> sp.Expr:
@@ -126,8 +118,7 @@ class Spectrum:
         others = self.eigenvalues[1:2] if lazy else self.nonzero
         if not others:
             raise ValueError("all eigenvalues are 0; expected a graph with links")
-        least = min(abs(e.value) for e in others) * (1 + 1e-12)
-        return next(e.exact for e in others if abs(e.value) <= least)
+        return others[0].exact if lazy else _farthest(others, -1)
 
     def evaluate(self, digits: int) -> tuple[sp.Expr, ...]:
         """The distinct eigenvalues as SymPy Floats, each within one unit of the last of `digits` digits."""
@@ -152,6 +143,20 @@ class Spectrum:
         shown = [f"{e}: {e.multiplicity}" for e in (self.eigenvalues[: SHOWN - 1] if many else self.eigenvalues)]
         last = [f"… ({len(self) - SHOWN} more)", f"{self[-1]}: {self[-1].multiplicity}"] if many else []
         return "{" + ", ".join(shown + last) + "}"
+
+
+def _farthest(eigenvalues: Sequence[Eigenvalue], way: int) -> sp.Expr:
+    """The eigenvalue of largest modulus, of smallest where `way` is -1; the first of those that 1024 bits hold equal."""
+    top = max(way * abs(e.value) for e in eigenvalues)
+    bound = top - 1e-12 * abs(top)
+    best, bits = [e for e in eigenvalues if way * abs(e.value) >= bound], 64
+    while len(best) > 1 and bits <= 1024:
+        with precision(bits + 64):
+            sizes = [way * abs(e.enclosure(bits)) for e in best]
+            first = reduce(lambda a, b: b if b > a else a, sizes)
+            best = [e for e, size in zip(best, sizes, strict=True) if not size < first]
+        bits *= 4
+    return best[0].exact
 
 
 @lru_cache(maxsize=32)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from decimal import Decimal, localcontext
-from fractions import Fraction
 
 import sympy as sp
 from flint import acb, arb, fmpq
@@ -14,19 +12,23 @@ from .algebraic import ComplexRoot, RealRoot
 from .angle_sums import AngleSum, read
 from .balls import enclose, precision
 from .claims import Claim, Claimed
+from .conjugates import multiplied
+from .eigenvalue_words import entry, times, words
+from .part_verdict import judged
 from .separation import equal
-from .spectrum import Eigenvalue, spectrum
+from .spectrum import Eigenvalue, characteristic, spectrum
 
 __all__ = ["Verdict", "verify"]
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What is wrong with a claim, in sentences, and the eigenvalues of its graph."""
+    """What is wrong with a claim, in sentences; `proved` is False where a closed form was believed, not multiplied out."""
 
     claim: Claim
     problems: tuple[str, ...]
-    eigenvalues: Sequence[Eigenvalue]
+    proved: bool = True
+    parts: str = ""
 
     @property
     def right(self) -> bool:
@@ -34,9 +36,14 @@ class Verdict:
         return not self.problems
 
     @property
+    def eigenvalues(self) -> Sequence[Eigenvalue]:
+        """The eigenvalues of the graph."""
+        return spectrum(self.claim.graph, prove=bool(self.problems)).eigenvalues
+
+    @property
     def expected(self) -> str:
-        """The spectrum of the graph in the words of a claims file."""
-        return ", ".join(_entry(e) for e in self.eigenvalues)
+        """What would be right, in the words of a claims file."""
+        return self.parts or ", ".join(entry(e) for e in self.eigenvalues)
 
 
 def verify(claim: Claim) -> Verdict:
@@ -44,6 +51,24 @@ def verify(claim: Claim) -> Verdict:
 
     Raises ValueError where a number is too involved to be compared, ProofError where the proof of the spectrum fails.
     """
+    if claim.parts:
+        return Verdict(claim, *judged(claim))
+    if _multiplies_out(claim):
+        return Verdict(claim, ())
+    return Verdict(claim, _compared(claim))
+
+
+def _multiplies_out(claim: Claim) -> bool:
+    """True where the claimed numbers themselves multiply to the characteristic polynomial; False where that is not seen."""
+    numbers = [(claimed.sum, claimed.count) for claimed in claim.numbers]
+    if sum(count for _, count in numbers) != claim.graph.n:
+        return False
+    known = [(number, count) for number, count in numbers if number is not None]
+    return len(known) == len(numbers) and multiplied(known) == characteristic(claim.graph)
+
+
+def _compared(claim: Claim) -> tuple[str, ...]:
+    """What is wrong with a claim, number by number."""
     found = spectrum(claim.graph, prove=True).eigenvalues
     tally, problems = [0] * len(found), []
     known = _angles(found) if any(c.angle is not None for c in claim.numbers) else {}
@@ -55,18 +80,18 @@ def verify(claim: Claim) -> Verdict:
             place = _find(claimed.number, found, middles)
             if place is None:
                 near = found[_nearest(_middle(claimed.number), middles)]
-                problems.append(f"claimed {claimed.words}: no eigenvalue; the nearest is {_words(near)}")
+                problems.append(f"claimed {claimed.words}: no eigenvalue; the nearest is {words(near)}")
         if place is not None:
             tally[place] += claimed.count
     exact = tuple(tally)
     problems += _assign([c for c in claim.numbers if c.interval is not None], found, tally)
     for e, before, count in zip(found, exact, tally, strict=True):
         if count == 0:
-            problems.append(f"not claimed: {_words(e)}, {_times(e.multiplicity)}")
+            problems.append(f"not claimed: {words(e)}, {times(e.multiplicity)}")
         elif count != e.multiplicity:
             how = "claimed" if before else "claimed (approximately)"
-            problems.append(f"{how} {_words(e)} {_times(count)}; it occurs {_times(e.multiplicity)}")
-    return Verdict(claim, tuple(problems), found)
+            problems.append(f"{how} {words(e)} {times(count)}; it occurs {times(e.multiplicity)}")
+    return tuple(problems)
 
 
 def _angles(found: Sequence[Eigenvalue]) -> dict[AngleSum, int]:
@@ -122,9 +147,9 @@ def _assign(claims: Sequence[Claimed], found: Sequence[Eigenvalue], tally: list[
             left -= taken
         if not inside:
             near = found[min(rising, key=lambda i: abs(found[i].value.real - _centre(claimed)))] if rising else found[0]
-            problems.append(f"claimed {claimed.text}: no eigenvalue rounds to it; the nearest is {_words(near)}")
+            problems.append(f"claimed {claimed.text}: no eigenvalue rounds to it; the nearest is {words(near)}")
         elif left:
-            problems.append(f"claimed {claimed.text} {_times(left)} more than eigenvalues are left that round to it")
+            problems.append(f"claimed {claimed.text} {times(left)} more than eigenvalues are left that round to it")
     return problems
 
 
@@ -147,35 +172,3 @@ def _rounds_to(e: Eigenvalue, claimed: Claimed) -> bool:
             if ball < below or ball > above:
                 return False
     return equal(e.number, low) or equal(e.number, high)
-
-
-def _entry(e: Eigenvalue) -> str:
-    """An eigenvalue in the words of a claims file; decimals where no short exact form is known."""
-    text = e.text
-    if isinstance(e.number, RealRoot):
-        text = f"~{_rounded(e)}"
-    elif isinstance(e.number, ComplexRoot):
-        text = f"({e.evaluate(12)})"
-    return text if e.multiplicity == 1 else f"{text}^{e.multiplicity}"
-
-
-def _rounded(e: Eigenvalue, digits: int = 12) -> str:
-    """A real eigenvalue rounded to so many digits, each of them right."""
-    mantissa, exponent = e.enclosure(256).mid().man_exp()
-    value = Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
-    with localcontext() as context:
-        context.prec = digits
-        return str(Decimal(value.numerator) / Decimal(value.denominator))
-
-
-def _words(e: Eigenvalue) -> str:
-    if isinstance(e.number, (RealRoot, ComplexRoot)):
-        value = _rounded(e) if isinstance(e.number, RealRoot) else e.evaluate(12)
-        return f"{value} (a root of degree {len(e.number.polynomial) - 1})"
-    if e.number.is_Rational:
-        return e.text
-    return f"{e.text} = {e.evaluate(12) if isinstance(e.value, complex) else _rounded(e)}"
-
-
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"

@@ -288,7 +288,8 @@ def test_exit_codes_and_forms(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert (found["right"], found["wrong"]) == (1, 1)
     assert [(c["line"], c["right"], len(c["graphs"])) for c in found["claims"]] == [(2, True, 1), (4, False, 7)]
     assert found["claims"][1]["graphs"][2] == {
-        "topology": "star", "n": 5, "options": {}, "right": True, "problems": [], "expected": "0, -1^3, -5"
+        "topology": "star", "n": 5, "options": {}, "right": True, "proved": True, "problems": [],
+        "expected": "0, -1^3, -5"
     }  # fmt: skip
     suites = ElementTree.parse(report).getroot()
     cases = suites.findall("testsuite/testcase")

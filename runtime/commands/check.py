@@ -77,6 +77,8 @@ def _print(arguments: Namespace, found: Sequence[Sequence[Verdict]], wrong: int)
 def _name(line: Sequence[Verdict]) -> str:
     """The graphs of a line."""
     first, last = line[0].claim, line[-1].claim
+    if "(" in first.graph.name and first.n is None:
+        return first.graph.name
     sizes = f"n = {first.n} … {last.n}" if first.n is not None else str(first.graph.n)
     chosen = "".join(f" {key}={_option(value)}" for key, value in first.graph.options)
     return f"{first.graph.name} {sizes}{chosen}"
@@ -88,7 +90,8 @@ def _option(value: object) -> str:
 
 def _report(line: Sequence[Verdict]) -> list[str]:
     wrong = [v for v in line if not v.right]
-    return [f"line {line[0].claim.line}: {_name(line)}: {'WRONG' if wrong else 'right'}", *_problems(line)]
+    believed = "" if all(v.proved for v in line) else " (closed form, not multiplied out)"
+    return [f"line {line[0].claim.line}: {_name(line)}: {'WRONG' if wrong else 'right'}{believed}", *_problems(line)]
 
 
 def _problems(line: Sequence[Verdict]) -> list[str]:
@@ -107,7 +110,7 @@ def _problems(line: Sequence[Verdict]) -> list[str]:
 def _as_dict(line: Sequence[Verdict]) -> dict[str, Any]:
     graphs = [
         {"topology": v.claim.graph.name, "n": v.claim.graph.n, "options": dict(v.claim.graph.options),
-         "right": v.right, "problems": list(v.problems),
+         "right": v.right, "proved": v.proved, "problems": list(v.problems),
          "expected": v.expected}
         for v in line
     ]  # fmt: skip
