@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
 from math import lcm
-from typing import Any, overload
+from typing import Any, Literal, overload
 
 import sympy as sp
 from flint import fmpq, fmpq_poly, fmpz_mat
@@ -23,6 +23,7 @@ from .descending import Descending
 from .eigenvalue import Eigenvalue, ordered
 from .expect import instance
 from .jordan import blocks, semisimple
+from .modular import check_modulo
 from .proof import ProofError, check, minimal_polynomial
 from .radicals import written
 from .spectrum_table import table
@@ -32,6 +33,9 @@ __all__ = ["Eigenvalue", "ProofError", "Spectrum", "characteristic", "spectrum",
 
 PROOF_LIMIT = 200
 """Up to so many nodes a closed form is proved when it is made; above only on request."""
+
+CHECK_LIMIT = 400
+"""Up to so many nodes it is multiplied out modulo primes, which takes less than half a second."""
 
 DENSE_LIMIT = 1000
 """Largest matrix without a closed form."""
@@ -45,12 +49,14 @@ class Spectrum:
     """The distinct eigenvalues from 0 downwards by real part, conjugates side by side.
 
     `verified` is True where the product of (z - γ)^multiplicity was multiplied out and found equal to the
-    exact characteristic polynomial; False says that nobody looked (a closed form above PROOF_LIMIT nodes).  There
-    `eigenvalues` of a chain or ring are made one by one as they are asked for; elsewhere they are a tuple.
+    exact characteristic polynomial; False says that nobody did (a closed form of a large graph).  There
+    `eigenvalues` of a chain or ring are made one by one as they are asked for; elsewhere they are a tuple.  `chance` is
+    not None where the two were found equal modulo large primes: about the chance that this misses a difference.
     """
 
     eigenvalues: Sequence[Eigenvalue]
     verified: bool = False
+    chance: float | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.eigenvalues, Descending):
@@ -136,7 +142,7 @@ class Spectrum:
             }
             for e in self.eigenvalues
         ]
-        return {"n": self.n, "eigenvalues": listed, "verified": self.verified}
+        return {"n": self.n, "eigenvalues": listed, "verified": self.verified, "chance": self.chance}
 
     def __repr__(self) -> str:
         many = len(self) > SHOWN
@@ -160,18 +166,18 @@ def _farthest(eigenvalues: Sequence[Eigenvalue], way: int) -> sp.Expr:
 
 
 @lru_cache(maxsize=32)
-def spectrum(graph: Topology, prove: bool | None = None) -> Spectrum:
+def spectrum(graph: Topology, prove: bool | Literal["primes"] | None = None) -> Spectrum:
     """The exact spectrum of a graph's connectivity matrix.
 
-    It proves itself; a closed form with more than PROOF_LIMIT nodes does so only where `prove` is True.
+    It proves itself; a closed form with more than PROOF_LIMIT nodes does so only where `prove` is True.  Up to CHECK_LIMIT
+    nodes, and where `prove` is "primes", it is multiplied out modulo three large primes instead (1000 nodes: seconds).
     Raises ProofError where the proof fails, ValueError on more than DENSE_LIMIT nodes without a closed form.
     """
     listed = _closed_form(graph)
-    if listed is not None and not (graph.n <= PROOF_LIMIT if prove is None else prove):
-        if isinstance(listed, Descending):
-            return Spectrum(Descending(len(listed), listed.n, lambda k: _claim(listed[k], True)))
-        simple = semisimple(graph)
-        return Spectrum(ordered([_claim(pair, simple) for pair in listed]))
+    if prove is None:
+        prove = graph.n <= PROOF_LIMIT or ("primes" if graph.n <= CHECK_LIMIT else False)
+    if listed is not None and prove is not True:
+        return _believed(graph, listed, check_modulo(graph, listed) if prove == "primes" else None)
     if listed is None and graph.n > DENSE_LIMIT:
         raise ValueError(
             f"topology {graph.name}: n = {graph.n} without a closed form; expected at most {DENSE_LIMIT} "
@@ -212,6 +218,14 @@ def _closed_form(graph: Topology) -> Sequence[tuple[sp.Expr, int]] | None:
     except ValueError:
         return None
     return made.rule() if made.rule is not None and made.links == graph.links else None
+
+
+def _believed(graph: Topology, listed: Sequence[tuple[sp.Expr, int]], chance: float | None) -> Spectrum:
+    """The spectrum of a closed form that is not multiplied out over the rationals."""
+    if isinstance(listed, Descending):
+        return Spectrum(Descending(len(listed), listed.n, lambda k: _claim(listed[k], True)), chance=chance)
+    simple = semisimple(graph)
+    return Spectrum(ordered([_claim(pair, simple) for pair in listed]), chance=chance)
 
 
 def _claim(pair: tuple[sp.Expr, int], simple: bool) -> Eigenvalue:

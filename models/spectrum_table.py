@@ -23,6 +23,8 @@ def table(found: Spectrum) -> str:
         words = ("Jordan blocks", *(_blocks(e) for e in found.eigenvalues))
         rows = [f"{row}  {word}" for row, word in zip(rows, words, strict=True)]
     state = "proved" if found.verified else "not proved (closed form of a large graph)"
+    if found.chance is not None:
+        state = f"the same modulo three large primes (a difference would show but for a chance of {found.chance:.0e})"
     rows.append(f"{found.n} eigenvalues, {len(lines)} distinct; characteristic polynomial: {state}")
     if found.defective:
         rows.append(

@@ -467,6 +467,7 @@ def test_as_dict_is_what_the_command_line_prints() -> None:
             {"exact": "-2 - sqrt(2)", "value": -3.414213562373095, "multiplicity": 1, **once},
         ],
         "verified": True,
+        "chance": None,
     }
     spiral = one_way_ring(3).spectrum.as_dict()["eigenvalues"][1]
     assert spiral["exact"] == "-3/2 - sqrt(3)*I/2"

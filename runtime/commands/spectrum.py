@@ -29,6 +29,9 @@ FILES = ("matrix", "edges", "graphml")
 PROVED = 500
 """Up to so many nodes closed forms are multiplied out here; this takes about two seconds."""
 
+CHECKED = 1000
+"""Up to so many nodes they are multiplied out modulo primes; this takes some seconds."""
+
 
 def configure(parser: ArgumentParser) -> None:
     """Add topology, size and options, or a file."""
@@ -72,7 +75,7 @@ def execute(arguments: Namespace) -> int:
         return _symbolic(arguments)
     with wrong_use():
         chosen = graph(arguments)
-        found = spectrum(chosen, prove=chosen.n <= PROVED)
+        found = spectrum(chosen, prove=chosen.n <= PROVED or ("primes" if chosen.n <= CHECKED else False))
     zero = found.eigenvalues[0]
     if zero.multiplicity > 1 and zero.exact == 0:
         warn([f"zero is an eigenvalue of multiplicity {zero.multiplicity}: {_reason(chosen)}"])
