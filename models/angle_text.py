@@ -53,8 +53,8 @@ class Wave:
         for shift, terms in ((self.shift, other.terms), (other.shift, self.terms)):
             found += Wave(Fraction(0), {turn: shift * factor for turn, factor in terms.items() if shift})
         for ((a, b), f), ((c, d), g) in product(self.terms.items(), other.terms.items()):
-            found += Wave(Fraction(0), {(a + c, b + d): f * g})
-            found += Wave(2 * f * g) if (a, b) == (c, d) else Wave(Fraction(0), {(a - c, b - d): f * g})
+            found += Wave(Fraction(0), {_even(a + c, b + d): f * g})
+            found += Wave(2 * f * g) if (a, b) == (c, d) else Wave(Fraction(0), {_even(a - c, b - d): f * g})
         return found
 
     def at(self, low: int, high: int) -> list[AngleSum]:
@@ -65,6 +65,11 @@ class Wave:
             folded_sum(self.shift, [((a + b * k) % unit, factor) for a, b, factor in steps], unit)
             for k in range(low, high + 1)
         ]
+
+
+def _even(a: Fraction, b: Fraction) -> Linear:
+    """One form for the angles of equal cosines, but for those of constants: whole turns off, k with a positive factor."""
+    return (-a % 1, -b) if b < 0 else (a % 1, b)
 
 
 def angle_number(text: str, values: Mapping[str, int]) -> AngleSum | None:
@@ -116,7 +121,7 @@ def _value(node: ast.expr, values: Mapping[str, int], letter: str, depth: int) -
             a, b = (Fraction(1, 4) - a, -b) if name == "sin" else (a, b)
             if max(a.denominator, b.denominator) > DENOMINATOR:
                 raise _Other
-            return Wave(Fraction(0), {(a, b): Fraction(1, 2)})
+            return Wave(Fraction(0), {_even(a, b): Fraction(1, 2)})
     raise _Other
 
 

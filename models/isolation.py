@@ -32,8 +32,17 @@ def real_brackets(f: fmpz_poly) -> list[Bracket] | None:
     """
     if not _newton_inequalities(f):
         return None
-    for width in (128 * 2**attempt for attempt in range(_ATTEMPTS)):
-        with precision(2 * f.degree() + f.height_bits() + 3 * width):
+    centre = -f[f.degree() - 1] // (f.degree() * f[f.degree()])  # values cancel least about the mean of the roots
+    found = _centred(f(fmpz_poly([centre, 1])))
+    return None if found is None else [(low + centre, high + centre) for low, high in found]
+
+
+def _centred(f: fmpz_poly) -> list[Bracket] | None:
+    """The brackets, with few bits first; then with as many as the coefficients have, and finer ones."""
+    full = 2 * f.degree() + f.height_bits()
+    tried = [(min(_usual(f), full), 128), *((full, 128 * 2**attempt) for attempt in range(_ATTEMPTS))]
+    for bits, width in tried:
+        with precision(bits + 3 * width):
             found = _climb(f, width)
         if found is not None:
             brackets = [_around(root, width) for root in found]
@@ -44,12 +53,19 @@ def real_brackets(f: fmpz_poly) -> list[Bracket] | None:
 
 def sign(f: fmpz_poly, x: fmpq) -> int:
     """The sign of f(x): certified by a ball, or exact where the ball cannot tell."""
-    with precision(f.height_bits() + 2 * f.degree() + 192):
-        value = arb_poly(f)(arb(x))
-        if value > 0 or value < 0:
-            return 1 if value > 0 else -1
+    full = f.height_bits() + 2 * f.degree()
+    for bits in sorted({min(_usual(f), full), full}):
+        with precision(bits + 320):
+            value = arb_poly(f)(arb(x))
+            if value > 0 or value < 0:
+                return 1 if value > 0 else -1
     exact = f(x)
     return (exact > 0) - (exact < 0)
+
+
+def _usual(f: fmpz_poly) -> int:
+    """Bits that usually cancel in a value of f between its roots: some per root, however large the roots are."""
+    return 4 * f.degree() + 64
 
 
 def dyadic(ball: arb) -> fmpq:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import random
 import subprocess
 import sys
 from collections import Counter
@@ -19,6 +20,7 @@ from effort import effort
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from synchain.models import isolation
 from synchain.models import topology as graphs
 from synchain.models.algebraic import ComplexRoot, RealRoot, complex_roots, real_roots
 from synchain.models.angles import cosine, linear_cosine, minimal_polynomial
@@ -168,6 +170,7 @@ def test_a_wrong_angle_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_large_closed_forms_say_that_they_are_not_proved(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("synchain.models.spectrum.PROOF_LIMIT", 10)
+    monkeypatch.setattr("synchain.models.spectrum.CHECK_LIMIT", 10)
     assert fresh(topology("ring", 10)).verified
     assert not fresh(topology("ring", 11)).verified
     assert fresh(topology("ring", 11), prove=True).verified
@@ -403,6 +406,26 @@ def test_roots_found_wrongly_are_not_believed(monkeypatch: pytest.MonkeyPatch) -
             "synchain.models.isolation._climb", lambda f, width, found=wrong: [flint.arb(x) for x in found]
         )
         assert real_brackets(f) is None
+
+
+def test_roots_far_from_zero_and_near_one_another_take_few_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some per root, once they are counted from their mean; the coefficients have thirty times as many."""
+    stream, n = random.Random(1), 40
+    upper = [[stream.randint(1, 10**12) if j > i else 0 for j in range(n)] for i in range(n)]
+    rows = [[upper[min(i, j)][max(i, j)] for j in range(n)] for i in range(n)]
+    for i, row in enumerate(rows):
+        row[i] = -sum(row)
+    f = flint.fmpz_mat(rows).charpoly().factor()[1][-1][0]
+    assert f.degree() == 39
+    bits: list[int] = []
+    climb = isolation._climb
+    monkeypatch.setattr(isolation, "_climb", lambda g, width: bits.append(flint.ctx.prec) or climb(g, width))
+    found = real_brackets(f)
+    assert found is not None
+    assert len(found) == 39
+    assert bits == [4 * 39 + 64 + 3 * 128]
+    assert f.height_bits() > 1500
+    assert all(sign(f, low) * sign(f, high) < 0 for low, high in found)
 
 
 def test_a_sign_is_exact_where_balls_cannot_tell() -> None:
