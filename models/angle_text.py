@@ -21,7 +21,7 @@ from .angle_sums import AngleSum, folded_sum
 __all__ = ["Wave", "angle_number", "angle_wave"]
 
 _CIRCULAR = re.compile(r"[0-9A-Za-z_+\-*/() \t]*\b(?:sin|cos)\([0-9A-Za-z_+\-*/() \t]*", re.ASCII)
-LENGTH, DEPTH, TERMS, POWER, WHOLE, DENOMINATOR = 300, 24, 8, 4, 10**10, 10**10
+LENGTH, DEPTH, TERMS, POWER, WHOLE, DENOMINATOR = 300, 24, 16, 4, 10**10, 10**10
 
 Linear = tuple[Fraction, Fraction]
 """a + b k, k the open letter."""
