@@ -111,10 +111,15 @@ def _claimed(numbers: Sequence[tuple[Powers, int]], m: int, p: int) -> nmod_poly
 
 def _characteristic(graph: Topology, p: int) -> nmod_poly:
     """det(z - G) modulo p."""
-    entries = {(i, i): 0 for i in range(graph.n)}
+    residues: dict[Fraction, int] = {}
+    entries, sums = dict[tuple[int, int], int](), [0] * graph.n
     for target, source, weight in graph.links:
-        entries[target, source] = value = _residue(weight, p)
-        entries[target, target] = (entries[target, target] - value) % p
+        value = residues.get(weight)
+        if value is None:
+            value = residues[weight] = _residue(weight, p)
+        entries[target, source] = value
+        sums[target] -= value
+    entries.update({(i, i): total % p for i, total in enumerate(sums)})
     if banded(graph.n, entries):
         return cyclic(graph.n, entries, lambda c: nmod_poly([x % p for x in c], p))
     flat = [0] * graph.n**2
@@ -127,10 +132,10 @@ def _chance(graph: Topology, numbers: Sequence[tuple[Powers, int]], m: int) -> f
     """About the largest share of the primes that can divide the norm of a coefficient of the difference."""
     parts = [x for (a, terms), _ in numbers for x in (a, *(b for _, b in terms))]
     scale = lcm(*{x.denominator for x in (*parts, *(w for _, _, w in graph.links))})
-    rows = [Fraction(0)] * graph.n
+    rows = [0.0] * graph.n
     for target, _, weight in graph.links:
-        rows[target] += 2 * abs(weight)
-    largest = max(*rows, *(abs(a) + sum(abs(b) for _, b in c) for (a, c), _ in numbers))
+        rows[target] += 2.0 * abs(weight.numerator) / weight.denominator
+    largest = max(*rows, *(float(abs(a) + sum(abs(b) for _, b in c)) for (a, c), _ in numbers))
     units = int(fmpz(m).euler_phi())
-    bad = units * (graph.n * log2(1 + float(scale * largest)) + 1) / BITS
+    bad = units * (graph.n * log2(1 + scale * largest) + 1) / BITS
     return bad * units * (BITS + 1) * log(2.0) / 2.0**BITS  # of the primes, about 2**BITS / (units * log of one)

@@ -35,7 +35,7 @@ PROOF_LIMIT = 200
 """Up to so many nodes a closed form is proved when it is made; above only on request."""
 
 CHECK_LIMIT = 400
-"""Up to so many nodes it is multiplied out modulo primes, which takes a second at most."""
+"""Up to so many nodes it is multiplied out modulo primes, which takes about a second at most."""
 
 DENSE_LIMIT = 1000
 """Largest matrix without a closed form."""
