@@ -69,7 +69,7 @@ def scale(intervals: Sequence[Interval], factor: float) -> list[Interval]:
 
 
 def intersect(left: Sequence[Interval], right: Sequence[Interval]) -> list[Interval]:
-    """The points that lie in both sets; single points count only where both sets have them as intervals."""
+    """The points that lie in both sets; a single point counts only where one of the sets has it as an interval."""
     found = []
     for a, b in left:
         for c, d in right:

@@ -38,7 +38,26 @@ def test_nothing_good_and_everything_good():
     assert find(lambda p: p >= 0, x, 1e-3)[0] == [(0.0, 1.0)]
 
 
-@pytest.mark.parametrize("x", [[1.0, 0.5], [0.0, 0.0], [[0.0, 1.0]]])
+def test_one_point_is_a_grid():
+    assert find(lambda p: p >= 0, np.array([0.5]), 1e-3)[0] == [(0.5, 0.5)]
+    assert find(lambda p: p < 0, np.array([0.5]), 1e-3)[0] == []
+
+
+def test_a_bracket_narrows_to_the_change_next_to_its_good_end():
+    asked = []
+
+    def judge(x):
+        asked.append(x.tolist())
+        return (x <= 0.3) | ((x > 0.7) & (x < 0.9))
+
+    found, verdict = find(judge, np.array([0.0, 1.0]), 0.01, fan=3)
+    assert asked[:3] == [[0.0, 1.0], [0.25, 0.5, 0.75], [0.3125, 0.375, 0.4375]]
+    assert len(asked) == 5  # brackets of 1/4, 1/16, 1/64 and 1/256, the first below 0.01
+    assert found == [(0.0, 0.298828125)]  # the middle of the last one
+    assert verdict.tolist() == [True, False]
+
+
+@pytest.mark.parametrize("x", [[], [1.0, 0.5], [0.0, 0.0], [[0.0, 1.0]]])
 def test_grids_that_do_not_increase_are_refused(x):
     with pytest.raises(ValueError, match="increasing"):
         find(lambda p: p > 0, np.array(x), 1e-3)
@@ -55,7 +74,24 @@ def test_intersection_is_what_both_contain():
     assert intersect(left, []) == []
 
 
+@pytest.mark.parametrize(
+    ("left", "right", "expected"),
+    [
+        ([(0.0, 1.0)], [(1.0, 2.0)], []),
+        ([(1.0, 1.0)], [(0.0, 2.0)], [(1.0, 1.0)]),
+        ([(0.0, 2.0)], [(1.0, 1.0)], [(1.0, 1.0)]),
+        ([(0.0, 1.0)], [(1.0, 1.0)], [(1.0, 1.0)]),
+        ([(1.0, 1.0)], [(2.0, 2.0)], []),
+        ([(2.0, 3.0), (0.0, 1.0)], [(0.5, 2.5)], [(0.5, 1.0), (2.0, 2.5)]),
+    ],
+)
+def test_single_points_count_where_they_are_given_as_intervals(left, right, expected):
+    assert intersect(left, right) == expected
+
+
 def test_scale_needs_a_positive_factor():
     assert scale([(1.0, 2.0)], 0.5) == [(0.5, 1.0)]
     with pytest.raises(ValueError, match="factor"):
         scale([(1.0, 2.0)], 0.0)
+    with pytest.raises(ValueError, match="factor"):
+        scale([], float("nan"))

@@ -16,7 +16,7 @@ from synchain.models.algebraic import RealRoot
 from synchain.models.modes_of import compare, geometric_multiplicity
 from synchain.models.spectrum import Eigenvalue
 from synchain.models.topology import Topology, from_matrix, topology
-from synchain.runtime.stable_ranges import stated, widened
+from synchain.runtime.stable_ranges import Range, stated, widened
 from synchain.runtime.synchronisability import verdict, windows
 from synchain.runtime.threshold import project
 from synchain.runtime.transversal import transversal
@@ -204,6 +204,37 @@ def test_an_end_at_zero_is_no_measured_end() -> None:
     assert verdict([(0.0, 1.0)], topology("chain", 30), [(0.1, 0.1)]).answer == "yes"
     assert verdict([(0.01, 1.0)], topology("chain", 30), [(0.005, 0.0)]).answer == "no"
     assert verdict([(0.01, 1.0)], topology("chain", 30), [(0.01, 0.0)]).answer == "undecided within the error"
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "ratio"),
+    [(1, 3, 3.0), (2, 3, 1.5), (3, 3, 1.0), (1, None, math.inf), (0, None, math.inf), (0, 2, math.inf), (0, 0, 0.0)],
+)
+def test_the_largest_eigenratio_that_a_range_holds(low: int, high: int | None, ratio: float) -> None:
+    assert Range(Fraction(low), None if high is None else Fraction(high)).ratio == ratio
+
+
+def test_what_lies_below_zero_is_cut_off_with_its_errors() -> None:
+    given = [(-3.0, -2.0), (-1.0, 0.5), (1.0, 2.0), (3.0, math.inf)]
+    assert stated(given, [(0.25, 0.25)] * 4) == [
+        Range(Fraction(0), Fraction(1, 2), (0.0, 0.25)),
+        Range(Fraction(1), Fraction(2), (0.25, 0.25)),
+        Range(Fraction(3), None, (0.25, 0.0)),
+    ]
+    assert stated([(-1.0, 0.0)], [(0.25, 0.25)]) == [Range(Fraction(0), Fraction(0), (0.0, 0.25))]
+    assert stated([(0.0, 1.0)], [(0.25, 0.25)]) == [Range(Fraction(0), Fraction(1), (0.0, 0.25))]
+
+
+def test_ranges_that_just_meet_are_joined_and_one_that_shrinks_to_a_point_stays() -> None:
+    given = stated([(1.0, 1.5), (2.0, 3.0)], [(0.25, 0.25), (0.25, 0.25)])
+    assert widened(given, 1) == [Range(Fraction(3, 4), Fraction(13, 4))]
+    assert widened(given, -1)[0] == Range(Fraction(5, 4), Fraction(5, 4))
+    below = stated([(0.125, 1.0), (2.0, 2.0)], [(0.25, 0.0), (2.0, 0.0)])
+    assert widened(below, 1) == [Range(Fraction(0), Fraction(2))]  # no range begins below 0
+    unending = stated([(1.0, 1.5), (2.0, math.inf)], [(0.25, 0.25), (0.25, 0.0)])
+    assert [(r.low, r.high, r.errors) for r in widened(unending, 1)] == [(Fraction(3, 4), None, (0.0, 0.0))]
+    inside = stated([(1.0, 4.0), (5.0, 6.0)], [(0.0, 3.0), (2.0, 0.0)])
+    assert widened(inside, 1) == [Range(Fraction(1), Fraction(7))]
 
 
 def test_ranges_that_meet_within_their_errors_are_one() -> None:
