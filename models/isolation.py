@@ -112,7 +112,7 @@ def _laguerre(values: Sequence[arb_poly], start: Ball, found: Sequence[Ball], le
             if left > 1 and abs(spread) > slope * slope * arb(2) ** -48:
                 return None
             spread = arb(0)
-        step = (-left / (slope - spread.sqrt())).mid()
+        step = (-left / (slope + spread.sqrt() * (1 if slope > 0 else -1))).mid()  # back if rounding passed a root
         if not step.is_finite():
             return None
         x = (x + step).mid()

@@ -26,7 +26,7 @@ from synchain.models.algebraic import ComplexRoot, RealRoot, complex_roots, real
 from synchain.models.angles import cosine, linear_cosine, minimal_polynomial
 from synchain.models.eigenvalue import ordered
 from synchain.models.graph_readers import from_graph
-from synchain.models.isolation import real_brackets, sign
+from synchain.models.isolation import _proved, real_brackets, sign
 from synchain.models.radicals import biquadratic
 from synchain.models.spectrum import Eigenvalue, ProofError, Spectrum, spectrum, table
 from synchain.models.topology import Topology, from_matrix, names, topology
@@ -399,6 +399,33 @@ def test_roots_that_nearly_coincide_are_isolated() -> None:
     assert all(abs(float(a.low) - x) < 1e-12 for a, x in zip(found[::2], (-(3**0.5), -(2**0.5), 2**0.5), strict=True))
 
 
+@pytest.mark.parametrize(
+    "coefficients",
+    [[-2, 0, 1], [1, -5, 0, 3], [2, 4, 1], [-1, -3, 0, 1], [-1, -2, 1, 1], [2, -6, 0, 5], [1, 0, -10, 0, 1]],
+)
+def test_an_iteration_that_rounding_carries_past_a_root_comes_back(coefficients: list[int]) -> None:
+    """Steps end on a root as near as numbers go: a step to the next root from there would leave roots out."""
+    f = flint.fmpz_poly(coefficients)
+    found = real_brackets(f)
+    assert found is not None
+    roots = sorted(float(root.real.mid()) for root, _ in f.complex_roots())
+    assert [float(low.p) / float(low.q) for low, _ in found] == pytest.approx(roots, rel=1e-12)
+
+
+def test_no_real_factor_of_a_graph_is_left_to_the_search_for_complex_roots() -> None:
+    random = np.random.default_rng(3)
+    degrees = set()
+    for n in random.integers(2, 13, 40):
+        a = np.triu(random.integers(0, 4, (n, n)) * (random.random((n, n)) < 0.5), 1)
+        a = a + a.T
+        f = flint.fmpz_mat((a - np.diag(a.sum(axis=1))).tolist()).charpoly()
+        for factor, _ in f.factor()[1]:
+            if factor.degree() >= 2:
+                degrees.add(factor.degree())
+                assert len(real_brackets(factor) or ()) == factor.degree()
+    assert len(degrees) > 8
+
+
 def test_roots_found_wrongly_are_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     f = flint.fmpz_poly([-2, 0, 1])
     for wrong in ([-1.4, 1.4], [1.0, 2.0], [1.5]):
@@ -426,6 +453,23 @@ def test_roots_far_from_zero_and_near_one_another_take_few_bits(monkeypatch: pyt
     assert bits == [4 * 39 + 64 + 3 * 128]
     assert f.height_bits() > 1200
     assert all(sign(f, low) * sign(f, high) < 0 for low, high in found)
+
+
+@pytest.mark.parametrize(
+    ("brackets", "proved"),
+    [
+        ([(-2, -1), (1, 2)], True),
+        ([(-2, 0), (0, 2)], False),  # they touch
+        ([(-2, 1), (-1, 2)], False),
+        ([(-2, -1)], False),
+        ([(-2, -1), (2, 3)], False),
+        ([(-2, -1), (0, 1), (1, 2)], False),
+    ],
+)
+def test_brackets_are_proved_by_signs_on_both_sides(brackets: list[tuple[int, int]], proved: bool) -> None:
+    exact = [(flint.fmpq(low), flint.fmpq(high)) for low, high in brackets]
+    assert _proved(flint.fmpz_poly([-2, 0, 1]), exact) is proved
+    assert not _proved(flint.fmpz_poly([-1, 0, 1]), exact)  # the ends 1 and -1 are roots themselves
 
 
 def test_a_sign_is_exact_where_balls_cannot_tell() -> None:
