@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import is_dataclass
 from pathlib import Path
 
 import pytest
@@ -102,6 +104,19 @@ def test_a_long_function_is_seen() -> None:
     body = "    pass\n"
     assert long_functions(path, "def f():\n" + body * (FUNCTION_LINES - 1)) == []
     assert long_functions(path, "class A:\n  def f():\n" + body * FUNCTION_LINES) != []
+
+
+def test_values_of_the_models_cannot_be_changed() -> None:
+    found = []
+    for path in sources("models"):
+        dotted = ".".join(("synchain", *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(".__init__")
+        module = importlib.import_module(dotted)
+        kinds = [kind for kind in vars(module).values() if isinstance(kind, type) and is_dataclass(kind)]
+        found += [kind for kind in kinds if kind.__module__ == dotted]
+    assert len(found) > 20
+    assert [kind for kind in found if "__slots__" not in vars(kind)] == []
+    own = [kind for kind in found if not kind.__name__.startswith("_")]
+    assert [kind for kind in own if not kind.__dataclass_params__.frozen] == []  # type: ignore[attr-defined]
 
 
 def test_no_file_is_called_utils() -> None:

@@ -96,6 +96,12 @@ def test_refuses(kinetic: sp.Expr, forces: list[int], message: str) -> None:
         equations_of_motion(kinetic, sp.S.Zero, forces, [x, y], [v, w])
 
 
+def test_a_motion_has_one_rate_for_each_coordinate_and_velocity() -> None:
+    for rates in ([], [x, y]):
+        with pytest.raises(ValueError, match="zip"):
+            total_derivative(x * v, [x], [v], rates)
+
+
 def test_mechanics_wants_one_force_for_each_coordinate() -> None:
     with pytest.raises(ValueError, match="1 coordinates, 1 velocities and 0 forces; expected one each"):
         Mechanics((x,), (v,), v**2, x**2, ())
