@@ -115,6 +115,18 @@ def test_the_grid_of_the_probe_begins_at_zero_where_zero_is_asked_for(swept, gra
     assert swept[0][2]["criterion"] == Criterion()
 
 
+def test_the_prediction_ends_with_the_grid_of_sigma(swept):
+    assert thresholds(Scene(topology=chain(2)), sigma=[0.05, 0.15]).predicted == ((0.1, 0.15),)
+    assert thresholds(Scene(topology=chain(2)), sigma=[0.05, 0.5]).predicted == ((0.1, 0.2),)
+
+
+def test_the_criterion_is_that_of_the_published_table():
+    """docs/thresholds.md rests on it: 8 starts, 1000 periods and 100 more, a mean error below 1e-3."""
+    found = Criterion()
+    assert (found.tolerance, found.starts, found.reach) == (1e-3, 8, 0.4)
+    assert (found.transient, found.window, found.rtol, found.seed) == (1000.0, 100.0, 1e-8, 0)
+
+
 def test_at_least_half_of_the_starts_must_fall_below_the_tolerance(monkeypatch):
     def errors(scene, points, moves, *rest):
         assert len(moves) == SHORT.starts
