@@ -28,7 +28,7 @@ from synchain.models.eigenvalue import ordered
 from synchain.models.graph_readers import from_graph
 from synchain.models.isolation import _proved, real_brackets, sign
 from synchain.models.radicals import biquadratic
-from synchain.models.spectrum import Eigenvalue, ProofError, Spectrum, spectrum, table
+from synchain.models.spectrum import Eigenvalue, ProofError, Spectrum, characteristic, spectrum, table
 from synchain.models.topology import Topology, from_matrix, names, topology
 
 ONE = Fraction(1)
@@ -453,6 +453,28 @@ def test_roots_far_from_zero_and_near_one_another_take_few_bits(monkeypatch: pyt
     assert bits == [4 * 39 + 64 + 3 * 128]
     assert f.height_bits() > 1200
     assert all(sign(f, low) * sign(f, high) < 0 for low, high in found)
+
+
+def test_the_characteristic_polynomial_of_fractions_is_monic() -> None:
+    graph = from_matrix([["-1/2", "1/2", "0"], ["1/3", "-1/3", "0"], ["0", "2/5", "-2/5"]])
+    z = sp.Symbol("z")
+    expected = sp.Poly((z**2 + sp.Rational(5, 6) * z) * (z + sp.Rational(2, 5)), z)
+    assert [sp.Rational(int(c.p), int(c.q)) for c in characteristic(graph).coeffs()] == expected.all_coeffs()[::-1]
+
+
+@pytest.mark.parametrize(("name", "n"), [("chain", 7), ("ring", 5), ("star", 4), ("complete", 9)])
+def test_a_graph_by_the_name_and_links_of_a_family_has_its_closed_form(
+    name: str, n: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    family = topology(name, n)
+    monkeypatch.setattr("synchain.models.spectrum._by_factors", lambda *_: pytest.fail("factors were looked for"))
+    assert spectrum(Topology(name, n, family.links)).exact == family.spectrum.exact
+
+
+@pytest.mark.parametrize(("name", "n"), [("chain", 7), ("ring", 2), ("hypercube", 6)])
+def test_a_graph_of_another_kind_is_not_believed_its_name(name: str, n: int) -> None:
+    star = topology("star", n) if n > 2 else topology("chain", 2)
+    assert spectrum(Topology(name, n, star.links)).exact == star.spectrum.exact
 
 
 @pytest.mark.parametrize(
