@@ -455,6 +455,13 @@ def test_roots_far_from_zero_and_near_one_another_take_few_bits(monkeypatch: pyt
     assert all(sign(f, low) * sign(f, high) < 0 for low, high in found)
 
 
+def test_many_eigenvalues_are_shown_in_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    numbers = [Eigenvalue(sp.Integer(-k), k + 1, None) for k in range(5)]
+    monkeypatch.setattr("synchain.models.spectrum.SHOWN", 4)
+    assert repr(Spectrum(numbers)) == "{0: 1, -1: 2, -2: 3, … (1 more), -4: 5}"
+    assert repr(Spectrum(numbers[:4])) == "{0: 1, -1: 2, -2: 3, -3: 4}"
+
+
 def test_the_characteristic_polynomial_of_fractions_is_monic() -> None:
     graph = from_matrix([["-1/2", "1/2", "0"], ["1/3", "-1/3", "0"], ["0", "2/5", "-2/5"]])
     z = sp.Symbol("z")
@@ -498,6 +505,7 @@ def test_a_sign_is_exact_where_balls_cannot_tell() -> None:
     f = flint.fmpz_poly([-2, 1])
     tiny = flint.fmpq(1, 2**5000)
     assert [sign(f, 2 + tiny), sign(f, 2 - tiny), sign(f, flint.fmpq(2))] == [1, -1, 0]
+    assert [sign(f, flint.fmpq(3)), sign(f, flint.fmpq(1))] == [1, -1]
 
 
 def test_cancellation_costs_no_digits() -> None:

@@ -233,6 +233,8 @@ def test_ranges_that_just_meet_are_joined_and_one_that_shrinks_to_a_point_stays(
     assert widened(below, 1) == [Range(Fraction(0), Fraction(2))]  # no range begins below 0
     unending = stated([(1.0, 1.5), (2.0, math.inf)], [(0.25, 0.25), (0.25, 0.0)])
     assert [(r.low, r.high, r.errors) for r in widened(unending, 1)] == [(Fraction(3, 4), None, (0.0, 0.0))]
+    later = stated([(1.0, 2.0), (4.0, 5.0), (5.25, 6.0)], [(0.25, 0.25)] * 3)
+    assert [(r.low, r.high) for r in widened(later, 1)] == [(0.75, 2.25), (3.75, 6.25)]
     inside = stated([(1.0, 4.0), (5.0, 6.0)], [(0.0, 3.0), (2.0, 0.0)])
     assert widened(inside, 1) == [Range(Fraction(1), Fraction(7))]
 
