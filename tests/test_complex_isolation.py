@@ -7,6 +7,7 @@ import math
 import random
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from effort import effort
 from flint import acb, arb, fmpq, fmpz_poly
@@ -101,3 +102,16 @@ def test_a_hundred_complex_roots_take_the_fast_route(monkeypatch: pytest.MonkeyP
     roots, calls = effort(lambda: complex_roots(tuple(int(c) for c in f.coeffs())))
     assert len(roots) == 100
     assert calls < 4_000_000
+
+
+@pytest.mark.parametrize("coefficients", [[-2, 0, 0, 1], [1, 1, 0, 0, 1], [-1, -1, 0, 0, 0, 1]])
+def test_the_second_way_to_isolate_roots_finds_the_same(coefficients: list[int]) -> None:
+    f = fmpz_poly(coefficients)
+    found = algebraic._by_arb(f)
+    real = [disc for disc in found if disc.y == 0]
+    assert found[: len(real)] == real
+    points = [complex(float(d.x.p) / float(d.x.q), float(d.y.p) / float(d.y.q)) for d in found]
+    expected = np.roots(coefficients[::-1])
+    assert len(points) == len(expected)
+    assert all(min(abs(z - points)) < 1e-12 for z in expected)
+    assert all(0 < d.radius < fmpq(1, 2**60) for d in found)

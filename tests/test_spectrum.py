@@ -455,6 +455,17 @@ def test_roots_far_from_zero_and_near_one_another_take_few_bits(monkeypatch: pyt
     assert all(sign(f, low) * sign(f, high) < 0 for low, high in found)
 
 
+def test_largest_and_slowest_of_long_chains_and_of_small_graphs() -> None:
+    long = spectrum(topology("chain", 5000))
+    assert float(long.largest) == pytest.approx(-2 - 2 * np.cos(np.pi / 5000), rel=1e-14)
+    assert float(long.slowest) == pytest.approx(-4 * np.sin(np.pi / 10000) ** 2, rel=1e-12)
+    assert [spectrum(topology(name, 6)).slowest for name in ("ring", "star", "complete")] == [-1, -1, -6]
+    one_way = spectrum(from_matrix([[-1, 1, 0], [0, -1, 1], [1, 0, -1]]))
+    assert complex(one_way.slowest) == pytest.approx(-1.5 - 0.5j * 3**0.5)
+    with pytest.raises(ValueError, match="all eigenvalues are 0"):
+        _ = spectrum(from_matrix([[0, 0], [0, 0]])).slowest
+
+
 def test_many_eigenvalues_are_shown_in_part(monkeypatch: pytest.MonkeyPatch) -> None:
     numbers = [Eigenvalue(sp.Integer(-k), k + 1, None) for k in range(5)]
     monkeypatch.setattr("synchain.models.spectrum.SHOWN", 4)
