@@ -10,7 +10,7 @@ import sympy as sp
 
 from synchain.models import separation
 from synchain.models.algebraic import complex_roots, real_roots
-from synchain.models.separation import Number, _bits, _Field, _measure, check_size, equal
+from synchain.models.separation import Number, _bits, _Field, _measure, check_size, equal, sign
 
 ROOTS = real_roots((1, -5, 0, 3)) or ()  # of 3 x^3 - 5 x + 1
 PAIR = complex_roots((3, 1, 2))  # of 2 x^2 + x + 3
@@ -56,7 +56,7 @@ def test_sizes_of_numerators_and_denominators(number: Number, up: float, low: fl
     ],
 )
 def test_bits_that_tell_a_sum_from_zero(numbers: tuple[Number, ...], bits: float) -> None:
-    assert bits + 8 <= _bits(numbers) <= bits + 9.01
+    assert bits + 8 <= _bits(tuple((x,) for x in numbers)) <= bits + 9.01
 
 
 @pytest.mark.parametrize("steps", [20, 150, 600])
@@ -68,8 +68,11 @@ def test_a_convergent_of_the_root_of_two_is_not_that_root(steps: int) -> None:
     near = sp.Rational(p, q)
     assert not equal(near, sp.sqrt(2))
     assert not equal(sp.sqrt(2) + near, 2 * near)
+    above = 1 if p * p > 2 * q * q else -1
+    assert sign((near, sp.Integer(3)), (sp.sqrt(2), sp.Integer(3))) == above == -sign((sp.sqrt(2),), (near,))
+    assert sign((near, near), (near**2,)) == 0
     gap = math.log2(2.83) + 2 * math.log2(q)
-    assert gap <= _bits((near, sp.sqrt(2))) <= gap + 12
+    assert gap <= _bits(((near,), (sp.sqrt(2),))) <= gap + 12
     assert equal((1 + sp.sqrt(2)) ** 2 * near, near * 3 + 2 * near * sp.sqrt(2))
 
 
