@@ -158,7 +158,7 @@ class LoopWriter:
                 if e != 0:
                     place = f"MATRIX + {slot}[{a * len(self.state) + b}*{length} + {index}]"
                     value = show(e.xreplace(names))
-                    value = f"({value})" if sign.endswith("*") and e.is_Add else value
+                    value = f"({value})" if sign != "+ " and e.is_Add else value
                     lines.append(f"store(dense, {place}, load(dense, {place}, WIDTH) {sign}{value})")
         return lines
 

@@ -67,7 +67,7 @@ def looped() -> Equations:
     x_2, v_2, w, sigma, delta = real("x_there", "v_there", "weight", "sigma", "delta")
     node = Node((x, v), (v - x / 7, mu * (1 - x**2) * v - sp.exp(-c * x) + TIME * sp.sqrt(2) + sp.sin(omega * TIME) * x),
                 (c, mu, omega))  # fmt: skip
-    push = (delta * w * (v_2 - v), sigma * w * sp.sin(x_2 - x) + mu * v_2)
+    push = (delta * w * (v_2 - v), sigma * w * (x_2 - x) * sp.cos(x_2 - x) + mu * v_2)
     edge = Edge((x, v), (x_2, v_2), w, push, (sigma, delta, mu))
     links = ((0, 1, Fraction(2, 3)), (1, 2, Fraction(1)), (2, 0, Fraction(-3, 2)), (0, 2, Fraction(1)))
     return Equations(node, edge, 3, links)
