@@ -17,7 +17,6 @@ from .contacts import write_pushes
 from .explicit import write_explicit
 from .integrators import Integrator, integrator
 from .looped import LoopWriter
-from .mass import Mass
 from .naming import tidy
 from .printer import FUNCTIONS, show
 from .rosenbrock import write_rosenbrock
@@ -130,15 +129,6 @@ def _module(
 
 def _for_many(method: Integrator, equations: Equations) -> Integrator:
     """The method as looped kernels have it; ValueError for what only written-out kernels can."""
-    if equations.mixed:
-        raise ValueError(
-            f"nodes of several kinds: a kernel steps at most {LARGEST_UNROLLED} nodes, found {equations.n}; export the "
-            "equations for another solver, or take fewer nodes"
-        )
-    if not Mass(equations).constant:
-        raise ValueError(
-            f"links whose inertia depends on the state: a kernel steps at most {LARGEST_UNROLLED} nodes, found {equations.n}"
-        )
     if method.inexact:
         raise ValueError(
             f"integrator {method.name}: steps at most {LARGEST_UNROLLED} nodes, found {equations.n}; use rodas5p"

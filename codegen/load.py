@@ -40,10 +40,17 @@ _matrix, _counts = types.float64[:, ::1], types.int64[:, ::1]
 _given = types.Array(types.float64, 2, "C", readonly=True)
 """What a kernel only reads may be read-only or not."""
 _cube = types.float64[:, :, ::1]
-SIGNATURE = types.void(
-    types.int64, types.int64, _given, _given, _given, types.float64[::1], _matrix, _matrix, _counts, _cube, _cube,
-    types.UniTuple(types.int64[::1], len(NAMES)), types.float64[::1],
-)  # fmt: skip
+
+
+def _signature(arrays: int) -> Any:
+    """The types of a sweep kernel's arguments, with so many arrays in its graph."""
+    return types.void(
+        types.int64, types.int64, _given, _given, _given, types.float64[::1], _matrix, _matrix, _counts, _cube, _cube,
+        types.UniTuple(types.int64[::1], arrays), types.float64[::1],
+    )  # fmt: skip
+
+
+SIGNATURE = _signature(len(NAMES))
 """first, last, start, numbers, spans, control, end, sums, counts, points, samples, graph, weights."""
 MODES = types.void(
     types.int64, types.int64, _given, _given, _given, types.float64[::1], _given, _cube, _matrix, _matrix, _matrix,
@@ -142,14 +149,15 @@ def _kept(source: KernelSource, name: str, folder: Path) -> Kernel:
 def _compile(source: KernelSource, name: str, folder: Path) -> Kernel:
     path = folder / f"{name}.py"
     module = _module(source.text, name, path)
-    entry, signature = (module.march, MODES) if source.kind == "modes" else (module.drive, SIGNATURE)
-    entry.compile(signature)
-    entry.disable_compile()  # arrays of another type are a mistake of ours, not a reason to compile anew
-    hits = sum(entry.stats.cache_hits.values())
+    graph, weights = EMPTY, np.zeros(0)
     if source.kind == "sweep" and source.equations.n > LARGEST_UNROLLED:
         made = program(source.equations)
-        return Kernel(source, entry, made.arrays, made.weights, str(path), hits > 0)
-    return Kernel(source, entry, EMPTY, np.zeros(0), str(path), hits > 0)
+        graph, weights = made.arrays, made.weights
+    entry = module.march if source.kind == "modes" else module.drive
+    entry.compile(MODES if source.kind == "modes" else _signature(len(graph)))
+    entry.disable_compile()  # arrays of another type are a mistake of ours, not a reason to compile anew
+    hits = sum(entry.stats.cache_hits.values())
+    return Kernel(source, entry, graph, weights, str(path), hits > 0)
 
 
 def _module(text: str, name: str, path: Path) -> ModuleType:

@@ -8,13 +8,13 @@ f(u) and no system in M is solved at all; otherwise F(u) takes one elimination o
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import sympy as sp
 
 from synchain.models.calculus import derivative
-from synchain.models.equations import Equations
+from synchain.models.equations import Edge, Equations
 
 from .elimination import Entry, Factors, plan, write_elimination, write_solve
 from .printer import show
@@ -22,7 +22,21 @@ from .printer import show
 if TYPE_CHECKING:
     from .step import StepWriter
 
-__all__ = ["Mass"]
+__all__ = ["Mass", "momentum_slopes"]
+
+Block = tuple[tuple[sp.Expr, ...], ...]
+
+
+def momentum_slopes(edge: Edge, here: Sequence[sp.Symbol], there: Sequence[sp.Symbol]) -> tuple[Block, Block]:
+    """Return d(M F)/dy of one link at fixed rates F of its target, `here`, and of its source, by the states of either."""
+    if not edge.inertia:
+        zero = tuple((sp.S.Zero,) * len(edge.here) for _ in edge.here)
+        return zero, tuple((sp.S.Zero,) * len(edge.there) for _ in edge.here)
+    pairs = zip(edge.inertia, (here, there), strict=True)
+    parts = [[sp.Add(*(e * f for e, f in zip(row, rates, strict=True))) for row in block] for block, rates in pairs]
+    carried = [a + b for a, b in zip(*parts, strict=True)]
+    own, other = (tuple(tuple(derivative(e, s) for s in end) for e in carried) for end in (edge.here, edge.there))
+    return own, other
 
 
 class Mass:

@@ -20,7 +20,8 @@ __all__ = ["RESERVED", "tidy"]
 RESERVED = frozenset(
     {"i", "j", "k", "e", "old", "new", "graph", "weights", "pair", "factorise", "solve", "NODES", "DIMENSION",
      "DENSE_ROWS",
-     "ENTRIES", "STATE", "SLOPE", "TIME_SLOPE", "MATRIX", *(f"K{i}" for i in range(1, 32)), "t", "h", "y", "y_new", "dense",
+     "ENTRIES", "STATE", "SLOPE", "TIME_SLOPE", "MATRIX", *(f"K{i}" for i in range(1, 32)),
+     "MASS", "RATES", "where", "t", "h", "y", "y_new", "dense",
      "shift", "reach", "rate", "error", "size", "rtol", "atol", "node", "node_linear",
      "node_local", "bound", "bank", "step", "step_smooth", "section", "theta", "now",
      "njit", "p", "drive", "scaled", "inside", "total", "e3", "e5", "np", "math",

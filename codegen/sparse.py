@@ -10,21 +10,25 @@ kernel refines every solution to rounding.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+import sympy as sp
 
 from synchain.models.equations import Edge, Equations, Link
 
 from .elimination import Entry, Plan
+from .mass import Mass, momentum_slopes
+from .places import by_joint, by_kind, joint_numbers, table
 
 if TYPE_CHECKING:
     from .step import StepWriter
 
-__all__ = ["EMPTY", "FILL_LIMIT", "NAMES", "Program", "block_pattern", "program", "workspace"]
+__all__ = ["EMPTY", "FILL_LIMIT", "NAMES", "Program", "block_pattern", "names", "program", "workspace"]
 
 NAMES = (
     "target", "source", "node_slot", "here_slot", "there_slot", "order", "place", "row_start", "after_start", "column",
@@ -37,7 +41,7 @@ EMPTY: tuple[np.ndarray, ...] = tuple(np.zeros(0, np.int64) for _ in NAMES)
 FILL_LIMIT = 3.0
 """Entries of the exact factors for each entry of the matrix, above which the elimination is incomplete."""
 
-Pattern = frozenset[Entry]
+Pattern = tuple[Entry, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +50,10 @@ class Program:
 
     target, source (links,): ends of each link.  node_slot (components**2 * n,), here_slot, there_slot
     (components**2 * links,): where the entries of the node's block and of a link's two blocks stand in the matrix, -1 where
-    there is none.  order (dimension,): pivots; place (dimension,): its inverse.  The off-diagonal entries of pivot order[q]
-    are row_start[q] … row_start[q + 1] - 1, those from after_start[q] on belong to later pivots; column: of each entry.
+    there is none; where nodes are of several kinds, components are those of the node that has most, nodes and links are
+    numbered as codegen/places.py says, and `where` is its table.  order (dimension,): pivots; place (dimension,): its
+    inverse.  The off-diagonal entries of pivot order[q] are row_start[q] … row_start[q + 1] - 1, those from after_start[q]
+    on belong to later pivots; column: of each entry.
     """
 
     arrays: tuple[np.ndarray, ...]
@@ -61,24 +67,37 @@ def block_pattern(block: Iterable[Iterable[object]]) -> tuple[Entry, ...]:
     return tuple((a, b) for a, row in enumerate(block) for b, e in enumerate(row) if e != 0)
 
 
+def names(equations: Equations) -> tuple[str, ...]:
+    """Return what the arrays of a network's program are called, in their order."""
+    return (*NAMES, "where") if equations.mixed else NAMES
+
+
 def program(equations: Equations) -> Program:
     """Plan the elimination of (s - J) for a network; time and memory grow with its links.
 
     Equations that differ only in what their symbols are called, or in numbers, share the program.
     """
-    edge = equations.edge if equations.links else None
-    own = block_pattern(equations.node.jacobian())
-    here, there = (tuple(sorted(pattern)) for pattern in _link_patterns(edge))
-    return _program(equations.n, len(equations.node.state), own, here, there, equations.links)
+    size = max(len(node.state) for node in equations.nodes)
+    own = tuple(block_pattern(node.jacobian()) for node in equations.nodes)
+    joined = tuple(tuple(tuple(sorted(pattern)) for pattern in _link_patterns(edge)) for edge in equations.edges)
+    if not equations.mixed:
+        return _program(equations.n, size, own, joined, equations.links)
+    numbers = {i: k for k, i in enumerate(by_kind(equations))}
+    links = tuple((numbers[target], numbers[source], weight) for target, source, weight in by_joint(equations))
+    counts = tuple(map(equations.kinds.count, range(len(own))))
+    joints = joint_numbers(equations) if links else []
+    shares = tuple(map(joints.count, range(len(joined))))
+    return _program(equations.n, size, own, joined, links, tuple(table(equations).tolist()), counts, shares)
 
 
-def _link_patterns(edge: Edge | None) -> tuple[set[Entry], set[Entry]]:
-    """Where a link has entries of the Jacobian or of the mass matrix, by its target and by its source."""
-    if edge is None:
-        return set(), set()
+def _link_patterns(edge: Edge) -> tuple[set[Entry], set[Entry]]:
+    """Where a link has entries of shift M - J, by its target and by its source."""
     here, there = set(block_pattern(edge.jacobian_here())), set(block_pattern(edge.jacobian_there()))
-    for pattern, block in zip((here, there), edge.inertia, strict=False):
-        pattern.update(block_pattern(block))
+    rates = [sp.Dummy(real=True) for _ in (*edge.here, *edge.there)]
+    turned = momentum_slopes(edge, rates[: len(edge.here)], rates[len(edge.here) :])
+    for blocks in (edge.inertia, turned):
+        for pattern, block in zip((here, there), blocks, strict=False):
+            pattern.update(block_pattern(block))
     return here, there
 
 
@@ -86,39 +105,72 @@ def _link_patterns(edge: Edge | None) -> tuple[set[Entry], set[Entry]]:
 def _program(
     n: int,
     size: int,
-    own: tuple[Entry, ...],
-    here: tuple[Entry, ...],
-    there: tuple[Entry, ...],
+    own: tuple[Pattern, ...],
+    joined: tuple[tuple[Pattern, Pattern], ...],
     links: tuple[Link, ...],
+    where: tuple[int, ...] = (),
+    counts: tuple[int, ...] = (),
+    shares: tuple[int, ...] = (),
 ) -> Program:
-    nodes = np.arange(n)
-    target, source = (np.array([link[side] for link in links], np.int64) for side in (0, 1))
-    blocks = ((own, nodes, nodes), (here, target, target), (there, target, source))
-    parts = [np.stack([a * n + i, b * n + j]) for block, i, j in blocks for a, b in block]
+    """The program of a network of `counts` nodes of each kind and `shares` links of each joint; none: all of one."""
+    stands = np.array(where, np.int64).reshape(-1, n)[:size] if where else np.arange(n * size).reshape(size, n)
+    dimension = int((stands >= 0).sum())
+    nodes, (target, source) = np.arange(n), (np.array([link[side] for link in links], np.int64) for side in (0, 1))
+    alike = _Blocks(stands, nodes, nodes, own, _spans(counts or (n,)))
+    spans = _spans(shares or (len(links),))
+    ends = [
+        _Blocks(stands, target, end, tuple(pair[k] for pair in joined), spans) for k, end in enumerate((target, source))
+    ]
+    parts = [part for blocks in (alike, *ends) for part in blocks.entries()]
     pattern = np.unique(np.concatenate(parts, axis=1), axis=1) if parts else np.zeros((2, 0), np.int64)
-    pivots, entries, exact = _factors(n * size, pattern)
-    place = np.empty(n * size, np.int64)
-    place[pivots] = np.arange(n * size)
-    keys = np.unique(place[entries[0]] * (n * size) + place[entries[1]])
-    columns = keys % (n * size)
-    starts = np.searchsorted(keys, np.arange(n * size + 1) * (n * size))
-    middles = np.searchsorted(keys, np.arange(n * size) * (n * size + 1))
-    slots = [_slots(size, n, block, i, j, place, keys) for block, i, j in blocks]
-    arrays = (target, source, *slots, pivots, place, starts, middles, pivots[columns])
+    pivots, entries, exact = _factors(dimension, pattern)
+    place = np.empty(dimension, np.int64)
+    place[pivots] = np.arange(dimension)
+    keys = np.unique(place[entries[0]] * dimension + place[entries[1]])
+    columns = keys % dimension
+    starts = np.searchsorted(keys, np.arange(dimension + 1) * dimension)
+    middles = np.searchsorted(keys, np.arange(dimension) * (dimension + 1))
+    slots = [blocks.slots(place, keys) for blocks in (alike, *ends)]
+    arrays = (target, source, *slots, pivots, place, starts, middles, pivots[columns], *([where] if where else []))
     weights = np.array([float(link[2]) for link in links])
-    return Program(tuple(np.ascontiguousarray(a, np.int64) for a in arrays), weights, n * size + len(keys), exact)
+    return Program(tuple(np.ascontiguousarray(a, np.int64) for a in arrays), weights, dimension + len(keys), exact)
 
 
-def _slots(
-    size: int, n: int, block: tuple[Entry, ...], i: np.ndarray, j: np.ndarray, place: np.ndarray, keys: np.ndarray
-) -> np.ndarray:
-    """Slots of every block entry: (a * size + b) * len(i) + link or node."""
-    table = np.full((size * size, len(i)), -1, np.int64)
-    for a, b in block:
-        rows, columns = a * n + i, b * n + j
-        found = n * size + np.searchsorted(keys, place[rows] * (n * size) + place[columns])
-        table[a * size + b] = np.where(rows == columns, rows, found)
-    return table.reshape(-1)
+@dataclass(frozen=True, slots=True)
+class _Blocks:
+    """The blocks of nodes, or of one end of links: rows and columns by node, a pattern for each of some spans of them.
+
+    where (most states of a node, nodes): the place of a state in the whole state.
+    """
+
+    where: np.ndarray
+    rows: np.ndarray
+    columns: np.ndarray
+    patterns: tuple[Pattern, ...]
+    spans: tuple[slice, ...]
+
+    def entries(self) -> Iterator[np.ndarray]:
+        """Rows and columns (2, count) of the entries, one place in the pattern after another."""
+        for pattern, span in zip(self.patterns, self.spans, strict=False):
+            for a, b in pattern:
+                yield np.stack([self.where[a][self.rows[span]], self.where[b][self.columns[span]]])
+
+    def slots(self, place: np.ndarray, keys: np.ndarray) -> np.ndarray:
+        """Slots of every block entry: (a * size + b) * count + number of the node or link."""
+        size, dimension = len(self.where), len(place)
+        table = np.full((size * size, len(self.rows)), -1, np.int64)
+        for pattern, span in zip(self.patterns, self.spans, strict=False):
+            for a, b in pattern:
+                rows, columns = self.where[a][self.rows[span]], self.where[b][self.columns[span]]
+                found = dimension + np.searchsorted(keys, place[rows] * dimension + place[columns])
+                table[a * size + b, span] = np.where(rows == columns, rows, found)
+        return table.reshape(-1)
+
+
+def _spans(counts: Sequence[int]) -> tuple[slice, ...]:
+    """Parts of a numbering of these lengths, one after another."""
+    ends = list(accumulate(counts, initial=0))
+    return tuple(slice(a, b) for a, b in pairwise(ends))
 
 
 def _factors(dimension: int, pattern: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
@@ -219,9 +271,13 @@ def _eliminate(k: int, rows: list[set[int]], columns: list[set[int]], near: list
 def workspace(w: StepWriter, entries: int) -> int:
     """Groups of scratch memory: stages, stage state, slopes, time slopes and, for implicit methods, the matrix.
 
-    Factors of an incomplete elimination stand beside the matrix, exact ones replace it.
+    Factors of an incomplete elimination stand beside the matrix, exact ones replace it.  Where M depends on the state, an
+    implicit method keeps the rates at the start and a second matrix.
     """
     vectors = (len(w.method.c) + 3) * w.equations.dimension
     if w.method.kind != "rosenbrock" and not w.equations.inertial:
         return vectors
-    return vectors + (entries if program(w.equations).exact else 2 * entries)
+    matrix = entries if program(w.equations).exact else 2 * entries
+    if w.method.kind != "rosenbrock" or Mass(w.equations).constant:
+        return vectors + matrix
+    return vectors + 2 * matrix + w.equations.dimension

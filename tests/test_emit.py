@@ -28,6 +28,7 @@ from samples import (
 
 from synchain.codegen import integrators, printer
 from synchain.codegen.emit import emit
+from synchain.codegen.places import by_joint
 from synchain.codegen.sparse import program
 from synchain.models.equations import TIME, Equations
 
@@ -157,8 +158,6 @@ def close(found: list, expected: list, allowed=SMALL) -> bool:
 
 def refused(eq: Equations, m: integrators.Integrator, looped: bool) -> str:
     """What a kernel says that cannot step a network; empty where it can."""
-    if looped and eq.mixed:
-        return "nodes of several kinds: a kernel steps at most 0 nodes"
     if not eq.inertial or looped:
         return ""
     return "found links with inertia" if m.inexact or m.smooth is not None else ""
@@ -184,7 +183,7 @@ def test_a_step_is_what_its_definition_says(case, method, looped, exact_numbers,
         monkeypatch.setattr(sys.modules["synchain.codegen.emit"], "LARGEST_UNROLLED", 0)
     space = plain(emit(eq, method, ("trajectory",), width=1).text, EXACT)
     assert space["LOOPED"] is looped
-    weights = [mpf(w.numerator) / w.denominator for _, _, w in eq.links]
+    weights = [mpf(w.numerator) / w.denominator for _, _, w in by_joint(eq)]
     graph = (program(eq).arrays, np.array(weights, object)) if looped else ()
     steps = {"step": m} if m.smooth is None or looped else {"step": m, "step_smooth": m.smooth}
     for seed, name in itertools.product(range(6 if "friction" in case else 3), steps):

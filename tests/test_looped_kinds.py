@@ -1,0 +1,110 @@
+"""Large networks of several kinds and of links with inertia: loops against statements, and kernels against SciPy."""
+
+from __future__ import annotations
+
+import re
+import sys
+
+import numpy as np
+import pytest
+from samples import FLOATS, clocks, plain, take_step
+from scipy.integrate import solve_ivp
+
+from synchain.codegen import integrators, sparse
+from synchain.codegen.emit import emit
+from synchain.codegen.places import by_joint
+from synchain.codegen.sparse import program
+from synchain.models import Scene, load_scene, ring, star
+from synchain.models.equations import Equations
+from synchain.models.export import to_python
+from synchain.runtime import run
+
+
+def three_kinds() -> Equations:
+    """Nodes of two and of three states in an order that is not that of their kinds; two kinds share a varied parameter."""
+    kinds = [{"oscillator": "lorenz", "at": [2, 5]}, {"oscillator": "van_der_pol", "at": [4, 7]}]
+    own = {"b": [1, 2], "omega": [1, 2, 3, 4, 5], "delta": [0.1, 0.2, 0.3]}
+    return Scene(oscillator="duffing", nodes=kinds, topology=ring(7), coupling="x->x", parameters=own).equations
+
+
+def pairs(n: int, **given: object) -> Scene:
+    """A ring of nodes in pairs, two of one kind and two of the other: all of a kind have the same surroundings."""
+    kinds = [{"oscillator": "van_der_pol", "at": [i + 1 for i in range(n) if i % 4 > 1]}]
+    common = {"transient": 0, "window": 20, "record": (), "time_unit": "time", "rtol": 1e-10}
+    return Scene(oscillator="duffing", nodes=kinds, topology=ring(n), coupling="spring", **{**common, **given})
+
+
+def hanging(n: int, **given: object) -> Scene:
+    """Clocks of different swings on one beam."""
+    swings = {"mass": 10, "drag": 20, "escapement": 0.02, "swing": np.linspace(0.3, 0.5, n)}
+    start = {"x": 0, "theta": np.linspace(-0.5, 0.6, n), "theta_rate": 0}
+    return load_scene("huygens").replace(
+        topology=star(n + 1), initial=start, parameters=swings, record=(), window=20, rtol=1e-10, **given
+    )
+
+
+def by_scipy(scene: Scene, end: float) -> np.ndarray:
+    """The state at the end by SciPy from the exported source."""
+    space: dict = {}
+    exec(compile(to_python(scene.equations, scene.parameters), "<export>", "exec"), space)
+    return solve_ivp(space["rhs"], (0, end), scene.y0, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+
+
+@pytest.mark.parametrize("method", ["cash_karp", "dop853", "rodas5p"])
+@pytest.mark.parametrize("case", ["three kinds", "clocks", "clocks, incomplete"])
+def test_loops_do_what_the_written_statements_do(case: str, method: str, monkeypatch) -> None:
+    """Ten steps of the same network by either kernel, in plain Python."""
+    equations = three_kinds() if case == "three kinds" else clocks(6)
+    if "incomplete" in case:
+        monkeypatch.setattr(sparse, "FILL_LIMIT", 0.0)
+        sparse._program.cache_clear()
+    random = np.random.default_rng(4)
+    y, p = random.uniform(-1, 1, equations.dimension), random.uniform(0.5, 1.5, len(equations.parameters))
+    ends = []
+    for limit in (8, 0):
+        monkeypatch.setattr(sys.modules["synchain.codegen.emit"], "LARGEST_UNROLLED", limit)
+        space = plain(emit(equations, method, (), width=1).text, FLOATS)
+        assert space["LOOPED"] is (limit == 0)
+        weights = [float(weight) for _, _, weight in by_joint(equations)]
+        state, t, h = list(y), 0.0, 0.05
+        for _ in range(10):
+            graph = (program(equations).arrays, weights) if limit == 0 else ()
+            state, t = take_step(space, t, h, state, list(p), 1e-6, 1e-6, *graph).y_new, t + h
+        ends.append(state)
+    sparse._program.cache_clear()
+    assert program(equations).weights.tolist() == weights
+    np.testing.assert_allclose(*ends, rtol=1e-11, atol=1e-11)
+    assert np.abs(np.array(ends[0]) - y).max() > 0.1
+
+
+def test_forty_nodes_of_two_kinds_move_as_their_exported_equations_say() -> None:
+    """And from equal starts the nodes of a kind stay equal bit for bit, though each adds up its own links."""
+    random = np.random.default_rng(1)
+    scene = pairs(40, integrator="dop853", parameters={"sigma": 0.3, "omega": 1.1},
+                  initial={"x": random.uniform(-1, 1, 40), "v": 0})  # fmt: skip
+    found = run(scene, skip=False)
+    assert found.success
+    np.testing.assert_allclose(found.end, by_scipy(scene, 20), atol=3e-8)
+    first = [i for i in range(40) if i % 4 < 2]
+    equal = scene.replace(initial={"x": [0.7 if i in first else 0.2 for i in range(40)], "v": 0})
+    end = run(equal, skip=False).end.values.reshape(2, 40)
+    for kind in (first, [i for i in range(40) if i not in first]):
+        assert len(np.unique(end[:, kind], axis=1).T) == 1
+    assert abs(end[0, 0] - end[0, 2]) > 0.01
+
+
+def test_forty_clocks_on_a_beam_move_as_their_exported_equations_say() -> None:
+    scene = hanging(40, integrator="rodas5p")
+    found = run(scene)
+    assert found.success
+    np.testing.assert_allclose(found.end, by_scipy(scene, 20), atol=3e-8)
+
+
+@pytest.mark.parametrize("method", integrators.names())
+def test_the_text_of_a_kernel_does_not_grow_with_its_kinds_of_nodes(method: str) -> None:
+    if integrators.integrator(method).inexact:
+        pytest.skip("written-out kernels alone")
+    for make in (lambda n: pairs(n).equations, lambda n: hanging(n).equations):
+        small, large = (emit(make(n), method, (), width=2).text for n in (12, 1200))
+        body = [re.sub(r"\d+", "0", text[text.index("import math") :]) for text in (small, large)]
+        assert body[0] == body[1]
