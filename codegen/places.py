@@ -47,7 +47,9 @@ class Places:
         self.equations, self.mixed = equations, equations.mixed
         self.size = max(len(node.state) for node in equations.nodes)
         self.kinds, self.joints = _kinds(equations), _joints(equations)
-        self.slots = {name: slot for slot, name in enumerate(equations.parameters)} if equations.varied else {}
+        self.slots: dict[str, int] = {}
+        if equations.varied:
+            self.slots = {name: slot for slot, name in enumerate(equations.parameters, start=equations.dimension)}
 
     @property
     def rows(self) -> list[tuple[str, str]]:
@@ -70,11 +72,11 @@ class Places:
 
     def own(self, body: Body) -> list[str]:
         """Load the parameters that a node has for itself, those that a body uses."""
-        used, dimension = {s.name for s in body.symbols}, self.equations.dimension
+        used = {s.name for s in body.symbols}
         lines = []
         for row, name in enumerate(self.equations.varied, start=self.size):
             if name in used:
-                slot = f"where[{row}*NODES + i]" if self.mixed else f"{dimension + self.slots[f'{name}_1']} + i"
+                slot = f"where[{row}*NODES + i]" if self.mixed else f"{self.slots[f'{name}_1']} + i"
                 lines.append(f"{name} = load(p, {slot}, WIDTH)")
         return lines
 
@@ -150,7 +152,7 @@ def by_joint(equations: Equations) -> tuple[Link, ...]:
 def table(equations: Equations) -> np.ndarray:
     """Return `where`, (most states of a node + parameters with a value for each node) * n slots of a bank, -1 where none."""
     size = max(len(node.state) for node in equations.nodes)
-    slots = {name: equations.dimension + k for k, name in enumerate(equations.parameters)}
+    slots = {name: k for k, name in enumerate(equations.parameters, start=equations.dimension)}
     found = np.full((size + len(equations.varied), equations.n), -1, np.int64)
     places = equations.places()
     for number, i in enumerate(by_kind(equations)):

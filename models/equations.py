@@ -100,7 +100,7 @@ class Equations:
         """Number of state variables of the whole network."""
         if not self.mixed:
             return self.n * len(self.node.state)
-        return sum(len(self.node_at(i).state) for i in range(self.n))
+        return sum(len(node.state) * self.kinds.count(k) for k, node in enumerate(self.nodes))
 
     @property
     def parameters(self) -> tuple[str, ...]:

@@ -57,8 +57,18 @@ def check_masses(oscillator: str, values: Mapping[str, float]) -> None:
     found = _masses(oscillator)
     if found is None:
         return
+    used = {s.name for s in found[0].free_symbols}
+    _check_masses(oscillator, tuple((name, value) for name, value in values.items() if name in used))
+
+
+@lru_cache(maxsize=1024)
+def _check_masses(oscillator: str, values: tuple[tuple[str, float], ...]) -> None:
+    """The check in the parameters that the masses depend on: nodes that differ in others need none of their own."""
+    found = _masses(oscillator)
+    if found is None:
+        return
     masses, velocities = found
-    numbers = masses.subs({sp.Symbol(name, real=True): sp.Float(value) for name, value in values.items()})
+    numbers = masses.subs({sp.Symbol(name, real=True): sp.Float(value) for name, value in values})
     if numbers.free_symbols:
         return
     for k, velocity in enumerate(velocities):
