@@ -23,9 +23,9 @@ from synchain.runtime import run
 
 def three_kinds() -> Equations:
     """Nodes of two and of three states in an order that is not that of their kinds; two kinds share a varied parameter."""
-    kinds = [{"oscillator": "lorenz", "at": [2, 5]}, {"oscillator": "van_der_pol", "at": [4, 7]}]
+    kinds = [{"oscillator": "lorenz", "at": [2, 3]}, {"oscillator": "van_der_pol", "at": [4, 7]}]
     own = {"b": [1, 2], "omega": [1, 2, 3, 4, 5], "delta": [0.1, 0.2, 0.3]}
-    return Scene(oscillator="duffing", nodes=kinds, topology=ring(7), coupling="x->x", parameters=own).equations
+    return Scene(oscillator="duffing", nodes=kinds, topology=ring(7), coupling="x->x, y->y", parameters=own).equations
 
 
 def pairs(n: int, **given: object) -> Scene:
