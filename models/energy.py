@@ -1,13 +1,13 @@
-"""The energy of a network and the power that changes it, as exact expressions for one node and one link.
+"""The energy of a network and the power that changes it, as exact expressions for one node and one link of each kind.
 
-E = sum over nodes of sum v dL/dv - L, plus the potentials of the links; dE/dt = sum v Q - (partial) dL/dt, plus what
-Rayleigh functions of the links take away.
+E = sum over nodes of sum v dL/dv - L, plus the same of the links; dE/dt = sum v Q - (partial) dL/dt, plus what Rayleigh
+functions of the links take away.
 Source: Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. (Addison-Wesley, 2002), sect. 2.7.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,31 +15,38 @@ import sympy as sp
 
 from .calculus import derivative
 from .coupling_matrix import is_matrix
-from .coupling_name import coordinates_of, split
-from .equations import TIME, Equations, Link
+from .equations import TIME, Edge, Equations, Link
 from .expect import a_scene
-from .link import pair_energy
+from .link import link_energies
 from .nondimensional import FRICTION, friction_coefficient, nondimensional
 from .plugins import load
+from .scene_nodes import by_kind
 
 if TYPE_CHECKING:
     from .scene import Scene
 
-__all__ = ["Energy", "energy"]
+__all__ = ["Energy", "Share", "energy"]
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """What one node or one link has of the energy of a network, and the power that it feeds in."""
+
+    energy: sp.Expr = sp.S.Zero
+    power: sp.Expr = sp.S.Zero
 
 
 @dataclass(frozen=True, slots=True)
 class Energy:
-    """Energy and power of one node, in its states, and of one link, in those of its two ends; non-dimensional.
+    """Energy and power of a node of each kind, in its states, and of a link of each edge, in those of its two ends.
 
-    A pair of links, there and back, is one spring or damper: `pairs` are the links that count, each pair once.
+    All is non-dimensional.  `nodes` follow equations.nodes, `links` equations.edges.  A pair of links, there and back, is
+    one spring or damper: `pairs` are the links that count, each pair once.
     """
 
     equations: Equations
-    node: sp.Expr
-    node_power: sp.Expr
-    link: sp.Expr
-    link_power: sp.Expr
+    nodes: tuple[Share, ...]
+    links: tuple[Share, ...]
 
     @property
     def pairs(self) -> tuple[Link, ...]:
@@ -49,15 +56,24 @@ class Energy:
     @property
     def conservative(self) -> bool:
         """True where no power is fed in or lost, for all values of the parameters."""
-        return self.node_power == 0 and self.link_power == 0
+        return all(share.power == 0 for share in (*self.nodes, *self.links))
+
+    def of_link(self, link: Link) -> int:
+        """Return which edge a link is of, its number in equations.edges."""
+        eq = self.equations
+        pair = (eq.kind(link[0]), eq.kind(link[1]))
+        return [kinds for kinds, _ in eq.joints].index(pair) if eq.mixed else 0
 
     def whole(self) -> tuple[sp.Expr, sp.Expr]:
         """Return energy and power of the whole network in its state symbols (algebra grows with n: meant for small n)."""
-        return self._sum(self.node, self.link), self._sum(self.node_power, self.link_power)
-
-    def _sum(self, node: sp.Expr, link: sp.Expr) -> sp.Expr:
-        own = [node.xreplace(self.equations.at_node(i)) for i in range(self.equations.n)]
-        return sp.Add(*own, *(link.xreplace(dict(self.equations.at_link(pair))) for pair in self.pairs))
+        eq = self.equations
+        placed = [(self.nodes[eq.kind(i)], eq.at_node(i)) for i in range(eq.n)]
+        shares: list[tuple[Share, dict]] = [
+            *placed,
+            *((self.links[self.of_link(p)], eq.at_link(p)) for p in self.pairs),
+        ]
+        found = sp.Add(*(share.energy.xreplace(values) for share, values in shares))
+        return found, sp.Add(*(share.power.xreplace(values) for share, values in shares))
 
 
 def energy(scene: Scene) -> Energy:
@@ -66,43 +82,52 @@ def energy(scene: Scene) -> Energy:
     Raises ValueError for a vector field or a coupling by components, which have no energy, for one-way links, which have no
     potential, and for set-valued friction, whose force in stick is no function of the state.
     """
-    module = load("oscillator", a_scene(scene).oscillator)
-    if hasattr(module, "field"):
-        raise ValueError(f"energy: oscillator {scene.oscillator!r} is a vector field; expected one with a Lagrangian")
+    templates, _ = by_kind(a_scene(scene).oscillator, scene.friction, scene.nodes, scene.n)
+    for oscillator, _ in templates:
+        if hasattr(load("oscillator", oscillator), "field"):
+            raise ValueError(f"energy: oscillator {oscillator!r} is a vector field; expected one with a Lagrangian")
     equations = scene.equations
     if equations.node.contact is not None:
         raise ValueError("energy: set-valued friction does work that is no function of the state; use contact 'atan'")
-    if equations.mixed or equations.inertial:
-        equations.expect_alike("energy")
-    system = nondimensional(module)
+    nodes = tuple(_of_node(oscillator, friction, scene.contact) for oscillator, friction in templates)
+    return Energy(equations, nodes, _of_links(scene, [oscillator for oscillator, _ in templates]))
+
+
+def _of_node(oscillator: str, friction: str | None, contact: str) -> Share:
+    """Energy and power of one oscillator by itself."""
+    system = nondimensional(load("oscillator", oscillator))
     lagrangian = system.kinetic - system.potential
-    momenta = [derivative(lagrangian, v) for v in system.velocities]
-    own = sp.Add(*(v * p for v, p in zip(system.velocities, momenta, strict=True))) - lagrangian
     power = sp.Add(*(v * f for v, f in zip(system.velocities, system.forces, strict=True)))
     power -= derivative(lagrangian, TIME)
-    if scene.friction is not None:
-        coefficient = friction_coefficient(load("friction", scene.friction), scene.contact)
-        power = power.replace(FRICTION, coefficient)
-    potential, lost = _of_link(scene, equations)
-    return Energy(equations, sp.expand(own), power, potential, lost)
+    if friction is not None:
+        power = power.replace(FRICTION, friction_coefficient(load("friction", friction), contact))
+    return Share(_of_lagrangian(lagrangian, system.velocities), power)
 
 
-def _of_link(scene: Scene, equations: Equations) -> tuple[sp.Expr, sp.Expr]:
-    """The potential of a link, and the power it feeds in: minus v dR/dv at either end."""
-    edge = equations.edge
-    if edge is None or not equations.links or scene.coupling is None:
-        return sp.S.Zero, sp.S.Zero
+def _of_links(scene: Scene, oscillators: Sequence[str]) -> tuple[Share, ...]:
+    """Energy and power of one link of each edge."""
+    equations = scene.equations
+    if not equations.edges or scene.coupling is None:
+        return ()
     if is_matrix(scene.coupling):
         raise ValueError(f"energy: the coupling {scene.coupling!r} has none; expected a spring or damper by its name")
     if not scene.topology.symmetric:
         raise ValueError(f"energy: {scene.topology.name}({scene.n}) has one-way links; expected links both ways")
-    half = len(edge.here) // 2
-    module = load("coupling", split(scene.coupling)[0])
-    strengths = {name: sp.Symbol(name, real=True) for name in module.PARAMETERS}
-    chosen = coordinates_of(scene.coupling, tuple(s.name for s in equations.node.state[:half]))
-    potential, dissipation = pair_energy(module, edge.here, edge.there, edge.weight, strengths, chosen)
-    return potential, -sp.Add(*_works(dissipation, (*edge.here[half:], *edge.there[half:])))
+    kinds = [pair for pair, _ in equations.joints] if equations.mixed else [(0, 0)]
+    found = []
+    for (a, b), edge in zip(kinds, equations.edges, strict=True):
+        nodes = (equations.nodes[a], equations.nodes[b])
+        found.append(_of_link(edge, *link_energies(scene.coupling, edge, nodes, (oscillators[a], oscillators[b]))))
+    return tuple(found)
 
 
-def _works(dissipation: sp.Expr, velocities: tuple[sp.Symbol, ...]) -> Iterator[sp.Expr]:
-    return (v * derivative(dissipation, v) for v in velocities)
+def _of_link(edge: Edge, kinetic: sp.Expr, potential: sp.Expr, dissipation: sp.Expr) -> Share:
+    """The energy of a link, and the power it feeds in: minus v dR/dv at either end."""
+    velocities = (*edge.here[len(edge.here) // 2 :], *edge.there[len(edge.there) // 2 :])
+    lost = sp.Add(*(v * derivative(dissipation, v) for v in velocities))
+    return Share(potential if kinetic == 0 else _of_lagrangian(kinetic - potential, velocities), -lost)
+
+
+def _of_lagrangian(lagrangian: sp.Expr, velocities: Sequence[sp.Symbol]) -> sp.Expr:
+    """The energy function sum v dL/dv - L."""
+    return sp.expand(sp.Add(*(v * derivative(lagrangian, v) for v in velocities)) - lagrangian)

@@ -18,7 +18,7 @@ from .nondimensional import nondimensional
 from .orientation import link_energy
 from .plugins import call, load
 
-__all__ = ["check_coupling", "edge", "pair_energy"]
+__all__ = ["check_coupling", "edge", "link_energies"]
 
 Symbols = tuple[sp.Symbol, ...]
 
@@ -180,20 +180,17 @@ def _energies(
     return kinetic, potential, dissipation
 
 
-def pair_energy(
-    model: ModuleType,
-    here: Symbols,
-    there: Symbols,
-    weight: sp.Symbol,
-    given: Mapping[str, sp.Symbol],
-    chosen: tuple[int, ...],
-) -> tuple[sp.Expr, sp.Expr]:
-    """Return the potential and the Rayleigh function of a link, summed over the coordinates of number `chosen`.
+def link_energies(
+    coupling: str, joint: Edge, nodes: tuple[Node, Node], oscillators: tuple[str, str]
+) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """Return the kinetic energy, the potential and the Rayleigh function of a link, in the symbols of its edge.
 
-    `here` and `there` are the states at the target and the source, coordinates followed by their velocities.
+    `nodes` and `oscillators` are those of its target and its source.
     """
-    _, potential, dissipation = _energies(model, here, there, weight, given, [(k, k) for k in chosen])
-    return potential, dissipation
+    model = load("coupling", split(coupling)[0])
+    strengths = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
+    ends = _Ends(*nodes, *oscillators, joint.here, joint.there)
+    return ends.energies(coupling, model, {"weight": joint.weight, **strengths})
 
 
 def _names(node: Node) -> tuple[str, ...]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import mpmath
 import numpy as np
 import pytest
 import sympy as sp
 from mechanics_proof import vanishes
 
-from synchain.models import Scene, chain, from_matrix, ring
+from synchain.models import Scene, chain, from_matrix, load_scene, ring
 from synchain.models.energy import energy
 from synchain.models.equations import TIME
 from synchain.models.lagrangian import total_derivative
@@ -15,7 +16,7 @@ from synchain.models.plugins import load, names
 from synchain.runtime.energy import energy_function
 
 FORCES = [c for c in names("coupling") if not hasattr(load("coupling", c), "kinetic")]
-"""The couplings without inertia; tests/test_inertia.py has the others."""
+"""The couplings without inertia: their accelerations are the right-hand side itself."""
 
 LAGRANGIAN = [name for name in names("oscillator") if not hasattr(load("oscillator", name), "field")]
 
@@ -60,6 +61,39 @@ def test_the_power_of_a_cart_with_pendulums_that_is_joined_to_another() -> None:
     assert abs(gained) > 1e-3
 
 
+def unequal() -> dict[str, Scene]:
+    """Networks with inertia, with nodes of several kinds, and with both; some with parameters of their own."""
+    weights = from_matrix([["-1/2", "1/2", 0], ["1/2", "-5/2", 2], [0, 2, -2]])
+    kinds = [{"oscillator": "pendulum", "at": [2]}, {"oscillator": "friction", "at": [3]}]
+    own = {"delta": [0.1, 0.2, 0.3]}
+    return {
+        "inertial": Scene(oscillator="duffing", coupling="inerter", topology=weights, parameters=own),
+        "two coordinates": scene_of("double_pendulum", "inerter"),
+        "three kinds": Scene(oscillator="duffing", nodes=kinds, coupling="damper", topology=weights),
+        "oriented": scene_of("mass", "fput", 3),
+        "clocks": load_scene("huygens"),
+    }
+
+
+@pytest.mark.parametrize("name", unequal())
+def test_the_power_of_unequal_nodes_and_of_links_with_inertia(name: str) -> None:
+    """In 40 digits at random states: M is solved by numbers, as the equations are."""
+    scene = unequal()[name]
+    eq, (found, power) = scene.equations, energy(scene).whole()
+    state, random = sp.symbols(eq.state, real=True), np.random.default_rng(3)
+    symbols = [TIME, *state, *sp.symbols(eq.parameters, real=True)]
+    mass = sp.Matrix(sp.SparseMatrix(eq.dimension, eq.dimension, eq.mass())) if eq.inertial else sp.eye(eq.dimension)
+    made = [found.diff(TIME), [found.diff(s) for s in state], eq.rhs(), mass, power]
+    of = [sp.lambdify(symbols, e, "mpmath") for e in made]
+    with mpmath.workdps(40):
+        for _ in range(3):
+            at = [mpmath.mpf(value) for value in random.uniform(0.2, 1.3, len(symbols))]
+            explicit, slopes, rhs, masses, gained = (f(*at) for f in of)
+            rates = mpmath.lu_solve(masses, mpmath.matrix(rhs))
+            assert abs(explicit + mpmath.fdot(slopes, rates) - gained) < 1e-36
+            assert abs(gained) > 1e-3 or name == "oriented"
+
+
 @pytest.mark.parametrize("coupling", FORCES)
 def test_what_conserves_energy(coupling: str) -> None:
     assert energy(scene_of("harmonic", coupling)).conservative == ("damper" not in coupling)
@@ -78,21 +112,30 @@ def test_what_has_no_energy() -> None:
             energy(Scene(**given))
 
 
-def test_arrays_have_the_energy_of_the_exact_expression() -> None:
-    """Weighted, with two coordinates, for a stack of states: the same numbers as the expression of the whole network."""
+def pendulums() -> Scene:
+    """Weighted, with two coordinates."""
     graph = from_matrix([["-5/2", 2, "1/2"], [2, -2, 0], ["1/2", 0, "-1/2"]])
-    scene = Scene(oscillator="double_pendulum", coupling="torsion", topology=graph,
-                  parameters={"sigma": 0.7, "delta": 0.3, "mass_ratio": 1.5})  # fmt: skip
+    return Scene(oscillator="double_pendulum", coupling="torsion", topology=graph,
+                 parameters={"sigma": 0.7, "delta": 0.3, "mass_ratio": 1.5})  # fmt: skip
+
+
+@pytest.mark.parametrize("scene", [pendulums(), *unequal().values()], ids=["pendulums", *unequal()])
+def test_arrays_have_the_energy_of_the_exact_expression(scene: Scene) -> None:
+    """For a stack of states: the same numbers as the expression of the whole network."""
     function = energy_function(scene)
-    states = np.random.default_rng(1).normal(size=(2, 5, 12))
-    symbols = [*sp.symbols(scene.equations.state, real=True), *sp.symbols(scene.equations.parameters, real=True)]
+    scene = function.scene
+    states = np.random.default_rng(1).normal(size=(2, 5, scene.equations.dimension))
+    symbols = [TIME, *(real for names in (scene.equations.state, scene.equations.parameters)
+                       for real in sp.symbols(names, real=True))]  # fmt: skip
     numbers = [scene.parameters[name] for name in scene.equations.parameters]
-    for found, exact in zip((function(states), function.power(states)), function.exact.whole(), strict=True):
-        written = sp.lambdify(symbols, exact)(*np.moveaxis(states, -1, 0), *numbers)
+    found_both = function(states, 0.7), function.power(states, 0.7)
+    for found, exact in zip(found_both, function.exact.whole(), strict=True):
+        written = sp.lambdify(symbols, exact)(0.7, *np.moveaxis(states, -1, 0), *numbers)
         assert found.shape == (2, 5)
         assert np.allclose(found, written, rtol=1e-13, atol=1e-13)
-    other = function(states, parameters={"sigma": 0.0})
-    assert np.abs(other - function(states)).max() > 0.1
+    name = scene.equations.edges[0].parameters[0].name
+    other = function(states, parameters={name: scene.parameters[name] + 0.4})
+    assert (np.abs(other - function(states)).max() > 0.1) == (scene.coupling != "damper")
 
 
 def test_the_imbalance_of_an_exact_solution_is_that_of_the_rule() -> None:

@@ -19,6 +19,7 @@ from synchain.models import Scene, load_scene, ring, star
 from synchain.models.equations import Equations
 from synchain.models.export import to_python
 from synchain.runtime import run
+from synchain.runtime.energy import energy_function
 
 
 def three_kinds() -> Equations:
@@ -81,17 +82,28 @@ def test_loops_do_what_the_written_statements_do(case: str, method: str, monkeyp
 def test_forty_nodes_of_two_kinds_move_as_their_exported_equations_say() -> None:
     """And from equal starts the nodes of a kind stay equal bit for bit, though each adds up its own links."""
     random = np.random.default_rng(1)
-    scene = pairs(40, integrator="dop853", parameters={"sigma": 0.3, "omega": 1.1},
-                  initial={"x": random.uniform(-1, 1, 40), "v": 0})  # fmt: skip
+    numbers = {"sigma": 0.3, "u": 0.3, "delta": 0.1, "omega": np.linspace(1.0, 1.2, 40)}
+    scene = pairs(40, integrator="dop853", parameters=numbers, initial={"x": random.uniform(-1, 1, 40), "v": 0})
     found = run(scene, skip=False)
     assert found.success
     np.testing.assert_allclose(found.end, by_scipy(scene, 20), atol=3e-8)
     first = [i for i in range(40) if i % 4 < 2]
-    equal = scene.replace(initial={"x": [0.7 if i in first else 0.2 for i in range(40)], "v": 0})
-    end = run(equal, skip=False).end.values.reshape(2, 40)
+    start = {"x": [0.7 if i in first else 0.2 for i in range(40)], "v": 0}
+    frequencies = [1.0 if i in first else 1.3 for i in range(40)]
+    end = run(scene.replace(initial=start, omega=frequencies), skip=False).end.values.reshape(2, 40)
     for kind in (first, [i for i in range(40) if i not in first]):
         assert len(np.unique(end[:, kind], axis=1).T) == 1
     assert abs(end[0, 0] - end[0, 2]) > 0.01
+    kept(scene.replace(u=0.0, delta=0.0, mu=0.0), drift=3e-9)
+
+
+def kept(scene: Scene, drift: float) -> None:
+    """Without drive and damping the energy at the end is that at the start."""
+    function = energy_function(scene)
+    zero = {sp.Symbol(name, real=True): 0 for name, value in scene.parameters.items() if value == 0.0}
+    assert all(share.power.xreplace(zero) == 0 for share in (*function.exact.nodes, *function.exact.links))
+    start, end = function(scene.y0), function(run(scene, skip=False).end.values)
+    assert abs(end - start) < drift * abs(start)
 
 
 def test_forty_clocks_on_a_beam_move_as_their_exported_equations_say() -> None:
@@ -99,6 +111,7 @@ def test_forty_clocks_on_a_beam_move_as_their_exported_equations_say() -> None:
     found = run(scene)
     assert found.success
     np.testing.assert_allclose(found.end, by_scipy(scene, 20), atol=3e-8)
+    kept(scene.replace(escapement=0.0, drag=0.0), drift=3e-9)
 
 
 @pytest.mark.parametrize("method", ["dop853", "rodas5p"])
