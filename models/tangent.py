@@ -14,6 +14,7 @@ import sympy as sp
 
 from .calculus import derivative
 from .equations import TIME, Edge, Equations, Node
+from .mode_inertia import effective_slope, inertia_of_modes
 from .reduction import collapse
 from .saltation import Entry, Events, of_blocks, of_mode, of_network
 
@@ -79,7 +80,8 @@ def mode(equations: Equations, plane: bool = False) -> Variation:
     """Return the variational equation of one transversal mode along the synchronous orbit, d' = (J - alpha H) d.
 
     With `plane` the strength is complex, alpha + i beta, and the deviation has its real parts first, then its imaginary
-    parts.  J and H as in `transversal`, which raises the same errors.
+    parts.  J and H as in `transversal`, which raises the same errors.  Where links have inertia H stands for H + B J, and
+    the strength for tau = alpha/(1 + b alpha) (`synchain.models.mode_inertia`).
     """
     slope = coupling_slope(equations)
     node = equations.node
@@ -123,6 +125,8 @@ def clustered(equations: Equations, found: Clusters) -> Variation:
     Raises ValueError as `transversal` does, for a link whose derivative depends on the state, and for a partition that is
     not balanced.
     """
+    if equations.inertial:
+        equations.expect_alike("cluster states")
     slope = _constant_slope(equations)
     orbit = collapse(equations, found.classes)
     components = _deviating(orbit.node)
@@ -224,21 +228,24 @@ def transversal(equations: Equations) -> Equations:
 
     With links that vanish between equal states, a deviation along an eigenvector of G with eigenvalue gamma obeys
     d' = (J + sigma gamma H) d, J the Jacobian of one oscillator and sigma H the derivative of a link with respect to the
-    state at its source (Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998)); alpha = -sigma gamma.
+    state at its source (Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998)); alpha = -sigma gamma.  Links with inertia:
+    `synchain.models.mode_inertia`.
 
     Raises ValueError where there is no coupling, where a link does not vanish between equal states (the synchronous state
     is no solution), or where links are not proportional to sigma.
     """
     slope = coupling_slope(equations)
-    return Equations(_extend(equations.node, -ALPHA * slope, (ALPHA,)), None, 1)
+    strength = ALPHA / (1 + inertia_of_modes(equations)[1] * ALPHA)
+    return Equations(_extend(equations.node, -strength * slope, (ALPHA,)), None, 1)
 
 
 def coupling_slope(equations: Equations) -> sp.Matrix:
     """Return H: the derivative of a link of weight 1 with respect to the state at its source, over sigma, at equal states.
 
-    Raises ValueError as `transversal` does.
+    Of links with inertia it is H + B J.  Raises ValueError as `transversal` does.
     """
-    equations.expect_alike("transversal modes of complete synchronisation")
+    if equations.mixed or equations.varied:
+        equations.expect_alike("transversal modes of complete synchronisation")
     edge = equations.edge
     if edge is None:
         raise ValueError("these equations have no coupling; a transversal mode needs links")
@@ -257,7 +264,7 @@ def coupling_slope(equations: Equations) -> sp.Matrix:
         raise ValueError(
             f"between equal states links depend on {', '.join(sorted(more))} as well; expected sigma alone"
         )
-    return slope
+    return effective_slope(equations, slope)
 
 
 def _extend(node: Node, coupling: sp.Matrix, parameters: tuple[sp.Symbol, ...]) -> Node:

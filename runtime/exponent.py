@@ -119,7 +119,7 @@ def exponents(
     by_start, error, length = _by_start(orbits, attractors, precision, periods, show_progress)
     chosen = max(group(attractors, by_start), key=len)
     mean, spread = by_start[chosen].mean(axis=0), np.sqrt((error[chosen] ** 2).sum(axis=0)) / len(chosen)
-    return Exponents(orbits.strengths, mean, spread, length, starts, by_start, attractors)
+    return Exponents(strengths, mean, spread, length, starts, by_start, attractors)
 
 
 def _by_start(

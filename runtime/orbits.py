@@ -6,7 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import sympy as sp
 
+from synchain.models.mode_inertia import inertia_of_modes
 from synchain.models.scene import Scene
 from synchain.models.tangent import Variation, mode
 
@@ -27,7 +29,8 @@ LOOSENESS = 10.0
 class Orbits:
     """Orbits from several starts and the modes of `strengths` (m,) along them.
 
-    state (starts, components); unit: the period of the drive, or 2 pi; block: how many of them are advanced at once;
+    strengths: those of the variational equation, alpha + i beta unless links have inertia; state (starts, components);
+    unit: the period of the drive, or 2 pi; block: how many of them are advanced at once;
     deviations (starts, m, components), at unit length.
     """
 
@@ -45,12 +48,15 @@ class Orbits:
 
     @classmethod
     def make(cls, scene: Scene, strengths: np.ndarray, state: np.ndarray, workers: int | None) -> Orbits:
-        """Orbits at the start of their transient; ValueError where time enters without a known period."""
+        """Orbits at the start of their transient, `strengths` alpha + i beta of their modes.
+
+        Raises ValueError where time enters without a known period, and for a strength at which a mode has no mass.
+        """
         variation = mode(scene.equations, plane=bool(np.iscomplexobj(strengths)))
         unit = unit_of_time(scene)
         row = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])
         state = with_modes(variation.orbit, state, np.repeat(row, len(state), axis=0))
-        return cls(scene, variation, strengths, state, workers, unit)
+        return cls(scene, variation, _of_modes(scene, strengths), state, workers, unit)
 
     @property
     def components(self) -> int:
@@ -118,6 +124,19 @@ class Orbits:
         with np.errstate(divide="ignore", invalid="ignore"):
             self.deviations = np.where(length[..., None] > 0.0, moved / length[..., None], 0.0)
             return np.log(length)
+
+
+def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:
+    """The strengths tau = alpha/(1 + b alpha) of modes whose links have inertia (`synchain.models.mode_inertia`)."""
+    _, share = inertia_of_modes(scene.equations)
+    if share == 0:
+        return alpha
+    b = float(share.xreplace({sp.Symbol(name, real=True): value for name, value in scene.parameters.items()}))
+    mass = 1.0 + b * alpha
+    if not np.all(mass.real > 0.0):
+        worst = alpha[mass.real.argmin()]
+        raise ValueError(f"alpha = {worst}: the mass of this mode is not positive; expected strengths above {-1 / b:g}")
+    return np.asarray(alpha / mass)
 
 
 def unit_of_time(scene: Scene) -> float:

@@ -1,0 +1,66 @@
+"""Transversal modes of links that have inertia: one strength carries their stiffness and their inertia.
+
+A mode of strength alpha = -sigma gamma obeys (1 + alpha B) d' = (J - alpha H) d, B the inertia of a link over sigma at equal
+states.  Where B B = b B and B H = b H, b a number (the link moves some coordinates by forces and by inertia alike), this is
+d' = (J - tau (H + B J)) d with tau = alpha/(1 + b alpha): linear in one strength again.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from .equations import Equations
+
+__all__ = ["effective_slope", "inertia_of_modes"]
+
+
+def inertia_of_modes(equations: Equations) -> tuple[sp.Matrix, sp.Expr]:
+    """Return B and b of links with inertia, zero without any.
+
+    Raises ValueError where modes have no single strength: the inertia does not vanish between nodes that move alike, is not
+    proportional to sigma, or joins coordinates by different masses.
+    """
+    node, edge = equations.node, equations.edge
+    size = len(node.state)
+    if edge is None or not edge.inertia:
+        return sp.zeros(size, size), sp.S.Zero
+    here, there = (sp.Matrix(block) for block in edge.inertia)
+    if (here + there).applyfunc(sp.simplify) != sp.zeros(size, size):
+        raise ValueError(
+            "a link has inertia between nodes that move alike, so complete synchronisation is no solution of this network; "
+            "expected inertia of differences, as an inerter has"
+        )
+    sigma = sp.Symbol("sigma", real=True)
+    equal = dict(zip((*edge.here, *edge.there), node.state * 2, strict=True))
+    own = here.xreplace(equal)
+    b_matrix = own.xreplace({edge.weight: sp.S.One}).diff(sigma)
+    known = {*node.state, *node.parameters}
+    if (own - sigma * edge.weight * b_matrix).applyfunc(sp.simplify) != sp.zeros(size, size) or (
+        b_matrix.free_symbols - known
+    ):
+        raise ValueError("the inertia of links is not proportional to sigma; a mode has no single strength alpha")
+    share = sp.simplify(b_matrix.trace() / b_matrix.rank())
+    if share.has(*node.state) or (b_matrix * b_matrix - share * b_matrix).applyfunc(sp.simplify) != sp.zeros(
+        size, size
+    ):
+        raise ValueError(
+            "links have inertia that joins coordinates by different masses, or masses that depend on the state; a mode has "
+            "no single strength alpha; expected one mass for all coordinates that a link joins"
+        )
+    return b_matrix, share
+
+
+def effective_slope(equations: Equations, slope: sp.Matrix) -> sp.Matrix:
+    """Return H + B J, what multiplies the strength tau of a mode; H itself without inertia.
+
+    Raises ValueError as `inertia_of_modes` does, and where a link pushes coordinates that its inertia does not move.
+    """
+    b_matrix, share = inertia_of_modes(equations)
+    if share == 0:
+        return slope
+    if (b_matrix * slope - share * slope).applyfunc(sp.simplify) != sp.zeros(*slope.shape):
+        raise ValueError(
+            "links push coordinates that their inertia does not join; a mode has no single strength alpha; expected forces "
+            "and inertia on the same coordinates"
+        )
+    return slope + b_matrix * sp.Matrix(equations.node.jacobian())
