@@ -165,7 +165,7 @@ class Equations:
         contact = self.node_at(i).contact
         if contact is None:
             return None
-        _, velocity, mode = self.symbols(i)
+        velocity, mode = self.symbols(i)[1:3]
         own = contact.map(lambda e: e.xreplace(self.at_node(i)))
         felt = [link for link in self.links if link[0] == i]
         links = sp.Add(*(self.edge_at(link).rhs[1].xreplace(self.at_link(link)) for link in felt))

@@ -38,8 +38,8 @@ class Node:
         known = {TIME, *self.state, *self.parameters}
         _check("node", self.rhs, len(self.state), known)
         if self.contact is not None:
-            if len(self.state) != 3 or self.state[2] != SLIP:
-                raise ValueError(f"a node with set-valued friction has the states x, v, slip; found {self.state}")
+            if self.state[2:3] != (SLIP,):
+                raise ValueError(f"a node with set-valued friction has the states x, v, slip, …; found {self.state}")
             _check("contact", self.contact.expressions, len(self.contact.expressions), known)
 
     @property

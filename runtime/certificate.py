@@ -44,6 +44,7 @@ VERDICTS = (
     "not synchronous, the state is unstable",
     "not synchronous, exponent zero within its error",
     "not synchronous although the state is stable: another attractor, or too short a transient",
+    "synchronous on average, but not throughout, although the state is stable: bursts (bubbling), or too short a transient",
 )
 
 
@@ -73,10 +74,14 @@ class Certificate:
         """The part for some cells."""
         return Certificate(self.exponent[cells], self.stderr[cells], self.diffusion[cells])
 
-    def verdicts(self, finished: np.ndarray, error: np.ndarray) -> np.ndarray:
-        """Index into VERDICTS for each cell, from whether it finished and its mean synchronisation error."""
+    def verdicts(self, finished: np.ndarray, error: np.ndarray, largest: np.ndarray) -> np.ndarray:
+        """Index into VERDICTS for each cell, from whether it finished, its mean and its largest synchronisation error.
+
+        Near the loss of stability trajectories within the synchronous state are unstable, and a small distance bursts
+        although the exponent is negative (Ashwin, Buescu & Stewart, Phys. Lett. A 193, 126 (1994)).
+        """
         sign = np.where(self.exponent + 2 * self.stderr < 0.0, -1, np.where(self.exponent > 2 * self.stderr, 1, 0))
-        together = np.array([1, 2, 3])[sign + 1]
+        together = np.where((sign < 0) & (largest >= SYNCHRONOUS), 7, np.array([1, 2, 3])[sign + 1])
         apart = np.array([6, 5, 4])[sign + 1]
         return np.where(finished, np.where(error < SYNCHRONOUS, together, apart), 0)
 

@@ -85,7 +85,7 @@ def _certified(scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: C
     made["ended_early"] = ((buffers.counts[:, 0] == Status.FINISHED) & (buffers.sums[:, 3] < last)).astype(np.int32)
     if "sync_error" in scene.record:
         finished = buffers.counts[:, 0] == Status.FINISHED
-        made["verdict"] = certificate.verdicts(finished, buffers.sums[:, 0]).astype(np.int32)
+        made["verdict"] = certificate.verdicts(finished, buffers.sums[:, 0], buffers.sums[:, 1]).astype(np.int32)
     return made
 
 

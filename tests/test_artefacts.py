@@ -8,11 +8,13 @@ import pytest
 from synchain.models.scene import Scene
 from synchain.models.topology import topology
 from synchain.runtime import run
-from synchain.runtime.certificate import SYNCHRONOUS, VERDICTS
+from synchain.runtime.certificate import SYNCHRONOUS, VERDICTS, certify
 
 STABLE = "synchronous, certified by the exponent"
 APART = VERDICTS[6]
 """The verdict on cells that are not synchronous although the synchronous state is stable."""
+BURSTS = VERDICTS[7]
+"""The verdict on cells that are synchronous on average and left the synchronous state within the window."""
 
 
 def pair(**more: object) -> Scene:
@@ -66,3 +68,37 @@ def test_equal_oscillators_stay_equal_and_are_not_called_stable() -> None:
     assert VERDICTS[found[0].verdict.item()] == "synchronous by round-off only: the state is unstable"
     assert found[1].sync_error.item() > SYNCHRONOUS
     assert VERDICTS[found[1].verdict.item()] == "not synchronous, the state is unstable"
+
+
+def test_a_mismatch_bursts_near_the_loss_of_stability() -> None:
+    """Bubbling: at sigma = 0.295 the exponent is surely negative, and yet a mismatch of 1e-6 bursts to 1e-2.
+
+    At 0.15 it stays below 1e-5.  The scene says before the run that its nodes differ, and of equal nodes near the end no
+    cell is cut short.
+    """
+    strengths, starts = [0.15, 0.25, 0.295], np.linspace(0.25, 0.299, 8)
+    unequal = pair(parameters={"omega": 1.4, "mu_k": [0.15, 0.15 + 1e-6]}, transient=300.0, window=400.0)
+    assert any("the nodes differ in mu_k" in words for words in unequal.warnings)
+    found = run(unequal, sigma=strengths, x_2=starts, show_progress=False)
+    largest = found.sync_error_max.values
+    assert largest[0].max() < 1e-5
+    assert largest[2].max() > 500 * largest[0].max()
+    assert (largest[2] > 8 * found.sync_error.values[2]).all(), "long quiet stretches between the bursts"
+    sure = certify(pair(parameters={"omega": 1.4}, axes={"sigma": strengths}))
+    assert (sure.exponent + 2 * sure.stderr < 0.0).all()
+    assert list(sure.near > 0.0) == [False, True, False]
+
+
+def test_equal_oscillators_that_burst_within_the_window_are_told_apart() -> None:
+    """Bubbling without a mismatch: starts whose mean error is below the limit and whose largest is a hundred times above."""
+    near = pair(parameters={"omega": 1.4}, transient=100.0, window=400.0)
+    starts = np.linspace(0.25, 0.299, 24)
+    found = run(near, sigma=[0.25, 0.295], x_2=starts, certified=True, show_progress=False)
+    assert (found.transversal_exponent + 2 * found.transversal_stderr < 0.0).all()
+    inside, edge = ([VERDICTS[k] for k in row] for row in found.verdict.values)
+    assert set(inside) == {STABLE}
+    assert BURSTS in edge
+    bursts = found.verdict.values == VERDICTS.index(BURSTS)
+    assert (found.sync_error.values[bursts] < SYNCHRONOUS).all()
+    assert (found.sync_error_max.values[bursts] > SYNCHRONOUS).all()
+    assert found.sync_error_max.values[bursts].max() > 10 * SYNCHRONOUS

@@ -78,8 +78,9 @@ def test_when_an_early_end_is_safe() -> None:
     exponent = np.array([-0.1, -0.1, -0.1, -0.001, 0.1])
     made = Certificate(exponent, np.array([1e-3, 0.03, 1e-3, 1e-3, 1e-3]), 1e-2 * one * [1, 1, 100, 1, 1])
     assert list(made.near > 0) == [True, False, False, False, False]
-    verdicts = made.verdicts(np.array([True, True, True, True, False]), np.array([0.0, 1.0, 1e-9, 1.0, 0.0]))
-    assert list(verdicts) == [1, 6, 1, 5, 0]
+    finished, mean = np.array([True, True, True, True, False]), np.array([0.0, 1.0, 1e-9, 1.0, 0.0])
+    assert list(made.verdicts(finished, mean, 10 * mean)) == [1, 6, 1, 5, 0]
+    assert list(made.verdicts(finished, 1e-4 * mean, 100 * mean)) == [1, 7, 1, 2, 0]
 
 
 def test_an_interrupted_run_is_resumed_with_its_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

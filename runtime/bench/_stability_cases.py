@@ -8,9 +8,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from synchain.models.plugins import allow_code
 from synchain.models.scene import Scene
 from synchain.models.topology import topology
 
@@ -19,24 +21,32 @@ __all__ = ["BUDGET", "Case", "cases"]
 BUDGET = 2_000_000
 """Most steps of a cell."""
 
+REVERSING = str(Path(__file__).with_name("_reversing_belt.py"))
+"""The oscillator whose belt turns back and forth."""
+
 LENGTH = 6.0
 """Length of a run in non-dimensional time: one slip, one stick and their ends."""
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A scene, and the independent source of its end state: "radau", "modes", "growth", "wave", "steady" or "smooth"."""
+    """A scene, and the independent source of its end state, a name in `_stability_reference.REFERENCES`.
+
+    With `skip` it is run as everybody runs it, with whatever `run` may leave out; else every step is made.
+    """
 
     group: str
     name: str
     scene: Scene
     reference: str = "radau"
+    skip: bool = False
 
 
 def cases(quick: bool = False) -> Iterator[Case]:
     """Yield all cases; `quick` leaves out sizes, most tolerances and the cases with long references."""
     yield from _steepness(quick)
     yield from _laws(quick)
+    yield from _belts(quick)
     yield from _set_valued(quick)
     yield from _coupled(quick)
     yield from _linear(quick)
@@ -85,8 +95,25 @@ def _laws(quick: bool) -> Iterator[Case]:
             yield Case("start", f"start at {name}", _scene(initial={"x": x, "v": v}))
 
 
+def _belts(quick: bool) -> Iterator[Case]:
+    """A belt whose speed turns back and forth, theta_b cos(nu t): slowly, at about the pace of the mass, and fast."""
+    allow_code(REVERSING)
+    for nu in (3.0,) if quick else (0.3, 1.0, 3.0, 30.0):
+        for kappa in (1e5,) if quick else (1e2, 1e5, 1e12):
+            scene = _scene(
+                oscillator=REVERSING, initial={"x": 0.3, "v": 0.0}, parameters={"nu": nu, "kappa": kappa},
+                window=0.5 if nu > 10 else LENGTH,
+            )  # fmt: skip
+            yield Case("reversing belt", f"nu = {nu:g}, kappa = {kappa:g}", scene)
+
+
 def _set_valued(quick: bool) -> Iterator[Case]:
     """Stick and slip as they are, beside the smoothed law at kappa = 1e12."""
+    for sigma in () if quick else (1e-8, 1.0):
+        for gap in (0.02, 0.0):
+            start = {"x": (0.3, 0.3 - gap), "v": 0.0}
+            scene = _scene(2, contact="set-valued", parameters={"sigma": sigma}, initial=start)
+            yield Case("set-valued", f"sigma = {sigma:g}, apart by {gap:g}", scene, "smooth")
     for name, numbers in ({} if quick else LAWS).items():
         if name not in ("omega = 1e3", "load 1e4", "drive 1e4"):
             yield Case("set-valued", name, _scene(parameters=numbers, contact="set-valued"), "smooth")
@@ -114,20 +141,24 @@ def _linear(quick: bool) -> Iterator[Case]:
 
 
 def _sizes(quick: bool) -> Iterator[Case]:
-    """Chains in one normal mode."""
-    for n in () if quick else (1, 10, 1000):
-        shape = np.cos(np.pi * (np.arange(n) + 0.5) / n)
+    """Chains in one normal mode, and chains of equal friction oscillators, which move as one alone."""
+    for n in () if quick else (1, 10, 1000, 100_000):
+        shape = np.cos(np.pi * (np.arange(n) + 0.5) / n) if n > 1 else np.ones(1)
         strength = {"sigma": 1.0} if n > 1 else {}
         start = {"x": tuple(shape.tolist()), "v": 0.0}
         scene = _scene(n, oscillator="harmonic", friction=None, parameters=strength, initial=start)
         yield Case("size", f"n = {n}", scene, "wave")
+    for n in (10,) if quick else (10, 100_000):
+        scene = _scene(n, integrator="dop853", initial={"x": 0.3, "v": 0.0}, parameters={"sigma": 1.0, "kappa": 1e2})
+        yield Case("size", f"n = {n}, equal starts", scene, "alone")
 
 
 def _long(quick: bool) -> Iterator[Case]:
-    """A driven linear oscillator long after its transient."""
+    """A driven linear oscillator long after its transient: where it repeats itself whole cycles are left out, or not."""
     for periods in (1000,) if quick else (1000, 100_000, 1_000_000):
         scene = _scene(
             oscillator="duffing", friction=None, parameters={"delta": 0.1, "beta": 0.0, "u": 0.3, "omega": 1.15},
-            time_unit="period", transient=float(periods), window=0.3,
+            time_unit="period", transient=float(periods), window=0.3, max_steps=100 * periods,
         )  # fmt: skip
-        yield Case("long", f"{periods:g} periods", scene, "steady")
+        yield Case("long", f"{periods:g} periods", scene, "steady", skip=True)
+        yield Case("long", f"{periods:g} periods, every step", scene, "steady")

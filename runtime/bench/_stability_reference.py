@@ -11,13 +11,15 @@ import sympy as sp
 
 from synchain.models.equations import TIME, Equations
 from synchain.models.scene import Scene
+from synchain.models.topology import topology
 
 from ._cases import normal_modes
 
 __all__ = ["FLOOR", "REFERENCES", "end_state"]
 
 RTOL, ATOL = 1e-11, 1e-13
-FLOOR = {"radau": 1e-11, "smooth": 1e-6, "modes": 1e-13, "growth": 1e-13, "wave": 1e-13, "steady": 1e-10}
+FLOOR = {"radau": 1e-11, "smooth": 1e-6, "modes": 1e-13, "growth": 1e-13, "wave": 1e-13, "steady": 1e-10,
+         "alone": 1e-11}  # fmt: skip
 """How far a reference itself may be off, relative to the size of the state; "smooth" is another law, O(kappa^-1/2) away."""
 
 
@@ -60,6 +62,13 @@ def _smooth(scene: Scene) -> np.ndarray:
     return _radau(scene.replace(contact="atan", initial=start).replace(kappa=1e12))
 
 
+def _alone(scene: Scene) -> np.ndarray:
+    """Coupled oscillators that start equal: each of them as one alone."""
+    start = {name: values[0] for name, values in scene.initial.items()}
+    numbers = {name: value for name, value in scene.parameters.items() if name != "sigma"}
+    return np.repeat(_radau(scene.replace(topology=topology("chain", 1), initial=start, parameters=numbers)), scene.n)
+
+
 def _modes(scene: Scene) -> np.ndarray:
     return np.asarray(normal_modes(scene, np.array([scene.window]))[0])
 
@@ -75,7 +84,7 @@ def _growth(scene: Scene) -> np.ndarray:
 
 
 def _wave(scene: Scene) -> np.ndarray:
-    """The longest wave of a chain: x_i = cos(pi (i + 1/2)/n) cos(w t), w^2 = 1 + 4 sigma sin^2(pi/2n)."""
+    """The longest wave of a chain: x_i = cos(pi (i + 1/2)/n) cos(w t), w^2 = 1 + 4 sigma sin^2(pi/2n); of one: cos t."""
     shape, n, t = np.array(scene.y0[: scene.n]), scene.n, scene.window
     w = math.sqrt(1.0 + 4.0 * scene.parameters.get("sigma", 0.0) * math.sin(math.pi / (2 * n)) ** 2)
     return np.concatenate([shape * math.cos(w * t), -w * shape * math.sin(w * t)])
@@ -92,6 +101,7 @@ def _steady(scene: Scene) -> np.ndarray:
 REFERENCES: dict[str, Callable[[Scene], np.ndarray]] = {
     "radau": _radau,
     "smooth": _smooth,
+    "alone": _alone,
     "modes": _modes,
     "growth": _growth,
     "wave": _wave,
