@@ -581,7 +581,7 @@ def test_warnings_are_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
     assert capsys.readouterr().err == "warning: the cache is read-only\n"
 
 
-@pytest.mark.parametrize("words", ["topologies", "kernel two_oscillators"])
+@pytest.mark.parametrize("words", ["topologies", "kernel two_oscillators", "equations figure_4a", "spectrum chain 40"])
 def test_a_reader_that_leaves_early_ends_it_quietly(words: str) -> None:
     command = f"'{sys.executable}' -m synchain.runtime {words} | true; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60, env=BUFFERED)

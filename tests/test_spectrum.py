@@ -613,7 +613,7 @@ def test_large_matrices_take_the_fast_route(n: int, share: float, monkeypatch: p
     graph = integer_graph(n, share, 3)
     monkeypatch.setattr("synchain.models.spectrum.complex_roots", None)
     found, calls = effort(lambda: fresh(graph))
-    assert calls < 1_750 * n
+    assert calls < 2_000 * n  # 670 with the newest packages, 1900 with the lowest allowed
     assert found.verified
     expected = np.linalg.eigvalsh(floats(graph))
     assert np.sort(expanded(found)) == pytest.approx(expected, rel=1e-12, abs=1e-11)

@@ -1,5 +1,7 @@
 """DOP853: explicit Runge-Kutta method of order 8(5, 3) with 12 stages and dense output of order 7 (4 more stages)."""
 
+import math
+
 KIND = "explicit"
 ORDER = 8
 ERROR_ORDER = 7
@@ -109,7 +111,8 @@ def _dense() -> tuple[tuple[float, ...], ...]:
     rows = [f1]
     for weights in ((1, 1, 0, 0, 0), (0, -1, 1, 1, 0), (0, 0, -1, -2, 1), (0, 0, 0, 1, -2), (0, 0, 0, 0, 1)):
         parts = zip(f2, f3, f4, f5, f6, strict=True)
-        rows.append(tuple(sum(w * v for w, v in zip(weights, values, strict=True)) for values in parts))
+        # fsum: from Python 3.12 on `sum` rounds otherwise, and kernels would be others
+        rows.append(tuple(math.fsum(w * v for w, v in zip(weights, values, strict=True)) for values in parts))
     return tuple(rows)
 
 
