@@ -148,7 +148,7 @@ def _sizes(quick: bool) -> Iterator[Case]:
         start = {"x": tuple(shape.tolist()), "v": 0.0}
         scene = _scene(n, oscillator="harmonic", friction=None, parameters=strength, initial=start)
         yield Case("size", f"n = {n}", scene, "wave")
-    for n in () if quick else (100_000,):
+    for n in () if quick else (10, 100_000):
         scene = _scene(n, integrator="dop853", initial={"x": 0.3, "v": 0.0}, parameters={"sigma": 1.0, "kappa": 1e2})
         yield Case("size", f"n = {n}, equal starts", scene, "alone")
 
