@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .basin import Basin, basin
-    from .branches import Branch, follow, skeleton
+    from .branches import Branch, follow
     from .cluster_states import ClusterExponents, cluster_exponents
     from .exponent import Exponents, exponents
     from .lyapunov import Lyapunov, lyapunov_spectrum
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .progress import Progress
     from .result import Result, open_result
     from .sitting import SweepFailed, SweepInterrupted
+    from .skeletons import skeleton
     from .status import Status
     from .streaming import Streamed, stream
     from .sweep import kernel, run
@@ -33,7 +34,7 @@ __all__ = [
 
 _HOME = {
     "ClusterExponents": "cluster_states", "cluster_exponents": "cluster_states", "PeriodicOrbit": "periodic",
-    "periodic_orbit": "periodic", "Branch": "branches", "follow": "branches", "skeleton": "branches",
+    "periodic_orbit": "periodic", "Branch": "branches", "follow": "branches", "skeleton": "skeletons",
     "Lyapunov": "lyapunov", "lyapunov_spectrum": "lyapunov", "Basin": "basin", "basin": "basin",
     "Exponents": "exponent", "exponents": "exponent", "MSF": "msf", "Plane": "msf", "msf": "msf", "plane": "msf",
     "Probe": "probe", "universal_probe": "probe", "Result": "result", "open_result": "result",

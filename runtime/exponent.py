@@ -29,7 +29,7 @@ from .rows import averaging
 from .rows import row as row_of
 from .threads import worker_count
 
-__all__ = ["Batches", "Exponents", "exponents", "group", "one_cell", "single"]
+__all__ = ["Batches", "Exponents", "exponents", "group", "one_cell", "several_starts", "single"]
 
 BATCHES = 64
 
@@ -113,7 +113,7 @@ def exponents(
     """
     scene, strengths = single(scene, rtol, parameters), row_of("alpha", alpha, complex_too=True)
     precision, periods, transient, seed = averaging(precision, periods, transient, seed)
-    orbits = Orbits.make(scene, strengths, _starts(scene, starts, seed), worker_count(workers))
+    orbits = Orbits.make(scene, strengths, several_starts(scene, starts, seed), worker_count(workers))
     orbits.settle(transient)
     attractors = tuple(find_attractor(orbits, row, transient) for row in range(starts))
     by_start, error, length = _by_start(orbits, attractors, precision, periods, show_progress)
@@ -153,7 +153,7 @@ def one_cell(scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
     )
 
 
-def _starts(scene: Scene, starts: int, seed: int) -> np.ndarray:
+def several_starts(scene: Scene, starts: int, seed: int) -> np.ndarray:
     """Initial states (starts, components): the first oscillator's, and copies moved in the first component."""
     starts = whole("starts", starts, 1)
     state = np.tile([values[0] for values in scene.initial.values()], (starts, 1))

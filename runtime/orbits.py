@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import sympy as sp
 
+from synchain.models.equations import Equations
 from synchain.models.mode_inertia import inertia_of_modes
 from synchain.models.scene import Scene
 from synchain.models.tangent import Variation, mode
@@ -52,7 +54,7 @@ class Orbits:
 
         Raises ValueError where time enters without a known period, and for a strength at which a mode has no mass.
         """
-        variation = mode(scene.equations, plane=bool(np.iscomplexobj(strengths)))
+        variation = _variation(scene.equations, bool(np.iscomplexobj(strengths)))
         unit = unit_of_time(scene)
         row = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])
         state = with_modes(variation.orbit, state, np.repeat(row, len(state), axis=0))
@@ -137,6 +139,12 @@ def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:
         worst = alpha[mass.real.argmin()]
         raise ValueError(f"alpha = {worst}: the mass of this mode is not positive; expected strengths above {-1 / b:g}")
     return np.asarray(alpha / mass)
+
+
+@lru_cache(maxsize=16)
+def _variation(equations: Equations, plane: bool) -> Variation:
+    """The variational equation of a mode: Newton's method on an orbit asks for it at every step."""
+    return mode(equations, plane=plane)
 
 
 def unit_of_time(scene: Scene) -> float:

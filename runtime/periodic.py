@@ -9,23 +9,30 @@ Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (S
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from numbers import Integral, Real
 
 import numpy as np
 from scipy.optimize import brentq
 
+from synchain.models.contact import SLIP
 from synchain.models.scene import Scene
+from synchain.models.scene_checks import shown
 
 from .attractor import over_one_cycle
 from .exponent import single
 from .orbits import Orbits
 from .phases import Phases, phases_of
 
-__all__ = ["PeriodicOrbit", "periodic_orbit", "stability_end"]
+__all__ = ["SAME", "PeriodicOrbit", "orbit_through", "periodic_orbit", "stability_end", "strobe"]
 
 TOLERANCE = 1e-12
 """Relative tolerance of the integration."""
+
+SAME = 1e-7
+"""Orbits this close to each other are one."""
 
 MOST_STEPS = 30
 LONGEST = 10_000
@@ -57,6 +64,21 @@ class PeriodicOrbit:
         """The phases of stick and slip of one cycle (`synchain.runtime.phases`), None for friction without them."""
         return phases_of(self.scene, self.state, self.periods)
 
+    @property
+    def points(self) -> np.ndarray:
+        """The states (periods, components) at the beginning of each period of the drive."""
+        found = [self.state]
+        for _ in range(self.periods - 1):
+            found.append(_strobe(self.scene, found[-1], 1, 0.0)[0][: len(self.state)])
+        return np.array(found)
+
+    @property
+    def least(self) -> int:
+        """The least number of drive periods after which the motion repeats itself, to SAME."""
+        points = self.points
+        divisors = (k for k in range(1, self.periods) if self.periods % k == 0)
+        return next((k for k in divisors if np.abs(points[k] - points[0]).max() < SAME), self.periods)
+
     def transversal(self, alpha: float) -> np.ndarray:
         """The multipliers of a transversal mode of strength alpha along the orbit, the largest first."""
         return _sorted(_strobe(self.scene, self.state, self.periods, alpha)[1])
@@ -67,29 +89,17 @@ def periodic_orbit(
 ) -> PeriodicOrbit:
     """Find a periodic orbit of a scene's oscillator near `start` (default: the scene's, after its transient).
 
-    Raises ValueError for an oscillator that is not driven or periods out of range, ArithmeticError where Newton's method
-    does not converge.
+    Raises ValueError for an oscillator that is not driven, periods out of range, an unknown parameter or a start that is not
+    a state, ArithmeticError where Newton's method does not converge.
     """
-    scene = single(scene, TOLERANCE, parameters)
-    if not scene.period:
-        raise ValueError(
-            "periodic orbits are looked for on the stroboscopic map of a drive; found an oscillator without one"
-        )
-    if periods not in range(1, LONGEST + 1):
-        raise ValueError(f"periods = {periods!r}; expected a whole number, at least 1, at most {LONGEST}")
-    state = np.zeros(len(scene.initial))
-    given = [values[0] for values in scene.initial.values()] if start is None else start
-    state[: len(given)] = given
-    orbits = Orbits.make(scene, np.zeros(1), state[None], 1)
-    if start is None:
-        orbits.settle(scene.transient)
-        state = orbits.state[0]
-    size = orbits.components
-    state, best, steps = state[:size], np.inf, 0
-    kept = state
+    scene = _driven(scene, parameters)
+    if not isinstance(periods, Integral) or not 1 <= periods <= LONGEST:
+        raise ValueError(f"periods = {shown(periods)}; expected a whole number, at least 1, at most {LONGEST}")
+    state = _settled(scene) if start is None else _state(scene, start)
+    best, steps, kept = np.inf, 0, state
     while steps < MOST_STEPS:
         image, matrix = _strobe(scene, state, periods, 0.0)
-        gap = image[:size] - state
+        gap = image[: len(state)] - state
         residual = float(np.abs(gap).max())
         if not residual < best:
             break
@@ -100,7 +110,56 @@ def periodic_orbit(
         steps += 1
     if not best < 1e-9 * max(1.0, float(np.abs(kept).max())):
         raise ArithmeticError(f"no orbit of {periods} drive periods near the start: the best residual was {best:.1e}")
-    return PeriodicOrbit(scene, periods, kept, _sorted(found), best, steps)
+    return PeriodicOrbit(scene, int(periods), kept, _sorted(found), best, steps)
+
+
+def orbit_through(scene: Scene, periods: int, state: np.ndarray, **parameters: float) -> PeriodicOrbit:
+    """The orbit through a state (components,) that is known to return to itself; its residual says how well."""
+    scene = _driven(scene, parameters)
+    image, matrix = _strobe(scene, state, periods, 0.0)
+    return PeriodicOrbit(scene, periods, state, _sorted(matrix), float(np.abs(image[: len(state)] - state).max()), 0)
+
+
+def strobe(scene: Scene, state: np.ndarray, periods: int, **parameters: float) -> tuple[np.ndarray, np.ndarray]:
+    """The state (components,) some drive periods later, and its derivative (components, components) by the first one."""
+    image, matrix = _strobe(_driven(scene, parameters), state, periods, 0.0)
+    return image[: len(state)], matrix
+
+
+def _driven(scene: Scene, parameters: dict[str, float]) -> Scene:
+    """The scene with its parameters, to the tolerance of orbits; ValueError where it is not driven."""
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene: found {shown(scene)}; expected a Scene")
+    unknown = next((name for name in parameters if name not in scene.parameters), None)
+    if unknown is not None:
+        raise ValueError(f"unknown parameter {unknown!r}; known: {', '.join(scene.parameters)}")
+    scene = single(scene, TOLERANCE, parameters)
+    if not scene.period:
+        raise ValueError(
+            "periodic orbits are looked for on the stroboscopic map of a drive; found an oscillator without one"
+        )
+    return scene
+
+
+def _settled(scene: Scene) -> np.ndarray:
+    """The state (components,) after the scene's transient, from its initial one."""
+    state = np.zeros(len(scene.initial))
+    state[:] = [values[0] for values in scene.initial.values()]
+    orbits = Orbits.make(scene, np.zeros(1), state[None], 1)
+    orbits.settle(scene.transient)
+    return orbits.state[0][: orbits.components]
+
+
+def _state(scene: Scene, start: Sequence[float] | np.ndarray) -> np.ndarray:
+    """A start given by the caller, as the state (components,) of one oscillator."""
+    names = tuple(name for name in scene.components if name != SLIP.name)
+    try:
+        state = np.array(start, dtype=float)
+    except (TypeError, ValueError):
+        state = np.empty(0)
+    if state.ndim != 1 or len(state) not in (len(names), len(scene.components)) or not np.all(np.isfinite(state)):
+        raise ValueError(f"start: found {shown(start)}; expected a number for each of {', '.join(names)}")
+    return state[: len(names)]
 
 
 def _correction(matrix: np.ndarray, gap: np.ndarray) -> np.ndarray:
@@ -114,8 +173,12 @@ def _correction(matrix: np.ndarray, gap: np.ndarray) -> np.ndarray:
 def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
     """The strength alpha between `low` and `high` at which the largest transversal multiplier has modulus 1, to rounding.
 
-    Raises ValueError where the modulus is on the same side of 1 at both ends.
+    Raises ValueError for ends that are not finite numbers, and where the modulus is on the same side of 1 at both ends.
     """
+
+    for name, value in (("low", low), ("high", high)):
+        if not isinstance(value, Real) or not math.isfinite(value):
+            raise ValueError(f"{name} = {shown(value)}; expected a finite strength alpha")
 
     def growth(alpha: float) -> float:
         return float(np.log(abs(orbit.transversal(alpha)[0])))

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -89,15 +90,19 @@ Function = Callable[..., np.ndarray]
 
 def _margins(scene: Scene, contact: Contact) -> tuple[Function, Function]:
     """How far the load at a position and time is from the limits of static friction; the sliding velocity."""
-    x, v, _ = scene.equations.node.state
-    known = {sp.Symbol(name, real=True): value for name, value in scene.parameters.items()}
-    up, down, sliding = (
-        sp.lambdify([x, v, TIME], e.subs(known), "numpy") for e in (contact.up, contact.down, contact.sliding)
-    )
+    up, down, sliding = _functions(contact, tuple(scene.equations.node.state), tuple(scene.parameters))
+    numbers = list(scene.parameters.values())
     return (
-        lambda place, t: np.minimum(up(place, 0.0, t), -down(place, 0.0, t)),
-        lambda speed: np.asarray(sliding(0.0, speed, 0.0)),
+        lambda place, t: np.minimum(up(place, 0.0, t, *numbers), -down(place, 0.0, t, *numbers)),
+        lambda speed: np.asarray(sliding(0.0, speed, 0.0, *numbers)),
     )
+
+
+@lru_cache(maxsize=16)
+def _functions(contact: Contact, state: tuple[sp.Symbol, ...], names: tuple[str, ...]) -> tuple[Function, ...]:
+    """Both limits and the sliding velocity as functions of position, velocity, time and parameters."""
+    symbols = [*state[:2], TIME, *(sp.Symbol(name, real=True) for name in names)]
+    return tuple(sp.lambdify(symbols, e, "numpy") for e in (contact.up, contact.down, contact.sliding))
 
 
 def _least(values: np.ndarray) -> float:

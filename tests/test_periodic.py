@@ -7,8 +7,9 @@ import pytest
 
 from synchain.models.scene import Scene
 from synchain.models.topology import topology
-from synchain.runtime.branches import follow, skeleton
+from synchain.runtime.branches import follow
 from synchain.runtime.periodic import periodic_orbit, stability_end
+from synchain.runtime.skeletons import skeleton
 
 PAIR = topology("chain", 2)
 

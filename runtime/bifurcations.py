@@ -1,0 +1,212 @@
+"""Bifurcations of periodic orbits between two neighbours on a branch, and at its end.
+
+A real multiplier m passes -1 or 1 where det(M + 1) or det(M - 1) of the monodromy matrix M changes its sign.  Stick is lost
+where the load at a landing passes the limit of static friction, a number of either sign.  Grazing can be approached from
+the side of fewer phases alone, where the gap that closes is known: each orbit on the way has a sixteenth of the gap of the
+one before, and Newton's method starts from a polynomial through those, so it does not leave the side it comes from.
+
+Sources: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapters 5 and 7; di Bernardo, Budd,
+Champneys & Kowalczyk, Piecewise-smooth Dynamical Systems (Springer, 2008), chapters 7-8.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from .arcs import Arc
+from .folds import fold
+from .periodic import PeriodicOrbit, periodic_orbit, strobe
+from .phases import Phases
+
+__all__ = ["Found", "at_end", "between"]
+
+CLOSED = 1e-6
+"""A gap this small has closed: the branch ends by grazing."""
+
+SHUT = 1e-13
+"""A gap as small as the error of the integration: it cannot be closed further."""
+
+SHARE = 1.0 / 16.0
+"""What each step towards a graze leaves of the gap."""
+
+MOST_STEPS = 80
+"""Steps towards a graze; halving alone exhausts the digits of the parameter in 53."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A bifurcation: the value of the parameter, its kind in words, how far its test function is from zero, and the nearest
+    orbit that was found."""
+
+    value: float
+    words: str
+    residual: float
+    orbit: PeriodicOrbit
+
+
+def between(arc: Arc, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> list[Found]:
+    """The bifurcations between the last orbit of an arc and the next one on the branch, in the order of the parameter."""
+    before = arc.phases[-1]
+    if before is None or phases is None or before.modes == phases.modes:
+        last, there = arc.orbits[-1], (arc.values[-1], value)
+        whole = Arc(arc.scene, arc.name, arc.periods, [*arc.values, value], [*arc.orbits, orbit], [*arc.phases, phases])
+        return _crossings(whole, there, (last, orbit))
+    ahead = len(before.modes) <= len(phases.modes)
+    known = _copy(arc) if ahead else arc.empty().take(value, orbit, phases)
+    far = value if ahead else arc.values[-1]
+    change = _stick_loss(arc, value, orbit, before, phases) if _same_slips(before, phases) else None
+    change = change or _graze(known, far)
+    start = (known.values[0], known.orbits[0]) if not ahead else (arc.values[-1], arc.orbits[-1])
+    beside = _crossings(known, (start[0], change.value), (start[1], change.orbit))
+    return sorted([change, *beside], key=lambda found: found.value)
+
+
+def at_end(arc: Arc, beyond: float) -> list[Found]:
+    """How a branch ends before `beyond`, where Newton's method finds no orbit of its own: where it was born of one
+    of half as many periods, at a fold, or at a graze; nothing where it is none of them."""
+    birth = _birth(arc, beyond)
+    if birth is not None:
+        return [birth]
+    turn = fold(arc, beyond)
+    if turn is not None:
+        at, orbit = turn
+        return [Found(at, "fold", float(np.abs(orbit.multipliers - 1.0).min()), orbit)]
+    if arc.phases[-1] is None:
+        return []
+    last = _graze(_copy(arc), beyond)
+    return [last] if last.residual < CLOSED else []
+
+
+def _birth(arc: Arc, beyond: float) -> Found | None:
+    """The period doubling of the orbit of half as many periods that runs between the halves of an arc's last orbit."""
+    half, last = arc.periods // 2, arc.orbits[-1]
+    if arc.periods % 2:
+        return None
+    try:
+        middle = 0.5 * (last.state + strobe(last.scene, last.state, half)[0])
+        single = Arc(arc.scene, arc.name, half)
+        for value in (arc.values[-1], beyond):
+            own = periodic_orbit(arc.scene, half, middle, **{arc.name: value})
+            middle = own.state
+            single.take(value, own, own.phases)
+        made = _crossings(single, (single.values[0], beyond), (single.orbits[0], single.orbits[1]))
+    except ArithmeticError:
+        return None
+    return next((each for each in made if each.words == "period doubling"), None)
+
+
+def _copy(arc: Arc) -> Arc:
+    return Arc(arc.scene, arc.name, arc.periods, [*arc.values], [*arc.orbits], [*arc.phases])
+
+
+def _crossings(arc: Arc, ends: tuple[float, float], orbits: tuple[PeriodicOrbit, PeriodicOrbit]) -> list[Found]:
+    """The crossings of a real multiplier through -1 or 1 between two orbits of the same phases."""
+    found = []
+    for point, words in ((-1.0, "period doubling"), (1.0, "fold")):
+        if not _beyond(orbits[0], point) * _beyond(orbits[1], point) < 0.0:
+            continue
+
+        def distance(value: float, point: float = point) -> float:
+            return _beyond(orbits[ends.index(value)] if value in ends else arc.at(value), point)
+
+        value, orbit = _root(distance, arc, ends)
+        found.append(Found(value, words, float(np.abs(orbit.multipliers - point).min()), orbit))
+    return found
+
+
+def _root(test: Callable[[float], float], arc: Arc, ends: tuple[float, float]) -> tuple[float, PeriodicOrbit]:
+    """Where a test function of the orbit is zero, and the orbit; the end that is nearer to zero where Newton's method loses
+    the orbit on the way."""
+    try:
+        value = float(brentq(test, *ends, xtol=1e-14, rtol=1e-14))
+        return value, arc.at(value)
+    except ArithmeticError:
+        value = min(ends, key=lambda end: abs(test(end)))
+        return value, arc.orbits[arc.values.index(value)]
+
+
+def _beyond(orbit: PeriodicOrbit, point: float) -> float:
+    """The product of the distances of all multipliers from a real number, det(M - point)."""
+    return float(np.prod(orbit.multipliers - point).real)
+
+
+def _same_slips(before: Phases, after: Phases) -> bool:
+    """True where stick alone comes or goes."""
+    slips = [sorted(mode for mode in phases.modes if mode != 0) for phases in (before, after)]
+    return slips[0] == slips[1] and before.modes.count(0) != after.modes.count(0)
+
+
+def _stick_loss(arc: Arc, value: float, orbit: PeriodicOrbit, before: Phases, after: Phases) -> Found | None:
+    """Where the load at the landing is the limit of static friction, between the last orbit of an arc and the next; None
+    where it does not pass the limit."""
+    if not before.landing * after.landing < 0.0:
+        return None
+    ends = {arc.values[-1]: before.landing, value: after.landing}
+    both = arc.empty().take(arc.values[-1], arc.orbits[-1], before).take(value, orbit, after)
+
+    def landing(at: float) -> float:
+        if at in ends:
+            return ends[at]
+        own = both.at(at)
+        phases = own.phases
+        if phases is None:
+            raise ArithmeticError("an orbit without phases")
+        both.take(at, own, phases)
+        return phases.landing
+
+    at, last = _root(landing, both, (arc.values[-1], value))
+    return Found(at, "stick loss", abs(landing(at)), last)
+
+
+def _graze(arc: Arc, beyond: float) -> Found:
+    """Where the gap of an arc's last orbit closes on the way to `beyond`, which lies past it."""
+    modes = _known(arc).modes
+    share = SHARE
+    for _ in range(MOST_STEPS):
+        low, gap = arc.values[-1], _known(arc).gap
+        if gap < SHUT or abs(beyond - low) <= 1e-15 * max(1.0, abs(low)):
+            break
+        value = _where(arc, share * gap)
+        guided = share < 0.99 and min(low, beyond) < value < max(low, beyond)
+        value = value if guided else 0.5 * (low + beyond)
+        own = _orbit(arc, value)
+        phases = None if own is None else own.phases
+        if own is not None and phases is not None and phases.modes == modes:
+            arc.take(value, own, phases)
+            share = SHARE
+            continue
+        share = math.sqrt(share)  # a shorter step, on which more is known of the orbit
+        beyond = beyond if own is None and guided else value
+    at = _where(arc, 0.0)
+    low = arc.values[-1]
+    at = at if min(low, beyond) <= at <= max(low, beyond) else 0.5 * (low + beyond)
+    return Found(at, "grazing", _known(arc).gap, arc.orbits[-1])
+
+
+def _known(arc: Arc) -> Phases:
+    phases = arc.phases[-1]
+    if phases is None:
+        raise RuntimeError("friction without phases has no gaps")
+    return phases
+
+
+def _orbit(arc: Arc, value: float) -> PeriodicOrbit | None:
+    try:
+        return arc.at(value)
+    except ArithmeticError:
+        return None
+
+
+def _where(arc: Arc, gap: float) -> float:
+    """The value at which a gap is expected, by the line through the last two; nan where there is none."""
+    if len(arc.values) < 2:
+        return float("nan")
+    (a, b), (one, two) = arc.values[-2:], arc.phases[-2:]
+    if one is None or two is None or not np.isfinite(one.gap - two.gap) or one.gap == two.gap:
+        return float("nan")
+    return b + (gap - two.gap) * (b - a) / (two.gap - one.gap)
