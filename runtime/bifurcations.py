@@ -185,7 +185,7 @@ def _graze(arc: Arc, beyond: float) -> Found:
     at = _where(arc, 0.0)
     low = arc.values[-1]
     at = at if min(low, beyond) <= at <= max(low, beyond) else 0.5 * (low + beyond)
-    return Found(at, "grazing", _known(arc).gap, arc.orbits[-1])
+    return Found(at, "grazing", abs(_known(arc).gap), arc.orbits[-1])
 
 
 def _known(arc: Arc) -> Phases:

@@ -29,6 +29,9 @@ SHORTEST = 1.0 / 32.0
 """Into pieces this short a step is cut, where Newton's method fails or leads far from what was expected, before the branch
 ends."""
 
+APART = 1.0 / 16.0
+"""To pieces of this part of a step changes of phases are brought before they are located: two in one piece count as one."""
+
 FAR = 0.3
 """An orbit farther from the expected state than this part of the step leads to another branch, perhaps."""
 
@@ -122,14 +125,19 @@ class Trail:
         while ahead:
             last = self.arc.values[-1]
             orbit = self._orbit(ahead[-1])
-            if orbit is not None:
+            if orbit is not None and (abs(ahead[-1] - last) <= APART * step or not self._changes(orbit)):
                 self.take(ahead.pop(), orbit)
-            elif abs(ahead[-1] - last) > SHORTEST * step:
+            elif orbit is not None or abs(ahead[-1] - last) > SHORTEST * step:
                 ahead.append(0.5 * (last + ahead[-1]))
             else:
                 self.found += at_end(self.arc, ahead[-1])
                 return None
         return self.arc.orbits[-1]
+
+    def _changes(self, orbit: PeriodicOrbit) -> bool:
+        """True where an orbit passes through other phases than the last one."""
+        own, last = orbit.phases, self.arc.phases[-1]
+        return own is not None and last is not None and own.modes != last.modes
 
     def _orbit(self, value: float) -> PeriodicOrbit | None:
         """The orbit at a value, if Newton's method finds one close to where it is expected."""

@@ -26,13 +26,16 @@ from .exponent import single
 from .orbits import Orbits
 from .phases import Phases, phases_of
 
-__all__ = ["SAME", "PeriodicOrbit", "orbit_through", "periodic_orbit", "stability_end", "strobe"]
+__all__ = ["SAME", "PeriodicOrbit", "check_periods", "orbit_through", "periodic_orbit", "stability_end", "strobe"]
 
 TOLERANCE = 1e-12
 """Relative tolerance of the integration."""
 
 SAME = 1e-7
 """Orbits this close to each other are one."""
+
+ROUNDING = 1e-12
+"""A sliding speed this small, of an orbit that sticks, is one of rounding."""
 
 MOST_STEPS = 30
 LONGEST = 10_000
@@ -93,13 +96,15 @@ def periodic_orbit(
     a state, ArithmeticError where Newton's method does not converge.
     """
     scene = _driven(scene, parameters)
-    if not isinstance(periods, Integral) or not 1 <= periods <= LONGEST:
-        raise ValueError(f"periods = {shown(periods)}; expected a whole number, at least 1, at most {LONGEST}")
+    check_periods(periods)
     state = _settled(scene) if start is None else _state(scene, start)
     best, steps, kept = np.inf, 0, state
     while steps < MOST_STEPS:
         image, matrix = _strobe(scene, state, periods, 0.0)
         gap = image[: len(state)] - state
+        if _nearly_sticks(image, gap):
+            state = image[: len(state)] - np.array([gap[0], 0.0])
+            continue
         residual = float(np.abs(gap).max())
         if not residual < best:
             break
@@ -111,6 +116,17 @@ def periodic_orbit(
     if not best < 1e-9 * max(1.0, float(np.abs(kept).max())):
         raise ArithmeticError(f"no orbit of {periods} drive periods near the start: the best residual was {best:.1e}")
     return PeriodicOrbit(scene, int(periods), kept, _sorted(found), best, steps)
+
+
+def _nearly_sticks(image: np.ndarray, gap: np.ndarray) -> bool:
+    """True where a state's image sticks and the state itself slips at a speed of rounding errors, as if it landed there."""
+    return len(image) > len(gap) and image[-1] == 0.0 and 0.0 < abs(gap[1]) < ROUNDING
+
+
+def check_periods(periods: object) -> None:
+    """Refuse what is not a number of drive periods."""
+    if not isinstance(periods, Integral) or not 1 <= int(periods) <= LONGEST:
+        raise ValueError(f"periods = {shown(periods)}; expected a whole number, at least 1, at most {LONGEST}")
 
 
 def orbit_through(scene: Scene, periods: int, state: np.ndarray, **parameters: float) -> PeriodicOrbit:

@@ -8,21 +8,27 @@ Source: Auerbach, Cvitanovic, Eckmann, Gunaratne & Procaccia, Phys. Rev. Lett. 5
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from numbers import Integral
 
 import numpy as np
 
 from synchain.models.scene import Scene
+from synchain.models.scene_checks import shown
 
 from .branches import Branch, checked_values, follow
 from .exponent import several_starts, single
 from .orbits import Orbits
-from .periodic import SAME, TOLERANCE, PeriodicOrbit, periodic_orbit
+from .periodic import SAME, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit
 
 __all__ = ["near_returns", "skeleton"]
 
 STARTS, LENGTH, DROPPED = 16, 200, 20
 """Motions that are looked through for returns, their length in periods of the drive, and what is dropped before it."""
+
+NEARER = 1.0 / 64.0
+"""The other sheet at a fold is entered at this part of the distance from the fold to the last orbit before it."""
 
 CLOSE, APART, TRIES = 0.05, 0.02, 12
 """Returns as close as this are tried, the closest first, those apart from each other by so much, and so many at most."""
@@ -39,14 +45,24 @@ def skeleton(
     Raises ValueError for an unknown parameter, values that do not rise or fall all the way, and fewer looks than one.
     """
     grid = sorted(checked_values(scene, name, values))
-    if looks < 1:
-        raise ValueError(f"looks = {looks}; expected at least 1")
+    if not isinstance(looks, Integral) or looks < 1:
+        raise ValueError(f"looks = {shown(looks)}; expected a whole number, at least 1")
+    for each in periods:
+        check_periods(each)
     made: list[Branch] = []
+
+    def take(k: int, orbit: PeriodicOrbit) -> None:
+        """Follow an orbit at grid[k] that is new, and what its branch turns into at its folds."""
+        if any(_passes(branch, grid[k], orbit) for branch in made):
+            return
+        made.append(_both_ways(scene, name, grid, k, orbit))
+        for end, other in _other_sheets(scene, made[-1]):
+            take(grid.index(end), other)
+
     count = min(looks, len(grid))
     for k in sorted({int((2 * j + 1) * len(grid) / (2 * count)) for j in range(count)}):
         for orbit in near_returns(scene, periods, **{name: grid[k]}):
-            if not any(_passes(branch, grid[k], orbit) for branch in made):
-                made.append(_both_ways(scene, name, grid, k, orbit))
+            take(k, orbit)
     return tuple(sorted(made, key=lambda branch: (branch.orbits[0].periods, branch.values[0])))
 
 
@@ -113,3 +129,25 @@ def _both_ways(scene: Scene, name: str, grid: list[float], k: int, orbit: Period
         (*down.bifurcations[::-1], *up.bifurcations), (*down.residuals[::-1], *up.residuals),
         (*down.phases[:0:-1], *up.phases), (*down.at[::-1], *up.at),
     )  # fmt: skip
+
+
+def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrbit]]:
+    """What a branch turns into at its folds: the value of its last orbit there, and the orbit of the other sheet at it.
+
+    Near a fold the sheets lie on both sides of it, at distances like the square root of that of the parameter.
+    """
+    found = []
+    for (fold, words), turn in zip(branch.bifurcations, branch.at, strict=True):
+        for k, inner in ((0, fold < branch.values[0]), (-1, fold > branch.values[-1])):
+            if words != "fold" or not inner:
+                continue
+            end, last = float(branch.values[k]), branch.orbits[k]
+            near = fold + NEARER * (end - fold)
+            try:
+                start = turn.state - math.sqrt(NEARER) * (last.state - turn.state)
+                first = periodic_orbit(scene, last.periods, start, **{branch.name: near})
+                way = follow(scene, branch.name, [near, end], first)
+            except ArithmeticError:
+                continue
+            found += [(end, way.orbits[1])] if len(way.orbits) == 2 else []
+    return found

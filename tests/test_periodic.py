@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
+
 import numpy as np
 import pytest
 
 from synchain.models.scene import Scene
 from synchain.models.topology import topology
 from synchain.runtime.branches import follow
-from synchain.runtime.periodic import periodic_orbit, stability_end
+from synchain.runtime.periodic import PeriodicOrbit, periodic_orbit, stability_end
 from synchain.runtime.skeletons import skeleton
 
 PAIR = topology("chain", 2)
@@ -112,17 +115,24 @@ def test_stops_begin_where_den_hartogs_motion_ends() -> None:
     assert branch.phases[0].landing == pytest.approx(r - load, abs=1e-9)
 
 
-def test_a_branch_that_ends_by_grazing_says_where() -> None:
-    """omega = 0.7: as the drive grows the slip of period one slows down to the belt's speed in its middle, at the rate at
-    which its gap has fallen."""
+def test_a_branch_goes_through_a_graze_to_its_fold() -> None:
+    """omega = 0.7: as the drive grows the load in stick of period one comes up to the limit of static friction, at the rate
+    at which its gap has fallen; beyond, the orbit lets go twice, and ends where it meets another one."""
     made = scene(transient=60.0, parameters={"omega": 0.7, "u": 0.15})
     branch = follow(made, "u", [0.15, 0.25, 0.35, 0.45, 0.5, 0.55], periodic_orbit(made))
-    assert [words for _, words in branch.bifurcations] == ["period doubling", "grazing"]
+    assert [words for _, words in branch.bifurcations] == ["period doubling", "grazing", "period doubling", "fold"]
     assert len(branch.orbits) == 5
     gaps = [phases.gap for phases in branch.phases[-2:]]
-    at = branch.bifurcations[-1][0]
+    at = branch.bifurcations[1][0]
     assert at == pytest.approx(0.5 + 0.05 * gaps[1] / (gaps[0] - gaps[1]), abs=2e-4)
-    assert max(branch.residuals) < 5e-7  # Newton's method finds orbits up to there
+    assert max(branch.residuals) < 3e-12
+    assert [len(orbit.phases.modes) for orbit in branch.at if orbit.phases] == [2, 2, 4, 4]
+    edge, turn = branch.bifurcations[-1][0], branch.at[-1].state
+    here = follow(made, "u", [0.5, 0.53, edge - 1e-4], branch.orbits[-1]).orbits[-1]
+    other = periodic_orbit(made, 1, 2.0 * turn - here.state, u=edge - 1e-4)  # the sheets lie on both sides of the fold
+    assert sum(orbit.multipliers[0].real > 1.0 for orbit in (here, other)) == 1
+    with pytest.raises(ArithmeticError):
+        periodic_orbit(made, 1, turn, u=edge + 1e-4)
 
 
 @pytest.mark.long
@@ -145,5 +155,53 @@ def test_what_is_refused() -> None:
         periodic_orbit(scene(), 0)
     with pytest.raises(ArithmeticError, match="no orbit of 1 drive periods near the start"):
         periodic_orbit(scene(), 1, start=[50.0, -40.0], omega=1.55)
-    with pytest.raises(ValueError, match="unknown parameter 'omga'"):
-        follow(scene(), "omga", [1.0], periodic_orbit(scene(), 2, omega=1.15))
+
+
+@pytest.mark.parametrize(
+    ("call", "kind", "message"),
+    [
+        (lambda s, o: periodic_orbit(s, 1.5), ValueError, "periods = 1.5; expected a whole number, at least 1"),
+        (lambda s, o: periodic_orbit(s, "2"), ValueError, "periods = '2'; expected a whole number"),
+        (lambda s, o: periodic_orbit("figure_3"), TypeError, "scene: found 'figure_3'; expected a Scene"),
+        (
+            lambda s, o: periodic_orbit(s, 2, omga=1.0),
+            ValueError,
+            "unknown parameter 'omga'; known: theta_b, epsilon, u",
+        ),
+        (
+            lambda s, o: periodic_orbit(s, 2, [0.1]),
+            ValueError,
+            r"start: found \[0.1\]; expected a number for each of x, v",
+        ),
+        (lambda s, o: periodic_orbit(s, 2, ["a", 1]), ValueError, "expected a number for each of x, v"),
+        (lambda s, o: periodic_orbit(s, 2, [np.nan, 0]), ValueError, "expected a number for each of x, v"),
+        (lambda s, o: stability_end(o, "a", 1), ValueError, "low = 'a'; expected a finite strength alpha"),
+        (lambda s, o: stability_end(o, 0.1, np.inf), ValueError, "high = inf; expected a finite strength alpha"),
+        (lambda s, o: follow(s, "omga", [1.0], o), ValueError, "unknown parameter 'omga'; known: theta_b"),
+        (lambda s, o: follow(s, "omega", [], o), ValueError, r"values: found \[\]; expected at least one number"),
+        (lambda s, o: follow(s, "omega", [1.15, 1.16, 1.1], o), ValueError, "rising or falling all the way"),
+        (
+            lambda s, o: follow(s, "omega", ["a"], o),
+            ValueError,
+            r"values: found \['a'\]; expected finite numbers for omega",
+        ),
+        (lambda s, o: follow(s, "omega", 1.15, o), ValueError, "values: found 1.15; expected finite numbers for omega"),
+        (lambda s, o: follow(s, "omega", [1.15], None), TypeError, "first: found None; expected a PeriodicOrbit"),
+        (lambda s, o: skeleton(s, "omga", [1.15]), ValueError, "unknown parameter 'omga'"),
+        (
+            lambda s, o: skeleton(s, "omega", [1.15], looks=0),
+            ValueError,
+            "looks = 0; expected a whole number, at least 1",
+        ),
+        (lambda s, o: skeleton(s, "omega", [1.15], (0,)), ValueError, "periods = 0; expected a whole number"),
+    ],
+)
+def test_misuse_is_answered_in_one_line(call: Callable[..., object], kind: type, message: str) -> None:
+    with pytest.raises(kind, match=message) as found:
+        call(scene(), known())
+    assert "\n" not in str(found.value)
+
+
+@cache
+def known() -> PeriodicOrbit:
+    return periodic_orbit(scene(), 2, [0.04373869, 0.1], omega=1.15)

@@ -30,6 +30,7 @@ __all__ = [
     "GREEN",
     "GREY",
     "ORANGE",
+    "PURPLE",
     "bands",
     "bracket",
     "context",

@@ -1,0 +1,202 @@
+"""The skeleton of the bifurcation diagram of figure 3: periodic orbits and their bifurcations over the motion itself.
+
+Cloud and orbits are those of set-valued friction, over a range of frequencies that starts before that of the paper, where
+the motion is periodic.  Each orbit is drawn where it crosses the section of figure 3.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from matplotlib.lines import Line2D
+
+from synchain.models.scene import Axis, Scene
+from synchain.models.scene_file import load_scene
+
+from ..branches import Branch
+from ..periodic import PeriodicOrbit
+from ..skeletons import skeleton
+from ..sweep import run
+from .bifurcation import Diagram, points
+from .study import Study
+from .style import BLACK, BLUE, COLUMN, ORANGE, PURPLE
+from .tables import Table
+
+__all__ = ["EXTRA", "SIZE", "compute", "document", "draw", "ranges", "table"]
+
+EXTRA = ("skeleton",)
+SIZE = (COLUMN, 3.3)
+LOW, HIGH = 1.0, 1.9
+PERIODS = (1, 2, 4)
+COLOURS = {1: PURPLE, 2: ORANGE, 4: BLUE}
+CLOUD = "#b4b4b4"
+KINDS = {"period doubling": "o", "fold": "s", "grazing": "^", "stick loss": "v"}
+STABLE: dict[str, Any] = {"linestyle": "-", "linewidth": 1.2}
+UNSTABLE: dict[str, Any] = {"linestyle": (0, (2.5, 1.2)), "linewidth": 0.8}
+MARK: dict[str, Any] = {"linestyle": "none", "markersize": 3.6, "markerfacecolor": "white", "markeredgewidth": 0.9,
+                        "zorder": 5}  # fmt: skip
+SAME = 1e-9
+"""Bifurcations of one kind as close as this are one, seen from both branches that meet there."""
+FULL = (1201, 181, 30)
+"""Values of omega of the cloud, those at which orbits are followed, and at how many of these they are looked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """An orbit of a branch at a value of the parameter, where it crosses the section (k,), and its phases in words; at a
+    bifurcation its kind and residual."""
+
+    value: float
+    orbit: PeriodicOrbit
+    x: np.ndarray
+    phases: str = ""
+    kind: str | None = None
+    residual: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Skeleton:
+    """The diagram, and for each branch its orbits in the order of the parameter."""
+
+    diagram: Diagram
+    branches: tuple[tuple[Place, ...], ...]
+
+
+def compute(name: str, study: Study) -> Skeleton:
+    """Run the scene of figure 3 with set-valued friction, and find its orbits of one, two and four drive periods."""
+    scene = load_scene("figure_3").replace(contact="set-valued")
+    cloud, values, looks = FULL
+    grid = study.quality.grid
+    values, looks = (values, looks) if grid is None else (max(3, (grid + 1) // 3), max(1, grid // 12))
+    swept = scene.replace(axes=(Axis.between("omega", LOW, HIGH, cloud),))
+    found = skeleton(scene.replace(axes=()), "omega", np.linspace(LOW, HIGH, values), PERIODS, looks)
+    return Skeleton(Diagram(study.run(swept), "omega", ()), tuple(_placed(scene, branch) for branch in found))
+
+
+def _placed(scene: Scene, branch: Branch) -> tuple[Place, ...]:
+    """The orbits of a branch and those at its bifurcations, with their points at the section."""
+    found = [
+        Place(float(value), orbit, np.empty(0), phases.words)
+        for value, orbit, phases in zip(branch.values, branch.orbits, branch.phases, strict=True)
+    ]
+    for (value, words), residual, orbit in zip(branch.bifurcations, branch.residuals, branch.at, strict=True):
+        found.append(Place(value, orbit, np.empty(0), "", words, residual))
+    found.sort(key=lambda place: place.value)
+    crossed = _crossings(scene, branch.name, [place.orbit for place in found])
+    return tuple(replace(place, x=x) for place, x in zip(found, crossed, strict=True))
+
+
+def _crossings(scene: Scene, name: str, orbits: list[PeriodicOrbit]) -> list[np.ndarray]:
+    """The positions at which orbits cross the scene's section, in the order of time, all over the longest of their cycles.
+
+    Two cycles are run and the first half of the crossings is kept, so that one at the start is counted once.
+    """
+    state = np.array([orbit.state for orbit in orbits])
+    values = [orbit.scene.parameters[name] for orbit in orbits]
+    axes = {name: values, "x_1": state[:, 0].tolist(), "v_1": state[:, 1].tolist()}
+    twice = scene.replace(
+        axes=tuple(Axis(key, value) for key, value in axes.items()), zipped=True, transient=0.0,
+        window=2.0 * max(orbit.periods for orbit in orbits), rtol=1e-11,
+    )  # fmt: skip
+    found = run(twice, show_progress=False)
+    each = found.section.sel(state="x_1").values
+    return [x[: (int(count) + 1) // 2] for x, count in zip(each, found.section_count.values, strict=True)]
+
+
+def _periods(branch: tuple[Place, ...]) -> int:
+    """Drive periods of a branch's orbits: that it was born of has fewer."""
+    return max(place.orbit.periods for place in branch)
+
+
+def table(data: Skeleton) -> Table:
+    """One row for each orbit and crossing of the section."""
+    rows = []
+    for number, branch in enumerate(data.branches):
+        for place in branch:
+            value, orbit = complex(place.orbit.multipliers[0]), place.orbit
+            own = (number, orbit.periods, place.value), (value.real, value.imag, orbit.residual, place.phases)
+            rows += [(*own[0], x, *own[1]) for x in place.x if place.kind is None]
+    columns = ("branch", "periods", "omega", "x_1", "multiplier_re", "multiplier_im", "residual", "phases")
+    return Table(columns, tuple(rows))
+
+
+def ranges(data: Skeleton) -> Table:
+    """One row for each bifurcation of each branch, at the lowest of its points at the section."""
+    rows = [
+        (number, place.orbit.periods, place.kind, place.value, place.residual, min(place.x, default=math.nan))
+        for number, branch in enumerate(data.branches)
+        for place in branch
+        if place.kind is not None
+    ]
+    return Table(("branch", "periods", "kind", "omega", "residual", "x_1"), tuple(rows))
+
+
+def document(data: Skeleton) -> str:
+    """The bifurcations as a table in Markdown, in the order of the parameter; one that two branches share stands once."""
+    lines = ["| ω | drive periods | kind | residual |", "|---|---|---|---|"]
+    last: tuple[Any, ...] = (None, math.nan)
+    for _, periods, kind, value, residual, _ in sorted(ranges(data).rows, key=lambda row: row[3]):
+        if kind != last[0] or not abs(value - last[1]) < SAME:
+            lines.append(f"| {value:.10f} | {periods} | {kind} | {residual:.0e} |")
+        last = kind, value
+    return "\n".join(lines) + "\n"
+
+
+def draw(axes: Any, data: Skeleton) -> Any:
+    """The motion as grey dots, stable orbits as lines, unstable ones dashed, and bifurcations by their kind."""
+    cloud, _ = points(data.diagram)
+    axes.plot(cloud[:, 0], cloud[:, 1], linestyle="none", marker=".", markersize=0.9, color=CLOUD,
+              markeredgewidth=0.0, rasterized=True, zorder=1)  # fmt: skip
+    for branch in data.branches:
+        colour = COLOURS.get(_periods(branch), BLACK)
+        for stable, line in curves(branch):
+            axes.plot(*np.array(line).T, color=colour, zorder=3, **(STABLE if stable else UNSTABLE))
+        for place in branch:
+            if place.kind is not None:
+                across = np.full(len(place.x), place.value)
+                axes.plot(across, place.x, markeredgecolor=colour, **MARK, marker=KINDS[place.kind])
+    axes.set(xlim=(LOW, HIGH), xlabel=r"drive frequency $\omega$", ylabel=r"$\chi_1$ at the section")
+    axes.figure.legend(handles=_key(data), loc="outside upper center", ncols=3, handlelength=1.8, columnspacing=1.2,
+                       borderpad=0.1)  # fmt: skip
+    return axes
+
+
+def curves(branch: tuple[Place, ...]) -> list[tuple[bool, list[tuple[float, float]]]]:
+    """The curves of a branch at the section, cut where its stability or the number of crossings changes."""
+    made: list[tuple[bool, list[tuple[float, float]]]] = []
+    order, style = branch[0].x, None
+    for before, after in pairwise(branch):
+        if len(order) != len(after.x):
+            order, style = after.x, None
+            continue
+        ends = min((np.roll(after.x, k) for k in range(len(order))), key=lambda x: float(np.abs(x - order).max()))
+        stable = _stable(before, after)
+        if stable != style:
+            made += [(stable, [(before.value, float(x))]) for x in order]
+        for (_, line), x in zip(made[len(made) - len(order) :], ends, strict=True):
+            line.append((after.value, float(x)))
+        order, style = ends, stable
+    return made
+
+
+def _stable(before: Place, after: Place) -> bool:
+    """True where the orbits between two places are stable, as that which is not at a bifurcation says."""
+    own = next((place for place in (before, after) if place.kind is None), None)
+    return own.orbit.stable if own else max(abs(place.orbit.multipliers[0]) for place in (before, after)) < 1.0 + SAME
+
+
+def _key(data: Skeleton) -> list[Line2D]:
+    """What colours, lines and marks stand for, those that occur."""
+    counts = sorted({_periods(branch) for branch in data.branches})
+    found = {place.kind for branch in data.branches for place in branch}
+    kinds = [kind for kind in KINDS if kind in found]
+    return [
+        *(Line2D([], [], color=COLOURS.get(n, BLACK), label=f"{n} drive period{'s' if n > 1 else ''}") for n in counts),
+        Line2D([], [], color=BLACK, label="stable", **STABLE), Line2D([], [], color=BLACK, label="unstable", **UNSTABLE),
+        Line2D([], [], color=CLOUD, marker=".", linestyle="none", label="motion"),
+        *(Line2D([], [], markeredgecolor=BLACK, marker=KINDS[kind], label=kind, **MARK) for kind in kinds),
+    ]  # fmt: skip
