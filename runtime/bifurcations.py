@@ -38,6 +38,10 @@ MOST_STEPS = 80
 """Steps towards a graze; halving alone exhausts the digits of the parameter in 53."""
 
 
+LEAST_REACH = 1e-4
+"""Where Newton's method finds nothing this close to the last orbit, relative to the other end, it is given up."""
+
+
 @dataclass(frozen=True, slots=True)
 class Found:
     """A bifurcation: the value of the parameter, its kind in words, how far its test function is from zero, and the nearest
@@ -166,22 +170,25 @@ def _stick_loss(arc: Arc, value: float, orbit: PeriodicOrbit, before: Phases, af
 def _graze(arc: Arc, beyond: float) -> Found:
     """Where the gap of an arc's last orbit closes on the way to `beyond`, which lies past it."""
     modes = _known(arc).modes
-    share = SHARE
+    share, reach = SHARE, 0.5
     for _ in range(MOST_STEPS):
         low, gap = arc.values[-1], _known(arc).gap
-        if gap < SHUT or abs(beyond - low) <= 1e-15 * max(1.0, abs(low)):
+        if gap < SHUT or abs(beyond - low) <= 1e-15 * max(1.0, abs(low)) or reach < LEAST_REACH:
             break
         value = _where(arc, share * gap)
         guided = share < 0.99 and min(low, beyond) < value < max(low, beyond)
-        value = value if guided else 0.5 * (low + beyond)
+        value = value if guided else low + reach * (beyond - low)
         own = _orbit(arc, value)
         phases = None if own is None else own.phases
-        if own is not None and phases is not None and phases.modes == modes:
+        if own is not None and phases is not None and phases.modes == modes and phases.gap > -SHUT:  # no phase unseen
             arc.take(value, own, phases)
-            share = SHARE
-            continue
-        share = math.sqrt(share)  # a shorter step, on which more is known of the orbit
-        beyond = beyond if own is None and guided else value
+            share, reach = SHARE, 0.5
+        elif own is not None:
+            beyond = value
+        elif guided:
+            share = math.sqrt(share)  # a shorter step, on which more is known of the orbit
+        else:
+            reach *= 0.5
     at = _where(arc, 0.0)
     low = arc.values[-1]
     at = at if min(low, beyond) <= at <= max(low, beyond) else 0.5 * (low + beyond)

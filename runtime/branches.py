@@ -35,6 +35,9 @@ APART = 1.0 / 16.0
 FAR = 0.3
 """An orbit farther from the expected state than this part of the step leads to another branch, perhaps."""
 
+KINK = 1e-2
+"""This far from the expected state an orbit may be in any case: a branch has a kink where its phases change."""
+
 
 @dataclass(frozen=True, slots=True)
 class Branch:
@@ -66,7 +69,7 @@ def follow(scene: Scene, name: str, values: Sequence[float] | np.ndarray, first:
     wanted = checked_values(first.scene, name, values)
     trail = Trail(Arc(scene, name, first.periods))
     start = periodic_orbit(scene, first.periods, first.state, **{name: wanted[0]})
-    orbits = [trail.take(wanted[0], start)]
+    orbits = [trail.take(wanted[0], start, start.phases)]
     for value in wanted[1:]:
         orbit = trail.on(value)
         if orbit is None:
@@ -103,9 +106,9 @@ class Trail:
         self.phases: dict[float, Phases | None] = {}
         self.least: int | None = None
 
-    def take(self, value: float, orbit: PeriodicOrbit) -> PeriodicOrbit:
+    def take(self, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> PeriodicOrbit:
         """Add an orbit, after the bifurcations on the way to it."""
-        phases = self.phases[value] = orbit.phases
+        self.phases[value] = phases
         self.least = self.least or orbit.least
         if self.arc.values:
             way = sorted(
@@ -125,8 +128,9 @@ class Trail:
         while ahead:
             last = self.arc.values[-1]
             orbit = self._orbit(ahead[-1])
-            if orbit is not None and (abs(ahead[-1] - last) <= APART * step or not self._changes(orbit)):
-                self.take(ahead.pop(), orbit)
+            phases = None if orbit is None else orbit.phases
+            if orbit is not None and (abs(ahead[-1] - last) <= APART * step or not self._changes(phases)):
+                self.take(ahead.pop(), orbit, phases)
             elif orbit is not None or abs(ahead[-1] - last) > SHORTEST * step:
                 ahead.append(0.5 * (last + ahead[-1]))
             else:
@@ -134,10 +138,10 @@ class Trail:
                 return None
         return self.arc.orbits[-1]
 
-    def _changes(self, orbit: PeriodicOrbit) -> bool:
-        """True where an orbit passes through other phases than the last one."""
-        own, last = orbit.phases, self.arc.phases[-1]
-        return own is not None and last is not None and own.modes != last.modes
+    def _changes(self, phases: Phases | None) -> bool:
+        """True where phases are others than those of the last orbit."""
+        last = self.arc.phases[-1]
+        return phases is not None and last is not None and phases.modes != last.modes
 
     def _orbit(self, value: float) -> PeriodicOrbit | None:
         """The orbit at a value, if Newton's method finds one close to where it is expected."""
@@ -146,7 +150,7 @@ class Trail:
         except ArithmeticError:
             return None
         guess, last = self.arc.guess(value), self.arc.orbits[-1].state
-        near = FAR * float(np.abs(guess - last).max()) + 1e-3
+        near = FAR * float(np.abs(guess - last).max()) + KINK
         if len(self.arc.values) > 1 and not float(np.abs(orbit.state - guess).max()) < near:
             return None
         return orbit if self.least in (None, orbit.least) else None

@@ -8,7 +8,6 @@ Source: Auerbach, Cvitanovic, Eckmann, Gunaratne & Procaccia, Phys. Rev. Lett. 5
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from numbers import Integral
 
@@ -27,8 +26,8 @@ __all__ = ["near_returns", "skeleton"]
 STARTS, LENGTH, DROPPED = 16, 200, 20
 """Motions that are looked through for returns, their length in periods of the drive, and what is dropped before it."""
 
-NEARER = 1.0 / 64.0
-"""The other sheet at a fold is entered at this part of the distance from the fold to the last orbit before it."""
+NEARER = 4
+"""The other sheet at a fold is entered at 4^-NEARER of the distance from the fold to the last orbit before it."""
 
 CLOSE, APART, TRIES = 0.05, 0.02, 12
 """Returns as close as this are tried, the closest first, those apart from each other by so much, and so many at most."""
@@ -45,6 +44,7 @@ def skeleton(
     Raises ValueError for an unknown parameter, values that do not rise or fall all the way, and fewer looks than one.
     """
     grid = sorted(checked_values(scene, name, values))
+    scene = single(scene, TOLERANCE, {})
     if not isinstance(looks, Integral) or looks < 1:
         raise ValueError(f"looks = {shown(looks)}; expected a whole number, at least 1")
     for each in periods:
@@ -142,12 +142,12 @@ def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrb
             if words != "fold" or not inner:
                 continue
             end, last = float(branch.values[k]), branch.orbits[k]
-            near = fold + NEARER * (end - fold)
+            way = [fold + 4.0**-j * (end - fold) for j in range(NEARER, -1, -1)]
             try:
-                start = turn.state - math.sqrt(NEARER) * (last.state - turn.state)
-                first = periodic_orbit(scene, last.periods, start, **{branch.name: near})
-                way = follow(scene, branch.name, [near, end], first)
+                start = turn.state - 2.0**-NEARER * (last.state - turn.state)
+                first = periodic_orbit(scene, last.periods, start, **{branch.name: way[0]})
+                sheet = follow(scene, branch.name, way, first)
             except ArithmeticError:
                 continue
-            found += [(end, way.orbits[1])] if len(way.orbits) == 2 else []
+            found += [(end, sheet.orbits[-1])] if len(sheet.orbits) == len(way) else []
     return found

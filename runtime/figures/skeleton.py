@@ -36,12 +36,12 @@ COLOURS = {1: PURPLE, 2: ORANGE, 4: BLUE}
 CLOUD = "#b4b4b4"
 KINDS = {"period doubling": "o", "fold": "s", "grazing": "^", "stick loss": "v"}
 STABLE: dict[str, Any] = {"linestyle": "-", "linewidth": 1.2}
-UNSTABLE: dict[str, Any] = {"linestyle": (0, (2.5, 1.2)), "linewidth": 0.8}
+UNSTABLE: dict[str, Any] = {"linestyle": "--", "dashes": (2.5, 1.2), "linewidth": 0.8}
 MARK: dict[str, Any] = {"linestyle": "none", "markersize": 3.6, "markerfacecolor": "white", "markeredgewidth": 0.9,
                         "zorder": 5}  # fmt: skip
 SAME = 1e-9
 """Bifurcations of one kind as close as this are one, seen from both branches that meet there."""
-FULL = (1201, 181, 30)
+FULL = (901, 121, 16)
 """Values of omega of the cloud, those at which orbits are followed, and at how many of these they are looked for."""
 
 
