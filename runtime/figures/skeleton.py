@@ -34,6 +34,8 @@ LOW, HIGH = 1.0, 1.9
 PERIODS = (1, 2, 4)
 COLOURS = {1: PURPLE, 2: ORANGE, 4: BLUE}
 CLOUD = "#b4b4b4"
+CROWDED, INSET = ((1.443, 1.484), (0.585, 0.611)), (0.11, 0.08, 0.36, 0.35)
+"""The part that is drawn larger, and where."""
 KINDS = {"period doubling": "o", "fold": "s", "grazing": "^", "stick loss": "v"}
 STABLE: dict[str, Any] = {"linestyle": "-", "linewidth": 1.2}
 UNSTABLE: dict[str, Any] = {"linestyle": "--", "dashes": (2.5, 1.2), "linewidth": 0.8}
@@ -147,9 +149,26 @@ def document(data: Skeleton) -> str:
 
 
 def draw(axes: Any, data: Skeleton) -> Any:
-    """The motion as grey dots, stable orbits as lines, unstable ones dashed, and bifurcations by their kind."""
+    """The motion as grey dots, stable orbits as lines, unstable ones dashed, bifurcations by their kind, and where they are
+    many the same once more, larger."""
+    _diagram(axes, data, 0.9)
+    axes.set(xlim=(LOW, HIGH), xlabel=r"drive frequency $\omega$", ylabel=r"$\chi_1$ at the section")
+    if CROWDED[0][0] > LOW and CROWDED[0][1] < HIGH:
+        inset = axes.inset_axes(INSET)
+        _diagram(inset, data, 1.6)
+        inset.set(xlim=CROWDED[0], ylim=CROWDED[1])
+        inset.tick_params(labelsize=5.5, pad=2)
+        inset.locator_params(nbins=3)
+        axes.indicate_inset_zoom(inset, edgecolor=BLACK, linewidth=0.5)
+    axes.figure.legend(handles=_key(data), loc="outside upper center", ncols=3, handlelength=1.8, columnspacing=1.2,
+                       borderpad=0.1)  # fmt: skip
+    return axes
+
+
+def _diagram(axes: Any, data: Skeleton, size: float) -> None:
+    """The motion in dots of a size in points, the branches over it, and their bifurcations."""
     cloud, _ = points(data.diagram)
-    axes.plot(cloud[:, 0], cloud[:, 1], linestyle="none", marker=".", markersize=0.9, color=CLOUD,
+    axes.plot(cloud[:, 0], cloud[:, 1], linestyle="none", marker=".", markersize=size, color=CLOUD,
               markeredgewidth=0.0, rasterized=True, zorder=1)  # fmt: skip
     for branch in data.branches:
         colour = COLOURS.get(_periods(branch), BLACK)
@@ -159,10 +178,6 @@ def draw(axes: Any, data: Skeleton) -> Any:
             if place.kind is not None:
                 across = np.full(len(place.x), place.value)
                 axes.plot(across, place.x, markeredgecolor=colour, **MARK, marker=KINDS[place.kind])
-    axes.set(xlim=(LOW, HIGH), xlabel=r"drive frequency $\omega$", ylabel=r"$\chi_1$ at the section")
-    axes.figure.legend(handles=_key(data), loc="outside upper center", ncols=3, handlelength=1.8, columnspacing=1.2,
-                       borderpad=0.1)  # fmt: skip
-    return axes
 
 
 def curves(branch: tuple[Place, ...]) -> list[tuple[bool, list[tuple[float, float]]]]:
