@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import synchain.codegen.load as load_module
 from synchain.models.scene import Scene
 from synchain.models.topology import topology
 from synchain.runtime import Status, run
+from synchain.runtime.cli import main
 
 NINE = topology("chain", 9)
 WIDTH = 4
@@ -77,3 +79,17 @@ def test_a_sweep_finds_the_end_of_the_synchronous_range() -> None:
     result = run(scene, skip=False, show_progress=False, width=WIDTH, sigma=[0.1, 0.11, 0.13, 0.14])
     assert np.all(result.status == Status.FINISHED)
     assert list(result.sync_error.values < 1e-6) == [True, True, False, False]
+
+
+@pytest.mark.parametrize(("friction", "end"), [("exponential", "0.04650"), ("coulomb_static", "0.05831")])
+def test_modes_of_ten_oscillators_from_the_command_line(
+    friction: str, end: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A star's strongest mode has gamma = -n: its range of sigma is that of alpha over 10, 0.465033877 at omega = 1.15."""
+    scene = tmp_path / "star.toml"
+    scene.write_text(f'friction = "{friction}"\ncontact = "set-valued"\n[topology]\nname = "star"\nn = 10\n'
+                     "[parameters]\nomega = 1.15\n")  # fmt: skip
+    assert main(f"msf {scene} --alpha 0:1.2:25 --periods 100 --starts 1 --workers 1".split()) == 0
+    said = capsys.readouterr().out
+    assert f"sigma     0 … {end} ± 0.00001; lost above: gamma = -10" in said
+    assert "star(10): every mode dies out for" in said
