@@ -18,6 +18,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from synchain.models.contact import SLIP
+from synchain.models.expect import a_scene
 from synchain.models.scene import Scene
 from synchain.models.scene_checks import shown
 
@@ -144,8 +145,7 @@ def strobe(scene: Scene, state: np.ndarray, periods: int, **parameters: float) -
 
 def _driven(scene: Scene, parameters: dict[str, float]) -> Scene:
     """The scene with its parameters, to the tolerance of orbits; ValueError where it is not driven."""
-    if not isinstance(scene, Scene):
-        raise TypeError(f"scene: found {shown(scene)}; expected a Scene")
+    scene = a_scene(scene)
     unknown = next((name for name in parameters if name not in scene.parameters), None)
     if unknown is not None:
         raise ValueError(f"unknown parameter {unknown!r}; known: {', '.join(scene.parameters)}")
