@@ -66,14 +66,14 @@ def _worked(scene: Scene, exact: Energy) -> tuple[np.ndarray, float]:
 
 def _with_work(equations: Equations, exact: Energy) -> Equations:
     """The same network with the work done on each oscillator as its last state."""
-    node, edge = equations.node, equations.edge
-    if exact.link_power != 0:
+    node, edge, share = equations.node, equations.edge, exact.nodes[0]
+    if any(share.power != 0 for share in exact.links):
         raise ValueError("the balance is for springs; found links that lose energy")
     work, here, there = (sp.Symbol(f"work{end}", real=True) for end in ("", "_i", "_j"))
-    power = exact.node_power
+    power = share.power
     if node.contact is not None:  # the force of friction in stick is whatever holds the body
         x, v = node.state[:2]
-        power = total_derivative(exact.node, (x,), (v,), (node.rhs[1],), TIME)
+        power = total_derivative(share.energy, (x,), (v,), (node.rhs[1],), TIME)
     single = Node((*node.state, work), (*node.rhs, power), node.parameters, node.contact)
     if edge is not None:
         rates = (*edge.rhs, _link_power(node, edge))
