@@ -20,6 +20,7 @@ def linearise(w: StepWriter) -> list[dict[str, sp.Expr]]:
     w.put(f"# right-hand side{', Jacobian and time derivative' if implicit else ' and Jacobian'} at the start")
     function = "node_linear" if implicit else "node_local"
     w.timed("t", w.wanted([w.first_of(blocks) for blocks in w.kinds]))
+    kept = keep_times(w)
     own: list[dict[str, sp.Expr]] = []
     for i in range(eq.n):
         states, body = eq.node_at(i).state, w.first_of(w.of(i))
@@ -33,9 +34,18 @@ def linearise(w: StepWriter) -> list[dict[str, sp.Expr]]:
             left = ", ".join(named[kind].name for kind in kinds if kind not in plain)
             w.put(f"{left} = {w.call(function, body, coded, i, '')}")
         w.put(*(f"{named[kind]} = {show(plain[kind])}" for kind in kinds[: len(states)] if kind in plain))
-        own.append({kind: plain.get(kind, named[kind]) for kind in kinds})
+        own.append({kind: plain.get(kind, named[kind]).xreplace(kept) for kind in kinds})
     w.links("", "f_")
     return own
+
+
+def keep_times(w: StepWriter) -> dict[sp.Symbol, sp.Symbol]:
+    """Keep time terms that stand for themselves in the linearisation, where stages give these names other values."""
+    plain = {s for blocks in w.kinds for e in w.first_of(blocks).results if w.is_plain(e) for s in e.free_symbols}
+    moved = w.wanted([blocks.rhs for blocks in w.kinds]) & plain
+    kept = {s: sp.Symbol(f"at_{s.name}", real=True) for s in sorted(moved, key=lambda s: s.name)}
+    w.put(*(f"{there} = {here}" for here, there in kept.items()))
+    return kept
 
 
 def entry(r: sp.Symbol, c: sp.Symbol) -> str:

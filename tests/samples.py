@@ -73,6 +73,14 @@ def looped() -> Equations:
     return Equations(node, edge, 3, links)
 
 
+def parametric() -> Equations:
+    """Two nodes whose equations hold the same terms of time as their Jacobian and their time derivative."""
+    x, v, omega, u = real("x", "v", "omega", "u")
+    wave = u * omega * sp.sin(omega * TIME)
+    rhs = (v + u * sp.cos(omega * TIME), wave * x * v - x * sp.sin(omega * TIME))
+    return Equations(Node((x, v), rhs, (omega, u)), spring(), 2, path(2))
+
+
 def third_order() -> Equations:
     """One node of three states: a chain of derivatives, with kinks and a power."""
     x, y, z, a, b = real("x", "y", "z", "a", "b")
@@ -92,7 +100,7 @@ def tanh_pair() -> Equations:
 
 CASES: dict[str, Equations] = {
     "friction 1": friction_chain(1), "friction 3": friction_chain(3), "harmonic": harmonic_chain(2), "looped": looped(),
-    "third order": third_order(), "tanh pair": tanh_pair(), "waving": waving(),
+    "parametric": parametric(), "third order": third_order(), "tanh pair": tanh_pair(), "waving": waving(),
 }  # fmt: skip
 
 

@@ -27,8 +27,7 @@ def test_hard_cases_are_right(case: Case) -> None:
     row = stability.row(case)
     assert row[STATUS] == "FINISHED"
     assert row[VERDICT] == "right", row
-    # work with explicit time is integrated less exactly than the state (docs/stability.md), hence 1e-5
-    assert math.isnan(row[ENERGY]) or abs(row[ENERGY]) <= max(row[ALLOWED], 1e-5), row
+    assert math.isnan(row[ENERGY]) or abs(row[ENERGY]) <= max(row[ALLOWED], 1e-12), row
 
 
 def test_verdicts() -> None:
