@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import operator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -33,12 +35,10 @@ def test_inner_functions_have_no_wrappers() -> None:
     assert description.llvm_cfunc_wrapper_name not in text
 
 
-def test_entry_points_are_callable_from_python(tmp_path: Any) -> None:
-    path = tmp_path / "entry.py"
-    path.write_text("def double(x):\n    return 2.0 * x\n")
-    names: dict[str, Any] = {}
-    exec(compile(path.read_text(), str(path), "exec"), names)
-    double = njit(error_model="numpy", cache=True)(names["double"])
+def test_entry_points_are_callable_from_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "entry_point.py").write_text("def double(x):\n    return 2.0 * x\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    double = njit(error_model="numpy", cache=True)(importlib.import_module("entry_point").double)
     text, description = _text(double)
     assert description.llvm_cpython_wrapper_name in text
     assert double(1.5) == 3.0
