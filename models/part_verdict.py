@@ -24,7 +24,7 @@ from .eigenvalue_words import words
 from .part_claims import Exact, Part
 from .products import factors
 from .separation import Number, equal, sign
-from .spectrum import Spectrum, spectrum
+from .spectrum import Spectrum, has_closed_form, spectrum
 from .topology import Topology, family, topology
 
 __all__ = ["judged"]
@@ -66,6 +66,8 @@ class _Known:
     def spectrum(self) -> Spectrum:
         """All eigenvalues, proved up to LARGEST nodes."""
         n = self.graph.n
+        if n > LARGEST and not has_closed_form(self.graph):
+            raise ValueError(f"{self.graph.name} {n}: a graph without a closed form; expected at most {LARGEST} nodes")
         if n > LISTED and not _short(self.graph):
             raise ValueError(
                 f"{self.graph.name} {n}: expected at most {LISTED} nodes for this part of the spectrum of this graph"

@@ -29,7 +29,7 @@ from .radicals import written
 from .spectrum_table import table
 from .topology import Topology, family, names, topology
 
-__all__ = ["Eigenvalue", "ProofError", "Spectrum", "characteristic", "spectrum", "table"]
+__all__ = ["Eigenvalue", "ProofError", "Spectrum", "characteristic", "has_closed_form", "spectrum", "table"]
 
 PROOF_LIMIT = 200
 """Up to so many nodes a closed form is proved when it is made; above only on request."""
@@ -218,6 +218,11 @@ def _closed_form(graph: Topology) -> Sequence[tuple[sp.Expr, int]] | None:
     except ValueError:
         return None
     return made.rule() if made.rule is not None and made.links == graph.links else None
+
+
+def has_closed_form(graph: Topology) -> bool:
+    """True where the eigenvalues of a graph are known without its characteristic polynomial."""
+    return _closed_form(graph) is not None
 
 
 def _believed(graph: Topology, listed: Sequence[tuple[sp.Expr, int]], chance: float | None) -> Spectrum:

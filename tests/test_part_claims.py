@@ -149,6 +149,7 @@ def test_believed_closed_forms_are_called_so(tmp_path: Path, capsys: pytest.Capt
         ("one_way_ring 5: ratio < 3", "complex eigenvalues have no order"),
         ("one_way_ring 5: largest < 3", "complex eigenvalues have no order"),
         ("wheel 6000: distinct = 3000", "expected at most 5000 nodes for this part"),
+        ("erdos_renyi 501: largest < 0", "without a closed form; expected at most 500 nodes"),
     ],
 )
 def test_what_cannot_be_decided_is_refused(text: str, words: str, tmp_path: Path) -> None:
