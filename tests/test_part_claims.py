@@ -144,7 +144,7 @@ def test_believed_closed_forms_are_called_so(tmp_path: Path, capsys: pytest.Capt
         ("chain 4: largest = -2, 0", "found '0'; expected e.g."),
         ("chain 501: 0, -1", "those about parts of them: largest, slowest, ratio"),
         ("cartesian(chain(100), chain(100)): 0", "10000 nodes; expected at most 500"),
-        ("tree 2000: largest < 0", "n = 2000 without a closed form"),
+        ("tree 2000: largest < 0", "tree 2000: a graph without a closed form"),
         ("cartesian(chain(4), open(3)): largest = 0", "open"),
         ("one_way_ring 5: ratio < 3", "complex eigenvalues have no order"),
         ("one_way_ring 5: largest < 3", "complex eigenvalues have no order"),
