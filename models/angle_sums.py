@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 from itertools import product
-from math import cos, gcd, lcm, pi
+from math import cos, gcd, inf, lcm, pi
 
 import sympy as sp
 from flint import arb, arb_poly, fmpq, fmpq_poly, fmpz_poly
@@ -21,6 +21,9 @@ from . import angles
 from .balls import Ball, precision
 
 __all__ = ["AngleSum", "box", "expression", "folded_sum", "merged", "minimal_polynomial", "read"]
+
+_HUGE = 10**300
+"""Rational numbers above it are infinite as floats."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +77,9 @@ class AngleSum:
 
     @property
     def near(self) -> float:
-        """The value as a float, within rounding."""
+        """The value as a float, within rounding; infinite where it is too large for one."""
+        if abs(self.shift) > _HUGE:
+            return inf if self.shift > 0 else -inf
         return float(self.shift) + sum(2 * float(b) * cos(2 * pi * float(t)) for t, b in self.terms)
 
     @property

@@ -68,7 +68,7 @@ def _graph(node: ast.expr, text: str, largest: int | None, depth: int) -> Topolo
         case ast.Call(func=ast.Name(id="complement"), args=[a], keywords=[]) if depth < DEPTH:
             return products.complement(_graph(a, text, largest, depth + 1))
         case ast.Call(func=ast.Name(id="weighted"), args=[a, b], keywords=[]) if depth < DEPTH:
-            return products.weighted(_graph(a, text, largest, depth + 1), _option(b))
+            return products.weighted(_graph(a, text, largest, depth + 1), _option(b, text))
         case ast.Call(func=ast.Name(id=name), args=[ast.Constant(value=int() as n)]) if not isinstance(n, bool):
             _fits(n, text, largest)
             return topology(name, n, **_options(node.keywords, text))
@@ -97,12 +97,14 @@ def _pair(name: str, home: object) -> Callable[[T, T], T]:
 def _options(keywords: list[ast.keyword], text: str) -> dict[str, str]:
     if any(keyword.arg is None for keyword in keywords):
         raise _unreadable(text)
-    return {str(keyword.arg): _option(keyword.value) for keyword in keywords}
+    return {str(keyword.arg): _option(keyword.value, text) for keyword in keywords}
 
 
-def _option(node: ast.expr) -> str:
-    """The value of an option as a command line has it: (3, 4) as 3,4; 1 / 10 as 1/10."""
-    return ast.unparse(node).replace(" ", "").strip("()").rstrip(",")
+def _option(node: ast.expr, text: str) -> str:
+    """The value of an option as a command line has it: (3, 4) as 3,4; 1 / 10 as 1/10; digits stay as they are written."""
+    if isinstance(node, ast.Tuple):
+        return ",".join(_option(element, text) for element in node.elts)
+    return (ast.get_source_segment(text.strip(), node) or "").replace(" ", "")
 
 
 def _fits(n: int, text: str, largest: int | None) -> None:

@@ -155,7 +155,7 @@ def _farthest(eigenvalues: Sequence[Eigenvalue], way: int) -> sp.Expr:
     """The eigenvalue of largest modulus, of smallest where `way` is -1; the first of those that 1024 bits hold equal."""
     top = max(way * abs(e.value) for e in eigenvalues)
     bound = top - 1e-12 * abs(top)
-    best, bits = [e for e in eigenvalues if way * abs(e.value) >= bound], 64
+    best, bits = [e for e in eigenvalues if not way * abs(e.value) < bound], 64  # of infinite floats, all
     while len(best) > 1 and bits <= 1024:
         with precision(bits + 64):
             sizes = [way * abs(e.enclosure(bits)) for e in best]

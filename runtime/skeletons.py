@@ -13,6 +13,7 @@ from numbers import Integral
 
 import numpy as np
 
+from synchain.models.expect import a_scene
 from synchain.models.scene import Scene
 from synchain.models.scene_checks import shown
 
@@ -43,7 +44,9 @@ def skeleton(
     fewer periods is left out, and so is one that a branch passes through already.
     Raises ValueError for an unknown parameter, values that do not rise or fall all the way, and fewer looks than one.
     """
-    grid = sorted(checked_values(scene, name, values))
+    grid = sorted(checked_values(a_scene(scene), name, values))
+    if isinstance(periods, Integral | str) or len(periods) == 0:
+        raise ValueError(f"periods = {shown(periods)}; expected numbers of drive periods, e.g. (1, 2)")
     scene = single(scene, TOLERANCE, {})
     if not isinstance(looks, Integral) or looks < 1:
         raise ValueError(f"looks = {shown(looks)}; expected a whole number, at least 1")

@@ -128,9 +128,11 @@ def thresholds(
     grid in alpha covers every sigma |gamma|.  Ends are refined to `resolution` in sigma.  A network in several parts is
     allowed; its warnings say so.  `workers`, `executor`, `show_progress` and `progress` are those of `run`.
 
-    Raises ValueError for a network without links, or with one-way links whose eigenvalues are complex.
+    Raises ValueError for a network without links, or with one-way links whose eigenvalues are complex, for unequal nodes and
+    for links with inertia.
     """
-    scene = a_scene(scene).replace(axes=(), zipped=False, continuation="none", record=(), **parameters)
+    a_scene(scene).equations.expect_alike("thresholds")
+    scene = scene.replace(axes=(), zipped=False, continuation="none", record=(), **parameters)
     criterion = checked(criterion)
     spectrum = scene.topology.spectrum
     check_probe(scene.topology, spectrum)

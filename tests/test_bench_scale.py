@@ -13,8 +13,8 @@ def test_rows_and_sizes(monkeypatch):
     rows = scale.measure(quick=True)
     assert asked == [10, 32]
     assert all(len(row) == len(scale.COLUMNS) for row in rows)
-    cells, threads, seconds, rate, steps, memory, size, each = rows[0]
-    assert (cells, threads) == (16, 2)
+    cells, periods, threads, seconds, rate, steps, memory, size, each = rows[0]
+    assert (cells, periods, threads) == (16, 120, 2)
     assert rate == pytest.approx(cells / seconds)
     assert size * 1e6 == pytest.approx(each * cells)
     assert steps > 1000

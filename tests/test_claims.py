@@ -307,3 +307,21 @@ def test_files_that_cannot_be_written_or_read(tmp_path: Path, capsys: pytest.Cap
     path.write_bytes(b"chain 3: 0, \xff")
     assert main(["check", str(path)]) == 2
     assert "UTF-8" in capsys.readouterr().err
+
+
+def test_claims_that_cannot_be_decided_do_not_hide_the_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, report = tmp_path / "claims.txt", tmp_path / "report.xml"
+    path.write_text("erdos_renyi 501: largest < 0\nchain 3: 0, -1, -3\nwheel 6000: distinct = 3\n")
+    assert main(["check", str(path), "--junit", str(report)]) == 2
+    shown = capsys.readouterr()
+    assert shown.out.splitlines() == ["line 2: chain 3: right", "1 claim: 1 right, 0 wrong"]
+    assert "line 1: erdos_renyi 501: a graph without a closed form" in shown.err
+    assert "(and 1 more)" in shown.err
+    suites = ElementTree.parse(report).getroot()
+    assert (suites.get("tests"), suites.get("failures"), suites.get("errors")) == ("3", "0", "2")
+    assert [case.find("error") is None for case in suites.iter("testcase")] == [True, False, False]
+    assert main(["check", str(path), "--json"]) == 2
+    found = json.loads(capsys.readouterr().out)
+    assert [u["line"] for u in found["undecided"]] == [1, 3]

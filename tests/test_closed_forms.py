@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
+from fractions import Fraction
 from itertools import product
 
 import mpmath
@@ -254,3 +255,10 @@ def test_letters_of_options_obey_their_conditions() -> None:
         form.at(n=9, s=5)
     with pytest.raises(ValueError, match="expected"):
         form.at(n=9, s=1)
+
+
+def test_numbers_in_texts_keep_all_their_digits() -> None:
+    links = read_graph("weighted(chain(2), 0.1234567890123456789)").links
+    assert {weight for _, _, weight in links} == {Fraction("0.1234567890123456789")}
+    assert read_graph(" torus(12, shape=(3, 4))") == topology("torus", 12, shape=(3, 4))
+    assert read_graph("weighted(chain(4), 1e400)").spectrum.largest < -(10**400)

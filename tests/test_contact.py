@@ -91,7 +91,7 @@ def test_equal_oscillators_stay_equal_although_the_state_is_unstable() -> None:
     assert np.ptp(whole.end.values.reshape(3, 3), axis=1).max() == 0.0
 
 
-@pytest.mark.parametrize("width", [1, pytest.param(2, marks=pytest.mark.long), 4])
+@pytest.mark.parametrize("width", [1, *(pytest.param(width, marks=pytest.mark.long) for width in (2, 4))])
 def test_lanes_do_not_change_a_bit(width: int) -> None:
     cells = {"sigma": np.linspace(0.0, 0.4, 11), "show_progress": False}
     s = scene(2, rtol=1e-8, window=50.0)

@@ -34,7 +34,7 @@ def ran(scene: Scene, **more: Any) -> np.ndarray:
     return np.asarray(result.end.values.reshape(3, -1))
 
 
-@pytest.mark.parametrize("coupling", ["spring", "damper"])
+@pytest.mark.parametrize("coupling", ["spring", pytest.param("damper", marks=pytest.mark.long)])
 def test_looped_events_are_those_of_the_kernel_that_is_written_out(
     coupling: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -101,7 +101,7 @@ def test_widths_and_chunks_change_nothing(alone, width, size):
     same(run(width, chunks(size)), alone)
 
 
-@pytest.mark.parametrize("width", [1, 4, pytest.param(8, marks=pytest.mark.long)])
+@pytest.mark.parametrize("width", [1, *(pytest.param(width, marks=pytest.mark.long) for width in (4, 8))])
 @pytest.mark.parametrize("size", [29, 11, 3])
 def test_changing_sides_changes_nothing(alone_switching, width, size):
     smooth = alone_switching.counts[:, 5]

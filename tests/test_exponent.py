@@ -192,7 +192,7 @@ def test_two_periodic_attractors_are_not_averaged() -> None:
 
 def test_what_is_refused() -> None:
     s = scene("friction", "spring")
-    with pytest.raises(ValueError, match="alpha: found a number that is not finite"):
+    with pytest.raises(ValueError, match="alpha: found nan; expected finite numbers"):
         exponents(s, [0.1, np.nan])
     with pytest.raises(ValueError, match="alpha: found numbers that do not increase"):
         msf(s, [0.3, 0.1])
@@ -210,7 +210,7 @@ def test_what_is_refused() -> None:
         ([0.0, np.nan, 1.0], "found nan; expected finite numbers"),
         ([[0.0, 1.0]], r"found an array of shape \(1, 2\); expected a row"),
         ("a", "found 'a'; expected real numbers"),
-        (0.5, "at least two numbers"),
+        (0.5, "at least 2 numbers"),
     ],
 )
 def test_a_line_of_strengths_that_is_none_is_named(strengths: object, words: str) -> None:

@@ -31,7 +31,7 @@ def always_looped(monkeypatch):
     ("graph", "integrator"),
     [
         pytest.param(GRAPHS[1], "rodas5p", marks=pytest.mark.long, id="star5-rodas5p"),
-        pytest.param(GRAPHS[3], "rodas5p", id="matrix3-rodas5p"),
+        pytest.param(GRAPHS[3], "rodas5p", marks=pytest.mark.long, id="matrix3-rodas5p"),
         pytest.param(GRAPHS[3], "dop853", marks=pytest.mark.long, id="matrix3-dop853"),
     ],
 )
@@ -49,6 +49,7 @@ def test_looped_step_equals_the_unrolled_one(graph, integrator, request):
     assert abs(int(looped.steps) - int(plain.steps)) <= 0.02 * int(plain.steps)
 
 
+@pytest.mark.long
 def test_large_ring_runs_in_loops_and_keeps_its_symmetry():
     """Neighbours alternate, so the ring of twelve is two oscillators coupled by 2 sigma: chain(2) at twice the coupling."""
     start = {"x": [0.30, 0.28] * 6, "v": 0}

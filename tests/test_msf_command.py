@@ -329,6 +329,7 @@ def test_equations_without_modes_are_refused_before_anything_is_computed(
         raise ValueError(f"no synchronous state, plane {plane}")
 
     monkeypatch.setattr(orbits, "mode", mode)
+    orbits._variation.cache_clear()
     for words, plane in (("", False), ("--beta 0:1:3", True)):
         assert main(["msf", "figure_8", *words.split()]) == 2
         assert f"no synchronous state, plane {plane}" in capsys.readouterr().err

@@ -239,6 +239,7 @@ def test_non_linear_couplings_are_linear_between_equal_states(coupling: str) -> 
     assert coupling_slope(made) == coupling_slope(plain.equations)
 
 
+@pytest.mark.long
 def test_two_double_pendulums_in_a_kernel_follow_scipy() -> None:
     """Exported Python right-hand side under SciPy's DOP853 beside our kernel: full mass matrix and links on angles."""
     scene = Scene(oscillator="double_pendulum", topology=chain(2), coupling="spring on phi", parameters={"sigma": 0.3},
@@ -272,7 +273,7 @@ def test_equations_written_by_hand(oscillator: str, friction: str | None) -> Non
 
 
 def test_joints_of_double_pendulums_lose_energy() -> None:
-    power = energy(Scene(oscillator="double_pendulum")).node_power
+    power = energy(Scene(oscillator="double_pendulum")).nodes[0].power
     delta, one, two = sp.symbols("delta w_phi w_psi", real=True)
     assert sp.expand(power + delta * (one**2 + (two - one) ** 2)) == 0
 

@@ -51,6 +51,7 @@ def compare(scene: Scene, tolerance: float = 1e-9, nodes: int | None = None, **o
 # -- each skip and its answer --------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_no_forcing():
     scene = FRICTION.replace(u=0.0)
     compare(scene.replace(axes={"sigma": [0.05, 0.1]}))

@@ -95,7 +95,8 @@ def test_the_probe_covers_every_mode_and_the_network_is_swept_as_asked(swept):
     assert np.diff(2 * half).max() <= 0.01 + 1e-12
     assert 81 <= len(half) <= 82
     assert sigma.tolist() == [0.1, 0.2, 0.3]
-    assert options == direct == {"resolution": 1e-3, "criterion": SHORT, "workers": 1, "show_progress": None}
+    asked = {"resolution": 1e-3, "criterion": SHORT, "workers": 1, "show_progress": None}
+    assert options == direct == {**asked, "executor": None, "progress": None}
     assert found.probe.intervals == ((0.2, 0.4),)
     np.testing.assert_array_equal(found.probe.x, 2 * half)
     assert found.predicted == ()  # 0.2 … 0.4 holds no number and its triple
@@ -154,8 +155,8 @@ def test_cells_are_every_coupling_with_every_start_and_failed_ones_count_as_infi
 
     monkeypatch.setattr(threshold, "run", run)
     moves = np.array([0.0, 0.125])
-    options = (Criterion(transient=7, window=3, rtol=1e-5), 2, False)
-    found = threshold._errors(Scene(topology=chain(2)), np.array([0.1, 0.2]), moves, *options)
+    criterion, options = Criterion(transient=7, window=3, rtol=1e-5), {"workers": 2, "show_progress": False}
+    found = threshold._errors(Scene(topology=chain(2)), np.array([0.1, 0.2]), moves, criterion, options)
     assert found.tolist() == [[0.0, 1.0], [np.inf, 3.0]]
     ((cells, given),) = seen
     assert {name: tuple(axis.values) for name, axis in zip(("sigma", "x_1", "x_2"), cells.axes, strict=True)} == {
@@ -244,3 +245,10 @@ def test_exponent_changes_sign_where_the_probe_does():
     assert found.intervals[0][1] == pytest.approx(0.4653, abs=2e-3)
     assert np.all(np.diff(found.exponent) > 0)
     assert np.all(found.stderr < 2e-3)
+
+
+@pytest.mark.parametrize("changed", [{"coupling": "inerter"}, {"parameters": {"mu_k": [0.15, 0.16, 0.14]}}])
+def test_networks_that_the_probe_says_nothing_about_are_refused_at_once(changed, swept):
+    with pytest.raises(ValueError, match=r"^thresholds: found (links with inertia|nodes that differ in mu_k)"):
+        thresholds(Scene(topology=chain(3), **changed), omega=1.15)
+    assert swept == []

@@ -6,7 +6,7 @@ import re
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ._outcome import FAILED, FINE, WrongUse, print_json, wrong_use
 
@@ -19,6 +19,9 @@ EXAMPLES = (
     "synchain check claims.txt --json",
     "synchain check claims.txt --junit report.xml",
 )
+
+Undecided: TypeAlias = tuple[int, str, str]
+"""Line, text and reason of a claim that cannot be decided."""
 
 SHOWN = 3
 """Of a line about a range of n, so many wrong sizes are described."""
@@ -43,29 +46,37 @@ def execute(arguments: Namespace) -> int:
     with wrong_use():
         lines = read_claims(arguments.file)
     found: list[list[Verdict]] = []
+    open_ones: list[Undecided] = []
     for line in lines:
         try:
             found.append([verify(claim) for claim in line])
         except (ValueError, TypeError) as problem:
-            raise WrongUse(f"{arguments.file}, line {line[0].line}: {' '.join(str(problem).split())}") from problem
+            open_ones.append((line[0].line, line[0].text, " ".join(str(problem).split())))
     wrong = sum(not all(v.right for v in line) for line in found)
     if arguments.junit is not None:
         with wrong_use():
-            _write_junit(arguments.junit, arguments.file, found, wrong)
+            _write_junit(arguments.junit, arguments.file, found, open_ones)
     code = FAILED if wrong else FINE
     try:
-        _print(arguments, found, wrong)
+        _print(arguments, found, open_ones)
     except BrokenPipeError as closed:  # the reader has seen enough, but the answer counts
         setattr(closed, "exit_code", code)  # noqa: B010
         raise
+    if open_ones:
+        number, _, why = open_ones[0]
+        more = f" (and {len(open_ones) - 1} more)" * (len(open_ones) > 1)
+        raise WrongUse(f"{arguments.file}, line {number}: {why}{more}")
     return code
 
 
-def _print(arguments: Namespace, found: Sequence[Sequence[Verdict]], wrong: int) -> None:
+def _print(arguments: Namespace, found: Sequence[Sequence[Verdict]], open_ones: Sequence[Undecided]) -> None:
     """Print all claims as JSON or text."""
+    wrong = sum(not all(v.right for v in line) for line in found)
     if arguments.json:
         claims = [_as_dict(line) for line in found]
-        print_json({"file": arguments.file, "right": len(found) - wrong, "wrong": wrong, "claims": claims})
+        undecided = [{"line": line, "claim": text, "why": why} for line, text, why in open_ones]
+        counts = {"right": len(found) - wrong, "wrong": wrong}
+        print_json({"file": arguments.file, **counts, "claims": claims, "undecided": undecided})
     else:
         for verdicts in found:
             print("\n".join(_report(verdicts)))
@@ -118,15 +129,15 @@ def _as_dict(line: Sequence[Verdict]) -> dict[str, Any]:
     return {"line": first.line, "claim": first.text, "right": all(v.right for v in line), "graphs": graphs}
 
 
-def _write_junit(path: str, file: str, found: Sequence[Sequence[Verdict]], wrong: int) -> None:
+def _write_junit(path: str, file: str, found: Sequence[Sequence[Verdict]], open_ones: Sequence[Undecided]) -> None:
     from xml.etree import ElementTree as Tree
 
     from ..files import write_text
 
-    count = str(len(found))
-    suites = Tree.Element("testsuites", {"tests": count, "failures": str(wrong)})
-    about = {"name": _legal(f"synchain check {file}"), "tests": count, "failures": str(wrong), "errors": "0"}
-    suite = Tree.SubElement(suites, "testsuite", about)
+    wrong = sum(not all(v.right for v in line) for line in found)
+    counts = {"tests": str(len(found) + len(open_ones)), "failures": str(wrong), "errors": str(len(open_ones))}
+    suites = Tree.Element("testsuites", counts)
+    suite = Tree.SubElement(suites, "testsuite", {"name": _legal(f"synchain check {file}"), **counts})
     for line in found:
         claim = line[0].claim
         name = _legal(f"line {claim.line}: {claim.text}")
@@ -134,6 +145,10 @@ def _write_junit(path: str, file: str, found: Sequence[Sequence[Verdict]], wrong
         problems = [row.strip() for row in _problems(line)]
         if problems:
             Tree.SubElement(case, "failure", {"message": _legal(problems[0])}).text = _legal("\n".join(problems))
+    for number, text, why in open_ones:
+        name = _legal(f"line {number}: {text}")
+        case = Tree.SubElement(suite, "testcase", {"name": name, "classname": "claims", "file": _legal(file)})
+        Tree.SubElement(case, "error", {"message": _legal(why)})
     Tree.indent(suites)
     write_text(path, '<?xml version="1.0" encoding="utf-8"?>\n' + Tree.tostring(suites, encoding="unicode") + "\n")
 
