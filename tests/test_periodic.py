@@ -196,7 +196,7 @@ def test_what_is_refused() -> None:
         (lambda s, o: skeleton(s, "omega", [1.15], (0,)), ValueError, "periods = 0; expected a whole number"),
         (lambda s, o: skeleton(s, "omega", [1.15], 2), ValueError, "periods = 2; expected numbers of drive periods"),
         (lambda s, o: skeleton(s, "omega", [1.15], ()), ValueError, "expected numbers of drive periods"),
-        (lambda s, o: skeleton("figure_3", "omega", [1.15]), TypeError, r"scene: found 'figure_3' \(str\); expected a Scene"),
+        (lambda s, o: skeleton("figure_3", "omega", [1.15]), TypeError, r"scene: found 'figure_3' \(str\); expected"),
     ],
 )
 def test_misuse_is_answered_in_one_line(call: Callable[..., object], kind: type, message: str) -> None:
