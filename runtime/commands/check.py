@@ -52,11 +52,10 @@ def execute(arguments: Namespace) -> int:
             found.append([verify(claim) for claim in line])
         except (ValueError, TypeError) as problem:
             open_ones.append((line[0].line, line[0].text, " ".join(str(problem).split())))
-    wrong = sum(not all(v.right for v in line) for line in found)
     if arguments.junit is not None:
         with wrong_use():
             _write_junit(arguments.junit, arguments.file, found, open_ones)
-    code = FAILED if wrong else FINE
+    code = FAILED if _wrong(found) else FINE
     try:
         _print(arguments, found, open_ones)
     except BrokenPipeError as closed:  # the reader has seen enough, but the answer counts
@@ -69,9 +68,14 @@ def execute(arguments: Namespace) -> int:
     return code
 
 
+def _wrong(found: Sequence[Sequence[Verdict]]) -> int:
+    """How many lines hold a wrong claim."""
+    return sum(not all(v.right for v in line) for line in found)
+
+
 def _print(arguments: Namespace, found: Sequence[Sequence[Verdict]], open_ones: Sequence[Undecided]) -> None:
     """Print all claims as JSON or text."""
-    wrong = sum(not all(v.right for v in line) for line in found)
+    wrong = _wrong(found)
     if arguments.json:
         claims = [_as_dict(line) for line in found]
         undecided = [{"line": line, "claim": text, "why": why} for line, text, why in open_ones]
@@ -134,21 +138,21 @@ def _write_junit(path: str, file: str, found: Sequence[Sequence[Verdict]], open_
 
     from ..files import write_text
 
-    wrong = sum(not all(v.right for v in line) for line in found)
-    counts = {"tests": str(len(found) + len(open_ones)), "failures": str(wrong), "errors": str(len(open_ones))}
+    counts = {"tests": str(len(found) + len(open_ones)), "failures": str(_wrong(found)), "errors": str(len(open_ones))}
     suites = Tree.Element("testsuites", counts)
     suite = Tree.SubElement(suites, "testsuite", {"name": _legal(f"synchain check {file}"), **counts})
+
+    def case(number: int, text: str) -> Tree.Element:
+        about = {"name": _legal(f"line {number}: {text}"), "classname": "claims", "file": _legal(file)}
+        return Tree.SubElement(suite, "testcase", about)
+
     for line in found:
-        claim = line[0].claim
-        name = _legal(f"line {claim.line}: {claim.text}")
-        case = Tree.SubElement(suite, "testcase", {"name": name, "classname": "claims", "file": _legal(file)})
+        one = case(line[0].claim.line, line[0].claim.text)
         problems = [row.strip() for row in _problems(line)]
         if problems:
-            Tree.SubElement(case, "failure", {"message": _legal(problems[0])}).text = _legal("\n".join(problems))
+            Tree.SubElement(one, "failure", {"message": _legal(problems[0])}).text = _legal("\n".join(problems))
     for number, text, why in open_ones:
-        name = _legal(f"line {number}: {text}")
-        case = Tree.SubElement(suite, "testcase", {"name": name, "classname": "claims", "file": _legal(file)})
-        Tree.SubElement(case, "error", {"message": _legal(why)})
+        Tree.SubElement(case(number, text), "error", {"message": _legal(why)})
     Tree.indent(suites)
     write_text(path, '<?xml version="1.0" encoding="utf-8"?>\n' + Tree.tostring(suites, encoding="unicode") + "\n")
 
