@@ -58,8 +58,7 @@ def between(arc: Arc, value: float, orbit: PeriodicOrbit, phases: Phases | None)
     before = arc.phases[-1]
     if before is None or phases is None or before.modes == phases.modes:
         last, there = arc.orbits[-1], (arc.values[-1], value)
-        whole = Arc(arc.scene, arc.name, arc.periods, [*arc.values, value], [*arc.orbits, orbit], [*arc.phases, phases])
-        return _crossings(whole, there, (last, orbit))
+        return _crossings(_copy(arc).take(value, orbit, phases), there, (last, orbit))
     ahead = len(before.modes) <= len(phases.modes)
     known = _copy(arc) if ahead else arc.empty().take(value, orbit, phases)
     far = value if ahead else arc.values[-1]

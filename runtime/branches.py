@@ -15,6 +15,7 @@ from numbers import Real
 
 import numpy as np
 
+from synchain.models.expect import instance
 from synchain.models.scene import Scene
 from synchain.models.scene_checks import shown
 
@@ -64,8 +65,7 @@ def follow(scene: Scene, name: str, values: Sequence[float] | np.ndarray, first:
     Raises ValueError for an unknown parameter and for values that do not rise, or fall, all the way, TypeError for a first
     orbit that is none, ArithmeticError where there is no orbit near `first` at values[0].
     """
-    if not isinstance(first, PeriodicOrbit):
-        raise TypeError(f"first: found {shown(first)}; expected a PeriodicOrbit, such as periodic_orbit(scene) returns")
+    instance("first", first, PeriodicOrbit, "a PeriodicOrbit, such as periodic_orbit(scene) returns")
     wanted = checked_values(first.scene, name, values)
     trail = Trail(Arc(scene, name, first.periods))
     start = periodic_orbit(scene, first.periods, first.state, **{name: wanted[0]})

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 import pytest
 import sympy as sp
+from claim_files import verdicts
 from effort import effort
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -18,19 +19,8 @@ from synchain.models.claims import read_claims
 from synchain.models.exact_text import exact_number, whole_number
 from synchain.models.separation import equal
 from synchain.models.topology import names, topology
-from synchain.models.verdict import Verdict, verify
+from synchain.models.verdict import verify
 from synchain.runtime.cli import main
-
-MATRIX = "-1 0 1\n1/2 -1/2 0\n0 1/2 -1/2\n"
-
-
-def verdicts(folder: Path, text: str) -> list[Verdict]:
-    """What is said of a file of claims; G.txt lies beside it."""
-    (folder / "G.txt").write_text(MATRIX)
-    path = folder / "claims.txt"
-    path.write_text(text, encoding="utf-8")
-    return [verify(claim) for line in read_claims(path) for claim in line]
-
 
 REFUSAL = 15_000
 """A refusal takes up to 4700 calls."""

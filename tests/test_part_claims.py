@@ -10,30 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
+from claim_files import verdicts
 from effort import effort
 
 from synchain.models import cartesian, chain, feed_forward, ring, star
 from synchain.models.angle_sums import AngleSum
-from synchain.models.claims import read_claims
 from synchain.models.part_claims import interval, read_part
 from synchain.models.products import factors
 from synchain.models.separation import sign
 from synchain.models.topology import topology
-from synchain.models.verdict import Verdict, verify
 from synchain.runtime.cli import main
-
-MATRIX = "-1 0 1\n1/2 -1/2 0\n0 1/2 -1/2\n"
-WEIGHTS = "-3 1 2\n1 -6 5\n2 5 -7\n"
-
-
-def verdicts(folder: Path, *lines: str) -> list[Verdict]:
-    """What is said of the lines of a file; two matrices lie beside it."""
-    (folder / "G.txt").write_text(MATRIX)
-    (folder / "W.txt").write_text(WEIGHTS)
-    path = folder / "claims.txt"
-    path.write_text("\n".join(lines), encoding="utf-8")
-    return [verify(claim) for line in read_claims(path) for claim in line]
-
 
 RIGHT = [
     "chain 1000000: largest = -4*cos(pi/(2*n))**2, slowest = -4*sin(pi/(2*n))**2, distinct = n",
