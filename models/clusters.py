@@ -15,14 +15,12 @@ from collections.abc import Collection, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from fractions import Fraction
 
-import sympy as sp
 from flint import fmpq, fmpq_mat, fmpq_poly
 
 from .automorphisms import automorphisms
-from .equations import Edge, Equations, Node
 from .expect import a_graph
 from .proof import ProofError
-from .reduction import collapse
+from .reduction import class_links
 from .scene_checks import typed
 from .topology import Topology
 
@@ -110,8 +108,7 @@ def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
 
 def _described(graph: Topology, classes: tuple[int, ...], characteristic: fmpq_poly) -> Clusters:
     """Quotient and blocks, proved by characteristic polynomials."""
-    links = collapse(_diffusive(graph), classes).links
-    quotient = Topology(f"{graph.name} quotient", max(classes) + 1, links)
+    quotient = Topology(f"{graph.name} quotient", max(classes) + 1, class_links(graph.n, graph.links, classes))
     made = Clusters(classes, quotient, _blocks(graph, classes))
     product = _polynomial(quotient.rows)
     for block in made.blocks:
@@ -122,12 +119,6 @@ def _described(graph: Topology, classes: tuple[int, ...], characteristic: fmpq_p
             f"characteristic polynomial {characteristic}"
         )
     return made
-
-
-def _diffusive(graph: Topology) -> Equations:
-    """The smallest network on a graph that has its couplings: what a partition must be balanced for."""
-    x, y, w = sp.symbols("x y w", real=True)
-    return Equations(Node((x,), (sp.S.Zero,), ()), Edge((x,), (y,), w, (w * (y - x),), ()), graph.n, graph.links)
 
 
 def _blocks(graph: Topology, classes: tuple[int, ...]) -> tuple[Block, ...]:

@@ -23,7 +23,7 @@ import sympy as sp
 from .contact import Contact
 from .equations import Edge, Equations, Link, Node
 
-__all__ = ["NoQuotient", "coarsest_balanced", "collapse", "fold", "quotient"]
+__all__ = ["NoQuotient", "class_links", "coarsest_balanced", "collapse", "fold", "quotient"]
 
 
 class NoQuotient(ValueError):
@@ -109,14 +109,14 @@ def collapse(equations: Equations, classes: Sequence[int]) -> Equations:
         raise NoQuotient("quotient: nodes of several kinds or links with inertia are stepped one by one")
     if equations.edge is not None and equations.links:
         _check_coupling(equations.edge)
-    links = _class_links(equations, classes)
+    links = class_links(equations.n, equations.links, classes)
     return replace(equations, edge=equations.edge if links else None, n=count, links=links)
 
 
-def _class_links(equations: Equations, classes: Sequence[int]) -> tuple[Link, ...]:
-    """The links between classes, proved to be the same for all nodes of a class."""
-    felt: list[dict[int, Fraction]] = [{} for _ in range(equations.n)]
-    for target, source, weight in equations.links:
+def class_links(n: int, links: Iterable[Link], classes: Sequence[int]) -> tuple[Link, ...]:
+    """Return the links between the classes of n nodes; ValueError if nodes of a class receive different weights."""
+    felt: list[dict[int, Fraction]] = [{} for _ in range(n)]
+    for target, source, weight in links:
         k = classes[source]
         if k != classes[target]:
             felt[target][k] = felt[target].get(k, Fraction(0)) + weight
