@@ -226,18 +226,6 @@ class Equations:
             found |= {k: e.xreplace(self.at_node(i)) for k, e in rows}
         return tuple(found[k] for k in range(self.dimension))
 
-    def latex(self) -> str:
-        """The equations in LaTeX (see `synchain.models.present`)."""
-        from .present import latex
-
-        return latex(self)
-
-    def text(self) -> str:
-        """The equations in plain text with Greek letters."""
-        from .present import text
-
-        return text(self)
-
     @property
     def digest(self) -> str:
         """Hexadecimal SHA-256 of the equations: equal equations have equal digests, whatever made them."""

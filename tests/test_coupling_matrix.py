@@ -19,6 +19,7 @@ from synchain.models.coupling_matrix import canonical, entries
 from synchain.models.equations import Node
 from synchain.models.network import connectivity, edge, network, node, parameters
 from synchain.models.plugins import load, names
+from synchain.models.present import text
 from synchain.models.tangent import ALPHA, deviation_names, transversal
 from synchain.runtime import run
 
@@ -231,7 +232,7 @@ def test_entries_between_lagrangian_oscillators() -> None:
     equations = Scene(oscillator="harmonic", topology=chain(2), coupling="x->x").equations
     v_1, x_1, x_2 = sp.symbols("v_1 x_1 x_2", real=True)
     assert equations.rhs()[0] == v_1 + SIGMA * (x_2 - x_1)
-    assert equations.text().splitlines()[0] == "x_1' = v_1 + σ (x_2 - x_1)"
+    assert text(equations).splitlines()[0] == "x_1' = v_1 + σ (x_2 - x_1)"
 
 
 # -- runs ----------------------------------------------------------------------------------------------------

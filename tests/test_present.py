@@ -44,7 +44,6 @@ def test_two_friction_oscillators_as_in_the_paper() -> None:
         r"\chi_2'' = -\chi_2 + u\cos(\omega\tau) + \varepsilon f(\vartheta_b - \chi_2') + \sigma(\chi_1 - \chi_2)",
         r"f(w) = \frac{2}{\pi}(\mu_k + (\mu_s - \mu_k)\exp(-a|w|))\arctan(\kappa w)",
     ]
-    assert (PAIR.text(), PAIR.latex()) == (text(PAIR), latex(PAIR))
 
 
 def test_one_oscillator_has_no_index() -> None:

@@ -13,6 +13,7 @@ from synchain.codegen.emit import emit
 from synchain.models import Scene, chain, from_matrix, load_scene, ring, star
 from synchain.models.equations import TIME, Equations, Node
 from synchain.models.export import to_python
+from synchain.models.present import text
 from synchain.models.tangent import transversal
 from synchain.runtime import exponents, run
 from synchain.runtime.certificate import certify
@@ -68,8 +69,8 @@ def test_equations_of_nodes_with_their_own_parameters() -> None:
         drive = u * sp.cos(real(f"omega_{i + 1}") * TIME)
         rows.append(-x[i] - beta * x[i] ** 3 - real(f"delta_{i + 1}") * v[i] + drive + felt)
     assert [sp.expand(a - b) for a, b in zip(scene().equations.rhs(), [*v, *rows], strict=True)] == [0] * 6
-    assert "δ_2 x_2'" in scene().equations.text()
-    assert "ω_3" in scene().equations.text()
+    assert "δ_2 x_2'" in text(scene().equations)
+    assert "ω_3" in text(scene().equations)
 
 
 def test_equal_numbers_are_equal_nodes() -> None:
@@ -223,9 +224,9 @@ def test_a_coupling_between_other_kinds_is_refused() -> None:
 
 def test_friction_laws_of_two_kinds() -> None:
     made = Scene(topology=chain(2), nodes=[{"oscillator": "friction", "friction": "coulomb", "at": [2]}])
-    text = made.equations.text()
-    assert "of node 1" in text
-    assert "of node 2" in text
+    words = text(made.equations)
+    assert "of node 1" in words
+    assert "of node 2" in words
     with pytest.raises(ValueError, match="nodes of several kinds: found set-valued friction"):
         Scene(topology=chain(2), contact="set-valued", nodes=made.nodes).equations  # noqa: B018
 
