@@ -13,12 +13,13 @@ from .scene_checks import Frozen, suggestion, table, text
 from .scene_complete import complete
 from .scene_model import bare, derived, model_parameters
 from .scene_nodes import Group, by_kind
-from .scene_parameters import known_name, varied, without
+from .scene_parameters import drive, known_name, varied, without
 from .scene_section import Section
 from .topology import Topology
 
 if TYPE_CHECKING:
     from .equations import Equations
+    from .periodicity import Drive
     from .spectrum import Spectrum
 
 __all__ = ["Axis", "Scene", "Section"]
@@ -31,8 +32,8 @@ class Scene:
     """A network of oscillators, its numbers, its start, what to record and what to sweep.
 
     Every keyword has a default; the same names are the keys of a scene file (see docs/scenes.md).  States,
-    parameters and times are non-dimensional; `transient` and `window` count periods of the drive 2 pi/omega
-    where `time_unit` is "period", the default where there is a drive.  `atol` is a tenth of `rtol` unless given.
+    parameters and times are non-dimensional; `transient` and `window` count periods of the drive if `time_unit`
+    is "period", the default if the equations repeat themselves in time.  `atol` is a tenth of `rtol` unless given.
     `friction` "default" is "exponential" where the oscillator takes a friction law, else None.  Raises ValueError
     or TypeError on anything that the model does not know or cannot be given.
     """
@@ -125,15 +126,26 @@ class Scene:
         return any(node.forced for node in bare(self.model()).nodes)
 
     @property
-    def omega(self) -> float | None:
-        """Frequency of the drive (an axis may sweep it), None where the oscillator is not driven."""
-        return self.parameters.get("omega") if self.forced else None
+    def drive(self) -> Drive:
+        """At which frequencies time enters the equations: expressions of the parameters, derived from the equations."""
+        return drive({**self.model(), "parameters": self.parameters})
+
+    @property
+    def angular_frequency(self) -> float | None:
+        """Angular frequency of the drive (an axis may sweep it), None if the equations do not repeat themselves."""
+        from .periodicity import as_function, names_in
+
+        frequency = self.drive.frequency
+        if frequency is None:
+            return None
+        return as_function(frequency)(*(self.parameters[name] for name in names_in(frequency)))
 
     @property
     def period(self) -> float | None:
-        """Period of the drive in non-dimensional time, None where there is no drive or its frequency is 0."""
-        omega = self.omega
-        return 2 * math.pi / abs(omega) if omega else None
+        """Period of the drive in non-dimensional time, None if there is no drive or its frequency is 0."""
+        from .periodicity import period_of
+
+        return period_of(self.angular_frequency or 0.0)
 
     @property
     def y0(self) -> tuple[float, ...]:

@@ -13,7 +13,7 @@ from .scene_checks import Frozen, choice, integer, number, shown, text
 from .scene_friction import check_friction
 from .scene_model import bare, check_links, check_state, components, coordinate_names
 from .scene_nodes import by_kind, default_friction, groups
-from .scene_parameters import at_nodes, parameters
+from .scene_parameters import at_nodes, drive, parameters
 from .scene_section import Section
 from .scene_start import SEED_LIMIT, chosen_start, default_start, start
 from .scene_sweep import check_sweep, read_axes
@@ -122,13 +122,13 @@ def _records(made: dict[str, Any]) -> None:
 
 
 def _times(made: dict[str, Any]) -> None:
-    forced = any(node.forced for node in bare(made).nodes) and "omega" in made["parameters"]
+    found = drive(made)
     if made["time_unit"] is None:
-        made["time_unit"] = "period" if forced else "time"
+        made["time_unit"] = "time" if found.frequency is None else "period"
     made["time_unit"] = choice("time_unit", made["time_unit"], TIME_UNITS)
-    if made["time_unit"] == "period" and not forced:
+    if made["time_unit"] == "period" and found.frequency is None:
         raise ValueError(
-            f"time_unit: found 'period', but the oscillator {made['oscillator']!r} is not driven; "
+            f"time_unit: found 'period', but the oscillator {made['oscillator']!r} {found.problem}; "
             "expected 'time'; change it or leave it out"
         )
     for name in ("transient", "window"):

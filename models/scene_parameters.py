@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .parameter import Parameter
 from .scene_checks import Frozen, shown, table
 from .scene_model import bare, in_range, known_parameters, model_parameters, unknown
 from .scene_nodes import by_kind
 
-__all__ = ["at_nodes", "collected", "known_name", "node_parameter", "parameters", "varied", "without"]
+if TYPE_CHECKING:
+    from .periodicity import Drive
+
+__all__ = ["at_nodes", "collected", "drive", "known_name", "node_parameter", "parameters", "varied", "without"]
 
 
 def node_parameter(made: Mapping[str, Any], name: str) -> tuple[str, int] | None:
@@ -132,6 +135,13 @@ def at_nodes(
         if key not in seen:
             seen.add(key)
             yield *pair, mine
+
+
+def drive(made: Mapping[str, Any]) -> Drive:
+    """Return at which frequencies time enters the equations of a scene whose parameters are complete."""
+    from .periodicity import drive_of
+
+    return drive_of(bare(made).nodes, varied(made["parameters"], model_parameters(made)))
 
 
 def without(values: Mapping[str, Any], names: Iterable[str], varied: Iterable[str]) -> dict[str, Any]:

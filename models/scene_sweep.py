@@ -10,7 +10,7 @@ from typing import Any
 from .axis import Axis
 from .scene_checks import choice, shown
 from .scene_model import bare, check_state, components, in_range, model_parameters, unknown
-from .scene_parameters import known_name
+from .scene_parameters import drive, known_name
 
 __all__ = ["check_sweep", "read_axes"]
 
@@ -41,8 +41,23 @@ def check_sweep(made: dict[str, Any]) -> None:
         raise ValueError(
             f"sweep: found {cells} cells; expected at most {CELL_LIMIT}; use fewer values or split the sweep"
         )
+    _period(made)
     _samples(made, cells)
     _continuation(made)
+
+
+def _period(made: Mapping[str, Any]) -> None:
+    """Refuse a drive that stands still in a cell whose times count its periods."""
+    from .periodicity import rest_in_sweep
+
+    if not made["axes"] or made["time_unit"] != "period":
+        return
+    found = rest_in_sweep(drive(made).frequency, made["parameters"], made["axes"], made["zipped"])
+    if found is not None:
+        raise ValueError(
+            f"axis {found[0]}: found {found[1]:g}, at which the drive has no period; "
+            'expected other values or time_unit = "time"'
+        )
 
 
 def _samples(made: Mapping[str, Any], cells: int) -> None:
@@ -87,8 +102,6 @@ def _axis(made: Mapping[str, Any], axis: Axis) -> None:
             states = tuple(f"{c}_1" for c in own)
             raise ValueError(unknown(made, axis.name, "axis", (*known, *states)))
         check_state(made, axis.name, "axis")
-    if axis.name == "omega" and made["time_unit"] == "period" and 0.0 in axis.values:
-        raise ValueError('axis omega: found 0, which has no period; expected other values or time_unit = "time"')
 
 
 def _continuation(made: dict[str, Any]) -> None:

@@ -83,14 +83,16 @@ def warnings(scene: Scene) -> tuple[str, ...]:
             f"the nodes differ in {', '.join(scene.varied)}: equal states are no solution of this network, so there is no "
             "complete synchronisation; the synchronisation error stays above 0"
         )
-    if graph.links and scene.coupling is not None and not _vanishes(scene):
+    vanishing = not graph.links or _vanishes(scene)
+    if not vanishing:
         found.append(
             f"coupling {scene.coupling!r} does not vanish between oscillators in equal states, so that equal motion of all "
             "is no solution: there is no complete synchronisation; make it a function of differences"
         )
     found += _stiff_springs(scene)
     moved = {axis.name.rpartition("_")[0] for axis in scene.axes} & set(scene.initial)
-    if "sync_error" in scene.record and not moved and all(len(set(x)) == 1 for x in scene.initial.values()):
+    same = not moved and all(len(set(x)) == 1 for x in scene.initial.values())
+    if "sync_error" in scene.record and same and vanishing and not (scene.varied or scene.equations.mixed):
         found.append(
             "all oscillators start from the same state, so the synchronisation error stays 0 whatever the "
             "coupling; give them different initial states"

@@ -16,7 +16,7 @@ from synchain.models.scene import Scene
 from synchain.models.tangent import Variation
 
 from .contact_modes import local_clock
-from .plan import CANCEL, control_array, periods, tolerances
+from .plan import CANCEL, control_array, half_swing, periods, tolerances
 from .status import Status
 from .threads import worker_count
 
@@ -68,7 +68,7 @@ class Carrier:
         where[order] = np.arange(count)
         rtol, atol = tolerances(scene, numbers)
         repeat = periods(kernel.equations, numbers)
-        longest = 0.5 * repeat[repeat > 0.0].min() if np.any(repeat > 0.0) else math.inf
+        longest = half_swing(kernel.equations, dict(zip(kernel.equations.parameters, numbers.T, strict=True)))
         control = np.append(control_array(rtol, atol, longest, scene.max_steps, jumps=False), looseness)
         vectors = np.full((len(state), variation.size, padded), 1.0 / math.sqrt(variation.size))
         kept = np.ascontiguousarray(strengths[:, chosen], dtype=float)

@@ -14,10 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from synchain.models.periodicity import rest_in_sweep
 from synchain.models.scene import Scene
 from synchain.models.tangent import mode
 
 from .exponent import Exponents, exponents
+from .orbits import unit_of_time
 from .plan import axis_columns
 
 __all__ = ["VERDICTS", "Certificate", "certify", "check_certifiable"]
@@ -121,8 +123,11 @@ def check_certifiable(scene: Scene) -> None:
     if scene.cells > MOST:
         raise ValueError(f"a certificate needs memory for every cell; found {scene.cells}, expected at most {MOST}")
     mode(scene.equations)
-    if scene.forced and any(v == 0.0 for axis in scene.axes if axis.name == "omega" for v in axis.values):
-        raise ValueError("a certificate needs a drive with a period; found omega = 0 in the sweep")
+    unit_of_time(scene)
+    frequency = scene.drive.frequency
+    rest = None if frequency is None else rest_in_sweep(frequency, scene.parameters, scene.axes, scene.zipped)
+    if rest is not None:
+        raise ValueError(f"a certificate needs a drive with a period; found {rest[0]} = {rest[1]:g} in the sweep")
 
 
 def _transversal(scene: Scene) -> np.ndarray:

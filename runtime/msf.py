@@ -6,8 +6,9 @@ intervals ("ragged"): Stefański, Perlikowski & Kapitaniak, Phys. Rev. E 75, 016
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -72,9 +73,27 @@ class MSF:
         return tuple(found.kind for found in self.fine.attractors)
 
     @property
+    def errors(self) -> tuple[Interval, ...] | None:
+        """The uncertainties of the ends; None if an average was too short to give them."""
+        found = self.uncertainties
+        return found if np.isfinite(found).all() else None
+
+    @property
     def windows(self) -> tuple[Window, ...]:
-        """Ranges of sigma in which every mode of the scene's network is stable; real eigenvalues only."""
-        return windows(self.open_ranges, self.scene.topology, self.uncertainties)
+        """Ranges of sigma in which every mode of the scene's network is stable; real eigenvalues only.
+
+        Where a range ends with the grid of alpha no mode is lost.
+        """
+        return tuple(self._trimmed(window) for window in windows(self.open_ranges, self.scene.topology, self.errors))
+
+    def _trimmed(self, window: Window) -> Window:
+        """A window without the modes whose strength at its ends is an end of the grid."""
+        low, high = (float(self.fine.alpha[k]) for k in (0, -1))
+        modes = [
+            None if mode is None or math.isclose(sigma * mode.size, end, rel_tol=1e-12) else mode
+            for sigma, mode, end in ((window.low, window.low_mode, low), (window.high, window.high_mode, high))
+        ]
+        return replace(window, low_mode=modes[0], high_mode=modes[1])
 
     @property
     def open_ranges(self) -> tuple[Interval, ...]:

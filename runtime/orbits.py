@@ -148,9 +148,13 @@ def _variation(equations: Equations, plane: bool) -> Variation:
 
 
 def unit_of_time(scene: Scene) -> float:
-    """The period of the drive, or 2 pi where there is none; ValueError where time enters without a known period."""
-    if scene.forced and not scene.period and scene.omega != 0.0:
-        raise ValueError("exponents need equations that are periodic in time; found time dependence without a period")
+    """The period of the drive, or 2 pi if there is none; ValueError if time enters without a known period."""
+    drive = scene.drive
+    if scene.forced and drive.frequency is None:
+        raise ValueError(
+            f"drive: the oscillator {scene.oscillator!r} {drive.problem}; expected one with a period; "
+            "`run` integrates others with time_unit = 'time'"
+        )
     return scene.period or 2.0 * math.pi
 
 

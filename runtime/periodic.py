@@ -24,7 +24,7 @@ from synchain.models.scene_checks import shown
 
 from .attractor import over_one_cycle
 from .exponent import single
-from .orbits import Orbits
+from .orbits import Orbits, unit_of_time
 from .phases import Phases, phases_of
 
 __all__ = ["SAME", "PeriodicOrbit", "check_periods", "orbit_through", "periodic_orbit", "stability_end", "strobe"]
@@ -150,6 +150,7 @@ def _driven(scene: Scene, parameters: dict[str, float]) -> Scene:
     if unknown is not None:
         raise ValueError(f"unknown parameter {unknown!r}; known: {', '.join(scene.parameters)}")
     scene = single(scene, TOLERANCE, parameters)
+    unit_of_time(scene)
     if not scene.period:
         raise ValueError(
             "periodic orbits are looked for on the stroboscopic map of a drive; found an oscillator without one"

@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import sympy as sp
 
 from synchain.models.equations import Equations
-from synchain.models.periodicity import angular_frequency
+from synchain.models.periodicity import as_function, drive_of, names_in
 from synchain.models.scene import Scene
 
 from .contact_modes import local_clock, with_modes
 
-__all__ = ["CANCEL", "Plan", "Planner", "control_array", "parameter_names", "plan", "tolerances"]
+__all__ = [
+    "CANCEL",
+    "Plan",
+    "Planner",
+    "control_array",
+    "half_swing",
+    "longest_step",
+    "parameter_names",
+    "plan",
+    "tolerances",
+]
 
 FIRST_STEP = 1e-4
 """Step tried first in every cell; the step control enlarges it sixfold at a time."""
@@ -82,8 +92,8 @@ class Planner:
                 start[:, state.index(name)] = values
         start = with_modes(equations, start, numbers)
         last = np.zeros(len(cells)) if near is None else near
-        clock = local_clock(equations, periods(equations, numbers))
-        spans = np.column_stack([_spans(scene, columns, len(cells)), clock, last])
+        repeat = periods(equations, numbers)
+        spans = np.column_stack([_spans(scene, repeat), local_clock(equations, repeat), last])
         return Plan(start, numbers, np.ascontiguousarray(spans))
 
     def extremes(self) -> Plan:
@@ -102,25 +112,44 @@ def periods(equations: Equations, numbers: np.ndarray) -> np.ndarray:
     """The period of the equations for each row of parameters; 0 where time does not enter or no period is known."""
     if len(numbers) == 0:
         return np.zeros(0)
-    value = _frequency(equations)
-    if value is None:
+    frequency = drive_of(equations.nodes, equations.varied).frequency
+    if frequency is None:
         return np.zeros(len(numbers))
-    size = np.abs(np.broadcast_to(np.asarray(value(*numbers.T), dtype=float), len(numbers)))
     with np.errstate(divide="ignore"):
-        found = 2.0 * math.pi / size
+        found = 2.0 * math.pi / _sizes(frequency, dict(zip(equations.parameters, numbers.T, strict=True)), len(numbers))
     return np.where(np.isfinite(found), found, 0.0)
 
 
-@lru_cache(maxsize=16)
-def _frequency(equations: Equations) -> Callable[..., np.ndarray] | None:
-    """The angular frequency of the equations as a function of their parameters; None where no period is known."""
-    frequency = angular_frequency(equations)
-    if frequency is None:
-        return None
-    made: Callable[..., np.ndarray] = sp.lambdify(
-        [sp.Symbol(name, real=True) for name in equations.parameters], frequency, "numpy"
-    )
-    return made
+def _sizes(frequency: sp.Expr, values: Mapping[str, np.ndarray], rows: int) -> np.ndarray:
+    """The absolute values (rows,) of a frequency, by the same function as `Scene.angular_frequency`."""
+    names = names_in(frequency)
+    if not names:
+        return np.full(rows, abs(as_function(frequency)()))
+    found = np.frompyfunc(as_function(frequency), len(names), 1)(*(values[name] for name in names))
+    return np.abs(np.asarray(found, dtype=float))
+
+
+def half_swing(equations: Equations, values: Mapping[str, np.ndarray]) -> float:
+    """Half the period of the fastest sine or cosine of time at arrays of parameters of one length; inf without a drive.
+
+    No step may be longer, so that none can miss a whole swing of the drive.
+    """
+    rows = max((len(column) for column in values.values()), default=1)
+    waves = drive_of(equations.nodes, equations.varied).waves
+    fastest = max((float(np.max(_sizes(wave, values, rows), initial=0.0)) for wave in waves), default=0.0)
+    return math.pi / fastest if fastest > 0.0 else math.inf
+
+
+def longest_step(scene: Scene) -> float:
+    """The half swing at the ends of all that a scene's nodes and axes give to the parameters of its drive."""
+    known = dict.fromkeys(name for wave in scene.drive.waves for name in names_in(wave))
+    ends = []
+    for names in (parameter_names(scene, name) for name in known):
+        values = [scene.parameters[name] for name in names]
+        values += [end(axis.values) for axis in scene.axes if axis.name in names for end in (min, max)]
+        ends.append((min(values), max(values)))
+    corners = np.array(list(itertools.product(*ends)), dtype=float)
+    return half_swing(scene.equations, dict(zip(known, corners.T, strict=True)))
 
 
 def axis_columns(scene: Scene) -> dict[str, np.ndarray]:
@@ -135,13 +164,11 @@ def parameter_names(scene: Scene, name: str) -> tuple[str, ...]:
     return tuple(found for found in scene.parameters if found.rpartition("_")[0] == name)
 
 
-def _spans(scene: Scene, columns: dict[str, np.ndarray], cells: int) -> np.ndarray:
-    unit = np.ones(cells)
-    if scene.time_unit == "period":
-        omega = columns.get("omega", np.full(cells, scene.omega or 0.0))
-        if np.any(omega == 0.0):
-            raise ValueError("a window in drive periods needs omega > 0, found 0; set time_unit = 'time'")
-        unit = 2.0 * math.pi / np.abs(omega)
+def _spans(scene: Scene, period: np.ndarray) -> np.ndarray:
+    unit = period if scene.time_unit == "period" else np.ones(len(period))
+    if np.any(unit == 0.0):
+        name = scene.drive.frequency
+        raise ValueError(f"a window in drive periods needs {name} other than 0, found 0; set time_unit = 'time'")
     spans = np.stack([scene.transient * unit, (scene.transient + scene.window) * unit], axis=1)
     if not np.all(spans < 1e12):
         raise ValueError(

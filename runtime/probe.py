@@ -25,7 +25,7 @@ from synchain.models.scene import Scene
 from synchain.models.topology import topology
 
 from .crew import Crew, Task, crew_size, feed
-from .plan import Plan, control_array, plan, tolerances
+from .plan import Plan, control_array, longest_step, plan, tolerances
 from .progress import Hook, Reporter
 from .result import Buffers
 from .rows import numbers
@@ -91,7 +91,7 @@ def universal_probe(
     equations = ring_of_three(three.equations)
     cells = _cells(three, equations.parameters, real.reshape(-1), imaginary.reshape(-1), criterion)
     limits = tolerances(three, np.empty((0, 0)))
-    control = control_array(*limits, 0.5 * (three.period or math.inf), three.max_steps)
+    control = control_array(*limits, longest_step(three), three.max_steps)
     error, status = integrate(
         Rows(equations, three.integrator, cells, control), workers=workers, executor=executor, show_progress=show_progress,
         progress=progress,

@@ -260,7 +260,10 @@ def explain(chosen: Skip) -> str:
     parts = (
         ("left out", (*chosen.skipped, *_unwritten(chosen))),
         ("not left out", chosen.kept),
-        ("in a cell, while it runs", (DIVERGED, PERIODIC) if chosen.jumps and chosen.scene.forced else (DIVERGED,)),
+        (
+            "in a cell, while it runs",
+            (DIVERGED, PERIODIC) if chosen.jumps and chosen.scene.drive.frequency is not None else (DIVERGED,),
+        ),
     )
     return "\n".join(
         "\n".join([title, *(f"  {sentence}" for sentence in sentences or ("nothing",))]) for title, sentences in parts

@@ -26,7 +26,7 @@ from synchain.models.scene import Scene
 from synchain.models.topology import Topology
 
 from .kernels import kernel, kernel_source
-from .plan import CANCEL, Plan, Planner, control_array, parameter_names, tolerances
+from .plan import CANCEL, Plan, Planner, control_array, longest_step, tolerances
 from .result import Buffers
 from .status import Status
 
@@ -161,7 +161,7 @@ class Workshop:
         self.planner = Planner(scene)
         limits = tolerances(scene, self.planner.extremes().numbers)
         direction = DIRECTIONS[scene.section.direction]
-        self.control = control_array(*limits, _max_step(scene), scene.max_steps, direction, chosen.jumps)
+        self.control = control_array(*limits, longest_step(scene), scene.max_steps, direction, chosen.jumps)
 
     @property
     def samples(self) -> int:
@@ -239,14 +239,6 @@ def versions() -> str:
     """The versions that a result depends on."""
     names = ("synchain", "numba", "numpy", "sympy")
     return ", ".join(f"{name} {importlib.metadata.version(name)}" for name in names)
-
-
-def _max_step(scene: Scene) -> float:
-    """Half a drive period at most, so that no step can miss a whole swing of the drive."""
-    names = parameter_names(scene, "omega") if scene.forced else ()
-    swept = (v for axis in scene.axes if axis.name in names for v in axis.values)
-    fastest = max(map(abs, (*swept, *(scene.parameters[name] for name in names))), default=0.0)
-    return math.pi / fastest if fastest > 0.0 else math.inf
 
 
 def _room(scene: Scene, row: int) -> int:

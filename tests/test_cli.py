@@ -191,7 +191,7 @@ def test_run_writes_a_result_and_a_figure(scene: str, tmp_path: Path, capsys: py
     assert (out / "short.png").read_bytes().startswith(b"\x89PNG")
     result = open_result(out / "short.nc")
     assert result.scene.rtol == 1e-6
-    assert result.scene.omega == 1.4
+    assert result.scene.parameters["omega"] == 1.4
     assert result.data.sigma.values.tolist() == [0.0, 0.25, 0.5]
     assert float(result.end[0, 0]) != float(result.end[1, 0])
 
@@ -311,7 +311,7 @@ def test_thresholds_as_json_and_as_a_table(monkeypatch: pytest.MonkeyPatch, caps
     assert asked[0]["sigma"] == (0.0, 0.1, 0.2, 0.3, 0.4)
     assert asked[0]["workers"] == 2
     assert asked[0]["scene"].topology == chain(3)
-    assert asked[0]["scene"].omega == 1.15
+    assert asked[0]["scene"].parameters["omega"] == 1.15
 
 
 def test_thresholds_of_a_scene_of_a_matrix_and_of_other_graphs(
@@ -330,7 +330,7 @@ def test_thresholds_of_a_scene_of_a_matrix_and_of_other_graphs(
         "--scene figure_6 --topology ring",
     ):
         assert main(["thresholds", *words.split(), "--json"]) == 0
-    graphs = [(a["scene"].topology.name, a["scene"].n, a["scene"].omega) for a in asked]
+    graphs = [(a["scene"].topology.name, a["scene"].n, a["scene"].parameters["omega"]) for a in asked]
     assert graphs == [
         ("chain", 3, 1.55),
         ("ring", 4, 1.2),

@@ -92,6 +92,12 @@ a, b = sp.symbols("a b", real=True)
         (sp.cos(b * TIME**2), None),
         (TIME * sp.cos(b * TIME), None),
         (sp.cos(b * TIME + x), b),
+        (sp.cos(2 * b * TIME) * sp.sin(3 * b * TIME), b),
+        (sp.cos(b * TIME / 2) + sp.cos(b * TIME / 3), b / 6),
+        (sp.cos(TIME) + sp.cos(sp.sqrt(2) * TIME), None),
+        (sp.cos(x * TIME), None),
+        (sp.cos(sp.Piecewise((0, TIME < 5), (1, True))), None),
+        (sp.cos(b * TIME) * sp.exp(-TIME), None),
         (-x, None),
     ],
 )

@@ -28,7 +28,7 @@ def simulation(monkeypatch: pytest.MonkeyPatch) -> Simulation:
 
 def test_exponents_are_drawn_with_their_stable_range_and_error(simulation: Simulation) -> None:
     panels, data = drawn("msf", Study(TINY))
-    assert [found.scene.omega for found in data] == [1.15, 1.4, 1.55]
+    assert [found.scene.parameters["omega"] for found in data] == [1.15, 1.4, 1.55]
     for panel, found, (low, high) in zip(panels, data, ((0.0, 0.466), (0.09, 0.6), (0.176, 0.594)), strict=True):
         band = next(patch for patch in panel.patches if patch.get_facecolor() == to_rgba(style.GREY))
         assert (band.get_x(), band.get_x() + band.get_width()) == pytest.approx((low, high), abs=1e-3)

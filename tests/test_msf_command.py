@@ -16,6 +16,7 @@ from figure_samples import rows
 
 import synchain.runtime
 from synchain.models import chain, complete
+from synchain.models.plugins import allow_code
 from synchain.models.scene import Scene
 from synchain.models.topology import Topology, read_matrix
 from synchain.runtime import orbits
@@ -120,7 +121,7 @@ def test_json_of_a_star_and_what_was_asked_for(asked: list[dict[str, Any]], caps
     assert {k: asked[0][k] for k in ("precision", "periods", "starts", "workers")} == {
         "precision": 0.01, "periods": 99.0, "starts": 2, "workers": 1
     }  # fmt: skip
-    assert asked[0]["scene"].omega == 1.4
+    assert asked[0]["scene"].parameters["omega"] == 1.4
 
 
 @pytest.mark.parametrize(
@@ -145,7 +146,7 @@ def test_oscillator_and_network_are_those_asked_for(
 ) -> None:
     assert main(["msf", *words.split(), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert asked[0]["scene"].omega == omega
+    assert asked[0]["scene"].angular_frequency == omega
     assert asked[0]["scene"].axes == ()
     assert (found["windows"] is None) == (network is None)
     assert (found["verdict"] is None) == (network is None)
@@ -153,21 +154,87 @@ def test_oscillator_and_network_are_those_asked_for(
         assert asked[0]["scene"].topology == network
 
 
+def own_drive(folder: Path, wave: str) -> Path:
+    """A scene file with a driven oscillator of its own, whose parameter omega is no frequency of the drive."""
+    code = folder / "own.py"
+    code.write_text(
+        "import sympy as sp\nfrom synchain.models.parameter import Parameter\n"
+        'SUMMARY = SOURCE = "a harmonic oscillator with a drive"\nFRICTION = False\n'
+        'PARAMETERS = {name: Parameter(1.0, "1", "a number") for name in ("omega", "Omega")}\n'
+        "def kinetic(v): return v**2 / 2\n"
+        f"def potential(x, t, omega, Omega): return omega**2 * x**2 / 2 - x * {wave}\n"
+        "def force(v): return -v\n"
+    )
+    allow_code(code)
+    file = folder / "own.toml"
+    file.write_text(f'oscillator = "{code}"\ntopology = {{name = "chain", n = 2}}\n')
+    return file
+
+
+def test_the_option_omega_sets_the_frequency_of_the_drive_whatever_its_name(
+    asked: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = own_drive(tmp_path, "sp.cos(Omega * t)")
+    assert main(["msf", str(file), "--omega", "1.4"]) == 0
+    assert asked[0]["scene"].parameters == {"omega": 1.0, "Omega": 1.4, "sigma": asked[0]["scene"].parameters["sigma"]}
+    assert "spring coupling, Omega = 1.4: exponents" in capsys.readouterr().out
+    file.write_text(file.read_text() + "[sweep]\nomega = [1.0, 2.0]\n")
+    assert main(["msf", str(file)]) == 0
+    file.write_text(file.read_text().replace("omega = [", "Omega = ["))
+    assert main(["msf", str(file)]) == 2
+    assert "sweeps Omega; expected one frequency" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("wave", "words", "headline"),
+    [
+        ("sp.cos(2 * Omega * t)", "2*Omega", ", 2*Omega = 2:"),
+        ("sp.cos(2 * t)", "the frequency 2;", ", drive frequency 2:"),
+    ],
+)
+def test_a_frequency_that_is_no_parameter_is_told_but_cannot_be_set(
+    wave: str,
+    words: str,
+    headline: str,
+    asked: list[dict[str, Any]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    file = own_drive(tmp_path, wave)
+    assert main(["msf", str(file), "--omega", "1.4"]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert "expected one that is a parameter" in error
+    assert main(["msf", str(file)]) == 0
+    assert headline in capsys.readouterr().out
+
+
 def test_where_the_grid_ends_no_mode_is_lost_and_no_is_not_said() -> None:
     scene = Scene(topology=chain(4))
     cut = LineReport(function(scene, end=0.4), True)
     assert cut.verdict[0] == GRID_ENDS
-    assert cut.windows == ()
+    assert cut.found.windows == ()
     assert "0.1000 ± 0.0020 … 0.4..." in cut.text()
     pair = LineReport(function(Scene(topology=chain(2)), end=0.4), True)
     assert pair.verdict[0] == "yes"
-    (window,) = pair.windows
+    (window,) = pair.found.windows
     assert window.low_mode is not None
     assert window.high_mode is None
     assert "0.2000..." in pair.text()
     assert LineReport(function(scene), True).verdict[0] == "yes"
     assert LineReport(function(scene, high=0.3), True).verdict[0] == "no"
-    assert LineReport(function(scene, low=-0.1), True).windows[0].low == 0.0
+    assert LineReport(function(scene, low=-0.1), True).found.windows[0].low == 0.0
+
+
+def test_windows_in_python_are_those_of_the_command() -> None:
+    for end, error in ((0.4, 1e-3), (1.2, math.inf)):
+        found = function(Scene(topology=chain(2)), end=end, error=error)
+        (window,) = found.windows
+        (told,) = LineReport(found, True).as_dict()["windows"]
+        assert window.low_mode is not None
+        assert told["low_mode"] == window.low_mode.eigenvalue.text
+        assert (window.high_mode is None) == (told["high_mode"] is None) == (end < HIGH)
+        assert (told["low"], told["high"]) == (window.low, window.high)
 
 
 def test_a_ratio_within_the_error_is_undecided() -> None:

@@ -92,7 +92,7 @@ def test_parameters_are_completed_and_text_is_a_number() -> None:
 
 def test_an_undriven_oscillator_counts_plain_time() -> None:
     scene = Scene(oscillator="harmonic", topology=chain(2))
-    assert (scene.friction, scene.time_unit, scene.omega, scene.period) == (None, "time", None, None)
+    assert (scene.friction, scene.time_unit, scene.angular_frequency, scene.period) == (None, "time", None, None)
     with pytest.raises(ValueError, match="'harmonic' is not driven"):
         Scene(oscillator="harmonic", time_unit="period")
 
@@ -341,6 +341,25 @@ def test_equal_starts_are_said() -> None:
     (sentence,) = two(initial={"x": 0.3}).warnings
     assert "start from the same state" in sentence
     assert two(initial={"x": 0.3}, axes={"x_1": [0.1, 0.2]}).warnings == ()
+
+
+def test_equal_starts_of_unequal_nodes_are_not_said_to_stay_equal() -> None:
+    """The synchronisation error of this ring becomes 0.113."""
+    given = {"topology": ring(3), "initial": {"x": 0.1, "v": 0.0}}
+    uneven = Scene(oscillator="rotor", coupling="torsion", parameters={"power": [0.1, -0.2, 0.1]}, **given)
+    (sentence,) = uneven.warnings
+    assert "stays above 0" in sentence
+    even = uneven.replace(parameters={"power": 0.1})
+    assert "stays 0" in even.warnings[-1]
+    swept = even.replace(axes={"power_1": [0.1, 0.2]})
+    assert not any("stays 0" in sentence for sentence in swept.warnings)
+    kinds = Scene(
+        topology=ring(3),
+        initial={"x": 0.1, "v": 0.0},
+        nodes=[{"oscillator": "harmonic", "at": [2]}],
+        parameters={"u": 0.0},
+    )
+    assert not any("stays 0" in sentence for sentence in kinds.warnings)
 
 
 # ---------------------------------------------------------------- replace

@@ -15,6 +15,8 @@ import numpy as np
 from synchain.models.scene import Scene
 from synchain.models.topology import topology
 
+from ..orbits import unit_of_time
+
 __all__ = ["CASES", "Case", "normal_modes", "read_case"]
 
 CASES = {
@@ -47,7 +49,7 @@ class Case:
     @property
     def period(self) -> float:
         """Period of the drive in non-dimensional time."""
-        return float(2.0 * np.pi / self.scene.parameters["omega"])
+        return unit_of_time(self.scene)
 
     @property
     def periods(self) -> int:
@@ -72,7 +74,7 @@ def read_case(name: str) -> Case:
         raise ValueError(f"unknown case {name!r}; known: {'; '.join(CASES)}")
     if not CASES[name]:
         scene = _scene(4, FRICTIONLESS, {"x": (0.30, 0.28, 0.26, 0.24), "v": 0.0})
-        times = _times(PERIODS, float(2.0 * np.pi / scene.parameters["omega"]))
+        times = _times(PERIODS, unit_of_time(scene))
         return Case(name, scene, times, normal_modes(scene, times))
     data = json.loads(files(__package__).joinpath("data", f"{CASES[name]}.json").read_text(encoding="utf-8"))
     parameters = {OLD_NAMES.get(key, key): value for key, value in data["parameters"].items()}

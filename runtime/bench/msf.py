@@ -29,7 +29,7 @@ from synchain.models.scene import Scene
 from synchain.models.topology import topology
 
 from ..exponent import Batches, exponents, single
-from ..orbits import Orbits
+from ..orbits import Orbits, unit_of_time
 from ..plan import control_array, plan, tolerances
 from ..propagate import exact
 from ..result import Buffers
@@ -211,7 +211,7 @@ def _own_row(case: Case, values: Sequence[float] | np.ndarray, quick: bool) -> R
     for scene in _starts(case, quick):
         begin = time.process_time()
         one = exponents(scene, values, precision=_bar(quick), periods=1e6, **options)  # type: ignore[arg-type]
-        unit = scene.period or 2.0 * math.pi
+        unit = unit_of_time(scene)
         found.append((time.process_time() - begin, one.time / unit, float(one.exponent[0]), float(one.stderr.max())))
     return _timed(case, "synchain", values, found)
 
@@ -232,7 +232,7 @@ def _peer_rows(case: Case, quick: bool) -> list[Row]:
 
 def _averaged(growths: jitcode.Growths, case: Case, scene: Scene, alpha: float, bar: float) -> tuple[Batches, float]:
     """Batches of growth up to the error bar, as `exponents` takes them, and the unit of time."""
-    unit = scene.period or 2.0 * math.pi
+    unit = unit_of_time(scene)
     start = np.array([numbers[0] for numbers in scene.initial.values()])
     batches = Batches(case.block * unit)
     for growth in growths(alpha, start, batches.length, SETTLED // case.block):

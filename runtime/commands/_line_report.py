@@ -11,9 +11,8 @@ import numpy as np
 
 from synchain.models.topology import Topology
 
-from ..intervals import Interval
 from ..msf import MSF
-from ..synchronisability import Verdict, Window, verdict, windows
+from ..synchronisability import Verdict, verdict
 from ..transversal import transversal
 from ._stability_words import (
     defective_rows,
@@ -59,33 +58,13 @@ class LineReport:
         return self.network and not complex_modes(self.found.scene.topology, 1.0)
 
     @property
-    def errors(self) -> tuple[Interval, ...] | None:
-        """Uncertainties of the ends; None where an average was too short to give them."""
-        found = self.found.uncertainties
-        return found if np.isfinite(found).all() else None
-
-    @property
-    def windows(self) -> tuple[Window, ...]:
-        """The windows of sigma; where the grid ends no mode is lost."""
-        found = windows(self.found.intervals, self.found.scene.topology, self.errors)
-        return tuple(self._trimmed(window) for window in found)
-
-    def _trimmed(self, window: Window) -> Window:
-        low, high = (float(self.found.fine.alpha[k]) for k in (0, -1))
-        modes = [
-            None if mode is None or math.isclose(sigma * mode.size, end, rel_tol=1e-12) else mode
-            for sigma, mode, end in ((window.low, window.low_mode, low), (window.high, window.high_mode, high))
-        ]
-        return Window(window.low, window.high, window.low_error, window.high_error, *modes)
-
-    @property
     def verdict(self) -> tuple[str, Verdict]:
         """Whether the network can synchronise, in words that mind the ends of the grid, and what that rests on."""
         graph, ranges = self.found.scene.topology, list(self.found.intervals)
-        given = verdict(ranges, graph, self.errors)
+        given = verdict(ranges, graph, self.found.errors)
         line = self.found.fine.alpha
         open_ranges = [(0.0 if a == line[0] else a, math.inf if b == line[-1] else b) for a, b in ranges]
-        further = verdict(open_ranges, graph, self.errors)
+        further = verdict(open_ranges, graph, self.found.errors)
         return (given.answer if further.answer == given.answer else GRID_ENDS), given
 
     def as_dict(self) -> dict[str, Any]:
@@ -93,7 +72,7 @@ class LineReport:
         seen: dict[str, Any] = {**self.found.as_dict(), "windows": None, "verdict": None}
         if self.judged:
             answer, given = self.verdict
-            seen["windows"] = [window_dict(window) for window in self.windows]
+            seen["windows"] = [window_dict(window) for window in self.found.windows]
             seen["verdict"] = {
                 "answer": answer,
                 "ratio": None if given.ratio is None else str(given.ratio),
@@ -109,7 +88,7 @@ class LineReport:
         found, line = self.found, self.found.fine.alpha
         ranges = [
             f"{measured(low, a, low == line[0])} … {measured(high, b, high == line[-1])}"
-            for (low, high), (a, b) in zip(found.intervals, self.errors or found.uncertainties, strict=True)
+            for (low, high), (a, b) in zip(found.intervals, found.errors or found.uncertainties, strict=True)
         ]
         rows = [
             ("class", f"{found.kind}, for alpha from {line[0]:g} to {line[-1]:g}"),
@@ -130,7 +109,7 @@ class LineReport:
             exact = f"{given.ratio} = " if given.ratio is not None and not given.ratio.is_Rational else ""
             allowed = "any" if given.allowed == math.inf else f"{given.allowed:.6g}" if given.allowed > 0 else "none"
             answer += f" (largest over smallest |gamma|: {exact}{given.ratio_value:.6g}; allowed: {allowed})"
-        rows = [("sigma", words) for words in map(window_text, self.windows)] or [("sigma", "none")]
+        rows = [("sigma", words) for words in map(window_text, self.found.windows)] or [("sigma", "none")]
         title = f"{graph.name}({graph.n}): every mode dies out for"
         return [title, *rows_of([*rows, ("possible", answer), *defective_rows(graph)])]
 

@@ -15,6 +15,7 @@ from synchain.models.topology import Topology
 
 from ..synchronisability import Window
 from ..transversal import Mode
+from ._drive import drive_words
 
 __all__ = [
     "defective_rows",
@@ -33,8 +34,7 @@ __all__ = [
 def headline(scene: Scene) -> str:
     """What oscillates, and what is computed."""
     coupling = f", {scene.coupling} coupling" if scene.coupling else ""
-    drive = f", omega = {scene.omega:g}" if scene.omega is not None else ""
-    return f"{scene.oscillator} oscillator{coupling}{drive}: exponents per unit of time"
+    return f"{scene.oscillator} oscillator{coupling}{drive_words(scene)}: exponents per unit of time"
 
 
 def how(scene: Scene, attractors: Sequence[str], time: float, stderr: np.ndarray) -> list[tuple[str, str]]:

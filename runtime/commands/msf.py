@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ._arguments import above_zero, add_allow_code, add_workers, folder, positive, spaced, whole
+from ._drive import at_frequency
 from ._outcome import FINE, Failed, WrongUse, print_json, sentence, warn, wrong_use
 
 if TYPE_CHECKING:
@@ -106,20 +107,11 @@ def _scene(arguments: Namespace) -> tuple[Scene, bool]:
 
     scene = None if arguments.scene is None else load_scene(arguments.scene)
     graph = _graph(arguments, scene)
-    if scene is None:
-        if arguments.omega is None:
-            raise WrongUse("expected a frequency of the drive, e.g. --omega 1.4, or a SCENE")
-        scene = Scene(topology=graph or topology("chain", 2))
-    elif graph is not None and graph != scene.topology:
-        scene = scene.replace(topology=graph, axes=(), zipped=False, continuation="none", record=None)
-    changes: dict[str, Any] = {"axes": (), "zipped": False, "continuation": "none", "record": None}
-    if arguments.omega is not None:
-        if "omega" not in scene.parameters:
-            raise WrongUse(f"--omega: the oscillators of {arguments.scene} are not driven; leave it out")
-        changes["omega"] = arguments.omega
-    elif any(axis.name == "omega" for axis in scene.axes):
-        raise WrongUse(f"{arguments.scene} sweeps omega; expected one frequency of the drive, e.g. --omega 1.4")
-    return scene.replace(**changes), graph is not None
+    given = Scene(topology=graph or topology("chain", 2)) if scene is None else scene
+    chosen = at_frequency(given, arguments.omega, arguments.scene)
+    if graph is not None and graph != given.topology:
+        given = given.replace(topology=graph, axes=(), zipped=False, continuation="none", record=None)
+    return given.replace(axes=(), zipped=False, continuation="none", record=None, **chosen), graph is not None
 
 
 def _graph(arguments: Namespace, scene: Scene | None) -> Topology | None:

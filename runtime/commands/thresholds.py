@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ._arguments import above_zero, add_allow_code, add_workers, grid, positive, whole
+from ._drive import at_frequency, drive_words
 from ._outcome import FINE, WrongUse, print_json, warn, wrong_use
 
 if TYPE_CHECKING:
@@ -105,17 +106,11 @@ def _scene(arguments: Namespace) -> Scene:
     graph = _graph(arguments, scene)
     if scene is not None:
         scene.equations.expect_alike("thresholds")
-    if scene is None:
-        scene = Scene(topology=graph)
-    elif graph != scene.topology:
-        scene = scene.replace(topology=graph, axes=(), zipped=False, continuation="none", record=None)
-    if arguments.omega is None:
-        if arguments.scene is None or any(axis.name == "omega" for axis in scene.axes):
-            raise WrongUse("expected a frequency of the drive, e.g. --omega 1.15")
-        return scene.replace(axes=(), zipped=False, continuation="none", record=None)
-    if "omega" not in scene.parameters:
-        raise WrongUse(f"--omega: the oscillators of {arguments.scene} are not driven; leave it out")
-    return scene.replace(axes=(), zipped=False, continuation="none", record=None, omega=arguments.omega)
+    given = Scene(topology=graph) if scene is None else scene
+    chosen = at_frequency(given, arguments.omega, arguments.scene)
+    if graph != given.topology:
+        given = given.replace(topology=graph, axes=(), zipped=False, continuation="none", record=None)
+    return given.replace(axes=(), zipped=False, continuation="none", record=None, **chosen)
 
 
 def _graph(arguments: Namespace, scene: Scene | None) -> Topology:
@@ -140,7 +135,6 @@ def report(found: Thresholds, criterion: Criterion) -> str:
     """The ranges as a table."""
     scene, end, reach = found.scene, float(found.direct.x[-1]), float(found.probe.x[-1])
     steepest = max(abs(value) for value in scene.topology.spectrum.values)
-    drive = f", omega = {scene.omega:g}" if scene.omega is not None else ""
     unit = "drive periods" if scene.time_unit == "period" else "units of time"
     rows = [
         ("sigma, simulated", _written(found.direct.intervals, end)),
@@ -151,7 +145,7 @@ def report(found: Thresholds, criterion: Criterion) -> str:
     wide = max(len(name) for name, _ in rows)
     return "\n".join(
         [
-            f"{scene.topology.name}({scene.n}){drive}: where all oscillators synchronise",
+            f"{scene.topology.name}({scene.n}){drive_words(scene)}: where all oscillators synchronise",
             *(f"  {name:<{wide}}  {ranges}" for name, ranges in rows),
             f"synchronous: mean error below {criterion.tolerance:g} over {criterion.window:g} {unit} after "
             f"{criterion.transient:g}, from at least half of {criterion.starts} starts",

@@ -69,7 +69,7 @@ def compute(name: str, study: Study) -> tuple[MSF, ...]:
 def table(data: tuple[MSF, ...]) -> Table:
     """Exponent and standard error, per unit of time, for each frequency and strength."""
     rows = [
-        (found.scene.omega, alpha, exponent, error)
+        (found.scene.parameters["omega"], alpha, exponent, error)
         for found in data
         for alpha, exponent, error in zip(found.alpha, found.exponent, found.stderr, strict=True)
     ]
@@ -79,7 +79,7 @@ def table(data: tuple[MSF, ...]) -> Table:
 def ranges(data: tuple[MSF, ...]) -> Table:
     """Ranges of alpha with a negative exponent, the uncertainties of their ends, and the kind of motion."""
     rows = [
-        (found.scene.omega, low, high, *errors, found.attractors[0])
+        (found.scene.parameters["omega"], low, high, *errors, found.attractors[0])
         for found in data
         for (low, high), errors in zip(found.intervals, found.uncertainties, strict=True)
     ]
@@ -95,12 +95,12 @@ def draw(axes: list[Any], data: tuple[MSF, ...]) -> list[Any]:
     """One curve in each panel, with the published range of two oscillators as a thin bar."""
     for panel, found in zip(axes, data, strict=True):
         draw_exponent(panel, found)
-        row = published(2, float(found.scene.omega or 0.0))
+        row = published(2, found.scene.parameters["omega"])
         low, high = panel.get_ylim()
         panel.set_ylim(low, high + 0.16 * (high - low))
         bracket(panel, _inside(scale(row.intervals, 2.0), panel.get_xlim()) if row else (), 0.92, ORANGE, "published")
         motion = found.attractors[0].replace("drive periods", "periods")
-        panel.set_title(rf"$\omega={found.scene.omega:.2f}$, {motion}", fontsize=7.5, pad=3, loc="left")
+        panel.set_title(rf"$\omega={found.scene.parameters['omega']:.2f}$, {motion}", fontsize=7.5, pad=3, loc="left")
         stable = ", ".join(f"{a:.3f} … {b:.3f}" for a, b in found.intervals[:2]) or "nowhere"
         panel.set_title(rf"$\Lambda<0$: {stable}", fontsize=7.0, pad=3, loc="right")
         panel.set_ylabel("")
