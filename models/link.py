@@ -11,12 +11,13 @@ import sympy as sp
 from . import coupling_matrix
 from .contact import SLIP
 from .coupling_name import coordinates_of, split
+from .coupling_name import named as named_coupling
 from .equations import TIME, Edge, Node
 from .lagrangian import balance, mass_matrix
 from .mass_solve import solve_masses
 from .nondimensional import nondimensional
 from .orientation import link_energy
-from .plugins import call, load
+from .plugins import call, load, named
 
 __all__ = ["check_coupling", "edge", "link_energies"]
 
@@ -43,7 +44,6 @@ def check_coupling(coupling: str, single: Node, other: Node | None = None) -> No
             coordinates_of(coupling, _names(node)[: max(half, 1)])
 
 
-@lru_cache(maxsize=64)
 def edge(
     coupling: str, single: Node, oscillator: str | None = None, other: Node | None = None, partner: str | None = None
 ) -> Edge:
@@ -63,9 +63,16 @@ def edge(
     Set-valued friction takes up the force of a link while its target sticks.
     Raises ValueError as `check_coupling` does, and where nothing is joined.
     """
+    own, others = (name if name is None else named("oscillator", name) for name in (oscillator, partner))
+    return _edge(named_coupling(coupling), single, own, other, others)
+
+
+@lru_cache(maxsize=64)
+def _edge(coupling: str, single: Node, oscillator: str | None, other: Node | None, partner: str | None) -> Edge:
+    """The link of `edge`."""
     if single.contact is not None:
         plain = Node(single.state[:2], (single.state[1], sp.S.Zero), single.parameters)
-        return _on_sliding(edge(coupling, plain, oscillator))
+        return _on_sliding(_edge(coupling, plain, oscillator, None, None))
     check_coupling(coupling, single, other)
     here = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in single.state)
     there = tuple(sp.Symbol(f"{s.name}_j", real=True) for s in (other or single).state)
@@ -133,7 +140,7 @@ class _Ends:
         self, coupling: str, model: ModuleType, given: dict[str, sp.Symbol]
     ) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
         """The energies of a coupling that joins two named kinds of oscillator, in the names of their states."""
-        if set(self.oscillators) != set(model.BETWEEN):
+        if set(map(str, self.oscillators)) != set(model.BETWEEN):
             wanted = " and ".join(model.BETWEEN)
             raise ValueError(f"coupling {coupling!r} joins {wanted}; found a link between {self._described()}")
         names = dict(zip(_names(self.nodes[0]), self.here, strict=True))
