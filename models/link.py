@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import partial
 from types import ModuleType
 
 import sympy as sp
@@ -17,7 +17,7 @@ from .lagrangian import balance, mass_matrix
 from .mass_solve import solve_masses
 from .nondimensional import nondimensional
 from .orientation import link_energy
-from .plugins import call, load, named
+from .plugins import call, load, named, remembered
 
 __all__ = ["check_coupling", "edge", "link_energies"]
 
@@ -44,6 +44,7 @@ def check_coupling(coupling: str, single: Node, other: Node | None = None) -> No
             coordinates_of(coupling, _names(node)[: max(half, 1)])
 
 
+@remembered(coupling=named_coupling, oscillator=partial(named, "oscillator"), partner=partial(named, "oscillator"))
 def edge(
     coupling: str, single: Node, oscillator: str | None = None, other: Node | None = None, partner: str | None = None
 ) -> Edge:
@@ -63,16 +64,9 @@ def edge(
     Set-valued friction takes up the force of a link while its target sticks.
     Raises ValueError as `check_coupling` does, and where nothing is joined.
     """
-    own, others = (name if name is None else named("oscillator", name) for name in (oscillator, partner))
-    return _edge(named_coupling(coupling), single, own, other, others)
-
-
-@lru_cache(maxsize=64)
-def _edge(coupling: str, single: Node, oscillator: str | None, other: Node | None, partner: str | None) -> Edge:
-    """The link of `edge`."""
     if single.contact is not None:
         plain = Node(single.state[:2], (single.state[1], sp.S.Zero), single.parameters)
-        return _on_sliding(_edge(coupling, plain, oscillator, None, None))
+        return _on_sliding(edge(coupling, plain, oscillator))
     check_coupling(coupling, single, other)
     here = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in single.state)
     there = tuple(sp.Symbol(f"{s.name}_j", real=True) for s in (other or single).state)

@@ -18,13 +18,16 @@ import pkgutil
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import lru_cache, wraps
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
-__all__ = ["OwnFile", "allow_code", "allowed_code", "blamed", "call", "load", "located", "named", "names"]
+__all__ = ["OwnFile", "allow_code", "allowed_code", "blamed", "call", "load", "located", "named", "names", "remembered"]
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 OTHERWISE = {"coupling": ", or components such as 'x->x'"}
 """What a kind can be besides the name of a file, for the message that refuses a name."""
@@ -126,6 +129,26 @@ def load(kind: str, name: str) -> ModuleType:
     close = difflib.get_close_matches(str(name), known, n=1)
     hint = f" (did you mean {close[0]!r}?)" if close else ""
     raise ValueError(f"unknown {kind} {name!r}; known: {', '.join(known)}{OTHERWISE.get(kind, '')}{hint}")
+
+
+def remembered(**parts: Callable[[str], str]) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Let a function keep its answers; `parts` says how its arguments that name plug-ins are `named`, so by their text."""
+
+    def decorate(function: Callable[P, T]) -> Callable[P, T]:
+        signature, answers = inspect.signature(function), lru_cache(maxsize=64)(function)
+
+        @wraps(function)
+        def answer(*positional: P.args, **keywords: P.kwargs) -> T:
+            given = signature.bind(*positional, **keywords)
+            given.apply_defaults()
+            for argument, naming in parts.items():
+                if given.arguments[argument] is not None:
+                    given.arguments[argument] = naming(given.arguments[argument])
+            return answers(*given.args)
+
+        return answer
+
+    return decorate
 
 
 def call(function: Callable[..., Any], symbols: Mapping[str, Any]) -> Any:
