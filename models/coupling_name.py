@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 
+from . import plugins
+from .coupling_matrix import is_matrix
 from .scene_checks import shown, suggestion
 
-__all__ = ["canonical", "coordinates_of", "split"]
+__all__ = ["canonical", "coordinates_of", "named", "split"]
 
 _CHOSEN = re.compile(r"(?P<name>\S.*?)\s+on\s+(?P<coordinates>[^\W\d]\w*(?:\s*,\s*[^\W\d]\w*)*)\s*")
 
@@ -16,7 +18,20 @@ def split(coupling: str) -> tuple[str, tuple[str, ...] | None]:
     match = _CHOSEN.fullmatch(coupling)
     if match is None:
         return coupling, None
-    return match["name"], tuple(part.strip() for part in match["coordinates"].split(","))
+    return _spelt(coupling, match["name"]), tuple(part.strip() for part in match["coordinates"].split(","))
+
+
+def named(coupling: str) -> str:
+    """Return the coupling as scenes keep it, see `plugins.named`; ValueError where its file cannot be loaded."""
+    if is_matrix(coupling):
+        return coupling
+    own = plugins.named("coupling", split(coupling)[0])
+    return _spelt(own, coupling)
+
+
+def _spelt(coupling: str, name: str) -> str:
+    """A part of the text of a coupling, or more of it: of the same file where it is one."""
+    return coupling.spelt(name) if isinstance(coupling, plugins.OwnFile) else name
 
 
 def coordinates_of(coupling: str, known: tuple[str, ...]) -> tuple[int, ...]:
@@ -45,4 +60,4 @@ def canonical(coupling: str, known: tuple[str, ...]) -> str:
     """
     chosen = coordinates_of(coupling, known)
     name = split(coupling)[0]
-    return name if len(chosen) == len(known) else f"{name} on {', '.join(known[k] for k in chosen)}"
+    return name if len(chosen) == len(known) else _spelt(name, f"{name} on {', '.join(known[k] for k in chosen)}")

@@ -12,6 +12,7 @@ from fractions import Fraction
 from types import ModuleType
 from typing import Any, TypeAlias
 
+from .plugins import located
 from .rationals import rational
 
 __all__ = ["Option", "Options", "as_options", "defaults", "probability", "settled", "whole", "whole_numbers"]
@@ -40,6 +41,10 @@ def settled(name: str, module: ModuleType, n: int, given: Mapping[str, Any]) -> 
         found = module.settle(n, **{**known, **given})
     except (ValueError, TypeError) as error:
         raise type(error)(f"topology {name}: {error}") from None
+    except Exception as error:
+        raise located(error, module.settle) from error
+    if not isinstance(found, Mapping):
+        raise ValueError(f"topology {name}: settle returns {found!r}; expected a dict of the options; correct its file")
     return as_options({key: value for key, value in found.items() if value is not None})
 
 

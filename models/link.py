@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import partial
 from types import ModuleType
 
 import sympy as sp
@@ -11,12 +11,13 @@ import sympy as sp
 from . import coupling_matrix
 from .contact import SLIP
 from .coupling_name import coordinates_of, split
+from .coupling_name import named as named_coupling
 from .equations import TIME, Edge, Node
 from .lagrangian import balance, mass_matrix
 from .mass_solve import solve_masses
 from .nondimensional import nondimensional
 from .orientation import link_energy
-from .plugins import call, load
+from .plugins import call, load, named, remembered
 
 __all__ = ["check_coupling", "edge", "link_energies"]
 
@@ -43,7 +44,7 @@ def check_coupling(coupling: str, single: Node, other: Node | None = None) -> No
             coordinates_of(coupling, _names(node)[: max(half, 1)])
 
 
-@lru_cache(maxsize=64)
+@remembered(coupling=named_coupling, oscillator=partial(named, "oscillator"), partner=partial(named, "oscillator"))
 def edge(
     coupling: str, single: Node, oscillator: str | None = None, other: Node | None = None, partner: str | None = None
 ) -> Edge:
@@ -133,7 +134,7 @@ class _Ends:
         self, coupling: str, model: ModuleType, given: dict[str, sp.Symbol]
     ) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
         """The energies of a coupling that joins two named kinds of oscillator, in the names of their states."""
-        if set(self.oscillators) != set(model.BETWEEN):
+        if set(map(str, self.oscillators)) != set(model.BETWEEN):
             wanted = " and ".join(model.BETWEEN)
             raise ValueError(f"coupling {coupling!r} joins {wanted}; found a link between {self._described()}")
         names = dict(zip(_names(self.nodes[0]), self.here, strict=True))

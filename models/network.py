@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from functools import lru_cache
+from functools import partial
 from types import ModuleType
 
 import sympy as sp
@@ -24,7 +24,7 @@ from .link import check_coupling, edge
 from .nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
 from .orientation import drawn, is_oriented
 from .parameter import Parameter
-from .plugins import call, load, names
+from .plugins import call, load, named, names, remembered
 from .topology import Topology
 
 __all__ = ["check_coupling", "connectivity", "edge", "mixed_network", "network", "node", "parameters"]
@@ -50,7 +50,7 @@ def parameters(
     return {name: replace(p, scale=str(scale(model, p.unit))) for name, p in table.items()}
 
 
-@lru_cache(maxsize=64)
+@remembered(oscillator=partial(named, "oscillator"), friction=partial(named, "friction"))
 def node(oscillator: str, friction: str | None = None, contact: str = "atan") -> Node:
     """Derive the equations of one oscillator: for a Lagrangian x' = v and v' from the Euler-Lagrange equations.
 

@@ -19,7 +19,16 @@ from .lagrangian import Mechanics
 from .plugins import call
 from .units import dimension
 
-__all__ = ["FRICTION", "friction_coefficient", "mechanics", "nondimensional", "physical", "scale", "static_coefficient"]
+__all__ = [
+    "FRICTION",
+    "friction_coefficient",
+    "mechanics",
+    "nondimensional",
+    "physical",
+    "physical_symbols",
+    "scale",
+    "static_coefficient",
+]
 
 FRICTION = sp.Function("f", real=True)
 """The friction coefficient as an unknown function of the sliding velocity; a law takes its place at the end."""
@@ -53,11 +62,16 @@ def scale(model: ModuleType, unit: str) -> sp.Expr:
 
 def physical(model: ModuleType) -> Mechanics:
     """Return the Lagrangian system of an oscillator in physical symbols (eq. 2), with `FRICTION` for its friction law."""
+    return mechanics(model, physical_symbols(model))
+
+
+def physical_symbols(model: ModuleType) -> dict[str, Any]:
+    """Return what the functions of an oscillator may ask for by name, in physical symbols."""
     names = {name: sp.Symbol(name, positive=True) for name in getattr(model, "UNITS", {})}
     terms = getattr(model, "PHYSICAL", {})
     for name in model.PARAMETERS:
         names[terms.get(name, name)] = sp.Symbol(terms.get(name, name), real=True)
-    return mechanics(model, {**names, **_state(model), "t": TIME, "friction": FRICTION})
+    return {**names, **_state(model), "t": TIME, "friction": FRICTION}
 
 
 def nondimensional(model: ModuleType) -> Mechanics:

@@ -4,31 +4,73 @@ Besides the files of this package there are entry points of installed packages (
 ``synchain.frictions``, ``synchain.couplings``, ``synchain.topologies``), and files anywhere, named by a path that ends in
 ``.py``.  Such a file is run only after `allow_code` has been called for it, so that a scene, which is data, never runs code
 by itself.
+
+A file outside the package is known by its place and its text (`OwnFile`), so that an edited file is another model.  What
+such a file imports is not looked at: write a model in one file.
 """
 
 from __future__ import annotations
 
 import difflib
+import hashlib
 import inspect
 import pkgutil
 import traceback
-from collections.abc import Callable, Mapping
-from functools import lru_cache
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import lru_cache, wraps
 from importlib import import_module
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
-__all__ = ["allow_code", "allowed_code", "call", "load", "located", "names"]
+__all__ = ["OwnFile", "allow_code", "allowed_code", "blamed", "call", "load", "located", "named", "names", "remembered"]
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 OTHERWISE = {"coupling": ", or components such as 'x->x'"}
 """What a kind can be besides the name of a file, for the message that refuses a name."""
 
-NEEDED = {"oscillator": ("PARAMETERS", "FRICTION"), "friction": ("PARAMETERS", "force"), "coupling": ("PARAMETERS",),
-          "topology": ("SUMMARY", "MINIMUM", "edges")}  # fmt: skip
-ONE_OF = {"oscillator": ("field", "kinetic"), "coupling": ("potential", "dissipation")}
-"""What a file from outside must hold; of ONE_OF at least one."""
+
+class OwnFile(str):
+    """The name of a plug-in file outside the package, as it was written, with the file and the text that it stands for.
+
+    Two of them are equal where name, place and text are equal; none is equal to a plain text.  So whatever is kept for a
+    name is kept for one text of one file.
+    """
+
+    __slots__ = ("digest", "place")
+    place: str
+    digest: str
+
+    def __new__(cls, name: str, place: str, digest: str) -> OwnFile:
+        made = super().__new__(cls, name)
+        made.place, made.digest = place, digest
+        return made
+
+    def spelt(self, name: str) -> OwnFile:
+        """The same file and text with another name: "law.py" of "law.py on x"."""
+        return OwnFile(name, self.place, self.digest)
+
+    def _key(self) -> tuple[str, str, str]:
+        return str(self), self.place, self.digest
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, OwnFile) and self._key() == other._key()
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def __reduce__(self) -> tuple[type[OwnFile], tuple[str, str, str]]:
+        return OwnFile, self._key()
+
+
+_modules: dict[tuple[str, str, str], ModuleType] = {}
+"""Kind, place and digest of the text -> what came of it; scenes keep the model that they were made with."""
 
 _allowed: set[Path] = set()
 
@@ -55,15 +97,31 @@ def allowed_code() -> tuple[str, ...]:
     return tuple(sorted(map(str, _allowed)))
 
 
+def named(kind: str, name: str) -> str:
+    """Return the name of a plug-in as it is; that of a file outside the package as an `OwnFile` of its present text.
+
+    What is an `OwnFile` already stays what it is, whatever has become of its file.
+    """
+    if isinstance(name, OwnFile) or not (isinstance(name, str) and name.endswith(".py")):
+        return name
+    place = Path(name).resolve()
+    text = _text(kind, name, place)
+    own = OwnFile(name, str(place), hashlib.sha256(text).hexdigest())
+    _module(kind, own, text)
+    return own
+
+
 def load(kind: str, name: str) -> ModuleType:
     """Return the plug-in module `name`; raises ValueError with the known names where there is none.
 
-    A path that ends in ".py" is loaded where `allow_code` has allowed it; an error in that file names its line.
+    A path that ends in ".py" is loaded where `allow_code` has allowed it, as its text is now; an error in that file names
+    its line.  An `OwnFile` gives the text that it was made of: ValueError where that is neither known nor in the file.
     """
     if name in _own(kind):
         return import_module(f".{_home(kind)}.{name}", __package__)
-    if isinstance(name, str) and name.endswith(".py"):
-        return _file(kind, name)
+    own = named(kind, name)
+    if isinstance(own, OwnFile):
+        return _module(kind, own)
     entries = _entry_points(kind)
     if name in entries:
         return _entry(kind, name)
@@ -71,6 +129,26 @@ def load(kind: str, name: str) -> ModuleType:
     close = difflib.get_close_matches(str(name), known, n=1)
     hint = f" (did you mean {close[0]!r}?)" if close else ""
     raise ValueError(f"unknown {kind} {name!r}; known: {', '.join(known)}{OTHERWISE.get(kind, '')}{hint}")
+
+
+def remembered(**parts: Callable[[str], str]) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Let a function keep its answers; `parts` says how its arguments that name plug-ins are `named`, so by their text."""
+
+    def decorate(function: Callable[P, T]) -> Callable[P, T]:
+        signature, answers = inspect.signature(function), lru_cache(maxsize=64)(function)
+
+        @wraps(function)
+        def answer(*positional: P.args, **keywords: P.kwargs) -> T:
+            given = signature.bind(*positional, **keywords)
+            given.apply_defaults()
+            for argument, naming in parts.items():
+                if given.arguments[argument] is not None:
+                    given.arguments[argument] = naming(given.arguments[argument])
+            return answers(*given.args)
+
+        return answer
+
+    return decorate
 
 
 def call(function: Callable[..., Any], symbols: Mapping[str, Any]) -> Any:
@@ -84,9 +162,15 @@ def call(function: Callable[..., Any], symbols: Mapping[str, Any]) -> Any:
         if name not in symbols:
             where = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
             raise ValueError(f"{where} asks for {name!r}; known: {', '.join(symbols)}; declare it as a parameter")
-    given = {name: symbols[name] for name in wanted}
+    with blamed(function):
+        return function(**{name: symbols[name] for name in wanted})
+
+
+@contextmanager
+def blamed(function: Callable[..., Any]) -> Iterator[None]:
+    """Within it, an error of a function from outside the package becomes a ValueError with its file and line."""
     try:
-        return function(**given)
+        yield
     except Exception as error:
         told = located(error, function)
         if told is error:
@@ -121,46 +205,70 @@ def _entry_points(kind: str) -> Mapping[str, Any]:
 
 def _entry(kind: str, name: str) -> ModuleType:
     entry = _entry_points(kind)[name]
+    where = f"{kind} {name!r} of the entry point {entry.value!r}"
     try:
         module = entry.load()
     except Exception as error:
-        raise _located(error, "", f"{kind} {name!r} of the entry point {entry.value!r}") from error
-    return _complete(kind, module, f"{kind} {name!r} of the entry point {entry.value!r}")
+        raise _located(error, "", where) from error
+    if not isinstance(module, ModuleType):
+        raise ValueError(f"{where}: found no module; expected a {kind} file; see: synchain new {kind} NAME")
+    _check_installed(kind, module, where)
+    return module
 
 
-def _file(kind: str, name: str) -> ModuleType:
-    place = Path(name).resolve()
+@lru_cache(maxsize=64)
+def _check_installed(kind: str, module: ModuleType, where: str) -> None:
+    """Check a module of an installed package, once."""
+    try:
+        text = inspect.getsource(module).encode()
+    except (OSError, TypeError):  # it has no source, and so no names that could be looked at
+        text = b""
+    _check(kind, module, where, text)
+
+
+def _text(kind: str, name: str, place: Path) -> bytes:
+    """What stands in a file that may be run; ValueError where it may not, or cannot be read."""
+    if not place.is_file():
+        raise ValueError(f"{kind} {name!r}: no such file: {place}; expected a .py file; check the path")
     if place not in _allowed:
         raise ValueError(
             f"{kind} {name!r} is a file of code, which is not run unasked; read it, then allow it: "
             f"synchain.models.plugins.allow_code({name!r}), or --allow-code where a command has it"
         )
-    return _run(kind, place)
-
-
-@lru_cache(maxsize=64)
-def _run(kind: str, place: Path) -> ModuleType:
-    spec = spec_from_file_location(f"synchain_{kind}_{place.stem}", place)
-    if spec is None or spec.loader is None:
-        raise ValueError(f"{kind} {str(place)!r} cannot be loaded as Python; expected a .py file")
-    module = module_from_spec(spec)
     try:
-        spec.loader.exec_module(module)
+        return place.read_bytes()
+    except OSError as error:
+        raise ValueError(f"{kind} {name!r}: cannot be read ({error.strerror}); check the rights of {place}") from None
+
+
+def _module(kind: str, own: OwnFile, text: bytes | None = None) -> ModuleType:
+    """What the text of a file of code defines, run once for each text."""
+    key = (kind, own.place, own.digest)
+    if key in _modules:
+        return _modules[key]
+    if text is None:
+        text = _text(kind, own, Path(own.place))
+        if hashlib.sha256(text).hexdigest() != own.digest:
+            raise ValueError(
+                f"{kind} {str(own)!r}: found another text in {own.place} than when its scene was made; "
+                "expected the same text; make the scene anew, or restore the file"
+            )
+    module = ModuleType(f"synchain_{kind}_{Path(own.place).stem}")
+    module.__file__ = own.place
+    try:
+        exec(compile(text, own.place, "exec", dont_inherit=True), module.__dict__)
     except Exception as error:
-        raise _located(error, str(place)) from error
-    return _complete(kind, module, str(place))
-
-
-def _complete(kind: str, module: Any, where: str) -> ModuleType:
-    """The module, where it holds what its kind must hold."""
-    missing = [name for name in NEEDED[kind] if not hasattr(module, name)]
-    choice = ONE_OF.get(kind, ())
-    if choice and not any(hasattr(module, name) for name in choice):
-        missing.append(" or ".join(choice))
-    if missing or not isinstance(module, ModuleType):
-        found = "no module" if not isinstance(module, ModuleType) else f"no {', no '.join(missing)}"
-        raise ValueError(f"{where}: found {found}; expected a {kind} file; see: synchain new {kind} NAME")
+        raise _located(error, own.place) from error
+    _check(kind, module, own.place, text)
+    _modules[key] = module
     return module
+
+
+def _check(kind: str, module: ModuleType, where: str, text: bytes) -> None:
+    """Raise ValueError where a module from outside is not what its kind must be."""
+    from .definition import check
+
+    check(kind, module, where, text)
 
 
 def _located(error: Exception, file: str, what: str = "") -> ValueError:

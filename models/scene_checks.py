@@ -11,8 +11,21 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Generic, TypeVar
 
 from .expressions import constant
+from .plugins import OwnFile
 
-__all__ = ["Frozen", "choice", "integer", "known_keys", "number", "shown", "suggestion", "table", "text", "typed"]
+__all__ = [
+    "Frozen",
+    "choice",
+    "integer",
+    "known_keys",
+    "number",
+    "part",
+    "shown",
+    "suggestion",
+    "table",
+    "text",
+    "typed",
+]
 
 T = TypeVar("T")
 
@@ -91,6 +104,12 @@ def text(what: str, value: object, limit: int = 200) -> str:
     if len(value) > limit:
         raise ValueError(f"{what}: found {len(value)} characters; expected at most {limit}; shorten it")
     return str(value)
+
+
+def part(what: str, value: object) -> str:
+    """Return the name of a part of the model where it is text; it may be a long path to a file of code."""
+    words = text(what, value, 1000 if isinstance(value, str) and ".py" in value else 200)
+    return value if isinstance(value, OwnFile) else words
 
 
 def choice(what: str, value: object, known: tuple[str, ...]) -> str:

@@ -7,9 +7,10 @@ from typing import Any
 
 from .coupling_matrix import canonical, is_matrix
 from .coupling_name import canonical as chosen_coordinates
+from .coupling_name import named as named_coupling
 from .coupling_name import split
-from .plugins import load
-from .scene_checks import Frozen, choice, integer, number, shown, text
+from .plugins import load, named
+from .scene_checks import Frozen, choice, integer, number, part, shown, text
 from .scene_friction import check_friction
 from .scene_model import bare, check_links, check_state, components, coordinate_names
 from .scene_nodes import by_kind, default_friction, groups
@@ -58,7 +59,7 @@ def _physics(made: Mapping[str, Any]) -> None:
 
 
 def _model(made: dict[str, Any]) -> None:
-    made["oscillator"] = text("oscillator", made["oscillator"])
+    made["oscillator"] = named("oscillator", part("oscillator", made["oscillator"]))
     made["contact"] = text("contact", made["contact"])
     graph = made["topology"] = topology("chain", 1) if made["topology"] is None else made["topology"]
     if not isinstance(graph, Topology):
@@ -66,7 +67,8 @@ def _model(made: dict[str, Any]) -> None:
     made["friction"] = default_friction(made["oscillator"], made["friction"])
     made["nodes"] = groups(made["nodes"], graph.n)
     if made["coupling"] is not None:
-        made["coupling"] = None if text("coupling", made["coupling"]) == "none" else str(made["coupling"])
+        coupling = part("coupling", made["coupling"])
+        made["coupling"] = None if coupling == "none" else named_coupling(coupling)
     if made["coupling"] is not None and not is_matrix(made["coupling"]):
         load("coupling", split(made["coupling"])[0])  # an unknown name is refused even where nothing uses it
     if made["coupling"] is not None and is_matrix(made["coupling"]):

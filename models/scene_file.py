@@ -10,9 +10,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from .coupling_name import split
 from .family_options import defaults
 from .scene import Scene
-from .scene_checks import integer, known_keys, shown, suggestion, table, text
+from .scene_checks import integer, known_keys, part, shown, suggestion, table, text
 from .scene_parameters import collected
 from .topology import Topology, family, from_matrix, names, read_matrix, topology
 
@@ -94,7 +95,7 @@ def _scene(name: str, content: bytes, folder: Path | None) -> Scene:
 
 
 def from_dict(values: Mapping[str, Any], folder: Path | None = None) -> Scene:
-    """Return the scene of names and values as in a scene file; a matrix file is looked up in `folder`."""
+    """Return the scene of names and values as in a scene file; paths in it start in `folder`."""
     found = table("scene", values)
     keys = ["sweep" if field.name == "axes" else field.name for field in fields(Scene)]
     known_keys("scene", found, keys)
@@ -110,11 +111,30 @@ def from_dict(values: Mapping[str, Any], folder: Path | None = None) -> Scene:
     for name in ("parameters", "initial"):
         if name in given:
             table(name, given[name])
+    for name in ("oscillator", "friction", "coupling"):
+        if name in given:
+            given[name] = _placed(given[name], folder)
+    if isinstance(given.get("nodes"), list):
+        given["nodes"] = [_placed_group(group, folder) for group in given["nodes"]]
     return Scene(**given)
 
 
+def _placed(name: object, folder: Path | None) -> object:
+    """The name of a part; a path to a file of code starts in the folder of the scene file."""
+    if not isinstance(name, str) or folder is None or not split(name)[0].endswith(".py"):
+        return name
+    return str(folder / name)
+
+
+def _placed_group(group: object, folder: Path | None) -> object:
+    """A group of nodes, its paths to files of code too."""
+    if not isinstance(group, Mapping):
+        return group
+    return {key: _placed(value, folder) if key in ("oscillator", "friction") else value for key, value in group.items()}
+
+
 def _topology(given: Mapping[object, Any], folder: Path | None) -> Topology:
-    name = given.get("name")
+    name = _placed(given.get("name"), folder)
     known = isinstance(name, str) and "matrix" not in given and (name in names() or name.endswith(".py"))
     options = defaults(family(str(name))) if known else {}
     known_keys("topology", given, ("name", "n", *options, "matrix", "file"))
@@ -136,14 +156,15 @@ def _topology(given: Mapping[object, Any], folder: Path | None) -> Topology:
             found = shown(dict(given))
             raise ValueError(f"topology: {key!r} is missing in {found}; expected name and n, or matrix, or file")
     chosen = {key: given[key] for key in options if key in given}
-    return topology(text("topology name", name), integer("topology n", given["n"], 0, NODES), **chosen)
+    return topology(part("topology name", name), integer("topology n", given["n"], 0, NODES), **chosen)
 
 
 def as_dict(scene: Scene) -> dict[str, Any]:
     """Return the whole scene in JSON types, in the names of a scene file."""
     made = {field.name: getattr(scene, field.name) for field in fields(scene)}
-    made["friction"] = "none" if scene.friction is None else scene.friction
-    made["coupling"] = "none" if scene.coupling is None else scene.coupling
+    made["oscillator"] = str(scene.oscillator)
+    made["friction"] = "none" if scene.friction is None else str(scene.friction)
+    made["coupling"] = "none" if scene.coupling is None else str(scene.coupling)
     made["topology"] = _graph(scene.topology)
     made["nodes"] = [group.as_dict() for group in scene.nodes]
     made["parameters"] = collected(scene.parameters, scene.varied)
@@ -161,5 +182,5 @@ def _graph(graph: Topology) -> dict[str, Any]:
         same = False
     if same:
         options = {key: list(value) if isinstance(value, tuple) else value for key, value in graph.options}
-        return {"name": graph.name, "n": graph.n, **options}
-    return {"name": graph.name, "matrix": [[str(entry) for entry in row] for row in graph.rows]}
+        return {"name": str(graph.name), "n": graph.n, **options}
+    return {"name": str(graph.name), "matrix": [[str(entry) for entry in row] for row in graph.rows]}

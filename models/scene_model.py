@@ -37,7 +37,6 @@ def known_parameters(oscillator: str, friction: str | None, contact: str, coupli
     return Frozen(parameters(oscillator, friction, contact, coupling))
 
 
-@lru_cache(maxsize=64)
 def node(oscillator: str, friction: str | None, contact: str) -> Node:
     """Return the equations of one oscillator."""
     from . import network

@@ -8,8 +8,8 @@ from functools import lru_cache
 from itertools import islice
 from typing import Any
 
-from .plugins import load
-from .scene_checks import integer, known_keys, shown, table, text
+from .plugins import load, named
+from .scene_checks import integer, known_keys, part, shown, table
 
 __all__ = ["Group", "by_kind", "default_friction", "groups"]
 
@@ -27,17 +27,18 @@ class Group:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the group in the names of a scene file."""
-        return {"oscillator": self.oscillator, "friction": self.friction or "none", "at": list(self.at)}
+        return {"oscillator": str(self.oscillator), "friction": str(self.friction or "none"), "at": list(self.at)}
 
 
 def default_friction(oscillator: str, friction: object) -> str | None:
     """Return the name of a friction law: of "default" the one that an oscillator starts with, of "none" None."""
     if friction == "default":
         return "exponential" if load("oscillator", oscillator).FRICTION else None
-    if friction is None or text("friction", friction) == "none":
+    if friction is None or part("friction", friction) == "none":
         return None
-    load("friction", str(friction))  # an unknown name is refused even where nothing uses it
-    return str(friction)
+    law = named("friction", part("friction", friction))
+    load("friction", law)  # an unknown name is refused even where nothing uses it
+    return law
 
 
 def groups(given: object, n: int) -> tuple[Group, ...]:
@@ -66,7 +67,7 @@ def _group(what: str, given: object, n: int) -> Group:
     for key in ("oscillator", "at"):
         if key not in entry:
             raise ValueError(f"{what}: {key!r} is missing; expected an oscillator and the numbers of its nodes, at")
-    oscillator = text(f"{what} oscillator", entry["oscillator"])
+    oscillator = named("oscillator", part(f"{what} oscillator", entry["oscillator"]))
     at = entry["at"]
     if isinstance(at, str | bytes | Mapping | set | frozenset) or not isinstance(at, Iterable):
         raise TypeError(f"{what}: at is {shown(at)}; expected a list of nodes, e.g. [1, 3]")

@@ -24,6 +24,7 @@ from .eigenvalue import Eigenvalue, ordered
 from .expect import instance
 from .jordan import blocks, semisimple
 from .modular import check_modulo
+from .plugins import OwnFile
 from .proof import ProofError, check, minimal_polynomial
 from .radicals import written
 from .spectrum_table import table
@@ -171,8 +172,19 @@ def spectrum(graph: Topology, prove: bool | Literal["primes"] | None = None) -> 
 
     It proves itself; a closed form with more than PROOF_LIMIT nodes does so only where `prove` is True.  Up to CHECK_LIMIT
     nodes, and where `prove` is "primes", it is multiplied out modulo three large primes instead (1000 nodes: seconds).
-    Raises ProofError where the proof fails, ValueError on more than DENSE_LIMIT nodes without a closed form.
+    Raises ValueError on more than DENSE_LIMIT nodes without a closed form and where the closed form of a file outside
+    the package is wrong, ProofError where another proof fails.
     """
+    try:
+        return _found(graph, prove)
+    except ProofError as error:
+        if isinstance(graph.name, OwnFile):
+            raise ValueError(f"{graph.name.place}: {error}") from None
+        raise
+
+
+def _found(graph: Topology, prove: bool | Literal["primes"] | None) -> Spectrum:
+    """The spectrum of a graph, by its closed form or by factors."""
     listed = _closed_form(graph)
     if prove is None:
         prove = graph.n <= PROOF_LIMIT or ("primes" if graph.n <= CHECK_LIMIT else False)

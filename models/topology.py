@@ -167,15 +167,16 @@ def topology(name: str, n: int, **options: Any) -> Topology:
     Raises ValueError on an unknown name or option, on n below the family's minimum and on more than LINK_LIMIT
     links, and TypeError where n is no integer.
     """
-    module = family(name)
+    module = family(name := plugins.named("topology", name))
     size = _size(name, n, module)
     chosen = settled(name, module, size, options)
     keywords = dict(chosen)
-    rule = partial(module.spectrum, size, **keywords) if hasattr(module, "spectrum") else None
+    rule = partial(_closed_form, name, size, chosen) if hasattr(module, "spectrum") else None
     if not hasattr(module, "count"):
         found = tuple(_links(name, module, size, keywords))
         return ruled(Topology(name, size, found, chosen), rule, len(found))
-    count = module.count(size, **keywords) * (1 if getattr(module, "DIRECTED", False) else 2)
+    with plugins.blamed(module.count):
+        count = module.count(size, **keywords) * (1 if getattr(module, "DIRECTED", False) else 2)
     if count > LINK_LIMIT:
         raise _too_many(name, size)
     made = object.__new__(Topology)
@@ -191,18 +192,27 @@ def ruled(graph: Topology, rule: Rule | None, count: int = -1) -> Topology:
     return graph
 
 
+def _closed_form(name: str, n: int, options: Options) -> Sequence[tuple[sp.Expr, int]] | None:
+    """What a family says of its spectrum; ValueError where a file outside the package gives no such list."""
+    module = family(name)
+    with plugins.blamed(module.spectrum):
+        found: Sequence[tuple[sp.Expr, int]] | None = module.spectrum(n, **dict(options))
+    if isinstance(name, plugins.OwnFile) and found is not None:
+        for pair in found if isinstance(found, list | tuple) else (found,):
+            if not (isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[1], int) and pair[1] > 0):
+                raise ValueError(
+                    f"{name.place}: spectrum({n}) has {pair!r}; expected a list of (eigenvalue, multiplicity) or None"
+                )
+    return found
+
+
 def _links(name: str, module: ModuleType, n: int, keywords: dict[str, Any]) -> Iterator[Link]:
     """The sorted links of a family's edges; ValueError where they are too many."""
     directed, one = getattr(module, "DIRECTED", False), Fraction(1)
     limit = LINK_LIMIT if directed else LINK_LIMIT // 2
-    try:
+    with plugins.blamed(module.edges):
         edges = module.edges(n, **keywords)
         found = [(i, j, one if weight == 1 else Fraction(weight)) for i, j, weight in islice(edges, limit + 1)]
-    except Exception as error:
-        told = plugins.located(error, module.edges)
-        if told is error:
-            raise
-        raise told from error
     if len(found) > limit:
         raise _too_many(name, n)
     if not directed:

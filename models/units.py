@@ -20,8 +20,10 @@ UNITS: dict[str, Dimension] = {
 def dimension(unit: str) -> Dimension:
     """Return the powers of (kg, m, s) in a unit such as ``N/m``, ``kg*m/s^2`` or ``1``.
 
-    Raises ValueError on a name outside kg, m, s, N, rad, 1 and on a power that is not an integer.
+    Raises ValueError on a name outside kg, m, s, N, rad, 1 and on a power that is not an integer, TypeError on no text.
     """
+    if not isinstance(unit, str):
+        raise TypeError(f"unit {unit!r} is a {type(unit).__name__}; expected text such as 'N/m' or '1'")
     total = [0, 0, 0]
     sign, rest = 1, unit.replace(" ", "")
     while True:

@@ -18,7 +18,17 @@ if TYPE_CHECKING:
 
     from .result import Buffers
 
-__all__ = ["MEANINGS", "Variable", "coordinates", "dimensions", "provenance", "scene_of", "variables"]
+__all__ = [
+    "MEANINGS",
+    "Variable",
+    "alike",
+    "changed",
+    "coordinates",
+    "dimensions",
+    "provenance",
+    "scene_of",
+    "variables",
+]
 
 Variable = tuple[str, tuple[str, ...], np.ndarray]
 """Name, dimensions besides those of the sweep, values with one row for each cell."""
@@ -98,8 +108,23 @@ def coordinates(scene: Scene) -> dict[str, Any]:
 
 
 def scene_of(attributes: Mapping[Any, Any]) -> Scene:
-    """The scene that a result says it is of."""
-    return Scene.from_dict(json.loads(attributes["scene"]))
+    """The scene that a result says it is of; ValueError where the models that are here cannot make it."""
+    values = json.loads(attributes["scene"])
+    try:
+        return Scene.from_dict(values)
+    except (ValueError, TypeError) as error:
+        raise type(error)(f"its scene cannot be made with the models as they are now: {error}") from None
+
+
+def alike(first: Scene, second: Scene) -> bool:
+    """True where two scenes differ in their titles at most, and in the text of the files of code that they name."""
+    one, other = first.replace(title=""), second.replace(title="")
+    return one == other or one.as_dict() == other.as_dict()
+
+
+def changed(attributes: Mapping[Any, Any], scene: Scene) -> bool:
+    """True where a result of a scene comes of another model: the code behind the names of its parts has changed since."""
+    return "model" in attributes and attributes["model"] != scene.equations.digest
 
 
 def provenance(
@@ -109,6 +134,7 @@ def provenance(
     return {
         "title": scene.title or repr(scene),
         "scene": json.dumps(scene.as_dict()),
+        "model": scene.equations.digest,
         "equations": kernel.equations.digest,
         "kernel": kernel.digest,
         "lanes": kernel.origin.width,

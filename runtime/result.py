@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +17,7 @@ from synchain.models.scene import Scene
 
 from .certificate import Certificate
 from .files import netcdf_data, whole_file
-from .labels import MEANINGS, coordinates, dimensions, scene_of, variables
+from .labels import MEANINGS, alike, changed, coordinates, dimensions, scene_of, variables
 from .status import Status
 
 if TYPE_CHECKING:
@@ -95,7 +97,7 @@ class Result:
 
     def belongs_to(self, scene: Scene) -> bool:
         """True where the scene is this result's but for its title."""
-        return self.scene.replace(title="") == scene.replace(title="")
+        return alike(self.scene, scene)
 
     def stepped(self, equations: Equations) -> bool:
         """True where these are the equations that were integrated: the scene's, or what was left of them to step."""
@@ -108,6 +110,11 @@ class Result:
         """
         if not self.belongs_to(scene):
             raise ValueError("the result to resume belongs to another scene; run without resume")
+        if changed(self.data.attrs, scene):
+            raise ValueError(
+                "the result to resume comes of another model: its code has changed since; "
+                "restore the code, or run without resume"
+            )
         if not self.stepped(equations):
             raise ValueError("the result to resume left out other parts of its scene; resume with the skip of that run")
         cells, data = scene.cells, self.data
@@ -134,11 +141,24 @@ class Result:
 def open_result(path: str | os.PathLike[str]) -> Result:
     """Read a file written by `Result.save` or `stream`, or the cells so far of a run that is not finished.
 
-    OSError or ValueError where it is none of these.
+    Warns where the code of its model has changed since it was written: the numbers are those of the former model, the scene
+    names the present one.  OSError or ValueError where it is none of these.
     """
+    result = _opened(a_path("result", path))
+    if changed(result.data.attrs, result.scene):
+        warnings.warn(
+            f"{path}: the code of its model has changed since it was written: its numbers are those of the former model, "
+            "its scene has the equations of the present one; restore the code, or run it again",
+            UserWarning,
+            stacklevel=2,
+        )
+    return result
+
+
+def _opened(path: Path) -> Result:
+    """The result of a file of either kind."""
     from .store import is_store
 
-    path = a_path("result", path)
     if is_store(path):
         from .unfinished import open_unfinished
 

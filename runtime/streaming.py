@@ -17,7 +17,7 @@ from synchain.models.scene import Scene
 from .crew import Task, crew_size, worker_lost
 from .files import drop_leftovers, netcdf_data
 from .kernels import chosen_skip
-from .labels import scene_of
+from .labels import alike, changed, scene_of
 from .layout import Layout
 from .progress import Hook, Progress, Reporter
 from .result import Buffers
@@ -152,8 +152,13 @@ def _check_same(chosen: Skip, certified: bool, path: Path, told: Mapping[str, An
     """Raise ValueError where a file is not that of this run."""
     kept = told["attributes"]
     again = "repeat the options of that run, choose another path (--out), or replace it with overwrite (--overwrite)"
-    if scene_of(kept).replace(title="") != chosen.scene.replace(title=""):
+    if not alike(scene_of(kept), chosen.scene):
         raise ValueError(f"{path} belongs to another scene ({kept['title']}); {again}")
+    if changed(kept, chosen.scene):
+        raise ValueError(
+            f"{path} comes of another model: the code of its scene has changed since; "
+            f"{again.replace('repeat the options of that run', 'restore the code')}"
+        )
     if kept["equations"] != chosen.equations.digest:
         raise ValueError(
             f"{path} left out other parts of its scene: {kept.get('skipped', 'nothing')}; "
@@ -195,7 +200,7 @@ def _fill(
         drop_leftovers(path)
         reporter.start(store.counts)
         sitting.run(prepared.shop, executor, prepared.workers)
-        return finish_file(store, path)
+        return finish_file(store, path, scene)
     except KeyboardInterrupt:
         raise SweepInterrupted(int(store.counts.sum()), scene.cells) from None
     except Exception as problem:

@@ -59,9 +59,9 @@ def certificate_of(told: Mapping[str, Any]) -> Certificate | None:
 class _Reader:
     """Reads blocks of a store as those of the whole network."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Store, scene: Scene) -> None:
         told = store.about
-        self.store, self.scene = store, scene_of(told["attributes"])
+        self.store, self.scene = store, scene
         self.layout, self.certificate = layout_of(told, self.scene), certificate_of(told)
         self.planner = Planner(self.scene)
         same = np.arange(int(told["dimension"]))
@@ -80,8 +80,8 @@ def open_unfinished(path: str | os.PathLike[str]) -> Result:
     """The cells so far of a sweep on disk; the others have the status NOT_RUN."""
     store = Store.open(path)
     try:
-        reader = _Reader(store)
-        scene = reader.scene
+        scene = scene_of(store.about["attributes"])
+        reader = _Reader(store, scene)
         whole = Buffers.empty(scene.cells, len(reader.merged.places), store.most, int(store.about["samples"]))
         for block in np.flatnonzero(store.done).tolist():
             rows, made = reader.layout.rows(block), reader.buffers(block)
@@ -93,13 +93,12 @@ def open_unfinished(path: str | os.PathLike[str]) -> Result:
         store.close()
 
 
-def finish_file(store: Store, path: str | os.PathLike[str]) -> dict[str, int]:
-    """Write the netCDF file of a store whose blocks are all there, one block in memory at a time.
+def finish_file(store: Store, path: str | os.PathLike[str], scene: Scene) -> dict[str, int]:
+    """Write the netCDF file of a scene's store whose blocks are all there, one block in memory at a time.
 
     Returns how many cells have which verdict, and how many "ended early"; empty where the cells are not certified.
     """
-    reader = _Reader(store)
-    scene = reader.scene
+    reader = _Reader(store, scene)
     told: dict[str, int] = {}
     axes = {axis.name: len(axis) for axis in scene.axes}
     lengths = {"cell": scene.cells} if scene.zipped else axes

@@ -7,7 +7,7 @@ from math import comb
 import networkx as nx
 import pytest
 
-from synchain.models.topology import Topology, family, topology
+from synchain.models.topology import Topology, topology
 
 
 @pytest.mark.parametrize("d", range(8))
@@ -23,7 +23,6 @@ def test_the_spectrum_of_ten_dimensions_is_binomial() -> None:
 
 @pytest.mark.parametrize(("n", "radices"), [(1, []), (7, [7]), (12, [2, 2, 3]), (45, [3, 3, 5]), (97, [97])])
 def test_other_sizes_are_products_of_complete_graphs(n: int, radices: list[int]) -> None:
-    assert family("hypercube").radices(n) == radices
     expected = nx.complete_graph(1)
     for p in radices:
         expected = nx.cartesian_product(expected, nx.complete_graph(p))

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import importlib
+import os
+import pickle
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,8 +19,10 @@ import test_lagrangian
 import test_network
 import test_topologies
 
-from synchain.models import Scene, chain, plugins
+from synchain.models import Scene, chain, load_scene, plugins
+from synchain.models.definition import check
 from synchain.models.frictions import CONTACTS
+from synchain.models.network import node
 from synchain.models.topology import names, topology
 from synchain.runtime.cli import main
 
@@ -231,3 +236,244 @@ def test_the_groups_of_entry_points_are_read(monkeypatch: pytest.MonkeyPatch) ->
     plugins.names("topology")
     plugins._entry_points.cache_clear()
     assert asked == ["synchain.oscillators", "synchain.topologies"]
+
+
+# -- a file is its text ---------------------------------------------------------------------------------------
+
+HEAD = 'import sympy as sp\nfrom synchain.models.parameter import Parameter\nSUMMARY = "s"\nSOURCE = "s, 2000"\n'
+WELL = (
+    "FRICTION = False\nPARAMETERS = {}\ndef kinetic(v):\n    return v**2 / 2\ndef potential(x):\n    return x**2 / 2\n"
+)
+PULL = (
+    'PARAMETERS = {"sigma": Parameter(0.1, "N/m", "stiffness")}\n'
+    "def potential(q_i, q_j, weight, sigma):\n    return sigma * weight * (q_i - q_j) ** 2 / 2\n"
+)
+RUB = 'ODD = True\nPARAMETERS = {"c": Parameter(0.3, "s/m", "growth")}\ndef force(w, c):\n    return c * w\n'
+X = sp.Symbol("x", real=True)
+
+
+def written(path: Path, text: str) -> str:
+    """The path of a file with this text, allowed to run."""
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(HEAD + text, encoding="utf-8")
+    plugins.allow_code(path)
+    return str(path)
+
+
+def test_an_edited_file_is_another_model_and_a_scene_keeps_its_own(tmp_path: Path) -> None:
+    """Also where neither the length of the file nor its time tells of the change."""
+    path = written(tmp_path / "well.py", WELL)
+    stamp = os.stat(path).st_mtime
+    first = Scene(oscillator=path)
+    assert first.equations.node.rhs[1] == -X
+    written(tmp_path / "well.py", WELL.replace("x**2", "x**4"))
+    os.utime(path, (stamp, stamp))
+    second = Scene(oscillator=path)
+    assert second.equations.node.rhs[1] == -2 * X**3
+    assert node(path).rhs[1] == -2 * X**3
+    assert first != second
+    assert first.replace(topology=chain(2), coupling="spring").equations.node.rhs[1] == -X
+    assert first.replace(oscillator=path) == second
+    assert Scene.from_dict(first.as_dict()) == second
+    written(tmp_path / "well.py", WELL)
+    assert Scene(oscillator=path) == first
+
+
+def test_an_edited_law_coupling_or_group_of_nodes_is_another_model(tmp_path: Path) -> None:
+    well, rub, pull = (
+        written(tmp_path / f"{name}.py", text) for name, text in (("well", WELL), ("rub", RUB), ("pull", PULL))
+    )
+
+    def scene() -> Scene:
+        nodes = [{"oscillator": "harmonic", "at": [1]}]
+        coupling = f"{pull} on x"
+        assert Scene(friction=rub).coupling == "spring"
+        return Scene(oscillator=well, nodes=nodes, coupling=coupling, topology=chain(2))
+
+    before, law = scene(), Scene(friction=rub)
+    digest = before.equations.digest
+    written(tmp_path / "rub.py", RUB.replace("c * w", "2 * c * w"))
+    assert Scene(friction=rub).equations.digest != law.equations.digest
+    written(tmp_path / "pull.py", PULL.replace("/ 2", "/ 8"))
+    after = scene()
+    assert after.equations.digest != digest
+    written(tmp_path / "well.py", WELL.replace("x**2", "x**4"))
+    assert scene().equations.digest not in (digest, after.equations.digest)
+    assert before.replace(rtol=1e-6).equations.digest == digest
+
+
+def test_one_relative_name_in_two_folders_is_two_models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A star must not get the spectrum of a chain, whatever the names of their files."""
+    edges = (
+        "MINIMUM = 1\ndef edges(n):\n    return (({}, i, 1) for i in range(1, n))\ndef count(n):\n    return n - 1\n"
+    )
+    graphs, scenes = [], []
+    for folder, first, power in (("a", "0", "x**2"), ("b", "i - 1", "x**4")):
+        written(tmp_path / folder / "graph.py", edges.format(first))
+        written(tmp_path / folder / "well.py", WELL.replace("x**2", power))
+        monkeypatch.chdir(tmp_path / folder)
+        graphs.append(topology("./graph.py", 5))
+        scenes.append(Scene(oscillator="./well.py"))
+        assert graphs[-1].spectrum.exact == topology("star" if folder == "a" else "chain", 5).spectrum.exact
+    assert graphs[0] != graphs[1]
+    assert len({*graphs}) == 2
+    assert [scene.equations.node.rhs[1] for scene in scenes] == [-X, -2 * X**3]
+    assert graphs[0].links == topology("star", 5).links
+    assert pickle.loads(pickle.dumps(scenes[0])) == scenes[0]
+
+
+def test_another_process_refuses_a_scene_whose_file_has_changed(tmp_path: Path) -> None:
+    path = written(tmp_path / "well.py", WELL)
+    packed = tmp_path / "scene"
+    packed.write_bytes(pickle.dumps(Scene(oscillator=path)))
+    words = (
+        f"import pickle; from synchain.models.plugins import allow_code; allow_code({path!r})\n"
+        f"print(pickle.load(open({str(packed)!r}, 'rb')).equations.node.rhs)"
+    )
+
+    def elsewhere() -> subprocess.CompletedProcess[str]:
+        return subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, timeout=240, check=False)
+
+    assert elsewhere().stdout == "(v, -x)\n"
+    written(tmp_path / "well.py", WELL.replace("x**2", "x**4"))
+    assert "found another text in" in elsewhere().stderr.splitlines()[-1]
+
+
+# -- what a file says takes effect, or is refused --------------------------------------------------------------
+
+
+def test_everything_in_the_package_is_what_a_file_may_be() -> None:
+    for kind in KINDS:
+        for name in plugins.names(kind):
+            module = plugins.load(kind, name)
+            check(kind, module, name, Path(str(module.__file__)).read_bytes())
+
+
+def refusal(kind: str, path: Path, text: str) -> str:
+    """Why a file is refused, without its folder."""
+    with pytest.raises(ValueError) as caught:  # noqa: PT011  (the caller looks at the words)
+        plugins.load(kind, written(path, text))
+    assert "\n" not in str(caught.value)
+    return str(caught.value).replace(f"{path.parent}{os.sep}", "")
+
+
+FIELD = "FRICTION = False\nPARAMETERS = {}\nSTATE = ('x', 'y')\ndef field(x, y):\n    return y, -x\n"
+DAMPED = 'PARAMETERS = {"delta": Parameter(0.1, "1", "damping")}\n'
+DOUBLE = (
+    WELL.replace("kinetic(v)", "kinetic(v, w)")
+    .replace("v**2", "(v**2 + w**2)")
+    .replace("potential(x)", "potential(x, y)")
+    + "COORDINATES = {'x': ('v', 'm'), 'y': ('w', 'm')}\ndef force(v, w):\n    return -v, -w\n"
+)
+SCALED = (
+    'FRICTION = False\nPARAMETERS = {"delta": Parameter(0.1, "kg/s", "damping")}\nPHYSICAL = {"delta": "d"}\n'
+    'UNITS = {"m": "kg", "k": "N/m", "l": "m"}\ndef kinetic(v, m):\n    return m * v**2 / 2\n'
+    "def potential(x, k):\n    return k * x**2 / 2\ndef force(v, d):\n    return -d * v\n"
+    'def scales(m, k, l):\n    return {"kg": m, "m": l, "s": sp.sqrt(m / k)}\n'
+)
+FAMILY = (
+    "MINIMUM = 1\ndef edges(n, *, step=1):\n    return ((i, i + step, 1) for i in range(n - step))\n"
+    "def settle(n, step):\n    return {'step': step}\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "words"),
+    [
+        ("oscillator", WELL + "def forces(v):\n    return -v\n", "part.py, line 11: found 'forces'; an oscillator"),
+        ("oscillator", WELL + "def forces(v):\n    return -v\n", "did you mean 'force'?"),
+        ("oscillator", WELL + "damping = 3\n", "line 11: found 'damping'"),
+        ("oscillator", WELL + "if True:\n    damping = 3\n", "line 12: found 'damping'"),
+        ("coupling", PULL + "def force(v_i, v_j):\n    return 0\n", "line 8: found 'force'; a coupling file knows"),
+        ("friction", RUB.replace("def force", "def forces"), "no force; expected a friction file; found 'forces' in line 7"),
+        ("topology", FAMILY + "def conut(n, *, step=1):\n    return n\n", "did you mean 'count'?"),
+        ("oscillator", FIELD + "def kinetic(v):\n    return v**2\n", "line 10: found kinetic beside field"),
+        ("oscillator", WELL + "STATE = ('x', 'v')\n", "line 11: found STATE without field"),
+        ("oscillator", WELL + "UNITS = {'m': 'kg'}\n", "line 11: found UNITS without scales"),
+        ("oscillator", DAMPED + WELL.replace("PARAMETERS = {}\n", ""), "line 5: no function uses the parameter 'delta'"),
+        ("oscillator", SCALED.replace("-d * v", "-v"), "no function uses the parameter 'delta' (d in the"),
+        ("friction", RUB.replace("return c * w", "return w"), "line 6: no function uses the parameter 'c'"),
+        ("coupling", PULL.replace("sigma * weight", "weight"), "line 5: no function uses the parameter 'sigma'"),
+        ("coupling", PULL.replace("sigma * weight", "sigma"), "line 6: potential does not use weight"),
+        ("oscillator", WELL.replace("False", "True"), "line 5: FRICTION is True, but no function uses friction"),
+        ("oscillator", WELL + "def force(v, friction):\n    return friction(v)\n", "FRICTION is False, but a function uses"),
+        ("topology", FAMILY.replace(", *, step=1", "", 1).replace("step", "1", 2), "found settle without options"),
+    ],
+)  # fmt: skip
+def test_what_would_be_ignored_is_refused(kind: str, text: str, words: str, tmp_path: Path) -> None:
+    assert words in refusal(kind, tmp_path / "part.py", text)
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "words"),
+    [
+        ("oscillator", WELL.replace("{}", '{"k": 2.0}'), "line 6: PARAMETERS['k'] is 2.0; expected Parameter(2.0, \"1\","),
+        ("oscillator", WELL.partition("def potential")[0], "part.py: found no potential; expected an oscillator file"),
+        ("oscillator", FIELD.replace("STATE = ('x', 'y')\n", ""), "part.py: found no STATE"),
+        ("oscillator", FIELD.replace("('x', 'y')", "'xy'"), "line 7: STATE is 'xy'; expected a tuple of names"),
+        ("oscillator", FIELD.replace("y, -x", "-x").replace("'x', 'y'", "'x',").replace("x, y", "x"),
+         "line 8: field returns -x alone; expected a tuple of 1, one for each of x"),
+        ("oscillator", WELL + "COORDINATES = {'x': 'v'}\n", "line 11: COORDINATES has 'x': 'v'; expected a"),
+        ("oscillator", DOUBLE.replace("-v, -w", "-v"),
+         "line 12: force returns -v alone; expected a tuple of 2, one for each of x, y"),
+        ("oscillator", WELL.replace("return x**2 / 2", "x**2 / 2"), "line 9: potential returns None (NoneType)"),
+        ("oscillator", WELL.replace("def potential(x):\n    return x**2 / 2", "potential = 3"), "line 9: potential is 3"),
+        ("oscillator", SCALED.replace('"kg": m, ', ""), "line 15: scales returns a dict of 'm', 's'"),
+        ("oscillator", SCALED.replace('{"delta": "d"}', "{}"), "line 7: PHYSICAL is {}; expected the physical"),
+        ("oscillator", SCALED.replace('UNITS = {"m": "kg", "k": "N/m", "l": "m"}\n', ""), "part.py: found no UNITS"),
+        ("oscillator", SCALED.replace('"m": "kg"', '"m": 1'), "line 8: UNITS is {'m': 1, 'k': 'N/m', 'l': 'm'}; expected"),
+        ("oscillator", WELL + "INITIAL = {'y': 1}\n", "line 11: INITIAL is {'y': 1}; expected a dict with keys out of x, v"),
+        ("friction", RUB + "ORDER = (('c', 'd'),)\n", "line 9: ORDER is (('c', 'd'),); expected pairs of parameters"),
+        ("friction", RUB.replace("True", "'yes'"), "line 5: ODD is 'yes'; expected True or False"),
+        ("friction", RUB.replace('"s/m"', "1"), "line 6: TypeError: unit 1 is a int; expected text such as 'N/m'"),
+        ("coupling", PULL.replace("sigma", "k"), "line 5: PARAMETERS has no 'sigma'"),
+        ("coupling", PULL.replace("weight *", "weight * x_i *"), "line 7: NameError: name 'x_i' is not defined"),
+        ("topology", FAMILY.partition("def settle")[0], "part.py: found no settle; expected a topology file"),
+        ("topology", FAMILY + "def count(n):\n    return n\n", "line 10: count lacks the option 'step' of edges"),
+        ("topology", FAMILY.replace("step=1", "step"), "line 6: the option 'step' of edges has no default"),
+    ],
+)  # fmt: skip
+def test_an_incomplete_file_is_refused_in_one_line(kind: str, text: str, words: str, tmp_path: Path) -> None:
+    assert words in refusal(kind, tmp_path / "part.py", text)
+
+
+def test_wrong_answers_of_a_family_are_those_of_its_file(tmp_path: Path) -> None:
+    spectrum = "def spectrum(n, *, step=1):\n    return {}\n"
+    for returned, words in (
+        ("[(sp.Integer(0), n)]", "family.py: spectrum of .*: correct the closed form"),
+        ("[1, 2]", r"family.py: spectrum\(3\) has 1; expected a list of \(eigenvalue, multiplicity\)"),
+        ("1 / 0", r"family.py, line 11: ZeroDivisionError"),
+    ):
+        path = written(tmp_path / "family.py", FAMILY + spectrum.format(returned))
+        with pytest.raises(ValueError, match=words):
+            _ = topology(path, 3).spectrum
+    path = written(tmp_path / "family.py", FAMILY.replace("return {'step': step}", "return step.nothing"))
+    with pytest.raises(ValueError, match=r"family.py, line 9: AttributeError"):
+        topology(path, 3)
+    path = written(tmp_path / "family.py", FAMILY.replace("return {'step': step}", "pass"))
+    with pytest.raises(ValueError, match="settle returns None; expected a dict of the options"):
+        topology(path, 3)
+
+
+# -- paths ----------------------------------------------------------------------------------------------------
+
+
+def test_a_file_that_does_not_exist_is_said_to_be_missing() -> None:
+    with pytest.raises(ValueError, match=r"friction '\./none\.py': no such file: .*none\.py; expected a \.py file"):
+        Scene(friction="./none.py")
+
+
+def test_paths_in_a_scene_file_start_in_its_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "study"
+    written(folder / "well.py", WELL)
+    written(folder / "pull.py", PULL)
+    written(folder / "family.py", FAMILY)
+    (folder / "own.toml").write_text(
+        'oscillator = "./well.py"\ncoupling = "pull.py on x"\n[topology]\nname = "family.py"\nn = 3\nstep = 2\n'
+        '[[nodes]]\noscillator = "./well.py"\nat = [2]\n'
+    )
+    monkeypatch.chdir(tmp_path)
+    scene = load_scene("study/own.toml")
+    assert scene.equations.node.rhs[1] == -X
+    assert scene.topology.link_count == 2
+    assert Scene.from_dict(scene.as_dict()) == scene

@@ -163,8 +163,6 @@ def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
     for name in added:
         sys.modules.pop(f"synchain.models.oscillators.{name}", None)
         vars(oscillators).pop(name, None)
-    node.cache_clear()
-    edge.cache_clear()
 
 
 def test_a_lagrangian_in_one_file(plug_in: Callable[[str, str], ModuleType]) -> None:

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from concurrent.futures import Executor, Future
 from pathlib import Path
 
@@ -18,6 +19,8 @@ import pytest
 from streams import MAP, PAIR, UP, kill_again_and_again, partial, warm
 from test_skip import MIRRORED
 
+from synchain.models import Scene
+from synchain.models.plugins import allow_code
 from synchain.runtime import Status, SweepFailed, SweepInterrupted, open_result, run, stream
 from synchain.runtime.figures.result_plot import draw_result
 from synchain.runtime.netcdf import Sheet
@@ -369,6 +372,79 @@ def test_other_versions_do_not_go_on_with_a_run(tmp_path, monkeypatch, interrupt
     monkeypatch.setattr("synchain.runtime.work.versions", lambda: "synchain 0.0.1")
     with pytest.raises(ValueError, match=r"was begun with synchain .*; found synchain 0\.0\.1"):
         stream(MAP, path, resume=True, show_progress=False)
+
+
+FALLING = """import sympy as sp
+from synchain.models.parameter import Parameter
+SUMMARY, SOURCE, FRICTION = "decay", "none, 2000", False
+PARAMETERS = {"rate": Parameter(1.0, "1", "rate of decay")}
+STATE = ("x",)
+def field(x, rate):
+    return (-rate * x,)
+"""
+
+
+@pytest.fixture
+def own(tmp_path) -> Path:
+    path = tmp_path / "falling.py"
+    path.write_text(FALLING)
+    allow_code(path)
+    return path
+
+
+def falling(path: Path) -> Scene:
+    axes = {"rate": [0.01 * k for k in range(400)]}
+    return Scene(oscillator=str(path), axes=axes, transient=0, window=2, record=("trajectory",), samples=3)
+
+
+def test_a_result_says_that_its_model_has_changed(own, tmp_path):
+    path, before = tmp_path / "a.nc", falling(own)
+    stream(before, path, show_progress=False)
+    result = run(before, show_progress=False)
+    own.write_text("# another comment\n" + FALLING)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert open_result(path).data.trajectory.identical(result.data.trajectory)
+        with pytest.raises(FileExistsError, match="holds the result of this scene already"):
+            stream(falling(own), path, show_progress=False)
+    own.write_text(FALLING.replace("-rate * x", "-rate * x**3"))
+    with pytest.warns(UserWarning, match=r"a\.nc: the code of its model has changed since it was written"):
+        opened = open_result(path)
+    assert opened.data.trajectory.identical(result.data.trajectory)
+    for options in ({}, {"resume": True}):
+        with pytest.raises(ValueError, match=r"a\.nc comes of another model: the code of its scene has changed since"):
+            stream(falling(own), path, show_progress=False, **options)
+    with pytest.raises(ValueError, match="the result to resume comes of another model: its code has changed since"):
+        run(falling(own), resume=result, show_progress=False)
+    with pytest.raises(FileExistsError, match="holds the result of this scene already"):
+        stream(before, path, show_progress=False)
+    own.write_text(FALLING.replace("rate", "pace"))
+    with pytest.raises(ValueError, match=r"its scene cannot be made with the models as they are now: .*'rate'"):
+        open_result(path)
+
+
+def test_an_unfinished_run_of_an_edited_model_does_not_go_on(own, tmp_path, interruptible):
+    path = tmp_path / "a.nc"
+    with pytest.raises(SweepInterrupted):
+        stream(falling(own), path, show_progress=False, workers=1, progress=interrupt_at(1))
+    kept = partial(path).read_bytes()
+    own.write_text(FALLING.replace("-rate * x", "-rate * x**3"))
+    with pytest.warns(UserWarning, match="the code of its model has changed"):
+        open_result(partial(path))
+    with pytest.raises(ValueError, match=r"a\.partial comes of another model: the code"):
+        stream(falling(own), path, resume=True, show_progress=False)
+    assert partial(path).read_bytes() == kept
+
+
+def test_a_file_that_is_edited_during_a_run_leaves_the_run_as_it_is(own, tmp_path):
+    scene = falling(own)
+    stream(scene, tmp_path / "a.nc", show_progress=False)
+
+    def edit(_) -> None:
+        own.write_text(FALLING.replace("'x'", "'y'").replace("(x", "(y").replace("* x", "* y").replace('"x"', '"y"'))
+
+    stream(scene, tmp_path / "b.nc", show_progress=False, progress=edit)
+    assert Path(tmp_path, "b.nc").read_bytes() == Path(tmp_path, "a.nc").read_bytes()
 
 
 def test_the_command_says_that_there_is_nothing_to_do(tmp_path, capsys):

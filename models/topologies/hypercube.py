@@ -19,7 +19,7 @@ SOURCE = (
 )
 
 
-def radices(n: int) -> list[int]:
+def _radices(n: int) -> list[int]:
     """The prime factors of n, ascending: the base of each digit of a node's place."""
     found, p = [], 2
     while p * p <= n:
@@ -33,7 +33,7 @@ def radices(n: int) -> list[int]:
 
 def edges(n: int) -> Iterator[tuple[int, int, int]]:
     """Each node and those that are larger in one digit."""
-    bases = radices(n)
+    bases = _radices(n)
     for i in range(n):
         place, value = i, 1
         for base in bases:
@@ -44,14 +44,14 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
 
 def count(n: int) -> int:
     """Number of edges: half of n (p - 1) for each prime factor p."""
-    return n * sum(p - 1 for p in radices(n)) // 2
+    return n * sum(p - 1 for p in _radices(n)) // 2
 
 
 def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
     """-2 k, C(d, k) times, for n = 2**d; for each prime factor p of n a sum of 0 (once) and -p (p - 1 times)."""
     from sympy import Integer
 
-    bases = radices(n)
+    bases = _radices(n)
     counts = {0: 1}
     for p in sorted(set(bases)):
         d, more = bases.count(p), dict[int, int]()

@@ -11,22 +11,22 @@ SOURCE = (
     "B. Bollobás, F. R. K. Chung, SIAM J. Discrete Math. 1, 328 (1988); in the limit of many nodes like a uniformly "
     "random cubic graph: R. W. Robinson, N. C. Wormald, Random Struct. Algorithms 3, 117 (1992)"
 )
-SEED = 1988
+_SEED = 1988
 
 
 def edges(n: int) -> Iterator[tuple[int, int, int]]:
     """The ring, then the pairs."""
     yield from ((i, i + 1, 1) for i in range(n - 1))
     yield 0, n - 1, 1
-    yield from ((min(pair), max(pair), 1) for pair in pairs(n))
+    yield from ((min(pair), max(pair), 1) for pair in _pairs(n))
 
 
-def pairs(n: int) -> list[tuple[int, int]]:
+def _pairs(n: int) -> list[tuple[int, int]]:
     """A random perfect matching (n odd: of all but one node) without edges of the ring.
 
     Pairs that are neighbours in the ring swap their second nodes with those of random pairs until none is left.
     """
-    stream = random.Random(SEED)
+    stream = random.Random(_SEED)
 
     def below(count: int) -> int:
         return int(stream.random() * count)  # the one method whose numbers Python promises never to change

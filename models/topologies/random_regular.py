@@ -13,7 +13,7 @@ MINIMUM = 5
 SOURCE = "A. Steger, N. C. Wormald, Comb. Probab. Comput. 8, 377 (1999)"
 
 CONNECTED = False
-Edges = set[tuple[int, int]]
+_Edges = set[tuple[int, int]]
 
 
 def settle(n: int, degree: Any, seed: Any) -> dict[str, Any]:
@@ -33,10 +33,10 @@ def edges(n: int, *, degree: int = 4, seed: int = 0) -> Iterator[tuple[int, int,
     return ((i, j, 1) for i, j in sorted(found))
 
 
-def _paired(n: int, degree: int, stream: random.Random) -> Edges | None:
+def _paired(n: int, degree: int, stream: random.Random) -> _Edges | None:
     """The edges of one attempt; None where the ends that are left have no pair to form."""
     ends = [i for i in range(n) for _ in range(degree)]
-    found: Edges = set()
+    found: _Edges = set()
     while ends:
         for k in range(len(ends) - 1, 0, -1):
             j = int(stream.random() * (k + 1))
@@ -54,7 +54,7 @@ def _paired(n: int, degree: int, stream: random.Random) -> Edges | None:
     return found
 
 
-def _possible(ends: list[int], found: Edges) -> bool:
+def _possible(ends: list[int], found: _Edges) -> bool:
     """True where two of the free ends can still be joined."""
     nodes = sorted(set(ends))
     return any((a, b) not in found for k, a in enumerate(nodes) for b in nodes[k + 1 :])
