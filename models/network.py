@@ -139,6 +139,7 @@ def mixed_network(
 
     Every pair of kinds that a link joins gets its own edge.  Raises ValueError where a coupling does not fit a pair.
     """
+    apart = Equations(singles[0], None, graph.n, (), varied, tuple(singles[1:]), tuple(kinds))
     links = graph.links if coupling is not None else ()
     pairs = sorted({(kinds[target], kinds[source]) for target, source, _ in links})
     joints = tuple(
@@ -146,7 +147,7 @@ def mixed_network(
     )
     if any(a == b and is_oriented(link) for (a, b), link in joints):
         raise ValueError(f"coupling {coupling!r} tells the ends of a link apart; expected nodes of one kind")
-    return Equations(singles[0], None, graph.n, links, varied, tuple(singles[1:]), tuple(kinds), joints)
+    return replace(apart, links=links, joints=joints)
 
 
 def connectivity(coupling: str, graph: Topology) -> tuple[tuple[Fraction, ...], ...]:

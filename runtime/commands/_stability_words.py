@@ -34,7 +34,8 @@ def headline(scene: Scene) -> str:
     """What oscillates, and what is computed."""
     coupling = f", {scene.coupling} coupling" if scene.coupling else ""
     drive = f", omega = {scene.omega:g}" if scene.omega is not None else ""
-    return f"{scene.oscillator} oscillator{coupling}{drive}: exponents per unit of time"
+    oscillators = " and ".join(dict.fromkeys(oscillator for oscillator, _ in scene.templates))
+    return f"{oscillators} oscillator{coupling}{drive}: exponents per unit of time"
 
 
 def how(scene: Scene, attractors: Sequence[str], time: float, stderr: np.ndarray) -> list[tuple[str, str]]:
