@@ -17,8 +17,9 @@ def check_friction(made: Mapping[str, Any]) -> None:
     if made["contact"] != "set-valued":
         return
     for _, friction, own in at_nodes(made, {name: name for name in made["parameters"]}):
-        for low, high in getattr(load("friction", friction), "ORDER", ()) if friction is not None else ():
-            _check_order(made, friction, own[low], own[high])
+        if friction is not None:
+            for low, high in getattr(load("friction", friction), "ORDER", ()):
+                _check_order(made, friction, own[low], own[high])
 
 
 def _check_order(made: Mapping[str, Any], friction: str, low: str, high: str) -> None:
