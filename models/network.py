@@ -15,6 +15,7 @@ from types import ModuleType
 import sympy as sp
 
 from . import coupling_matrix
+from .calculus import cancelled
 from .contact import SLIP, set_valued
 from .coupling_name import split
 from .equations import SLIDING, TIME, Edge, Equations, Node
@@ -63,7 +64,7 @@ def node(oscillator: str, friction: str | None = None, contact: str = "atan") ->
         rates = call(model.field, {**symbols, **own, "t": TIME})
         return Node(tuple(own.values()), tuple(map(sp.sympify, rates)), tuple(symbols.values()))
     system = nondimensional(model)
-    found = system.accelerations()
+    found = cancelled(system.accelerations())
     state = (*system.coordinates, *system.velocities)
     if law is None:
         return Node(state, (*system.velocities, *found), tuple(symbols.values()))
