@@ -6,9 +6,28 @@ that vanish there, or is used away from them; in both cases the one-sided deriva
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import sympy as sp
 
-__all__ = ["derivative"]
+__all__ = ["cancelled", "derivative", "operations"]
+
+LARGEST_CANCELLED = 200
+"""Operations of an expression up to which it is cancelled: longer ones are products of minors, which grow by it."""
+
+
+def operations(expressions: Sequence[sp.Expr]) -> int:
+    """The number of operations that evaluate the expressions together, what they share once."""
+    shared, left = sp.cse(expressions)
+    return sum(int(sp.count_ops(e)) for e in (*(e for _, e in shared), *left))
+
+
+def cancelled(expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
+    """The expressions over their common denominators without common factors, if that saves operations; else unchanged."""
+    if any(sp.count_ops(e) > LARGEST_CANCELLED for e in expressions):
+        return tuple(expressions)
+    found = tuple(map(sp.cancel, expressions))
+    return found if operations(found) < operations(expressions) else tuple(expressions)
 
 
 def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:

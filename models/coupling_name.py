@@ -42,6 +42,11 @@ def coordinates_of(coupling: str, known: tuple[str, ...]) -> tuple[int, ...]:
     _, chosen = split(coupling)
     if chosen is None:
         return tuple(range(len(known)))
+    if not known:
+        raise ValueError(
+            f"coupling {shown(coupling)}: found oscillators without coordinates, which are vector fields; expected "
+            "a coupling by components, e.g. 'x->x'"
+        )
     for name in chosen:
         if name not in known:
             raise ValueError(

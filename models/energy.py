@@ -20,7 +20,6 @@ from .expect import a_scene
 from .link import link_energies
 from .nondimensional import FRICTION, friction_coefficient, nondimensional
 from .plugins import load
-from .scene_nodes import by_kind
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -82,7 +81,7 @@ def energy(scene: Scene) -> Energy:
     Raises ValueError for a vector field or a coupling by components, which have no energy, for one-way links, which have no
     potential, and for set-valued friction, whose force in stick is no function of the state.
     """
-    templates, _ = by_kind(a_scene(scene).oscillator, scene.friction, scene.nodes, scene.n)
+    templates = a_scene(scene).templates
     for oscillator, _ in templates:
         if hasattr(load("oscillator", oscillator), "field"):
             raise ValueError(f"energy: oscillator {oscillator!r} is a vector field; expected one with a Lagrangian")

@@ -15,9 +15,9 @@ import sympy as sp
 
 from .contact import Contact
 from .equation_checks import check
-from .template import TIME, Edge, Link, Node
+from .template import SLIDING, TIME, Edge, Link, Node
 
-__all__ = ["TIME", "Edge", "Equations", "Link", "Node"]
+__all__ = ["SLIDING", "TIME", "Edge", "Equations", "Link", "Node"]
 
 Entry = tuple[tuple[int, int], sp.Expr]
 Block = tuple[tuple[sp.Expr, ...], ...]

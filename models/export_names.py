@@ -41,7 +41,7 @@ def portable(equations: Equations) -> tuple[Equations, dict[str, str]]:
     taken = {s.name for s in shown if _fine(s.name)} | {"t"}
     for s in shown:
         swap[s] = _renamed(s, taken)
-    first, *others = (Node(_all(n.state, swap), _all(n.rhs, swap), _all(n.parameters, swap)) for n in equations.nodes)
+    first, *others = (_node(node, swap) for node in equations.nodes)
     changed = {s.name: new.name for s, new in swap.items() if s.name != new.name}
     edges = {}
     for edge in equations.edges:
@@ -57,6 +57,11 @@ def portable(equations: Equations) -> tuple[Equations, dict[str, str]]:
         varied=tuple(swap[sp.Symbol(name, real=True)].name for name in equations.varied),
     )
     return made, changed
+
+
+def _node(node: Node, swap: dict[sp.Symbol, sp.Symbol]) -> Node:
+    law = None if node.law is None else node.law.xreplace(swap)
+    return Node(_all(node.state, swap), _all(node.rhs, swap), _all(node.parameters, swap), law=law)
 
 
 def _edge(edge: Edge, outer: dict[sp.Symbol, sp.Symbol], taken: set[str]) -> tuple[Edge, dict[str, str]]:

@@ -15,9 +15,10 @@ from types import ModuleType
 import sympy as sp
 
 from . import coupling_matrix
+from .calculus import cancelled
 from .contact import SLIP, set_valued
 from .coupling_name import split
-from .equations import TIME, Edge, Equations, Node
+from .equations import SLIDING, TIME, Edge, Equations, Node
 from .frictions import CONTACTS, KAPPA
 from .lagrangian import Mechanics
 from .link import check_coupling, edge
@@ -59,17 +60,19 @@ def node(oscillator: str, friction: str | None = None, contact: str = "atan") ->
     model, law = _model(oscillator, friction, contact)
     symbols = {name: sp.Symbol(name, real=True) for name in parameters(oscillator, friction, contact)}
     if hasattr(model, "field"):
-        state = {name: sp.Symbol(name, real=True) for name in model.STATE}
-        rates = call(model.field, {**symbols, **state, "t": TIME})
-        return Node(tuple(state.values()), tuple(map(sp.sympify, rates)), tuple(symbols.values()))
+        own = {name: sp.Symbol(name, real=True) for name in model.STATE}
+        rates = call(model.field, {**symbols, **own, "t": TIME})
+        return Node(tuple(own.values()), tuple(map(sp.sympify, rates)), tuple(symbols.values()))
     system = nondimensional(model)
-    found = system.accelerations()
-    if law is not None and contact == "set-valued" and _jumps(law):
+    found = cancelled(system.accelerations())
+    state = (*system.coordinates, *system.velocities)
+    if law is None:
+        return Node(state, (*system.velocities, *found), tuple(symbols.values()))
+    if contact == "set-valued" and _jumps(law):
         return _sticking(system, found, law, tuple(symbols.values()))
-    if law is not None:
-        coefficient = friction_coefficient(law, contact)
-        found = tuple(e.replace(FRICTION, coefficient) for e in found)
-    return Node((*system.coordinates, *system.velocities), (*system.velocities, *found), tuple(symbols.values()))
+    coefficient = friction_coefficient(law, contact)
+    rates = (e.replace(FRICTION, coefficient) for e in found)
+    return Node(state, (*system.velocities, *rates), tuple(symbols.values()), law=coefficient(SLIDING))
 
 
 def _jumps(law: ModuleType) -> bool:
@@ -84,10 +87,11 @@ def _sticking(
     if len(found) != 1:
         raise ValueError(f"set-valued contact: the oscillator has {len(found)} coordinates; expected one")
     w = sp.Dummy("w", real=True)
-    coefficient = friction_coefficient(law, "set-valued")(w)
+    coefficient = friction_coefficient(law, "set-valued")
     (velocity,) = system.velocities
-    rate, contact = set_valued(found[0], FRICTION, coefficient, w, static_coefficient(law), velocity)
-    return Node((*system.coordinates, velocity, SLIP), (velocity, SLIP**2 * rate, sp.S.Zero), parameters, contact)
+    rate, contact = set_valued(found[0], FRICTION, coefficient(w), w, static_coefficient(law), velocity)
+    rates = (velocity, SLIP**2 * rate, sp.S.Zero)
+    return Node((*system.coordinates, velocity, SLIP), rates, parameters, contact, coefficient(SLIDING))
 
 
 def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str) -> None:
@@ -139,6 +143,7 @@ def mixed_network(
 
     Every pair of kinds that a link joins gets its own edge.  Raises ValueError where a coupling does not fit a pair.
     """
+    apart = Equations(singles[0], None, graph.n, (), varied, tuple(singles[1:]), tuple(kinds))
     links = graph.links if coupling is not None else ()
     pairs = sorted({(kinds[target], kinds[source]) for target, source, _ in links})
     joints = tuple(
@@ -146,7 +151,7 @@ def mixed_network(
     )
     if any(a == b and is_oriented(link) for (a, b), link in joints):
         raise ValueError(f"coupling {coupling!r} tells the ends of a link apart; expected nodes of one kind")
-    return Equations(singles[0], None, graph.n, links, varied, tuple(singles[1:]), tuple(kinds), joints)
+    return replace(apart, links=links, joints=joints)
 
 
 def connectivity(coupling: str, graph: Topology) -> tuple[tuple[Fraction, ...], ...]:

@@ -16,7 +16,7 @@ import hashlib
 import inspect
 import pkgutil
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache, wraps
 from importlib import import_module
@@ -161,7 +161,7 @@ def call(function: Callable[..., Any], symbols: Mapping[str, Any]) -> Any:
     for name in wanted:
         if name not in symbols:
             where = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
-            raise ValueError(f"{where} asks for {name!r}; known: {', '.join(symbols)}; declare it as a parameter")
+            raise ValueError(f"{where} asks for {name!r}; known: {', '.join(symbols)}{_instead(name, symbols)}")
     with blamed(function):
         return function(**{name: symbols[name] for name in wanted})
 
@@ -176,6 +176,14 @@ def blamed(function: Callable[..., Any]) -> Iterator[None]:
         if told is error:
             raise
         raise told from error
+
+
+def _instead(name: str, known: Iterable[str]) -> str:
+    """What to do about a name that a plug-in's function asks for in vain; the states of a link's ends have fixed names."""
+    ends = [other for other in known if other.endswith(("_i", "_j"))]
+    if ends and name.endswith(("_i", "_j")):
+        return f"; the ends of a link are {', '.join(ends)} whatever the coordinate is; use these names"
+    return "; correct the name or declare it as a parameter"
 
 
 def _home(kind: str) -> str:

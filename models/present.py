@@ -11,11 +11,9 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from .equations import TIME, Edge, Equations, Node
-from .frictions import CONTACTS
-from .nondimensional import FRICTION, friction_coefficient
+from .equations import SLIDING, TIME, Edge, Equations, Node
+from .nondimensional import FRICTION
 from .orientation import is_oriented
-from .plugins import load, names
 from .typeset import Latex, Style, Text, Writer
 
 __all__ = ["as_dict", "latex", "text"]
@@ -23,7 +21,6 @@ __all__ = ["as_dict", "latex", "text"]
 LARGEST = 6
 """Networks of more nodes are written once, for node i, instead of node by node."""
 
-SLIDING = sp.Symbol("w", real=True)
 WEIGHT = sp.Symbol("G_ij", real=True)
 
 
@@ -67,20 +64,11 @@ class _Named:
 
 def _name_law(node: Node) -> _Named:
     taken = {s.name for s in (*node.state, *node.parameters)}
-    if not taken & {SLIDING.name, "f"}:
-        for law in _laws(taken):
-            rhs = tuple(_with_law(e, law, node.state) for e in node.rhs)
-            if any(e.has(FRICTION) for e in rhs):
-                return _Named(rhs, law)
+    if node.law is not None and not taken & {SLIDING.name, "f"}:
+        rhs = tuple(_with_law(e, node.law, node.state) for e in node.rhs)
+        if any(e.has(FRICTION) for e in rhs):
+            return _Named(rhs, node.law)
     return _Named(node.rhs, None)
-
-
-def _laws(known: set[str]) -> Iterator[sp.Expr]:
-    """Every friction law whose parameters are known, as a function of SLIDING, with each contact."""
-    for name in names("friction"):
-        module = load("friction", name)
-        if set(module.PARAMETERS) <= known:
-            yield from (friction_coefficient(module, contact)(SLIDING) for contact in CONTACTS)
 
 
 def _with_law(e: sp.Expr, law: sp.Expr, state: tuple[sp.Symbol, ...]) -> sp.Expr:
@@ -138,7 +126,7 @@ def _in_slip(equations: Equations) -> Equations:
     node, edge = equations.node, equations.edge
     if node.contact is None or equations.mixed:
         return equations
-    plain = Node(node.state[:2], (node.rhs[0], node.contact.shown), node.parameters)
+    plain = Node(node.state[:2], (node.rhs[0], node.contact.shown), node.parameters, law=node.law)
     if edge is not None:
         one = {edge.here[2]: sp.S.One}
         edge = Edge(

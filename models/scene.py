@@ -111,6 +111,11 @@ class Scene:
         return derived(templates, kinds, self.contact, self.coupling, self.topology, self.varied)
 
     @property
+    def templates(self) -> tuple[tuple[str, str | None], ...]:
+        """(oscillator, friction law) of each kind of node that there is, in the order of their first nodes."""
+        return by_kind(self.oscillator, self.friction, self.nodes, self.n)[0]
+
+    @property
     def varied(self) -> tuple[str, ...]:
         """Names of the parameters that have a value for each node: `parameters` has them as a_1 … a_n."""
         return varied(self.parameters, model_parameters(self.model()))
@@ -228,8 +233,10 @@ class Scene:
         return from_dict(values)
 
     def __repr__(self) -> str:
-        kinds = {oscillator: None for oscillator, _ in by_kind(self.oscillator, self.friction, self.nodes, self.n)[0]}
-        names = [" and ".join(kinds), self.friction, self.coupling if self.topology.links else None]
+        oscillators, laws = (
+            " and ".join(dict.fromkeys(filter(None, own))) for own in zip(*self.templates, strict=True)
+        )
+        names = [oscillators, laws, self.coupling if self.topology.links else None]
         words = [repr(self.title)] if self.title else []
         words += [
             "/".join(name for name in names if name),

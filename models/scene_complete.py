@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import pkgutil
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from .coupling_matrix import canonical, is_matrix
@@ -20,11 +22,18 @@ from .scene_start import SEED_LIMIT, chosen_start, default_start, start
 from .scene_sweep import check_sweep, read_axes
 from .topology import Topology, topology
 
-__all__ = ["complete"]
+__all__ = ["complete", "integrators"]
 
 RECORDS = ("sync_error", "section", "trajectory")
 TIME_UNITS = ("period", "time")
+METHODS = Path(__file__).parents[1] / "codegen" / "integrators"
+"""The folder of the integrators, one file each; it is listed here, and read by the code generator alone."""
 TIME_LIMIT, STEP_LIMIT, SAMPLE_LIMIT = 1e9, 10**12, 10**8
+
+
+def integrators() -> tuple[str, ...]:
+    """Names of all integrators."""
+    return tuple(sorted(m.name for m in pkgutil.iter_modules([str(METHODS)]) if not m.name.startswith("_")))
 
 
 def complete(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -129,8 +138,11 @@ def _times(made: dict[str, Any]) -> None:
         made["time_unit"] = "time" if found.frequency is None else "period"
     made["time_unit"] = choice("time_unit", made["time_unit"], TIME_UNITS)
     if made["time_unit"] == "period" and found.frequency is None:
+        templates, _ = by_kind(made["oscillator"], made["friction"], made["nodes"], made["topology"].n)
+        names = " and ".join(dict.fromkeys(repr(oscillator) for oscillator, _ in templates))
+        whole = names if len(templates) == 1 else f"the network of {names}"
         raise ValueError(
-            f"time_unit: found 'period', but the oscillator {made['oscillator']!r} {found.problem}; "
+            f"time_unit: found 'period', but {whole} {found.problem}; "
             "expected 'time'; change it or leave it out"
         )
     for name in ("transient", "window"):
@@ -140,9 +152,7 @@ def _times(made: dict[str, Any]) -> None:
 
 
 def _numerics(made: dict[str, Any]) -> None:
-    made["integrator"] = text("integrator", made["integrator"])
-    if not made["integrator"].isidentifier():
-        raise ValueError(f"integrator: found {shown(made['integrator'])}; expected 'auto' or a name such as 'rodas5p'")
+    made["integrator"] = choice("integrator", made["integrator"], ("auto", *integrators()))
     made["rtol"] = number("rtol", made["rtol"], 1e-15, 0.1)
     made["atol"] = made["rtol"] / 10 if made["atol"] is None else number("atol", made["atol"], 0.0, 0.1)
     if made["atol"] < 1e-300:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from .plugins import load
+from .scene_parameters import at_nodes
 
 __all__ = ["check_friction"]
 
@@ -13,21 +14,19 @@ __all__ = ["check_friction"]
 def check_friction(made: Mapping[str, Any]) -> None:
     """Raise ValueError for set-valued friction with a static coefficient below that of slip, which can neither hold nor
     slip: a law names such pairs in ORDER, the smaller parameter first."""
-    if made["friction"] is None or made["contact"] != "set-valued":
+    if made["contact"] != "set-valued":
         return
+    for _, friction, own in at_nodes(made, {name: name for name in made["parameters"]}):
+        if friction is not None:
+            for low, high in getattr(load("friction", friction), "ORDER", ()):
+                _check_order(made, friction, own[low], own[high])
+
+
+def _check_order(made: Mapping[str, Any], friction: str, low: str, high: str) -> None:
+    """Compare two parameters in all cells."""
     axes = {axis.name: axis.values for axis in made["axes"]}
-    for low, high in getattr(load("friction", made["friction"]), "ORDER", ()):
-        lows, highs = (_values(made, axes, name) for name in (low, high))
-        together = made["zipped"] and low in axes and high in axes
-        pairs = zip(lows, highs, strict=True) if together else ((max(lows), min(highs)),)
-        for a, b in pairs:
-            if b < a:
-                raise ValueError(
-                    f"friction {made['friction']}: found {high} = {b!r} below {low} = {a!r}; expected {low} <= {high}"
-                )
-
-
-def _values(made: Mapping[str, Any], axes: Mapping[str, tuple[float, ...]], name: str) -> tuple[float, ...]:
-    """The values of a parameter in all cells, and at all nodes where these differ."""
-    own = (key for key in made["parameters"] if key == name or key.rpartition("_")[0] == name)
-    return tuple(value for key in own for value in axes.get(key, (made["parameters"][key],)))
+    lows, highs = (axes.get(name, (made["parameters"][name],)) for name in (low, high))
+    together = made["zipped"] and low in axes and high in axes
+    for a, b in zip(lows, highs, strict=True) if together else ((max(lows), min(highs)),):
+        if b < a:
+            raise ValueError(f"friction {friction}: found {high} = {b!r} below {low} = {a!r}; expected {low} <= {high}")

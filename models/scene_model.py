@@ -80,11 +80,11 @@ def check_links(made: Mapping[str, Any]) -> None:
 
     if not made["topology"].links or made["coupling"] is None:
         return
-    if made["nodes"]:
-        templates, kinds = by_kind(made["oscillator"], made["friction"], made["nodes"], made["topology"].n)
+    templates, kinds = by_kind(made["oscillator"], made["friction"], made["nodes"], made["topology"].n)
+    if kinds:
         derived(templates, kinds, made["contact"], made["coupling"], made["topology"])
     else:
-        check_coupling(made["coupling"], node(made["oscillator"], made["friction"], made["contact"]))
+        check_coupling(made["coupling"], node(*templates[0], made["contact"]))
 
 
 def components(made: Mapping[str, Any]) -> tuple[str, ...]:
@@ -93,12 +93,13 @@ def components(made: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def coordinate_names(made: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the names of the coordinates of one oscillator, those components that have a velocity."""
+    """Return the names of the coordinates of a scene's oscillators, those components that have a velocity."""
     from .nondimensional import coordinates
     from .plugins import load
 
-    model = load("oscillator", made["oscillator"])
-    return () if hasattr(model, "field") else tuple(coordinates(model))
+    templates, _ = by_kind(made["oscillator"], made["friction"], made["nodes"], made["topology"].n)
+    models = [load("oscillator", oscillator) for oscillator, _ in templates]
+    return tuple(dict.fromkeys(name for model in models if not hasattr(model, "field") for name in coordinates(model)))
 
 
 def model_parameters(made: Mapping[str, Any]) -> Frozen[Parameter]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from .parameter import Parameter
 from .scene_checks import Frozen, shown, table
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from .periodicity import Drive
 
 __all__ = ["at_nodes", "collected", "drive", "known_name", "node_parameter", "parameters", "varied", "without"]
+
+T = TypeVar("T")
 
 
 def node_parameter(made: Mapping[str, Any], name: str) -> tuple[str, int] | None:
@@ -120,10 +122,11 @@ def varied(values: Mapping[str, float], known: Iterable[str]) -> tuple[str, ...]
     return tuple(name for name in known if name not in values)
 
 
-def at_nodes(
-    made: Mapping[str, Any], values: Mapping[str, float]
-) -> Iterator[tuple[str, str | None, dict[str, float]]]:
-    """Yield (oscillator, friction law, parameters) of every node that differs from those before; `values` as in a scene."""
+def at_nodes(made: Mapping[str, Any], values: Mapping[str, T]) -> Iterator[tuple[str, str | None, dict[str, T]]]:
+    """Yield (oscillator, friction law, parameters) of every node that differs from those before.
+
+    The keys of `values` are the parameters of the scene (a, or a_1 … a_n), those of what is yielded the node's own (a).
+    """
     templates, kinds = by_kind(made["oscillator"], made["friction"], made["nodes"], made["topology"].n)
     known = model_parameters(made)
     own = {name: dict.fromkeys(_holders(made, name)) for name in known if name not in values}

@@ -51,13 +51,10 @@ def _stiff_springs(scene: Scene) -> list[str]:
 
 def _vanishes(scene: Scene) -> bool:
     from .coupling_matrix import is_matrix
-    from .network import edge
-    from .scene_model import node
 
     if scene.coupling is None or is_matrix(scene.coupling) or scene.equations.mixed:
         return True
-    single = node(scene.oscillator, scene.friction, scene.contact)
-    return edge(scene.coupling, single, scene.oscillator).diffusive
+    return all(edge.diffusive for edge in scene.equations.edges)
 
 
 def warnings(scene: Scene) -> tuple[str, ...]:

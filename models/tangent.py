@@ -277,4 +277,4 @@ def _extend(node: Node, coupling: sp.Matrix, parameters: tuple[sp.Symbol, ...]) 
     for i, rhs in enumerate(node.rhs):
         slopes = (derivative(rhs, s) + coupling[i, j] for j, s in enumerate(node.state))
         rows.append(sp.Add(*(slope * d for slope, d in zip(slopes, names, strict=True))))
-    return Node((*node.state, *names), (*node.rhs, *rows), (*node.parameters, *parameters))
+    return Node((*node.state, *names), (*node.rhs, *rows), (*node.parameters, *parameters), law=node.law)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 import sympy as sp
@@ -10,10 +10,13 @@ import sympy as sp
 from .calculus import derivative
 from .contact import SLIP, Contact
 
-__all__ = ["TIME", "Edge", "Link", "Node"]
+__all__ = ["SLIDING", "TIME", "Edge", "Link", "Node"]
 
 TIME = sp.Symbol("t", real=True)
 """Non-dimensional time, the one time symbol of all equations."""
+
+SLIDING = sp.Symbol("w", real=True)
+"""The sliding velocity, the argument of a friction law."""
 
 Link = tuple[int, int, Fraction]
 """(target, source, weight): node `target` feels node `source`; indices start at 0."""
@@ -25,13 +28,15 @@ class Node:
 
     Raises ValueError where the right-hand side uses a symbol that is not declared, contains a floating-point number
     (numbers are parameters or rationals), has not one entry for each state symbol, or where two names are the same.
-    With set-valued friction (`contact`) the third state is the mode, which only events change.
+    With set-valued friction (`contact`) the third state is the mode, which only events change.  `law` is the friction
+    coefficient as a function of `SLIDING`, None where the model has no friction law; it is for printing alone.
     """
 
     state: tuple[sp.Symbol, ...]
     rhs: tuple[sp.Expr, ...]
     parameters: tuple[sp.Symbol, ...]
     contact: Contact | None = None
+    law: sp.Expr | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         _differ("node", (TIME, *self.state, *self.parameters))

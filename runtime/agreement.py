@@ -21,6 +21,7 @@ from synchain.models.scene import Scene
 from synchain.models.topology import Topology
 
 from .exponent import Exponents, exponents
+from .keywords import with_parameters
 from .threshold import Criterion, check_probe, simulate
 
 __all__ = ["CAUSES", "OUTCOMES", "Agreement", "Cell", "agreement", "strengths"]
@@ -116,8 +117,9 @@ def agreement(
     without it they are computed.  Raises ValueError for a line that lacks a strength, for a sigma that is negative or not
     finite or does not increase, and as `strengths` does.
     """
+    fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ("sync_error",)}
+    scene = with_parameters(agreement, scene, parameters, **fixed)
     check_probe(scene.topology, scene.spectrum)
-    scene = scene.replace(axes=(), zipped=False, continuation="none", record=("sync_error",), **parameters)
     grid = np.atleast_1d(np.asarray(sigma, dtype=float))
     if grid.ndim != 1 or not (np.all(np.isfinite(grid)) and np.all(np.diff(grid) > 0.0) and np.all(grid >= 0.0)):
         raise ValueError("sigma: expected finite numbers from 0 up that increase")

@@ -19,6 +19,7 @@ from synchain.models.expect import a_scene, whole
 from synchain.models.scene import Scene
 from synchain.models.scene_checks import number, table
 
+from .keywords import with_parameters
 from .plan import Planner
 from .progress import Hook
 from .rows import row
@@ -121,10 +122,8 @@ def basin(
     confidence or time that makes no sense; TypeError for a number of samples that is not whole.
     """
     _check(scene, samples, tolerance, confidence, seed)
-    scene = scene.replace(
-        axes=(), zipped=False, continuation="none", record=("sync_error",), transient=transient, window=window,
-        **parameters,
-    )  # fmt: skip
+    fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ("sync_error",)}
+    scene = with_parameters(basin, scene, parameters, **fixed, transient=transient, window=window)
     cells = _started(scene, _box(scene, ranges), samples, seed)
     chosen = replace(decide(cells, skip=False), jumps=True)
     result = run(cells, skip=chosen, workers=workers, executor=executor, show_progress=show_progress, progress=progress)

@@ -105,7 +105,7 @@ def cluster_exponents(
     an integration fails.
     """
     precision, periods, transient, seed = averaging(precision, periods, transient, seed)
-    scene = one_cell(scene, rtol, parameters)
+    scene = one_cell(cluster_exponents, scene, rtol, parameters)
     found = _of_graph(scene, state)
     variation, unit = clustered(scene.equations, found), unit_of_time(scene)
     carrier = _carrier(scene, found, variation, seed)

@@ -12,8 +12,9 @@ Sources: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); Benettin, Galgani, 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -24,6 +25,7 @@ from synchain.models.topology import topology
 
 from .attractor import Attractor, find_attractor
 from .intervals import Interval
+from .keywords import with_parameters
 from .orbits import Orbits
 from .rows import averaging
 from .rows import row as row_of
@@ -111,7 +113,7 @@ def exponents(
     Raises ValueError for a network without coupling or a coupling without synchronous state, and for time dependence
     without a known period; FloatingPointError where an integration fails.
     """
-    scene, strengths = single(scene, rtol, parameters), row_of("alpha", alpha, complex_too=True)
+    scene, strengths = single(exponents, scene, rtol, parameters), row_of("alpha", alpha, complex_too=True)
     precision, periods, transient, seed = averaging(precision, periods, transient, seed)
     orbits = Orbits.make(scene, strengths, several_starts(scene, starts, seed), worker_count(workers))
     orbits.settle(transient)
@@ -139,17 +141,19 @@ def _by_start(
     return found, error, length
 
 
-def single(scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
+def single(function: Callable[..., Any], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
     """The scene with fixed parameters and without records; a lone oscillator gets a partner, so that it has a
     coupling."""
     graph = scene.topology if a_scene(scene).topology.links else topology("chain", 2)
-    return one_cell(scene.replace(topology=graph, axes=(), zipped=False, continuation="none"), rtol, parameters)
+    coupled = scene.replace(topology=graph, axes=(), zipped=False, continuation="none")
+    return one_cell(function, coupled, rtol, parameters)
 
 
-def one_cell(scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
-    """A single cell of the scene without records, with fixed parameters; TypeError where it is no Scene."""
-    return a_scene(scene).replace(
-        axes=(), zipped=False, continuation="none", record=(), rtol=rtol, atol=None, **parameters
+def one_cell(function: Callable[..., Any], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
+    """A single cell of the scene without records, with parameters that `function` was given; TypeError where it is no
+    Scene."""
+    return with_parameters(
+        function, scene, parameters, axes=(), zipped=False, continuation="none", record=(), rtol=rtol, atol=None
     )
 
 

@@ -103,7 +103,7 @@ def lyapunov_spectrum(
     without a known period; FloatingPointError where an integration fails.
     """
     precision, periods, transient, seed = averaging(precision, periods, transient, seed)
-    scene = one_cell(scene, rtol, parameters)
+    scene = one_cell(lyapunov_spectrum, scene, rtol, parameters)
     walk = Walk.make(scene, _counted(scene, count), seed)
     for _ in range(round(transient)):
         walk.advance()

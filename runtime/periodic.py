@@ -10,20 +10,20 @@ Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (S
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from numbers import Integral, Real
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
 from synchain.models.contact import SLIP
-from synchain.models.expect import a_scene
 from synchain.models.scene import Scene
 from synchain.models.scene_checks import shown
 
 from .attractor import over_one_cycle
-from .exponent import single
+from .exponent import one_cell, single
 from .orbits import Orbits, unit_of_time
 from .phases import Phases, phases_of
 
@@ -96,7 +96,7 @@ def periodic_orbit(
     Raises ValueError for an oscillator that is not driven, periods out of range, an unknown parameter or a start that is not
     a state, ArithmeticError where Newton's method does not converge.
     """
-    scene = _driven(scene, parameters)
+    scene = _driven(periodic_orbit, scene, parameters)
     check_periods(periods)
     state = _settled(scene) if start is None else _state(scene, start)
     best, steps, kept = np.inf, 0, state
@@ -132,30 +132,26 @@ def check_periods(periods: object) -> None:
 
 def orbit_through(scene: Scene, periods: int, state: np.ndarray, **parameters: float) -> PeriodicOrbit:
     """The orbit through a state (components,) that is known to return to itself; its residual says how well."""
-    scene = _driven(scene, parameters)
+    scene = _driven(orbit_through, scene, parameters)
     image, matrix = _strobe(scene, state, periods, 0.0)
     return PeriodicOrbit(scene, periods, state, _sorted(matrix), float(np.abs(image[: len(state)] - state).max()), 0)
 
 
 def strobe(scene: Scene, state: np.ndarray, periods: int, **parameters: float) -> tuple[np.ndarray, np.ndarray]:
     """The state (components,) some drive periods later, and its derivative (components, components) by the first one."""
-    image, matrix = _strobe(_driven(scene, parameters), state, periods, 0.0)
+    image, matrix = _strobe(_driven(strobe, scene, parameters), state, periods, 0.0)
     return image[: len(state)], matrix
 
 
-def _driven(scene: Scene, parameters: dict[str, float]) -> Scene:
+def _driven(function: Callable[..., Any], scene: Scene, parameters: dict[str, float]) -> Scene:
     """The scene with its parameters, to the tolerance of orbits; ValueError where it is not driven."""
-    scene = a_scene(scene)
-    unknown = next((name for name in parameters if name not in scene.parameters), None)
-    if unknown is not None:
-        raise ValueError(f"unknown parameter {unknown!r}; known: {', '.join(scene.parameters)}")
-    scene = single(scene, TOLERANCE, parameters)
+    scene = one_cell(function, scene, TOLERANCE, parameters)
     unit_of_time(scene)
     if not scene.period:
         raise ValueError(
             "periodic orbits are looked for on the stroboscopic map of a drive; found an oscillator without one"
         )
-    return scene
+    return single(function, scene, TOLERANCE, {})
 
 
 def _settled(scene: Scene) -> np.ndarray:

@@ -47,7 +47,7 @@ def skeleton(
     grid = sorted(checked_values(a_scene(scene), name, values))
     if isinstance(periods, Integral | str) or len(periods) == 0:
         raise ValueError(f"periods = {shown(periods)}; expected numbers of drive periods, e.g. (1, 2)")
-    scene = single(scene, TOLERANCE, {})
+    scene = single(skeleton, scene, TOLERANCE, {})
     if not isinstance(looks, Integral) or looks < 1:
         raise ValueError(f"looks = {shown(looks)}; expected a whole number, at least 1")
     for each in periods:
@@ -71,7 +71,7 @@ def skeleton(
 
 def near_returns(scene: Scene, periods: Sequence[int], **parameters: float) -> list[PeriodicOrbit]:
     """The periodic orbits of these numbers of drive periods that motions from several starts nearly return to, each once."""
-    scene = single(scene, TOLERANCE, parameters)
+    scene = single(near_returns, scene, TOLERANCE, parameters)
     path = _path(scene)
     found: list[PeriodicOrbit] = []
     for count in periods:

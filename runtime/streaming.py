@@ -70,7 +70,7 @@ def stream(
     Raises the errors of `claim` where the files do not allow it, SweepInterrupted on Ctrl-C, SweepFailed where the workers
     are lost or the disk is full.
     """
-    chosen = chosen_skip(scene := with_axes(scene, axes), skip)
+    chosen = chosen_skip(scene := with_axes(scene, axes, stream), skip)
     reporter = Reporter(scene.cells, show_progress, progress)
     crew_size(executor, workers)  # refuses what is no executor before there is a file
     if (state := claim(chosen, path, resume=resume, overwrite=overwrite, certified=certified)) == "complete":

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from synchain.models.expect import a_scene, instance
 from synchain.models.scene import Scene
-from synchain.models.scene_checks import number, suggestion
+from synchain.models.scene_checks import number
 
 from .crew import Task, worker_lost
 from .kernels import kernel, kernel_source
+from .keywords import check_keywords
 from .layout import Layout
 from .plan import plan
 from .progress import Hook, Reporter
@@ -162,8 +163,8 @@ def _fits(scene: Scene, numbers: int) -> None:
         )
 
 
-def with_axes(scene: Scene, axes: dict[str, Any]) -> Scene:
-    """The scene with parameters fixed by numbers and axes set by sequences."""
+def with_axes(scene: Scene, axes: dict[str, Any], function: Callable[..., Any] = run) -> Scene:
+    """The scene with parameters fixed by numbers and axes set by sequences, as the `function` takes them."""
     fixed: dict[str, Any] = {}
     swept: dict[str, Any] = {axis.name: axis.values for axis in a_scene(scene).axes}
     start = {name: list(values) for name, values in scene.initial.items()}
@@ -177,12 +178,7 @@ def with_axes(scene: Scene, axes: dict[str, Any]) -> Scene:
         else:
             fixed[name] = value
             swept.pop(name, None)
-    settings = {setting.name for setting in fields(Scene)}
-    unknown = [name for name in fixed if not scene.takes(name) and name not in settings]
-    if unknown:
-        known = (*scene.parameters, *scene.equations.state)
-        close = suggestion(unknown[0], known)
-        raise ValueError(f"unknown parameter or initial state {unknown[0]!r}; known: {', '.join(known)}{close}")
+    check_keywords(function, scene, fixed, scene.equations.state)
     if axes:
         scene = scene.replace(axes=swept, initial=start, **fixed)
     return scene

@@ -21,6 +21,7 @@ from synchain.models.spectrum import Spectrum
 from synchain.models.topology import Topology, topology
 
 from .intervals import Interval, find, intersect, scale
+from .keywords import with_parameters
 from .progress import Hook
 from .rows import row
 from .status import Status
@@ -132,7 +133,7 @@ def thresholds(
     for links with inertia.
     """
     a_scene(scene).equations.expect_alike("thresholds")
-    scene = scene.replace(axes=(), zipped=False, continuation="none", record=(), **parameters)
+    scene = with_parameters(thresholds, scene, parameters, axes=(), zipped=False, continuation="none", record=())
     criterion = checked(criterion)
     spectrum = scene.topology.spectrum
     check_probe(scene.topology, spectrum)

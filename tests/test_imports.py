@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ast
 import importlib
+import re
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from dataclasses import is_dataclass
 from pathlib import Path
@@ -113,6 +115,20 @@ def loaded_by(statement: str) -> set[str]:
 )
 def test_start_loads_only_what_it_needs(statement: str, absent: set[str]) -> None:
     assert loaded_by(statement) & absent == set()
+
+
+def test_every_package_that_is_imported_is_declared() -> None:
+    """Peers of the benchmark and the extra `dask` aside, which may be missing."""
+    found = {
+        name.partition(".")[0]
+        for room in ROOMS
+        for path in sources(room)
+        if path.parent.name != "peers"
+        for _, name in imported(path, ast.parse(path.read_text("utf-8")))
+    }
+    project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text("utf-8"))["project"]
+    declared = {re.match("[a-z-]+", line).group().removeprefix("python-") for line in project["dependencies"]}
+    assert found - sys.stdlib_module_names - OURS - {"distributed"} == declared
 
 
 def test_the_package_offers_its_names_on_first_use() -> None:

@@ -16,6 +16,7 @@ from samples import DIGITS, plain, take_step, waving
 from synchain.codegen import integrators
 from synchain.codegen.emit import emit
 from synchain.codegen.integrators import Integrator
+from synchain.models import scene_complete
 
 METHODS = {name: m for name in integrators.names() if (m := integrators.integrator(name)).smooth is None}
 ROUNDING = {"rosenbrock": 4e-14, "explicit": 2e-14}
@@ -311,3 +312,7 @@ def test_a_switching_integrator_is_the_two_it_names():
     assert (m.a, m.b, m.c, m.e, m.gamma, m.order) == (stiff.a, stiff.b, stiff.c, stiff.e, stiff.gamma, stiff.order)
     assert stiff.source in m.source
     assert smooth.source in m.source
+
+
+def test_scenes_know_the_integrators_that_there_are():
+    assert scene_complete.integrators() == integrators.names()

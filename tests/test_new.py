@@ -135,7 +135,7 @@ def test_a_scene_file_runs_code_only_with_the_option(law: Path, capsys: pytest.C
     assert main(["equations", str(scene)]) == 2
     assert "--allow-code" in capsys.readouterr().err
     assert main(["equations", str(scene), "--allow-code", str(law)]) == 0
-    assert "x'' = -x + 2 ε μ_0 atan(κ (ϑ_b - x'))/(π (1 + |ϑ_b - x'|/w_0))" in capsys.readouterr().out
+    assert "ε f(ϑ_b - χ')\nf(w) = 2 μ_0 atan(κ w)/(π (1 + |w|/w_0))\n" in capsys.readouterr().out
     assert main(["equations", str(scene), "--allow-code", str(law.parent)]) == 2
 
 
@@ -161,6 +161,17 @@ def test_an_error_names_file_and_line(law: Path, old: str, new: str, words: str)
     with pytest.raises(ValueError, match=words) as caught:
         _ = Scene(friction=str(law)).equations
     assert "my_law" in str(caught.value)
+
+
+def test_a_name_that_no_file_can_declare_is_not_asked_for_as_a_parameter() -> None:
+    def potential(x_i: Any, sigma: Any) -> Any:
+        return sigma * x_i
+
+    known = {"q_i": 1, "q_j": 2, "weight": 3}
+    with pytest.raises(ValueError, match=r"asks for 'x_i'; .*; the ends of a link are q_i, q_j .*; use these names$"):
+        plugins.call(potential, {**known, "sigma": 4})
+    with pytest.raises(ValueError, match=r"asks for 'sigma'; .*; correct the name or declare it as a parameter$"):
+        plugins.call(potential, {**known, "x_i": 1})
 
 
 def test_entry_points_are_plug_ins(law: Path, monkeypatch: pytest.MonkeyPatch) -> None:

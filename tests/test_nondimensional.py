@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from random import Random
 from types import ModuleType
 
 import pytest
@@ -14,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from synchain.models import oscillators
+from synchain.models.calculus import cancelled, operations
 from synchain.models.equations import TIME
 from synchain.models.network import edge, node, parameters
 from synchain.models.nondimensional import FRICTION, nondimensional, physical, scale
@@ -148,6 +150,29 @@ def scales(m, l, g): return {"kg": m, "m": l, "s": sp.sqrt(l / g)}
 )
 
 
+HARDENING = (
+    HEADER
+    + """
+PARAMETERS = {"beta": Parameter(1.0, "N/m^3", "hardening"), "delta": Parameter(0.1, "N*s/m", "damping")}
+PHYSICAL, UNITS = {"beta": "K", "delta": "d"}, {"m": "kg", "k": "N/m", "l": "m"}
+def kinetic(v, m): return m * v**2 / 2
+def potential(x, k, K): return k * x**2 / 2 + K * x**4 / 4
+def dissipation(v, d): return d * v**2 / 2
+def scales(m, k, l): return {"kg": m, "m": l, "s": sp.sqrt(m / k)}
+"""
+)
+HEAVY = (
+    HEADER
+    + """
+PARAMETERS = {"m": Parameter(2.0, "kg", "mass"), "g": Parameter(9.8, "m/s^2", "gravity"),
+              "c": Parameter(0.1, "1/s", "damping")}
+def kinetic(v, m): return m * v**2 / 2
+def potential(x, m, g): return -m * g * sp.cos(x)
+def dissipation(v, m, c): return m * c * v**2 / 2
+"""
+)
+
+
 @pytest.fixture
 def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str, str], ModuleType]]:
     """A function that puts one more file into the folder of the oscillators, as far as Python can see."""
@@ -188,6 +213,42 @@ def test_an_angle_scales_like_an_angle(plug_in: Callable[[str, str], ModuleType]
     delta = sp.Symbol("delta", real=True)
     assert node("hanging").rhs == (v, -sp.sin(x) - delta * v)
     assert parameters("hanging")["delta"].scale in {"sqrt(g)*l**(3/2)*m", "g**(1/2)*l**(3/2)*m", "l**(3/2)*sqrt(g)*m"}
+
+
+def test_equations_keep_no_common_factors(plug_in: Callable[[str, str], ModuleType]) -> None:
+    for name, body in (("hardening", HARDENING), ("heavy", HEAVY)):
+        plug_in(name, body)
+    beta, delta, g, c = sp.symbols("beta delta g c", real=True)
+    assert node("hardening").rhs == (v, -beta * x**3 - delta * v - x)
+    assert node("heavy").rhs == (v, -c * v - g * sp.sin(x))
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in names("oscillator") if not hasattr(load("oscillator", name), "field")]
+)
+def test_cancelling_changes_the_text_of_an_equation_alone(name: str) -> None:
+    """The rates of a node against those that the Euler-Lagrange equations give, at random places."""
+    system = nondimensional(load("oscillator", name))
+    derived = system.accelerations()
+    found = cancelled(derived)
+    assert operations(found) <= operations(derived)
+    forms = (derived, found, tuple(map(sp.cancel, derived)) if len(derived) == 1 else found)
+    symbols = sorted(set().union(*(e.free_symbols for e in derived)), key=str)
+    functions = [sp.lambdify(symbols, form, [{"f": math.tanh}, "math"]) for form in forms]
+    random = Random(name)
+    for _ in range(20):
+        place = [random.uniform(0.1, 2.0) for _ in symbols]
+        expected = functions[0](*place)
+        for function in functions[1:]:
+            assert function(*place) == pytest.approx(expected, rel=1e-13, abs=1e-13)
+
+
+def test_long_equations_and_shorter_ones_stay_as_they_were_derived() -> None:
+    mu = sp.Symbol("mu", real=True)
+    short = (mu * (1 - x**2) * v - x,)
+    assert cancelled(short) == short
+    long = (sp.Add(*(sp.Symbol(f"a_{k}", real=True) * x * v / v.func(f"b_{k}") for k in range(99))) * v / (x * v),)
+    assert cancelled(long) == long
 
 
 @pytest.mark.parametrize(

@@ -220,6 +220,8 @@ def test_a_coupling_on_one_coordinate_leaves_the_others_alone() -> None:
         scene.replace(coupling="spring on phi, phi")
     with pytest.raises(ValueError, match="unknown coordinate 'v'; known: x; name coordinates"):
         Scene(topology=chain(2), coupling="spring on v", contact="set-valued")
+    with pytest.raises(ValueError, match=r"found oscillators without coordinates, .* by components, e\.g\. 'x->x'"):
+        Scene(oscillator="lorenz", topology=chain(2), coupling="torsion on theta")
 
 
 def test_a_full_mass_matrix_reaches_the_master_stability_function() -> None:

@@ -166,7 +166,7 @@ def test_what_is_refused() -> None:
         (
             lambda s, o: periodic_orbit(s, 2, omga=1.0),
             ValueError,
-            "unknown parameter 'omga'; known: theta_b, epsilon, u",
+            "unknown parameter or keyword 'omga' of periodic_orbit; known: theta_b, epsilon, u",
         ),
         (
             lambda s, o: periodic_orbit(s, 2, [0.1]),

@@ -85,6 +85,15 @@ def test_links_of_a_node_are_gathered() -> None:
     assert lines[2].endswith(" + σ (χ_1' - χ_3')")
 
 
+def test_a_law_is_named_only_where_the_model_has_one() -> None:
+    """The membrane has the term c (sum) and a parameter c, which is also that of viscous friction."""
+    nerve = made(topology("chain", 1), "fitzhugh_nagumo", None, coupling=None)
+    assert text(nerve).splitlines() == ["x' = c (current + x + y - (1/3) x³)", "y' = (a - x - b y)/c"]
+    x, v, mu, kappa = (sp.Symbol(name, real=True) for name in ("x", "v", "mu", "kappa"))
+    smooth = Equations(Node((x, v), (v, 2 * mu * sp.atan(kappa * (x - v)) / sp.pi), (mu, kappa)), None, 1)
+    assert text(smooth).splitlines() == ["x'' = (2/π) μ atan(κ (x - x'))"]
+
+
 # -- other oscillators ---------------------------------------------------------------------------------------
 
 

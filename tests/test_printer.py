@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import math
+import re
+from pathlib import Path
 
 import mpmath
 import pytest
@@ -211,3 +213,10 @@ def test_every_function_is_printed_and_exists():
         arguments = (x, y) if kind in (sp.Max, sp.Min) else (x,)
         assert show(kind(*arguments)).startswith(f"{name}(")
         assert hasattr(elementary, name) or hasattr(lanes, name)
+
+
+def test_the_page_on_plug_ins_names_every_function_that_can_be_compiled():
+    page = (Path(__file__).parents[1] / "docs" / "plugins.md").read_text("utf-8")
+    section = page.partition("## Functions that can be compiled")[2]
+    named = re.findall("`([A-Za-z]+)`", section.partition("SymPy")[0])
+    assert sorted(named) == sorted(kind.__name__ for kind in FUNCTIONS)

@@ -258,3 +258,62 @@ def test_a_star_of_two_kinds_may_be_one_way() -> None:
     made = mixed(topology=graph, nodes=[{"oscillator": "van_der_pol", "at": [1]}])
     assert [pair for pair, _ in made.equations.joints] == [(1, 0)]
     assert star(3).n == made.n
+
+
+# -- oscillators and laws that `nodes` gives alone -------------------------------------------------------------------
+
+STATIC = {"oscillator": "friction", "friction": "coulomb_static", "at": [1, 2]}
+BOTH = {"nodes": [STATIC], "topology": chain(2), "contact": "set-valued"}
+
+
+def test_a_law_that_nodes_give_is_checked_as_that_of_the_scene() -> None:
+    wrong = {"parameters": {"mu_s": 0.1, "mu_k": 0.3}}
+    refusal = "friction coulomb_static: found mu_s = 0.1 below mu_k = 0.3"
+    with pytest.raises(ValueError, match=refusal):
+        Scene(friction="coulomb_static", topology=chain(2), contact="set-valued", **wrong)
+    with pytest.raises(ValueError, match=refusal):
+        Scene(**BOTH, **wrong)
+    unused = {"friction": "coulomb_static", "nodes": [{**STATIC, "friction": "coulomb"}]}
+    assert "mu_s" not in Scene(**{**BOTH, **unused}).parameters
+
+
+def test_static_and_sliding_friction_are_compared_node_by_node() -> None:
+    Scene(**BOTH, parameters={"mu_s": [0.2, 0.4], "mu_k": [0.1, 0.3]})
+    with pytest.raises(ValueError, match=r"found mu_s_1 = 0\.2 below mu_k_1 = 0\.25"):
+        Scene(**BOTH, parameters={"mu_s": [0.2, 0.4], "mu_k": [0.25, 0.3]})
+    with pytest.raises(ValueError, match=r"found mu_s_2 = 0\.2 below mu_k = 0\.3"):
+        Scene(**BOTH, parameters={"mu_s": [0.5, 0.4], "mu_k": 0.3}, axes={"mu_s_2": [0.2, 0.6]})
+
+
+def test_coordinates_are_those_of_the_nodes() -> None:
+    pendulums = [{"oscillator": "double_pendulum", "at": [1, 2]}]
+    by_nodes = Scene(nodes=pendulums, topology=chain(2), coupling="spring on phi")
+    assert (
+        by_nodes.equations == Scene(oscillator="double_pendulum", topology=chain(2), coupling="spring on phi").equations
+    )
+    with pytest.raises(ValueError, match="unknown coordinate 'x'; known: phi, psi"):
+        Scene(nodes=pendulums, topology=chain(2), coupling="spring on x")
+
+
+def test_the_repr_names_the_laws_of_the_nodes() -> None:
+    assert repr(Scene(**BOTH)) == "Scene(friction/coulomb_static/spring, chain(2))"
+    one = {**STATIC, "at": [2]}
+    assert (
+        repr(Scene(nodes=[one], topology=chain(2))) == "Scene(friction/exponential and coulomb_static/spring, chain(2))"
+    )
+
+
+def test_what_is_not_driven_is_named_as_the_nodes_are() -> None:
+    with pytest.raises(ValueError, match="found 'period', but 'lorenz' is not driven"):
+        Scene(nodes=[{"oscillator": "lorenz", "at": [1]}], time_unit="period")
+
+
+def test_the_warning_of_a_coupling_that_does_not_vanish_reads_the_oscillator_of_the_nodes() -> None:
+    pendulums = [{"oscillator": "double_pendulum", "at": [1, 2]}]
+    assert Scene(nodes=pendulums, topology=chain(2), coupling="spring on phi").warnings == ()
+
+
+def test_set_valued_friction_beside_another_kind_is_refused_by_the_scene() -> None:
+    for other in ({"oscillator": "harmonic"}, {"oscillator": "friction", "friction": "viscous"}):
+        with pytest.raises(ValueError, match="several kinds: found set-valued friction; expected smooth contacts"):
+            Scene(contact="set-valued", topology=chain(2), nodes=[{**other, "at": [2]}])

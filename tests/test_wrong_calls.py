@@ -16,6 +16,7 @@ from synchain import models, runtime
 from synchain.models import Scene, Section, Spectrum, Topology, chain, star
 from synchain.models.clusters import clusters, orbital_partitions
 from synchain.models.energy import energy
+from synchain.runtime.agreement import agreement
 from synchain.runtime.energy import energy_function
 from synchain.runtime.sweep import with_axes, worker_count
 from synchain.runtime.threshold import Criterion
@@ -79,7 +80,7 @@ CALLS = [
     (lambda: runtime.run(PAIR, sigma=[[1, 2], [3]]), r"axis sigma: found \[1, 2\]"),
     (lambda: runtime.run(PAIR, sigma={1, 2}), "found a set, which has no order"),
     (lambda: runtime.run(PAIR, x_1=None), "x_1: found None"),
-    (lambda: runtime.run(PAIR, lanes=4), "unknown parameter or initial state 'lanes'"),
+    (lambda: runtime.run(PAIR, lanes=4), "unknown parameter or keyword 'lanes' of run; known: sigma, x_1"),
     (lambda: runtime.run(PAIR, workers=1.5), r"workers = 1\.5; expected a whole number"),
     (lambda: runtime.run(PAIR, workers="2"), "workers = '2'"),
     (lambda: runtime.run(PAIR, workers=True), "workers = True"),
@@ -114,7 +115,21 @@ CALLS = [
     (lambda: runtime.basin(PAIR, tolerance="a"), "tolerance: 'a'"),
     (lambda: runtime.basin(PAIR, seed=-1), "seed = -1"),
     (lambda: runtime.basin(PAIR, samples=10**12), "samples = 1000000000000; expected at most 10000000"),
-    (lambda: runtime.basin(PAIR, smaples=3), "unknown parameter or keyword 'smaples'"),
+    (lambda: runtime.basin(PAIR, smaples=3), "unknown parameter or keyword 'smaples' of basin.*did you mean 'samples'"),
+    (lambda: runtime.run(PAIR, worker=2), "'worker' of run.*did you mean 'workers'"),
+    (lambda: runtime.run(PAIR, sgima=2), "'sgima' of run.*did you mean 'sigma'"),
+    (lambda: runtime.stream(PAIR, "a.nc", overwrit=True), "'overwrit' of stream.*did you mean 'overwrite'"),
+    (lambda: runtime.thresholds(PAIR, resolutoin=1), "'resolutoin' of thresholds.*did you mean 'resolution'"),
+    (lambda: runtime.thresholds(PAIR, record=()), "unknown parameter or keyword 'record' of thresholds"),
+    (lambda: runtime.exponents(PAIR, 0.1, perods=5), "'perods' of exponents.*did you mean 'periods'"),
+    (lambda: runtime.exponents(PAIR, 0.1, atol=5), "unknown parameter or keyword 'atol' of exponents"),
+    (lambda: runtime.msf(PAIR, [0, 1], perods=5), "did you mean 'periods'"),
+    (lambda: runtime.plane(PAIR, [0, 1], [0, 1], perods=5), "did you mean 'periods'"),
+    (lambda: runtime.lyapunov_spectrum(PAIR, cuont=5), "'cuont' of lyapunov_spectrum.*did you mean 'count'"),
+    (lambda: runtime.cluster_exponents(PAIR, [0, 0], perods=5), "of cluster_exponents.*did you mean 'periods'"),
+    (lambda: agreement(PAIR, [0.1], criterium=3), "'criterium' of agreement.*did you mean 'criterion'"),
+    (lambda: runtime.periodic_orbit(Scene(), perods=2), "'perods' of periodic_orbit.*did you mean 'periods'"),
+    (lambda: runtime.periodic_orbit(Scene(oscillator="lorenz")), "map of a drive; found an oscillator without one"),
     (lambda: runtime.thresholds(None), A_SCENE),
     (lambda: runtime.thresholds(ONE), "has no links"),
     (lambda: runtime.thresholds(PAIR, sigma="a"), "sigma: found 'a'; expected real numbers"),

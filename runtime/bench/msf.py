@@ -144,7 +144,7 @@ def _span(values: Sequence[float] | np.ndarray) -> str:
 
 def _settled(omega: float, values: np.ndarray) -> Orbits:
     """One orbit with its modes, behind the transient."""
-    scene = single(Scene(topology=topology("chain", 2), record=()), RTOL, {"omega": omega})
+    scene = single(exponents, Scene(topology=topology("chain", 2), record=()), RTOL, {"omega": omega})
     start = np.array([[numbers[0] for numbers in scene.initial.values()]])
     orbits = Orbits.make(scene, values, start, workers=1)
     orbits.settle(SETTLED)

@@ -34,7 +34,8 @@ __all__ = [
 def headline(scene: Scene) -> str:
     """What oscillates, and what is computed."""
     coupling = f", {scene.coupling} coupling" if scene.coupling else ""
-    return f"{scene.oscillator} oscillator{coupling}{drive_words(scene)}: exponents per unit of time"
+    oscillators = " and ".join(dict.fromkeys(oscillator for oscillator, _ in scene.templates))
+    return f"{oscillators} oscillator{coupling}{drive_words(scene)}: exponents per unit of time"
 
 
 def how(scene: Scene, attractors: Sequence[str], time: float, stderr: np.ndarray) -> list[tuple[str, str]]:

@@ -155,14 +155,10 @@ def _fitting(scene: Scene, name: str, value: float | tuple[float, ...]) -> Any:
 
 def _check(skip: Skip, arguments: Namespace) -> None:
     """Find out whatever can go wrong before the first cell runs."""
-    from synchain.codegen.integrators import integrator
-
     from ..certificate import check_certifiable
     from ..kernels import kernel_source
     from ..plan import Planner
 
-    if skip.scene.integrator != "auto":
-        integrator(skip.scene.integrator)
     if arguments.out is None:
         return
     Planner(skip.scene).extremes()

@@ -45,7 +45,7 @@ def compute(name: str, study: Study) -> Law:
 
 def forces(scene: Scene) -> tuple[Any, Any]:
     """The friction coefficient as functions of an array of relative velocities: the law itself, and smoothed."""
-    law = plugin("friction", str(scene.friction))
+    law = plugin("friction", str(scene.templates[0][1]))
     w, kappa = sp.Symbol("w", real=True), sp.Symbol("kappa", real=True)
     symbols = {key: sp.Symbol(key, real=True) for key in law.PARAMETERS}
     sharp = law.force(w, **symbols)
