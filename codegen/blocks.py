@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import sympy as sp
+from sympy.functions.elementary.piecewise import ExprCondPair
 
 from synchain.models.equations import TIME, Node
 
@@ -45,6 +46,8 @@ class Hoist:
         """Return the expression with its fixed parts named."""
         if not e.free_symbols:
             return e
+        if isinstance(e, ExprCondPair):  # one branch of a choice is no value of its own
+            return e.func(*(self.apply(a) for a in e.args))
         if e.is_Symbol:
             return e if e in self.moving else self.name(e)
         if not e.free_symbols & self.moving:

@@ -32,6 +32,7 @@ from synchain.models.equations import Equations
 from . import elementary, inner, lane_types, lanes
 from .cache import cache_folder, discard, has_code, is_sound, open_folder, seal, write_whole
 from .emit import LARGEST_UNROLLED, KernelSource
+from .installation import InstallationError
 from .sparse import EMPTY, NAMES, program
 
 __all__ = ["Kernel", "load"]
@@ -103,8 +104,12 @@ def load(source: KernelSource) -> Kernel:
     """Compile a kernel, or load its machine code from the cache.
 
     Damaged cache files are deleted and the kernel is compiled anew.  Where the cache folder cannot be used, the kernel is
-    compiled for this process alone and a RuntimeWarning says why.
+    compiled for this process alone and a RuntimeWarning says why.  Raises InstallationError where Numba does not compile.
     """
+    if numba.config.DISABLE_JIT:
+        raise InstallationError(
+            "Numba: found compilation switched off (NUMBA_DISABLE_JIT); expected it on; unset NUMBA_DISABLE_JIT"
+        )
     with _lock:
         return _load(source)
 

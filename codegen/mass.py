@@ -62,8 +62,8 @@ class Mass:
 
     @property
     def rows(self) -> list[int]:
-        """The rows that have such entries."""
-        return sorted({row for row, _ in self.coupled})
+        """The rows that are solved together: those with such entries, and those of the rates that these multiply."""
+        return sorted({k for key in self.coupled for k in key})
 
     @property
     def constant(self) -> bool:

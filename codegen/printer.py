@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 import sympy as sp
+from sympy.logic.boolalg import Boolean
 
 __all__ = ["FUNCTIONS", "UnprintableError", "show"]
 
@@ -54,6 +55,8 @@ def _piece(e: sp.Expr) -> tuple[str, int]:
         return _power(e)
     if isinstance(e, sp.Piecewise):
         return _piecewise(e), ATOM
+    if isinstance(e, Boolean):
+        return _condition(e), SUM
     for kind, name in FUNCTIONS.items():
         if isinstance(e, kind):
             return _call(name, e.args), ATOM
@@ -135,16 +138,28 @@ def _piecewise(e: sp.Piecewise) -> str:
         raise UnprintableError(f"{e} has no value where no condition holds; end it with (value, True)")
     text = _text(value, SUM)
     for value, condition in reversed(e.args[:-1]):
-        text = f"select({_relation(condition)}, {_text(value, SUM)}, {text})"
+        text = f"select({_condition(condition)}, {_text(value, SUM)}, {text})"
     return text
 
 
-def _relation(e: Any) -> str:
+def _condition(e: Any) -> str:
+    """A condition, whose negations are carried inwards; a symbol names one that was computed before."""
+    e = sp.to_nnf(e, simplify=False)
+    if e.is_Symbol:
+        return str(e.name)
+    if isinstance(e, sp.Not) and e.args[0].is_Symbol:
+        return f"~{e.args[0].name}"
     if isinstance(e, sp.And | sp.Or):
         sign = " & " if isinstance(e, sp.And) else " | "
-        return sign.join(f"({_relation(a)})" for a in sorted(e.args, key=sp.default_sort_key))
+        return sign.join(_part(a) for a in sorted(e.args, key=sp.default_sort_key))
     signs = {sp.StrictLessThan: "<", sp.LessThan: "<=", sp.StrictGreaterThan: ">", sp.GreaterThan: ">="}
     for kind, sign in signs.items():
         if isinstance(e, kind):
             return f"{_text(e.lhs, TERM)} {sign} {_text(e.rhs, TERM)}"
-    raise UnprintableError(f"no printing rule for the condition {e}; use <, <=, >, >=, And, Or")
+    raise UnprintableError(f"no printing rule for the condition {e}; use <, <=, >, >=, And, Or, Not")
+
+
+def _part(e: Any) -> str:
+    """A part of a condition, in parentheses unless it is a name."""
+    text = _condition(e)
+    return text if text.lstrip("~").isidentifier() else f"({text})"

@@ -1,4 +1,4 @@
-"""Derivatives of expressions that contain ``Abs`` and ``sign``, taken on either side of the kink.
+"""Derivatives of expressions that contain kinks and jumps, taken on either side of them.
 
 ``sympy.diff`` turns ``sign(w)`` into ``2*DiracDelta(w)``.  A dry-friction law multiplies its kinks by functions
 that vanish there, or is used away from them; in both cases the one-sided derivative is the right one.
@@ -31,7 +31,10 @@ def cancelled(expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
 
 
 def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
-    """Return d(expression)/d(symbol) with d|w| = sign(w) dw and d sign(w) = 0, exact wherever w != 0."""
+    """Return d(expression)/d(symbol) with d|w| = sign(w) dw and d sign(w) = 0, exact wherever w != 0.
+
+    Derivatives of Max and Min are choices, those of floor and ceiling 0: exact wherever there is no kink and no jump.
+    """
     expression = sp.sympify(expression)
     kinks = sorted(expression.atoms(sp.Abs, sp.sign), key=sp.default_sort_key)
     hidden = {kink: sp.Dummy(f"kink{i}", real=True) for i, kink in enumerate(kinks)}
@@ -43,4 +46,14 @@ def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
             inner = kink.args[0]
             outer = smooth.diff(dummy).xreplace(shown)
             total += outer * sp.sign(inner) * derivative(inner, symbol)
-    return total
+    return _settled(total)
+
+
+def _settled(e: sp.Expr) -> sp.Expr:
+    """What SymPy leaves behind of Max, Min, floor and ceiling, as choices and zeros."""
+    jumps = (sp.floor, sp.ceiling)
+    if not e.has(sp.Heaviside, sp.Derivative, sp.Subs):
+        return e
+    e = e.replace(lambda part: isinstance(part, sp.Derivative) and part.has(*jumps), lambda part: sp.S.Zero)
+    e = e.replace(lambda part: isinstance(part, sp.Subs), lambda part: part.doit())
+    return e.replace(sp.Heaviside, lambda x, *_: sp.Piecewise((sp.S.One, x > 0), (sp.S.Zero, True)))

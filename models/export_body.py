@@ -176,16 +176,8 @@ def _parameter_symbols(equations: Equations) -> list[sp.Symbol]:
 
 
 def _places(block: tuple[tuple[sp.Expr, ...], ...]) -> dict[Place, sp.Expr]:
-    table = {(r, c): _settled(e) for r, row in enumerate(block) for c, e in enumerate(row)}
+    table = {(r, c): e for r, row in enumerate(block) for c, e in enumerate(row)}
     return {place: e for place, e in table.items() if e != 0}
-
-
-def _settled(e: sp.Expr) -> sp.Expr:
-    """Derivatives of Max and Min as choices, of floor and ceiling as 0: right away from their kinks and jumps."""
-    jumps = (sp.floor, sp.ceiling)
-    e = e.replace(lambda part: isinstance(part, sp.Derivative) and part.has(*jumps), lambda part: sp.S.Zero)
-    e = e.replace(lambda part: isinstance(part, sp.Subs), lambda part: part.doit())
-    return e.replace(sp.Heaviside, lambda x, *_: sp.Piecewise((sp.S.One, x > 0), (sp.S.Zero, True)))
 
 
 def _body(table: dict, every: bool = False) -> Body:

@@ -159,7 +159,8 @@ class _Writer:
             raise ValueError(f"{e} has no value where no condition holds; end it with (value, True)")
         words = self.text(value, _SUM)
         for value, condition in reversed(e.args[:-1]):
-            parts = {"condition": self.relation(condition), "yes": self.text(value, _SUM), "no": words}
+            plain = sp.to_nnf(condition, simplify=False)  # negations are carried inwards
+            parts = {"condition": self.relation(plain), "yes": self.text(value, _SUM), "no": words}
             words = self.dialect.choice.format(**parts)
         return words
 
@@ -170,7 +171,7 @@ class _Writer:
         for kind, sign in ((sp.Lt, "<"), (sp.Le, "<="), (sp.Gt, ">"), (sp.Ge, ">=")):
             if isinstance(e, kind):
                 return f"{self.text(e.lhs, _TERM)} {sign} {self.text(e.rhs, _TERM)}"
-        raise ValueError(f"no counterpart of the condition {e}; expected <, <=, >, >=, And, Or")
+        raise ValueError(f"no counterpart of the condition {e}; expected <, <=, >, >=, And, Or, Not")
 
 
 def _minus(e: sp.Expr) -> bool:

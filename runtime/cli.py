@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import re
+import signal
 import sys
 import warnings
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
@@ -12,6 +13,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import ModuleType
 from typing import Any, NoReturn
+
+from synchain.codegen.installation import InstallationError
 
 from .commands import command, names
 from .commands._outcome import FAILED, FINE, WRONG_USE, Failed, WrongUse, sentence, wrong_use
@@ -77,6 +80,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         _silence()
         return int(getattr(closed, "exit_code", FINE))
     except (Exception, KeyboardInterrupt) as problem:
+        if argv is None:  # the program ends: a second Ctrl-C cannot cut its last words short, nor change its exit code
+            with suppress(ValueError):  # only the main thread may ask for that
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
         return _report(name, problem)
 
 
@@ -156,8 +162,12 @@ def _report(name: str, problem: BaseException) -> int:
     elif isinstance(problem, ModuleNotFoundError) and not str(problem.name).startswith("synchain"):
         package = str(problem.name).partition(".")[0]
         words = f"the package {package} is missing; install it: python -m pip install {package}"
-    elif isinstance(problem, OSError):
+    elif isinstance(problem, OSError | InstallationError):
         words = sentence(problem)
+    elif isinstance(problem, RuntimeError) and "can't start new thread" in str(problem):
+        words = (
+            "no thread can be started: not enough memory, or too many processes; use fewer workers or raise the limit"
+        )
     else:
         words = (
             f"internal error, a bug in synchain: {type(problem).__name__}: {sentence(problem)}\n"

@@ -20,18 +20,20 @@ from .skip import Skip, decide
 __all__ = ["best_integrator", "chosen_skip", "kernel", "kernel_source"]
 
 
-def kernel(scene: Scene, width: int | None = None, skip: bool | Skip = False) -> Kernel:
-    """Return the compiled kernel of a scene; scenes that differ only in numbers share it.
+def kernel(scene: Scene, width: int | None = None, skip: bool | Skip = True) -> Kernel:
+    """Return the compiled kernel of a scene, the one that `run(scene)` runs; scenes that differ only in numbers share it.
 
-    With `skip` it is the one that `run` uses, which leaves out what the scene does not need (see
-    `synchain.runtime.skip`).
+    `width` and `skip` mean what they mean for `run`: by default the kernel leaves out what the scene does not need (see
+    `synchain.runtime.skip`), and has a single lane where the scene has a single cell; with `skip` False it integrates
+    the scene as it stands.
     """
     return load(kernel_source(scene, width, skip))
 
 
-def kernel_source(scene: Scene, width: int | None = None, skip: bool | Skip = False) -> KernelSource:
+def kernel_source(scene: Scene, width: int | None = None, skip: bool | Skip = True) -> KernelSource:
     """Return the text of a scene's kernel without compiling it."""
     chosen = chosen_skip(scene, skip)
+    width = 1 if width is None and scene.cells == 1 else width
     if width is not None and whole("width", width, 1) not in WIDTHS:
         raise ValueError(f"width = {width}; expected one of {', '.join(map(str, WIDTHS))}")
     section = None

@@ -145,7 +145,7 @@ def prepare(
     chosen = chosen_skip(scene, skip)
     if not isinstance(certificate, Certificate):
         flag("certified", certificate)
-    source = kernel_source(scene, 1 if width is None and scene.cells == 1 else width, chosen)
+    source = kernel_source(scene, width, chosen)
     _warn_of_chords(scene, source.integrator)
     count = crew_size(executor, workers)
     if isinstance(certificate, bool):

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from synchain.codegen.installation import InstallationError
 from synchain.models.expect import a_path, flag
 from synchain.models.scene import Scene
 
@@ -204,9 +205,9 @@ def _fill(
     except KeyboardInterrupt:
         raise SweepInterrupted(int(store.counts.sum()), scene.cells) from None
     except Exception as problem:
-        if not (worker_lost(problem) or isinstance(problem, OSError)):
+        if not (worker_lost(problem) or isinstance(problem, OSError | InstallationError)):
             raise
-        reason = f"the workers are lost ({problem})"
+        reason = str(problem) if isinstance(problem, InstallationError) else f"the workers are lost ({problem})"
         if isinstance(problem, OSError) and not worker_lost(problem):
             where = problem.filename or store.path
             reason = f"cannot write {where}: {problem.strerror}" if problem.strerror else str(problem)

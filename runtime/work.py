@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from synchain.codegen.emit import KernelSource, emit
+from synchain.codegen.installation import InstallationError
 from synchain.codegen.load import Kernel, load
 from synchain.models.equations import Equations
 from synchain.models.plugins import allow_code, allowed_code
@@ -83,11 +84,11 @@ class Recipe:
 
     @classmethod
     def unpacked(cls, data: bytes) -> Recipe:
-        """From bytes; RuntimeError where this worker has other versions than who packed them."""
+        """From bytes; InstallationError where this worker has other versions than who packed them."""
         source = io.BytesIO(data)
         head = pickle.load(source)
         if head["versions"] != versions():
-            raise RuntimeError(
+            raise InstallationError(
                 f"this worker has {versions()}; expected the versions of the main program, {head['versions']}: "
                 "a sweep needs the same installation everywhere"
             )
@@ -95,9 +96,9 @@ class Recipe:
         return cls(pickle.load(source), **head)
 
     def check(self, source: KernelSource) -> None:
-        """Raise RuntimeError where this worker has written another kernel than who made the recipe."""
+        """Raise InstallationError where this worker has written another kernel than who made the recipe."""
         if source.digest != self.digest:
-            raise RuntimeError(
+            raise InstallationError(
                 f"this worker makes the kernel {source.digest[:12]}; expected that of the main program, "
                 f"{self.digest[:12]}: a sweep needs the same installation everywhere"
             )

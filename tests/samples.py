@@ -98,7 +98,21 @@ def tanh_pair() -> Equations:
     return Equations(Node((x, phase), rhs, (a,)), edge, 2, path(2))
 
 
+def choices() -> Equations:
+    """Two oscillators with stops: conditions on states, on parameters, on time and on several of them, and kinks."""
+    x, v, a, b, omega = real("x", "v", "a", "b", "omega")
+    stop = sp.Piecewise((-a * (x - b), x > b), (-sp.sin(a) * (x + b), x <= -b), (0, True))
+    drag = sp.Piecewise((-a * v, a * b > 1), (-b * v**3, True)) - sp.Max(v, b / 3)
+    drive = sp.Piecewise((a, sp.cos(omega * TIME) > b / 9), (b**2, True))
+    mixed = sp.Piecewise((a**2, (v > 0) | (a < b)), (b, ~((x > 0) & (v > -b))), (x, True))
+    x_2, v_2, w, sigma = real("x_there", "v_there", "weight", "sigma")
+    rope = sp.Piecewise((sigma * w * (x_2 - x), (x_2 > x) & (sigma > b)), (0, True))
+    node = Node((x, v), (v, stop - x + drag + drive + mixed), (a, b, omega))
+    return Equations(node, Edge((x, v), (x_2, v_2), w, (sp.S.Zero, rope), (sigma, b)), 2, path(2))
+
+
 CASES: dict[str, Equations] = {
+    "choices": choices(),
     "friction 1": friction_chain(1), "friction 3": friction_chain(3), "harmonic": harmonic_chain(2), "looped": looped(),
     "parametric": parametric(), "third order": third_order(), "tanh pair": tanh_pair(), "waving": waving(),
 }  # fmt: skip

@@ -9,9 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
-from samples import TABLE, Outcome, drive, friction_chain, harmonic_chain, kernel, numbers
+from samples import TABLE, Outcome, drive, friction_chain, harmonic_chain, kernel, numbers, path, real
+from scipy.integrate import solve_ivp
 
+from synchain.codegen import integrators
 from synchain.codegen.load import load
+from synchain.models.equations import TIME, Edge, Equations, Node
+from synchain.models.export_python import to_python
 
 DATA = Path(__file__).parent / "data"
 ALL = ("sync_error", "section", "trajectory")
@@ -203,3 +207,42 @@ def test_a_wrong_jacobian_shows_in_the_number_of_steps():
     wrong = dataclasses.replace(right.origin, text=right.source.replace(constant, constant + "*kappa"))
     assert wrong.text != right.source
     assert steps_of(load(wrong)) > 20 * steps_of(right)
+
+
+# -- choices -------------------------------------------------------------------------------------------------
+
+
+def stopped(n: int) -> Equations:
+    """Driven oscillators with a stop at x = gap, a drag chosen by a parameter, and ropes that only pull."""
+    x, v, gap, stiff, drag, sigma, x_2, v_2, w = real("x", "v", "gap", "stiff", "drag", "sigma", "x_2", "v_2", "w")
+    stop = sp.Piecewise((-stiff * (x - gap), x > gap), (0, True))
+    braked = sp.Piecewise((-drag * v, drag > sp.Rational(1, 2)), (-drag * v * sp.Abs(v), True))
+    node = Node((x, v), (v, -x + stop + braked + sp.cos(sp.S(6) / 5 * TIME)), (gap, stiff, drag))
+    rope = sp.Piecewise((sigma * w * (x_2 - x), x_2 > x), (0, True))
+    edge = Edge((x, v), (x_2, v_2), w, (sp.S.Zero, rope), (sigma,))
+    return Equations(node, edge, n, path(n))
+
+
+KERNELS = [
+    *((method, None, 2) for method in integrators.names()),
+    ("rodas5p", 1, 2),
+    ("dop853", 1, 2),
+    ("rodas5p", 4, 9),
+]
+
+
+@pytest.mark.parametrize(("method", "width", "n"), KERNELS)
+def test_choices_by_states_and_parameters_end_where_scipy_says(method, width, n):
+    equations = stopped(n)
+    drags, start = [0.1, 0.4, 0.6, 0.9, 1.2], [*np.linspace(-0.4, 0.5, n), *np.linspace(0.7, -0.2, n)]
+    cells = [[0.2, 5.0, drag, 0.3] for drag in drags]
+    assert equations.parameters == ("gap", "stiff", "drag", "sigma")
+    found = drive(kernel(equations, method, width=width), [start] * 5, cells, [(0.0, 6.0)] * 5, 1e-8)
+    assert (found.counts[:, 0] == 1).all()
+    space: dict = {}
+    exec(to_python(equations), space)
+    for cell, end in zip(cells, found.end, strict=True):
+        known = solve_ivp(
+            space["rhs"], (0, 6), start, "DOP853", args=tuple(cell), rtol=1e-12, atol=1e-13, max_step=0.01
+        )
+        np.testing.assert_allclose(end, known.y[:, -1], rtol=0, atol=3e-6)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from samples import CASES, FLOATS, TABLE, friction_chain, path, plain, real, take_step
+from sympy.functions.elementary.piecewise import ExprCondPair
 
 from synchain.codegen import integrators
 from synchain.codegen.blocks import Body, Hoist, Names, analyse
@@ -32,6 +33,8 @@ def parameter_work(e: sp.Expr, moving: set[sp.Symbol]) -> list[sp.Expr]:
     """Parts of an expression, more than a symbol or its sign, that do not move."""
     if e.is_Symbol or not e.free_symbols:
         return []
+    if isinstance(e, ExprCondPair):
+        return [part for argument in e.args for part in parameter_work(argument, moving)]
     if not e.free_symbols & moving:
         return [] if e == -next(iter(e.free_symbols)) else [e]
     found = [part for argument in e.args for part in parameter_work(argument, moving)]
@@ -102,6 +105,16 @@ def test_a_sign_makes_no_second_name():
     assert len(hoist.table) == 1
     assert first.xreplace({s: e for e, s in hoist.table.items()}) == a * b * sp.sin(x)
     assert second.xreplace({s: e for e, s in hoist.table.items()}) == -a * b * sp.cos(x)
+
+
+def test_conditions_on_parameters_and_fixed_branches_are_computed_once():
+    choice = sp.Piecewise((-a * b, (x > a + b) | (a > b)), (a * x, a > b), (sp.cos(omega * TIME), True))
+    blocks = blocks_of(Node((x, v), (choice, -v), (a, b, omega)))
+    fixed = {e for _, e in blocks.constants}
+    assert {a > b, a + b} <= fixed
+    assert sp.cos in {e.func for _, e in blocks.timed}
+    moving = [*(e for _, e in blocks.rhs.statements), *blocks.rhs.results]
+    assert not any(e.has(a > b) or {a + b, a * b, TIME} & set(sp.preorder_traversal(e)) for e in moving)
 
 
 def test_names_avoid_those_that_are_taken():

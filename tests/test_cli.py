@@ -196,6 +196,31 @@ def test_run_writes_a_result_and_a_figure(scene: str, tmp_path: Path, capsys: py
     assert float(result.end[0, 0]) != float(result.end[1, 0])
 
 
+def test_a_figure_that_fails_says_that_the_result_is_complete(
+    scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "short.png").mkdir()
+    assert main(["run", scene, "--out", str(tmp_path), "--set", "sigma=0:0.5:3"]) == 1
+    (words,) = capsys.readouterr().err.splitlines()
+    assert words.startswith(
+        f"synchain run: the result is complete: {tmp_path / 'short.nc'}; its figure was not drawn: "
+    )
+    assert words.endswith("; the same command again draws it")
+    assert open_result(tmp_path / "short.nc").success
+    (tmp_path / "short.png").rmdir()
+    assert main(["run", scene, "--out", str(tmp_path), "--set", "sigma=0:0.5:3"]) == 0
+    assert (tmp_path / "short.png").is_file()
+
+
+def test_a_numba_that_does_not_compile_is_no_bug(scene: str, tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "synchain.runtime", "run", scene, "--out", str(tmp_path)]
+    surroundings = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run(words, capture_output=True, text=True, check=False, env=surroundings)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].endswith("unset NUMBA_DISABLE_JIT")
+    assert "bug" not in done.stderr
+
+
 def test_settings_reach_the_scene(scene: str, tmp_path: Path) -> None:
     settings = ["--set", "sigma=0.1", "--set", "x_1=0.1,0.2", "window=3", "max_steps=5000"]
     assert main(["run", scene, "--out", str(tmp_path), *settings]) == 0

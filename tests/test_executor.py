@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from streams import MAP, UP, partial, warm
 
+from synchain.codegen.installation import InstallationError
 from synchain.models import Scene, chain
 from synchain.models.products import cartesian
 from synchain.runtime import Result, SweepFailed, open_result, run, stream
@@ -62,6 +63,20 @@ def test_a_worker_with_other_versions_or_another_kernel_refuses(monkeypatch):
     monkeypatch.setattr(works, "versions", lambda: "synchain 0.0.1")
     with pytest.raises(RuntimeError, match=r"this worker has synchain 0\.0\.1; expected .*, synchain "):
         Recipe.unpacked(packed)
+
+
+class Elsewhere(Executor):
+    """A worker with another installation."""
+
+    def submit(self, function, /, *arguments, **more):
+        future: Future = Future()
+        future.set_exception(InstallationError("this worker has synchain 0.0.1; expected 1.0"))
+        return future
+
+
+def test_a_stream_on_a_worker_with_another_installation_fails_in_words(tmp_path):
+    with pytest.raises(SweepFailed, match=r"^this worker has synchain 0\.0\.1; expected 1\.0; 0 of \d+ cells"):
+        stream(MAP, tmp_path / "a.nc", executor=Elsewhere(), show_progress=False)
 
 
 def test_a_worker_that_does_not_know_the_sweep_asks_for_it(monkeypatch):

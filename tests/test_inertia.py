@@ -7,11 +7,14 @@ import pytest
 import scipy.linalg
 import sympy as sp
 from samples import clocks
+from scipy.integrate import solve_ivp
 from sympy.physics import mechanics
 
 from synchain.models import Scene, chain, from_matrix, load_scene
 from synchain.models.equations import Equations
+from synchain.models.export_python import to_python
 from synchain.models.network import connectivity, node
+from synchain.models.topology import topology
 from synchain.runtime import run
 
 T = mechanics.dynamicsymbols._t
@@ -139,6 +142,38 @@ def test_unequal_masses_move_in_the_modes_of_the_generalised_eigenproblem(integr
     found = run(scene)
     assert found.success
     np.testing.assert_allclose(found.end[:3], shapes @ (share * np.cos(np.sqrt(squares) * end)), atol=1e-11)
+
+
+def one_way(name: str) -> Scene:
+    """Networks in which somebody feels a node that feels nobody."""
+    common = {"coupling": "inerter", "transient": 0, "window": 6, "time_unit": "time", "record": (), "rtol": 1e-10}
+    if name == "pair":
+        start = {"x": [0.4, -0.3], "v": [0.1, 0.2]}
+        return Scene(oscillator="duffing", topology=from_matrix([[0, 0], [1, -1]]), initial=start, **common)
+    if name == "feed forward":
+        start = {"x": [0.4, -0.3, 0.2], "v": [0.1, 0.2, 0.0]}
+        return Scene(oscillator="duffing", topology=topology("feed_forward", 3), initial=start, **common)
+    if name == "static friction":
+        graph = from_matrix([[0, 0, 0, 0], [1, -1, 0, 0], ["1/2", 0, "-1/2", 0], [0, 1, 2, -3]])
+        start = {"x": [0.4, -0.3, 0.2, 0.1], "v": [0.3, 0.5, 0.2, 0.4]}
+        law = {"friction": "coulomb_static", "contact": "atan", "parameters": {"kappa": 20.0}}
+        return Scene(topology=graph, initial=start, **law, **common)
+    hanging = {"coupling": "hanging", "initial": {"x": 0.1, "theta": [0.9, -0.4], "theta_rate": [0.2, 0.5]}}
+    graph = from_matrix([[-2, 1, 1], [0, 0, 0], [1, 0, -1]])  # the beam feels both clocks, the first feels nothing
+    beam = [{"oscillator": "beam", "at": [1]}]
+    return Scene(oscillator="clock", nodes=beam, topology=graph, **{**common, **hanging})
+
+
+@pytest.mark.parametrize("integrator", ["rodas5p", "dop853"])
+@pytest.mark.parametrize("name", ["pair", "feed forward", "static friction", "clocks"])
+def test_nodes_may_feel_the_inertia_of_one_that_feels_nobody(name: str, integrator: str) -> None:
+    scene = one_way(name).replace(integrator=integrator)
+    found = run(scene, skip=False)
+    assert found.success
+    space: dict = {}
+    exec(to_python(scene.equations, {s: scene.parameters[s] for s in scene.equations.parameters}), space)
+    known = solve_ivp(space["rhs"], (0, 6), scene.y0, "Radau", jac=space["jac"], rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(found.end, known.y[:, -1], atol=1e-7)
 
 
 def test_frictionless_clocks_keep_their_energy_and_their_momentum() -> None:

@@ -146,6 +146,11 @@ def test_text_is_the_same_for_an_equal_expression(expression):
         (sp.Piecewise((x, x >= y), (y, x < z), (z, True)), "select(x >= y, x, select(x < z, y, z))"),
         (sp.Piecewise((x, (x < 0) | (y > 1)), (y, True)), "select((y > 1.0) | (x < 0.0), x, y)"),
         (sp.Piecewise((x, (x < 0) & (y >= 1)), (y, True)), "select((y >= 1.0) & (x < 0.0), x, y)"),
+        (sp.Piecewise((x, ~((x < 0) & (y >= 1))), (y, True)), "select((x >= 0.0) | (y < 1.0), x, y)"),
+        (sp.Piecewise((x, z), (y, kappa & (x < 0)), (z, True)), "select(z, x, select(kappa & (x < 0.0), y, z))"),
+        (sp.Piecewise((x, ~(z & (y > 1))), (y, True)), "select((y <= 1.0) | ~z, x, y)"),
+        (x - y > 1, "(x - y) > 1.0"),
+        ((x < 0) & (y >= 1), "(y >= 1.0) & (x < 0.0)"),
     ],
 )
 def test_text_reads_like_written_by_hand(expression, text):

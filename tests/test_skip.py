@@ -10,7 +10,7 @@ import xarray as xr
 
 from synchain.models import Axis, Scene, chain, from_matrix, ring, star
 from synchain.models import reduction as reduction_module
-from synchain.runtime import Status, run
+from synchain.runtime import Status, kernel, run
 from synchain.runtime import skip as skip_module
 from synchain.runtime.bench import skip as bench
 from synchain.runtime.cli import main
@@ -233,6 +233,28 @@ def test_cells_that_did_not_run_have_no_synchronisation_error():
 
 
 # -- kernels, words, benchmark -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        FRICTION,
+        FRICTION.replace(u=0.0, sigma=0.0),
+        MIRRORED.replace(record=("sync_error",)),
+        FRICTION.replace(record=(), axes={"sigma": [0.05, 0.1]}),
+    ],
+    ids=["one cell", "folded", "merged", "swept"],
+)
+def test_the_kernel_of_a_scene_is_the_one_that_runs(scene):
+    """By default with all skips; `skip=False` shows and runs the whole network."""
+    found = run(scene)
+    assert found.success
+    shown = kernel(scene)
+    assert (shown.digest, shown.equations.digest) == (found.data.attrs["kernel"], found.data.attrs["equations"])
+    assert kernel_source(scene).text == shown.source
+    whole = kernel_source(scene, skip=False)
+    assert whole.equations == scene.equations
+    assert (whole.digest == shown.digest) is not bool(decide(scene).skipped)
 
 
 def test_scenes_that_differ_in_numbers_share_a_kernel():

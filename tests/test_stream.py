@@ -291,7 +291,9 @@ sigma = { from = 0.0, to = 0.3, count = 300 }
 """
 
 
-@pytest.mark.parametrize("sign", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda sign: sign.name)
+@pytest.mark.parametrize(
+    "sign", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL], ids=lambda sign: sign.name
+)
 def test_the_real_program_is_stopped_and_goes_on(sign, tmp_path):
     scene = tmp_path / "slow.toml"
     scene.write_text(SLOW)
@@ -315,6 +317,24 @@ def test_the_real_program_is_stopped_and_goes_on(sign, tmp_path):
 
     done = stream(load_scene(str(scene)), tmp_path / "slow.nc", resume=True, show_progress=False)
     assert done.progress.kept == stored > 0
+
+
+def test_ctrl_c_pressed_again_and_again_ends_the_program_with_its_words(tmp_path):
+    scene = tmp_path / "slow.toml"
+    scene.write_text(SLOW)
+    words = [sys.executable, "-m", "synchain.runtime", "run", str(scene), "--out", str(tmp_path), "--workers", "1"]
+    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, preexec_fn=restore_interrupt)
+    give_up = time.monotonic() + 120
+    while process.poll() is None and not (tmp_path / "slow.partial").exists():
+        assert time.monotonic() < give_up
+        time.sleep(0.05)
+    while process.poll() is None:
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.003)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 1, err
+    assert "synchain run: interrupted" in err
+    assert "Traceback" not in err
 
 
 def restore_interrupt() -> None:

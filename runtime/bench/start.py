@@ -26,13 +26,13 @@ marks = [time.perf_counter()]
 from synchain.models.scene import Scene
 from synchain.models.topology import topology
 marks.append(time.perf_counter())
-scene = Scene(topology=topology("chain", int(sys.argv[1])))
+scene = Scene(topology=topology("chain", int(sys.argv[1])), axes={"omega": [1.0, 1.2]})
 scene.equations
 marks.append(time.perf_counter())
 from synchain.runtime.sweep import kernel_source
 from synchain.codegen.load import load
 marks.append(time.perf_counter())
-source = kernel_source(scene)
+source = kernel_source(scene, skip=False)
 marks.append(time.perf_counter())
 compiled = load(source)
 marks.append(time.perf_counter())

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..files import output_folder, whole_file
 from ._arguments import add_scene, add_workers, folder, setting, tolerance
-from ._outcome import FAILED, FINE, Failed, WrongUse, warn, wrong_use
+from ._outcome import FAILED, FINE, Failed, WrongUse, sentence, warn, wrong_use
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -112,7 +112,8 @@ def execute(arguments: Namespace) -> int:
             done = stream(scene, target, skip=skip, workers=arguments.workers, executor=executor, **given)
         except (SweepInterrupted, SweepFailed) as stop:
             raise _stopped(stop, target, arguments) from None
-    _summary(name, scene, done, (target, _draw(target)))
+    _summary(name, scene, done, target)
+    print(f"  {_drawn(target)}")
     return FINE if done.success else FAILED
 
 
@@ -175,21 +176,29 @@ def _nothing_to_do(target: Path) -> int:
     print(f"{target} holds the result of this scene already; nothing was run (--overwrite runs it again)")
     print(f"  made with {kept.data.attrs['versions']}\n  {kept.message}")
     if not target.with_suffix(".png").exists():
-        print(f"  {_draw(target)}")
+        print(f"  {_drawn(target)}")
     return FINE if kept.success else FAILED
 
 
 @contextmanager
 def stopped_by_signals() -> Iterator[None]:
-    """SIGTERM, with which batch systems announce the end, stops like Ctrl-C."""
+    """SIGTERM, with which batch systems announce the end, and SIGHUP of a closed terminal stop like Ctrl-C.
+
+    A signal that is ignored (nohup) stays so.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    known = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = {sign: signal.getsignal(sign) for sign in known}
+    caught = [sign for sign, handler in before.items() if handler is not signal.SIG_IGN]
+    for sign in caught:
+        signal.signal(sign, signal.default_int_handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for sign in caught:
+            signal.signal(sign, before[sign])
 
 
 @contextmanager
@@ -230,6 +239,17 @@ def _stopped(stop: SweepInterrupted | SweepFailed, target: Path, arguments: Name
     return Failed(f"interrupted with {kept}" if isinstance(stop, KeyboardInterrupt) else f"{stop.reason}; {kept}")
 
 
+def _drawn(target: Path) -> Path:
+    """Draw the figure; whatever stops that says that the result is complete."""
+    try:
+        return _draw(target)
+    except (Exception, KeyboardInterrupt) as problem:
+        why = "interrupted" if isinstance(problem, KeyboardInterrupt) else sentence(problem)
+        raise Failed(
+            f"the result is complete: {target}; its figure was not drawn: {why}; the same command again draws it"
+        ) from problem
+
+
 def _draw(target: Path) -> Path:
     """Write the figure of a result, which is read from its file as far as it is drawn."""
     import matplotlib
@@ -248,8 +268,8 @@ def _draw(target: Path) -> Path:
     return path
 
 
-def _summary(name: str, scene: Scene, done: Streamed, files: tuple[Path, ...]) -> None:
-    """Say how many cells ended how, failures on stderr, and where the files are."""
+def _summary(name: str, scene: Scene, done: Streamed, target: Path) -> None:
+    """Say how many cells ended how, failures on stderr, and where the result is."""
     from ..status import Status
 
     progress = done.progress
@@ -268,8 +288,7 @@ def _summary(name: str, scene: Scene, done: Streamed, files: tuple[Path, ...]) -
     for verdict, count in done.verdicts.items():
         if verdict != "ended early":
             print(f"  {_count(count, 'cell')} {verdict}")
-    for file in files:
-        print(f"  {file}")
+    print(f"  {target}")
 
 
 def _count(number: int, noun: str) -> str:
