@@ -1,9 +1,9 @@
 """Real and complex algebraic numbers: an irreducible integer polynomial and what isolates one of its roots.
 
 A real root is held between two rationals where the polynomial changes sign, a complex root in a disc that holds no
-other; both are refined to any accuracy.  Polynomials with real roots only are isolated by `isolation.py`, others by
-`complex_isolation.py` or, should that fail, by Arb (F. Johansson, IEEE Trans. Comput. 66, 1281, 2017).  Real roots are
-refined exactly: secant guesses, proved by signs (J. Abbott, ACM Commun. Comput. Algebra 48, 3, 2014).
+other; both are refined to any accuracy.  `isolation.py` isolates the roots or, should that fail, Arb (F. Johansson, IEEE
+Trans. Comput. 66, 1281, 2017).  Real roots are refined exactly: secant guesses, proved by signs (J. Abbott, ACM Commun.
+Comput. Algebra 48, 3, 2014).
 """
 
 from __future__ import annotations
@@ -17,11 +17,10 @@ import sympy as sp
 from flint import acb, arb, fmpq, fmpz_poly
 
 from .balls import precision
-from .complex_isolation import Disc, discs, sharpened
-from .isolation import dyadic, real_brackets, sign
+from .isolation import Disc, discs, dyadic, sharpened, sign
 from .sympy_order import complex_order
 
-__all__ = ["ComplexRoot", "RealRoot", "complex_roots", "real_roots"]
+__all__ = ["ComplexRoot", "RealRoot", "roots"]
 
 Polynomial = tuple[int, ...]
 """Integer coefficients, constant first; irreducible and primitive, the leading one positive."""
@@ -122,15 +121,7 @@ def _by_arb(f: fmpz_poly) -> list[Disc]:
     ]
 
 
-def real_roots(polynomial: Polynomial) -> tuple[RealRoot, ...] | None:
-    """All roots, ascending, of an irreducible polynomial of degree >= 2; None where not all prove real."""
-    brackets = real_brackets(fmpz_poly(list(polynomial)))
-    if brackets is None:
-        return None
-    return tuple(RealRoot(polynomial, i, _fraction(low), _fraction(high)) for i, (low, high) in enumerate(brackets))
-
-
-def complex_roots(polynomial: Polynomial) -> tuple[RealRoot | ComplexRoot, ...]:
+def roots(polynomial: Polynomial) -> tuple[RealRoot | ComplexRoot, ...]:
     """All roots of an irreducible polynomial of degree >= 2, each isolated by a disc that is proved to hold it alone.
 
     Real ones come first, ascending; conjugates are neighbours.

@@ -16,7 +16,7 @@ from typing import Any, Literal, overload
 import sympy as sp
 from flint import fmpq, fmpq_poly, fmpz_mat
 
-from .algebraic import complex_roots, real_roots
+from .algebraic import roots
 from .balls import precision
 from .continuant import banded, cyclic
 from .descending import Descending
@@ -253,7 +253,7 @@ def _by_factors(graph: Topology, polynomial: fmpq_poly) -> list[Eigenvalue]:
     claims = []
     for factor, count in polynomial.factor()[1]:
         whole = tuple(int(c) for c in factor.numer().coeffs())
-        numbers = written(factor) or real_roots(whole) or complex_roots(whole)
+        numbers = written(factor) or roots(whole)
         found = blocks(graph, factor, count)
         claims += [Eigenvalue(number, count, found) for number in numbers]
     return claims
