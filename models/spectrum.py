@@ -111,6 +111,13 @@ class Spectrum:
         return () if isinstance(self.eigenvalues, Descending) else tuple(e for e in self.eigenvalues if e.defective)
 
     @property
+    def zeros(self) -> int:
+        """How often 0 is an eigenvalue."""
+        if isinstance(self.eigenvalues, Descending):  # 0 is the first
+            return self.eigenvalues[0].multiplicity
+        return sum(e.multiplicity for e in self.eigenvalues if e.number is sp.S.Zero)
+
+    @property
     def largest(self) -> sp.Expr:
         """The eigenvalue of largest modulus; of several, the first in the order of the spectrum."""
         if isinstance(self.eigenvalues, Descending):  # all real, none positive

@@ -111,6 +111,32 @@ class Topology:
         return count
 
     @property
+    def leading_groups(self) -> int:
+        """Number of groups of nodes that reach one another and that no other node acts on; at least 1.
+
+        The starts of a search along the links cover all nodes; no start is reached from an earlier one.  Searched again
+        from the last start backwards, those that are not reached yet are in groups of their own.
+        """
+        followers: list[list[int]] = [[] for _ in range(self.n)]
+        for target, source, _ in self.links:
+            followers[source].append(target)
+
+        def starts(order: Iterable[int]) -> list[int]:
+            found, reached = [], [False] * self.n
+            for start in order:
+                if not reached[start]:
+                    found.append(start)
+                    reached[start], waiting = True, [start]
+                    while waiting:
+                        new = [i for i in followers[waiting.pop()] if not reached[i]]
+                        for i in new:
+                            reached[i] = True
+                        waiting += new
+            return found
+
+        return len(starts(reversed(starts(range(self.n)))))
+
+    @property
     def rows(self) -> tuple[tuple[Fraction, ...], ...]:
         """G as n rows of n fractions."""
         zero = Fraction(0)

@@ -137,6 +137,16 @@ def test_spectrum_of_separate_parts_is_allowed_but_said(tmp_path: Path, capsys: 
     assert capsys.readouterr().err == ""
 
 
+def test_several_parts_are_said_with_negative_weights_as_well(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = matrix(tmp_path, "1 -1 0 0\n-1 1 0 0\n0 0 -1 1\n0 0 1 -1")
+    assert main(["spectrum", "--matrix", path]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.splitlines()[1].split() == ["2", "2", "1"]
+    assert captured.err.startswith("warning: zero is an eigenvalue of multiplicity 2: the graph falls into 2 parts")
+
+
 def test_scenes_and_topologies_list_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["scenes"]) == 0
     listed = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}

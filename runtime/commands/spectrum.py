@@ -76,9 +76,8 @@ def execute(arguments: Namespace) -> int:
     with wrong_use():
         chosen = graph(arguments)
         found = spectrum(chosen, prove=chosen.n <= PROVED or ("primes" if chosen.n <= CHECKED else False))
-    zero = found.eigenvalues[0]
-    if zero.multiplicity > 1 and zero.exact == 0:
-        warn([f"zero is an eigenvalue of multiplicity {zero.multiplicity}: {_reason(chosen)}"])
+    if found.zeros > 1:
+        warn([f"zero is an eigenvalue of multiplicity {found.zeros}: {_reason(chosen)}"])
     if arguments.json:
         print_json(found.as_dict())
     else:
