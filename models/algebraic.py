@@ -20,12 +20,15 @@ from .balls import precision
 from .isolation import Disc, discs, dyadic, sharpened, sign
 from .sympy_order import complex_order
 
-__all__ = ["ComplexRoot", "RealRoot", "roots"]
+__all__ = ["ComplexRoot", "RealRoot", "coefficient_text", "roots"]
 
 Polynomial = tuple[int, ...]
 """Integer coefficients, constant first; irreducible and primitive, the leading one positive."""
 
 _X = sp.Symbol("x")
+
+_WRITTEN = 14_000
+"""Bits up to which Python turns whole numbers into decimals and back by default (4300 digits)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +48,7 @@ class RealRoot:
         f = fmpz_poly(list(self.polynomial))
         if not self.low < self.high or sign(f, _exact(self.low)) * sign(f, _exact(self.high)) >= 0:
             raise ValueError(
-                f"{self.text}: no sign change from {self.low} to {self.high}; expected a bracket of one root"
+                f"{self.text}: no sign change from {_short(self.low)} to {_short(self.high)}; expected a bracket of one root"
             )
 
     @property
@@ -94,13 +97,38 @@ class ComplexRoot:
 
 @lru_cache(maxsize=64)
 def polynomial_text(polynomial: Polynomial) -> str:
-    """The polynomial in x as SymPy prints it."""
+    """The polynomial in x as SymPy prints it; in words if Python refuses to write or read its coefficients."""
+    longest = max(abs(c).bit_length() for c in polynomial)
+    if longest > _WRITTEN:
+        return f"polynomial of degree {len(polynomial) - 1} with coefficients of up to {longest} bits"
     return sp.sstr(sp.Poly(list(polynomial[::-1]), _X).as_expr())
+
+
+def coefficient_text(c: int) -> str:
+    """A whole number as text for `int(text, 0)`: in decimals, or in hexadecimals if Python refuses so many decimals."""
+    return str(c) if abs(c).bit_length() <= _WRITTEN else hex(c)
+
+
+def _short(x: Fraction) -> str:
+    longest = max(abs(x.numerator).bit_length(), x.denominator.bit_length())
+    return str(x) if longest < 100 else f"a fraction of {longest} bits"
+
+
+class _Root(sp.CRootOf):
+    """SymPy's CRootOf of a polynomial whose coefficients Python refuses to write."""
+
+    __slots__ = ()
+
+    def _sympystr(self, printer: object) -> str:
+        return f"CRootOf({polynomial_text(tuple(int(c) for c in self.poly.all_coeffs()[::-1]))}, {self.index})"
+
+    _sympyrepr = _latex = _pretty = _sympystr
 
 
 @lru_cache(maxsize=512)
 def _expression(polynomial: Polynomial, index: int) -> sp.Expr:
-    return sp.CRootOf(sp.Poly(list(polynomial[::-1]), _X), index)
+    kind = _Root if max(abs(c).bit_length() for c in polynomial) > _WRITTEN else sp.CRootOf
+    return kind(sp.Poly(list(polynomial[::-1]), _X), index)
 
 
 @lru_cache(maxsize=4096)
@@ -115,7 +143,7 @@ def _by_arb(f: fmpz_poly) -> list[Disc]:
         found = [root for root, _ in f.complex_roots()]
         reals = sorted((ball for ball in found if ball.imag == 0), key=lambda ball: dyadic(ball.real))
         others = [ball for ball in found if ball.imag != 0]
-        radii = [dyadic((ball.real.rad() + ball.imag.rad()).upper()) + fmpq(1, 2**120) for ball in reals + others]
+        radii = [dyadic((ball.real.rad() + ball.imag.rad()).upper()) for ball in reals + others]
     return [
         Disc(dyadic(ball.real), dyadic(ball.imag), radius) for ball, radius in zip(reals + others, radii, strict=True)
     ]

@@ -16,7 +16,7 @@ from typing import Any, Literal, overload
 import sympy as sp
 from flint import fmpq, fmpq_poly, fmpz_mat
 
-from .algebraic import roots
+from .algebraic import ComplexRoot, RealRoot, coefficient_text, roots
 from .balls import precision
 from .continuant import banded, cyclic
 from .descending import Descending
@@ -138,18 +138,36 @@ class Spectrum:
         return tuple(e.evaluate(digits) for e in self.eigenvalues)
 
     def as_dict(self) -> dict[str, Any]:
-        """What `synchain spectrum --json` prints; a complex value is [real, imaginary]."""
-        listed = [
-            {
-                "exact": e.text,
-                "value": [e.value.real, e.value.imag] if isinstance(e.value, complex) else e.value,
-                "multiplicity": e.multiplicity,
-                "geometric_multiplicity": e.geometric,
-                "jordan_blocks": None if e.blocks is None else [list(block) for block in e.blocks],
-            }
-            for e in self.eigenvalues
-        ]
-        return {"n": self.n, "eigenvalues": listed, "verified": self.verified, "chance": self.chance}
+        """What `synchain spectrum --json` prints; a complex value is [real, imaginary].
+
+        Each polynomial is written once; an eigenvalue that is given by one has its number and its own index as CRootOf.
+        """
+        numbers: dict[tuple[int, ...], int] = {}
+        listed = []
+        for e in self.eigenvalues:
+            number, index, exact = None, None, None
+            if isinstance(e.number, (RealRoot, ComplexRoot)):
+                number, index = numbers.setdefault(e.number.polynomial, len(numbers)), e.number.index
+                exact = f"CRootOf(p{number}, {index})"
+            listed.append(
+                {
+                    "exact": exact or e.text,
+                    "polynomial": number,
+                    "index": index,
+                    "value": [e.value.real, e.value.imag] if isinstance(e.value, complex) else e.value,
+                    "multiplicity": e.multiplicity,
+                    "geometric_multiplicity": e.geometric,
+                    "jordan_blocks": None if e.blocks is None else [list(block) for block in e.blocks],
+                }
+            )
+        polynomials = [[coefficient_text(c) for c in polynomial] for polynomial in numbers]
+        return {
+            "n": self.n,
+            "polynomials": polynomials,
+            "eigenvalues": listed,
+            "verified": self.verified,
+            "chance": self.chance,
+        }
 
     def __repr__(self) -> str:
         many = len(self) > SHOWN

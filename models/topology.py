@@ -57,6 +57,8 @@ class Topology:
         def __getattr__(self, name: str) -> Any:
             if name != "links":
                 raise AttributeError(f"'Topology' object has no attribute {name!r}")
+            if self._count > LINK_LIMIT:
+                raise _too_many(self.name, self.n)
             module = family(self.name)
             made = Topology(self.name, self.n, tuple(_links(self.name, module, self.n, dict(self.options))))
             object.__setattr__(self, "links", made.links)
@@ -191,7 +193,8 @@ def topology(name: str, n: int, **options: Any) -> Topology:
     """The named graph of `n` nodes, all weights as its family gives them, with the family's own options.
 
     Raises ValueError on an unknown name or option, on n below the family's minimum and on more than LINK_LIMIT
-    links, and TypeError where n is no integer.
+    links (with a closed form, whose spectrum needs none, when the links are first asked for), and TypeError where n
+    is no integer.
     """
     module = family(name)
     size = _size(name, n, module)
@@ -202,7 +205,7 @@ def topology(name: str, n: int, **options: Any) -> Topology:
         found = tuple(_links(name, module, size, keywords))
         return ruled(Topology(name, size, found, chosen), rule, len(found))
     count = module.count(size, **keywords) * (1 if getattr(module, "DIRECTED", False) else 2)
-    if count > LINK_LIMIT:
+    if count > LINK_LIMIT and rule is None:
         raise _too_many(name, size)
     made = object.__new__(Topology)
     for key, value in (("name", name), ("n", size), ("options", chosen)):

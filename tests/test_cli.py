@@ -137,6 +137,18 @@ def test_spectrum_of_separate_parts_is_allowed_but_said(tmp_path: Path, capsys: 
     assert capsys.readouterr().err == ""
 
 
+def test_long_tables_are_abbreviated_unless_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["spectrum", "chain", "30000"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 203
+    assert lines[101] == "… (29800 more)"
+    assert lines[-1].startswith("30000 eigenvalues, 30000 distinct;")
+    assert main(["spectrum", "chain", "201", "--all"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 203
+    assert main(["spectrum", "chain", "201", "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["eigenvalues"]) == 201
+
+
 def test_several_parts_are_said_with_negative_weights_as_well(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -535,9 +535,10 @@ def test_cosines_are_recognised_in_every_spelling() -> None:
 
 def test_as_dict_is_what_the_command_line_prints() -> None:
     found = topology("chain", 4).spectrum.as_dict()
-    once = {"geometric_multiplicity": 1, "jordan_blocks": [[1, 1]]}
+    once = {"geometric_multiplicity": 1, "jordan_blocks": [[1, 1]], "polynomial": None, "index": None}
     assert json.loads(json.dumps(found)) == {
         "n": 4,
+        "polynomials": [],
         "eigenvalues": [
             {"exact": "0", "value": 0.0, "multiplicity": 1, **once},
             {"exact": "-2 + sqrt(2)", "value": -0.585786437626905, "multiplicity": 1, **once},
@@ -575,6 +576,38 @@ def test_an_ill_scaled_one_way_graph_is_proved() -> None:
     assert [e.value for e in found if not isinstance(e.value, complex)] == pytest.approx(
         [0, -2.215330009687225, -999999999996.3334], rel=1e-14
     )
+
+
+def test_polynomials_are_written_once_and_roots_refer_to_them() -> None:
+    graph = integer_graph(12, 0.4, 1)
+    found = json.loads(json.dumps(graph.spectrum.as_dict()))
+    assert len(found["polynomials"]) == 1
+    coefficients = [int(text, 0) for text in found["polynomials"][0]]
+    p0 = sp.Poly(coefficients[::-1], sp.Symbol("x"))
+    of_roots = [e for e in found["eigenvalues"] if e["polynomial"] is not None]
+    assert len(of_roots) == 11
+    for e in of_roots:
+        root = sp.sympify(e["exact"], locals={"p0": p0})
+        assert root == sp.CRootOf(p0, e["index"])
+        assert float(root.evalf(17)) == pytest.approx(e["value"], rel=1e-15)
+
+
+def test_coefficients_that_python_refuses_to_write_are_abbreviated() -> None:
+    """Whole numbers of more than 4300 digits cannot be turned into decimals by default."""
+    weights = {(i, i + 1): Fraction(1, 10**1500 + i) for i in range(4)}
+    links = sorted((*pair, w) for (i, j), w in weights.items() for pair in ((i, j), (j, i)))
+    graph = Topology("long", 5, tuple(links))
+    found = fresh(graph)
+    assert found.verified
+    assert "(degree 4)" in repr(found)
+    assert "root 0 of a polynomial of degree 4" in table(found)
+    for shown in (str(found.largest), repr(found.largest), found[1].text):
+        assert shown.startswith("CRootOf(polynomial of degree 4 with coefficients of up to ")
+        assert len(shown) < 100
+    listed = json.loads(json.dumps(found.as_dict()))
+    coefficients = [int(text, 0) for text in listed["polynomials"][0]]
+    assert coefficients == list(found[1].number.polynomial)
+    assert max(coefficients) > 10**4300
 
 
 def test_the_table() -> None:
