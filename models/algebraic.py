@@ -1,9 +1,9 @@
 """Real and complex algebraic numbers: an irreducible integer polynomial and what isolates one of its roots.
 
 A real root is held between two rationals where the polynomial changes sign, a complex root in a disc that holds no
-other; both are refined to any accuracy.  Polynomials with real roots only are isolated by `isolation.py`, others by
-`complex_isolation.py` or, should that fail, by Arb (F. Johansson, IEEE Trans. Comput. 66, 1281, 2017).  Real roots are
-refined exactly: secant guesses, proved by signs (J. Abbott, ACM Commun. Comput. Algebra 48, 3, 2014).
+other; both are refined to any accuracy.  `isolation.py` isolates the roots or, should that fail, Arb (F. Johansson, IEEE
+Trans. Comput. 66, 1281, 2017).  Real roots are refined exactly: secant guesses, proved by signs (J. Abbott, ACM Commun.
+Comput. Algebra 48, 3, 2014).
 """
 
 from __future__ import annotations
@@ -17,16 +17,18 @@ import sympy as sp
 from flint import acb, arb, fmpq, fmpz_poly
 
 from .balls import precision
-from .complex_isolation import Disc, discs, sharpened
-from .isolation import dyadic, real_brackets, sign
+from .isolation import Disc, discs, dyadic, sharpened, sign
 from .sympy_order import complex_order
 
-__all__ = ["ComplexRoot", "RealRoot", "complex_roots", "real_roots"]
+__all__ = ["ComplexRoot", "RealRoot", "coefficient_text", "roots"]
 
 Polynomial = tuple[int, ...]
 """Integer coefficients, constant first; irreducible and primitive, the leading one positive."""
 
 _X = sp.Symbol("x")
+
+_WRITTEN = 14_000
+"""Bits up to which Python turns whole numbers into decimals and back by default (4300 digits)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +48,7 @@ class RealRoot:
         f = fmpz_poly(list(self.polynomial))
         if not self.low < self.high or sign(f, _exact(self.low)) * sign(f, _exact(self.high)) >= 0:
             raise ValueError(
-                f"{self.text}: no sign change from {self.low} to {self.high}; expected a bracket of one root"
+                f"{self.text}: no sign change from {_short(self.low)} to {_short(self.high)}; expected a bracket of one root"
             )
 
     @property
@@ -95,13 +97,38 @@ class ComplexRoot:
 
 @lru_cache(maxsize=64)
 def polynomial_text(polynomial: Polynomial) -> str:
-    """The polynomial in x as SymPy prints it."""
+    """The polynomial in x as SymPy prints it; in words if Python refuses to write or read its coefficients."""
+    longest = max(abs(c).bit_length() for c in polynomial)
+    if longest > _WRITTEN:
+        return f"polynomial of degree {len(polynomial) - 1} with coefficients of up to {longest} bits"
     return sp.sstr(sp.Poly(list(polynomial[::-1]), _X).as_expr())
+
+
+def coefficient_text(c: int) -> str:
+    """A whole number as text for `int(text, 0)`: in decimals, or in hexadecimals if Python refuses so many decimals."""
+    return str(c) if abs(c).bit_length() <= _WRITTEN else hex(c)
+
+
+def _short(x: Fraction) -> str:
+    longest = max(abs(x.numerator).bit_length(), x.denominator.bit_length())
+    return str(x) if longest < 100 else f"a fraction of {longest} bits"
+
+
+class _Root(sp.CRootOf):
+    """SymPy's CRootOf of a polynomial whose coefficients Python refuses to write."""
+
+    __slots__ = ()
+
+    def _sympystr(self, printer: object) -> str:
+        return f"CRootOf({polynomial_text(tuple(int(c) for c in self.poly.all_coeffs()[::-1]))}, {self.index})"
+
+    _sympyrepr = _latex = _pretty = _sympystr
 
 
 @lru_cache(maxsize=512)
 def _expression(polynomial: Polynomial, index: int) -> sp.Expr:
-    return sp.CRootOf(sp.Poly(list(polynomial[::-1]), _X), index)
+    kind = _Root if max(abs(c).bit_length() for c in polynomial) > _WRITTEN else sp.CRootOf
+    return kind(sp.Poly(list(polynomial[::-1]), _X), index)
 
 
 @lru_cache(maxsize=4096)
@@ -116,21 +143,13 @@ def _by_arb(f: fmpz_poly) -> list[Disc]:
         found = [root for root, _ in f.complex_roots()]
         reals = sorted((ball for ball in found if ball.imag == 0), key=lambda ball: dyadic(ball.real))
         others = [ball for ball in found if ball.imag != 0]
-        radii = [dyadic((ball.real.rad() + ball.imag.rad()).upper()) + fmpq(1, 2**120) for ball in reals + others]
+        radii = [dyadic((ball.real.rad() + ball.imag.rad()).upper()) for ball in reals + others]
     return [
         Disc(dyadic(ball.real), dyadic(ball.imag), radius) for ball, radius in zip(reals + others, radii, strict=True)
     ]
 
 
-def real_roots(polynomial: Polynomial) -> tuple[RealRoot, ...] | None:
-    """All roots, ascending, of an irreducible polynomial of degree >= 2; None where not all prove real."""
-    brackets = real_brackets(fmpz_poly(list(polynomial)))
-    if brackets is None:
-        return None
-    return tuple(RealRoot(polynomial, i, _fraction(low), _fraction(high)) for i, (low, high) in enumerate(brackets))
-
-
-def complex_roots(polynomial: Polynomial) -> tuple[RealRoot | ComplexRoot, ...]:
+def roots(polynomial: Polynomial) -> tuple[RealRoot | ComplexRoot, ...]:
     """All roots of an irreducible polynomial of degree >= 2, each isolated by a disc that is proved to hold it alone.
 
     Real ones come first, ascending; conjugates are neighbours.

@@ -5,14 +5,14 @@ Arb: F. Johansson, IEEE Trans. Comput. 66, 1281 (2017).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeAlias
 
 import sympy as sp
 from flint import acb, arb, ctx, fmpq, fmpz
 
-__all__ = ["Ball", "accurate", "decimals", "enclose", "nearest", "precision"]
+__all__ = ["Ball", "accurate", "decimals", "disjoint", "enclose", "nearest", "precision"]
 
 Ball: TypeAlias = Any
 """flint.arb where the number is real, flint.acb where it is complex (flint has no types)."""
@@ -74,6 +74,19 @@ def decimals(ball_at: Callable[[int], Ball], digits: int) -> sp.Expr:
             return _decimal(ball, digits)
         real, imaginary = (_decimal(_part(x, ball, bits), digits) for x in (ball.real, ball.imag))
     return real + imaginary * sp.I
+
+
+def disjoint(balls: Sequence[Ball]) -> bool:
+    """True if no two balls overlap; sorted by their left ends, so that each meets few others."""
+    ordered = sorted((acb(ball) for ball in balls), key=lambda ball: ball.real.lower())
+    for i, ball in enumerate(ordered):
+        end = ball.real.upper()
+        for other in ordered[i + 1 :]:
+            if other.real.lower() > end:
+                break
+            if other.overlaps(ball):
+                return False
+    return True
 
 
 def _decimal(x: Ball, digits: int) -> sp.Float:

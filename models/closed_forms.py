@@ -110,6 +110,7 @@ def _chosen(indices: tuple[Index, ...], given: dict[sp.Symbol, int]) -> Iterator
 class ClosedForm:
     """The spectrum of a family or product: its terms and the number of nodes `size` in its symbols.
 
+    `blocks` says which Jordan blocks are larger than 1; it does not hold for products.
     `options` are those of the family, in these symbols; `least` is the smallest number for each symbol that is not in
     `lowest`, and `where` what they must obey; `degree` is the in-degree of every node where it is one for all.
     """
@@ -119,6 +120,7 @@ class ClosedForm:
     options: Mapping[str, Any] = field(default_factory=dict)
     least: int = 1
     note: str = ""
+    blocks: str = ""
     degree: sp.Expr | None = None
     where: sp.Basic = sp.true
     lowest: Mapping[sp.Symbol, int] = field(default_factory=dict)
@@ -154,7 +156,12 @@ class ClosedForm:
 
     def as_dict(self) -> dict[str, Any]:
         """What `synchain spectrum FAMILY --symbolic --json` prints."""
-        return {"n": sp.sstr(self.size), "terms": [_term_dict(term) for term in self.terms], "note": self.note}
+        return {"n": sp.sstr(self.size), "terms": [_term_dict(term) for term in self.terms], "note": self.words}
+
+    @property
+    def words(self) -> str:
+        """The note and what is known of Jordan blocks."""
+        return "; ".join(filter(None, (self.note, self.blocks)))
 
     @property
     def text(self) -> str:
@@ -164,7 +171,7 @@ class ClosedForm:
             rows.append(f"  {term.text}")
             if term.vector is not None:
                 rows.append(f"    eigenvector{'s' * bool(term.numbered)}: {term.vector_text(self.size)}")
-        return "\n".join([*rows, *([f"  {self.note}"] if self.note else [])])
+        return "\n".join([*rows, *([f"  {self.words}"] if self.words else [])])
 
     def given(self, numbers: Mapping[str, int]) -> dict[sp.Symbol, int]:
         """The numbers by symbols; ValueError as `at`."""

@@ -137,8 +137,15 @@ def _joined(
     name: str, operation: Joined, first: ClosedForm, second: ClosedForm, terms: tuple[Term, ...], degree: sp.Expr | None
 ) -> ClosedForm:
     lowest = {s: form.least_of(s) for form in (first, second) for s in form.symbols}
+    defective = " and ".join(dict.fromkeys(form.name for form in (first, second) if form.blocks))
     return ClosedForm(
-        terms, first.size * second.size, note="; ".join(filter(None, (first.note, second.note))), degree=degree,
-        where=sp.And(first.where, second.where), lowest=lowest, name=f"{name}({first.name}, {second.name})",
+        terms,
+        first.size * second.size,
+        note="; ".join(filter(None, (first.note, second.note))),
+        blocks=f"defective, as {defective} is; Jordan blocks are found for given sizes" if defective else "",
+        degree=degree,
+        where=sp.And(first.where, second.where),
+        lowest=lowest,
+        name=f"{name}({first.name}, {second.name})",
         build=lambda given: operation(first.made(given), second.made(given)),
-    )  # fmt: skip
+    )

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cmp_to_key
 
 import sympy as sp
-from flint import fmpq
+from flint import acb, fmpq
 
 from .algebraic import ComplexRoot, RealRoot
-from .balls import Ball, accurate, decimals, enclose, nearest
+from .balls import Ball, accurate, decimals, enclose, nearest, precision
 from .jordan import Blocks
 from .proof import ProofError, distinct
 
@@ -82,9 +84,9 @@ class Eigenvalue:
 
 
 def ordered(claims: Sequence[Eigenvalue]) -> tuple[Eigenvalue, ...]:
-    """From 0 downwards by real part; reals compared by certified balls, conjugates side by side."""
+    """From 0 downwards by real part, conjugates side by side; what floats cannot tell apart, certified balls do."""
     if any(isinstance(e.value, complex) for e in claims):
-        return tuple(sorted(claims, key=_complex_key))
+        return tuple(sorted(claims, key=cmp_to_key(_complex_order)))
     if len({e.value for e in claims}) == len(claims):
         return tuple(sorted(claims, key=lambda e: e.value.real, reverse=True))
     if not distinct(claims):
@@ -92,8 +94,28 @@ def ordered(claims: Sequence[Eigenvalue]) -> tuple[Eigenvalue, ...]:
     return tuple(sorted(claims, key=_midpoint, reverse=True))
 
 
-def _complex_key(e: Eigenvalue) -> tuple[float, float, float]:
-    return -round(e.value.real, 12), abs(e.value.imag), e.value.imag
+def _complex_order(a: Eigenvalue, b: Eigenvalue) -> int:
+    """Below 0 if `a` comes first: by real part, downwards, then by |imaginary part|, then the lower conjugate.
+
+    Parts that agree to 1024 bits of the moduli are taken to be equal.
+    """
+    gap, room = b.value.real - a.value.real, 2.0**-50 * (abs(a.value) + abs(b.value))
+    if room < abs(gap) < math.inf:
+        return 1 if gap > 0 else -1
+    if a.value != b.value.conjugate() or not _conjugate(a, b):
+        for part in (lambda ball: -ball.real, lambda ball: abs(ball.imag)):
+            for bits in (72, 256, 1024):
+                with precision(2 * bits):
+                    first, second = (part(acb(e.enclosure(bits))) for e in (a, b))
+                    if not first.overlaps(second):
+                        return -1 if first < second else 1
+    return -1 if a.value.imag < b.value.imag else 1
+
+
+def _conjugate(a: Eigenvalue, b: Eigenvalue) -> bool:
+    """True if one number is the mirror image of the other, to 256 bits."""
+    with precision(512):
+        return bool(acb(a.enclosure(256)).conjugate().overlaps(acb(b.enclosure(256))))
 
 
 def _midpoint(e: Eigenvalue) -> fmpq:

@@ -1,58 +1,88 @@
-"""Isolation of the roots of polynomials that have real roots only: Laguerre's method finds, signs prove.
+"""Isolation of all roots, real and complex, of an irreducible polynomial: Aberth's method finds, discs prove.
 
-From the left of all roots Laguerre's iteration climbs to the smallest one and never beyond it (A. S. Householder,
-The Numerical Treatment of a Single Nonlinear Equation, McGraw-Hill, 1970, section 4.3); each root found is divided out
-by subtracting its part from the logarithmic derivative (H. J. Maehly, Z. angew. Math. Phys. 5, 260, 1954).  Nothing
-of this is trusted: a bracket counts only where the signs at its ends, certified by Arb, differ.
+All roots are improved at once, each as if the others were divided out (O. Aberth, Math. Comp. 27, 339, 1973), from starts
+on the circles that the sizes of the coefficients suggest (D. A. Bini, Numer. Algorithms 13, 179, 1996), or on the real axis
+if Newton's inequalities allow that all roots are real.  Nothing of this is trusted: within d |f/f'| of any point lies a root
+of f, of degree d (D. A. Bini, G. Fiorentino, Numer. Algorithms 23, 127, 2000), and d discs that do not touch each other hold
+one root each.
 """
 
 from __future__ import annotations
 
+import cmath
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
-from flint import arb, arb_poly, fmpq, fmpz, fmpz_poly
+from flint import acb, acb_poly, arb, arb_poly, fmpq, fmpz, fmpz_poly
 
-from .balls import Ball, precision
+from .balls import Ball, disjoint, precision
 
-__all__ = ["dyadic", "real_brackets", "sign"]
+__all__ = ["Disc", "discs", "dyadic", "sharpened", "sign"]
 
-Bracket = tuple[fmpq, fmpq]
+_IDLE = {arb: 30, acb: 200}
+"""Steps without a further root that settles, after which the iteration ends; up to 10 and 70 are taken."""
+_DIGITS = 2.0**-44
+"""Relative size of the step after which Newton's method takes over."""
+_SHARP = 160
+"""Bits of the discs."""
+_LARGE = 900.0
+"""Radii of starts are floats from 2**-900 to 2**900."""
 
-_STEPS = 100
-"""Steps of the iteration towards one root; about seven are taken."""
-_ATTEMPTS = 4
-"""Each with brackets of twice as many digits as the one before."""
+
+@dataclass(frozen=True, slots=True)
+class Disc:
+    """A disc in the complex plane that holds exactly one root; a real centre: the root is real."""
+
+    x: fmpq
+    y: fmpq
+    radius: fmpq
+
+    @property
+    def ball(self) -> acb:
+        """A ball that holds the disc."""
+        return self.within(1)
+
+    def within(self, times: int) -> acb:
+        """A ball that holds the disc of so many times the radius."""
+        return acb(_wide(self.x, times * self.radius), _wide(self.y, times * self.radius))
 
 
-def real_brackets(f: fmpz_poly) -> list[Bracket] | None:
-    """Disjoint brackets of all roots, ascending, of an irreducible polynomial of degree >= 2; None where some are complex.
+def discs(f: fmpz_poly) -> list[Disc] | None:
+    """One disc for each root of a polynomial without multiple roots, real ones first; None if this finds none.
 
-    As many sign changes as the degree are all the roots there are.
+    No two discs touch, not even at four times their size.
     """
-    if not _newton_inequalities(f):
-        return None
-    centre = -f[f.degree() - 1] // (f.degree() * f[f.degree()])  # values cancel least about the mean of the roots
-    found = _centred(f(fmpz_poly([centre, 1])))
-    return None if found is None else [(low + centre, high + centre) for low, high in found]
-
-
-def _centred(f: fmpz_poly) -> list[Bracket] | None:
-    """The brackets, with few bits first; then with as many as the coefficients have, and finer ones."""
+    mean = -f[f.degree() - 1] // (f.degree() * f[f.degree()])  # values cancel least about the mean of the roots
+    shifted = [(middle, f(fmpz_poly([middle, 1]))) for middle in (mean, fmpz(0))]
+    real = all(_newton_inequalities(g) for _, g in shifted)
     full = 2 * f.degree() + f.height_bits()
-    tried = [(min(_usual(f), full), 128), *((full, 128 * 2**attempt) for attempt in range(_ATTEMPTS))]
-    for bits, width in tried:
-        with precision(bits + 3 * width):
-            found = _climb(f, width)
-        if found is not None:
-            brackets = [_around(root, width) for root in found]
-            if _proved(f, brackets):
-                return brackets
+    for bits in sorted({min(_usual(f), full), full}):
+        with precision(bits + _SHARP + 64):
+            for middle, g in shifted:
+                found = _isolated(g, real)
+                if found is not None:
+                    moved = [Disc(disc.x + middle, disc.y, disc.radius) for disc in found]
+                    return sorted(moved, key=lambda disc: (disc.y != 0, disc.x, disc.y))
     return None
 
 
+def sharpened(f: fmpz_poly, disc: Disc, room: fmpq, bits: int) -> acb:
+    """A ball around the only root within `room` of a disc's centre, of radius below 2**-bits times its modulus.
+
+    Raises ValueError if no such root is found: the disc was wrong.
+    """
+    with precision(2 * f.degree() + f.height_bits() + 2 * bits + 64):
+        start = acb(disc.x, disc.y)
+        found = _sharp(acb_poly(f), acb_poly(f.derivative()), start, bits + 4)
+        if found is None or not abs(acb(found.x, found.y) - start) + arb(found.radius) < arb(room):
+            raise ValueError(f"no root near {complex(start)}; expected one within {float(arb(room)):.3g}")
+        return found.ball
+
+
 def sign(f: fmpz_poly, x: fmpq) -> int:
-    """The sign of f(x): certified by a ball, or exact where the ball cannot tell."""
+    """The sign of f(x): certified by a ball, or exact if the ball cannot tell."""
     full = f.height_bits() + 2 * f.degree()
     for bits in sorted({min(_usual(f), full), full}):
         with precision(bits + 320):
@@ -63,83 +93,136 @@ def sign(f: fmpz_poly, x: fmpq) -> int:
     return (exact > 0) - (exact < 0)
 
 
-def _usual(f: fmpz_poly) -> int:
-    """Bits that usually cancel in a value of f between its roots: some per root, however large the roots are."""
-    return 4 * f.degree() + 64
-
-
 def dyadic(ball: arb) -> fmpq:
     """The midpoint of a ball, exactly."""
     mantissa, exponent = ball.mid().man_exp()
     return fmpq(mantissa) * fmpq(2) ** int(exponent)
 
 
+def _usual(f: fmpz_poly) -> int:
+    """Bits that usually cancel in a value of f between its roots: some per root, however large the roots are."""
+    return 4 * f.degree() + 64
+
+
+def _isolated(f: fmpz_poly, real: bool) -> list[Disc] | None:
+    """One proved disc for each root, from starts on the axis if all roots may be `real`, then from starts on circles."""
+    radii = _radii(f)
+    if radii is None:
+        return None
+    found = _proved(f, arb, _on_axis(radii)) if real else None
+    return found or _proved(f, acb, _on_circles(radii))
+
+
+def _proved(f: fmpz_poly, kind: type, starts: Sequence[complex]) -> list[Disc] | None:
+    """Discs that do not touch each other, from Aberth's method in real or complex balls; None if one is missing."""
+    value, slope = (arb_poly(p) if kind is arb else acb_poly(p) for p in (f, f.derivative()))
+    found = []
+    for z in _aberth(value, slope, kind, list(starts)) or ():
+        disc = _sharp(value, slope, _point(kind, z), _SHARP)
+        if disc is None:
+            return None
+        found.append(disc)
+    if len(found) != f.degree() or not disjoint([disc.within(4) for disc in found]):
+        return None
+    return [_on_its_side(disc) for disc in found]
+
+
+def _on_its_side(disc: Disc) -> Disc:
+    """The disc, its centre put on the real axis if it meets the axis: then its root is real.
+
+    The mirror image of the disc holds the mirror image of its root, and no other disc is near: the two are one root.
+    """
+    return disc if abs(disc.y) > disc.radius else Disc(disc.x, fmpq(0), disc.radius + abs(disc.y))
+
+
 def _newton_inequalities(f: fmpz_poly) -> bool:
-    """False where c_k² < c_(k-1) c_(k+1) (1 + 1/k) (1 + 1/(d - k)) for some k: then some roots are complex."""
+    """False if c_k² < c_(k-1) c_(k+1) (1 + 1/k) (1 + 1/(d - k)) for some k: then some roots are complex."""
     c, d = f.coeffs(), f.degree()
     return all(c[k] * c[k] * k * (d - k) >= c[k - 1] * c[k + 1] * (k + 1) * (d - k + 1) for k in range(1, d))
 
 
-def _climb(f: fmpz_poly, width: int) -> list[Ball] | None:
-    """The roots, ascending, within about 2**-width; None where an iteration does not end or leaves the real line."""
-    first = f.derivative()
-    values = [arb_poly(p) for p in (f, first, first.derivative())]
-    scale = arb(_root_bound(f))
-    start, found = -scale, list[Ball]()
-    for left in range(f.degree(), 0, -1):
-        root = _laguerre(values, start, found, left, scale * arb(2) ** -(width + 32))
-        if root is None:
-            return None
-        found.append(root)
-        start = (root + scale * arb(2) ** -(width - 32)).mid()
-    return found
-
-
-def _laguerre(values: Sequence[arb_poly], start: Ball, found: Sequence[Ball], left: int, small: Ball) -> Ball | None:
-    """Climb from `start` to the smallest of the `left` roots that are not divided out yet."""
-    x, last = start, None
-    for _ in range(_STEPS):
-        f, first, second = (p(x).mid() for p in values)
-        if f == 0:
-            return x
-        slope = first / f
-        curve = slope * slope - second / f
-        for root in found:
-            part = 1 / (x - root)
-            slope, curve = (slope - part).mid(), (curve - part * part).mid()
-        spread = ((left - 1) * (left * curve - slope * slope)).mid()
-        if spread < 0:
-            if left > 1 and abs(spread) > slope * slope * arb(2) ** -48:
+def _aberth(value: Ball, slope: Ball, kind: type, z: list[complex]) -> list[complex] | None:
+    """All roots to about 2**-44 of themselves; None if the iteration does not settle or the precision is too low."""
+    number = float if kind is arb else complex
+    moving, idle = list(range(len(z))), 0
+    while idle < _IDLE[kind]:
+        still = []
+        for k in moving:
+            at = _point(kind, z[k])
+            try:
+                ball = value(at) / slope(at)
+                newton = number(ball.mid())
+                others = sum([1 / (z[k] - w) for w in z[:k] + z[k + 1 :]])
+                step = newton / (1 - newton * others)
+            except (ZeroDivisionError, OverflowError, ValueError):
                 return None
-            spread = arb(0)
-        step = (-left / (slope + spread.sqrt() * (1 if slope > 0 else -1))).mid()  # back if rounding passed a root
-        if not step.is_finite():
-            return None
-        x = (x + step).mid()
-        if abs(step) < small or (last is not None and abs(step) < small * arb(2) ** 48 and abs(step) >= last):
-            return x
-        last = abs(step)
+            error = float(abs(ball - ball.mid()).upper())
+            if not (cmath.isfinite(step) and error <= 2.0**-8 * abs(newton) + _DIGITS * abs(z[k])):
+                return None
+            z[k] -= step
+            if abs(step) > _DIGITS * abs(z[k]):
+                still.append(k)
+        idle = idle + 1 if len(still) == len(moving) else 0
+        moving = still
+        if not moving:
+            return z
     return None
 
 
-def _root_bound(f: fmpz_poly) -> int:
-    """A power of two beyond all roots (Fujiwara's bound, Tohoku Math. J. 10, 167, 1916)."""
-    c, d = f.coeffs(), f.degree()
-    lead = int(abs(c[d])).bit_length() - 1
-    return 2 ** (
-        1 + max((int(abs(c[d - k])).bit_length() - lead + k - 1) // k for k in range(1, d + 1) if c[d - k] != 0)
-    )
+def _radii(f: fmpz_poly) -> list[float] | None:
+    """About the modulus of each root, ascending: slopes of the upper hull of log |coefficient| over its place.
+
+    None if one is beyond the range of floats.
+    """
+    points = [(k, _log2(int(c))) for k, c in enumerate(f.coeffs()) if c != 0]
+    hull: list[tuple[int, float]] = []
+    for k, y in points:
+        while len(hull) > 1 and (hull[-1][1] - hull[-2][1]) * (k - hull[-2][0]) <= (y - hull[-2][1]) * (
+            hull[-1][0] - hull[-2][0]
+        ):
+            hull.pop()
+        hull.append((k, y))
+    found = [0.0] * hull[0][0]
+    for (i, low), (j, high) in pairwise(hull):
+        size = (low - high) / (j - i)
+        if abs(size) > _LARGE:
+            return None
+        found += [2.0**size] * (j - i)
+    return found
 
 
-def _around(root: Ball, width: int) -> Bracket:
-    """The root, rounded, with 2**-width on either side."""
-    near = fmpq((dyadic(root) * fmpz(2) ** (width + 2)).floor(), fmpz(2) ** (width + 2))
-    half = fmpq(1, fmpz(2) ** width)
-    return near - half, near + half
+def _on_circles(radii: Sequence[float]) -> list[complex]:
+    """Starts at equal angles on each circle."""
+    return [cmath.rect(r, 2 * math.pi * k / radii.count(r) + 0.7 + radii.index(r)) for k, r in enumerate(radii)]
 
 
-def _proved(f: fmpz_poly, brackets: Sequence[Bracket]) -> bool:
-    """True where the brackets are disjoint and the polynomial changes its sign in each."""
-    if any(first[1] >= second[0] for first, second in pairwise(brackets)):
-        return False
-    return len(brackets) == f.degree() and all(sign(f, low) * sign(f, high) < 0 for low, high in brackets)
+def _on_axis(radii: Sequence[float]) -> list[complex]:
+    """Starts on both sides of 0, no two of them equal."""
+    return [r * (1 + 1e-3 * k / len(radii)) * (-1) ** k for k, r in enumerate(radii)]
+
+
+def _log2(c: int) -> float:
+    shift = max(abs(c).bit_length() - 60, 0)
+    return math.log2(abs(c) >> shift) + shift
+
+
+def _sharp(value: Ball, slope: Ball, z: Ball, bits: int) -> Disc | None:
+    """Newton's method until d |f/f'| is at most 2**-bits of the modulus."""
+    for _ in range(bits.bit_length() + 8):
+        step = value(z) / slope(z)
+        if not step.is_finite():
+            return None
+        radius = (abs(step) * value.degree()).upper()
+        if radius * arb(2) ** bits <= abs(z).lower():
+            x, y = (z, arb(0)) if isinstance(z, arb) else (z.real, z.imag)
+            return Disc(dyadic(x), dyadic(y), dyadic(radius))
+        z = (z - step).mid()
+    return None
+
+
+def _point(kind: type, z: complex) -> Ball:
+    return arb(z.real) if kind is arb else acb(z.real, z.imag)
+
+
+def _wide(centre: fmpq, radius: fmpq) -> arb:
+    return arb(centre) + arb(0, arb(radius).upper())

@@ -14,11 +14,11 @@ from itertools import pairwise
 from typing import Protocol
 
 import sympy as sp
-from flint import acb, fmpq, fmpq_poly, fmpz_poly
+from flint import fmpq, fmpq_poly, fmpz_poly
 
 from . import angle_sums, angles
 from .algebraic import ComplexRoot, RealRoot
-from .balls import Ball, precision
+from .balls import Ball, disjoint, precision
 
 __all__ = ["ProofError", "check", "distinct", "minimal_polynomial"]
 
@@ -78,24 +78,13 @@ def distinct(claims: Sequence[Claim]) -> bool:
     """True once brackets or balls around all claims are disjoint; False where two agree to 4000 bits."""
     numbers = [claim.number for claim in claims]
     brackets = sorted((number.low, number.high) for number in numbers if isinstance(number, RealRoot))
-    if len(brackets) == len(numbers):
-        return all(first[1] <= second[0] for first, second in pairwise(brackets))  # no end is a root
+    if len(brackets) == len(numbers) and all(first[1] <= second[0] for first, second in pairwise(brackets)):
+        return True  # no end is a root
     for bits in (64, 256, 1024, 4096):
-        balls = [acb(claim.enclosure(bits)) for claim in claims]
+        balls = [claim.enclosure(bits) for claim in claims]
         with precision(bits):
-            balls.sort(key=lambda ball: (float(ball.real.mid()), float(ball.imag.mid())))
-            if not any(_touch(balls, i) for i in range(len(balls))):
+            if disjoint(balls):
                 return True
-    return False
-
-
-def _touch(balls: list[acb], i: int) -> bool:
-    """True where ball i overlaps a later one; sorted by real part, so that the search ends soon."""
-    for other in balls[i + 1 :]:
-        if other.overlaps(balls[i]):
-            return True
-        if float((other - balls[i]).real.mid()) > 1e-12 and not other.real.overlaps(balls[i].real):
-            return False
     return False
 
 

@@ -15,16 +15,22 @@ STIFF = 100.0
 """Frequency of a mode and number of its swings above which springs are called stiff."""
 
 
+COUNTED = 200
+"""Up to so many nodes zeros of a graph with negative weights are counted by its characteristic polynomial."""
+
+
 def zero_multiplicity(graph: Topology) -> int:
     """Return how often zero is an eigenvalue of the connectivity matrix; 1 means one connected whole.
 
-    With links both ways and positive weights it is the number of unconnected parts; else the exact spectrum
-    decides.
+    With positive weights it is the number of groups that no other node acts on (J. S. Caughman, J. J. P. Veerman,
+    Electron. J. Combin. 13, R39, 2006).  With negative weights it is at least that; up to COUNTED nodes it is exact.
     """
-    if graph.symmetric and all(weight > 0 for _, _, weight in graph.links):
-        return graph.components
-    zero = [eigenvalue.multiplicity for eigenvalue in graph.spectrum.eigenvalues if eigenvalue.exact == 0]
-    return sum(zero)
+    leading = graph.leading_groups
+    if graph.n > COUNTED or all(weight > 0 for _, _, weight in graph.links):
+        return leading
+    from .spectrum import characteristic
+
+    return next(k for k, c in enumerate(characteristic(graph).coeffs()) if c != 0)
 
 
 def _stiff_springs(scene: Scene) -> list[str]:

@@ -16,7 +16,7 @@ from typing import Any, Literal, overload
 import sympy as sp
 from flint import fmpq, fmpq_poly, fmpz_mat
 
-from .algebraic import complex_roots, real_roots
+from .algebraic import ComplexRoot, RealRoot, coefficient_text, roots
 from .balls import precision
 from .continuant import banded, cyclic
 from .descending import Descending
@@ -112,6 +112,13 @@ class Spectrum:
         return () if isinstance(self.eigenvalues, Descending) else tuple(e for e in self.eigenvalues if e.defective)
 
     @property
+    def zeros(self) -> int:
+        """How often 0 is an eigenvalue."""
+        if isinstance(self.eigenvalues, Descending):  # 0 is the first
+            return self.eigenvalues[0].multiplicity
+        return sum(e.multiplicity for e in self.eigenvalues if e.number is sp.S.Zero)
+
+    @property
     def largest(self) -> sp.Expr:
         """The eigenvalue of largest modulus; of several, the first in the order of the spectrum."""
         if isinstance(self.eigenvalues, Descending):  # all real, none positive
@@ -132,18 +139,36 @@ class Spectrum:
         return tuple(e.evaluate(digits) for e in self.eigenvalues)
 
     def as_dict(self) -> dict[str, Any]:
-        """What `synchain spectrum --json` prints; a complex value is [real, imaginary]."""
-        listed = [
-            {
-                "exact": e.text,
-                "value": [e.value.real, e.value.imag] if isinstance(e.value, complex) else e.value,
-                "multiplicity": e.multiplicity,
-                "geometric_multiplicity": e.geometric,
-                "jordan_blocks": None if e.blocks is None else [list(block) for block in e.blocks],
-            }
-            for e in self.eigenvalues
-        ]
-        return {"n": self.n, "eigenvalues": listed, "verified": self.verified, "chance": self.chance}
+        """What `synchain spectrum --json` prints; a complex value is [real, imaginary].
+
+        Each polynomial is written once; an eigenvalue that is given by one has its number and its own index as CRootOf.
+        """
+        numbers: dict[tuple[int, ...], int] = {}
+        listed = []
+        for e in self.eigenvalues:
+            number, index, exact = None, None, None
+            if isinstance(e.number, (RealRoot, ComplexRoot)):
+                number, index = numbers.setdefault(e.number.polynomial, len(numbers)), e.number.index
+                exact = f"CRootOf(p{number}, {index})"
+            listed.append(
+                {
+                    "exact": exact or e.text,
+                    "polynomial": number,
+                    "index": index,
+                    "value": [e.value.real, e.value.imag] if isinstance(e.value, complex) else e.value,
+                    "multiplicity": e.multiplicity,
+                    "geometric_multiplicity": e.geometric,
+                    "jordan_blocks": None if e.blocks is None else [list(block) for block in e.blocks],
+                }
+            )
+        polynomials = [[coefficient_text(c) for c in polynomial] for polynomial in numbers]
+        return {
+            "n": self.n,
+            "polynomials": polynomials,
+            "eigenvalues": listed,
+            "verified": self.verified,
+            "chance": self.chance,
+        }
 
     def __repr__(self) -> str:
         many = len(self) > SHOWN
@@ -265,7 +290,7 @@ def _by_factors(graph: Topology, polynomial: fmpq_poly) -> list[Eigenvalue]:
     claims = []
     for factor, count in polynomial.factor()[1]:
         whole = tuple(int(c) for c in factor.numer().coeffs())
-        numbers = written(factor) or real_roots(whole) or complex_roots(whole)
+        numbers = written(factor) or roots(whole)
         found = blocks(graph, factor, count)
         claims += [Eigenvalue(number, count, found) for number in numbers]
     return claims

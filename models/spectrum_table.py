@@ -13,19 +13,27 @@ if TYPE_CHECKING:
 __all__ = ["table"]
 
 
-def table(found: Spectrum) -> str:
-    """The spectrum as text: exact, decimal, multiplicity; long polynomials are cut short."""
+def table(found: Spectrum, limit: int | None = None) -> str:
+    """The spectrum as text: exact, decimal, multiplicity; long polynomials are cut short.
+
+    Of more than `limit` distinct eigenvalues the first and the last are shown, `limit` in all.
+    """
     head = ("exact", "decimal", "multiplicity")
-    lines = [(_short(e), decimal(e.value), str(e.multiplicity)) for e in found.eigenvalues]
+    many = limit is not None and len(found) > limit
+    half = (limit or 0) // 2
+    shown = [*found[:half], *found[len(found) - half :]] if many else list(found.eigenvalues)
+    lines = [(_short(e), decimal(e.value), str(e.multiplicity)) for e in shown]
     wide = [max(len(line[k]) for line in (head, *lines)) for k in range(3)]
     rows = [f"{a:<{wide[0]}}  {b:>{wide[1]}}  {c:>{wide[2]}}" for a, b, c in (head, *lines)]
     if found.defective:
-        words = ("Jordan blocks", *(_blocks(e) for e in found.eigenvalues))
+        words = ("Jordan blocks", *(_blocks(e) for e in shown))
         rows = [f"{row}  {word}" for row, word in zip(rows, words, strict=True)]
+    if many:
+        rows.insert(half + 1, f"… ({len(found) - 2 * half} more)")
     state = "proved" if found.verified else "not proved (closed form of a large graph)"
     if found.chance is not None:
         state = f"the same modulo three large primes (a difference would show but for a chance of {found.chance:.0e})"
-    rows.append(f"{found.n} eigenvalues, {len(lines)} distinct; characteristic polynomial: {state}")
+    rows.append(f"{found.n} eigenvalues, {len(found)} distinct; characteristic polynomial: {state}")
     if found.defective:
         rows.append(
             "defective: of a block of size s, errors go as t^(s-1) exp(lambda t), lambda the exponent of its mode"

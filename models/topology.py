@@ -57,6 +57,8 @@ class Topology:
         def __getattr__(self, name: str) -> Any:
             if name != "links":
                 raise AttributeError(f"'Topology' object has no attribute {name!r}")
+            if self._count > LINK_LIMIT:
+                raise _too_many(self.name, self.n)
             module = family(self.name)
             made = Topology(self.name, self.n, tuple(_links(self.name, module, self.n, dict(self.options))))
             object.__setattr__(self, "links", made.links)
@@ -109,6 +111,32 @@ class Topology:
                 parent[max(a, b)] = min(a, b)
                 count -= 1
         return count
+
+    @property
+    def leading_groups(self) -> int:
+        """Number of groups of nodes that reach one another and that no other node acts on; at least 1.
+
+        The starts of a search along the links cover all nodes; no start is reached from an earlier one.  Searched again
+        from the last start backwards, those that are not reached yet are in groups of their own.
+        """
+        followers: list[list[int]] = [[] for _ in range(self.n)]
+        for target, source, _ in self.links:
+            followers[source].append(target)
+
+        def starts(order: Iterable[int]) -> list[int]:
+            found, reached = [], [False] * self.n
+            for start in order:
+                if not reached[start]:
+                    found.append(start)
+                    reached[start], waiting = True, [start]
+                    while waiting:
+                        new = [i for i in followers[waiting.pop()] if not reached[i]]
+                        for i in new:
+                            reached[i] = True
+                        waiting += new
+            return found
+
+        return len(starts(reversed(starts(range(self.n)))))
 
     @property
     def rows(self) -> tuple[tuple[Fraction, ...], ...]:
@@ -165,7 +193,8 @@ def topology(name: str, n: int, **options: Any) -> Topology:
     """The named graph of `n` nodes, all weights as its family gives them, with the family's own options.
 
     Raises ValueError on an unknown name or option, on n below the family's minimum and on more than LINK_LIMIT
-    links, and TypeError where n is no integer.
+    links (with a closed form, whose spectrum needs none, when the links are first asked for), and TypeError where n
+    is no integer.
     """
     module = family(name := plugins.named("topology", name))
     size = _size(name, n, module)
@@ -177,7 +206,7 @@ def topology(name: str, n: int, **options: Any) -> Topology:
         return ruled(Topology(name, size, found, chosen), rule, len(found))
     with plugins.blamed(module.count):
         count = module.count(size, **keywords) * (1 if getattr(module, "DIRECTED", False) else 2)
-    if count > LINK_LIMIT:
+    if count > LINK_LIMIT and rule is None:
         raise _too_many(name, size)
     made = object.__new__(Topology)
     for key, value in (("name", name), ("n", size), ("options", chosen)):

@@ -72,4 +72,4 @@ def transversal(graph: Topology) -> tuple[Mode, ...]:
 
 def loose_parts(graph: Topology) -> bool:
     """True where 0 is a multiple eigenvalue: parts of the network that nothing couples to each other."""
-    return sum(e.multiplicity for e in graph.spectrum.eigenvalues if e.value == 0) > 1
+    return graph.spectrum.zeros > 1

@@ -31,7 +31,7 @@ TESTS = {
     "models/closed_forms": "closed_forms spectrum",
     "models/contact": "contact contact_theory",
     "models/coupling_matrix": "coupling_matrix parts_manual",
-    "models/isolation": "spectrum",
+    "models/isolation": "isolation spectrum",
     "models/lagrangian": "lagrangian nondimensional energy inertia",
     "models/link": "network inertia coupling_matrix lagrangian nondimensional",
     "models/network": "network nondimensional inertia coupling_matrix",

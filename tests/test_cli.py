@@ -137,6 +137,28 @@ def test_spectrum_of_separate_parts_is_allowed_but_said(tmp_path: Path, capsys: 
     assert capsys.readouterr().err == ""
 
 
+def test_long_tables_are_abbreviated_unless_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["spectrum", "chain", "30000"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 203
+    assert lines[101] == "… (29800 more)"
+    assert lines[-1].startswith("30000 eigenvalues, 30000 distinct;")
+    assert main(["spectrum", "chain", "201", "--all"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 203
+    assert main(["spectrum", "chain", "201", "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["eigenvalues"]) == 201
+
+
+def test_several_parts_are_said_with_negative_weights_as_well(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = matrix(tmp_path, "1 -1 0 0\n-1 1 0 0\n0 0 -1 1\n0 0 1 -1")
+    assert main(["spectrum", "--matrix", path]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.splitlines()[1].split() == ["2", "2", "1"]
+    assert captured.err.startswith("warning: zero is an eigenvalue of multiplicity 2: the graph falls into 2 parts")
+
+
 def test_scenes_and_topologies_list_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["scenes"]) == 0
     listed = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}

@@ -262,3 +262,13 @@ def test_numbers_in_texts_keep_all_their_digits() -> None:
     assert {weight for _, _, weight in links} == {Fraction("0.1234567890123456789")}
     assert read_graph(" torus(12, shape=(3, 4))") == topology("torus", 12, shape=(3, 4))
     assert read_graph("weighted(chain(4), 1e400)").spectrum.largest < -(10**400)
+
+
+def test_products_do_not_repeat_what_is_said_of_the_blocks_of_their_factors() -> None:
+    assert "one Jordan block of n - 1 for -1" in closed_form("feed_forward").text
+    for text in ("cartesian(feed_forward, feed_forward)", "union(feed_forward, feed_forward)"):
+        form = read_form(text)
+        assert "one Jordan block" not in form.text
+        assert "defective, as feed_forward is" in form.text
+        assert form.as_dict()["note"] == "defective, as feed_forward is; Jordan blocks are found for given sizes"
+    assert "defective" not in read_form("cartesian(chain, ring)").text

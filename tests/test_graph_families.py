@@ -274,6 +274,7 @@ def test_wrong_options(name: str, n: int, options: dict, error: type[Exception],
 
 def test_a_million_nodes_cost_nothing_until_asked() -> None:
     def asked() -> None:
+        assert topology("wheel", 10**6).spectrum.largest == -(10**6)
         for name in ("chain", "ring"):
             graph = topology(name, 10**6)
             found = graph.spectrum
@@ -295,13 +296,23 @@ def test_a_million_nodes_cost_nothing_until_asked() -> None:
 
 
 def test_lazy_spectra_are_those_that_are_proved() -> None:
-    for name, n in product(("chain", "ring"), (201, 202, 301)):
+    for name, n in product(("chain", "ring", "wheel"), (201, 202, 301)):
         lazy, proved = topology(name, n).spectrum, spectrum(topology(name, n), prove=True)
         assert tuple(lazy) == tuple(proved)
         assert lazy.values == proved.values
         assert (lazy.n, len(lazy), lazy.largest, lazy.slowest) == (n, len(proved), proved.largest, proved.slowest)
         assert tuple(lazy.nonzero) == tuple(proved.nonzero)
         assert tuple(lazy[2:9:3]) == tuple(proved[2:9:3])
+
+
+def test_a_spectrum_in_closed_form_needs_no_links() -> None:
+    graph = topology("complete_bipartite", 10**5)
+    assert graph.spectrum.as_dict()["n"] == 10**5
+    assert repr(graph.spectrum) == "{0: 1, -50000: 99998, -100000: 1}"
+    with pytest.raises(ValueError, match="n = 100000 has too many links; expected at most 20000000"):
+        graph.links  # noqa: B018
+    with pytest.raises(ValueError, match="too many links"):
+        topology("erdos_renyi", 10**5, p=1)
 
 
 def test_long_spectra_are_printed_in_part() -> None:

@@ -9,11 +9,11 @@ import pytest
 import sympy as sp
 
 from synchain.models import separation
-from synchain.models.algebraic import complex_roots, real_roots
+from synchain.models.algebraic import roots
 from synchain.models.separation import Number, _bits, _Field, _measure, check_size, equal, sign
 
-ROOTS = real_roots((1, -5, 0, 3)) or ()  # of 3 x^3 - 5 x + 1
-PAIR = complex_roots((3, 1, 2))  # of 2 x^2 + x + 3
+ROOTS = roots((1, -5, 0, 3))  # of 3 x^3 - 5 x + 1
+PAIR = roots((3, 1, 2))  # of 2 x^2 + x + 3
 LOG3, LOG5 = math.log2(3), math.log2(5)
 
 
@@ -77,7 +77,7 @@ def test_a_convergent_of_the_root_of_two_is_not_that_root(steps: int) -> None:
 
 
 def test_roots_of_polynomials_meet_their_equals_and_not_their_neighbours() -> None:
-    golden = real_roots((-1, -1, 1)) or ()
+    golden = roots((-1, -1, 1))
     assert equal(golden[1], (1 + sp.sqrt(5)) / 2)
     assert not equal(golden[0], (1 + sp.sqrt(5)) / 2)
     assert equal(golden[1], 2 * sp.cos(sp.pi / 5))

@@ -20,13 +20,12 @@ from effort import effort
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synchain.models import isolation
 from synchain.models import topology as graphs
-from synchain.models.algebraic import ComplexRoot, RealRoot, complex_roots, real_roots
+from synchain.models.algebraic import ComplexRoot, RealRoot, roots
 from synchain.models.angles import cosine, linear_cosine, minimal_polynomial
 from synchain.models.eigenvalue import ordered
 from synchain.models.graph_readers import from_graph
-from synchain.models.isolation import _proved, real_brackets, sign
+from synchain.models.isolation import discs, sign
 from synchain.models.radicals import biquadratic
 from synchain.models.spectrum import Eigenvalue, ProofError, Spectrum, characteristic, spectrum, table
 from synchain.models.topology import Topology, from_matrix, names, topology
@@ -291,9 +290,9 @@ def test_complex_eigenvalues_without_a_closed_form() -> None:
     ],
 )
 def test_the_index_of_a_complex_root_is_that_of_sympy(coefficients: tuple[int, ...]) -> None:
-    roots = complex_roots(coefficients)
-    assert sorted(root.index for root in roots) == list(range(len(coefficients) - 1))
-    for root in roots:
+    found = roots(coefficients)
+    assert sorted(root.index for root in found) == list(range(len(coefficients) - 1))
+    for root in found:
         ball = root.enclosure(60)
         here = complex(float(ball.real.mid()), float(ball.imag.mid()))
         assert complex(root.expression.evalf(15)) == pytest.approx(here, rel=1e-12)
@@ -381,19 +380,20 @@ def test_a_bracket_far_off_is_refined_as_well() -> None:
     assert abs(root.evaluate(40) ** 2 - 2) < 1e-38
 
 
-def test_roots_that_are_not_all_real_are_left_to_the_complex_route() -> None:
-    assert real_roots((-2, 0, 0, 1)) is None
-    assert real_roots((1, 0, 1)) is None
-    assert real_roots((2, 0, -2, 0, 1)) is None  # x⁴ - 2x² + 2
-    assert real_roots((1, -1, -3, 1, 1, 7)) is None
+@pytest.mark.parametrize(
+    ("polynomial", "reals"),
+    [((-2, 0, 0, 1), 1), ((1, 0, 1), 0), ((2, 0, -2, 0, 1), 0), ((1, -1, -3, 1, 1, 7), 1)],
+)
+def test_real_and_complex_roots_are_told_apart(polynomial: tuple[int, ...], reals: int) -> None:
+    kinds = [type(root) for root in roots(polynomial)]
+    assert kinds == [RealRoot] * reals + [ComplexRoot] * (len(polynomial) - 1 - reals)
 
 
 def test_roots_that_nearly_coincide_are_isolated() -> None:
     """(x² - 2)² (x² - 3) shifted by 10**-60: pairs of roots 10**-30 apart."""
     polynomial = flint.fmpz_poly([-2, 0, 1]) ** 2 * flint.fmpz_poly([-3, 0, 1]) * 10**60 + 1
     assert [f.degree() for f, _ in polynomial.factor()[1]] == [6]
-    found = real_roots(tuple(int(c) for c in polynomial.coeffs()))
-    assert found is not None
+    found = roots(tuple(int(c) for c in polynomial.coeffs()))
     assert len(found) == 6
     assert all(a.high < b.low for a, b in pairwise(found))
     assert all(abs(float(a.low) - x) < 1e-12 for a, x in zip(found[::2], (-(3**0.5), -(2**0.5), 2**0.5), strict=True))
@@ -406,13 +406,13 @@ def test_roots_that_nearly_coincide_are_isolated() -> None:
 def test_an_iteration_that_rounding_carries_past_a_root_comes_back(coefficients: list[int]) -> None:
     """Steps end on a root as near as numbers go: a step to the next root from there would leave roots out."""
     f = flint.fmpz_poly(coefficients)
-    found = real_brackets(f)
+    found = discs(f)
     assert found is not None
-    roots = sorted(float(root.real.mid()) for root, _ in f.complex_roots())
-    assert [float(low.p) / float(low.q) for low, _ in found] == pytest.approx(roots, rel=1e-12)
+    expected = sorted(float(root.real.mid()) for root, _ in f.complex_roots())
+    assert [float(flint.arb(disc.x)) for disc in found] == pytest.approx(expected, rel=1e-12)
 
 
-def test_no_real_factor_of_a_graph_is_left_to_the_search_for_complex_roots() -> None:
+def test_every_factor_of_an_undirected_graph_is_isolated_on_the_real_axis() -> None:
     random = np.random.default_rng(3)
     degrees = set()
     for n in random.integers(2, 13, 40):
@@ -422,20 +422,11 @@ def test_no_real_factor_of_a_graph_is_left_to_the_search_for_complex_roots() -> 
         for factor, _ in f.factor()[1]:
             if factor.degree() >= 2:
                 degrees.add(factor.degree())
-                assert len(real_brackets(factor) or ()) == factor.degree()
+                assert [disc.y for disc in discs(factor) or ()] == [0] * factor.degree()
     assert len(degrees) > 8
 
 
-def test_roots_found_wrongly_are_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
-    f = flint.fmpz_poly([-2, 0, 1])
-    for wrong in ([-1.4, 1.4], [1.0, 2.0], [1.5]):
-        monkeypatch.setattr(
-            "synchain.models.isolation._climb", lambda f, width, found=wrong: [flint.arb(x) for x in found]
-        )
-        assert real_brackets(f) is None
-
-
-def test_roots_far_from_zero_and_near_one_another_take_few_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_roots_far_from_zero_and_near_one_another_are_isolated() -> None:
     """Some per root, once they are counted from their mean; the coefficients have more than twice as many."""
     stream, n = random.Random(1), 40
     upper = [[10**9 + stream.randint(1, 10**4) if j > i else 0 for j in range(n)] for i in range(n)]
@@ -444,15 +435,11 @@ def test_roots_far_from_zero_and_near_one_another_take_few_bits(monkeypatch: pyt
         row[i] = -sum(row)
     f = flint.fmpz_mat(rows).charpoly().factor()[1][-1][0]
     assert f.degree() == 39
-    bits: list[int] = []
-    climb = isolation._climb
-    monkeypatch.setattr(isolation, "_climb", lambda g, width: bits.append(flint.ctx.prec) or climb(g, width))
-    found = real_brackets(f)
-    assert found is not None
-    assert len(found) == 39
-    assert bits == [4 * 39 + 64 + 3 * 128]
     assert f.height_bits() > 1200
-    assert all(sign(f, low) * sign(f, high) < 0 for low, high in found)
+    found = discs(f)
+    assert found is not None
+    assert [disc.y for disc in found] == [0] * 39
+    assert all(sign(f, disc.x - disc.radius) * sign(f, disc.x + disc.radius) < 0 for disc in found)
 
 
 def test_largest_and_slowest_of_long_chains_and_of_small_graphs() -> None:
@@ -493,23 +480,6 @@ def test_a_graph_by_the_name_and_links_of_a_family_has_its_closed_form(
 def test_a_graph_of_another_kind_is_not_believed_its_name(name: str, n: int) -> None:
     star = topology("star", n) if n > 2 else topology("chain", 2)
     assert spectrum(Topology(name, n, star.links)).exact == star.spectrum.exact
-
-
-@pytest.mark.parametrize(
-    ("brackets", "proved"),
-    [
-        ([(-2, -1), (1, 2)], True),
-        ([(-2, 0), (0, 2)], False),  # they touch
-        ([(-2, 1), (-1, 2)], False),
-        ([(-2, -1)], False),
-        ([(-2, -1), (2, 3)], False),
-        ([(-2, -1), (0, 1), (1, 2)], False),
-    ],
-)
-def test_brackets_are_proved_by_signs_on_both_sides(brackets: list[tuple[int, int]], proved: bool) -> None:
-    exact = [(flint.fmpq(low), flint.fmpq(high)) for low, high in brackets]
-    assert _proved(flint.fmpz_poly([-2, 0, 1]), exact) is proved
-    assert not _proved(flint.fmpz_poly([-1, 0, 1]), exact)  # the ends 1 and -1 are roots themselves
 
 
 def test_a_sign_is_exact_where_balls_cannot_tell() -> None:
@@ -565,9 +535,10 @@ def test_cosines_are_recognised_in_every_spelling() -> None:
 
 def test_as_dict_is_what_the_command_line_prints() -> None:
     found = topology("chain", 4).spectrum.as_dict()
-    once = {"geometric_multiplicity": 1, "jordan_blocks": [[1, 1]]}
+    once = {"geometric_multiplicity": 1, "jordan_blocks": [[1, 1]], "polynomial": None, "index": None}
     assert json.loads(json.dumps(found)) == {
         "n": 4,
+        "polynomials": [],
         "eigenvalues": [
             {"exact": "0", "value": 0.0, "multiplicity": 1, **once},
             {"exact": "-2 + sqrt(2)", "value": -0.585786437626905, "multiplicity": 1, **once},
@@ -580,6 +551,63 @@ def test_as_dict_is_what_the_command_line_prints() -> None:
     spiral = one_way_ring(3).spectrum.as_dict()["eigenvalues"][1]
     assert spiral["exact"] == "-3/2 - sqrt(3)*I/2"
     assert spiral["value"] == pytest.approx([-1.5, -(3**0.5) / 2])
+
+
+def test_complex_eigenvalues_of_any_size_are_ordered_by_their_real_parts() -> None:
+    weights = {(0, 1): 1, (0, 2): 1, (1, 0): 7, (1, 2): 1, (2, 1): 9, (3, 4): 3, (4, 5): 1, (5, 3): 5}
+    for scale in (Fraction(1), Fraction(1, 10**15), Fraction(1, 10**30)):
+        links = tuple((i, j, weight * scale) for (i, j), weight in sorted(weights.items()))
+        values = Topology("scaled", 6, links).spectrum.values
+        pair = [complex(-4.5, -(2.75**0.5)), complex(-4.5, 2.75**0.5)]
+        assert [z / float(scale) for z in values] == pytest.approx([0, *pair, -9, -10], rel=1e-12)
+
+
+def test_an_ill_scaled_one_way_graph_is_proved() -> None:
+    """A root of size 2 beside one of size 1e12 was held twice, as two conjugates."""
+    rows = [
+        "-11/6 0.5 1 0 1/3",
+        "-2 -999999999996 1e12 -2 0",
+        "-2 1/3 19/6 -2 0.5",
+        "1 1 1 -1 -2",
+        "1e-12 1/3 -2 -2 10999999999997/3000000000000",
+    ]
+    found = from_matrix([row.split() for row in rows]).spectrum
+    assert found.verified
+    assert [e.value for e in found if not isinstance(e.value, complex)] == pytest.approx(
+        [0, -2.215330009687225, -999999999996.3334], rel=1e-14
+    )
+
+
+def test_polynomials_are_written_once_and_roots_refer_to_them() -> None:
+    graph = integer_graph(12, 0.4, 1)
+    found = json.loads(json.dumps(graph.spectrum.as_dict()))
+    assert len(found["polynomials"]) == 1
+    coefficients = [int(text, 0) for text in found["polynomials"][0]]
+    p0 = sp.Poly(coefficients[::-1], sp.Symbol("x"))
+    of_roots = [e for e in found["eigenvalues"] if e["polynomial"] is not None]
+    assert len(of_roots) == 11
+    for e in of_roots:
+        root = sp.sympify(e["exact"], locals={"p0": p0})
+        assert root == sp.CRootOf(p0, e["index"])
+        assert float(root.evalf(17)) == pytest.approx(e["value"], rel=1e-15)
+
+
+def test_coefficients_that_python_refuses_to_write_are_abbreviated() -> None:
+    """Whole numbers of more than 4300 digits cannot be turned into decimals by default."""
+    weights = {(i, i + 1): Fraction(1, 10**1500 + i) for i in range(4)}
+    links = sorted((*pair, w) for (i, j), w in weights.items() for pair in ((i, j), (j, i)))
+    graph = Topology("long", 5, tuple(links))
+    found = fresh(graph)
+    assert found.verified
+    assert "(degree 4)" in repr(found)
+    assert "root 0 of a polynomial of degree 4" in table(found)
+    for shown in (str(found.largest), repr(found.largest), found[1].text):
+        assert shown.startswith("CRootOf(polynomial of degree 4 with coefficients of up to ")
+        assert len(shown) < 100
+    listed = json.loads(json.dumps(found.as_dict()))
+    coefficients = [int(text, 0) for text in listed["polynomials"][0]]
+    assert coefficients == list(found[1].number.polynomial)
+    assert max(coefficients) > 10**4300
 
 
 def test_the_table() -> None:
@@ -611,7 +639,7 @@ def test_the_largest_of_equal_size_is_the_first() -> None:
 @pytest.mark.parametrize(("n", "share"), [(100, 0.1), (100, 0.9), (200, 0.3)])
 def test_large_matrices_take_the_fast_route(n: int, share: float, monkeypatch: pytest.MonkeyPatch) -> None:
     graph = integer_graph(n, share, 3)
-    monkeypatch.setattr("synchain.models.spectrum.complex_roots", None)
+    monkeypatch.setattr("synchain.models.algebraic._by_arb", None)
     found, calls = effort(lambda: fresh(graph))
     assert calls < 2_000 * n  # 670 with the newest packages, 1900 with the lowest allowed
     assert found.verified

@@ -7,16 +7,19 @@ import sys
 from collections import Counter
 from decimal import Decimal
 from fractions import Fraction
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 import sympy as sp
 from effort import effort
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from synchain.models import Scene
 from synchain.models.rationals import FILE_LIMIT
+from synchain.models.scene_warnings import zero_multiplicity
 from synchain.models.topology import Topology, family, from_matrix, names, read_matrix, topology
 
 ONE = Fraction(1)
@@ -131,7 +134,7 @@ def test_too_many_links_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         topology("erdos_renyi", 30)
     assert len(topology("complete", 10).links) == 90
     with pytest.raises(ValueError, match="complete: n = 11 has too many links; expected at most 100"):
-        topology("complete", 11)
+        topology("complete", 11).links  # noqa: B018
 
 
 @pytest.mark.parametrize(
@@ -302,3 +305,23 @@ def test_a_graph_is_built_without_sympy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     assert done.stdout == "[]\n"
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(1, 9), st.data())
+def test_leading_groups_are_as_many_as_zero_eigenvalues(n: int, data: st.DataObject) -> None:
+    pairs = [(i, j) for i, j in product(range(n), repeat=2) if i != j]
+    chosen = sorted(data.draw(st.lists(st.sampled_from(pairs), unique=True, max_size=2 * n))) if pairs else []
+    graph = Topology("random", n, tuple((i, j, Fraction(1)) for i, j in chosen))
+    assert graph.leading_groups == graph.spectrum.zeros
+    assert graph.leading_groups >= graph.components
+
+
+def test_warnings_need_no_spectrum_of_a_large_graph() -> None:
+    """1200 nodes without a closed form are too many for a spectrum, not for a run."""
+    for weight in (1, -1):
+        links = [(i, (i + step) % 1200, Fraction(weight)) for i in range(1200) for step in (1, 7)]
+        graph = Topology("large", 1200, tuple(sorted(links)))
+        sentences = Scene(oscillator="lorenz", coupling="x->x", topology=graph).warnings
+        assert len(sentences) == (weight < 0)
+        assert zero_multiplicity(graph) == 1

@@ -41,5 +41,5 @@ def formula() -> ClosedForm:
     from ..closed_forms import NODE, ClosedForm, N, Term
 
     last = KroneckerDelta(NODE, N - 1)
-    note = "one Jordan block of n - 1 for -1: one eigenvector"
-    return ClosedForm((Term(S.Zero, vector=S.One), Term(S.NegativeOne, N - 1, (), last)), least=2, note=note)
+    blocks = "one Jordan block of n - 1 for -1: one eigenvector"
+    return ClosedForm((Term(S.Zero, vector=S.One), Term(S.NegativeOne, N - 1, (), last)), least=2, blocks=blocks)

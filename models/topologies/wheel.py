@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING
 
@@ -29,14 +29,23 @@ def count(n: int) -> int:
     return 2 * (n - 1)
 
 
-def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
-    """0, -n, and -1 - 4 sin²(kπ/(n - 1)) for k = 1 … n - 2."""
-    from ..angle_sums import AngleSum, expression, merged
+def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
+    """0, -1 - 4 sin²(kπ/(n - 1)) for k = 1 … n - 2, -n; that of the hub is one of the rim's up to 5 nodes."""
+    from sympy import Integer
 
-    ring = [(AngleSum.cosine(-3, 1, k, n - 1), 1) for k in range(1, n - 1)]
-    return [
-        (expression(a), times) for a, times in merged([(AngleSum.rational(0), 1), (AngleSum.rational(-n), 1), *ring])
-    ]
+    from ..angle_sums import AngleSum, expression
+    from ..descending import Descending
+
+    rim = (n - 1) // 2
+    own = n > 5
+
+    def make(k: int) -> tuple[sp.Expr, int]:
+        if k == 0 or k > rim:
+            return Integer(-n if k else 0), 1
+        times = (1 if 2 * k == n - 1 else 2) + (k == rim and not own)
+        return expression(AngleSum.cosine(-3, 1, k, n - 1)), times
+
+    return Descending(rim + 1 + own, n, make)
 
 
 def formula() -> ClosedForm:

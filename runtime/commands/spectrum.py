@@ -29,6 +29,9 @@ FILES = ("matrix", "edges", "graphml")
 PROVED = 500
 """Up to so many nodes closed forms are multiplied out here; this takes about two seconds."""
 
+SHOWN = 200
+"""Distinct eigenvalues in a table without --all."""
+
 CHECKED = 1000
 """Up to so many nodes they are multiplied out modulo primes; this takes some seconds."""
 
@@ -62,7 +65,10 @@ def configure(parser: ArgumentParser) -> None:
         default=[],
         help="with --symbolic --matrix: a number for a letter",
     )
-    parser.add_argument("--json", action="store_true", help="print JSON: n, eigenvalues, verified")
+    parser.add_argument("--all", action="store_true", help=f"print more than {SHOWN} distinct eigenvalues as well")
+    parser.add_argument(
+        "--json", action="store_true", help="print JSON: n, polynomials, all eigenvalues, verified, chance"
+    )
 
 
 def execute(arguments: Namespace) -> int:
@@ -76,13 +82,12 @@ def execute(arguments: Namespace) -> int:
     with wrong_use():
         chosen = graph(arguments)
         found = spectrum(chosen, prove=chosen.n <= PROVED or ("primes" if chosen.n <= CHECKED else False))
-    zero = found.eigenvalues[0]
-    if zero.multiplicity > 1 and zero.exact == 0:
-        warn([f"zero is an eigenvalue of multiplicity {zero.multiplicity}: {_reason(chosen)}"])
+    if found.zeros > 1:
+        warn([f"zero is an eigenvalue of multiplicity {found.zeros}: {_reason(chosen)}"])
     if arguments.json:
         print_json(found.as_dict())
     else:
-        print(table(found))
+        print(table(found, None if arguments.all else SHOWN))
     return FINE
 
 

@@ -15,9 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synchain.models import algebraic
-from synchain.models.algebraic import ComplexRoot, RealRoot, complex_roots
-from synchain.models.balls import precision
-from synchain.models.complex_isolation import Disc, discs, sharpened
+from synchain.models.algebraic import ComplexRoot, RealRoot, roots
+from synchain.models.balls import disjoint, precision
+from synchain.models.isolation import Disc, discs, sharpened
 
 
 def inside(disc: Disc, ball: acb) -> bool:
@@ -61,18 +61,18 @@ def test_the_roots_of_unity() -> None:
 def test_near_roots_are_told_apart_or_left(gap: int) -> None:
     """Mignotte's polynomials have two real roots a distance of about gap**-4 apart."""
     f = fmpz_poly([-2, 4 * gap, -2 * gap * gap, 0, 0, 0, 0, 1])
-    roots = complex_roots(tuple(int(c) for c in f.coeffs()))
-    reals = [root for root in roots if isinstance(root, RealRoot)]
-    assert len(roots) == 7
+    found = roots(tuple(int(c) for c in f.coeffs()))
+    reals = [root for root in found if isinstance(root, RealRoot)]
+    assert len(found) == 7
     assert len(reals) == 3
     assert all(first.high <= second.low for first, second in pairwise(reals))
 
 
 def test_arb_takes_what_discs_leave(monkeypatch: pytest.MonkeyPatch) -> None:
     polynomial = (7, 3, -1, 5, 1, 1)
-    quick = complex_roots(polynomial)
+    quick = roots(polynomial)
     monkeypatch.setattr(algebraic, "discs", lambda f: None)
-    slow = complex_roots(polynomial)
+    slow = roots(polynomial)
     assert [type(root) for root in quick] == [type(root) for root in slow]
     for a, b in zip(quick, slow, strict=True):
         assert a.index == b.index
@@ -80,7 +80,7 @@ def test_arb_takes_what_discs_leave(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_any_number_of_digits() -> None:
-    root = next(r for r in complex_roots((1, 1, 0, 0, 0, 1, 0, 3)) if isinstance(r, ComplexRoot))
+    root = next(r for r in roots((1, 1, 0, 0, 0, 1, 0, 3)) if isinstance(r, ComplexRoot))
     for bits in (60, 600, 6000):
         ball = root.enclosure(bits)
         with precision(2 * bits):
@@ -99,8 +99,8 @@ def test_a_hundred_complex_roots_take_the_fast_route(monkeypatch: pytest.MonkeyP
     stream = random.Random(5)
     f = fmpz_poly([stream.randint(-(10**9), 10**9) for _ in range(100)] + [1])
     monkeypatch.setattr(algebraic, "_by_arb", None)
-    roots, calls = effort(lambda: complex_roots(tuple(int(c) for c in f.coeffs())))
-    assert len(roots) == 100
+    found, calls = effort(lambda: roots(tuple(int(c) for c in f.coeffs())))
+    assert len(found) == 100
     assert calls < 4_000_000
 
 
@@ -115,3 +115,35 @@ def test_the_second_way_to_isolate_roots_finds_the_same(coefficients: list[int])
     assert len(points) == len(expected)
     assert all(min(abs(z - points)) < 1e-12 for z in expected)
     assert all(0 < d.radius < fmpq(1, 2**60) for d in found)
+
+
+def test_a_real_root_beside_one_that_is_far_larger_is_seen_to_be_real() -> None:
+    """Roots near -1e12, -2.2 and 3.3 ± 1.4i: counted from their mean, three have few right digits at first."""
+    f = fmpz_poly(
+        [
+            3038999999988875000000000459,
+            -194999999996335999999999703,
+            -467999999998371000000000504,
+            107999999999136000000000108,
+            108000000000000,
+        ]
+    )
+    found = discs(f)
+    assert found is not None
+    assert [disc.y == 0 for disc in found] == [True, True, False, False]
+    assert [type(root) for root in roots(tuple(int(c) for c in f.coeffs()))] == [RealRoot] * 2 + [ComplexRoot] * 2
+
+
+def test_roots_beyond_the_range_of_floats_are_left_to_arb() -> None:
+    f = fmpz_poly([-(10**1000), 0, 1, 1])
+    assert discs(f) is None
+    found = roots(tuple(int(c) for c in f.coeffs()))
+    assert [type(root) for root in found] == [RealRoot, ComplexRoot, ComplexRoot]
+
+
+def test_balls_are_disjoint_or_not_at_any_scale() -> None:
+    for scale in (fmpq(1), fmpq(1, 10**30), fmpq(10**30)):
+        ball = [acb(arb(k * scale, scale / 3), arb(0, scale / 3)) for k in range(4)]
+        assert disjoint(ball)
+        assert not disjoint([*ball, acb(arb(fmpq(5, 2) * scale, scale / 3), arb(0, scale / 3))])
+        assert disjoint([*ball, acb(arb(fmpq(5, 2) * scale, scale / 3), arb(scale, scale / 3))])
