@@ -8,7 +8,6 @@ by itself.
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import pkgutil
 import traceback
@@ -20,6 +19,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from .scene_checks import shown, suggestion
+
 __all__ = ["allow_code", "allowed_code", "call", "load", "located", "names"]
 
 OTHERWISE = {"coupling": ", or components such as 'x->x'"}
@@ -29,6 +30,28 @@ NEEDED = {"oscillator": ("PARAMETERS", "FRICTION"), "friction": ("PARAMETERS", "
           "topology": ("SUMMARY", "MINIMUM", "edges")}  # fmt: skip
 ONE_OF = {"oscillator": ("field", "kinetic"), "coupling": ("potential", "dissipation")}
 """What a file from outside must hold; of ONE_OF at least one."""
+
+ALSO = {
+    "topology": {
+        "all_to_all": "complete",
+        "biclique": "complete_bipartite",
+        "clique": "complete",
+        "cubic": "random_cubic",
+        "cycle": "ring",
+        "gilbert": "erdos_renyi",
+        "gnp": "erdos_renyi",
+        "hamming": "hypercube",
+        "lattice": "grid",
+        "line": "chain",
+        "newman_watts": "small_world",
+        "open_chain": "chain",
+        "path": "chain",
+        "watts_strogatz": "small_world",
+    },
+    "oscillator": {"roessler": "rossler", "vdp": "van_der_pol"},
+    "coupling": {"dashpot": "damper"},
+}
+"""Other names of the field for what is here: they serve suggestions only."""
 
 _allowed: set[Path] = set()
 
@@ -68,9 +91,8 @@ def load(kind: str, name: str) -> ModuleType:
     if name in entries:
         return _entry(kind, name)
     known = names(kind)
-    close = difflib.get_close_matches(str(name), known, n=1)
-    hint = f" (did you mean {close[0]!r}?)" if close else ""
-    raise ValueError(f"unknown {kind} {name!r}; known: {', '.join(known)}{OTHERWISE.get(kind, '')}{hint}")
+    hint = suggestion(name, known, ALSO.get(kind))
+    raise ValueError(f"unknown {kind} {shown(name)}; known: {', '.join(known)}{OTHERWISE.get(kind, '')}{hint}")
 
 
 def call(function: Callable[..., Any], symbols: Mapping[str, Any]) -> Any:

@@ -32,7 +32,7 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     made["title"] = text("title", made["title"])
     made["seed"] = integer("seed", made["seed"], 0, SEED_LIMIT)
     _model(made)
-    made["axes"] = read_axes(made["axes"])
+    made["axes"] = read_axes(made["axes"], made["zipped"])
     made["parameters"] = parameters(made)
     made["initial"] = _start(made)
     _records(made)

@@ -13,6 +13,7 @@ import numpy as np
 
 from synchain.models.expect import a_path, flag
 from synchain.models.scene import Scene
+from synchain.models.scene_checks import shown
 
 from .crew import Task, crew_size, worker_lost
 from .files import drop_leftovers, netcdf_data
@@ -153,7 +154,7 @@ def _check_same(chosen: Skip, certified: bool, path: Path, told: Mapping[str, An
     kept = told["attributes"]
     again = "repeat the options of that run, choose another path (--out), or replace it with overwrite (--overwrite)"
     if scene_of(kept).replace(title="") != chosen.scene.replace(title=""):
-        raise ValueError(f"{path} belongs to another scene ({kept['title']}); {again}")
+        raise ValueError(f"{path} belongs to another scene ({shown(kept['title'])}); {again}")
     if kept["equations"] != chosen.equations.digest:
         raise ValueError(
             f"{path} left out other parts of its scene: {kept.get('skipped', 'nothing')}; "
