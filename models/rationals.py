@@ -140,7 +140,7 @@ def parse_rows(text: str, name: str) -> list[list[str]]:
 
     Raises ValueError on an empty entry and on more than ROWS rows or columns.
     """
-    rows = []
+    rows: list[list[str]] = []
     for number, line in enumerate(text.splitlines(), 1):
         bare = line.partition("#")[0].strip()
         if not bare:
