@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sized
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import islice
 
 from .scene_checks import integer, known_keys, number, shown, text
 
-__all__ = ["Axis"]
+__all__ = ["Axis", "known_length"]
 
 LIMIT = 10_000_000
 """Most values on one axis."""
@@ -59,6 +59,12 @@ class Axis:
         if len(self.values) < 5:
             return f"Axis({self.name!r}, {list(self.values)})"
         return f"Axis({self.name!r}, {len(self.values)} values from {self.values[0]:g} to {self.values[-1]:g})"
+
+
+def known_length(values: object) -> int:
+    """Return how many values the entry of an axis in a table will have; 1 where only building it would tell."""
+    size = values.get("count") if isinstance(values, Mapping) else len(values) if isinstance(values, Sized) else 1
+    return size if isinstance(size, int) else 1
 
 
 def _spaced(first: Fraction, last: Fraction, count: int) -> Iterator[float]:

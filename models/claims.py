@@ -26,7 +26,7 @@ from .exact_text import exact_number, whole_number
 from .graph_text import is_composed, read_graph
 from .part_claims import WORDS, Part, interval, is_part, read_part
 from .scene_checks import shown
-from .topology import Topology, read_matrix, topology
+from .topology import Topology, family, read_matrix, topology
 
 __all__ = ["Claim", "Claimed", "read_claims"]
 
@@ -152,6 +152,8 @@ def _family(name: str, n: int, written: str, largest: int | None) -> Topology:
         if key in options:
             raise ValueError(f"option {key} is given twice; expected it once")
         options[key] = value
+    if largest is None and n > LARGEST and not hasattr(family(name), "spectrum"):
+        raise ValueError(f"{name} {n}: a graph without a closed form; expected at most {LARGEST} nodes")
     if largest is not None and n > largest:
         raise ValueError(
             f"{name} {n}: expected at most {largest} nodes; claims about all eigenvalues of larger graphs are not proved "

@@ -6,14 +6,15 @@ feels u: it becomes the link v <- u.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence, Set
+from collections.abc import Hashable, Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 from .expect import flag, whole
 from .rationals import file_text, rational
-from .scene_checks import shown, typed
+from .scene_checks import printable, shown, typed
 from .topology import LINK_LIMIT, Topology
 
 __all__ = ["from_edges", "from_graph", "from_sparse", "read_edges", "read_graphml"]
@@ -35,8 +36,9 @@ def from_edges(
     found = [_edge(edge, f"{name}: edge {k + 1}") for k, edge in enumerate(edges)]
     size = 1 + max((max(i, j) for i, j, _ in found), default=-1) if n is None else whole(f"{name}: n", n, 1)
     weights: Weights = {}
+    called = _Names(name, range(size))
     for i, j, weight in found:
-        _put(weights, j, i, weight, directed, name, lambda k: str(k))
+        _put(weights, j, i, weight, directed, called)
     return _graph(name, size, weights)
 
 
@@ -51,10 +53,10 @@ def from_graph(graph: Any, weight: str = "weight", name: str = "graph") -> Topol
     nodes = list(graph.nodes())
     place = {node: k for k, node in enumerate(nodes)}
     many = bool(graph.is_multigraph()) if hasattr(graph, "is_multigraph") else False
-    weights: Weights = {}
+    weights, called = Weights(), _Names(name, [repr(node) for node in nodes])
     for u, v, data in graph.edges(data=True):
         value = rational(data.get(weight, 1), f"{name}: weight of edge {u!r} - {v!r}")
-        _put(weights, place[v], place[u], value, graph.is_directed(), name, lambda k: repr(nodes[k]), many)
+        _put(weights, place[v], place[u], value, graph.is_directed(), called, many)
     return _graph(name, len(nodes), weights)
 
 
@@ -98,7 +100,8 @@ def read_edges(path: str | Path, directed: bool = False) -> Topology:
     with one word is a node without edges.  Raises FileNotFoundError, and ValueError on what `from_edges` refuses.
     """
     text, name = file_text(path, "edge file")
-    edges: list[tuple[str, str, Any]] = []
+    one, most = Fraction(1), LINK_LIMIT if directed else LINK_LIMIT // 2
+    edges: list[tuple[str, str, Fraction]] = []
     order: dict[str, None] = {}
     for number, line in enumerate(text.splitlines(), 1):
         words = line.partition("#")[0].replace(",", " ").split()
@@ -106,7 +109,9 @@ def read_edges(path: str | Path, directed: bool = False) -> Topology:
             raise ValueError(f"{name}: line {number} has {len(words)} words; expected two nodes and perhaps a weight")
         order.update(dict.fromkeys(words[:2]))
         if len(words) > 1:
-            edges.append((words[0], words[1], rational(words[2], f"{name}: line {number}") if words[2:] else 1))
+            edges.append((words[0], words[1], rational(words[2], f"{name}: line {number}") if words[2:] else one))
+            if len(edges) > most:
+                raise ValueError(f"{name}: line {number} has edge {most + 1}; expected at most {LINK_LIMIT} links")
     numbers = all(word.isascii() and word.isdecimal() and len(word) < 19 for word in order)
     nodes = sorted(order, key=int) if numbers else list(order)
     return assembled(nodes, [(u, v, weight, directed) for u, v, weight in edges], name)
@@ -127,28 +132,46 @@ def read_graphml(path: str | Path, weight: str = "weight") -> Topology:
 
 def assembled(nodes: Sequence[Hashable], edges: Iterable[tuple[Hashable, Hashable, Any, bool]], name: str) -> Topology:
     """The graph of named nodes and edges (from, to, weight, one-way)."""
+    for node in nodes:
+        printable(f"{name}: node name", str(node))
     place = {node: k for k, node in enumerate(nodes)}
-    weights: Weights = {}
+    weights, called = Weights(), _Names(name, nodes)
     for u, v, value, directed in edges:
-        number = rational(value, f"{name}: weight of edge {u} - {v}")
-        _put(weights, place[v], place[u], number, directed, name, lambda k: str(nodes[k]))
+        number = value if type(value) is Fraction else rational(value, f"{name}: weight of edge {u} - {v}")
+        _put(weights, place[v], place[u], number, directed, called)
     return _graph(name, len(nodes), weights)
 
 
+@dataclass(frozen=True, slots=True)
+class _Names:
+    """What a graph and its nodes are called, for messages."""
+
+    graph: str
+    nodes: Sequence[Hashable]
+
+    def edge(self, source: int, target: int) -> str:
+        return f"{self.graph}: edge {self.nodes[source]} - {self.nodes[target]}"
+
+
 def _put(
-    weights: Weights, target: int, source: int, value: Fraction, directed: bool, name: str,
-    called: Callable[[int], str], many: bool = False,
-) -> None:  # fmt: skip
+    weights: Weights, target: int, source: int, value: Fraction, directed: bool, called: _Names, many: bool = False
+) -> None:
     """Add an edge; ValueError where it is a loop, has no weight or is there already."""
-    edge = f"{name}: edge {called(source)} - {called(target)}"
     if target == source:
-        raise ValueError(f"{edge} joins a node to itself; it has no effect on a difference: leave it out")
+        raise ValueError(
+            f"{called.edge(source, target)} joins a node to itself; it has no effect on a difference: leave it out"
+        )
     if not value:
-        raise ValueError(f"{edge} has weight 0; leave it out or give it a weight")
-    for link in [(target, source)] if directed else [(target, source), (source, target)]:
-        if link in weights and not many:
-            raise ValueError(f"{edge} is given twice; expected each edge once: add the weights up")
-        weights[link] = weights.get(link, Fraction(0)) + value
+        raise ValueError(f"{called.edge(source, target)} has weight 0; leave it out or give it a weight")
+    for link in ((target, source),) if directed else ((target, source), (source, target)):
+        if link not in weights:
+            weights[link] = value
+        elif many:
+            weights[link] += value
+        else:
+            raise ValueError(
+                f"{called.edge(source, target)} is given twice; expected each edge once: add the weights up"
+            )
 
 
 def _edge(edge: Sequence[Any], where: str) -> tuple[int, int, Fraction]:

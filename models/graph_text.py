@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
 from . import products
+from .scene_checks import shown
 from .topology import Topology, topology
 
 if TYPE_CHECKING:
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
 __all__ = ["is_composed", "read_form", "read_graph"]
 
 LENGTH, DEPTH = 300, 8
-PAIRS = ("cartesian", "kronecker", "union")
+PAIRS, SIZED = ("cartesian", "kronecker", "union"), ("complement", "weighted")
+"""Operations of two graphs, and of one: these have no closed form without sizes."""
 
 T = TypeVar("T")
 
@@ -45,21 +47,20 @@ def read_form(text: str) -> ClosedForm:
     return _form(_parsed(text), text, 0)
 
 
-def _parsed(text: str) -> ast.expr:
-    if len(text) <= LENGTH:
-        try:
-            return ast.parse(text.strip(), mode="eval").body
-        except (SyntaxError, ValueError, RecursionError, MemoryError):
-            pass
-    raise _unreadable(text)
+def _parsed(text: str) -> ast.expr | None:
+    """The tree of a text; None where it is too long or no expression."""
+    try:
+        return ast.parse(text.strip(), mode="eval").body if len(text) <= LENGTH else None
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return None
 
 
 def _unreadable(text: str) -> ValueError:
-    known = ", ".join((*PAIRS, "complement", "weighted"))
-    return ValueError(f"unreadable graph {text[:60]!r}; expected {known}, e.g. cartesian(chain(4), ring(5))")
+    known = ", ".join((*PAIRS, *SIZED))
+    return ValueError(f"unreadable graph {shown(text)}; expected {known}, e.g. cartesian(chain(4), ring(5))")
 
 
-def _graph(node: ast.expr, text: str, largest: int | None, depth: int) -> Topology:
+def _graph(node: ast.expr | None, text: str, largest: int | None, depth: int) -> Topology:
     match node:
         case ast.Call(func=ast.Name(id=name), args=[a, b], keywords=[]) if name in PAIRS and depth < DEPTH:
             first, second = (_graph(part, text, largest, depth + 1) for part in (a, b))
@@ -75,7 +76,7 @@ def _graph(node: ast.expr, text: str, largest: int | None, depth: int) -> Topolo
     raise _unreadable(text)
 
 
-def _form(node: ast.expr, text: str, depth: int) -> ClosedForm:
+def _form(node: ast.expr | None, text: str, depth: int) -> ClosedForm:
     from . import closed_products
     from .closed_forms import closed_form
 
@@ -86,7 +87,15 @@ def _form(node: ast.expr, text: str, depth: int) -> ClosedForm:
             return _pair(name, closed_products)(_form(a, text, depth + 1), _form(b, text, depth + 1))
         case ast.Call(func=ast.Name(id=name), args=[]):
             return closed_form(name, **_options(node.keywords, text))
-    raise _unreadable(text)
+        case ast.Call(func=ast.Name(id=name)) if name in SIZED:
+            raise ValueError(
+                f"{shown(text)}: {name} has no closed form without sizes; expected a graph with its size, "
+                "e.g. complement(chain(4))"
+            )
+    raise ValueError(
+        f"unreadable closed form {shown(text)}; expected {', '.join(PAIRS)} of families without sizes, "
+        "e.g. cartesian(chain, torus(shape=(p, q)))"
+    )
 
 
 def _pair(name: str, home: object) -> Callable[[T, T], T]:

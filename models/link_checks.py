@@ -6,14 +6,14 @@ from fractions import Fraction
 from typing import Any
 
 from .expect import instance, whole
-from .scene_checks import shown
+from .scene_checks import printable, shown
 
 __all__ = ["check_links"]
 
 
 def check_links(name: object, n: object, links: object) -> None:
     """Raise TypeError or ValueError where links (target, source, weight) of n nodes are not sorted and sound."""
-    what = f"topology {instance('topology name', name, str, 'text')}"
+    what = f"topology {printable('topology name', instance('topology name', name, str, 'text'))}"
     size = whole(f"{what}: n", n, -(10**18))
     if size < 1:
         raise ValueError(f"{what}: n = {size}; expected at least one node")

@@ -11,7 +11,6 @@ such a file imports is not looked at: write a model in one file.
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import inspect
 import pkgutil
@@ -24,7 +23,21 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, ParamSpec, TypeVar
 
-__all__ = ["OwnFile", "allow_code", "allowed_code", "blamed", "call", "load", "located", "named", "names", "remembered"]
+from .scene_checks import shown, suggestion, text
+
+__all__ = [
+    "OwnFile",
+    "allow_code",
+    "allowed_code",
+    "blamed",
+    "call",
+    "load",
+    "located",
+    "named",
+    "names",
+    "part",
+    "remembered",
+]
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -71,6 +84,28 @@ class OwnFile(str):
 
 _modules: dict[tuple[str, str, str], ModuleType] = {}
 """Kind, place and digest of the text -> what came of it; scenes keep the model that they were made with."""
+
+ALSO = {
+    "topology": {
+        "all_to_all": "complete",
+        "biclique": "complete_bipartite",
+        "clique": "complete",
+        "cubic": "random_cubic",
+        "cycle": "ring",
+        "gilbert": "erdos_renyi",
+        "gnp": "erdos_renyi",
+        "hamming": "hypercube",
+        "lattice": "grid",
+        "line": "chain",
+        "newman_watts": "small_world",
+        "open_chain": "chain",
+        "path": "chain",
+        "watts_strogatz": "small_world",
+    },
+    "oscillator": {"roessler": "rossler", "vdp": "van_der_pol"},
+    "coupling": {"dashpot": "damper"},
+}
+"""Other names of the field for what is here: they serve suggestions only."""
 
 _allowed: set[Path] = set()
 
@@ -126,9 +161,14 @@ def load(kind: str, name: str) -> ModuleType:
     if name in entries:
         return _entry(kind, name)
     known = names(kind)
-    close = difflib.get_close_matches(str(name), known, n=1)
-    hint = f" (did you mean {close[0]!r}?)" if close else ""
-    raise ValueError(f"unknown {kind} {name!r}; known: {', '.join(known)}{OTHERWISE.get(kind, '')}{hint}")
+    hint = suggestion(name, known, ALSO.get(kind))
+    raise ValueError(f"unknown {kind} {shown(name)}; known: {', '.join(known)}{OTHERWISE.get(kind, '')}{hint}")
+
+
+def part(what: str, value: object) -> str:
+    """Return the name of a part of the model where it is text; it may be a long path to a file of code."""
+    words = text(what, value, 1000 if isinstance(value, str) and ".py" in value else 200)
+    return value if isinstance(value, OwnFile) else words
 
 
 def remembered(**parts: Callable[[str], str]) -> Callable[[Callable[P, T]], Callable[P, T]]:

@@ -68,11 +68,16 @@ def factors(graph: Topology) -> tuple[Topology, Topology] | None:
 
 
 def union(first: Topology, second: Topology) -> Topology:
-    """Both graphs side by side, without links between them: the eigenvalues of both."""
+    """Both graphs side by side, without links between them: the eigenvalues of both.
+
+    Raises ValueError on more than LINK_LIMIT links.
+    """
     n = a_graph("union: first", first).n
     a_graph("union: second", second)
+    name = f"union({_named(first)}, {_named(second)})"
+    _small(name, first.link_count + second.link_count)
     links = [*first.links, *((i + n, j + n, w) for i, j, w in second.links)]
-    return _made(f"union({_named(first)}, {_named(second)})", n + second.n, links, partial(_both, first, second))
+    return _made(name, n + second.n, links, partial(_both, first, second))
 
 
 def complement(graph: Topology) -> Topology:
@@ -82,11 +87,11 @@ def complement(graph: Topology) -> Topology:
     """
     n = a_graph("complement", graph).n
     name = f"complement({_named(graph)})"
+    _small(name, n * (n - 1) - graph.link_count)
     odd = next((link for link in graph.links if link[2] != 1), None)
     if odd is not None or not graph.symmetric:
         found = f"a link of weight {odd[2]}" if odd is not None else "one-way links"
         raise ValueError(f"{name}: found {found}; expected undirected links of weight 1")
-    _small(name, n * (n - 1) - graph.link_count)
     present = {(i, j) for i, j, _ in graph.links}
     links = [(i, j, Fraction(1)) for i in range(n) for j in range(n) if i != j and (i, j) not in present]
     return _made(name, n, links, partial(_others, graph))

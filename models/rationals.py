@@ -6,18 +6,24 @@ import re
 from collections.abc import Iterable
 from decimal import Decimal
 from fractions import Fraction
+from functools import lru_cache
+from math import lcm
 from numbers import Complex, Integral, Rational, Real
 from pathlib import Path
 from typing import Any
 
 from .expect import a_path
+from .scene_checks import printable
 
-__all__ = ["FILE_LIMIT", "file_text", "parse_rows", "rational", "rational_rows", "square"]
+__all__ = ["FILE_LIMIT", "ROWS", "file_text", "parse_rows", "rational", "rational_rows", "square", "total"]
 
 FILE_LIMIT = 32 * 2**20
 """Largest matrix file that is read, in bytes."""
+ROWS = 2000
+"""Most rows of a matrix: larger graphs are made of their links."""
 
-_TEXT = re.compile(r"[+-]?(?:\d+/\d+|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)", re.ASCII)
+_TEXT = re.compile(r"[+-]?(?:\d+/0*[1-9]\d*|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)", re.ASCII)
+_BY_ZERO = re.compile(r"[+-]?\d+/0+", re.ASCII)
 _LONGEST = 1000
 _EXPECTED = "expected a rational number such as 1/2, -3 or 0.25"
 
@@ -43,13 +49,19 @@ def rational(entry: Any, where: str) -> Fraction:
     raise TypeError(f"{where} is {entry!r}, a {type(entry).__name__}; {_EXPECTED}")
 
 
+@lru_cache(maxsize=4096)
+def _number(text: str) -> Fraction | None:
+    """The number that a text is; None where it is none."""
+    return Fraction(text) if len(text) <= _LONGEST and _TEXT.fullmatch(text) else None
+
+
 def _from_text(text: str, where: str) -> Fraction:
-    if len(text) <= _LONGEST and _TEXT.fullmatch(text):
-        try:
-            return Fraction(text)
-        except ZeroDivisionError:
-            raise ValueError(f"{where} is {text}, a division by zero; {_EXPECTED}") from None
+    found = _number(text)
+    if found is not None:
+        return found
     shown = text if len(text) <= 40 else f"{text[:40]}… ({len(text)} characters)"
+    if _BY_ZERO.fullmatch(text):
+        raise ValueError(f"{where} is {shown}, a division by zero; {_EXPECTED}")
     if text.lstrip("+-").lower() in {"nan", "snan", "inf", "infinity", "oo"}:
         raise ValueError(f"{where} is {shown}, not finite; {_EXPECTED}")
     raise ValueError(f"{where} is {shown!r}, not a number; {_EXPECTED}")
@@ -57,10 +69,19 @@ def _from_text(text: str, where: str) -> Fraction:
 
 def rational_rows(rows: Any, name: str) -> list[list[Fraction]]:
     """A square table of fractions; ValueError where it is empty or not square, TypeError for no table."""
-    return [
-        [rational(entry, f"{name}: entry ({i + 1}, {j + 1})") for j, entry in enumerate(line)]
-        for i, line in enumerate(square(rows, name))
-    ]
+    return [[_entry(entry, name, i, j) for j, entry in enumerate(line)] for i, line in enumerate(square(rows, name))]
+
+
+def _entry(entry: Any, name: str, i: int, j: int) -> Fraction:
+    found = _number(entry) if type(entry) is str else None
+    return rational(entry, f"{name}: entry ({i + 1}, {j + 1})") if found is None else found
+
+
+def total(numbers: Iterable[Fraction]) -> Fraction:
+    """The sum of many fractions: their numerators over one denominator, reduced once."""
+    found = list(filter(None, numbers))
+    below = lcm(*(x.denominator for x in found))
+    return Fraction(sum(x.numerator * (below // x.denominator) for x in found), below)
 
 
 def square(rows: Any, name: str) -> list[list[Any]]:
@@ -72,6 +93,8 @@ def square(rows: Any, name: str) -> list[list[Any]]:
         raise TypeError(f"{name} is a {type(rows).__name__}; expected rows of numbers: [[-1, 1], [1, -1]]{hint}")
     lines = []
     for i, line in enumerate(listed):
+        if i == ROWS:
+            raise _too_large(name)
         if isinstance(line, (str, bytes)) or not isinstance(line, Iterable):
             raise TypeError(f"{name}: row {i + 1} is {line!r}; expected a list of numbers")
         lines.append(list(line))
@@ -86,9 +109,17 @@ def square(rows: Any, name: str) -> list[list[Any]]:
     return lines
 
 
+def _too_large(name: str) -> ValueError:
+    return ValueError(
+        f"{name} has more than {ROWS} rows or columns; expected at most {ROWS}; give its edges, which are fewer: "
+        "read_edges or from_sparse (--edges)"
+    )
+
+
 def file_text(path: str | Path, what: str, expected: str = "a text file") -> tuple[str, str]:
     """The text of a file of at most FILE_LIMIT bytes, and its name; FileNotFoundError, TypeError or ValueError else."""
     place = a_path(what, path)
+    printable(what, place.name)
     if not place.exists():
         raise FileNotFoundError(f"{what} {str(place)!r} does not exist; expected {expected}: check the path")
     if not place.is_file():
@@ -105,13 +136,20 @@ def file_text(path: str | Path, what: str, expected: str = "a text file") -> tup
 
 
 def parse_rows(text: str, name: str) -> list[list[str]]:
-    """Split a matrix text into entries: blanks or commas between them, `#` comments, empty lines skipped."""
-    rows = []
+    """Split a matrix text into entries: blanks or commas between them, `#` comments, empty lines skipped.
+
+    Raises ValueError on an empty entry and on more than ROWS rows or columns.
+    """
+    rows: list[list[str]] = []
     for number, line in enumerate(text.splitlines(), 1):
         bare = line.partition("#")[0].strip()
         if not bare:
             continue
+        if len(rows) == ROWS:
+            raise _too_large(name)
         cells = [cell for part in bare.split(",") for cell in (part.split() or [""])]
+        if len(cells) > ROWS:
+            raise _too_large(name)
         if "" in cells:
             raise ValueError(f"{name}: line {number} has an empty entry between commas; write 0 for no link")
         rows.append(cells)

@@ -6,12 +6,12 @@ import difflib
 import math
 import numbers
 import operator
+import re
 import reprlib
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Generic, TypeVar
 
 from .expressions import constant
-from .plugins import OwnFile
 
 __all__ = [
     "Frozen",
@@ -19,7 +19,7 @@ __all__ = [
     "integer",
     "known_keys",
     "number",
-    "part",
+    "printable",
     "shown",
     "suggestion",
     "table",
@@ -28,6 +28,9 @@ __all__ = [
 ]
 
 T = TypeVar("T")
+
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+"""Control characters, ends of lines, changes of direction, and halves of characters."""
 
 
 class Frozen(Mapping[str, T], Generic[T]):
@@ -73,10 +76,17 @@ def shown(value: object) -> str:
     return words if len(words) <= 120 else words[:117] + "..."
 
 
-def suggestion(found: object, known: Iterable[str]) -> str:
-    """Return "; did you mean 'x'?" where a known name is close to the one found, else nothing."""
-    close = difflib.get_close_matches(found, sorted(known), 1) if isinstance(found, str) else []
-    return f"; did you mean {close[0]!r}?" if close else ""
+def suggestion(found: object, known: Iterable[str], other: Mapping[str, str] | None = None) -> str:
+    """Return "; did you mean 'x'?" where a known name is close to the one found, else nothing.
+
+    `other` gives the known name for names that are used elsewhere: what is close to one of those means it.
+    """
+    if not isinstance(found, str):
+        return ""
+    meant = {name: name for name in known}
+    meant = {name: here for name, here in (other or {}).items() if here in meant} | meant
+    close = difflib.get_close_matches(found, sorted(meant), 1)
+    return f"; did you mean {meant[close[0]]!r}?" if close else ""
 
 
 def known_keys(what: str, given: Mapping[object, object], known: Iterable[str]) -> None:
@@ -98,18 +108,23 @@ def table(what: str, value: object) -> Mapping[object, object]:
 
 
 def text(what: str, value: object, limit: int = 200) -> str:
-    """Return the value where it is text of at most `limit` characters."""
+    """Return the value where it is text of at most `limit` characters, all of which can be printed on one line."""
     if not isinstance(value, str):
         raise TypeError(f"{what}: found {typed(value)}; expected text in quotation marks")
     if len(value) > limit:
         raise ValueError(f"{what}: found {len(value)} characters; expected at most {limit}; shorten it")
-    return str(value)
+    return printable(what, str(value))
 
 
-def part(what: str, value: object) -> str:
-    """Return the name of a part of the model where it is text; it may be a long path to a file of code."""
-    words = text(what, value, 1000 if isinstance(value, str) and ".py" in value else 200)
-    return value if isinstance(value, OwnFile) else words
+def printable(what: str, value: str) -> str:
+    """Return the text where it has no control character: a terminal obeys those, and a name may come from anywhere."""
+    found = _CONTROL.search(value)
+    if found:
+        raise ValueError(
+            f"{what}: found the control character {found[0]!a}; expected letters, digits and signs on one line; "
+            "remove it"
+        )
+    return value
 
 
 def choice(what: str, value: object, known: tuple[str, ...]) -> str:

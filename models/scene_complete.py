@@ -11,8 +11,8 @@ from .coupling_matrix import canonical, is_matrix
 from .coupling_name import canonical as chosen_coordinates
 from .coupling_name import named as named_coupling
 from .coupling_name import split
-from .plugins import load, named
-from .scene_checks import Frozen, choice, integer, number, part, shown, text
+from .plugins import load, named, part
+from .scene_checks import Frozen, choice, integer, number, shown, text
 from .scene_friction import check_friction
 from .scene_model import bare, check_links, check_state, components, coordinate_names
 from .scene_nodes import by_kind, default_friction, groups
@@ -42,7 +42,7 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     made["title"] = text("title", made["title"])
     made["seed"] = integer("seed", made["seed"], 0, SEED_LIMIT)
     _model(made)
-    made["axes"] = read_axes(made["axes"])
+    made["axes"] = read_axes(made["axes"], made["zipped"])
     made["parameters"] = parameters(made)
     made["initial"] = _start(made)
     _records(made)
@@ -142,8 +142,7 @@ def _times(made: dict[str, Any]) -> None:
         names = " and ".join(dict.fromkeys(repr(oscillator) for oscillator, _ in templates))
         whole = names if len(templates) == 1 else f"the network of {names}"
         raise ValueError(
-            f"time_unit: found 'period', but {whole} {found.problem}; "
-            "expected 'time'; change it or leave it out"
+            f"time_unit: found 'period', but {whole} {found.problem}; expected 'time'; change it or leave it out"
         )
     for name in ("transient", "window"):
         made[name] = number(name, made[name], 0.0, TIME_LIMIT)

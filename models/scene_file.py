@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import fields
@@ -12,8 +13,9 @@ from typing import Any
 
 from .coupling_name import split
 from .family_options import defaults
+from .plugins import part
 from .scene import Scene
-from .scene_checks import integer, known_keys, part, shown, suggestion, table, text
+from .scene_checks import integer, known_keys, shown, suggestion, table, text
 from .scene_parameters import collected
 from .topology import Topology, family, from_matrix, names, read_matrix, topology
 
@@ -23,6 +25,17 @@ BYTES = 1_000_000
 """Largest scene file that is read."""
 NODES = 100_000
 """Largest number of oscillators that a scene file may ask for."""
+KEY_PARTS = 8
+"""Most parts of a dotted key in a scene file."""
+
+_STRINGS = (
+    r'"""(?:\\.|[^\\])*?(?:"""|\Z)',
+    r"'''.*?(?:'''|\Z)",
+    r'"(?:\\.|[^"\\\n])*"?',
+    r"'[^'\n]*'?",
+)
+_TOKEN = re.compile(rf"(?P<word>{'|'.join(_STRINGS)}|[\w+-]+|[ \t]+)|(?P<dot>\.)|(?P<end>#[^\n]*|.)", re.DOTALL)
+"""What stands in a TOML text: strings, bare words and blanks, which go on with a key, dots, and whatever ends one."""
 
 
 def scene_names() -> tuple[str, ...]:
@@ -83,15 +96,32 @@ def _scene(name: str, content: bytes, folder: Path | None) -> Scene:
         raise ValueError(
             f"{name}: byte {error.start} is not UTF-8; expected UTF-8 text; save the file in that encoding"
         ) from None
+    _check_keys(name, words)
     try:
         values = tomllib.loads(words)
     except (ValueError, RecursionError) as error:
         reason = str(error) if isinstance(error, tomllib.TOMLDecodeError) else "too deep or too long a value"
-        raise ValueError(f"{name}: not TOML: {' '.join(reason.split())}; correct the file there") from None
+        raise ValueError(f"{name}: not TOML: {' '.join(reason.split())[:300]}; correct the file there") from None
     try:
         return from_dict(values, folder)
     except (ValueError, TypeError) as error:
         raise type(error)(f"{name}: {error}") from None
+
+
+def _check_keys(name: str, words: str) -> None:
+    """Refuse a dotted key of more than KEY_PARTS parts: the parser's time and memory rise with their square."""
+    dots = 0
+    for found in _TOKEN.finditer(words):
+        if found.lastgroup == "dot":
+            dots += 1
+        elif found.lastgroup == "end":
+            dots = 0
+        if dots >= KEY_PARTS:
+            line = words.count("\n", 0, found.start()) + 1
+            raise ValueError(
+                f"{name}: line {line} has a key of more than {KEY_PARTS} parts with dots between them; expected at most "
+                "3, as in sweep.sigma.from; correct the file there"
+            )
 
 
 def from_dict(values: Mapping[str, Any], folder: Path | None = None) -> Scene:

@@ -8,8 +8,8 @@ from functools import lru_cache
 from itertools import islice
 from typing import Any
 
-from .plugins import load, named
-from .scene_checks import integer, known_keys, part, shown, table
+from .plugins import load, named, part
+from .scene_checks import integer, known_keys, shown, table
 
 __all__ = ["Group", "by_kind", "default_friction", "groups"]
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
-from .axis import Axis
+from .axis import LIMIT, Axis, known_length
 from .scene_checks import choice, shown
 from .scene_model import bare, check_state, components, in_range, model_parameters, unknown
 from .scene_parameters import drive, known_name
@@ -31,19 +31,28 @@ def check_sweep(made: dict[str, Any]) -> None:
         _axis(made, axis)
         if axis.name in names[:i]:
             raise ValueError(f"axis {axis.name!r} occurs twice; expected each axis once; merge their values")
-    cells = math.prod(len(axis) for axis in axes)
-    if made["zipped"] and axes:
-        cells = len(axes[0])
-        if any(len(axis) != cells for axis in axes):
-            lengths = ", ".join(f"{axis.name}: {len(axis)}" for axis in axes)
-            raise ValueError(f"zipped axes have different lengths ({lengths}); expected one length for all")
+    if made["zipped"] and len({len(axis) for axis in axes}) > 1:
+        lengths = ", ".join(f"{axis.name}: {len(axis)}" for axis in axes)
+        raise ValueError(f"zipped axes have different lengths ({lengths}); expected one length for all")
+    cells = _cells([len(axis) for axis in axes], made["zipped"])
+    _period(made)
+    _samples(made, cells)
+    _continuation(made)
+
+
+def _cells(lengths: Sequence[int], zipped: object) -> int:
+    """Return the number of cells of axes of these lengths; ValueError where they or the values are too many."""
+    cells = max(lengths, default=1) if zipped is True else math.prod(lengths)
     if cells > CELL_LIMIT:
         raise ValueError(
             f"sweep: found {cells} cells; expected at most {CELL_LIMIT}; use fewer values or split the sweep"
         )
-    _period(made)
-    _samples(made, cells)
-    _continuation(made)
+    if sum(lengths) > LIMIT:
+        raise ValueError(
+            f"sweep: found {sum(lengths)} values on {len(lengths)} axes together; expected at most {LIMIT}; "
+            "use fewer values or split the sweep"
+        )
+    return cells
 
 
 def _period(made: Mapping[str, Any]) -> None:
@@ -72,9 +81,10 @@ def _samples(made: Mapping[str, Any], cells: int) -> None:
         )
 
 
-def read_axes(given: object) -> tuple[Axis, ...]:
-    """Return the axes of a list of Axis objects or of a table of names and values."""
+def read_axes(given: object, zipped: object) -> tuple[Axis, ...]:
+    """Return the axes of a list of Axis objects or of a table of names and values, whose cells are counted first."""
     if isinstance(given, Mapping):
+        _cells([known_length(values) for values in given.values()], zipped)
         return tuple(Axis.from_table(name, values) for name, values in given.items())
     if isinstance(given, (str, bytes)) or not isinstance(given, Iterable):
         raise TypeError(f"axes: found {shown(given)}; expected Axis objects, e.g. [Axis('sigma', [0.1, 0.2])]")

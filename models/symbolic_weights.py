@@ -10,6 +10,9 @@ import ast
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import reduce
+from math import comb
+from operator import add, mul
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +26,9 @@ from .topology import Topology, from_matrix
 __all__ = ["SymbolicSpectrum", "SymbolicTopology", "from_symbols", "read_symbols", "weight"]
 
 LARGEST, LENGTH, DEPTH, EXPONENT = 30, 200, 20, 12
+DEGREE, TERMS, BITS = 60, 2000, 10_000
+"""Largest degree, number of terms and bits of a number that a weight may have once it is multiplied out."""
+
 Z = sp.Symbol("z")
 """The variable of characteristic polynomials; no weight may be called so."""
 
@@ -162,7 +168,55 @@ def weight(entry: Any, where: str) -> sp.Expr:
         raise ValueError(f"{where} is {entry}; {_EXPECTED}")
     if Z in found.free_symbols or any(str(s) == "z" for s in found.free_symbols):
         raise ValueError(f"{where} is {entry}; z is the variable of the characteristic polynomial: rename the weight")
+    _check_size(found, where)
     return sp.cancel(found)
+
+
+@dataclass(frozen=True, slots=True)
+class _Size:
+    """At most so many terms above and below the line, and so high a degree, of an expression that is multiplied out."""
+
+    above: int = 1
+    below: int = 1
+    degree: int = 0
+
+    def __add__(self, other: _Size) -> _Size:
+        above = self.above * other.below + other.above * self.below
+        below = self.below * other.below
+        join = max if below == 1 else add
+        return _Size(above, below, join(self.degree, other.degree))
+
+    def __mul__(self, other: _Size) -> _Size:
+        return _Size(self.above * other.above, self.below * other.below, self.degree + other.degree)
+
+    def __pow__(self, power: int) -> _Size:
+        if power < 0:
+            return _Size(self.below, self.above, self.degree) ** -power
+        return _Size(comb(self.above + power - 1, power), comb(self.below + power - 1, power), self.degree * power)
+
+
+def _check_size(found: sp.Expr, where: str) -> None:
+    """Refuse an expression that is too large multiplied out, before it is."""
+
+    def size(e: sp.Expr) -> _Size:
+        if e.is_Symbol:
+            return _Size(degree=1)
+        if e.is_Pow and e.exp.is_Integer:
+            inner = size(e.base)
+            made = inner ** int(e.exp) if inner.degree * abs(int(e.exp)) <= DEGREE else _Size(degree=DEGREE + 1)
+        elif e.is_Add or e.is_Mul:
+            parts = [size(part) for part in e.args]
+            made = reduce(add if e.is_Add else mul, parts)
+        else:
+            return _Size()
+        if made.degree > DEGREE or max(made.above, made.below) > TERMS:
+            raise ValueError(
+                f"{where} may have more than {TERMS} terms or a degree above {DEGREE} when multiplied out; "
+                "write it shorter or give the weight a letter of its own"
+            )
+        return made
+
+    size(found)
 
 
 def _read(text: str, where: str) -> sp.Expr:
@@ -187,7 +241,10 @@ def _value(node: ast.AST, text: str, where: str, depth: int) -> sp.Expr:
         case ast.UnaryOp(op=ast.USub(), operand=inner):
             return -_value(inner, text, where, depth + 1)
         case ast.BinOp(left=left, op=ast.Pow(), right=ast.Constant(value=int() as power)) if 0 < power <= EXPONENT:
-            return _value(left, text, where, depth + 1) ** power
+            base = _value(left, text, where, depth + 1)
+            if base.is_Rational and power * max(int(base.p).bit_length(), int(base.q).bit_length()) > BITS:
+                raise ValueError(f"{where} is {text!r}, a number of more than {BITS} bits; expected a smaller one")
+            return base**power
         case ast.BinOp(left=left, op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div() as op, right=right):
             a, b = (_value(side, text, where, depth + 1) for side in (left, right))
             return {ast.Add: a + b, ast.Sub: a - b, ast.Mult: a * b}[type(op)] if not isinstance(op, ast.Div) else a / b

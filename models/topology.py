@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from . import plugins
 from .family_options import Options, settled
 from .link_checks import check_links
-from .rationals import file_text, parse_rows, rational_rows
+from .rationals import file_text, parse_rows, rational_rows, total
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -33,8 +33,8 @@ __all__ = ["Rule", "Topology", "family", "from_matrix", "names", "read_matrix", 
 Rule: TypeAlias = Callable[[], "Sequence[tuple[sp.Expr, int]] | None"]
 """Gives the eigenvalues of G with multiplicities, without repetition; None where no closed form is known."""
 
-LINK_LIMIT = 20_000_000
-"""More links than this are refused: they would not fit into the memory of an ordinary machine."""
+LINK_LIMIT = 4_000_000
+"""More links than this are not built: they take more than 600 MB."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +57,7 @@ class Topology:
         def __getattr__(self, name: str) -> Any:
             if name != "links":
                 raise AttributeError(f"'Topology' object has no attribute {name!r}")
-            if self._count > LINK_LIMIT:
-                raise _too_many(self.name, self.n)
+            _few(self.name, self.n, self._count)
             module = family(self.name)
             made = Topology(self.name, self.n, tuple(_links(self.name, module, self.n, dict(self.options))))
             object.__setattr__(self, "links", made.links)
@@ -179,10 +178,10 @@ def family(name: str) -> ModuleType:
     A plug-in has SUMMARY, MINIMUM, SOURCE and `edges(n)`, which yields (i, j, weight) once for each edge,
     i < j; with DIRECTED = True it yields (target, source, weight) once for each link.  It may have
     `spectrum(n)`, a sequence of (eigenvalue of G as a SymPy expression, multiplicity) without repetition (or None for
-    an n without a closed form), `count(n)`, the number of edges, TOO_SMALL, what to do below MINIMUM, and
-    CONNECTED = False where it may fall into parts.  Keyword-only parameters of `edges` with defaults are options of
-    the family: `spectrum` and `count` take the same ones, and `settle(n, **options)` checks them and returns them
-    as they are stored (see `family_options`; None is not stored).
+    an n without a closed form), `count(n)`, the number of edges, or `expected(n)`, their mean number if chance decides,
+    TOO_SMALL, what to do below MINIMUM, and CONNECTED = False where it may fall into parts.  Keyword-only parameters of
+    `edges` with defaults are options of the family: `spectrum`, `count` and `expected` take the same ones, and
+    `settle(n, **options)` checks them and returns them as they are stored (see `family_options`; None is not stored).
     """
     if not isinstance(name, str):
         raise TypeError(f"topology name {name!r} is no text; expected one of {', '.join(names())}")
@@ -192,22 +191,23 @@ def family(name: str) -> ModuleType:
 def topology(name: str, n: int, **options: Any) -> Topology:
     """The named graph of `n` nodes, all weights as its family gives them, with the family's own options.
 
-    Raises ValueError on an unknown name or option, on n below the family's minimum and on more than LINK_LIMIT
-    links (with a closed form, whose spectrum needs none, when the links are first asked for), and TypeError where n
-    is no integer.
+    Raises ValueError on an unknown name or option and on n below the family's minimum, and TypeError where n is no
+    integer.  More than LINK_LIMIT links raise ValueError before any is built: at once where the family does not count
+    them, else where they are first asked for.
     """
     module = family(name := plugins.named("topology", name))
     size = _size(name, n, module)
     chosen = settled(name, module, size, options)
     keywords = dict(chosen)
     rule = partial(_closed_form, name, size, chosen) if hasattr(module, "spectrum") else None
+    each = 1 if getattr(module, "DIRECTED", False) else 2
     if not hasattr(module, "count"):
+        if hasattr(module, "expected"):
+            _few(name, size, each * module.expected(size, **keywords))
         found = tuple(_links(name, module, size, keywords))
         return ruled(Topology(name, size, found, chosen), rule, len(found))
     with plugins.blamed(module.count):
-        count = module.count(size, **keywords) * (1 if getattr(module, "DIRECTED", False) else 2)
-    if count > LINK_LIMIT and rule is None:
-        raise _too_many(name, size)
+        count = each * module.count(size, **keywords)
     made = object.__new__(Topology)
     for key, value in (("name", name), ("n", size), ("options", chosen)):
         object.__setattr__(made, key, value)
@@ -242,16 +242,18 @@ def _links(name: str, module: ModuleType, n: int, keywords: dict[str, Any]) -> I
     with plugins.blamed(module.edges):
         edges = module.edges(n, **keywords)
         found = [(i, j, one if weight == 1 else Fraction(weight)) for i, j, weight in islice(edges, limit + 1)]
-    if len(found) > limit:
-        raise _too_many(name, n)
+    _few(name, n, len(found) if directed else 2 * len(found))
     if not directed:
         found += [(j, i, weight) for i, j, weight in found]
     found.sort(key=operator.itemgetter(0, 1))
     return iter(found)
 
 
-def _too_many(name: str, n: int) -> ValueError:
-    return ValueError(f"topology {name}: n = {n} has too many links; expected at most {LINK_LIMIT}: reduce n")
+def _few(name: str, n: int, links: int) -> None:
+    if links > LINK_LIMIT:
+        raise ValueError(
+            f"topology {name}: n = {n} has too many links, {links} or more; expected at most {LINK_LIMIT}: reduce n"
+        )
 
 
 def _size(name: str, n: Any, module: ModuleType) -> int:
@@ -274,17 +276,17 @@ def from_matrix(rows: Iterable[Iterable[Any]] | sp.MatrixBase, name: str = "matr
     """
     table = [list(row) for row in rational_rows(rows, name)]
     given = rows.tolist() if hasattr(rows, "tolist") else rows  # an iterator is used up by now: its numbers are exact
-    rounded = [any(map(_rounded, row)) for row in given] if isinstance(given, list | tuple) else [False] * len(table)
     for i, row in enumerate(table):
-        total = sum(row)
-        if total and rounded[i] and abs(total) <= sum(map(abs, row)) / 10**12:
-            row[i] -= total
-            total = sum(row)
-        if total:
+        excess = total(row)
+        if not excess:
+            continue
+        rounded = isinstance(given, list | tuple) and any(map(_rounded, given[i]))
+        if not rounded or abs(excess) > total(map(abs, row)) / 10**12:
             raise ValueError(
-                f"{name}: row {i + 1} sums to {total}; expected 0, or the synchronous state is no solution: "
-                f"set its diagonal entry {row[i]} to {row[i] - total}"
+                f"{name}: row {i + 1} sums to {excess}; expected 0, or the synchronous state is no solution: "
+                f"set its diagonal entry {row[i]} to {row[i] - excess}"
             )
+        row[i] -= excess
     links = tuple((i, j, weight) for i, row in enumerate(table) for j, weight in enumerate(row) if weight and i != j)
     return Topology(name, len(table), links)
 

@@ -14,6 +14,7 @@ import numpy as np
 from synchain.codegen.installation import InstallationError
 from synchain.models.expect import a_path, flag
 from synchain.models.scene import Scene
+from synchain.models.scene_checks import shown
 
 from .crew import Task, crew_size, worker_lost
 from .files import drop_leftovers, netcdf_data
@@ -154,7 +155,7 @@ def _check_same(chosen: Skip, certified: bool, path: Path, told: Mapping[str, An
     kept = told["attributes"]
     again = "repeat the options of that run, choose another path (--out), or replace it with overwrite (--overwrite)"
     if not alike(scene_of(kept), chosen.scene):
-        raise ValueError(f"{path} belongs to another scene ({kept['title']}); {again}")
+        raise ValueError(f"{path} belongs to another scene ({shown(kept['title'])}); {again}")
     if changed(kept, chosen.scene):
         raise ValueError(
             f"{path} comes of another model: the code of its scene has changed since; "

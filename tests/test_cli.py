@@ -649,7 +649,7 @@ def test_exit_codes_and_streams_of_the_real_program() -> None:
     assert (done.returncode, done.stdout) == (2, "")
     assert (
         done.stderr
-        == f"synchain spectrum: unknown topology 'rnig'; known: {', '.join(families())} (did you mean 'ring'?)\n"
+        == f"synchain spectrum: unknown topology 'rnig'; known: {', '.join(families())}; did you mean 'ring'?\n"
     )
     done = synchain("equations two_oscillators", env={**os.environ, "PYTHONIOENCODING": "ascii"})
     assert (done.returncode, done.stderr) == (0, "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import pickle
 from collections import Counter
 from fractions import Fraction
@@ -142,6 +143,37 @@ def test_random_graphs_are_the_same_on_every_machine() -> None:
     assert edges(topology("erdos_renyi", 5)) == PINNED["erdos_renyi"]
     assert edges(topology("small_world", 6, p="1/2")) == PINNED["small_world"]
     assert edges(topology("random_regular", 6, degree=3)) == PINNED["random_regular"]
+
+
+@pytest.mark.parametrize(
+    ("name", "n", "options", "digest"),
+    [
+        ("random_regular", 50, {"degree": 10, "seed": 1}, "a8fd903585836203"),
+        ("random_regular", 30, {"degree": 15, "seed": 2}, "2b2ba5f81183ef43"),
+        ("random_regular", 1000, {"degree": 6, "seed": 7}, "c0261a0118521fd9"),
+        ("small_world", 60, {"neighbours": 6, "p": "1/4", "seed": 9}, "d8c39453b8481f6b"),
+        ("small_world", 20, {"neighbours": 18, "p": "1/2", "seed": 1}, "074cc2dfcd951e95"),
+        ("erdos_renyi", 300, {"p": 0.02, "seed": 4}, "51dedea9a9b3df72"),
+        ("erdos_renyi", 80, {"p": "0.5", "seed": 6}, "fd2d561431f8fe52"),
+    ],
+)
+def test_seeds_keep_their_graphs(name: str, n: int, options: dict[str, object], digest: str) -> None:
+    found = repr(topology(name, n, **options).links)
+    assert hashlib.sha256(found.encode()).hexdigest().startswith(digest)
+
+
+@pytest.mark.parametrize(("n", "degree"), [(100, 98), (100, 97), (600, 598), (7, 4)])
+def test_regular_graphs_of_high_degree_are_drawn_by_what_is_missing(n: int, degree: int) -> None:
+    graph, other = (topology("random_regular", n, degree=degree, seed=seed) for seed in (0, 1))
+    assert len(graph.links) == graph.link_count == n * degree
+    assert set(Counter(target for target, _, _ in graph.links).values()) == {degree}
+    assert graph.symmetric
+    assert graph.links != other.links
+
+
+def test_the_smallest_probabilities_join_nobody() -> None:
+    assert topology("erdos_renyi", 1000, p="1e-320").links == ()
+    assert topology("erdos_renyi", 1000, p="1e-999").links == ()
 
 
 PINNED: dict[str, set[tuple[int, int]]] = {

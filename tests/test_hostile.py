@@ -11,12 +11,16 @@ import time
 from pathlib import Path
 
 import pytest
+import sympy as sp
+from effort import effort
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from synchain.models import network, plugins
+from synchain.models.claims import read_claims
 from synchain.models.scene import Scene
 from synchain.models.scene_file import load_scene
+from synchain.models.symbolic_weights import weight
 from synchain.models.topology import topology
 from synchain.runtime.cli import main
 
@@ -113,6 +117,24 @@ HUGE = {
     "power": ("[parameters]\nomega = '9**9**9'", "expected"),
     "digits": ("[parameters]\nomega = " + "9" * 5000, "too long a value"),
     "depth": ("[parameters]\nomega = " + "[" * 20000 + "]" * 20000, "too deep"),
+    "links of a complete graph": ("[topology]\nname = 'complete'\nn = 4400", "at most 4000000"),
+    "degree": ("[topology]\nname = 'random_regular'\nn = 100000\ndegree = 99998", "at most 4000000"),
+    "neighbours": ("[topology]\nname = 'small_world'\nn = 99999\nneighbours = 99998",
+                   "random numbers; expected at most 10000000"),
+    "close neighbours": ("[topology]\nname = 'small_world'\nn = 1900\nneighbours = 1898\np = '1'",
+                         "about 3424086900 random numbers; expected at most 10000000"),
+    "chances": ("[topology]\nname = 'erdos_renyi'\nn = 100000\np = '1'", "at most 4000000"),
+    "axes": ("[sweep]\n" + "".join(f"a{i} = {{from = 0, to = 1, count = 10000000}}\n" for i in range(20)),
+             "at most 1000000000"),
+    "zipped axes": ("zipped = true\n[sweep]\n" + "".join(f"a{i} = {{from = 0, to = 1, count = 10000000}}\n"
+                                                        for i in range(20)), "values on 20 axes together"),
+    "key": (".".join("a" * 20000) + " = 1", "line 1 has a key of more than 8 parts"),
+    "quoted key": ("[parameters]\nomega = 1\n['a'" + " . \"a\"" * 20000 + "]", "line 3 has a key of more than 8 parts"),
+    "key in a table": ("parameters = {" + ".".join("a" * 20000) + " = 1}", "line 1 has a key of more than 8 parts"),
+    "long key": (f"[{'a' * 90000}]\n[{'a' * 90000}]", "not TOML"),
+    "escape sequence": ("title = \"\\u001b]0;owned\\u0007\"", r"the control character '\x1b'"),
+    "direction": ("title = \"\\u202etxt.exe\"", r"the control character '\u202e'"),
+    "name of a graph": ("[topology]\nname = \"\\u009b2J\"\nmatrix = [[-1, 1], [1, -1]]", r"the control character '\x9b'"),
     "not a number": ("[parameters]\nomega = nan", "finite"),
     "infinite": ("[initial]\nx = inf", "finite"),
     "twice": ("rtol = 1e-8\nrtol = 1e-9", "not TOML"),
@@ -141,6 +163,84 @@ def test_too_much_is_refused_at_once(name: str, tmp_path: Path, monkeypatch, cap
     assert len(lines[0]) < 1000
     assert part in lines[0]
     assert sorted(p.name for p in tmp_path.iterdir()) == before
+
+
+def test_dots_in_strings_comments_and_numbers_are_no_keys(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    title = "a.b.c.d.e.f.g.h.i.j.k"
+    path.write_text(
+        f"title = '{title}'  # {title}\n[initial]\nx = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]\n"
+        "[topology]\nname = 'chain'\nn = 10\n"
+    )
+    assert load_scene(path).title == title
+
+
+def test_long_axes_of_the_command_line_are_counted_before_they_are_built(tmp_path: Path, capsys) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text("record = []\n")
+    words = ["run", str(path), "--out", str(tmp_path / "out"), "--set", "omega=1:2:10000000", "x_1=0:1:10000000"]
+    codes: list[int] = []
+    _, calls = effort(lambda: codes.append(main(words)))
+    assert codes == [2]
+    assert "found 100000000000000 cells; expected at most 1000000000" in capsys.readouterr().err
+    assert calls < 1_000_000
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [("--edges", "expected at most 4000000 links"), ("--matrix", "more than 2000 rows or columns; expected at most 2000")],
+)  # fmt: skip
+def test_large_files_of_graphs_are_refused_by_their_size(options: str, words: str, tmp_path: Path, capsys) -> None:
+    path = tmp_path / "graph.txt"
+    path.write_text("1 2\n" * 2_000_001 if options == "--edges" else ("0 " * 2001 + "\n") * 2001)
+    assert main(["spectrum", options, str(path)]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert error.count("\n") == 1
+
+
+def test_nodes_and_files_with_escape_sequences_are_refused(tmp_path: Path, capsys) -> None:
+    nodes, graph, named = tmp_path / "nodes.txt", tmp_path / "graph.xml", tmp_path / "a\x1b[2J.txt"
+    nodes.write_text("a\x1b[2J b\na\x1b[2J b\n")
+    graph.write_text(
+        '<graphml><graph><node id="&#x9b;2J"/><edge source="&#x9b;2J" target="&#x9b;2J"/></graph></graphml>'
+    )
+    named.write_text("a b\na b\n")
+    for option, path, what in (
+        ("--edges", nodes, r"nodes.txt: node name: found the control character '\x1b'"),
+        ("--graphml", graph, r"graph.xml: node name: found the control character '\x9b'"),
+        ("--edges", named, r"edge file: found the control character '\x1b'"),
+    ):
+        assert main(["spectrum", option, str(path)]) == 2
+        error = capsys.readouterr().err
+        assert what in error
+        assert error.rstrip("\n").isprintable()
+
+
+@pytest.mark.parametrize(
+    "entry",
+    ["((((((a+b)**12)**12)**12)**12)**12)**12", "((((((9)**12)**12)**12)**12)**12)**12", "(a+b+c+d+e+f+g+h)**12"],
+)
+def test_symbolic_weights_are_measured_before_they_are_multiplied_out(entry: str) -> None:
+    with pytest.raises(ValueError, match=r"more than (2000 terms|10000 bits)"):
+        weight(entry, "w")
+    assert weight("(a+b)**12", "w") == sp.expand(weight("a+b", "w") ** 12)
+    assert weight("-" + "-".join(f"{a}*{b}*c" for a in "abde" for b in "fghi"), "w").is_Add
+
+
+@pytest.mark.parametrize(
+    "claim",
+    ["erdos_renyi 2000: distinct = 3", "small_world 900000: distinct = 3", "random_regular 501: largest = -3"],
+)
+def test_claims_about_large_graphs_without_a_closed_form_are_refused_unbuilt(claim: str, tmp_path: Path) -> None:
+    path = tmp_path / "claims.txt"
+    path.write_text(claim)
+
+    def refused() -> None:
+        with pytest.raises(ValueError, match="a graph without a closed form; expected at most 500 nodes"):
+            list(read_claims(path))
+
+    assert effort(refused)[1] < 10_000
 
 
 VALUES = st.one_of(

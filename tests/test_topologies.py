@@ -130,11 +130,12 @@ def test_a_long_chain_is_built_at_once() -> None:
 
 def test_too_many_links_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("synchain.models.topology.LINK_LIMIT", 100)
-    with pytest.raises(ValueError, match="erdos_renyi: n = 30 has too many links; expected at most 100"):
+    with pytest.raises(ValueError, match="erdos_renyi: n = 30 has too many links, 434 or more; expected at most 100"):
         topology("erdos_renyi", 30)
     assert len(topology("complete", 10).links) == 90
-    with pytest.raises(ValueError, match="complete: n = 11 has too many links; expected at most 100"):
+    with pytest.raises(ValueError, match="complete: n = 11 has too many links, 110 or more; expected at most 100"):
         topology("complete", 11).links  # noqa: B018
+    assert topology("complete", 5000).spectrum.largest == -5000
 
 
 @pytest.mark.parametrize(
@@ -147,6 +148,10 @@ def test_too_many_links_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
             f"unknown topology 'rnig'; known: chain, circulant, complete, {', '.join(names()[3:])}",
         ),
         ("", 3, ValueError, "unknown topology ''; known: "),
+        ("path", 3, ValueError, "; did you mean 'chain'?"),
+        ("cycle", 3, ValueError, "; did you mean 'ring'?"),
+        ("hamming", 8, ValueError, "; did you mean 'hypercube'?"),
+        ("latice", 9, ValueError, "; did you mean 'grid'?"),
         ("../scene", 3, ValueError, "unknown topology '../scene'; known: "),
         (7, 3, TypeError, "topology name 7 is no text"),
         ("ring", 2, ValueError, "ring: n = 2; expected at least 3: a ring of two would join one pair twice"),

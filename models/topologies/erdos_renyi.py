@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator
+from fractions import Fraction
 from math import log1p
 from typing import Any
 
@@ -24,6 +25,11 @@ def settle(n: int, p: Any, seed: Any) -> dict[str, Any]:
     return {"p": probability("p", p), "seed": whole("seed", seed, 0)}
 
 
+def expected(n: int, *, p: str = "1/2", seed: int = 0) -> int:
+    """Mean number of edges."""
+    return int(Fraction(p) * (n * (n - 1) // 2))
+
+
 def edges(n: int, *, p: str = "1/2", seed: int = 0) -> Iterator[tuple[int, int, int]]:
     """Each pair with probability p: one draw for each edge, which tells how many pairs are left out before it."""
     stream = random.Random(seed)
@@ -32,9 +38,12 @@ def edges(n: int, *, p: str = "1/2", seed: int = 0) -> Iterator[tuple[int, int, 
     if chance == 1:
         yield from ((i, j, 1) for j in range(n) for i in range(j))
     elif chance:
-        i, j, scale = -1, 1, log1p(-chance)
+        i, j, scale, pairs = -1, 1, log1p(-chance), n * (n - 1) // 2
         while j < n:
-            i += 1 + int(log1p(-stream.random()) / scale)
+            left_out = log1p(-stream.random()) / scale
+            if left_out >= pairs:  # infinite for the smallest probabilities
+                return
+            i += 1 + int(left_out)
             while i >= j and j < n:
                 i, j = i - j, j + 1
             if j < n:

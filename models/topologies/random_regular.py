@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator
+from itertools import combinations
 from typing import Any
 
 from ..family_options import whole
@@ -13,6 +14,9 @@ MINIMUM = 5
 SOURCE = "A. Steger, N. C. Wormald, Comb. Probab. Comput. 8, 377 (1999)"
 
 CONNECTED = False
+ATTEMPTS = 1000
+"""Attempts at a pairing; at the highest degree that is drawn, half of the nodes, one in five succeeds."""
+
 _Edges = set[tuple[int, int]]
 
 
@@ -25,12 +29,32 @@ def settle(n: int, degree: Any, seed: Any) -> dict[str, Any]:
 
 
 def edges(n: int, *, degree: int = 4, seed: int = 0) -> Iterator[tuple[int, int, int]]:
-    """Pair free ends at random until none is left; from the start again where the rest cannot be paired."""
+    """Pair free ends at random until none is left; from the start again where the rest cannot be paired.
+
+    Of a degree above n/2 the pairs that are not joined are drawn in place of those that are.
+    """
     stream = random.Random(seed)
-    found = None
-    while found is None:
+    dense = 2 * degree > n
+    drawn = _drawn(n, n - 1 - degree if dense else degree, stream)
+    if dense:
+        return ((i, j, 1) for i, j in combinations(range(n), 2) if (i, j) not in drawn)
+    return ((i, j, 1) for i, j in sorted(drawn))
+
+
+def count(n: int, *, degree: int = 4, seed: int = 0) -> int:
+    """Number of edges."""
+    return n * degree // 2
+
+
+def _drawn(n: int, degree: int, stream: random.Random) -> _Edges:
+    """The edges of the first attempt that succeeds."""
+    for _ in range(ATTEMPTS):
         found = _paired(n, degree, stream)
-    return ((i, j, 1) for i, j in sorted(found))
+        if found is not None:
+            return found
+    raise ValueError(
+        f"random_regular: found no graph of {n} nodes of degree {degree} in {ATTEMPTS} attempts; choose another seed"
+    )
 
 
 def _paired(n: int, degree: int, stream: random.Random) -> _Edges | None:

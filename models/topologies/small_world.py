@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator
+from fractions import Fraction
 from typing import Any
 
 from ..family_options import probability, whole
@@ -13,14 +14,23 @@ MINIMUM = 5
 SOURCE = "D. J. Watts, S. H. Strogatz, Nature 393, 440 (1998)"
 
 CONNECTED = False
+DRAWS = 10**7
+"""Most random numbers that a graph may take: a node that is joined to nearly all others finds a new one late."""
 
 
 def settle(n: int, neighbours: Any, p: Any, seed: Any) -> dict[str, Any]:
-    """An even number of neighbours below n, a probability, a whole number."""
+    """An even number of neighbours below n, a probability, a whole number; few draws."""
     count = whole("neighbours", neighbours, 2)
     if count % 2 or count >= n:
         raise ValueError(f"neighbours = {count} with n = {n}; expected an even number below n")
-    return {"neighbours": count, "p": probability("p", p), "seed": whole("seed", seed, 0)}
+    chance = probability("p", p)
+    draws = int(Fraction(chance) * (n * count // 2) * (n - 1) / max(n - 1 - count, 1))
+    if draws > DRAWS:
+        raise ValueError(
+            f"neighbours = {count} with n = {n} and p = {chance} takes about {draws} random numbers; "
+            f"expected at most {DRAWS}: take fewer neighbours"
+        )
+    return {"neighbours": count, "p": chance, "seed": whole("seed", seed, 0)}
 
 
 def edges(n: int, *, neighbours: int = 4, p: str = "1/10", seed: int = 0) -> Iterator[tuple[int, int, int]]:
@@ -38,6 +48,11 @@ def edges(n: int, *, neighbours: int = 4, p: str = "1/10", seed: int = 0) -> Ite
             if stream.random() < chance and len(near[i]) < n - 1:
                 _rewire(near, i, (i + s) % n, stream)
     return ((i, j, 1) for i in range(n) for j in sorted(near[i]) if i < j)
+
+
+def count(n: int, *, neighbours: int = 4, p: str = "1/10", seed: int = 0) -> int:
+    """Number of edges: those that are led elsewhere are not lost."""
+    return n * neighbours // 2
 
 
 def _rewire(near: list[set[int]], i: int, old: int, stream: random.Random) -> None:

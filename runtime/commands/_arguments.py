@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from argparse import ArgumentParser, ArgumentTypeError
+from typing import Any
 
 from synchain.models.axis import LIMIT as AXIS_LIMIT
 from synchain.models.axis import Axis
@@ -75,15 +76,20 @@ def tolerance(text: str) -> float:
     return value
 
 
-def spaced(text: str) -> tuple[float, ...]:
-    """LO:HI:N as N equally spaced numbers."""
+def span(text: str) -> dict[str, Any]:
+    """LO:HI:N as the table from, to and count of an axis, none of whose values is built."""
     parts = text.split(":")
     if len(parts) != 3:
         raise ArgumentTypeError(f"found {shown(text)}; expected LO:HI:N, e.g. 0:0.6:241")
     low, high, count = number(parts[0]), number(parts[1]), positive(parts[2], AXIS_LIMIT)
     if count < 2 or not low < high:
         raise ArgumentTypeError(f"found {shown(text)}; expected LO below HI and at least 2 values")
-    return Axis.between("grid", low, high, count).values
+    return {"from": low, "to": high, "count": count}
+
+
+def spaced(text: str) -> tuple[float, ...]:
+    """LO:HI:N as N equally spaced numbers."""
+    return Axis.from_table("grid", span(text)).values
 
 
 def grid(text: str) -> tuple[float, ...]:
@@ -94,13 +100,13 @@ def grid(text: str) -> tuple[float, ...]:
     return values
 
 
-def setting(text: str) -> tuple[str, float | tuple[float, ...]]:
+def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, Any]]:
     """name=value, name=a,b,c or name=LO:HI:N."""
     name, equals, value = text.partition("=")
     if not (name.isidentifier() and equals and value):
         raise ArgumentTypeError(f"found {shown(text)}; expected name=value, name=a,b,c or name=LO:HI:N, after SCENE")
     if ":" in value:
-        return name, spaced(value)
+        return name, span(value)
     if "," in value:
         return name, tuple(number(part) for part in value.split(","))
     return name, number(value)

@@ -135,7 +135,7 @@ def changed_scene(arguments: Namespace) -> Scene:
     return scene if arguments.rtol is None else scene.replace(rtol=arguments.rtol)
 
 
-def _fitting(scene: Scene, name: str, value: float | tuple[float, ...]) -> Any:
+def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[str, Any]) -> Any:
     """The value of a setting as the scene wants it."""
     from synchain.models.scene_model import check_state, unknown
 
@@ -149,8 +149,9 @@ def _fitting(scene: Scene, name: str, value: float | tuple[float, ...]) -> Any:
         made = scene.model()
         states = {name.rpartition("_")[0]: name for name in reversed(scene.equations.state)}.values()
         raise WrongUse(f"--set: {unknown(made, name, 'parameter', (*scene.parameters, *states, *SETTINGS))}")
-    if isinstance(value, tuple):
-        raise WrongUse(f"--set {name}: found {len(value)} values; only parameters and initial states can be swept")
+    if isinstance(value, tuple | dict):
+        count = value["count"] if isinstance(value, dict) else len(value)
+        raise WrongUse(f"--set {name}: found {count} values; only parameters and initial states can be swept")
     return int(value) if name in ("samples", "max_steps") and value.is_integer() else value
 
 

@@ -15,13 +15,14 @@ Discovery is a listing of the folder: a new figure is one new file.
 
 from __future__ import annotations
 
-import difflib
 import pkgutil
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
+
+from synchain.models.scene_checks import suggestion
 
 if TYPE_CHECKING:
     from .study import Study
@@ -68,9 +69,7 @@ def load(name: str) -> Drawing:
     """Return the figure `name`; ValueError with the known names where there is none."""
     known = _listing()
     if name not in known:
-        close = difflib.get_close_matches(str(name), sorted(known), 1)
-        hint = f"; did you mean {close[0]!r}?" if close else ""
-        raise ValueError(f"unknown figure {name!r}; known: {', '.join(names(extra=True))}{hint}")
+        raise ValueError(f"unknown figure {name!r}; known: {', '.join(names(extra=True))}{suggestion(name, known)}")
     return Drawing(name, known[name][0])
 
 
