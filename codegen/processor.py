@@ -5,7 +5,7 @@ from __future__ import annotations
 import llvmlite.binding as llvm
 import numba
 
-__all__ = ["processor"]
+__all__ = ["processor", "told_apart"]
 
 
 def processor() -> str:
@@ -20,3 +20,16 @@ def processor() -> str:
         found = llvm.get_host_cpu_features().items()
         features = [word for word, there in found if there and (numba.config.ENABLE_AVX or not word.startswith("avx"))]
     return f"{name}: {' '.join(sorted(features))}"
+
+
+def told_apart(one: str, other: str) -> tuple[str, str]:
+    """Return two kinds of processor in few words: the names, and of equal ones the features that the other has not."""
+    (name, _, features), (other_name, _, other_features) = one.partition(": "), other.partition(": ")
+    if name != other_name:
+        return name, other_name
+    return _more(name, features, other_features), _more(name, other_features, features)
+
+
+def _more(name: str, features: str, fewer: str) -> str:
+    more = sorted(set(features.split()) - set(fewer.split()))
+    return f"{name} with {' '.join(more) or 'nothing more'}"

@@ -23,6 +23,9 @@ __all__ = ["MEANINGS", "Variable", "coordinates", "dimensions", "provenance", "s
 Variable = tuple[str, tuple[str, ...], np.ndarray]
 """Name, dimensions besides those of the sweep, values with one row for each cell."""
 
+TOLD = ("scene", "title", "equations", "kernel", "versions")
+"""Attributes of a result that are text."""
+
 MEANINGS = {
     "sync_error": "average synchronisation error",
     "sync_error_max": "largest synchronisation error seen in the window",
@@ -98,12 +101,26 @@ def coordinates(scene: Scene) -> dict[str, Any]:
 
 
 def scene_of(attributes: Mapping[Any, Any]) -> Scene:
-    """The scene that a result says it is of."""
-    return Scene.from_dict(json.loads(attributes["scene"]))
+    """The scene that a result says it is of; ValueError or TypeError if it does not say it as `provenance` does."""
+    missing = [name for name in TOLD if not isinstance(attributes.get(name), str)]
+    if "scene" in missing:
+        raise ValueError("it is no synchain result: it has no attribute 'scene'")
+    if missing:
+        raise ValueError(f"it is no whole synchain result: it has no attribute {missing[0]!r}")
+    try:
+        values = json.loads(attributes["scene"])
+    except (ValueError, RecursionError):
+        raise ValueError("its scene is not JSON") from None
+    return Scene.from_dict(values)
 
 
 def provenance(
-    scene: Scene, kernel: Kernel, tolerances: tuple[float, float], skipped: tuple[str, ...], versions: str
+    scene: Scene,
+    kernel: Kernel,
+    tolerances: tuple[float, float],
+    skipped: tuple[str, ...],
+    versions: str,
+    processor: str,
 ) -> dict[str, Any]:
     """Where a result comes from; `skipped` says what was left out of the equations (see `synchain.runtime.skip`)."""
     return {
@@ -116,5 +133,6 @@ def provenance(
         "atol_used": tolerances[1],
         "seed": scene.seed,
         "versions": versions,
+        "processor": processor,
         "skipped": "; ".join(skipped) or "nothing",
     }
