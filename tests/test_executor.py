@@ -64,6 +64,13 @@ def test_a_worker_with_other_versions_or_another_kernel_refuses(monkeypatch):
         Recipe.unpacked(packed)
 
 
+def test_a_worker_with_another_processor_says_so(monkeypatch):
+    packed = recipe(MAP).packed()
+    monkeypatch.setattr("llvmlite.binding.get_host_cpu_name", lambda: "abacus")
+    with pytest.raises(RuntimeError, match="this worker has the processor abacus; expected that of the main program"):
+        Recipe.unpacked(packed)
+
+
 def test_a_worker_that_does_not_know_the_sweep_asks_for_it(monkeypatch):
     cells = np.arange(3)
     assert run_block("first", None, cells) is None
