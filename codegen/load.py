@@ -11,6 +11,7 @@ import functools
 import hashlib
 import importlib.metadata
 import logging
+import pickle
 import platform
 import shutil
 import sys
@@ -22,17 +23,18 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import llvmlite.binding as llvm
 import numba
 import numpy as np
 from numba import types
+from numba.core.serialize import dumps
 
 from synchain.models.equations import Equations
 
 from . import elementary, inner, lane_types, lanes
-from .cache import cache_folder, discard, has_code, is_sound, open_folder, seal, write_whole
+from .cache import Folder, cache_folder, open_folder
 from .emit import LARGEST_UNROLLED, KernelSource
 from .installation import InstallationError
+from .processor import processor
 from .sparse import EMPTY, NAMES, program
 
 __all__ = ["Kernel", "load"]
@@ -103,8 +105,8 @@ class Kernel:
 def load(source: KernelSource) -> Kernel:
     """Compile a kernel, or load its machine code from the cache.
 
-    Damaged cache files are deleted and the kernel is compiled anew.  Where the cache folder cannot be used, the kernel is
-    compiled for this process alone and a RuntimeWarning says why.  Raises InstallationError where Numba does not compile.
+    A kernel whose cache file is damaged is compiled anew.  If the cache folder cannot be used, the kernel is compiled for
+    this process alone and a RuntimeWarning says why.  Raises InstallationError if Numba does not compile.
     """
     if numba.config.DISABLE_JIT:
         raise InstallationError(
@@ -118,18 +120,15 @@ def load(source: KernelSource) -> Kernel:
 def _load(source: KernelSource) -> Kernel:
     name = f"kernel_{_fingerprint(source)[:32]}"
     try:
-        folder = open_folder(cache_folder())
-        if not is_sound(folder, name):
-            discard(folder, name)
-        if not has_code(folder, name):
-            _tell(source, "kept for later runs")
-        return _kept(source, name, folder)
+        with open_folder(cache_folder()) as folder:
+            return _kept(source, name, folder)
     except (OSError, RuntimeError) as problem:  # RuntimeError: no home folder
         warnings.warn(f"kernels are not kept on disk: {problem}", RuntimeWarning, stacklevel=3)
     _tell(source, "for this process alone")
-    folder = Path(tempfile.mkdtemp(prefix="synchain-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return _compile(source, name, folder)
+    path = Path(tempfile.mkdtemp(prefix="synchain-"), f"{name}.py")
+    atexit.register(shutil.rmtree, path.parent, ignore_errors=True)
+    path.write_text(source.text, encoding="utf-8")
+    return _compile(source, path, _MachineCode())
 
 
 def _tell(source: KernelSource, how: str) -> None:
@@ -137,46 +136,61 @@ def _tell(source: KernelSource, how: str) -> None:
     LOG.info("compiling a kernel for %d oscillator%s (%s), %s", n, "s" * (n != 1), source.integrator, how)
 
 
-def _kept(source: KernelSource, name: str, folder: Path) -> Kernel:
-    """The kernel from the folder, or compiled into it; what cannot be loaded is deleted and compiled anew."""
-    try:
-        found = _compile(source, name, folder)
-    except Exception:
-        sys.modules.pop(name, None)
-        if not discard(folder, name):
-            raise
-        found = _compile(source, name, folder)
-    if not found.from_cache:
-        seal(folder, name)
-    return found
+def _kept(source: KernelSource, name: str, folder: Folder) -> Kernel:
+    """The kernel from the folder, or compiled into it; what cannot be loaded is compiled anew."""
+    path, text = folder.path / f"{name}.py", source.text.encode()
+    if folder.read(path.name) != text:
+        folder.write(path.name, text)
+    if (found := folder.machine_code(name)) is not None:
+        try:
+            return _compile(source, path, _MachineCode(found))
+        except Exception:
+            sys.modules.pop(name, None)
+    _tell(source, "kept for later runs")
+    code = _MachineCode()
+    kernel = _compile(source, path, code)
+    folder.keep(name, code.data)
+    return kernel
 
 
-def _compile(source: KernelSource, name: str, folder: Path) -> Kernel:
-    path = folder / f"{name}.py"
-    module = _module(source.text, name, path)
+class _MachineCode:
+    """Stands in for the files that Numba would read and write by their paths: machine code as bytes that were checked."""
+
+    def __init__(self, data: bytes = b"") -> None:
+        self.data = data
+
+    def load(self, key: Any) -> Any:
+        """What was compiled for these types and this processor, None if that is not here."""
+        return pickle.loads(self.data).get(key) if self.data else None
+
+    def save(self, key: Any, compiled: Any) -> None:
+        self.data = dumps({key: compiled})
+
+
+def _compile(source: KernelSource, path: Path, code: _MachineCode) -> Kernel:
+    module = _module(source.text, path)
     graph, weights = EMPTY, np.zeros(0)
     if source.kind == "sweep" and source.equations.n > LARGEST_UNROLLED:
         made = program(source.equations)
         graph, weights = made.arrays, made.weights
     entry = module.march if source.kind == "modes" else module.drive
+    entry._cache._cache_file = code
     entry.compile(MODES if source.kind == "modes" else _signature(len(graph)))
     entry.disable_compile()  # arrays of another type are a mistake of ours, not a reason to compile anew
     hits = sum(entry.stats.cache_hits.values())
     return Kernel(source, entry, graph, weights, str(path), hits > 0)
 
 
-def _module(text: str, name: str, path: Path) -> ModuleType:
-    """Write the module file where it is missing, and run its text.
+def _module(text: str, path: Path) -> ModuleType:
+    """Run the text of a module.
 
-    The text comes from memory, not from the file and not from what Python would keep of it in `__pycache__`; the file is
-    there for Numba, which puts machine code beside it, and for readers.
+    The text comes from memory, not from the file at `path` and not from what Python would keep of it in `__pycache__`; the
+    file is there for readers, and for Numba, which caches nothing that has none.
     """
-    if not path.exists() or path.read_text(encoding="utf-8") != text:
-        write_whole(path, text)
-    module = ModuleType(name)
+    module = ModuleType(path.stem)
     module.__file__ = str(path)
-    sys.modules[name] = module  # before execution: Numba looks its functions up there
-    elsewhere, numba.config.CACHE_DIR = numba.config.CACHE_DIR, ""  # code comes from the folder that was checked
+    sys.modules[path.stem] = module  # before execution: Numba looks its functions up there
+    elsewhere, numba.config.CACHE_DIR = numba.config.CACHE_DIR, ""  # nothing is made in a folder of Numba's own
     try:
         exec(compile(text, str(path), "exec"), module.__dict__)
     finally:
@@ -188,9 +202,8 @@ def _module(text: str, name: str, path: Path) -> ModuleType:
 def _surroundings() -> str:
     """Everything besides the text that the machine code depends on."""
     here = [Path(m.__file__).read_text(encoding="utf-8") for m in (inner, lane_types, lanes, elementary) if m.__file__]
-    features = ",".join(f"{k}{int(v)}" for k, v in sorted(llvm.get_host_cpu_features().items()))
     versions = [sys.version, numba.__version__, importlib.metadata.version("llvmlite"), platform.machine()]
-    return "\n".join([*here, *versions, llvm.get_host_cpu_name(), features])
+    return "\n".join([*here, *versions, processor()])
 
 
 def _fingerprint(source: KernelSource) -> str:

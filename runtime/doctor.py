@@ -83,9 +83,10 @@ def _cache() -> Answer:
     from synchain.codegen.cache import cache_folder, describe, open_folder
 
     try:
-        folder = open_folder(cache_folder())
-        (probe := folder / f"probe-{os.getpid()}.tmp").write_bytes(b"0" * 4096)
-        probe.unlink()
+        with open_folder(cache_folder()) as opened:
+            opened.write(probe := f"probe-{os.getpid()}", b"0" * 4096)
+            opened.delete(probe)
+            folder = opened.path
     except (OSError, RuntimeError) as problem:  # RuntimeError: no home folder
         words = " ".join(str(problem).split())
         return DOUBTFUL, f"every process compiles its kernels: {words}", "set SYNCHAIN_CACHE to a folder of yours"

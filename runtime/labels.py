@@ -33,6 +33,9 @@ __all__ = [
 Variable = tuple[str, tuple[str, ...], np.ndarray]
 """Name, dimensions besides those of the sweep, values with one row for each cell."""
 
+TOLD = ("scene", "title", "equations", "kernel", "versions")
+"""Attributes of a result that are text."""
+
 MEANINGS = {
     "sync_error": "average synchronisation error",
     "sync_error_max": "largest synchronisation error seen in the window",
@@ -108,8 +111,17 @@ def coordinates(scene: Scene) -> dict[str, Any]:
 
 
 def scene_of(attributes: Mapping[Any, Any]) -> Scene:
-    """The scene that a result says it is of; ValueError where the models that are here cannot make it."""
-    values = json.loads(attributes["scene"])
+    """The scene that a result says it is of; ValueError or TypeError if it does not say it as `provenance` does, or if the
+    models that are here cannot make it."""
+    missing = [name for name in TOLD if not isinstance(attributes.get(name), str)]
+    if "scene" in missing:
+        raise ValueError("it is no synchain result: it has no attribute 'scene'")
+    if missing:
+        raise ValueError(f"it is no whole synchain result: it has no attribute {missing[0]!r}")
+    try:
+        values = json.loads(attributes["scene"])
+    except (ValueError, RecursionError):
+        raise ValueError("its scene is not JSON") from None
     try:
         return Scene.from_dict(values)
     except (ValueError, TypeError) as error:
@@ -128,7 +140,12 @@ def changed(attributes: Mapping[Any, Any], scene: Scene) -> bool:
 
 
 def provenance(
-    scene: Scene, kernel: Kernel, tolerances: tuple[float, float], skipped: tuple[str, ...], versions: str
+    scene: Scene,
+    kernel: Kernel,
+    tolerances: tuple[float, float],
+    skipped: tuple[str, ...],
+    versions: str,
+    processor: str,
 ) -> dict[str, Any]:
     """Where a result comes from; `skipped` says what was left out of the equations (see `synchain.runtime.skip`)."""
     return {
@@ -142,5 +159,6 @@ def provenance(
         "atol_used": tolerances[1],
         "seed": scene.seed,
         "versions": versions,
+        "processor": processor,
         "skipped": "; ".join(skipped) or "nothing",
     }

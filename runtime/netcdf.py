@@ -2,10 +2,13 @@
 
 The form is that of netCDF "64-bit offset" files, as SciPy writes it for `Result.save`, byte for byte: the header says where
 each variable begins, then the variables follow, whole, big endian (NetCDF Classic Format Specification, Unidata).
+
+The first attribute of a result is a digest of the whole file, taken with zeros in the place of the digest itself.
 """
 
 from __future__ import annotations
 
+import hashlib
 import io
 import struct
 from collections.abc import Mapping
@@ -16,10 +19,16 @@ import numpy as np
 import xarray as xr
 from scipy.io import netcdf_file
 
-__all__ = ["Sheet"]
+__all__ = ["DIGEST", "Sheet", "is_sealed", "seal", "unsealed"]
+
+DIGEST = "digest"
+"""Name of the attribute that holds the SHA-256 of the file, in hexadecimal digits."""
+BLANK = "0" * 64
 
 DIMENSION, VARIABLE, ATTRIBUTE, ABSENT = (struct.pack(">i", tag) for tag in (10, 11, 12, 0))
 TYPES = {"b": 1, "c": 2, "h": 3, "i": 4, "l": 4, "f": 5, "d": 6}
+PIECE = 2**20
+"""Bytes that are read at a time."""
 LARGEST = 2**32 - 4
 """Bytes of the largest variable whose size the header can hold; of a larger one it says 2^32 - 1, and readers count."""
 
@@ -79,6 +88,51 @@ class Sheet:
             _attributes(variable._attributes),
         ]
         return b"".join([*parts, struct.pack(">iI", TYPES[variable.typecode()], size)])
+
+
+def unsealed(data: xr.Dataset) -> xr.Dataset:
+    """The data with room for a digest before the other attributes."""
+    made = data.copy(deep=False)
+    made.attrs = {DIGEST: BLANK, **{name: value for name, value in data.attrs.items() if name != DIGEST}}
+    return made
+
+
+def seal(file: BinaryIO) -> None:
+    """Write the digest of a file of `unsealed` data, which is open for reading and writing, into its room."""
+    place = _digest_place(file)
+    if place is None:
+        raise ValueError("the file has no room for a digest")
+    digest = _digest(file, place)
+    file.seek(place)
+    file.write(digest)
+
+
+def is_sealed(file: BinaryIO) -> bool | None:
+    """True if a file is as it was sealed, False if it has changed since, None if it has no digest."""
+    place = _digest_place(file)
+    if place is None:
+        return None
+    file.seek(place)
+    return file.read(len(BLANK)) == _digest(file, place)
+
+
+def _digest_place(file: BinaryIO) -> int | None:
+    """Where the digest stands; before it there are only the names of the dimensions."""
+    file.seek(0)
+    before = _text(DIGEST) + struct.pack(">ii", TYPES["c"], len(BLANK))
+    found = file.read(PIECE).find(before)
+    return None if found < 0 else found + len(before)
+
+
+def _digest(file: BinaryIO, place: int) -> bytes:
+    total, here = hashlib.sha256(), 0
+    file.seek(0)
+    while piece := bytearray(file.read(PIECE)):
+        for k in range(max(place - here, 0), min(place + len(BLANK) - here, len(piece))):
+            piece[k] = ord("0")
+        total.update(piece)
+        here += len(piece)
+    return total.hexdigest().encode()
 
 
 def _bytes(template: xr.Dataset) -> bytes:

@@ -12,22 +12,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from synchain.codegen.processor import processor, told_apart
 from synchain.models.expect import a_path, a_scene, instance
 from synchain.models.scene import Scene
 
 from .certificate import Certificate
-from .files import netcdf_data, whole_file
+from .files import netcdf_data, understood, whole_file
 from .labels import MEANINGS, alike, changed, coordinates, dimensions, scene_of, variables
+from .netcdf import DIGEST, seal, unsealed
 from .status import Status
 
 if TYPE_CHECKING:
     from synchain.models.equations import Equations
 
-__all__ = ["Buffers", "Result", "gather", "open_result"]
+__all__ = ["Buffers", "Result", "gather", "open_result", "told_by"]
 
 
 SUMS, COUNTS = 4, 6
 """Columns of the numbers and of the counts that a kernel writes for each cell."""
+
+IN_MEMORY = 10**9
+"""Numbers of the largest result that is kept in memory, 8 GB."""
 
 
 @dataclass(slots=True)
@@ -91,9 +96,14 @@ class Result:
         return "; ".join(parts)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a netCDF file that opens in xarray and in `open_result`; it appears whole or not at all."""
+        """Write a netCDF file that opens in xarray and in `open_result`; it appears whole or not at all.
+
+        Its attribute `digest` is the SHA-256 of the file, by which `open_result` and `stream` see whether it was damaged.
+        """
         with whole_file(path) as temporary:
-            self.data.to_netcdf(temporary, engine="scipy", format="NETCDF3_64BIT")
+            unsealed(self.data).to_netcdf(temporary, engine="scipy", format="NETCDF3_64BIT")
+            with open(temporary, "r+b") as file:
+                seal(file)
 
     def belongs_to(self, scene: Scene) -> bool:
         """True where the scene is this result's but for its title."""
@@ -106,7 +116,8 @@ class Result:
     def restore(self, scene: Scene, buffers: Buffers, equations: Equations) -> None:
         """Put the finished cells of this result into the buffers of a new run of the same scene that steps these equations.
 
-        Raises ValueError where the scenes differ in more than their titles, or this result comes of other equations.
+        Raises ValueError if the scenes differ in more than their titles, or if this result comes of other equations or of
+        another kind of processor.
         """
         if not self.belongs_to(scene):
             raise ValueError("the result to resume belongs to another scene; run without resume")
@@ -117,6 +128,12 @@ class Result:
             )
         if not self.stepped(equations):
             raise ValueError("the result to resume left out other parts of its scene; resume with the skip of that run")
+        if (begun := str(self.data.attrs.get("processor"))) != processor():
+            there, here = told_apart(begun, processor())
+            raise ValueError(
+                f"the result to resume was begun on the processor {there}; found {here}, which may round otherwise; "
+                "resume on the first kind, or run without resume"
+            )
         cells, data = scene.cells, self.data
         for source, target in (("end", buffers.end), ("trajectory", buffers.samples)):
             if source in data:
@@ -141,8 +158,10 @@ class Result:
 def open_result(path: str | os.PathLike[str]) -> Result:
     """Read a file written by `Result.save` or `stream`, or the cells so far of a run that is not finished.
 
-    Warns where the code of its model has changed since it was written: the numbers are those of the former model, the scene
-    names the present one.  OSError or ValueError where it is none of these.
+    Raises OSError or ValueError if it is none of these or if it is damaged.  A result without a digest, which another
+    program wrote, or an earlier version, is read with a RuntimeWarning: damage of its numbers cannot be seen.  A UserWarning
+    says if the code of its model has changed since it was written: the numbers are those of the former model, the scene
+    names the present one.
     """
     result = _opened(a_path("result", path))
     if changed(result.data.attrs, result.scene):
@@ -165,9 +184,25 @@ def _opened(path: Path) -> Result:
         return open_unfinished(path)
     with netcdf_data(path) as file:
         data = file.load()
-    if "scene" not in data.attrs:
-        raise ValueError(f"{path} is no synchain result: it has no attribute 'scene'")
-    return Result(data, scene_of(data.attrs))
+    data.attrs = told_by(data.attrs, path)
+    with understood(path):
+        scene = scene_of(data.attrs)
+        status = data.get("status")
+        if status is None or status.dims != dimensions(scene) or status.shape != scene.shape:
+            raise ValueError("its variables are not those of its scene")
+        list(map(Status, np.unique(status.values).tolist()))
+    return Result(data, scene)
+
+
+def told_by(attributes: Mapping[Any, Any], path: Path) -> dict[str, Any]:
+    """The attributes of a result's file without its digest; a RuntimeWarning says if there is none."""
+    if "scene" in attributes and DIGEST not in attributes:
+        warnings.warn(
+            f"{path} has no digest, so damage of its numbers cannot be seen; open it and save it with Result.save",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+    return {str(name): value for name, value in attributes.items() if name != DIGEST}
 
 
 def gather(

@@ -126,7 +126,10 @@ class Prepared:
     def attributes(self) -> dict[str, Any]:
         """What a result says about how it came about."""
         recipe = self.shop.recipe
-        return provenance(recipe.chosen.scene, self.shop.kernel, self.limits, recipe.chosen.skipped, recipe.versions)
+        chosen = recipe.chosen
+        return provenance(
+            chosen.scene, self.shop.kernel, self.limits, chosen.skipped, recipe.versions, recipe.processor
+        )
 
     def size(self) -> int:
         """Cells of a block."""

@@ -12,17 +12,18 @@ from typing import Any
 import numpy as np
 
 from synchain.codegen.installation import InstallationError
+from synchain.codegen.processor import told_apart
 from synchain.models.expect import a_path, flag
 from synchain.models.scene import Scene
 from synchain.models.scene_checks import shown
 
 from .crew import Task, crew_size, worker_lost
-from .files import drop_leftovers, netcdf_data
+from .files import check_replaceable, drop_leftovers, netcdf_data, understood
 from .kernels import chosen_skip
 from .labels import alike, changed, scene_of
 from .layout import Layout
 from .progress import Hook, Progress, Reporter
-from .result import Buffers
+from .result import Buffers, told_by
 from .sitting import Prepared, Sitting, SweepFailed, SweepInterrupted, prepare
 from .skip import Skip
 from .status import Status
@@ -117,14 +118,18 @@ def claim(
         flag(name, value)
     target = a_path("path", path)
     partial = partial_path(target)
+    if target.suffix.lower() == partial.suffix:
+        raise ValueError(
+            f"path: found {str(target)!r}, the name of an unfinished run; expected that of a result; end it in .nc"
+        )
     if resume and overwrite:
         raise ValueError("found both resume and overwrite; expected one of them")
-    if target.is_dir():
-        raise IsADirectoryError(f"{target} is a folder; expected a file or nothing there; choose another path (--out)")
+    check_replaceable(target)
     if overwrite:
         return "begin"
     if partial.exists() and (resume or not target.exists()):
-        _check_same(chosen, certified, partial, Store.describe(partial))
+        with understood(partial):
+            _check_same(chosen, certified, partial, Store.describe(partial))
         if not resume:
             raise FileExistsError(
                 f"{partial} keeps a run of this scene that was not finished; "
@@ -132,7 +137,8 @@ def claim(
             )
         return "continue"
     if target.exists():
-        _check_same(chosen, certified, target, _described(target))
+        with understood(target):
+            _check_same(chosen, certified, target, _described(target))
         return "complete"
     if resume:
         raise FileNotFoundError(f"nothing to resume: {target} does not exist; run without resume (--resume)")
@@ -143,11 +149,7 @@ def _described(target: Path) -> dict[str, Any]:
     """Of a finished result what a store says of an unfinished one."""
     with netcdf_data(target) as file:
         attributes, certified = dict(file.attrs), "transversal_exponent" in file
-    if "scene" not in attributes:
-        raise ValueError(
-            f"{target} is no synchain result; choose another path (--out), or replace it with overwrite (--overwrite)"
-        )
-    return {"attributes": attributes, "certificate": certified or None}
+    return {"attributes": told_by(attributes, target), "certificate": certified or None}
 
 
 def _check_same(chosen: Skip, certified: bool, path: Path, told: Mapping[str, Any]) -> None:
@@ -216,8 +218,14 @@ def _fill(
 
 
 def _check_kernel(prepared: Prepared, store: Store) -> None:
-    """Raise ValueError where a store's cells were run by another kernel, or another version of what it is made with."""
+    """Raise ValueError if a store's cells were run by another kernel, version or kind of processor."""
     recipe, kept = prepared.shop.recipe, store.about["attributes"]
+    if (begun := str(kept.get("processor"))) != recipe.processor:
+        there, here = told_apart(begun, recipe.processor)
+        raise ValueError(
+            f"{store.path} was begun on the processor {there}; found {here}, which may round otherwise: the two parts of "
+            "the sweep might differ; go on there, or replace it with overwrite (--overwrite)"
+        )
     if kept["lanes"] == recipe.width and kept["kernel"] != recipe.digest:
         raise ValueError(f"{store.path} was begun with another kernel; replace it with overwrite (--overwrite)")
     if kept["versions"] != recipe.versions:

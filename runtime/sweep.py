@@ -19,7 +19,7 @@ from .keywords import check_keywords
 from .layout import Layout
 from .plan import plan
 from .progress import Hook, Reporter
-from .result import COUNTS, SUMS, Buffers, Result, gather
+from .result import COUNTS, IN_MEMORY, SUMS, Buffers, Result, gather
 from .sitting import Prepared, Sitting, SweepFailed, SweepInterrupted, prepare
 from .skip import Skip
 from .status import CODES, Status, tally
@@ -27,10 +27,6 @@ from .threads import worker_count
 from .work import Start
 
 __all__ = ["Buffers", "SweepFailed", "SweepInterrupted", "kernel", "kernel_source", "run", "with_axes", "worker_count"]
-
-
-IN_MEMORY = 10**9
-"""Numbers of the largest result that `run` keeps in memory, 8 GB."""
 
 
 def run(

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from synchain.models.expect import whole
 from synchain.models.scene import Scene
 
 from .certificate import VERDICTS, Certificate
-from .files import whole_file
+from .files import understood, whole_file
 from .labels import MEANINGS, Variable, coordinates, dimensions, scene_of, variables
 from .layout import Layout
-from .netcdf import Sheet
+from .netcdf import Sheet, seal, unsealed
 from .plan import Planner
-from .result import Buffers, Result, gather
+from .result import COUNTS, IN_MEMORY, SUMS, Buffers, Result, gather
 from .skip import Merged, Skip
 from .store import Store
 
@@ -46,8 +48,11 @@ def about(
 
 
 def layout_of(told: Mapping[str, Any], scene: Scene) -> Layout:
-    """The blocks of a store."""
-    return Layout.of(scene, int(told["size"]))
+    """The blocks of a store; ValueError if it does not have as many as its scene needs."""
+    layout = Layout.of(scene, whole("size", told["size"], 1))
+    if layout.blocks != told["blocks"]:
+        raise ValueError(f"found {told['blocks']} blocks; expected {layout.blocks} for the cells of its scene")
+    return layout
 
 
 def certificate_of(told: Mapping[str, Any]) -> Certificate | None:
@@ -78,19 +83,30 @@ class _Reader:
 
 def open_unfinished(path: str | os.PathLike[str]) -> Result:
     """The cells so far of a sweep on disk; the others have the status NOT_RUN."""
-    store = Store.open(path)
-    try:
-        scene = scene_of(store.about["attributes"])
-        reader = _Reader(store, scene)
-        whole = Buffers.empty(scene.cells, len(reader.merged.places), store.most, int(store.about["samples"]))
-        for block in np.flatnonzero(store.done).tolist():
-            rows, made = reader.layout.rows(block), reader.buffers(block)
-            for target, source in zip(whole.arrays(), made.arrays(), strict=True):
-                target[(rows, slice(source.shape[1]))] = source
-        spans = reader.planner.rows(np.arange(scene.cells)).spans
-        return gather(scene, store.about["attributes"], spans, whole, reader.certificate)
-    finally:
-        store.close()
+    with understood(Path(path)):
+        told = Store.describe(path)
+        scene = scene_of(told["attributes"])
+        layout_of(told, scene)
+        with closing(Store.open(path)) as store:
+            return _so_far(store, scene)
+
+
+def _so_far(store: Store, scene: Scene) -> Result:
+    reader = _Reader(store, scene)
+    dimension, samples = len(reader.merged.places), int(store.about["samples"])
+    numbers = scene.cells * (dimension * (1 + samples) + (dimension + 1) * store.most + SUMS + COUNTS)
+    if numbers > IN_MEMORY:
+        raise ValueError(
+            f"found a sweep of {numbers * 8 / 1e9:.0f} GB; expected at most {IN_MEMORY * 8 / 1e9:.0f} GB in memory; finish "
+            "it with resume (--resume), and open parts of the result with xarray"
+        )
+    made = Buffers.empty(scene.cells, dimension, store.most, samples)
+    for block in np.flatnonzero(store.done).tolist():
+        rows, found = reader.layout.rows(block), reader.buffers(block)
+        for target, source in zip(made.arrays(), found.arrays(), strict=True):
+            target[(rows, slice(source.shape[1]))] = source
+    spans = reader.planner.rows(np.arange(scene.cells)).spans
+    return gather(scene, store.about["attributes"], spans, made, reader.certificate)
 
 
 def finish_file(store: Store, path: str | os.PathLike[str], scene: Scene) -> dict[str, int]:
@@ -102,7 +118,7 @@ def finish_file(store: Store, path: str | os.PathLike[str], scene: Scene) -> dic
     told: dict[str, int] = {}
     axes = {axis.name: len(axis) for axis in scene.axes}
     lengths = {"cell": scene.cells} if scene.zipped else axes
-    with whole_file(path) as temporary, open(temporary, "wb") as file:
+    with whole_file(path) as temporary, open(temporary, "w+b") as file:
         sheet = Sheet(file, _template(reader), lengths)
         for axis in scene.axes:
             sheet.put(axis.name, np.arange(len(axis)), np.array(axis.values))
@@ -112,6 +128,7 @@ def finish_file(store: Store, path: str | os.PathLike[str], scene: Scene) -> dic
                 sheet.put(name, rows, values)
                 for word, count in _words(name, values):
                     told[word] = told.get(word, 0) + count
+        seal(file)
         file.flush()
         os.fsync(file.fileno())
     return told
@@ -131,7 +148,7 @@ def _template(reader: _Reader) -> xr.Dataset:
     for axis in scene.axes:
         dim, values = made[axis.name]
         made[axis.name] = (dim, values[:1])
-    return xr.Dataset(data, made, reader.store.about["attributes"])
+    return unsealed(xr.Dataset(data, made, reader.store.about["attributes"]))
 
 
 def _words(name: str, values: np.ndarray) -> list[tuple[str, int]]:

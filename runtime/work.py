@@ -21,6 +21,7 @@ import numpy as np
 from synchain.codegen.emit import KernelSource, emit
 from synchain.codegen.installation import InstallationError
 from synchain.codegen.load import Kernel, load
+from synchain.codegen.processor import processor, told_apart
 from synchain.models.equations import Equations
 from synchain.models.plugins import allow_code, allowed_code
 from synchain.models.scene import Scene
@@ -60,6 +61,8 @@ class _Pickler(pickle.Pickler):
 class Recipe:
     """What all blocks of a sweep have in common; `digest` is that of the kernel's text, `code` are files allowed to run.
 
+    `processor` is the kind that machine code is made for (see `synchain.codegen.processor`).
+
     `chosen` is what is left of a scene to integrate (a Skip), or cells of a kernel that no scene has (Rows).
     """
 
@@ -67,30 +70,37 @@ class Recipe:
     width: int
     digest: str
     versions: str
+    processor: str
     code: tuple[str, ...]
 
     @classmethod
     def of(cls, chosen: Any, source_width: int, digest: str) -> Recipe:
         """The recipe of a sweep in this process."""
-        return cls(chosen, source_width, digest, versions(), allowed_code())
+        return cls(chosen, source_width, digest, versions(), processor(), allowed_code())
 
     def packed(self) -> bytes:
         """As bytes, for a worker elsewhere."""
         target = io.BytesIO()
-        head = {"versions": self.versions, "code": self.code, "width": self.width, "digest": self.digest}
+        head = {name: getattr(self, name) for name in ("versions", "processor", "code", "width", "digest")}
         pickle.dump(head, target)
         _Pickler(target).dump(self.chosen)
         return target.getvalue()
 
     @classmethod
     def unpacked(cls, data: bytes) -> Recipe:
-        """From bytes; InstallationError where this worker has other versions than who packed them."""
+        """From bytes; InstallationError if this worker has other versions or another processor than the main program."""
         source = io.BytesIO(data)
         head = pickle.load(source)
         if head["versions"] != versions():
             raise InstallationError(
                 f"this worker has {versions()}; expected the versions of the main program, {head['versions']}: "
                 "a sweep needs the same installation everywhere"
+            )
+        if head["processor"] != processor():
+            kept, here = told_apart(head["processor"], processor())
+            raise InstallationError(
+                f"this worker has the processor {here}; expected that of the main program, {kept}, because another kind may "
+                "round otherwise; run on one kind, or set NUMBA_CPU_NAME and NUMBA_CPU_FEATURES to one that all can run"
             )
         allow_code(*head["code"])
         return cls(pickle.load(source), **head)

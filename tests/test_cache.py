@@ -36,8 +36,8 @@ def test_where_kernels_are_kept(monkeypatch, tmp_path):
 
 
 def test_a_new_folder_belongs_to_its_user_alone(folder):
-    cache.open_folder(folder)
-    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    with cache.open_folder(folder):
+        assert stat.S_IMODE(folder.stat().st_mode) == 0o700
 
 
 def test_clearing_leaves_other_files_alone(folder):
@@ -48,7 +48,7 @@ def test_clearing_leaves_other_files_alone(folder):
         ("kernel_a.py", "12"),
         ("kernel_b.py", "345"),
         ("__pycache__/kernel_a.nbi", "6"),
-        ("kernel_a.sha256", "7"),
+        ("kernel_a.code", "7"),
         ("kernel_b8.tmp", "8"),
         ("notes.txt", ""),
     ):

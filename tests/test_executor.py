@@ -79,6 +79,15 @@ def test_a_stream_on_a_worker_with_another_installation_fails_in_words(tmp_path)
         stream(MAP, tmp_path / "a.nc", executor=Elsewhere(), show_progress=False)
 
 
+def test_a_worker_with_another_processor_says_so(monkeypatch):
+    packed = recipe(MAP).packed()
+    monkeypatch.setattr("llvmlite.binding.get_host_cpu_name", lambda: "abacus")
+    with pytest.raises(
+        InstallationError, match="this worker has the processor abacus; expected that of the main program"
+    ):
+        Recipe.unpacked(packed)
+
+
 def test_a_worker_that_does_not_know_the_sweep_asks_for_it(monkeypatch):
     cells = np.arange(3)
     assert run_block("first", None, cells) is None

@@ -8,6 +8,7 @@ import importlib.util
 import json
 import math
 import os
+import pickle
 import py_compile
 import shutil
 import stat
@@ -98,7 +99,7 @@ def works(compiled) -> bool:
 
 
 def machine_code(place: Path) -> list[Path]:
-    return sorted((place / "__pycache__").glob("kernel_*.nb*"))
+    return sorted(place.glob("kernel_*.code"))
 
 
 @pytest.fixture(scope="module")
@@ -195,11 +196,10 @@ def test_the_file_name_follows_everything_that_shapes_machine_code(monkeypatch):
 # -- damage --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
 @pytest.mark.parametrize("damage", ["empty", "half", "noise"])
-def test_damaged_files_are_compiled_anew(compiled_folder, folder, suffix, damage):
+def test_damaged_files_are_compiled_anew(compiled_folder, folder, damage):
     copied(compiled_folder, folder)
-    path = next(p for p in machine_code(folder) if p.suffix == f".{suffix}")
+    (path,) = machine_code(folder)
     whole = path.read_bytes()
     path.write_bytes({"empty": b"", "half": whole[: len(whole) // 2], "noise": b"\x93noise" * 40}[damage])
     compiled = fresh()
@@ -216,7 +216,7 @@ def test_a_changed_module_file_is_written_anew(compiled_folder, folder):
     assert path.read_text() == SOURCE.text
 
 
-def test_a_missing_index_is_no_problem(compiled_folder, folder):
+def test_missing_machine_code_is_no_problem(compiled_folder, folder):
     copied(compiled_folder, folder)
     for path in machine_code(folder):
         path.unlink()
@@ -225,7 +225,7 @@ def test_a_missing_index_is_no_problem(compiled_folder, folder):
 
 def test_one_wrong_bit_in_machine_code_is_not_run(compiled_folder, folder):
     copied(compiled_folder, folder)
-    path = next(p for p in machine_code(folder) if p.suffix == ".nbc")
+    (path,) = machine_code(folder)
     content = bytearray(path.read_bytes())
     content[2 * len(content) // 3] ^= 4
     path.write_bytes(content)
@@ -235,23 +235,40 @@ def test_one_wrong_bit_in_machine_code_is_not_run(compiled_folder, folder):
     assert fresh().from_cache
 
 
-def test_machine_code_without_a_checksum_is_not_run(compiled_folder, folder):
-    copied(compiled_folder, folder)
-    next(folder.glob("kernel_*.sha256")).unlink()
-    assert not fresh().from_cache
-    assert fresh().from_cache
-
-
 def test_machine_code_of_another_kernel_is_not_run(compiled_folder, folder):
     copied(compiled_folder, folder)
     other = dataclasses.replace(SOURCE, text=TINY.replace("2.0", "5.0"))
-    wrong = next(folder.glob("kernel_*.sha256")).stem
-    name = Path(fresh(other).path).stem
-    pairs = zip(sorted(folder.rglob(f"{name}*.nb*")), sorted(folder.rglob(f"{wrong}*.nb*")), strict=True)
-    for mine, theirs in pairs:
-        shutil.copyfile(theirs, mine)
+    (theirs,) = machine_code(folder)
+    mine = Path(fresh(other).path).with_suffix(".code")
+    shutil.copyfile(theirs, mine)
     again = fresh(other)
     assert drive(again, [[1.0, 2.0]], [[]], [(0.0, 1.0)], 1e-9).end[0].tolist() == [5.0, 6.0]
+
+
+def test_an_index_of_numba_is_not_read(compiled_folder, folder, tmp_path):
+    """Numba's index is a pickle, which may run anything when it is read."""
+    copied(compiled_folder, folder)
+    (folder / "__pycache__").mkdir(exist_ok=True)
+    touch = f"import pathlib; pathlib.Path({str(tmp_path / 'ran')!r}).touch()"
+    evil = pickle.dumps(numba.__version__) + pickle.dumps(Runs(touch))
+    (name,) = (path.stem for path in folder.glob("kernel_*.py"))
+    line = TINY[: TINY.index("@njit")].count("\n") + 1
+    version = f"py{sys.version_info.major}{sys.version_info.minor}"
+    (folder / "__pycache__" / f"{name}.drive-{line}.{version}.nbi").write_bytes(evil)
+    for path in machine_code(folder):
+        path.unlink()
+    assert works(fresh())
+    assert not (tmp_path / "ran").exists()
+
+
+class Runs:
+    """An object whose pickle runs a line of Python when it is read."""
+
+    def __init__(self, line: str) -> None:
+        self.line = line
+
+    def __reduce__(self):
+        return exec, (self.line,)
 
 
 def test_what_python_keeps_beside_a_module_is_not_run(compiled_folder, folder):
@@ -279,7 +296,7 @@ def test_a_cache_of_numba_elsewhere_is_not_used(folder, tmp_path, monkeypatch):
 
 def test_another_processor_compiles_its_own(compiled_folder, folder, monkeypatch):
     copied(compiled_folder, folder)
-    monkeypatch.setattr(loading.llvm, "get_host_cpu_name", lambda: "abacus")
+    monkeypatch.setattr("llvmlite.binding.get_host_cpu_name", lambda: "abacus")
     loading._surroundings.cache_clear()
     try:
         compiled = fresh()
@@ -292,15 +309,10 @@ def test_another_processor_compiles_its_own(compiled_folder, folder, monkeypatch
 
 
 def test_a_full_disk_is_no_problem(folder, monkeypatch):
-    def full(path: Path, text: str) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+    def full(opened: cache.Folder, name: str, data: bytes) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", name)
 
-    ready = cache.write_whole
-
-    def some(path: Path, text: str) -> None:
-        (full if path.parent == folder else ready)(path, text)
-
-    monkeypatch.setattr(loading, "write_whole", some)
+    monkeypatch.setattr(cache.Folder, "write", full)
     warned("No space left on device")
 
 
@@ -312,6 +324,8 @@ def test_a_kernel_that_cannot_be_compiled_is_an_error(folder):
 
 # -- places that cannot be used ------------------------------------------------------------------------------
 
+posix = pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs POSIX permissions")
+
 
 def warned(match: str):
     with pytest.warns(RuntimeWarning, match=match) as caught:
@@ -322,7 +336,7 @@ def warned(match: str):
     return compiled
 
 
-@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs POSIX permissions")
+@posix
 @pytest.mark.parametrize("mode", [0o777, 0o720, 0o702])
 def test_a_folder_that_others_can_write_is_refused(compiled_folder, folder, mode):
     copied(compiled_folder, folder)
@@ -332,31 +346,70 @@ def test_a_folder_that_others_can_write_is_refused(compiled_folder, folder, mode
     assert not compiled.from_cache
 
 
-@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs POSIX permissions")
-def test_machine_code_that_others_can_write_is_refused(compiled_folder, folder):
-    copied(compiled_folder, folder)
-    (folder / "__pycache__").chmod(0o777)
-    assert not warned("can be written by others").from_cache
-
-
-@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs POSIX permissions")
-@pytest.mark.parametrize("suffix", ["nbc", "nbi", "sha256"])
+@posix
+@pytest.mark.parametrize("suffix", ["code", "py"])
 def test_a_file_that_others_can_write_is_refused(compiled_folder, folder, suffix):
     copied(compiled_folder, folder)
-    next(folder.rglob(f"kernel_*.{suffix}")).chmod(0o666)
+    next(folder.glob(f"kernel_*.{suffix}")).chmod(0o666)
     assert not warned("can be written by others; run: chmod go-w").from_cache
 
 
-@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs POSIX permissions")
-def test_a_folder_that_others_can_replace_is_refused(tmp_path, monkeypatch):
-    (tmp_path / "open").mkdir()
-    (tmp_path / "open").chmod(0o777)
-    monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path / "open" / "kernels"))
-    warned("which everybody can write")
+@posix
+@pytest.mark.parametrize("mode", [0o777, 0o775])
+def test_a_folder_that_others_can_replace_is_refused(mode, tmp_path, monkeypatch):
+    (tmp_path / "open" / "inner").mkdir(parents=True)
+    (tmp_path / "open").chmod(mode)
+    monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path / "open" / "inner" / "kernels"))
+    warned("which others can write; run: chmod go-w")
     (tmp_path / "open").chmod(0o1777)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert works(fresh())
+
+
+@posix
+@pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="only root gives folders away")
+def test_a_folder_in_the_folder_of_another_user_is_refused(tmp_path, monkeypatch):
+    """The owner of a folder can put another one in the place of any that lies in it."""
+    (tmp_path / "theirs" / "inner").mkdir(parents=True)
+    os.chown(tmp_path / "theirs", 4711, 4711)
+    (tmp_path / "link").symlink_to(tmp_path / "theirs" / "inner")
+    for way in ("theirs/inner", "link"):
+        monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path / way / "kernels"))
+        warned(f"lies in {tmp_path / 'theirs'}, which belongs to another user; set SYNCHAIN_CACHE")
+
+
+@posix
+def test_another_folder_in_the_place_of_an_open_one_is_not_read(tmp_path):
+    """A swap between the check of a folder and the reading of its files changes nothing."""
+    with cache.open_folder(tmp_path / "kernels") as opened:
+        opened.keep("kernel_a", b"mine")
+        (tmp_path / "kernels").rename(tmp_path / "aside")
+        with cache.open_folder(tmp_path / "kernels") as evil:
+            evil.keep("kernel_a", b"theirs")
+        assert opened.machine_code("kernel_a") == b"mine"
+        opened.write("kernel_b.py", b"b")
+    assert (tmp_path / "aside" / "kernel_b.py").exists()
+
+
+@posix
+def test_missing_parents_are_made_for_the_user_alone(tmp_path, monkeypatch):
+    before = os.umask(0o002)
+    try:
+        with cache.open_folder(tmp_path / "a" / "b" / "kernels"):
+            assert stat.S_IMODE((tmp_path / "a").stat().st_mode) == 0o700
+    finally:
+        os.umask(before)
+
+
+@posix
+@pytest.mark.parametrize("suffix", ["code", "py"])
+def test_a_pipe_in_the_place_of_a_file_does_not_keep_anybody_waiting(compiled_folder, folder, suffix):
+    copied(compiled_folder, folder)
+    path = next(folder.glob(f"kernel_*.{suffix}"))
+    path.unlink()
+    os.mkfifo(path, 0o600)
+    assert not warned("is a pipe or device; expected a file").from_cache
 
 
 def test_a_read_only_folder_is_no_problem(folder, monkeypatch):

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import logging
-import os
 from argparse import ArgumentTypeError
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from samples import harmonic_chain
+from test_load import SOURCE
 
 from synchain.codegen import load as loading
-from synchain.codegen.emit import emit
 from synchain.models import Scene, chain
 from synchain.models.typeset import Latex
 from synchain.runtime import cli, propagate, run, sweep, work
@@ -29,23 +27,18 @@ LARGE = {"sigma": np.linspace(0, 1, 1000), "x_1": np.linspace(0, 1, 1000), "x_2"
 
 
 def test_compiling_is_told_and_loading_is_not(tmp_path, monkeypatch, caplog):
-    monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path))
-    monkeypatch.setattr(loading, "open_folder", lambda folder: folder)
-    monkeypatch.setattr(loading, "_kept", lambda *given: given)
-    source = emit(harmonic_chain(2), "dop853", width=1)
+    monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path / "kernels"))
+    said = "compiling a kernel for 1 oscillator (cash_karp), "
     with caplog.at_level(logging.INFO, "synchain"):
-        loading._load.__wrapped__(source)
-        assert [record.getMessage() for record in caplog.records] == [
-            "compiling a kernel for 2 oscillators (dop853), kept for later runs"
-        ]
-        monkeypatch.setattr(loading, "has_code", lambda *given: True)
-        loading._load.__wrapped__(source)
-        assert len(caplog.records) == 1
-        monkeypatch.setattr(loading, "_compile", lambda *given: given)
-        monkeypatch.setattr(loading, "open_folder", lambda folder: os.listdir(tmp_path / "no such folder"))
+        for _ in range(2):
+            loading._load.cache_clear()
+            loading.load(SOURCE)
+        assert [record.getMessage() for record in caplog.records] == [said + "kept for later runs"]
+        monkeypatch.setenv("SYNCHAIN_CACHE", __file__)
+        loading._load.cache_clear()
         with pytest.warns(RuntimeWarning, match="not kept on disk"):
-            loading._load.__wrapped__(source)
-    assert caplog.records[-1].getMessage() == "compiling a kernel for 2 oscillators (dop853), for this process alone"
+            loading.load(SOURCE)
+    assert caplog.records[-1].getMessage() == said + "for this process alone"
 
 
 def test_the_command_line_prints_what_is_told_and_leaves_no_trace(capsys):

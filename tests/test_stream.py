@@ -26,7 +26,7 @@ from synchain.runtime.figures.result_plot import draw_result
 from synchain.runtime.netcdf import Sheet
 from synchain.runtime.result import Buffers
 from synchain.runtime.skip import decide
-from synchain.runtime.store import Store
+from synchain.runtime.store import HEAD, Store
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of Unix")
 
@@ -173,15 +173,79 @@ def test_a_damaged_block_is_none(store):
     assert Store.open(store).done.tolist() == [True, True, True, False]
 
 
+def test_each_copy_of_the_first_line_stands_in_for_the_other(store):
+    whole = store.read_bytes()
+    for place in (0, 4096):
+        for damage in (lambda old: b"\0" * len(old), lambda old: bytes([old[0] ^ 1]) + old[1:]):
+            for begin in (place, place + 17, place + 40):
+                store.write_bytes(whole[:begin] + damage(whole[begin : begin + 20]) + whole[begin + 20 :])
+                assert open_result_or_refusal(store) != "no store"
+                assert Store.open(store).done.tolist() == [True, True, True, False]
+                assert Store.describe(store) == ABOUT
+
+
+def open_result_or_refusal(path: Path) -> str:
+    """What `open_result` says of a store that no scene belongs to."""
+    try:
+        open_result(path)
+    except OSError:
+        return "no store"
+    except ValueError as refusal:
+        return str(refusal)
+    return ""
+
+
 def test_a_damaged_first_line_is_an_error_that_says_so(store):
     whole = bytearray(store.read_bytes())
-    whole[40] ^= 1
-    store.write_bytes(whole)
-    with pytest.raises(ValueError, match="first line is damaged"):
-        Store.open(store)
-    store.write_bytes(b"something else")
-    with pytest.raises(ValueError, match="no unfinished run"):
-        Store.open(store)
+    for place in (40, 4096 + 40):
+        whole[place] ^= 1
+    for content, words in (
+        (bytes(whole), "both copies of its first line are damaged"),
+        (b"something else", "no unfinished run"),
+        (b"", "is empty"),
+        (b"synchain blocks 1\n" + bytes(200), "another version"),
+    ):
+        store.write_bytes(content)
+        with pytest.raises(ValueError, match=words) as caught:
+            Store.open(store)
+        assert "(--overwrite)" in str(caught.value)
+
+
+def test_a_bit_in_the_head_of_a_record_costs_that_record_alone(store):
+    whole = store.read_bytes()
+    first = whole.index(b"blk\0")
+    for bit in range(8 * HEAD.size):
+        damaged = bytearray(whole)
+        damaged[first + bit // 8] ^= 1 << bit % 8
+        store.write_bytes(damaged)
+        found = Store.open(store, writing=True)
+        assert found.done.tolist() == [False, True, True, False], bit
+        found.close()
+        assert store.read_bytes() == damaged
+
+
+def test_a_page_of_zeros_costs_the_records_that_lie_on_it(tmp_path):
+    path = tmp_path / "x.partial"
+    Store.create(path, {**ABOUT, "blocks": 60})
+    made = Store.open(path, writing=True)
+    for number in range(60):
+        made.append(number, block(5, number + 0.5))
+    places = made.places.copy()
+    made.close()
+    whole = path.read_bytes()
+    ends = np.append(places[1:], len(whole))
+    for page in range(0, len(whole), 4096):
+        path.write_bytes(whole[:page] + bytes(len(whole[page : page + 4096])) + whole[page + 4096 :])
+        found = Store.open(path, writing=True)
+        np.testing.assert_array_equal(found.done, (ends <= page) | (places >= page + 4096))
+        for lost in np.flatnonzero(~found.done):
+            found.append(int(lost), block(5, lost + 0.5))
+        found.close()
+        again = Store.open(path)
+        assert again.done.all()
+        assert again.counts[1] == 300
+        for number in range(60):
+            np.testing.assert_array_equal(again.read(number).end, block(5, number + 0.5).end)
 
 
 def test_two_processes_do_not_write_to_one_store(store):
@@ -249,7 +313,7 @@ def test_a_disk_that_is_full_when_the_result_is_written(files, tmp_path, monkeyp
 
     with monkeypatch.context() as patch:
         patch.setattr(Sheet, "put", full)
-        with pytest.raises(SweepFailed, match="No space left on device; 400 of 400 cells"):
+        with pytest.raises(SweepFailed, match=r"cannot write .*a\.nc: No space left on device; 400 of 400 cells"):
             stream(MAP, path, show_progress=False)
     assert [p.name for p in tmp_path.iterdir()] == ["a.partial"]
     stream(MAP, path, resume=True, show_progress=False)
@@ -465,6 +529,152 @@ def test_a_file_that_is_edited_during_a_run_leaves_the_run_as_it_is(own, tmp_pat
 
     stream(scene, tmp_path / "b.nc", show_progress=False, progress=edit)
     assert Path(tmp_path, "b.nc").read_bytes() == Path(tmp_path, "a.nc").read_bytes()
+
+
+def test_another_kind_of_processor_does_not_go_on_with_a_run(tmp_path, interruptible):
+    path = tmp_path / "a.nc"
+    with pytest.raises(SweepInterrupted):
+        stream(MAP, path, show_progress=False, progress=interrupt_at(1))
+    told = Store.describe(partial(path))
+    name, _, features = told["attributes"]["processor"].partition(": ")
+    assert features
+    kinds = {
+        f"abacus: {features}": "processor abacus; found ",
+        f"{name}: {features} beads": f"{name} with beads; found ",
+    }
+    for forged, words in kinds.items():
+        told["attributes"]["processor"] = forged
+        Store.create(partial(path), told)
+        with pytest.raises(ValueError, match=words) as caught:
+            stream(MAP, path, resume=True, show_progress=False)
+        assert "go on there, or replace it with overwrite (--overwrite)" in str(caught.value)
+
+
+# -- files that were damaged or forged -----------------------------------------------------------------------
+
+
+def test_every_flipped_byte_of_a_result_is_noticed(tmp_path):
+    small, path = PAIR.replace(axes={"sigma": [0.05, 0.1]}), tmp_path / "a.nc"
+    stream(small, path, width=8, show_progress=False)
+    assert open_result(path).success
+    whole = path.read_bytes()
+    for place in [*range(0, 400), *range(400, len(whole), 37)]:
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << place % 8
+        path.write_bytes(damaged)
+        noticed = 0
+        for look in (lambda: open_result(path), lambda: stream(small, path, width=8, show_progress=False)):
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                try:
+                    look()
+                except FileExistsError:
+                    pass
+                except (OSError, ValueError, RuntimeWarning):
+                    noticed += 1
+        assert noticed == 2, place
+        assert path.read_bytes() == damaged
+
+
+def test_a_result_without_a_digest_is_read_with_a_warning(tmp_path):
+    result = run(PAIR, show_progress=False)
+    result.data.to_netcdf(tmp_path / "old.nc", engine="scipy", format="NETCDF3_64BIT")
+    with pytest.warns(RuntimeWarning, match="has no digest, so damage of its numbers cannot be seen"):
+        again = open_result(tmp_path / "old.nc")
+    assert again.data.identical(result.data)
+    again.save(tmp_path / "new.nc")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert open_result(tmp_path / "new.nc").data.identical(result.data)
+
+
+FORGERIES = [
+    {"scene": "[" * 100_000}, {"scene": "3"}, {"scene": '{"topology": 3}'}, {"scene": '{"axes": null}'},
+    {"scene": 3}, {"title": 3}, {"equations": None}, {"versions": None}, {"scene": '{"oscillator": [1]}'},
+    {"scene": '{"sweep": {"sigma": {"from": 0, "to": 1, "count": 900000000}}, "topology": {"name": "chain", "n": 2}}'},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("forged", FORGERIES, ids=lambda forged: str(forged)[:60])
+def test_a_forged_scene_is_one_sentence(forged, tmp_path, interruptible):
+    result = run(PAIR, show_progress=False)
+    result.data.attrs = {k: v for k, v in {**result.data.attrs, **forged}.items() if v is not None}
+    result.save(tmp_path / "a.nc")
+    path = tmp_path / "b.nc"
+    with pytest.raises(SweepInterrupted):
+        stream(MAP, path, show_progress=False, progress=interrupt_at(1))
+    told = Store.describe(partial(path))
+    told["attributes"] = {k: v for k, v in {**told["attributes"], **forged}.items() if v is not None}
+    Store.create(partial(path), told)
+    looks = (
+        lambda: open_result(tmp_path / "a.nc"),
+        lambda: stream(PAIR, tmp_path / "a.nc", show_progress=False),
+        lambda: open_result(partial(path)),
+        lambda: stream(MAP, path, resume=True, show_progress=False),
+    )
+    for look in looks:
+        with pytest.raises((OSError, ValueError)) as caught:
+            look()
+        assert not isinstance(caught.value, FileExistsError)
+        assert str(tmp_path) in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "forged",
+    [{"blocks": 10**12}, {"blocks": 10**8}, {"blocks": "x"}, {"blocks": -1}, {"size": 0}, {"size": None}, {"samples": 10**9},
+     {"dimension": 1}, {"dimension": 10**9}, {"merged": [[0], [10**9]]}, {"merged": 3}, {"certificate": [1, 2]},
+     {"attributes": []}, {"attributes": {}}, {"attributes": None}],
+    ids=str,
+)  # fmt: skip
+def test_a_forged_store_is_one_sentence(forged, tmp_path, interruptible):
+    path = tmp_path / "b.nc"
+    with pytest.raises(SweepInterrupted):
+        stream(MAP, path, show_progress=False, progress=interrupt_at(20))
+    records = partial(path).read_bytes()[Store.open(partial(path)).places.max() :]
+    Store.create(partial(path), {**Store.describe(partial(path)), **forged})
+    with open(partial(path), "ab") as file:
+        file.write(records)
+    with pytest.raises((OSError, ValueError)) as caught:
+        open_result(partial(path))
+    assert str(partial(path)) in str(caught.value)
+
+
+def test_a_file_with_a_scene_alone_is_no_result(tmp_path):
+    path = tmp_path / "a.nc"
+    run(PAIR, show_progress=False).data[[]].to_netcdf(path, engine="scipy", format="NETCDF3_64BIT")
+    with pytest.warns(RuntimeWarning, match="no digest"), pytest.raises(ValueError, match="variables are not those"):
+        open_result(path)
+
+
+# -- names and places that cannot be used --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["x.partial", "x.PARTIAL"])
+def test_the_name_of_an_unfinished_run_is_no_name_of_a_result(name, tmp_path):
+    with pytest.raises(ValueError, match=r"the name of an unfinished run; expected that of a result; end it in \.nc"):
+        stream(PAIR, tmp_path / name, show_progress=False)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["a.nc", "a.partial"])
+def test_pipes_and_devices_are_refused_at_once(name, tmp_path):
+    os.mkfifo(tmp_path / name)
+    looks = [lambda: open_result(tmp_path / name), lambda: open_result("/dev/zero")]
+    looks += [
+        lambda options=options: stream(PAIR, tmp_path / "a.nc", show_progress=False, **options)
+        for options in ({}, {"resume": True}, {"overwrite": True})
+    ]
+    for look in looks:
+        with pytest.raises(OSError, match=r"is a pipe or device; expected a file"):
+            look()
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+def test_a_result_is_not_saved_over_a_device(tmp_path):
+    os.mkfifo(tmp_path / "a.nc")
+    with pytest.raises(OSError, match="is a pipe or device"):
+        run(PAIR, show_progress=False).save(tmp_path / "a.nc")
 
 
 def test_the_command_says_that_there_is_nothing_to_do(tmp_path, capsys):

@@ -1,0 +1,35 @@
+"""Which kind of processor machine code is made for; another kind may round the last digit of a result otherwise."""
+
+from __future__ import annotations
+
+import llvmlite.binding as llvm
+import numba
+
+__all__ = ["processor", "told_apart"]
+
+
+def processor() -> str:
+    """Return name and features of the processor, as LLVM calls them, e.g. "znver3: aes avx avx2".
+
+    NUMBA_CPU_NAME, NUMBA_CPU_FEATURES and NUMBA_ENABLE_AVX choose another kind, for which Numba then compiles.
+    """
+    name = numba.config.CPU_NAME or llvm.get_host_cpu_name()
+    if numba.config.CPU_FEATURES is not None:
+        features = [word[1:] for word in numba.config.CPU_FEATURES.split(",") if word.startswith("+")]
+    else:
+        found = llvm.get_host_cpu_features().items()
+        features = [word for word, there in found if there and (numba.config.ENABLE_AVX or not word.startswith("avx"))]
+    return f"{name}: {' '.join(sorted(features))}"
+
+
+def told_apart(one: str, other: str) -> tuple[str, str]:
+    """Return two kinds of processor in few words: the names, and of equal ones the features that the other has not."""
+    (name, _, features), (other_name, _, other_features) = one.partition(": "), other.partition(": ")
+    if name != other_name:
+        return name, other_name
+    return _more(name, features, other_features), _more(name, other_features, features)
+
+
+def _more(name: str, features: str, fewer: str) -> str:
+    more = sorted(set(features.split()) - set(fewer.split()))
+    return f"{name} with {' '.join(more) or 'nothing more'}"

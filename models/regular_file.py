@@ -1,0 +1,40 @@
+"""Opens files that may be anything: a pipe or a device is refused before it can keep the program waiting."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from io import FileIO
+from pathlib import Path
+
+__all__ = ["open_regular"]
+
+
+def open_regular(
+    path: str | os.PathLike[str], *, writing: bool = False, flags: int = 0, folder: int | None = None
+) -> FileIO:
+    """Open a regular file to read it, with `writing` also to change it; a relative path counts from the open `folder`.
+
+    The kind of file is asked of what was opened, so that nothing put in its place meanwhile is read.
+
+    Raises
+    ------
+    OSError
+        If there is none, if it cannot be opened, or if it is a folder, a pipe or a device.
+    """
+    flags |= os.O_RDWR if writing else os.O_RDONLY
+    flags |= getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+    place = Path(path)
+    if folder is None and place.is_dir():  # Windows cannot open one
+        raise IsADirectoryError(f"{place} is a folder; expected a file: name the file in it")
+    try:
+        descriptor = os.open(path, flags, dir_fd=folder)
+    except OSError as problem:
+        if problem.errno == errno.ENXIO:  # a socket
+            raise OSError(f"{place} is a pipe or device; expected a file; choose another path") from None
+        raise
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise OSError(f"{place} is a pipe or device; expected a file; choose another path")
+    return FileIO(descriptor, "r+b" if writing else "rb")
