@@ -80,6 +80,13 @@ Quantities = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
+class Counts:
+    """Whole numbers that rounding can change, such as counts of steps: compared on the same machine alone."""
+
+    values: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
 class Picture:
     """A scene of the catalogue: its name, what is seen of it, and whether that takes minutes."""
 
@@ -124,13 +131,15 @@ def take(name: str, whole: bool = False) -> dict[str, Any]:
 
 
 def _encoded(value: Any, whole: bool) -> Any:
-    """A text, numbers as a shape with hexadecimal floats, or the SHA-256 of a long text or of bytes."""
+    """A text, counts, numbers as a shape with hexadecimal floats, or the SHA-256 of a long text or of bytes."""
     if isinstance(value, str):
         if whole or len(value) <= LONGEST:
             return value
         return {"sha256": hashlib.sha256(value.encode()).hexdigest(), "lines": value.count("\n") + 1}
     if isinstance(value, bytes):
         return {"bits": hashlib.sha256(value).hexdigest()}
+    if isinstance(value, Counts):
+        return {"counts": " ".join(str(int(x)) for x in value.values.reshape(-1))}
     numbers = np.asarray(value)
     if np.iscomplexobj(numbers):
         numbers = np.stack([numbers.real, numbers.imag], axis=-1)
@@ -145,8 +154,8 @@ def _encoded(value: Any, whole: bool) -> Any:
 def compare(old: Mapping[str, Any], new: Mapping[str, Any], same_camera: bool) -> list[str]:
     """Say in one line each which quantities of a scene differ.
 
-    With `same_camera` numbers have to agree to the last bit.  Else they may differ by ELSEWHERE, and bytes, which come of
-    numbers, are not compared; texts have to agree in any case.
+    With `same_camera` numbers have to agree to the last bit.  Else they may differ by ELSEWHERE, and counts and bytes, which
+    come of numbers, are not compared; texts have to agree in any case.
     """
     found = []
     for quantity in sorted({*old, *new}):
@@ -164,7 +173,7 @@ def _difference(old: Any, new: Any, same_camera: bool) -> str | None:
     if isinstance(old, dict) and isinstance(new, dict) and old.keys() == new.keys():
         if "numbers" in old and old["shape"] == new["shape"]:
             return _apart(old, new, same_camera)
-        if "bits" in old and not same_camera:
+        if ("bits" in old or "counts" in old) and not same_camera:
             return None
     return f"was {_words(old)}; is {_words(new)}"
 
@@ -203,7 +212,7 @@ def simulated(given: Scene, **options: Any) -> Quantities:
     seen: Quantities = {"message": found.message, "left out": found.data.attrs["skipped"], "parts": _parts(found.scene)}
     counts = ("steps", "rejected", "periods_skipped")
     for name, values in found.data.data_vars.items():
-        seen[str(name)] = np.ascontiguousarray(values.values).tobytes() if name in counts else values.values
+        seen[str(name)] = Counts(values.values) if name in counts else values.values
     return seen | written(found.scene, options.get("skip", True))
 
 
@@ -309,7 +318,7 @@ def _() -> Quantities:
     return simulated(pair(transient=20.0), sigma=[0.02, 0.3], certified=True)
 
 
-@scene("friction, ring of six that moves as two")
+@scene("friction, ring of six that moves as two", long=True)
 def _() -> Quantities:
     start = {"x": [0.3, 0.1] * 3, "v": 0.0}
     return simulated(Scene(topology=ring(6), initial=start, record=("sync_error",), **SHORT), sigma=[0.1, 0.3])
@@ -321,12 +330,12 @@ def _() -> Quantities:
     return simulated(Scene(topology=complete(4), initial=start, record=("sync_error",), **SHORT), sigma=[0.1, 0.3])
 
 
-@scene("friction, looped chain of twelve")
+@scene("friction, looped chain of twelve", long=True)
 def _() -> Quantities:
     return simulated(Scene(topology=chain(12), record=("sync_error",), **SHORT), sigma=[0.1, 0.4])
 
 
-@scene("Stribeck chain of three")
+@scene("Stribeck chain of three", long=True)
 def _() -> Quantities:
     numbers = {"c": 0.05, "epsilon": [1.9, 2.0, 2.1]}
     return simulated(Scene(friction="stribeck", topology=chain(3), parameters=numbers, **SHORT), sigma=[0.1, 0.3])
@@ -350,28 +359,28 @@ def _() -> Quantities:
     return simulated(Scene(friction="coulomb_static", contact="set-valued", **given), omega=[1.15, 1.4])
 
 
-@scene("set-valued ring of three, per-node friction, dop853")
+@scene("set-valued ring of three, per-node friction, dop853", long=True)
 def _() -> Quantities:
     own = {"mu_k": [0.14, 0.15, 0.16]}
     given = SHORT | {"integrator": "dop853"}
     return simulated(Scene(contact="set-valued", topology=ring(3), parameters=own, **given), sigma=[0.1, 0.3])
 
 
-@scene("Froude pendulums, torsion, rodas6p")
+@scene("Froude pendulums, torsion, rodas6p", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "rodas6p"}
     network = {"oscillator": "froude", "friction": "viscous", "coupling": "torsion", "topology": complete(3)}
     return simulated(Scene(**network, **given), sigma=[0.1, 0.3])
 
 
-@scene("Burridge-Knopoff chain, ros34pw2")
+@scene("Burridge-Knopoff chain, ros34pw2", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "ros34pw2"}
     network = {"oscillator": "spring_block", "friction": "hyperbolic", "topology": chain(3)}
     return simulated(Scene(**network, **given), sigma=[1.0, 4.0])
 
 
-@scene("Duffing grid, own frequencies, dop853")
+@scene("Duffing grid, own frequencies, dop853", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "dop853", "time_unit": "time"}
     own = {"delta": [0.1, 0.2, 0.3, 0.4], "omega": [1, 1.5, 2, 2.5]}
@@ -385,7 +394,7 @@ def _() -> Quantities:
     return simulated(Scene(oscillator="duffing", coupling="inerter", topology=graph, **given), sigma=[0.1, 0.5])
 
 
-@scene("Duffing with inerters, looped chain of nine")
+@scene("Duffing with inerters, looped chain of nine", long=True)
 def _() -> Quantities:
     return simulated(Scene(oscillator="duffing", coupling="inerter", topology=chain(9), **SHORT), sigma=[0.1, 0.5])
 
@@ -404,28 +413,28 @@ def _() -> Quantities:
     return simulated(Scene(**network, **given), sigma=[0.1, 0.5])
 
 
-@scene("Duffing and van der Pol, looped ring of ten")
+@scene("Duffing and van der Pol, looped ring of ten", long=True)
 def _() -> Quantities:
     others = [{"oscillator": "van_der_pol", "at": [3, 4, 7, 8]}]
     given = SHORT | {"time_unit": "time"}
     return simulated(Scene(oscillator="duffing", nodes=others, topology=ring(10), **given), sigma=[0.1, 0.5])
 
 
-@scene("van der Pol with dampers, looped small world, dop853")
+@scene("van der Pol with dampers, looped small world, dop853", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "dop853", "time_unit": "time"}
     graph = models.small_world(12)
     return simulated(Scene(oscillator="van_der_pol", coupling="damper", topology=graph, **given), sigma=[0.1, 0.5])
 
 
-@scene("Rössler in a feed-forward chain, switching")
+@scene("Rössler in a feed-forward chain, switching", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "switching", "initial": {"x": [1.0, 1.1, 1.2], "y": 0, "z": 0}}
     network = {"oscillator": "rossler", "coupling": "y->y", "topology": models.feed_forward(3)}
     return simulated(Scene(**network, **given), sigma=[0.1, 0.5])
 
 
-@scene("Lorenz on a bipartite graph, dop853")
+@scene("Lorenz on a bipartite graph, dop853", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "dop853", "transient": 0.2, "window": 1.0}
     graph = models.complete_bipartite(3)
@@ -446,14 +455,14 @@ def _() -> Quantities:
     return simulated(Scene(**network, **given), sigma=[0.1, 0.3])
 
 
-@scene("double pendulums, spring on one angle, rodas6p")
+@scene("double pendulums, spring on one angle, rodas6p", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "rodas6p"}
     network = {"oscillator": "double_pendulum", "coupling": "spring on phi", "topology": chain(2)}
     return simulated(Scene(**network, **given), sigma=[0.1, 0.3])
 
 
-@scene("double pendulum on a belt, dop853")
+@scene("double pendulum on a belt, dop853", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "dop853", "record": ("section",), "parameters": {"kappa": 100.0}}
     return simulated(Scene(oscillator="belt_double_pendulum", friction="coulomb", **given), theta_b=[0.1, 0.2])
@@ -480,7 +489,7 @@ def _() -> Quantities:
     return simulated(network, fput_alpha=[0.25, 0.5]) | balance(network)
 
 
-@scene("harmonic hypercube with cubic springs, switching")
+@scene("harmonic hypercube with cubic springs, switching", long=True)
 def _() -> Quantities:
     given = SHORT | {"integrator": "switching", "record": ("trajectory",), "samples": 5}
     network = Scene(oscillator="harmonic", coupling="cubic_spring", topology=models.hypercube(4), **given)
@@ -636,12 +645,12 @@ def _() -> Quantities:
     return spectrum_of_motion(Scene(oscillator="lorenz"), periods=2, transient=0)
 
 
-@scene("Lyapunov spectrum of set-valued friction")
+@scene("Lyapunov spectrum of set-valued friction", long=True)
 def _() -> Quantities:
     return spectrum_of_motion(Scene(contact="set-valued"), omega=1.4)
 
 
-@scene("cluster exponents of van der Pol on a star")
+@scene("cluster exponents of van der Pol on a star", long=True)
 def _() -> Quantities:
     network = Scene(oscillator="van_der_pol", topology=star(5), parameters={"u": 0.4, "omega": 1.3, "sigma": 0.1})
     found = cluster_exponents(network, [0, 1, 1, 2, 2], periods=8, transient=2)
@@ -653,7 +662,7 @@ def _() -> Quantities:
 TINY = Criterion(transient=20, window=5, starts=2, tolerance=1e-2)
 
 
-@scene("thresholds of a friction pair")
+@scene("thresholds of a friction pair", long=True)
 def _() -> Quantities:
     grid = np.linspace(0, 0.6, 7)
     given = Scene(topology=chain(2), integrator="rodas5p")
@@ -666,14 +675,14 @@ def _() -> Quantities:
     return seen
 
 
-@scene("basin of a friction pair")
+@scene("basin of a friction pair", long=True)
 def _() -> Quantities:
     given = Scene(topology=chain(2), integrator="rodas5p")
     found = basin(given, sigma=0.1, samples=12, transient=5, window=2, workers=1, show_progress=False)
     return _seen(found, "start", "error", "share", "interval", "message")
 
 
-@scene("three-oscillator probe of friction")
+@scene("three-oscillator probe of friction", long=True)
 def _() -> Quantities:
     given = Scene(topology=chain(2), integrator="rodas5p")
     found = universal_probe(given, [0.1, 0.6], [0.0, 0.1], criterion=TINY, workers=1, show_progress=False)
