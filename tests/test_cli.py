@@ -377,7 +377,7 @@ def test_thresholds_of_a_scene_of_a_matrix_and_of_other_graphs(
         "--scene figure_6 --topology ring",
     ):
         assert main(["thresholds", *words.split(), "--json"]) == 0
-    graphs = [(a["scene"].topology.name, a["scene"].n, a["scene"].parameters["omega"]) for a in asked]
+    graphs = [(a["scene"].topology.name, a["scene"].n, a["scene"].angular_frequency) for a in asked]
     assert graphs == [
         ("chain", 3, 1.55),
         ("ring", 4, 1.2),

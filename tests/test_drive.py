@@ -197,17 +197,18 @@ def _meets(one: object, other: object) -> bool:
 
 @pytest.mark.parametrize("name", ["own", "half"])
 def test_exponents_count_the_periods_of_the_drive(files: Path, name: str) -> None:
-    """0.158, 0.118, 0.009 by an integration with SciPy; a wrong period gives 0.147, 0.110, 0.023 in the mean."""
+    """Means of 300 motions over 450 periods by the classical Runge-Kutta method, their errors below 0.0007; with the
+    period of the natural frequency they are 0.145, 0.109 and 0.021."""
     found = exponents(scene(files, name), [0.0, 0.2, 0.5], precision=1e-3, periods=20000, starts=8)
-    np.testing.assert_allclose(found.exponent, [0.158, 0.118, 0.009], atol=0.005)
+    np.testing.assert_allclose(found.exponent, [0.1567, 0.1169, 0.0117], atol=0.005)
     line = msf(scene(files, name), [0.0, 0.2, 0.5], precision=2e-3, periods=20000)
     np.testing.assert_allclose(line.exponent, found.exponent, atol=0.008)
 
 
 def test_lyapunov_exponents_count_the_periods_of_the_drive(files: Path) -> None:
-    """0.16 and -0.31 by an integration with SciPy; a wrong period gives twice -0.075."""
+    """The sum of both is -d; with the period of the natural frequency both are -0.075."""
     found = lyapunov_spectrum(scene(files, topology=ALONE), periods=2000)
-    np.testing.assert_allclose(found.exponent, [0.158, -0.308], atol=0.02)
+    np.testing.assert_allclose(found.exponent, [0.157, -0.307], atol=0.02)
     assert found.time == pytest.approx(2000 * PERIOD)
 
 
