@@ -175,7 +175,8 @@ def describe(
     more: str = "",
 ) -> str:
     """The docstring at the head of a kernel module."""
-    swapped = [f"{a} as {b}" for a, b in zip(equations.parameters, plain.parameters, strict=True) if a != b]
+    named, written = ((*eq.state, *eq.parameters) for eq in (equations, plain))
+    swapped = tuple(f"{a} as {b}" for a, b in zip(named, written, strict=True) if a != b)
     rows = [
         f"Generated kernel: {equations.n} oscillator{'s' * (equations.n > 1)}, {len(equations.links)} links, {method.name}.",
         "",
@@ -188,7 +189,7 @@ def describe(
         f"Step        {_operations(lines)} operations outside the node functions",
     ]
     if swapped:
-        rows.append(f"Renamed     {', '.join(swapped)}")
+        rows.append(f"Renamed     {_listed(swapped)}")
     return '"""' + "\n".join(rows) + '\n"""'
 
 

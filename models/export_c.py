@@ -144,9 +144,9 @@ def _solved(model: Equations, name: str, columns: int) -> list[str]:
     """Statements that multiply by the inverse of the mass matrix where it is not the identity."""
     if not model.inertial:
         return []
-    lines = ["double mass[DIMENSION*DIMENSION] = {0.0};"]
-    lines += ["for (int k = 0; k < DIMENSION; k++) mass[k*DIMENSION + k] = 1.0;", *mass_lines(model, SYNTAX)]
-    return [*lines, f"solve(mass, {name}, {columns if columns == 1 else 'DIMENSION'});"]
+    lines = ["double mass_[DIMENSION*DIMENSION] = {0.0};"]
+    lines += ["for (int k_ = 0; k_ < DIMENSION; k_++) mass_[k_*DIMENSION + k_] = 1.0;", *mass_lines(model, SYNTAX)]
+    return [*lines, f"solve(mass_, {name}, {columns if columns == 1 else 'DIMENSION'});"]
 
 
 def _jacobian(model: Equations, small: bool) -> list[str]:

@@ -42,11 +42,11 @@ def rhs_lines(equations: Equations, syntax: Syntax) -> list[str]:
             loads = _pair(equations, at, other, link, syntax.reads)
             lines += _block(syntax, begin, syntax.body(link_body(equations, link), loads, _adding(syntax, at)))
         return lines
-    lines += _loop(syntax, "i", "NODES", _node(equations, syntax, None, _indexed("i")))
+    lines += _loop(syntax, "i_", "NODES", _node(equations, syntax, None, _indexed("i_")))
     if equations.links:
-        loads = _pair(equations, _indexed("i"), _indexed("j"))
-        inner = syntax.body(link_body(equations), loads, _adding(syntax, _indexed("i")))
-        lines += _loop(syntax, "link", "LINKS", [*_ends(syntax, equations, False), *inner])
+        loads = _pair(equations, _indexed("i_"), _indexed("j_"))
+        inner = syntax.body(link_body(equations), loads, _adding(syntax, _indexed("i_")))
+        lines += _loop(syntax, "link_", "LINKS", [*_ends(syntax, equations, False), *inner])
     return lines
 
 
@@ -58,23 +58,23 @@ def jacobian_lines(equations: Equations, syntax: Syntax) -> list[str]:
     own = list(node_places(equations))
 
     def place_own(place: Any, text: str) -> str:
-        return syntax.assign.format(f"values[{_index(own.index(place), 'NODES', 'i')}]", "=", text)
+        return syntax.assign.format(f"values[{_index(own.index(place), 'NODES', 'i_')}]", "=", text)
 
     body = node_body(equations, True)
-    loads = _loads(equations, syntax, None, _indexed("i"))
-    lines += _loop(syntax, "i", "NODES", syntax.body(body, loads, place_own))
+    loads = _loads(equations, syntax, None, _indexed("i_"))
+    lines += _loop(syntax, "i_", "NODES", syntax.body(body, loads, place_own))
     if equations.links:
         here, there = link_places(equations)
         slots = [(False, place) for place in here] + [(True, place) for place in there]
 
         def place_link(place: Any, text: str) -> str:
-            slot = _index(slots.index(place), "LINKS", "link")
+            slot = _index(slots.index(place), "LINKS", "link_")
             first = f"{len(own)}*NODES + " if own else ""
             return syntax.assign.format(f"values[{first}{slot}]", "=", text)
 
-        pair = _pair(equations, _indexed("i"), _indexed("j"))
+        pair = _pair(equations, _indexed("i_"), _indexed("j_"))
         inner = syntax.body(link_body(equations, None, True), pair, place_link)
-        lines += _loop(syntax, "link", "LINKS", [*_ends(syntax, equations, True), *inner])
+        lines += _loop(syntax, "link_", "LINKS", [*_ends(syntax, equations, True), *inner])
     return lines
 
 
@@ -105,7 +105,7 @@ def mass_lines(equations: Equations, syntax: Syntax) -> list[str]:
 
         def store(place: Any, text: str, at: Callable[[int], str] = at, other: Callable[[int], str] = other) -> str:
             there, (r, c) = place
-            name = syntax.entry.format(at(r), (other if there else at)(c)).replace("matrix", "mass", 1)
+            name = syntax.entry.format(at(r), (other if there else at)(c)).replace("matrix", "mass_", 1)
             return syntax.assign.format(name, "+=", text)
 
         if body.results:
@@ -143,7 +143,7 @@ def _loads(equations: Equations, syntax: Syntax, i: int | None, at: Callable[[in
     state = equations.node_at(i or 0).state
     found = dict(zip(state, (f"state[{at(c)}]" for c in range(len(state))), strict=True))
     for s, k in own_parameters(equations, i or 0).items():
-        found[s] = f"numbers[{k}{' + i' if i is None else ''}]" if syntax.reads else equations.parameters[k]
+        found[s] = f"numbers[{k}{' + i_' if i is None else ''}]" if syntax.reads else equations.parameters[k]
     return found
 
 
@@ -204,11 +204,11 @@ def _ends(syntax: Syntax, equations: Equations, jacobian: bool) -> list[str]:
         return []
     lines = []
     if not jacobian or body.uses(edge.here):
-        lines.append(syntax.whole.format("i", "TARGET[link]"))
+        lines.append(syntax.whole.format("i_", "TARGET[link_]"))
     if body.uses(edge.there):
-        lines.append(syntax.whole.format("j", "SOURCE[link]"))
+        lines.append(syntax.whole.format("j_", "SOURCE[link_]"))
     if body.uses([edge.weight]):
-        lines.append(syntax.declare.format(edge.weight.name, "WEIGHT[link]"))
+        lines.append(syntax.declare.format(edge.weight.name, "WEIGHT[link_]"))
     return lines
 
 

@@ -25,13 +25,13 @@ fma fmax fmin fmod frexp gamma hypot ilogb ldexp lgamma llrint llround log log10
 nearbyint nextafter nexttoward pow pow10 remainder remquo rint round scalb scalbln scalbn significand sin sinh sqrt tan tanh
 tgamma trunc drem finite isinf isnan isfinite isnormal signbit fpclassify signgam j0 j1 jn y0 y1 yn float_t double_t"""
 _OWN = """np math types cfunc carray csc_matrix lsoda_sig address rhs jac jacobian jacobian_places sparsity state rates
-numbers matrix mass solve right pivot factor values rows columns entry sign i j k link weight NODES DIMENSION PARAMETERS
-LINKS ENTRIES TARGET SOURCE WEIGHT ROWS COLUMNS STATE NODE defaults memset"""
+numbers matrix mass_ solve right_ values sign i_ j_ k_ link_ weight_ NODES DIMENSION PARAMETERS LINKS ENTRIES TARGET SOURCE
+WEIGHT ROWS COLUMNS STATE NODE HEAVY defaults memset"""
 RESERVED = {*f"{_C} {_MATH} {_OWN}".split(), *keyword.kwlist, *keyword.softkwlist, *dir(builtins)}
 """Words of the languages, of their mathematics and of the exported text; a symbol of that name gets an underscore."""
 
 _MACRO = re.compile(r"(M|FP|MATH)_\w+")
-_LATER = re.compile(r"w[0-9]+|rate_[ij][0-9]+")
+_LATER = re.compile(r"w[0-9]+|rate_[ij][0-9]+|mass_[0-9]+_")
 
 
 def portable(equations: Equations) -> tuple[Equations, dict[str, str]]:
@@ -80,7 +80,7 @@ def _edge(edge: Edge, outer: dict[sp.Symbol, sp.Symbol], taken: set[str]) -> tup
     for s in (*edge.here, *edge.there):
         swap[s] = _renamed(s, taken, s.name in taken)
         taken.add(swap[s].name)
-    swap[edge.weight] = sp.Symbol("weight", real=True)
+    swap[edge.weight] = sp.Symbol("weight_", real=True)
     return Edge(
         _all(edge.here, swap),
         _all(edge.there, swap),

@@ -44,8 +44,12 @@ def to_numba(equations: Equations, values: Mapping[str, float] | None = None) ->
     lines += ["@cfunc(lsoda_sig)", "def rhs(t, state, rates, numbers):"]
     inner = rhs_lines(model, SYNTAX)
     if model.inertial:
-        inner += ["mass = np.eye(DIMENSION)", *mass_lines(model, SYNTAX), "right = np.empty(DIMENSION)"]
-        inner += ["for k in range(DIMENSION):", "    right[k] = rates[k]", "right = np.linalg.solve(mass, right)"]
-        inner += ["for k in range(DIMENSION):", "    rates[k] = right[k]"]
+        inner += ["mass_ = np.eye(DIMENSION)", *mass_lines(model, SYNTAX), "right_ = np.empty(DIMENSION)"]
+        inner += [
+            "for k_ in range(DIMENSION):",
+            "    right_[k_] = rates[k_]",
+            "right_ = np.linalg.solve(mass_, right_)",
+        ]
+        inner += ["for k_ in range(DIMENSION):", "    rates[k_] = right_[k_]"]
     lines += ['    """Write d(state)/dt to `rates`."""', *(f"    {line}" for line in inner)]
     return "\n".join(lines) + "\n"

@@ -78,7 +78,7 @@ def to_python(equations: Equations, values: Mapping[str, float] | None = None) -
     ]
     check_inertia(model, "python")
     rhs = ["rates = np.empty_like(state)", *(rhs_lines(model, SYNTAX) if small else _rhs(model))]
-    rhs += [*_masses(model, small), "return solve(mass, rates)"] if model.inertial else ["return rates"]
+    rhs += [*_masses(model, small), "return solve(mass_, rates)"] if model.inertial else ["return rates"]
     lines += _function("rhs", arguments, "Return d(state)/dt, DIMENSION numbers.", rhs)
     jac = _jac(model, small, given)
     pattern = SPARSITY if small or not model.inertial else COUPLED
@@ -99,9 +99,9 @@ def _jac(model: Equations, small: bool, given: Mapping[str, str]) -> list[str]:
         moving = model.inertial and not constant_mass(model)
         jac = [f"rates = rhs({', '.join(['t', 'state', *given])})"] if moving else []
         jac += ["matrix = np.zeros((DIMENSION, DIMENSION))", *jacobian_lines(model, SYNTAX)]
-        return jac + ([*_masses(model, small), "return solve(mass, matrix)"] if model.inertial else ["return matrix"])
+        return jac + ([*_masses(model, small), "return solve(mass_, matrix)"] if model.inertial else ["return matrix"])
     sparse = "csc_matrix((values, (ROWS, COLUMNS)), shape=(DIMENSION, DIMENSION))"
-    solved = [f"matrix = {sparse}", *_masses(model, small), "return solve(mass, matrix)"]
+    solved = [f"matrix = {sparse}", *_masses(model, small), "return solve(mass_, matrix)"]
     return ["values = np.empty(ROWS.size)", *_jacobian(model), *(solved if model.inertial else [f"return {sparse}"])]
 
 
@@ -124,19 +124,19 @@ def _function(name: str, arguments: str, about: str, lines: list[str]) -> list[s
 def _masses(model: Equations, small: bool) -> list[str]:
     """Statements that build M, by whose inverse the rates are M^-1 times the right-hand side."""
     if small:
-        return ["mass = np.eye(DIMENSION)", *mass_lines(model, SYNTAX)]
+        return ["mass_ = np.eye(DIMENSION)", *mass_lines(model, SYNTAX)]
     rows, columns, values = ["np.arange(DIMENSION)"], ["np.arange(DIMENSION)"], ["np.ones(DIMENSION)"]
 
     def store(place: Any, text: str) -> str:
         there, (r, c) = place
         rows.append(_at(r, "TARGET"))
         columns.append(_at(c, "SOURCE" if there else "TARGET"))
-        values.append(f"mass_{len(values)}")
+        values.append(f"mass_{len(values)}_")
         return f"{values[-1]} = ({text})*np.ones(len(TARGET))"
 
     lines = SYNTAX.body(mass_body(model), _loads(model)[1], store)
     parts = (f"np.concatenate([{', '.join(part)}])" for part in (values, rows, columns))
-    return [*lines, "mass = csc_matrix(({}, ({}, {})), shape=(DIMENSION, DIMENSION))".format(*parts)]
+    return [*lines, "mass_ = csc_matrix(({}, ({}, {})), shape=(DIMENSION, DIMENSION))".format(*parts)]
 
 
 def _state(model: Equations) -> str:

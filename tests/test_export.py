@@ -293,8 +293,8 @@ def test_large_networks_are_loops() -> None:
     for make in (to_python, to_c, to_numba):
         small, large = (make(Scene(topology=chain(n)).equations) for n in (30, 3000))
         assert len(large) - len(small) < 2970 * 2 * 3 * 10
-        assert abs(sum("[link]" in line or "np.exp" in line for line in large.splitlines())
-                   - sum("[link]" in line or "np.exp" in line for line in small.splitlines())) == 0  # fmt: skip
+        assert abs(sum("[link_]" in line or "np.exp" in line for line in large.splitlines())
+                   - sum("[link_]" in line or "np.exp" in line for line in small.splitlines())) == 0  # fmt: skip
         long = [len([row for row in text.splitlines() if not row.startswith("    ") or row[4].isalpha()])
                 for text in (small, large)]  # fmt: skip
         assert long[0] == long[1]
@@ -321,6 +321,54 @@ def test_names_that_are_fine_stay() -> None:
     model, changed = portable(Scene(oscillator="lorenz", topology=chain(2), coupling="x->x").equations)
     assert changed == {}
     assert [s.name for s in model.node.state] == ["x", "y", "z"]
+
+
+USUAL = [
+    "e",
+    "i",
+    "j",
+    "k",
+    "p",
+    "h",
+    "y",
+    "m",
+    "mass",
+    "rate",
+    "error",
+    "step",
+    "link",
+    "weight",
+    "right",
+    "rows",
+    "pivot",
+]
+
+
+def usual(n: int, inertia: bool) -> Equations:
+    """The names that mechanics uses most, which are those of this text's own words."""
+    symbols = real(*USUAL[3:])
+    x, v, x_2, v_2, w = real("i", "j", "i_there", "j_there", "w")
+    pull = sp.Add(*((c + 1) * s for c, s in enumerate(symbols)))
+    node = Node((x, v), (v, -pull * x), tuple(symbols))
+    mass = ((0, 0), (0, w * symbols[5])), ((0, 0), (0, -w * symbols[5]))
+    blocks = tuple(tuple(tuple(map(sp.sympify, row)) for row in block) for block in mass) if inertia else ()
+    edge = Edge((x, v), (x_2, v_2), w, (sp.S.Zero, symbols[0] * w * (x_2 - x)), (symbols[0], symbols[5]), blocks)
+    return Equations(node, edge, n, tuple((i, i + 1, Fraction(1, 3)) for i in range(n - 1)))
+
+
+@pytest.mark.parametrize("language", RUNS)
+@pytest.mark.parametrize(("n", "inertia"), [(2, False), (9, False), (2, True), (9, True)])
+def test_exported_functions_keep_the_names_of_mechanics(n: int, inertia: bool, language: str, tmp_path: Path) -> None:
+    if (inertia and n > 8 and language != "python") or (language == "c" and COMPILER is None):
+        pytest.skip("there is no such text, or no C compiler")
+    equations = usual(n, inertia)
+    assert portable(equations)[1] == {}
+    t, state, numbers = point(equations, 4)
+    rates, matrix = RUNS[language](equations, tmp_path, t, state, numbers)
+    right, slopes = exact(equations, t, state, numbers)
+    np.testing.assert_allclose(rates, right, rtol=1e-12, atol=1e-12 * abs(right).max())
+    if matrix.size:
+        np.testing.assert_allclose(matrix, slopes, rtol=1e-12, atol=1e-12 * abs(slopes).max())
 
 
 def test_a_name_cannot_leave_its_comment() -> None:

@@ -13,6 +13,7 @@ from samples import CASES, TABLE, friction_chain, real
 
 from synchain.codegen import printer
 from synchain.codegen.emit import emit
+from synchain.models import Scene, chain
 from synchain.models.equations import Equations, Node
 
 V_1 = sp.Symbol("v_1", real=True)
@@ -104,3 +105,12 @@ def test_what_cannot_be_printed_is_refused():
     x = real("x")[0]
     with pytest.raises(printer.UnprintableError, match="no printing rule for gamma"):
         emit(Equations(Node((x,), (sp.gamma(x),), ()), None, 1))
+
+
+def test_the_head_of_a_kernel_names_the_states_that_are_called_otherwise():
+    for n in (2, 9):
+        head = emit(Scene(oscillator="lorenz", topology=chain(n), coupling="x->x").equations).text.split("import math")[
+            0
+        ]
+        (line,) = (row for row in head.splitlines() if row.startswith("Renamed"))
+        assert line == "Renamed     " + ", ".join(f"y_{i + 1} as y__{i + 1}" for i in range(n))
