@@ -231,7 +231,11 @@ def _told_apart(group: Sequence[tuple[AngleSum, tuple[int, ...], int]]) -> list[
             different.append((a, key, times))
         else:
             different[place] = (*different[place][:2], different[place][2] + times)
-    ordered = sorted(different, key=cmp_to_key(lambda x, y: (y[0] + -x[0]).sign()))
+
+    def order(x: tuple[AngleSum, tuple[int, ...], int], y: tuple[AngleSum, tuple[int, ...], int]) -> int:
+        return (y[0] + -x[0]).sign()
+
+    ordered = sorted(different, key=cmp_to_key(order))
     return [(key, times) for _, key, times in ordered]
 
 
