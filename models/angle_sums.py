@@ -7,18 +7,20 @@ conjugates of one are had by multiplying all its angles (L. C. Washington, Intro
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
-from itertools import product
-from math import cos, gcd, inf, lcm, pi
+from functools import cmp_to_key, lru_cache
+from itertools import combinations_with_replacement, product
+from math import cos, factorial, fsum, gcd, inf, lcm, pi, prod
 
 import sympy as sp
 from flint import arb, arb_poly, fmpq, fmpq_poly, fmpz_poly
 
 from . import angles
 from .balls import Ball, precision
+from .descending import Descending
 
 __all__ = ["AngleSum", "box", "expression", "folded_sum", "merged", "minimal_polynomial", "read"]
 
@@ -162,16 +164,79 @@ def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]
     return found
 
 
-def box(sizes: Sequence[int], closed: Sequence[bool]) -> list[tuple[sp.Expr, int]]:
-    """The spectrum of the Cartesian product of chains, and of rings where `closed`: sums of -4 sin² of each."""
-    numbers = [(AngleSum.rational(0), 1)]
-    for size, ring in zip(sizes, closed, strict=True):
-        if ring:
-            one = [(AngleSum.cosine(-2, 1, k, size), 1 if k in (0, size - k) else 2) for k in range(size // 2 + 1)]
+def box(sizes: Sequence[int], closed: Sequence[bool]) -> Descending[tuple[sp.Expr, int]]:
+    """The spectrum of the Cartesian product of chains, and of rings where `closed`: sums of -4 sin² of each.
+
+    Directions of one kind and size are taken in one order only.  Only what cosines cannot be told apart by floats is
+    compared exactly; expressions are made as they are asked for.
+    """
+    kinds = Counter(zip(sizes, closed, strict=True))
+    unit = lcm(*(size if ring else 2 * size for size, ring in kinds))
+    waves = [list(combinations_with_replacement(_waves(*kind, unit), times)) for kind, times in kinds.items()]
+    counts: dict[tuple[int, ...], int] = {}
+    for choice in product(*waves):
+        folded, times = list[int](), 1
+        for group in choice:
+            times *= factorial(len(group))
+            for (r, often), same in Counter(group).items():
+                folded += [r] * same
+                times = times * often**same // factorial(same)
+        key = _cancelled(folded, unit)
+        counts[key] = counts.get(key, 0) + times
+    near = [2 * cos(2 * pi * r / unit) for r in range(unit // 2 + 1)]
+    places = sorted(((fsum(near[r] for r in key), key) for key in counts), reverse=True)
+    shift = -2 * len(sizes)
+
+    def number(key: tuple[int, ...]) -> AngleSum:
+        return folded_sum(Fraction(shift), [(r, Fraction(1)) for r in key], unit)
+
+    found: list[tuple[tuple[int, ...], int]] = []
+    start = 0
+    for end in range(1, len(places) + 1):
+        if end == len(places) or places[end - 1][0] - places[end][0] > 1e-12 * len(sizes):  # of cosines: within 2 each
+            found += _told_apart([(number(key), key, counts[key]) for _, key in places[start:end]])
+            start = end
+    return Descending(len(found), prod(sizes), lambda k: (expression(number(found[k][0])), found[k][1]))
+
+
+def _waves(size: int, ring: bool, unit: int) -> list[tuple[int, int]]:
+    """(r, how often) for each 2 cos(2πr/unit) of a chain or ring, 0 <= r <= unit/2."""
+    if ring:
+        return [(k * (unit // size), 1 if k in (0, size - k) else 2) for k in range(size // 2 + 1)]
+    return [(k * (unit // (2 * size)), 1) for k in range(size)]
+
+
+def _cancelled(turns: Sequence[int], unit: int) -> tuple[int, ...]:
+    """The turns, ascending, with pairs r and unit/2 - r, whose cosines add up to 0, all written alike."""
+    left = sorted(turns)
+    found = list[int]()
+    while left:
+        r = left.pop()
+        if 2 * r != unit - 2 * r and unit % 2 == 0 and unit // 2 - r in left:
+            left.remove(unit // 2 - r)
+            found += [0, unit // 2]
         else:
-            one = [(AngleSum.cosine(-2, 1, k, 2 * size), 1) for k in range(size)]
-        numbers = merged([(a + b, m * times) for (a, m), (b, times) in product(numbers, one)])
-    return [(expression(number), times) for number, times in numbers]
+            found.append(r)
+    return tuple(sorted(found))
+
+
+def _told_apart(group: Sequence[tuple[AngleSum, tuple[int, ...], int]]) -> list[tuple[tuple[int, ...], int]]:
+    """Nearly equal numbers, descending, equal ones once with their multiplicities added; all decided exactly."""
+    if len(group) == 1:
+        return [group[0][1:]]
+    different: list[tuple[AngleSum, tuple[int, ...], int]] = []
+    for a, key, times in group:
+        place = next((i for i, (b, _, _) in enumerate(different) if (a + -b).vanishes()), None)
+        if place is None:
+            different.append((a, key, times))
+        else:
+            different[place] = (*different[place][:2], different[place][2] + times)
+
+    def order(x: tuple[AngleSum, tuple[int, ...], int], y: tuple[AngleSum, tuple[int, ...], int]) -> int:
+        return (y[0] + -x[0]).sign()
+
+    ordered = sorted(different, key=cmp_to_key(order))
+    return [(key, times) for _, key, times in ordered]
 
 
 def expression(number: AngleSum) -> sp.Expr:

@@ -337,6 +337,25 @@ def test_lazy_spectra_are_those_that_are_proved() -> None:
         assert tuple(lazy[2:9:3]) == tuple(proved[2:9:3])
 
 
+def test_lists_of_tori_and_grids_make_no_expression_until_asked() -> None:
+    def asked() -> None:
+        for name, distinct in (("torus", 1_301), ("grid", 5_001)):
+            found = topology(name, 10_000, shape=(100, 100)).spectrum
+            assert (found.n, len(found), found[0].number) == (10_000, distinct, 0)
+            assert found[distinct - 1].value == pytest.approx(-8, abs=0.01)
+
+    _, calls = effort(asked)
+    assert calls < 2_000_000
+
+
+@pytest.mark.parametrize(("name", "shape"), [("grid", (12, 12)), ("torus", (12, 12)), ("grid", (6, 6, 3, 2))])
+def test_lazy_sums_of_cosines_are_the_proved_ones(name: str, shape: tuple[int, ...]) -> None:
+    """Among them are equal sums of different cosines, such as 2 cos 20° + 2 cos 100° + 2 cos 140° = 0."""
+    graph = topology(name, int(np.prod(shape)), shape=shape)
+    listed, proved = graph.rule(), spectrum(graph, prove=True)
+    assert [(number, times) for number, times in listed] == [(e.exact, e.multiplicity) for e in proved]
+
+
 def test_a_spectrum_in_closed_form_needs_no_links() -> None:
     graph = topology("complete_bipartite", 10**5)
     assert graph.spectrum.as_dict()["n"] == 10**5

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import isqrt, prod
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +52,7 @@ def count(n: int, *, shape: tuple[int, ...] | None = None) -> int:
     return sum(n // size * (size - 1) for size in shape or sides(n))
 
 
-def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> list[tuple[sp.Expr, int]]:
+def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> Sequence[tuple[sp.Expr, int]]:
     """Sums of -4 sin²(kπ/2m), one for each direction of m nodes, k = 0 … m - 1."""
     from ..angle_sums import box
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def count(n: int) -> int:
     return n // 2 + n - 2
 
 
-def spectrum(n: int) -> list[tuple[sp.Expr, int]] | None:
+def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]] | None:
     """-4 sin²(kπ/n) and that less 2, k = 0 … n/2 - 1; none for odd n."""
     if n % 2:
         return None
