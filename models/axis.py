@@ -62,9 +62,9 @@ class Axis:
 
 
 def known_length(values: object) -> int:
-    """Return how many values the entry of an axis in a table will have; 1 where only building it would tell."""
+    """Return how many values the entry of an axis in a table will have; 1 if only the axis can tell, or refuses it."""
     size = values.get("count") if isinstance(values, Mapping) else len(values) if isinstance(values, Sized) else 1
-    return size if isinstance(size, int) else 1
+    return size if isinstance(size, int) and 0 < size <= LIMIT else 1
 
 
 def _spaced(first: Fraction, last: Fraction, count: int) -> Iterator[float]:
