@@ -11,7 +11,7 @@ import sympy as sp
 from synchain.models.equations import Equations
 from synchain.models.periodicity import angular_frequency
 
-from . import elementary, lanes, skeletons
+from . import lanes, simd, skeletons
 from .blocks import Names, NodeBlocks, analyse
 from .contacts import write_pushes
 from .explicit import write_explicit
@@ -212,18 +212,11 @@ def imports(functions: list[list[str]], lines: list[str], section: sp.Expr | Non
     used = sorted(
         n for n in {*FUNCTIONS.values(), "sqrt", "exp", "log"} if f"{n}(" in text or n in ("sqrt", "exp", "log")
     )
-    smooth = [n for n in used if n in elementary.__all__ and n not in lanes.__all__]
-    primitive = {"absolute", "any_lane", "broadcast", "lane_bits", "load", "maximum", "minimum", "one_lane"}
-    primitive |= {"select", "store", "sqrt", "truncated", *more, *(n for n in used if n in lanes.__all__)}
-    return "\n".join([
-        "import math",
-        "",
-        "import numpy as np",
-        "",
-        f"from synchain.codegen.elementary import {', '.join(smooth)}",
-        "from synchain.codegen.inner import njit",
-        f"from synchain.codegen.lanes import {', '.join(sorted(primitive))}",
-    ])  # fmt: skip
+    needed = {"absolute", "any_lane", "broadcast", "lane_bits", "load", "maximum", "minimum", "njit", "one_lane"}
+    needed |= {"select", "store", "sqrt", "truncated", *more, *(n for n in used if n in simd.__all__)}
+    return "\n".join(
+        ["import math", "", "import numpy as np", "", f"from synchain.codegen.simd import {', '.join(sorted(needed))}"]
+    )
 
 
 def _constants(

@@ -12,7 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .axis import Axis
+    from .family_options import probability, whole, whole_numbers
     from .graph_readers import from_edges, from_graph, from_sparse, read_edges, read_graphml
+    from .parameter import Parameter
+    from .plugins import allow_code
+    from .present import latex, text
     from .products import cartesian, complement, kronecker, union, weighted
     from .scene import Scene
     from .scene_file import load_scene, scene_names
@@ -23,10 +27,12 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Axis": "axis",
+    "Parameter": "parameter",
     "Scene": "scene",
     "Section": "scene_section",
     "Spectrum": "spectrum",
     "Topology": "topology",
+    "allow_code": "plugins",
     "cartesian": "products",
     "complement": "products",
     "from_edges": "graph_readers",
@@ -35,21 +41,28 @@ _HOMES = {
     "from_sparse": "graph_readers",
     "from_symbols": "symbolic_weights",
     "kronecker": "products",
+    "latex": "present",
     "load_scene": "scene_file",
+    "probability": "family_options",
     "read_edges": "graph_readers",
     "read_graphml": "graph_readers",
     "read_matrix": "topology",
     "scene_names": "scene_file",
+    "text": "present",
     "union": "products",
     "weighted": "products",
+    "whole": "family_options",
+    "whole_numbers": "family_options",
 }
 
 __all__ = [
     "Axis",
+    "Parameter",
     "Scene",
     "Section",
     "Spectrum",
     "Topology",
+    "allow_code",
     "cartesian",
     "complement",
     "from_edges",
@@ -58,13 +71,18 @@ __all__ = [
     "from_sparse",
     "from_symbols",
     "kronecker",
+    "latex",
     "load_scene",
+    "probability",
     "read_edges",
     "read_graphml",
     "read_matrix",
     "scene_names",
+    "text",
     "union",
     "weighted",
+    "whole",
+    "whole_numbers",
 ]
 
 

@@ -131,7 +131,7 @@ def test_free_decay(hold: float) -> None:
 BELT_DAMPER = '''
 """Block on a belt with a spring and a viscous damper to the ground, non-dimensional."""
 
-from synchain.models.parameter import Parameter
+from synchain.models import Parameter
 
 SUMMARY = "block on a moving belt with a viscous damper"
 SOURCE = "Stender & Hoffmann, Nonlinear Dynamics 107, 1451 (2022)"

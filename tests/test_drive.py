@@ -31,7 +31,7 @@ PERIOD = 2 * np.pi / 1.2
 OWN = '''
 """Duffing oscillator whose natural frequency is omega."""
 import sympy as sp
-from synchain.models.parameter import Parameter
+from synchain.models import Parameter
 
 SUMMARY = "oscillator with two wells, its natural frequency called omega"
 SOURCE = "Kovacic & Brennan, The Duffing Equation (Wiley, 2011)"

@@ -11,9 +11,9 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from synchain.models import Parameter
 from synchain.models.frictions import CONTACTS, KAPPA, regularise
 from synchain.models.nondimensional import friction_coefficient
-from synchain.models.parameter import Parameter
 from synchain.models.plugins import load, names
 
 LAWS = names("friction")

@@ -30,7 +30,7 @@ SECONDS = float(os.environ.get("SYNCHAIN_FUZZ_SECONDS", "0"))
 
 def law(folder: Path, body: str, name: str = "law.py") -> str:
     """The path of a file of one's own, allowed to run."""
-    head = 'import sympy as sp\nfrom synchain.models.parameter import Parameter\nSUMMARY = "s"\nSOURCE = "s"\n'
+    head = 'import sympy as sp\nfrom synchain.models import Parameter\nSUMMARY = "s"\nSOURCE = "s"\n'
     path = folder / name
     path.write_text(head + textwrap.dedent(body))
     plugins.allow_code(path)

@@ -158,7 +158,7 @@ def own_drive(folder: Path, wave: str) -> Path:
     """A scene file with a driven oscillator of its own, whose parameter omega is no frequency of the drive."""
     code = folder / "own.py"
     code.write_text(
-        "import sympy as sp\nfrom synchain.models.parameter import Parameter\n"
+        "import sympy as sp\nfrom synchain.models import Parameter\n"
         'SUMMARY = SOURCE = "a harmonic oscillator with a drive"\nFRICTION = False\n'
         'PARAMETERS = {name: Parameter(1.0, "1", "a number") for name in ("omega", "Omega")}\n'
         "def kinetic(v): return v**2 / 2\n"

@@ -251,7 +251,7 @@ def test_the_groups_of_entry_points_are_read(monkeypatch: pytest.MonkeyPatch) ->
 
 # -- a file is its text ---------------------------------------------------------------------------------------
 
-HEAD = 'import sympy as sp\nfrom synchain.models.parameter import Parameter\nSUMMARY = "s"\nSOURCE = "s, 2000"\n'
+HEAD = 'import sympy as sp\nfrom synchain.models import Parameter\nSUMMARY = "s"\nSOURCE = "s, 2000"\n'
 WELL = (
     "FRICTION = False\nPARAMETERS = {}\ndef kinetic(v):\n    return v**2 / 2\ndef potential(x):\n    return x**2 / 2\n"
 )

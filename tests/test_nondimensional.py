@@ -14,12 +14,11 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from synchain.models import oscillators
+from synchain.models import Parameter, oscillators
 from synchain.models.calculus import cancelled, operations
 from synchain.models.equations import TIME
 from synchain.models.network import edge, node, parameters
 from synchain.models.nondimensional import FRICTION, nondimensional, physical, scale
-from synchain.models.parameter import Parameter
 from synchain.models.plugins import call, load, names
 from synchain.models.units import dimension
 
@@ -116,7 +115,7 @@ def test_duffing_and_harmonic_are_as_published() -> None:
 
 HEADER = """
 import sympy as sp
-from synchain.models.parameter import Parameter
+from synchain.models import Parameter
 SUMMARY, SOURCE, FRICTION = "a model", "a journal 1, 2 (2003)", False
 """
 VAN_DER_POL = (

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.long
 UEDA = """
 import sympy as sp
 
-from synchain.models.parameter import Parameter
+from synchain.models import Parameter
 
 SUMMARY = "oscillator with a purely cubic spring, linear damping and a harmonic force"
 SOURCE = "Ueda, J. Stat. Phys. 20, 181 (1979)"

@@ -459,7 +459,7 @@ def test_other_versions_do_not_go_on_with_a_run(tmp_path, monkeypatch, interrupt
 
 
 FALLING = """import sympy as sp
-from synchain.models.parameter import Parameter
+from synchain.models import Parameter
 SUMMARY, SOURCE, FRICTION = "decay", "none, 2000", False
 PARAMETERS = {"rate": Parameter(1.0, "1", "rate of decay")}
 STATE = ("x",)
