@@ -32,7 +32,7 @@ KNOWN = {
     "coupling": ("SUMMARY", "SOURCE", "PARAMETERS", "BETWEEN", "kinetic", "potential", "dissipation"),
     "topology": (
         *("SUMMARY", "SOURCE", "MINIMUM", "TOO_SMALL", "DIRECTED", "CONNECTED"),
-        *("edges", "settle", "count", "spectrum", "formula", "sides"),
+        *("edges", "settle", "count", "expected", "spectrum", "formula", "sides"),
     ),
 }
 """The public names that a file of each kind may define; imports and names with an underscore in front are its own."""
@@ -335,7 +335,7 @@ def _topology(file: _File) -> None:
         file.idle(("settle",), "without options, which are keyword-only parameters of edges")
         return
     file.need("settle")
-    for function in known_of(file.module, ("settle", "count", "spectrum")):
+    for function in known_of(file.module, ("settle", "count", "expected", "spectrum")):
         missing = [name for name in options if name not in _asked(file.get(function))]
         if missing:
             raise file.wrong(function, f"{function} lacks the option {missing[0]!r} of edges; expected the same ones")

@@ -157,12 +157,13 @@ def test_oscillator_and_network_are_those_asked_for(
 def own_drive(folder: Path, wave: str) -> Path:
     """A scene file with a driven oscillator of its own, whose parameter omega is no frequency of the drive."""
     code = folder / "own.py"
+    names = ("omega", "Omega") if "Omega" in wave else ("omega",)
     code.write_text(
         "import sympy as sp\nfrom synchain.models import Parameter\n"
         'SUMMARY = SOURCE = "a harmonic oscillator with a drive"\nFRICTION = False\n'
-        'PARAMETERS = {name: Parameter(1.0, "1", "a number") for name in ("omega", "Omega")}\n'
+        f'PARAMETERS = {{name: Parameter(1.0, "1", "a number") for name in {names!r}}}\n'
         "def kinetic(v): return v**2 / 2\n"
-        f"def potential(x, t, omega, Omega): return omega**2 * x**2 / 2 - x * {wave}\n"
+        f"def potential(x, t, {', '.join(names)}): return omega**2 * x**2 / 2 - x * {wave}\n"
         "def force(v): return -v\n"
     )
     allow_code(code)

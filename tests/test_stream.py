@@ -402,8 +402,9 @@ def test_ctrl_c_pressed_again_and_again_ends_the_program_with_its_words(tmp_path
 
 
 def restore_interrupt() -> None:
-    """A shell may have started us with Ctrl-C ignored."""
+    """A shell may have started the tests with Ctrl-C ignored, nohup with SIGHUP ignored."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 @pytest.mark.long

@@ -115,7 +115,7 @@ def test_result_survives_its_file(tmp_path):
     assert again.scene == result.scene
     assert again.data.identical(result.data)
     with xr.open_dataset(path) as data:
-        assert data.attrs["kernel"] == kernel(scene).digest
+        assert data.attrs["kernel"] == kernel(result.scene).digest
         assert json.loads(data.attrs["scene"])["title"] == "Größe σ"
     assert [p.name for p in tmp_path.iterdir()] == ["pair.nc"]
 
