@@ -14,7 +14,7 @@ MINIMUM = 5
 SOURCE = "A. Steger, N. C. Wormald, Comb. Probab. Comput. 8, 377 (1999)"
 
 CONNECTED = False
-ATTEMPTS = 1000
+_ATTEMPTS = 1000
 """Attempts at a pairing; at the highest degree that is drawn, half of the nodes, one in five succeeds."""
 
 _Edges = set[tuple[int, int]]
@@ -48,12 +48,12 @@ def count(n: int, *, degree: int = 4, seed: int = 0) -> int:
 
 def _drawn(n: int, degree: int, stream: random.Random) -> _Edges:
     """The edges of the first attempt that succeeds."""
-    for _ in range(ATTEMPTS):
+    for _ in range(_ATTEMPTS):
         found = _paired(n, degree, stream)
         if found is not None:
             return found
     raise ValueError(
-        f"random_regular: found no graph of {n} nodes of degree {degree} in {ATTEMPTS} attempts; choose another seed"
+        f"random_regular: found no graph of {n} nodes of degree {degree} in {_ATTEMPTS} attempts; choose another seed"
     )
 
 

@@ -14,7 +14,7 @@ MINIMUM = 5
 SOURCE = "D. J. Watts, S. H. Strogatz, Nature 393, 440 (1998)"
 
 CONNECTED = False
-DRAWS = 10**7
+_DRAWS = 10**7
 """Most random numbers that a graph may take: a node that is joined to nearly all others finds a new one late."""
 
 
@@ -25,10 +25,10 @@ def settle(n: int, neighbours: Any, p: Any, seed: Any) -> dict[str, Any]:
         raise ValueError(f"neighbours = {count} with n = {n}; expected an even number below n")
     chance = probability("p", p)
     draws = int(Fraction(chance) * (n * count // 2) * (n - 1) / max(n - 1 - count, 1))
-    if draws > DRAWS:
+    if draws > _DRAWS:
         raise ValueError(
             f"neighbours = {count} with n = {n} and p = {chance} takes about {draws} random numbers; "
-            f"expected at most {DRAWS}: take fewer neighbours"
+            f"expected at most {_DRAWS}: take fewer neighbours"
         )
     return {"neighbours": count, "p": chance, "seed": whole("seed", seed, 0)}
 
