@@ -1,0 +1,1 @@
+"""From equations to machine code: text of one step, whole kernel modules, their compilation, and exports."""

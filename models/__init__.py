@@ -11,48 +11,50 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .axis import Axis
-    from .family_options import probability, whole, whole_numbers
-    from .graph_readers import from_edges, from_graph, from_sparse, read_edges, read_graphml
-    from .parameter import Parameter
-    from .plugins import allow_code
-    from .present import latex, text
-    from .products import cartesian, complement, kronecker, union, weighted
-    from .scene import Scene
-    from .scene_file import load_scene, scene_names
-    from .scene_section import Section
-    from .spectrum import Spectrum
-    from .symbolic_weights import from_symbols
-    from .topology import Topology, from_matrix, read_matrix
+    from .graphs.families import topology
+    from .graphs.products import cartesian, complement, kronecker, union, weighted
+    from .graphs.readers import from_edges, from_graph, from_sparse, read_edges, read_graphml
+    from .graphs.symbolic import from_symbols
+    from .graphs.topology import Topology, from_matrix, read_matrix
+    from .inputs.options import probability, whole, whole_numbers
+    from .inputs.plugins import allow_code
+    from .mechanics.parameter import Parameter
+    from .presentation.equations import latex, text
+    from .scenes.axis import Axis
+    from .scenes.file import load_scene, scene_names
+    from .scenes.scene import Scene
+    from .scenes.section import Section
+    from .spectra.spectrum import Spectrum
 
 _HOMES = {
-    "Axis": "axis",
-    "Parameter": "parameter",
-    "Scene": "scene",
-    "Section": "scene_section",
-    "Spectrum": "spectrum",
-    "Topology": "topology",
-    "allow_code": "plugins",
-    "cartesian": "products",
-    "complement": "products",
-    "from_edges": "graph_readers",
-    "from_graph": "graph_readers",
-    "from_matrix": "topology",
-    "from_sparse": "graph_readers",
-    "from_symbols": "symbolic_weights",
-    "kronecker": "products",
-    "latex": "present",
-    "load_scene": "scene_file",
-    "probability": "family_options",
-    "read_edges": "graph_readers",
-    "read_graphml": "graph_readers",
-    "read_matrix": "topology",
-    "scene_names": "scene_file",
-    "text": "present",
-    "union": "products",
-    "weighted": "products",
-    "whole": "family_options",
-    "whole_numbers": "family_options",
+    "Axis": "scenes.axis",
+    "Parameter": "mechanics.parameter",
+    "Scene": "scenes.scene",
+    "Section": "scenes.section",
+    "Spectrum": "spectra.spectrum",
+    "Topology": "graphs.topology",
+    "allow_code": "inputs.plugins",
+    "cartesian": "graphs.products",
+    "complement": "graphs.products",
+    "from_edges": "graphs.readers",
+    "from_graph": "graphs.readers",
+    "from_matrix": "graphs.topology",
+    "from_sparse": "graphs.readers",
+    "from_symbols": "graphs.symbolic",
+    "kronecker": "graphs.products",
+    "latex": "presentation.equations",
+    "load_scene": "scenes.file",
+    "probability": "inputs.options",
+    "read_edges": "graphs.readers",
+    "read_graphml": "graphs.readers",
+    "read_matrix": "graphs.topology",
+    "scene_names": "scenes.file",
+    "text": "presentation.equations",
+    "topology": "graphs.families",
+    "union": "graphs.products",
+    "weighted": "graphs.products",
+    "whole": "inputs.options",
+    "whole_numbers": "inputs.options",
 }
 
 __all__ = [
@@ -79,6 +81,7 @@ __all__ = [
     "read_matrix",
     "scene_names",
     "text",
+    "topology",
     "union",
     "weighted",
     "whole",
@@ -109,7 +112,7 @@ def _families() -> set[str]:
 
 
 def _family(name: str) -> Any:
-    from .topology import topology
+    from .graphs.families import topology
 
     def family(n: int, **options: Any) -> Topology:
         return topology(name, n, **options)

@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import importlib
-import sys
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .basin import Basin, basin
-    from .branches import Branch, follow
-    from .cluster_states import ClusterExponents, cluster_exponents
-    from .exponent import Exponents, exponents
-    from .lyapunov import Lyapunov, lyapunov_spectrum
-    from .msf import MSF, Plane, msf, plane
-    from .periodic import PeriodicOrbit, periodic_orbit
-    from .probe import Probe, universal_probe
-    from .progress import Progress
-    from .result import Result, open_result
-    from .sitting import SweepFailed, SweepInterrupted
-    from .skeletons import skeleton
-    from .status import Status
-    from .streaming import Streamed, stream
-    from .sweep import kernel, run
-    from .threshold import Thresholds, thresholds
+    from .bifurcation.branches import Branch, follow
+    from .bifurcation.periodic import PeriodicOrbit, periodic_orbit
+    from .bifurcation.skeleton import skeleton
+    from .cells.kernels import kernel
+    from .results.open import open_result
+    from .results.result import Result
+    from .stability.clusters import ClusterExponents, cluster_exponents
+    from .stability.lyapunov import Lyapunov, lyapunov_spectrum
+    from .stability.msf import MSF, Plane, msf, plane
+    from .stability.transversal import Exponents, exponents
+    from .support.status import Status
+    from .sweeps.progress import Progress
+    from .sweeps.run import run
+    from .sweeps.sitting import SweepFailed, SweepInterrupted
+    from .sweeps.stream import Streamed, stream
+    from .synchronisation.basin import Basin, basin
+    from .synchronisation.probe import Probe, universal_probe
+    from .synchronisation.threshold import Thresholds, thresholds
 
 __all__ = [
     "MSF", "Basin", "Branch", "ClusterExponents", "Exponents", "Lyapunov", "PeriodicOrbit", "Plane", "Probe",
@@ -33,15 +33,38 @@ __all__ = [
 ]  # fmt: skip
 
 _HOME = {
-    "ClusterExponents": "cluster_states", "cluster_exponents": "cluster_states", "PeriodicOrbit": "periodic",
-    "periodic_orbit": "periodic", "Branch": "branches", "follow": "branches", "skeleton": "skeletons",
-    "Lyapunov": "lyapunov", "lyapunov_spectrum": "lyapunov", "Basin": "basin", "basin": "basin",
-    "Exponents": "exponent", "exponents": "exponent", "MSF": "msf", "Plane": "msf", "msf": "msf", "plane": "msf",
-    "Probe": "probe", "universal_probe": "probe", "Result": "result", "open_result": "result",
-    "SweepInterrupted": "sitting", "SweepFailed": "sitting", "Progress": "progress", "Streamed": "streaming",
-    "stream": "streaming", "kernel": "sweep", "run": "sweep", "Status": "status", "Thresholds": "threshold",
-    "thresholds": "threshold",
-}  # fmt: skip
+    "Basin": "synchronisation.basin",
+    "Branch": "bifurcation.branches",
+    "ClusterExponents": "stability.clusters",
+    "Exponents": "stability.transversal",
+    "Lyapunov": "stability.lyapunov",
+    "MSF": "stability.msf",
+    "PeriodicOrbit": "bifurcation.periodic",
+    "Plane": "stability.msf",
+    "Probe": "synchronisation.probe",
+    "Progress": "sweeps.progress",
+    "Result": "results.result",
+    "Status": "support.status",
+    "Streamed": "sweeps.stream",
+    "SweepFailed": "sweeps.sitting",
+    "SweepInterrupted": "sweeps.sitting",
+    "Thresholds": "synchronisation.threshold",
+    "basin": "synchronisation.basin",
+    "cluster_exponents": "stability.clusters",
+    "exponents": "stability.transversal",
+    "follow": "bifurcation.branches",
+    "kernel": "sweeps.run",
+    "lyapunov_spectrum": "stability.lyapunov",
+    "msf": "stability.msf",
+    "open_result": "results.open",
+    "periodic_orbit": "bifurcation.periodic",
+    "plane": "stability.msf",
+    "run": "sweeps.run",
+    "skeleton": "bifurcation.skeleton",
+    "stream": "sweeps.stream",
+    "thresholds": "synchronisation.threshold",
+    "universal_probe": "synchronisation.probe",
+}
 
 
 def __getattr__(name: str) -> Any:
@@ -53,15 +76,3 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted(__all__)
-
-
-class _Package(ModuleType):
-    """A package in which a public function goes before the module of the same name that it lives in."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if isinstance(value, ModuleType) and _HOME.get(name) == name:  # the import system has just loaded it
-            value = getattr(value, name)
-        super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package

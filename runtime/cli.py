@@ -14,10 +14,10 @@ from contextlib import contextmanager, suppress
 from types import ModuleType
 from typing import Any, NoReturn
 
-from synchain.codegen.installation import InstallationError
+from synchain.codegen.kernels.installation import InstallationError
 
 from .commands import command, names
-from .commands._outcome import FAILED, FINE, WRONG_USE, Failed, WrongUse, sentence, wrong_use
+from .console.outcome import FAILED, FINE, WRONG_USE, Failed, WrongUse, sentence, wrong_use
 
 __all__ = ["main"]
 
@@ -111,7 +111,7 @@ def _dispatch(words: list[str]) -> int:
         return FINE
     arguments.command_line = ("synchain", *words)
     if getattr(arguments, "allow_code", None):
-        from synchain.models.plugins import allow_code
+        from synchain.models.inputs.plugins import allow_code
 
         with wrong_use():
             allow_code(*arguments.allow_code)

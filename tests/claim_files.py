@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from synchain.models.claims import read_claims
-from synchain.models.verdict import Verdict, verify
+from synchain.models.claims.language import read_claims
+from synchain.models.claims.verdict import Verdict, verify
 
 __all__ = ["verdicts"]
 

@@ -9,9 +9,11 @@ from collections.abc import Callable, Mapping, Sequence
 import mpmath
 import sympy as sp
 
-from synchain.models.equations import TIME, Equations
-from synchain.models.network import edge, network, node
-from synchain.models.topology import Topology
+from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.network import network, node
+from synchain.models.graphs.topology import Topology
+from synchain.models.mechanics.components import TIME
+from synchain.models.mechanics.link import edge
 
 DIGITS = 50
 TABLE = {

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from synchain.models import Scene
-from synchain.runtime.attractor import Attractor
-from synchain.runtime.exponent import Exponents
+from synchain.models.scenes.scene import Scene
 from synchain.runtime.figures import exponent, load, make, plane, study, style, synchronisability_map
-from synchain.runtime.msf import MSF, Plane
-from synchain.runtime.result import Result
-from synchain.runtime.status import Status
-from synchain.runtime.threshold import Criterion, Sweep, project
+from synchain.runtime.results.result import Result
+from synchain.runtime.stability.attractor import Attractor
+from synchain.runtime.stability.msf import MSF, Plane
+from synchain.runtime.stability.transversal import Exponents
+from synchain.runtime.support.status import Status
+from synchain.runtime.synchronisation.threshold import Criterion, Sweep, project
 
 RANGE = {1.15: (0.0, 0.466), 1.4: (0.09, 0.6), 1.55: (0.176, 0.594)}
 """Ranges of alpha that the stand-in for the simulation pretends to measure."""

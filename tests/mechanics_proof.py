@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import sympy as sp
 from sympy.physics import mechanics
 
-from synchain.models.equations import TIME
-from synchain.models.nondimensional import magnitude, nondimensional
-from synchain.models.plugins import call, load
-from synchain.models.topology import Topology
+from synchain.models.graphs.topology import Topology
+from synchain.models.inputs.plugins import call, load
+from synchain.models.mechanics.components import TIME
+from synchain.models.mechanics.nondimensional import magnitude, nondimensional
 
 T = mechanics.dynamicsymbols._t
 

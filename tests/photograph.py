@@ -33,36 +33,50 @@ import sympy as sp
 from scipy.io import netcdf_file
 
 from synchain import models
-from synchain.models import Scene, chain, complete, from_edges, from_matrix, from_symbols, load_scene, ring, star
-from synchain.runtime import (
-    basin,
-    cluster_exponents,
-    exponents,
-    follow,
-    lyapunov_spectrum,
-    msf,
-    open_result,
-    periodic_orbit,
-    plane,
-    run,
-    skeleton,
-    stream,
-    thresholds,
-    universal_probe,
-)
+from synchain.models import chain, complete, ring, star
+from synchain.models.graphs.readers import from_edges
+from synchain.models.graphs.symbolic import from_symbols
+from synchain.models.graphs.topology import from_matrix
+from synchain.models.scenes.file import load_scene
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.bifurcation.branches import follow
+from synchain.runtime.bifurcation.periodic import periodic_orbit
+from synchain.runtime.bifurcation.skeleton import skeleton
+from synchain.runtime.results.open import open_result
+from synchain.runtime.stability import msf
+from synchain.runtime.stability.clusters import cluster_exponents
+from synchain.runtime.stability.lyapunov import lyapunov_spectrum
+from synchain.runtime.stability.msf import plane
+from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.sweeps.run import run
+from synchain.runtime.sweeps.stream import stream
+from synchain.runtime.synchronisation import basin
+from synchain.runtime.synchronisation.probe import universal_probe
+from synchain.runtime.synchronisation.threshold import thresholds
 
 # What has no name in the two packages above.  A move of files changes these lines, and no others in this file.
-from synchain.models.closed_forms import closed_form, formulas  # isort: skip
-from synchain.models.clusters import clusters, orbital_partitions  # isort: skip
-from synchain.models.energy import energy  # isort: skip
-from synchain.models.export import to_c, to_numba, to_python  # isort: skip
-from synchain.models.plugins import load, names  # isort: skip
-from synchain.models.present import latex, text  # isort: skip
+from synchain.models.graphs.closed_forms import closed_form  # isort: skip
+from synchain.models.graphs.closed_forms import formulas
+
+from synchain.models.graphs.clusters import clusters  # isort: skip
+from synchain.models.graphs.clusters import orbital_partitions
+
+from synchain.models.scenes.energy import energy  # isort: skip
+from synchain.codegen.export.c import to_c  # isort: skip
+from synchain.codegen.export.numba import to_numba
+from synchain.codegen.export.python import to_python
+
+from synchain.models.inputs.plugins import load  # isort: skip
+from synchain.models.inputs.plugins import names
+
+from synchain.models.presentation.equations import latex  # isort: skip
+from synchain.models.presentation.equations import text
+
 from synchain.runtime.cli import main  # isort: skip
-from synchain.runtime.energy import energy_function  # isort: skip
-from synchain.runtime.kernels import chosen_skip  # isort: skip
-from synchain.runtime.skip import explain  # isort: skip
-from synchain.runtime.threshold import Criterion  # isort: skip
+from synchain.runtime.results.energy import energy_function  # isort: skip
+from synchain.runtime.cells.kernels import chosen_skip  # isort: skip
+from synchain.runtime.cells.reduce import explain  # isort: skip
+from synchain.runtime.synchronisation.threshold import Criterion  # isort: skip
 
 __all__ = ["SCENES", "Picture", "camera", "compare", "take"]
 

@@ -13,10 +13,13 @@ import mpmath
 import numpy as np
 import sympy as sp
 
-from synchain.codegen.emit import emit
-from synchain.codegen.load import Kernel, load
-from synchain.models import Scene, from_matrix, ring, star
-from synchain.models.equations import TIME, Edge, Equations, Node
+from synchain.codegen.kernels.compile import Kernel, load
+from synchain.codegen.kernels.sweep import emit
+from synchain.models import ring, star
+from synchain.models.dynamics.equations import Equations
+from synchain.models.graphs.topology import from_matrix
+from synchain.models.mechanics.components import TIME, Edge, Node
+from synchain.models.scenes.scene import Scene
 
 TABLE = {"theta_b": 0.1, "mu_s": 0.3, "mu_k": 0.15, "a": 2.5, "kappa": 1e5, "epsilon": 2.0, "u": 0.1, "omega": 1.15,
          "sigma": 0.1}  # fmt: skip

@@ -9,10 +9,14 @@ import time
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from synchain.models import Axis, Scene, chain
-from synchain.runtime import kernel, open_result, stream
-from synchain.runtime.progress import Progress
-from synchain.runtime.skip import decide
+from synchain.models import chain
+from synchain.models.scenes.axis import Axis
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.cells.kernels import kernel
+from synchain.runtime.cells.reduce import decide
+from synchain.runtime.results.open import open_result
+from synchain.runtime.sweeps.progress import Progress
+from synchain.runtime.sweeps.stream import stream
 
 RECORDS = ("sync_error", "section", "trajectory")
 PAIR = Scene(topology=chain(2), transient=2, window=4, parameters={"sigma": 0.1}, record=RECORDS, samples=5)

@@ -15,11 +15,11 @@ from hypothesis import HealthCheck, given, note, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from synchain.models.export_python import to_python
-from synchain.models.scene import Scene
-from synchain.models.topology import topology
-from synchain.runtime import run
-from synchain.runtime.status import Status
+from synchain.codegen.export.python import to_python
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.support.status import Status
+from synchain.runtime.sweeps.run import run
 
 SECONDS = float(os.environ.get("SYNCHAIN_FUZZ_SECONDS", "0"))
 EXAMPLES = 12

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from synchain.models.coupling_matrix import PARAMETERS
-from synchain.models.expressions import constant
-from synchain.models.frictions import KAPPA
-from synchain.models.plugins import load, names
+from synchain.models.inputs.arithmetic import constant
+from synchain.models.inputs.plugins import load, names
+from synchain.models.mechanics.coupling_text import PARAMETERS
+from synchain.models.mechanics.friction import KAPPA
 
 MANUAL = (Path(__file__).parent.parent / "docs" / "scenes.md").read_text("utf-8")
 TABLES = {"oscillator": "Oscillators", "friction": "Friction laws", "coupling": "Couplings"}

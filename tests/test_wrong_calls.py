@@ -13,13 +13,18 @@ import pytest
 import scipy.sparse
 
 from synchain import models, runtime
-from synchain.models import Scene, Section, Spectrum, Topology, chain, star
-from synchain.models.clusters import clusters, orbital_partitions
-from synchain.models.energy import energy
-from synchain.runtime.agreement import agreement
-from synchain.runtime.energy import energy_function
-from synchain.runtime.sweep import with_axes, worker_count
-from synchain.runtime.threshold import Criterion
+from synchain.models import chain, star
+from synchain.models.graphs.clusters import clusters, orbital_partitions
+from synchain.models.graphs.topology import Topology
+from synchain.models.scenes.energy import energy
+from synchain.models.scenes.scene import Scene
+from synchain.models.scenes.section import Section
+from synchain.models.spectra.spectrum import Spectrum
+from synchain.runtime.results.energy import energy_function
+from synchain.runtime.support.threads import worker_count
+from synchain.runtime.sweeps.run import with_axes
+from synchain.runtime.synchronisation.agreement import agreement
+from synchain.runtime.synchronisation.threshold import Criterion
 
 ONE = Scene(oscillator="harmonic", transient=1, window=1)
 PAIR = Scene(oscillator="harmonic", topology=chain(2), transient=1, window=1)

@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "spring with a cubic part; force sigma (r + cubic r^3) for the difference r of the coordinates"
 SOURCE = "Fermi, Pasta & Ulam, Los Alamos report LA-1940 (1955), cubic forces; Ford, Phys. Rep. 213, 271 (1992)"

@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "linear damper; force proportional to the difference of the velocities"
 SOURCE = "Rayleigh, Proc. London Math. Soc. s1-4, 357 (1873): dissipation function"

@@ -6,7 +6,7 @@ from node i to node j, from the smaller to the larger number, and round a ring (
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = (
     "spring of the Fermi-Pasta-Ulam-Tsingou chain; force sigma (r + fput_alpha r^2 + fput_beta r^3), r its extension"

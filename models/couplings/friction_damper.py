@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "friction damper; force sigma v_0 tanh(w/v_0) for the difference w of the velocities, at most sigma v_0"
 SOURCE = "Andersson, Söderberg & Björklund, Tribology International 40, 580 (2007): friction smoothed by tanh"

@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "inerter; force proportional to the difference of the accelerations, so that the mass matrix is the graph's"
 SOURCE = "Smith, IEEE Trans. Automat. Control 47, 1648 (2002)"

@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "linear spring; stiffness sigma times the stiffness of the oscillator's own spring"
 SOURCE = "Marszal, Saha, Jankowski, Stefański, Eur. Phys. J. Special Topics (2016), eqs. 6-8"

@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "torque proportional to the sine of the difference of two angles"
 SOURCE = "Tanaka, Lichtenberg & Oishi, Phys. Rev. Lett. 78, 2104 (1997): Kuramoto's coupling of rotors with inertia"

@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "friction coefficient mu, independent of the sliding speed"
 SOURCE = "Coulomb, Mém. math. phys. Acad. R. Sci. Paris 10, 161 (1785); Den Hartog, Phil. Mag. 9, 801 (1930)"

@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "friction coefficient mu_k in sliding, mu_s at rest with the contact 'set-valued'"
 SOURCE = "Coulomb, Mém. math. phys. Acad. R. Sci. Paris 10, 161 (1785)"

@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "friction coefficient that decays exponentially with the sliding speed, from mu_s to mu_k"
 SOURCE = "Marszal, Saha, Jankowski, Stefański, Eur. Phys. J. Special Topics (2016), eq. 4"

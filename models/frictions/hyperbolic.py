@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "friction coefficient that falls hyperbolically with the sliding speed, from mu_s towards 0"
 SOURCE = "Leine, van Campen, de Kraker, van den Steen, Nonlinear Dynamics 16, 41 (1998)"

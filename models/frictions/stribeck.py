@@ -6,7 +6,7 @@ a = 1/v_s.
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "friction coefficient that falls from mu_s to mu_k over the Stribeck speed v_s, plus viscous growth c w"
 SOURCE = (

@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "friction coefficient proportional to the sliding speed"
 SOURCE = "Rayleigh, Proc. London Math. Soc. s1-4, 357 (1873)"

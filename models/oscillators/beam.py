@@ -5,7 +5,7 @@ Non-dimensional as the clocks are: masses in units of a bob's, lengths of a pend
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "common beam of pendulum clocks, free to move to and fro; clocks hang from it by the coupling 'hanging'"
 SOURCE = "Bennett, Schatz, Rockwood & Wiesenfeld, Proc. R. Soc. Lond. A 458, 563 (2002)"

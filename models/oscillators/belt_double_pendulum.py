@@ -7,7 +7,7 @@ pendulums.
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "double pendulum below a cart on a moving belt with dry friction; three coordinates"
 SOURCE = (

@@ -7,7 +7,7 @@ q = C_2/(L G^2) = 100/7, a = -0.8/G = -8/7 and b = -0.5/G = -5/7.
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "electronic circuit with a piecewise linear resistor; x and y are voltages, z is the coil's current"
 SOURCE = "Matsumoto, IEEE Trans. Circuits Syst. 31, 1055 (1984)"

@@ -5,7 +5,7 @@ Non-dimensional: lengths in units of the pendulum's length l, times in units of 
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "pendulum with an escapement as van der Pol's damping; clocks hang from a beam by the coupling 'hanging'"
 SOURCE = (

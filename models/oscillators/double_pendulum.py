@@ -5,7 +5,7 @@ In units of the upper mass, the upper rod l and sqrt(l/g); the mass matrix is fu
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "plane double pendulum, two angles from the vertical; conservative unless damped"
 SOURCE = "Landau & Lifshitz, Mechanics, 3rd ed. (Pergamon, 1976), sect. 5, problem 1"

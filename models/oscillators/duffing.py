@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "oscillator with a cubic spring, linear damping and a harmonic force"
 SOURCE = (

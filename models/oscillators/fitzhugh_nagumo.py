@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "excitable or oscillating nerve membrane; x is its voltage, y its recovery"
 SOURCE = "FitzHugh, Biophys. J. 1, 445 (1961), eqs. 1 and 2; Nagumo, Arimoto & Yoshizawa, Proc. IRE 50, 2061 (1962)"

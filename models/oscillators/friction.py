@@ -6,7 +6,7 @@ frequency Omega (rad/s), normal load F_N (N), belt speed v_b (m/s) and friction 
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "mass on a moving belt with dry friction, held by a spring with a driven end"
 SOURCE = "Marszal, Saha, Jankowski, Stefański, Eur. Phys. J. Special Topics (2016), eqs. 2 and 3, table 1"

@@ -6,7 +6,7 @@ the radial load times the radius of the shaft over the largest torque of the wei
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "pendulum that hangs from a rotating shaft with dry friction"
 SOURCE = (

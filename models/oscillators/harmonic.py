@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "undamped linear oscillator of frequency 1; a network of them has frequencies sqrt(1 - sigma gamma_k)"
 SOURCE = "Rayleigh, The Theory of Sound, vol. 1, ch. 4-5 (Macmillan, 1877)"

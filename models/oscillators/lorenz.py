@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "chaotic vector field of a convection roll; x is its speed, y and z are temperature differences"
 SOURCE = (

@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "free mass; with the coupling 'fput' a Fermi-Pasta-Ulam-Tsingou chain"
 SOURCE = "Fermi, Pasta & Ulam, Los Alamos report LA-1940 (1955); Ford, Phys. Rep. 213, 271 (1992)"

@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "plane pendulum; joined by springs (torsion bars) a sine-Gordon chain"
 SOURCE = "Scott, Am. J. Phys. 37, 52 (1969): a line of pendulums on a torsion wire"

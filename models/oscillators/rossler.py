@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "chaotic vector field with one quadratic term; a spiral in x and y that folds back through z"
 SOURCE = (

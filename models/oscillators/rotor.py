@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "driven and damped rotor; with the coupling 'torsion' Kuramoto's model with inertia"
 SOURCE = (

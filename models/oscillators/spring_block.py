@@ -8,7 +8,7 @@ so that a block may slip back.  Displacements are counted along the surface, opp
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "block of the Burridge-Knopoff chain: a mass dragged by a rough surface, held by a spring"
 SOURCE = (

@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 SUMMARY = "self-excited oscillator whose damping is negative for |x| < 1; a harmonic force where u is not 0"
 SOURCE = "van der Pol, Phil. Mag. 2, 978 (1926); with the force: Phil. Mag. 3, 65 (1927)"

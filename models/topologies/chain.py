@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ..closed_forms import ClosedForm
+    from ..graphs.closed_forms import ClosedForm
 
 SUMMARY = "open chain (path graph)"
 MINIMUM = 1
@@ -27,8 +27,8 @@ def count(n: int) -> int:
 
 def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
     """-4 sin²(kπ/2n), k = 0 … n - 1, each once."""
-    from ..angles import minus_four_sine_squared
-    from ..descending import Descending
+    from ..algebra.cosines import minus_four_sine_squared
+    from ..algebra.lazy import Descending
 
     return Descending(n, n, lambda k: (minus_four_sine_squared(k, 2 * n), 1))
 
@@ -37,7 +37,7 @@ def formula() -> ClosedForm:
     """-4 sin²(kπ/2n) and its cosine wave."""
     from sympy import S, cos, pi, sin
 
-    from ..closed_forms import NODE, ClosedForm, K, N, Term
+    from ..graphs.closed_forms import NODE, ClosedForm, K, N, Term
 
     wave = cos(pi * K * (2 * NODE + 1) / (2 * N))
     return ClosedForm((Term(-4 * sin(pi * K / (2 * N)) ** 2, S.One, ((K, S.Zero, N - 1),), wave),))

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from ..family_options import whole_numbers
+from ..inputs.options import whole_numbers
 
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ..closed_forms import ClosedForm
+    from ..graphs.closed_forms import ClosedForm
 
 SUMMARY = "circulant graph: every node joined to those at given distances round a ring (offsets, 1 and 2)"
 MINIMUM = 3
@@ -44,7 +44,7 @@ def count(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> int:
 
 def spectrum(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> list[tuple[sp.Expr, int]]:
     """Sums of -4 sin²(ksπ/n) over the offsets s (half of it for s = n/2), k = 0 … n - 1."""
-    from ..angle_sums import AngleSum, expression, merged
+    from ..algebra.cosine_sums import AngleSum, expression, merged
 
     weights = [(s, Fraction(1, 2) if 2 * s == n else Fraction(1)) for s in offsets]
     numbers = []
@@ -60,7 +60,7 @@ def formula(offsets: Any = (1, 2)) -> ClosedForm:
 
     from sympy import Add, And, I, Integer, Ne, S, exp, pi, sin, true
 
-    from ..closed_forms import NODE, ClosedForm, K, N, Term, entries
+    from ..graphs.closed_forms import NODE, ClosedForm, K, N, Term, entries
 
     chosen = tuple(dict.fromkeys(entries("offsets", offsets)))
     if any(s == 0 or s in (N, K) for s in chosen):

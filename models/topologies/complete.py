@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ..closed_forms import ClosedForm
+    from ..graphs.closed_forms import ClosedForm
 
 SUMMARY = "complete graph: all to all"
 MINIMUM = 1
@@ -37,7 +37,7 @@ def formula() -> ClosedForm:
     """0, -n."""
     from sympy import KroneckerDelta, S
 
-    from ..closed_forms import NODE, ClosedForm, M, N, Term
+    from ..graphs.closed_forms import NODE, ClosedForm, M, N, Term
 
     pairs = KroneckerDelta(NODE, 0) - KroneckerDelta(NODE, M)
     terms = (Term(S.Zero, vector=S.One), Term(-N, N - 1, (), pairs, ((M, S.One, N - 1),)))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from ..family_options import whole
+from ..inputs.options import whole
 
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ..closed_forms import ClosedForm
+    from ..graphs.closed_forms import ClosedForm
 
 SUMMARY = "complete bipartite graph: all nodes of one group with all of another (left: size of the first, half of n)"
 MINIMUM = 2
@@ -55,7 +55,7 @@ def formula() -> ClosedForm:
     """0, -p, -q, -(p + q); the first p nodes are one group."""
     from sympy import KroneckerDelta, Piecewise, S
 
-    from ..closed_forms import NODE, ClosedForm, M, P, Q, Term
+    from ..graphs.closed_forms import NODE, ClosedForm, M, P, Q, Term
 
     left = KroneckerDelta(NODE, 0) - KroneckerDelta(NODE, M)
     right = KroneckerDelta(NODE, P) - KroneckerDelta(NODE, P + M)

@@ -8,7 +8,7 @@ from fractions import Fraction
 from math import log1p
 from typing import Any
 
-from ..family_options import probability, whole
+from ..inputs.options import probability, whole
 
 SUMMARY = "random graph: each pair joined with probability p (1/2), fixed by seed (0); it may fall into parts"
 MINIMUM = 1

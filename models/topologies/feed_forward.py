@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ..closed_forms import ClosedForm
+    from ..graphs.closed_forms import ClosedForm
 
 SUMMARY = "feed-forward (one-way) chain: every node but the first feels the one before it"
 MINIMUM = 1
@@ -38,7 +38,7 @@ def formula() -> ClosedForm:
     """0, -1; one Jordan block."""
     from sympy import KroneckerDelta, S
 
-    from ..closed_forms import NODE, ClosedForm, N, Term
+    from ..graphs.closed_forms import NODE, ClosedForm, N, Term
 
     last = KroneckerDelta(NODE, N - 1)
     blocks = "one Jordan block of n - 1 for -1: one eigenvector"

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 from math import isqrt, prod
 from typing import TYPE_CHECKING, Any
 
-from ..family_options import whole_numbers
+from ..inputs.options import whole_numbers
 
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ..closed_forms import ClosedForm
+    from ..graphs.closed_forms import ClosedForm
 
 SUMMARY = (
     "grid with open ends, as square as n allows (a prime n: a chain); shape: nodes in each of any number of directions"
@@ -54,7 +54,7 @@ def count(n: int, *, shape: tuple[int, ...] | None = None) -> int:
 
 def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> Sequence[tuple[sp.Expr, int]]:
     """Sums of -4 sin²(kπ/2m), one for each direction of m nodes, k = 0 … m - 1."""
-    from ..angle_sums import box
+    from ..algebra.cosine_sums import box
 
     sizes = shape or sides(n)
     return box(sizes, (False,) * len(sizes))
@@ -64,8 +64,8 @@ def formula(shape: Any = ("p", "q")) -> ClosedForm:
     """Sums of -4 sin² of each direction, of sizes that are letters or whole numbers; the last direction varies fastest."""
     from dataclasses import replace
 
-    from ..closed_forms import entries
-    from ..closed_products import box, counters
+    from ..graphs.closed_forms import entries
+    from ..graphs.closed_products import box, counters
     from .chain import formula as one
 
     sizes = entries("shape", shape)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ..closed_forms import ClosedForm
+    from ..graphs.closed_forms import ClosedForm
 
 SUMMARY = "hypercube where n is a power of two; for other n one digit for each prime factor (a prime n: all to all)"
 MINIMUM = 1
@@ -66,7 +66,7 @@ def formula() -> ClosedForm:
     """-2 k, C(d, k) times, and the Walsh functions (J. L. Walsh, Am. J. Math. 45, 5, 1923) as eigenvectors."""
     from sympy import Eq, Mod, Product, S, Sum, binomial, floor
 
-    from ..closed_forms import NODE, ClosedForm, D, J, K, M, Term
+    from ..graphs.closed_forms import NODE, ClosedForm, D, J, K, M, Term
 
     both = Mod(floor(NODE / 2**J), 2) * Mod(floor(M / 2**J), 2)
     digits = Eq(Sum(Mod(floor(M / 2**J), 2), (J, 0, D - 1)), K)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ..closed_forms import ClosedForm
+    from ..graphs.closed_forms import ClosedForm
 
 SUMMARY = "ladder: two chains joined node by node (odd n: the first chain is one node longer)"
 MINIMUM = 2
@@ -35,7 +35,7 @@ def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]] | None:
     """-4 sin²(kπ/n) and that less 2, k = 0 … n/2 - 1; none for odd n."""
     if n % 2:
         return None
-    from ..angle_sums import box
+    from ..algebra.cosine_sums import box
 
     return box((2, n // 2), (False, False))
 
@@ -44,7 +44,7 @@ def formula() -> ClosedForm:
     """-4 sin²(kπ/2p), and 2 less; both rails move alike, or against each other."""
     from sympy import S, cos, floor, pi, sin
 
-    from ..closed_forms import NODE, ClosedForm, K, P, Term
+    from ..graphs.closed_forms import NODE, ClosedForm, K, P, Term
 
     value, rungs = -4 * sin(pi * K / (2 * P)) ** 2, ((K, S.Zero, P - 1),)
     wave = cos(pi * K * (2 * floor(NODE / 2) + 1) / (2 * P))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ..closed_forms import ClosedForm
+    from ..graphs.closed_forms import ClosedForm
 
 SUMMARY = "one-way ring: every node feels the next one only"
 MINIMUM = 2
@@ -29,7 +29,7 @@ def count(n: int) -> int:
 
 def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
     """-1 + exp(2πik/n), k = 0 … n - 1, each once."""
-    from ..angles import exponential
+    from ..algebra.cosines import exponential
 
     return [(exponential(-1, k, n), 1) for k in range(n)]
 
@@ -38,7 +38,7 @@ def formula() -> ClosedForm:
     """-1 + exp(2πik/n) and its wave."""
     from sympy import I, S, exp, pi
 
-    from ..closed_forms import NODE, ClosedForm, K, N, Term
+    from ..graphs.closed_forms import NODE, ClosedForm, K, N, Term
 
     value, wave = exp(2 * pi * I * K / N) - 1, exp(2 * pi * I * NODE * K / N)
     return ClosedForm((Term(value, S.One, ((K, S.Zero, N - 1),), wave),), least=2, degree=S.One)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import combinations
 from typing import Any
 
-from ..family_options import whole
+from ..inputs.options import whole
 
 SUMMARY = "random graph with the same number of neighbours at each node (degree, 4), fixed by seed (0)"
 MINIMUM = 5

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ..closed_forms import ClosedForm
+    from ..graphs.closed_forms import ClosedForm
 
 SUMMARY = "closed ring (cycle graph)"
 MINIMUM = 3
@@ -29,8 +29,8 @@ def count(n: int) -> int:
 
 def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
     """-4 sin²(kπ/n), k = 0 … n/2: twice each, but once for k = 0 and k = n/2."""
-    from ..angles import minus_four_sine_squared
-    from ..descending import Descending
+    from ..algebra.cosines import minus_four_sine_squared
+    from ..algebra.lazy import Descending
 
     return Descending(n // 2 + 1, n, lambda k: (minus_four_sine_squared(k, n), 1 if k in (0, n - k) else 2))
 
@@ -39,7 +39,7 @@ def formula() -> ClosedForm:
     """-4 sin²(kπ/n) and its wave."""
     from sympy import I, Integer, S, exp, pi, sin
 
-    from ..closed_forms import NODE, ClosedForm, K, N, Term
+    from ..graphs.closed_forms import NODE, ClosedForm, K, N, Term
 
     wave = exp(2 * pi * I * NODE * K / N)
     term = Term(-4 * sin(pi * K / N) ** 2, S.One, ((K, S.Zero, N - 1),), wave)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any
 
-from ..family_options import probability, whole
+from ..inputs.options import probability, whole
 
 SUMMARY = "ring with several neighbours (4), each edge led elsewhere with probability p (1/10), fixed by seed (0)"
 MINIMUM = 5

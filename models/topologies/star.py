@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ..closed_forms import ClosedForm
+    from ..graphs.closed_forms import ClosedForm
 
 SUMMARY = "star: a hub (the first node) and n - 1 leaves"
 MINIMUM = 1
@@ -39,7 +39,7 @@ def formula() -> ClosedForm:
     """0, -1, -n."""
     from sympy import Integer, KroneckerDelta, S
 
-    from ..closed_forms import NODE, ClosedForm, M, N, Term
+    from ..graphs.closed_forms import NODE, ClosedForm, M, N, Term
 
     hub = N * KroneckerDelta(NODE, 0) - 1
     leaves = KroneckerDelta(NODE, 1) - KroneckerDelta(NODE, M)

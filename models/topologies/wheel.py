@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ..closed_forms import ClosedForm
+    from ..graphs.closed_forms import ClosedForm
 
 SUMMARY = "wheel: a hub (the first node) joined to every node of a ring"
 MINIMUM = 4
@@ -33,8 +33,8 @@ def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
     """0, -1 - 4 sin²(kπ/(n - 1)) for k = 1 … n - 2, -n; that of the hub is one of the rim's up to 5 nodes."""
     from sympy import Integer
 
-    from ..angle_sums import AngleSum, expression
-    from ..descending import Descending
+    from ..algebra.cosine_sums import AngleSum, expression
+    from ..algebra.lazy import Descending
 
     rim = (n - 1) // 2
     own = n > 5
@@ -52,7 +52,7 @@ def formula() -> ClosedForm:
     """0, -n, -1 - 4 sin²(kπ/(n - 1))."""
     from sympy import I, KroneckerDelta, S, exp, pi, sin
 
-    from ..closed_forms import NODE, ClosedForm, K, N, Term
+    from ..graphs.closed_forms import NODE, ClosedForm, K, N, Term
 
     wave = (1 - KroneckerDelta(NODE, 0)) * exp(2 * pi * I * K * (NODE - 1) / (N - 1))
     rim = Term(-1 - 4 * sin(pi * K / (N - 1)) ** 2, S.One, ((K, S.One, N - 2),), wave)

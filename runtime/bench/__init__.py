@@ -17,7 +17,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-__all__ = ["csv_text", "load", "machine", "markdown", "names", "text", "write"]
+from .kit.tables import markdown
+
+__all__ = ["csv_text", "load", "machine", "names", "text", "write"]
 
 
 def names() -> tuple[str, ...]:
@@ -40,13 +42,6 @@ def machine() -> str:
     return f"{llvm.get_host_cpu_name()}, {platform.system()}, Python {platform.python_version()}, Numba {numba.__version__}"
 
 
-def markdown(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    """A Markdown table."""
-    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
-    lines += ["| " + " | ".join(_cell(value) for value in row) + " |" for row in rows]
-    return "\n".join(lines)
-
-
 def csv_text(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     """A table as comma-separated values, numbers in full, a number that is not there empty."""
     target = io.StringIO()
@@ -64,7 +59,7 @@ def text(module: ModuleType, rows: Sequence[Sequence[Any]]) -> str:
 
 def write(name: str, module: ModuleType, rows: Sequence[Sequence[Any]], folder: Path) -> list[Path]:
     """Write `<name>.csv`, `<name>.md` and, where the benchmark draws, `<name>.png` and `.svg`; returns their paths."""
-    from ..files import write_text
+    from ..support.files import write_text
 
     table, page = folder / f"{name}.csv", folder / f"{name}.md"
     write_text(table, csv_text(module.COLUMNS, rows))
@@ -76,9 +71,3 @@ def write(name: str, module: ModuleType, rows: Sequence[Sequence[Any]], folder: 
 
     with context():
         return [table, page, *save(module.draw(rows), folder, name)]
-
-
-def _cell(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.3g}" if value != 0 else "0"
-    return str(value)

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from synchain.models.scene import Scene
-from synchain.models.topology import Topology, topology
+from synchain.models.graphs.families import topology
+from synchain.models.graphs.topology import Topology
+from synchain.models.scenes.scene import Scene
 
-from ..agreement import OUTCOMES, Agreement, agreement, strengths
-from ..exponent import Exponents, exponents
-from ..threshold import Criterion
+from ..stability.transversal import Exponents, exponents
+from ..synchronisation.agreement import OUTCOMES, Agreement, agreement, strengths
+from ..synchronisation.threshold import Criterion
 
 __all__ = ["COLUMNS", "GRAPHS", "OMEGAS", "measure", "summary"]
 

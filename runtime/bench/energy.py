@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from synchain.models.scene import Scene
-from synchain.models.topology import topology
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
 
-from ..energy import energy_function
-from ..sweep import run
+from ..results.energy import energy_function
+from ..sweeps.run import run
 
 __all__ = ["CASES", "COLUMNS", "INTEGRATORS", "Case", "drift", "measure", "measure_long"]
 

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from synchain.models.scene import Scene
-from synchain.models.topology import topology
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
 
-from ..exponent import Exponents, exponents
-from ..threshold import critical_ratio
+from ..stability.transversal import Exponents, exponents
+from ..synchronisation.threshold import critical_ratio
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -17,14 +17,15 @@ from functools import lru_cache
 
 import numpy as np
 
-from synchain.models.scene import Scene
-from synchain.models.topology import Topology, topology
+from synchain.models.graphs.families import topology
+from synchain.models.graphs.topology import Topology
+from synchain.models.scenes.scene import Scene
 
-from ..families import CLOSED, Largest, largest
-from ..msf import MSF, msf
-from ..synchronisability import Verdict, verdict
-from ..threshold import Criterion, simulate
-from . import markdown
+from ..prediction.families import CLOSED, Largest, largest
+from ..prediction.synchronisability import Verdict, verdict
+from ..stability.msf import MSF, msf
+from ..synchronisation.threshold import Criterion, simulate
+from .kit.tables import markdown
 
 __all__ = ["CASES", "COLUMNS", "GRAPHS", "function_of", "measure", "sigma_of", "summary"]
 

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from synchain.codegen.lanes import native_width
+from synchain.codegen.simd.lane_types import native_width
 
-from ._cases import Case, read_case
-from ._compare import table
-from ._own import REFILLS, Own, prepare
+from .kit.cases import Case, read_case
+from .kit.compare import table
+from .kit.own_program import REFILLS, Own, prepare
 from .precision import COLUMNS, row
 
 __all__ = ["CASES", "CHOICES", "COLUMNS", "draw", "exact", "measure", "points", "summary"]
@@ -69,7 +69,7 @@ def summary(rows: list[tuple[Any, ...]]) -> str:
 
 def draw(rows: list[tuple[Any, ...]]) -> Any:
     """A figure with one panel a case: time against error, a curve for each law and method."""
-    from ._work_figure import figure
+    from .kit.figure import figure
 
     return figure(_named(rows), own=OWN)
 

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from synchain.codegen.lanes import native_width
+from synchain.codegen.simd.lane_types import native_width
 
-from ._cases import Case, read_case
-from ._own import REFILLS, Own
+from .kit.cases import Case, read_case
+from .kit.own_program import REFILLS, Own
 
 __all__ = ["CASES", "CHOICES", "COLUMNS", "measure"]
 

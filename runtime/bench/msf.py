@@ -25,16 +25,18 @@ from unittest import mock
 
 import numpy as np
 
-from synchain.models.scene import Scene
-from synchain.models.topology import topology
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
 
-from ..exponent import Batches, exponents, single
-from ..orbits import Orbits, unit_of_time
-from ..plan import control_array, plan, tolerances
-from ..propagate import exact
-from ..result import Buffers
-from ..sweep import kernel
-from . import markdown, peers
+from ..cells.buffers import Buffers
+from ..cells.kernels import kernel
+from ..cells.plan import control_array, plan, tolerances
+from ..stability.averages import Batches
+from ..stability.interpolation import exact
+from ..stability.orbits import Orbits, unit_of_time
+from ..stability.transversal import exponents, single
+from . import peers
+from .kit.tables import markdown
 from .peers import _jitcode_transversal as jitcode
 
 __all__ = ["CASES", "COLUMNS", "Case", "difference", "measure", "notes", "orbit_rows", "strengths", "summary"]

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from synchain.codegen.lanes import native_width
+from synchain.codegen.simd.lane_types import native_width
 
 from . import peers
-from ._cases import CASES, Case, read_case
-from ._clock import Point, curve
-from ._own import REFILLS, Own, prepare
+from .kit.cases import CASES, Case, read_case
+from .kit.clock import Point, curve
+from .kit.own_program import REFILLS, Own, prepare
 
 __all__ = [
     "CASES",
@@ -117,14 +117,14 @@ def row(case: Case, point: Point) -> tuple[Any, ...]:
 
 def summary(rows: list[tuple[Any, ...]]) -> str:
     """A second table in Markdown: time of every method at the same error, and its ratio to the full lanes."""
-    from ._compare import table
+    from .kit.compare import table
 
     return table([dict(zip(COLUMNS, row, strict=False)) for row in rows], own={method.integrator for method in METHODS})
 
 
 def draw(rows: list[tuple[Any, ...]]) -> Any:
     """A figure with one panel a case: time against error, a curve for each method."""
-    from ._work_figure import figure
+    from .kit.figure import figure
 
     return figure(
         [dict(zip(COLUMNS, row, strict=False)) for row in rows], own={method.integrator for method in METHODS}

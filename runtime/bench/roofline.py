@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from synchain.codegen import lanes
-from synchain.codegen.emit import LARGEST_UNROLLED
-from synchain.models.scene import Scene
-from synchain.models.topology import topology
+from synchain.codegen.kernels.sweep import LARGEST_UNROLLED
+from synchain.codegen.simd import lanes
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
 
-from ..plan import plan
-from ..sweep import kernel
-from ._operations import operations
+from ..cells.kernels import kernel
+from ..cells.plan import plan
+from .kit.operations import operations
 
 __all__ = ["COLUMNS", "measure"]
 

@@ -11,11 +11,11 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from synchain.models.axis import Axis
-from synchain.models.scene import Scene
-from synchain.models.topology import topology
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.axis import Axis
+from synchain.models.scenes.scene import Scene
 
-from ..streaming import stream
+from ..sweeps.stream import stream
 from .scaling import apart, peak_memory
 
 if TYPE_CHECKING:

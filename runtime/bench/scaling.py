@@ -16,13 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from synchain.codegen.lanes import native_width
-from synchain.models.scene import Scene
-from synchain.models.topology import family, topology
+from synchain.codegen.simd.lane_types import native_width
+from synchain.models.graphs.families import family, topology
+from synchain.models.scenes.scene import Scene
 
-from ..plan import control_array, plan
-from ..result import Buffers
-from ..sweep import kernel, run
+from ..cells.buffers import Buffers
+from ..cells.kernels import kernel
+from ..cells.plan import control_array, plan
+from ..sweeps.run import run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,12 +11,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from synchain.models.scene import Scene
-from synchain.models.topology import topology
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
 
-from ..exponent import exponents
-from ..intervals import Interval
-from ..threshold import Criterion, project, simulate
+from ..prediction.intervals import Interval
+from ..stability.transversal import exponents
+from ..synchronisation.threshold import Criterion, project, simulate
 
 __all__ = ["CASES", "CHANGES", "COLUMNS", "PROJECTED", "measure"]
 

@@ -14,14 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from synchain.models.axis import Axis
-from synchain.models.scene import Scene
-from synchain.models.topology import topology
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.axis import Axis
+from synchain.models.scenes.scene import Scene
 
-from ..result import Result
-from ..skip import Skip, decide
-from ..sweep import kernel_source, run
-from ._operations import operations
+from ..cells.kernels import kernel_source
+from ..cells.reduce import Skip, decide
+from ..results.result import Result
+from ..sweeps.run import run
+from .kit.operations import operations
 
 __all__ = ["CASES", "COLUMNS", "Case", "difference", "measure", "operations"]
 

@@ -15,10 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from synchain.models.spectrum import Spectrum, characteristic, spectrum
-from synchain.models.topology import Topology, topology
+from synchain.models.graphs.families import topology
+from synchain.models.graphs.topology import Topology
+from synchain.models.spectra.characteristic import characteristic
+from synchain.models.spectra.solve import spectrum
+from synchain.models.spectra.spectrum import Spectrum
 
-from ._clock import best_time
+from .kit.clock import best_time
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from tqdm import tqdm
 
-from ..status import Status
-from ..sweep import run
-from ._stability_cases import Case, cases
-from ._stability_energy import energy_residual
-from ._stability_reference import FLOOR, end_state
+from ..support.status import Status
+from ..sweeps.run import run
+from .kit.stability_cases import Case, cases
+from .kit.stability_energy import energy_residual
+from .kit.stability_reference import FLOOR, end_state
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 
-from ._arguments import folder
-from ._outcome import FINE, wrong_use
+from ..console.arguments import folder
+from ..console.outcome import FINE, wrong_use
 
 SUMMARY = "run benchmarks and print their tables"
 EXAMPLES = ("synchain bench precision --quick", "synchain bench precision --out out", "synchain bench")
@@ -29,7 +29,7 @@ def execute(arguments: Namespace) -> int:
     """Run the benchmarks one after the other and print a Markdown table of each; with a folder, write files as well."""
     from ..bench import load, machine, text, write
     from ..bench import names as known
-    from ..files import output_folder
+    from ..support.files import output_folder
 
     with wrong_use():
         chosen = [(name, load(name)) for name in arguments.names or known()]

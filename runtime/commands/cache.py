@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ._outcome import FINE, Failed, sentence
+from ..console.outcome import FINE, Failed, sentence
 
 SUMMARY = "show or empty the folder of compiled kernels"
 EXAMPLES = ("synchain cache info", "synchain cache clear")
@@ -21,7 +21,7 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Describe or empty the cache."""
-    from synchain.codegen.cache import clear, describe
+    from synchain.codegen.kernels.cache import clear, describe
 
     try:
         found = describe()

@@ -8,10 +8,10 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from ._outcome import FAILED, FINE, WrongUse, print_json, wrong_use
+from ..console.outcome import FAILED, FINE, WrongUse, print_json, wrong_use
 
 if TYPE_CHECKING:
-    from synchain.models.verdict import Verdict
+    from synchain.models.claims.verdict import Verdict
 
 SUMMARY = "check claims about exact eigenvalues, one a line of a file"
 EXAMPLES = (
@@ -40,8 +40,8 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Check every claim; exit code 1 where one is wrong."""
-    from synchain.models.claims import read_claims
-    from synchain.models.verdict import verify
+    from synchain.models.claims.language import read_claims
+    from synchain.models.claims.verdict import verify
 
     with wrong_use():
         lines = read_claims(arguments.file)
@@ -136,7 +136,7 @@ def _as_dict(line: Sequence[Verdict]) -> dict[str, Any]:
 def _write_junit(path: str, file: str, found: Sequence[Sequence[Verdict]], open_ones: Sequence[Undecided]) -> None:
     from xml.etree import ElementTree as Tree
 
-    from ..files import write_text
+    from ..support.files import write_text
 
     counts = {"tests": str(len(found) + len(open_ones)), "failures": str(_wrong(found)), "errors": str(len(open_ones))}
     suites = Tree.Element("testsuites", counts)

@@ -6,7 +6,7 @@ import sys
 import warnings
 from argparse import ArgumentParser, Namespace
 
-from ._outcome import FAILED, FINE, print_json
+from ..console.outcome import FAILED, FINE, print_json
 
 SUMMARY = "check the installation, the cache, the processor and known answers"
 EXAMPLES = ("synchain doctor", "synchain doctor --json")
@@ -19,7 +19,7 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Print one line for each check; exit code 1 where something is wrong."""
-    from ..doctor import examine
+    from ..console.doctor import examine
 
     found = []
     with warnings.catch_warnings():

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ._arguments import add_scene
-from ._outcome import FINE, print_json, warn, wrong_use
+from ..console.arguments import add_scene
+from ..console.outcome import FINE, print_json, warn, wrong_use
 
 SUMMARY = "print the equations of motion that a scene integrates"
 EXAMPLES = (
@@ -33,14 +33,14 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Print the equations as text, LaTeX, JSON or source."""
-    from synchain.models.present import as_dict, latex, text
-    from synchain.models.scene_file import load_scene
+    from synchain.models.presentation.equations import as_dict, latex, text
+    from synchain.models.scenes.file import load_scene
 
     with wrong_use():
         scene = load_scene(arguments.scene)
     source = next((name for name in SOURCES if getattr(arguments, name)), None)
     if source is not None:
-        from synchain.models import export
+        from synchain.codegen import export
 
         if scene.contact == "set-valued":
             warn(["set-valued contact: the source holds between events; where sticking starts and ends is not in it"])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ._arguments import add_workers, folder
-from ._outcome import FINE, wrong_use
+from ..console.arguments import add_workers, folder
+from ..console.outcome import FINE, wrong_use
 
 SUMMARY = "make the paper's figures, those of the exponents, and the table of thresholds"
 EXAMPLES = ("synchain figures --out figures", "synchain figures 4b 5 --quick", "synchain figures msf msf_plane --quick")
@@ -34,7 +34,7 @@ def execute(arguments: Namespace) -> int:
 
     from ..figures import load, names
     from ..figures.make import make
-    from ..files import output_folder
+    from ..support.files import output_folder
 
     with wrong_use():
         known = names(extra=True)

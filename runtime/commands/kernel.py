@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ._arguments import add_scene
-from ._outcome import FINE, wrong_use
+from ..console.arguments import add_scene
+from ..console.outcome import FINE, wrong_use
 
 SUMMARY = "print the Python source that is generated and compiled for a scene"
 EXAMPLES = ("synchain kernel figure_4a",)
@@ -18,9 +18,9 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Print the source; nothing is compiled."""
-    from synchain.models.scene_file import load_scene
+    from synchain.models.scenes.file import load_scene
 
-    from ..sweep import kernel_source
+    from ..cells.kernels import kernel_source
 
     with wrong_use():
         source = kernel_source(load_scene(arguments.scene))

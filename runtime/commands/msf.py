@@ -6,16 +6,16 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._arguments import above_zero, add_allow_code, add_workers, folder, positive, spaced, whole
-from ._drive import at_frequency
-from ._outcome import FINE, Failed, WrongUse, print_json, sentence, warn, wrong_use
+from ..console.arguments import above_zero, add_allow_code, add_workers, folder, positive, spaced, whole
+from ..console.drive import at_frequency
+from ..console.outcome import FINE, Failed, WrongUse, print_json, sentence, warn, wrong_use
 
 if TYPE_CHECKING:
-    from synchain.models.scene import Scene
-    from synchain.models.topology import Topology
+    from synchain.models.graphs.topology import Topology
+    from synchain.models.scenes.scene import Scene
 
-    from ._line_report import LineReport
-    from ._plane_report import PlaneReport
+    from ..console.line_report import LineReport
+    from ..console.plane_report import PlaneReport
 
 SUMMARY = "compute the exponents of a network's modes from tangent equations, and where the network synchronises"
 EXAMPLES = (
@@ -61,10 +61,10 @@ def execute(arguments: Namespace) -> int:
     """Compute the function on a line or over a plane; print what it says, and write files where asked to."""
     import numpy as np
 
-    from ..files import output_folder
-    from ..msf import msf, plane
-    from ._line_report import LineReport, complex_modes
-    from ._plane_report import PlaneReport
+    from ..console.line_report import LineReport, complex_modes
+    from ..console.plane_report import PlaneReport
+    from ..stability.msf import msf, plane
+    from ..support.files import output_folder
 
     with wrong_use():
         scene, network = _scene(arguments)
@@ -101,9 +101,9 @@ def _tell(report: LineReport | PlaneReport, json: bool, files: list[Path]) -> No
 
 def _scene(arguments: Namespace) -> tuple[Scene, bool]:
     """The oscillator with its network, and whether it has one; ValueError where it cannot be."""
-    from synchain.models.scene import Scene
-    from synchain.models.scene_file import load_scene
-    from synchain.models.topology import topology
+    from synchain.models.graphs.families import topology
+    from synchain.models.scenes.file import load_scene
+    from synchain.models.scenes.scene import Scene
 
     scene = None if arguments.scene is None else load_scene(arguments.scene)
     graph = _graph(arguments, scene)
@@ -116,7 +116,8 @@ def _scene(arguments: Namespace) -> tuple[Scene, bool]:
 
 def _graph(arguments: Namespace, scene: Scene | None) -> Topology | None:
     """The network by file, by name and size, or the scene's; None where there is none."""
-    from synchain.models.topology import names, read_matrix, topology
+    from synchain.models.graphs.families import names, topology
+    from synchain.models.graphs.topology import read_matrix
 
     if arguments.matrix is not None:
         if arguments.n is not None or arguments.topology is not None:
@@ -140,11 +141,11 @@ def _check(scene: Scene, network: bool, arguments: Namespace) -> None:
     """Raise ValueError for what cannot be computed, before anything is."""
     import numpy as np
 
-    from synchain.models.topology import topology
+    from synchain.models.graphs.families import topology
 
-    from ..orbits import Orbits
-    from ..synchronisability import windows
-    from ._line_report import complex_modes
+    from ..console.line_report import complex_modes
+    from ..prediction.synchronisability import windows
+    from ..stability.orbits import Orbits
 
     if scene.coupling is None:
         raise WrongUse("the scene has no coupling, by which modes differ; expected one, e.g. coupling = 'spring'")

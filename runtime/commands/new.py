@@ -7,8 +7,8 @@ import re
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from ._arguments import folder
-from ._outcome import FINE, WrongUse, wrong_use
+from ..console.arguments import folder
+from ..console.outcome import FINE, WrongUse, wrong_use
 
 SUMMARY = "write a commented file to start a friction law, oscillator, coupling or topology from"
 EXAMPLES = ("synchain new friction my_law", "synchain new topology caterpillar --dir models/topologies")
@@ -28,7 +28,7 @@ def execute(arguments: Namespace) -> int:
     """Write the file; one that exists is left as it is."""
     from importlib import resources
 
-    from ..files import output_folder
+    from ..support.files import output_folder
 
     _check(arguments.kind, arguments.name)
     template = resources.files("synchain.models").joinpath("templates", f"{arguments.kind}.txt")
@@ -55,7 +55,7 @@ def _check(kind: str, name: str) -> None:
             f"name {name!r}; expected small letters, digits and underscores, a letter first, at most {LENGTH}, no word "
             "of Python, and neither 'default' nor 'none': e.g. my_law"
         )
-    from synchain.models import plugins
+    from synchain.models.inputs import plugins
 
     known = plugins.names(kind)
     if name in known:

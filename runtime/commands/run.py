@@ -12,18 +12,18 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..files import output_folder, whole_file
-from ._arguments import add_scene, add_workers, folder, setting, tolerance
-from ._outcome import FAILED, FINE, Failed, WrongUse, sentence, warn, wrong_use
+from ..console.arguments import add_scene, add_workers, folder, setting, tolerance
+from ..console.outcome import FAILED, FINE, Failed, WrongUse, sentence, warn, wrong_use
+from ..support.files import output_folder, whole_file
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from synchain.models.scene import Scene
+    from synchain.models.scenes.scene import Scene
 
-    from ..sitting import SweepFailed, SweepInterrupted
-    from ..skip import Skip
-    from ..streaming import Streamed
+    from ..cells.reduce import Skip
+    from ..sweeps.sitting import SweepFailed, SweepInterrupted
+    from ..sweeps.stream import Streamed
 
 SUMMARY = "run a scene; write its results (netCDF) and a figure"
 EXAMPLES = (
@@ -83,10 +83,10 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Explain the scene where asked to; run it to a file, draw, and say how the cells ended."""
-    from ..kernels import kernel
-    from ..sitting import SweepFailed, SweepInterrupted
-    from ..skip import decide, explain
-    from ..streaming import claim, stream
+    from ..cells.kernels import kernel
+    from ..cells.reduce import decide, explain
+    from ..sweeps.sitting import SweepFailed, SweepInterrupted
+    from ..sweeps.stream import claim, stream
 
     if arguments.out is None and (arguments.resume or arguments.overwrite or not arguments.explain):
         raise WrongUse("the following arguments are required: --out\nsee: synchain run --help")
@@ -119,9 +119,9 @@ def execute(arguments: Namespace) -> int:
 
 def changed_scene(arguments: Namespace) -> Scene:
     """The scene with the changes of --set and --rtol; ValueError where they do not fit."""
-    from synchain.models.scene_file import load_scene
+    from synchain.models.scenes.file import load_scene
 
-    from ..sweep import with_axes
+    from ..sweeps.run import with_axes
 
     scene = load_scene(arguments.scene)
     changes: dict[str, Any] = {}
@@ -137,7 +137,7 @@ def changed_scene(arguments: Namespace) -> Scene:
 
 def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[str, Any]) -> Any:
     """The value of a setting as the scene wants it."""
-    from synchain.models.scene_model import check_state, unknown
+    from synchain.models.scenes.model import check_state, unknown
 
     if scene.takes(name) or name in scene.equations.state:
         return value
@@ -157,9 +157,9 @@ def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[st
 
 def _check(skip: Skip, arguments: Namespace) -> None:
     """Find out whatever can go wrong before the first cell runs."""
-    from ..certificate import check_certifiable
-    from ..kernels import kernel_source
-    from ..plan import Planner
+    from ..cells.kernels import kernel_source
+    from ..cells.plan import Planner
+    from ..sweeps.certify import check_certifiable
 
     if arguments.out is None:
         return
@@ -171,7 +171,7 @@ def _check(skip: Skip, arguments: Namespace) -> None:
 
 def _nothing_to_do(target: Path) -> int:
     """Say that the result is there already; the exit code of the run that made it."""
-    from ..result import open_result
+    from ..results.open import open_result
 
     kept = open_result(target)
     print(f"{target} holds the result of this scene already; nothing was run (--overwrite runs it again)")
@@ -228,7 +228,7 @@ def _executor(address: str | None) -> Iterator[Executor | None]:
 
 def _stopped(stop: SweepInterrupted | SweepFailed, target: Path, arguments: Namespace) -> Failed:
     """What to say about a run that did not come to its end, and how to go on."""
-    from ..unfinished import partial_path
+    from ..results.unfinished import partial_path
 
     words = [word for word in arguments.command_line if word != "--overwrite"]
     again = shlex.join([*words, *(() if arguments.resume else ("--resume",))])
@@ -258,8 +258,8 @@ def _draw(target: Path) -> Path:
 
     matplotlib.use("Agg")
     from ..figures.result_plot import draw_result
-    from ..labels import scene_of
-    from ..result import Result
+    from ..results.labels import scene_of
+    from ..results.result import Result
 
     path = target.with_suffix(".png")
     with xr.open_dataset(target, engine="scipy") as data:
@@ -271,7 +271,7 @@ def _draw(target: Path) -> Path:
 
 def _summary(name: str, scene: Scene, done: Streamed, target: Path) -> None:
     """Say how many cells ended how, failures on stderr, and where the result is."""
-    from ..status import Status
+    from ..support.status import Status
 
     progress = done.progress
     times = f"{progress.running:.1f} s, after {progress.compiling:.1f} s for the kernel"

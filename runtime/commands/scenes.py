@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ._outcome import FINE
+from ..console.outcome import FINE
 
 SUMMARY = "list the scenes that come with the package"
 EXAMPLES = ("synchain scenes",)
@@ -19,9 +19,9 @@ def execute(arguments: Namespace) -> int:
     import tomllib
     from importlib import resources
 
-    from synchain.models.scene_file import scene_names
+    from synchain.models.scenes.file import scene_names
 
-    folder = resources.files("synchain.models").joinpath("scenes")
+    folder = resources.files("synchain.models.scenes.library")
     wide = max(map(len, scene_names()))
     for name in scene_names():
         title = tomllib.loads(folder.joinpath(f"{name}.toml").read_text(encoding="utf-8")).get("title", "")

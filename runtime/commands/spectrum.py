@@ -5,11 +5,11 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from ._arguments import add_allow_code, whole
-from ._outcome import FINE, WrongUse, print_json, warn, wrong_use
+from ..console.arguments import add_allow_code, whole
+from ..console.outcome import FINE, WrongUse, print_json, warn, wrong_use
 
 if TYPE_CHECKING:
-    from synchain.models.topology import Topology
+    from synchain.models.graphs.topology import Topology
 
 SUMMARY = "print the exact eigenvalues of a graph's connectivity matrix"
 EXAMPLES = (
@@ -75,7 +75,8 @@ def execute(arguments: Namespace) -> int:
     """Print the spectrum as a table or as JSON."""
     if arguments.value and not (arguments.symbolic and arguments.matrix):
         raise WrongUse("found --value without --symbolic --matrix FILE; expected all of them")
-    from synchain.models.spectrum import spectrum, table
+    from synchain.models.spectra.solve import spectrum
+    from synchain.models.spectra.spectrum import table
 
     if arguments.symbolic:
         return _symbolic(arguments)
@@ -93,8 +94,8 @@ def execute(arguments: Namespace) -> int:
 
 def _symbolic(arguments: Namespace) -> int:
     """Print the closed form of a family with symbols for its size, or the spectrum of a matrix of letters."""
-    from synchain.models.closed_forms import closed_form
-    from synchain.models.graph_text import is_composed, read_form
+    from synchain.models.graphs.closed_forms import closed_form
+    from synchain.models.graphs.graph_text import is_composed, read_form
 
     if arguments.matrix is not None and arguments.topology is None:
         return _letters(arguments)
@@ -115,8 +116,8 @@ def _symbolic(arguments: Namespace) -> int:
 
 def _letters(arguments: Namespace) -> int:
     """Print the spectrum of a matrix of letters, or for numbers in their place."""
-    from synchain.models.spectrum import table
-    from synchain.models.symbolic_weights import read_symbols
+    from synchain.models.graphs.symbolic import read_symbols
+    from synchain.models.spectra.spectrum import table
 
     with wrong_use():
         found = read_symbols(arguments.matrix)
@@ -135,9 +136,10 @@ def _letters(arguments: Namespace) -> int:
 
 def graph(arguments: Namespace) -> Topology:
     """The graph that the arguments ask for: of a family or of one of the files."""
-    from synchain.models.graph_readers import read_edges, read_graphml
-    from synchain.models.graph_text import is_composed, read_graph
-    from synchain.models.topology import read_matrix, topology
+    from synchain.models.graphs.families import topology
+    from synchain.models.graphs.graph_text import is_composed, read_graph
+    from synchain.models.graphs.readers import read_edges, read_graphml
+    from synchain.models.graphs.topology import read_matrix
 
     files = [key for key in FILES if getattr(arguments, key) is not None]
     if arguments.directed and files != ["edges"]:

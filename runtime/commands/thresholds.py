@@ -6,16 +6,16 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ._arguments import above_zero, add_allow_code, add_workers, grid, positive, whole
-from ._drive import at_frequency, drive_words
-from ._outcome import FINE, WrongUse, print_json, warn, wrong_use
+from ..console.arguments import above_zero, add_allow_code, add_workers, grid, positive, whole
+from ..console.drive import at_frequency, drive_words
+from ..console.outcome import FINE, WrongUse, print_json, warn, wrong_use
 
 if TYPE_CHECKING:
-    from synchain.models.scene import Scene
-    from synchain.models.topology import Topology
+    from synchain.models.graphs.topology import Topology
+    from synchain.models.scenes.scene import Scene
 
-    from ..intervals import Interval
-    from ..threshold import Criterion, Thresholds
+    from ..prediction.intervals import Interval
+    from ..synchronisation.threshold import Criterion, Thresholds
 
 SUMMARY = "measure for which coupling a network synchronises, beside the prediction of the two-oscillator probe"
 EXAMPLES = (
@@ -63,8 +63,8 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Print the synchronous ranges as a table or as JSON."""
-    from ..sweep import kernel_source
-    from ..threshold import Criterion, check_probe, default_grid, thresholds
+    from ..cells.kernels import kernel_source
+    from ..synchronisation.threshold import Criterion, check_probe, default_grid, thresholds
 
     with wrong_use():
         scene = _scene(arguments)
@@ -99,8 +99,8 @@ def _effort(arguments: Namespace) -> dict[str, Any]:
 
 def _scene(arguments: Namespace) -> Scene:
     """The network that the arguments describe; ValueError where it cannot be."""
-    from synchain.models.scene import Scene
-    from synchain.models.scene_file import load_scene
+    from synchain.models.scenes.file import load_scene
+    from synchain.models.scenes.scene import Scene
 
     scene = None if arguments.scene is None else load_scene(arguments.scene)
     graph = _graph(arguments, scene)
@@ -115,7 +115,8 @@ def _scene(arguments: Namespace) -> Scene:
 
 def _graph(arguments: Namespace, scene: Scene | None) -> Topology:
     """The graph by file, by name and size, or the scene's."""
-    from synchain.models.topology import names, read_matrix, topology
+    from synchain.models.graphs.families import names, topology
+    from synchain.models.graphs.topology import read_matrix
 
     if arguments.matrix is not None:
         if arguments.n is not None or arguments.topology is not None:
@@ -156,9 +157,9 @@ def report(found: Thresholds, criterion: Criterion) -> str:
 
 def _wu_chua(found: Thresholds) -> list[tuple[str, str]]:
     """The conjecture's row, where the probe's first range starts at no coupling and ends on the grid."""
-    from synchain.models.topology import topology
+    from synchain.models.graphs.families import topology
 
-    from ..threshold import wu_chua
+    from ..synchronisation.threshold import wu_chua
 
     if not found.probe.intervals:
         return []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ._outcome import FINE
+from ..console.outcome import FINE
 
 SUMMARY = "list the families of graphs"
 EXAMPLES = ("synchain topologies",)
@@ -16,8 +16,7 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Print name, summary, smallest size and options of every family."""
-    from synchain.models.family_options import defaults
-    from synchain.models.topology import family, names
+    from synchain.models.graphs.families import defaults, family, names
 
     rows = [(name, family(name)) for name in names()]
     wide = max(len(name) for name, _ in rows)

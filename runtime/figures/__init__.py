@@ -22,7 +22,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from synchain.models.scene_checks import suggestion
+from synchain.models.inputs.checks import suggestion
 
 if TYPE_CHECKING:
     from .study import Study

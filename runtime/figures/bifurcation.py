@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from synchain.models.scene_file import load_scene
+from synchain.models.scenes.file import load_scene
 
-from ..result import Result
-from ..status import Status
+from ..results.result import Result
+from ..support.status import Status
 from .published import published
 from .study import Study
 from .style import BLACK, COLUMN, ORANGE, bands, bracket, failures, note

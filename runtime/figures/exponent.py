@@ -10,11 +10,11 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from synchain.models.scene import Scene
-from synchain.models.topology import topology
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
 
-from ..intervals import Interval, scale
-from ..msf import MSF, msf
+from ..prediction.intervals import Interval, scale
+from ..stability.msf import MSF, msf
 from .published import PAIRS, published
 from .study import Study
 from .style import BLUE, COLUMN, ORANGE, bands, bracket

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from synchain.models.frictions import regularise
-from synchain.models.plugins import load as plugin
-from synchain.models.scene import Scene
-from synchain.models.scene_file import load_scene
+from synchain.models.inputs.plugins import load as plugin
+from synchain.models.mechanics.friction import regularise
+from synchain.models.scenes.file import load_scene
+from synchain.models.scenes.scene import Scene
 
 from .study import Study
 from .style import BLUE, COLUMN, ORANGE

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from ..files import output_folder, write_text
+from ..support.files import output_folder, write_text
 from . import Drawing, load
 from . import names as all_names
 from .study import FULL, QUICK, Study

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import TwoSlopeNorm
 
-from synchain.models.scene import Scene
-from synchain.models.topology import Topology
+from synchain.models.graphs.topology import Topology
+from synchain.models.scenes.scene import Scene
 
-from ..msf import Plane, plane
-from ..transversal import transversal
+from ..prediction.modes import transversal
+from ..stability.msf import Plane, plane
 from .exponent import HIGHEST, effort, finite
 from .study import Study
 from .style import BLACK, COLUMN

@@ -17,12 +17,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from synchain.models.scene import Scene
-from synchain.models.scene_file import load_scene
+from synchain.models.scenes.file import load_scene
+from synchain.models.scenes.scene import Scene
 
-from ..intervals import Interval, intersect, scale
-from ..msf import MSF
-from ..threshold import Sweep
+from ..prediction.intervals import Interval, intersect, scale
+from ..stability.msf import MSF
+from ..synchronisation.threshold import Sweep
 from .exponent import curve, finite
 from .published import published
 from .study import Study

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..intervals import Interval
+from ..prediction.intervals import Interval
 
 __all__ = ["NOT_PERIODIC", "PAIRS", "PUBLISHED", "Published", "published"]
 

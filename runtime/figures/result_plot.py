@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..result import Result
-from ..status import Status
+from ..results.result import Result
+from ..support.status import Status
 from .style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, context, failures, new_figure, note, symbol
 
 __all__ = ["KINDS", "draw_result"]

@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 from matplotlib.lines import Line2D
 
-from synchain.models.scene import Axis, Scene
-from synchain.models.scene_file import load_scene
+from synchain.models.scenes.axis import Axis
+from synchain.models.scenes.file import load_scene
+from synchain.models.scenes.scene import Scene
 
-from ..branches import Branch
-from ..periodic import PeriodicOrbit
-from ..skeletons import skeleton
-from ..sweep import run
+from ..bifurcation.branches import Branch
+from ..bifurcation.periodic import PeriodicOrbit
+from ..bifurcation.skeleton import skeleton
+from ..sweeps.run import run
 from .bifurcation import Diagram, points
 from .study import Study
 from .style import BLACK, BLUE, COLUMN, ORANGE, PURPLE

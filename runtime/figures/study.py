@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from synchain.models.scene import Axis, Scene
-from synchain.models.topology import topology
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.axis import Axis
+from synchain.models.scenes.scene import Scene
 
-from ..intervals import Interval, scale
-from ..result import Result
-from ..sweep import run
-from ..threshold import Criterion, Sweep, probe, project, simulate
+from ..prediction.intervals import Interval, scale
+from ..results.result import Result
+from ..sweeps.run import run
+from ..synchronisation.threshold import Criterion, Sweep, probe, project, simulate
 
 __all__ = ["FULL", "QUICK", "Quality", "Study", "thin"]
 

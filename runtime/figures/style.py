@@ -18,10 +18,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from synchain.models.typeset import Latex
+from synchain.models.presentation.writer import Latex
 
-from ..files import whole_file
-from ..intervals import Interval
+from ..prediction.intervals import Interval
+from ..support.files import whole_file
 
 __all__ = [
     "BLACK",

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from synchain.models.scene_file import load_scene
+from synchain.models.scenes.file import load_scene
 
-from ..intervals import Interval, runs
-from ..result import Result
-from ..status import Status
-from ..threshold import Criterion
+from ..prediction.intervals import Interval, runs
+from ..results.result import Result
+from ..support.status import Status
+from ..synchronisation.threshold import Criterion
 from .published import published
 from .study import Study
 from .style import BLUE, COLUMN, ORANGE, bands, bracket, failures, note

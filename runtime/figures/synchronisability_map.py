@@ -2,7 +2,7 @@
 
 The function of one oscillator on a line of strengths serves all networks: the mode of the eigenvalue gamma has the exponent
 Lambda(sigma |gamma|) (Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998)).  Where the starts lead to different motions a
-network counts as stable if it is so for most of them, as in `synchain.runtime.threshold`.
+network counts as stable if it is so for most of them, as in `synchain.runtime.synchronisation.threshold`.
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from synchain.models.scene import Scene
-from synchain.models.topology import Topology, topology
+from synchain.models.graphs.families import topology
+from synchain.models.graphs.topology import Topology
+from synchain.models.scenes.scene import Scene
 
-from ..exponent import exponents
-from ..transversal import transversal
+from ..prediction.modes import transversal
+from ..stability.transversal import exponents
 from .exponent import effort
 from .published import PAIRS, published
 from .study import Study

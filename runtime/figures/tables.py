@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..status import Status
+from ..support.status import Status
 
 __all__ = ["Table", "as_csv", "status_names"]
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from synchain.models.scene import Scene
-from synchain.models.scene_file import load_scene
+from synchain.models.scenes.file import load_scene
+from synchain.models.scenes.scene import Scene
 
-from ..intervals import Interval, intersect
+from ..prediction.intervals import Interval, intersect
 from . import projection
 from .published import NOT_PERIODIC, PUBLISHED, Published, published
 from .study import Quality, Study

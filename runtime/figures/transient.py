@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from ..intervals import Interval
-from ..threshold import Sweep
+from ..prediction.intervals import Interval
+from ..synchronisation.threshold import Sweep
 from .published import NOT_PERIODIC, PUBLISHED, Published
 from .study import Study
 from .style import COLUMN, ORANGE

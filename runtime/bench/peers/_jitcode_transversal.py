@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from synchain.models.scene import Scene
+from synchain.models.scenes.scene import Scene
 
 from ._problem import Problem
 

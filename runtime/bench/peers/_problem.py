@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from synchain.models.equations import Equations
-from synchain.models.scene import Scene
+from synchain.models.dynamics.equations import Equations
+from synchain.models.scenes.scene import Scene
 
 __all__ = ["Problem", "Solve", "ladder", "load"]
 

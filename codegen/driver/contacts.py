@@ -1,0 +1,187 @@
+"""Events of set-valued friction: which step would pass one, where it lies, and what each contact does there.
+
+The gap of a contact is positive while it keeps its mode: of one that slips the sliding velocity in the direction of its
+slip, of one that sticks the distance of its load from the limits of static friction.  A step that would make a gap negative
+is taken back and tried again with the length after which the gap has just passed zero, until the passage lies at its end
+to within rounding; all contacts that have passed change together.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, minimum, select, store
+from .names import NODES, WIDTH, pushes
+from .recording import ACCEPTED, REJECTED, RUSH, STEP, STOP, inside
+
+# --- kernel text below ---
+# A gap this little below zero counts as zero; a passage is never sought closer than the shortest step to it.
+PASSED, SHORTEST = 1e-13, 1e-13
+# Steps in which an event is looked for, equally spaced; a dip is followed to its bottom where a parabola through three
+# looks comes down to this part of the third.
+LOOKS, SHALLOW = 4, 0.2
+
+
+@njit(error_model="numpy", forceinline=True)
+def gap_of(i, p, out):
+    """The gap of one contact, from what `pushes` has written."""
+    slip = load(p, 2 * NODES + i, WIDTH)
+    held = minimum(load(out, 2 * NODES + i, WIDTH), -load(out, 3 * NODES + i, WIDTH))
+    return select(absolute(slip) < 0.5, held, slip * load(out, i, WIDTH))
+
+
+@njit(error_model="numpy", forceinline=True)
+def smallest_gap(t, y, p, out, network):
+    """The smallest gap of all contacts at a state."""
+    pushes(t, y, p, out, network)
+    least = broadcast(1e300, WIDTH)
+    for i in range(NODES):
+        least = minimum(least, gap_of(i, p, out))
+    return least
+
+
+@njit(error_model="numpy")
+def gap_inside(theta, t, h, bank, y_new, dense, middle, out, network):
+    """The smallest gap at a fraction of the step."""
+    for c in range(2 * NODES):
+        store(middle, c, inside(theta, c, bank, y_new, dense))
+    return smallest_gap(t + theta * h, middle, bank, out, network)
+
+
+@njit(error_model="numpy", forceinline=True)
+def keep_gaps(look, p, out):
+    """Keep the gaps of all contacts at a look; of three looks the gaps are known."""
+    for i in range(NODES):
+        store(out, (6 + look % 3) * NODES + i, gap_of(i, p, out))
+
+
+@njit(error_model="numpy")
+def bottom(i, theta, span, t, h, bank, y_new, dense, middle, out, network):
+    """The least gap of a contact near a fraction of the step where a parabola has its bottom, and its place.
+
+    A gap that dips below zero and comes back between two looks would otherwise pass unseen.
+    """
+    gap_inside(theta, t, h, bank, y_new, dense, middle, out, network)
+    place, least = theta, gap_of(i, bank, out)
+    for divisor in (8.0, 64.0):
+        part = span / divisor
+        gap_inside(place - part, t, h, bank, y_new, dense, middle, out, network)
+        before = gap_of(i, bank, out)
+        gap_inside(place + part, t, h, bank, y_new, dense, middle, out, network)
+        after = gap_of(i, bank, out)
+        bend, slope = before - 2.0 * least + after, 0.5 * (after - before)
+        turn = minimum(maximum(select(bend > 0.0, -slope / bend, 0.0 * bend), -1.0), 1.0)
+        shifted = minimum(maximum(place + part * turn, theta - span), theta + span)
+        gap_inside(shifted, t, h, bank, y_new, dense, middle, out, network)
+        gap = gap_of(i, bank, out)
+        better = gap < least
+        place, least = select(better, shifted, place), select(better, gap, least)
+    return place, least
+
+
+@njit(error_model="numpy")
+def first_dip(k, open_lanes, t, h, bank, y_new, dense, middle, out, network):
+    """The first place (2: none) between looks k-2 and k where the gap of a contact dips below zero, and that gap."""
+    span = 1.0 / LOOKS
+    first, depth = broadcast(2.0, WIDTH), broadcast(0.0, WIDTH)
+    for i in range(NODES):
+        earlier = load(out, (6 + (k - 2) % 3) * NODES + i, WIDTH)
+        before = load(out, (6 + (k - 1) % 3) * NODES + i, WIDTH)
+        gap = load(out, (6 + k % 3) * NODES + i, WIDTH)
+        bend, slope = earlier - 2.0 * before + gap, 0.5 * (gap - earlier)
+        dips = open_lanes & (absolute(slope) < bend) & (before - 0.5 * slope * slope / bend < SHALLOW * gap)
+        if any_lane(dips):
+            turn = minimum(maximum(span * (k - 1.0 - slope / bend), 0.0), 1.0)
+            place, least = bottom(i, turn, span, t, h, bank, y_new, dense, middle, out, network)
+            sunk = dips & (least < -PASSED) & (place < first)
+            first, depth = select(sunk, place, first), select(sunk, least, depth)
+    return first, depth
+
+
+@njit(error_model="numpy")
+def first_passage(accept, t, h, bank, y_new, dense, middle, out, network):
+    """The fraction of the step after which the first gap has just become negative; 2 in lanes where none does."""
+    zero, span = broadcast(0.0, WIDTH), 1.0 / LOOKS
+    low, high, f_low, f_high = zero, broadcast(2.0, WIDTH), zero, broadcast(-1.0, WIDTH)
+    earlier, before, open_lanes = zero, smallest_gap(t, bank, bank, out, network), accept
+    keep_gaps(0, bank, out)
+    for k in range(1, LOOKS + 1):
+        theta = broadcast(k * span, WIDTH)
+        if k == LOOKS:
+            gap = smallest_gap(t + h, y_new, bank, out, network)
+        else:
+            gap = gap_inside(theta, t, h, bank, y_new, dense, middle, out, network)
+        keep_gaps(k, bank, out)
+        hit = open_lanes & (gap < -PASSED)
+        f_low, low = select(hit, maximum(before, 0.0), f_low), select(hit, theta - span, low)
+        f_high, high = select(hit, gap, f_high), select(hit, theta, high)
+        if k > 1:
+            place, least = first_dip(k, open_lanes & ~hit, t, h, bank, y_new, dense, middle, out, network)
+            sunk, late = place < 1.5, place > theta - span
+            f_low, low = (
+                select(sunk, maximum(select(late, before, earlier), 0.0), f_low),
+                select(sunk, select(late, theta - span, theta - 2.0 * span), low),
+            )
+            f_high, high = select(sunk, least, f_high), select(sunk, place, high)
+            hit = hit | sunk
+        earlier, before, open_lanes = before, gap, open_lanes & ~hit
+    return narrowed(low, high, f_low, f_high, t, h, bank, y_new, dense, middle, out, network)
+
+
+@njit(error_model="numpy")
+def narrowed(low, high, f_low, f_high, t, h, bank, y_new, dense, middle, out, network):
+    """The end of the bracket `high` (2: no bracket) moved back until its gap is just below zero."""
+    found = high < 1.5
+    if any_lane(found):
+        for k in range(60):
+            active = found & (f_high < -0.5 * PASSED) & (high - low > 1e-15)
+            if not any_lane(active):
+                break
+            secant = high - f_high * (high - low) / (f_high - f_low)
+            fit = (secant > low) & (secant < high)
+            middle_point = 0.5 * (low + high)
+            theta = middle_point if k % 3 == 2 else select(fit, secant, middle_point)
+            theta = select(active, theta, 0.0 * high)
+            gap = gap_inside(theta, t, h, bank, y_new, dense, middle, out, network)
+            below = active & (gap < 0.0)
+            above = active & ~(gap < 0.0)
+            # the end that stays is given half its weight (Illinois)
+            high, f_high = select(below, theta, high), select(below, gap, select(above, 0.5 * f_high, f_high))
+            low, f_low = select(above, theta, low), select(above, gap, select(below, 0.5 * f_low, f_low))
+    return high
+
+
+@njit(error_model="numpy", forceinline=True)
+def take_back(accept, t, h, bank, y_new, dense, middle, out, network):
+    """Take back the steps that pass an event before their end, and aim at it; returns the lanes that go on."""
+    theta = first_passage(accept, t, h, bank, y_new, dense, middle, out, network)
+    least = SHORTEST * maximum(t, 1.0)
+    wanted = maximum(theta * h, least)
+    early = accept & (theta < 1.5) & (wanted < h) & (h > 2.0 * least)
+    # a gap that closes at once after it has opened may be an error of a long step: a shorter one will tell
+    doubtful = early & (theta * h < least) & (h > 16.0 * least)
+    store(bank, STEP, select(doubtful, 0.25 * h, load(bank, STEP, WIDTH)))
+    store(bank, STOP, select(early & ~doubtful, t + wanted, load(bank, STOP, WIDTH)))
+    store(bank, ACCEPTED, load(bank, ACCEPTED, WIDTH) - select(early, 1.0, 0.0 * h))
+    store(bank, REJECTED, load(bank, REJECTED, WIDTH) + select(early, 1.0, 0.0 * h))
+    rush = load(bank, RUSH, WIDTH)
+    short = h <= 100.0 * least
+    store(bank, RUSH, select(accept & ~early, select(short, rush + 1.0, 0.0), rush))
+    return accept & ~early
+
+
+@njit(error_model="numpy")
+def change_modes(moved, t, bank, out, network):
+    """Let every contact whose gap has closed stick, slip or turn, by what acts on it; `t` is the time of the event."""
+    if not any_lane(moved & (smallest_gap(t, bank, bank, out, network) <= 0.0)):
+        return
+    for i in range(NODES):
+        slip, speed = load(bank, 2 * NODES + i, WIDTH), load(bank, NODES + i, WIDTH)
+        up, down = load(out, 2 * NODES + i, WIDTH), load(out, 3 * NODES + i, WIDTH)
+        sticking = absolute(slip) < 0.5
+        touch = moved & ~sticking & (slip * load(out, i, WIDTH) <= 0.0)
+        leave = moved & sticking & (minimum(up, -down) <= 0.0)
+        lands = select(up < 0.0, 1.0, select(down > 0.0, -1.0, 0.0 * slip))
+        leaves = select(up <= 0.0, 1.0, -1.0 + 0.0 * slip)
+        store(bank, NODES + i, select(touch, load(out, NODES + i, WIDTH), speed))
+        store(bank, 2 * NODES + i, select(touch, lands, select(leave, leaves, slip)))

@@ -1,0 +1,213 @@
+"""What one node or one link contributes, as assignments that every exported language can write."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import sympy as sp
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.graphs.links import Link
+from synchain.models.mechanics.calculus import derivative
+from synchain.models.mechanics.components import Edge
+
+from .printer import Dialect, decimal, write
+
+__all__ = [
+    "LARGEST_UNROLLED", "Body", "Place", "Store", "Syntax", "check_inertia", "constant_mass", "link_body", "link_places",
+    "mass_body", "node_body", "node_places", "own_parameters", "parameters", "rate_symbols", "weights", "wrapped",
+]  # fmt: skip
+
+LARGEST_UNROLLED = 8
+"""Networks up to this size are written node by node, larger ones as loops."""
+
+Place = tuple[int, int]
+"""(row, column) of an entry in the block of one node or link, by component of the state."""
+
+Block: TypeAlias = tuple[tuple[sp.Expr, ...], ...]
+
+Store: TypeAlias = Callable[[Any, str], str]
+"""Makes the statement that stores the text of a value at a component or place."""
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """Temporaries in order, then the results that are not zero, with the component or place that each belongs to."""
+
+    steps: tuple[tuple[sp.Symbol, sp.Expr], ...]
+    results: tuple[tuple[Any, sp.Expr], ...]
+
+    def uses(self, symbols: Iterable[sp.Symbol]) -> list[sp.Symbol]:
+        """Those of the symbols that occur."""
+        found: set[sp.Symbol] = set().union(*(e.free_symbols for _, e in (*self.steps, *self.results)))
+        return [s for s in symbols if s in found]
+
+
+@dataclass(frozen=True, slots=True)
+class Syntax:
+    """How a language declares a number and a whole number, assigns, comments, and names an entry of a matrix.
+
+    `braces` where blocks are in braces; `reads` where parameters come in an array.
+    """
+
+    dialect: Dialect
+    declare: str
+    whole: str
+    assign: str
+    comment: str
+    entry: str
+    braces: bool = False
+    reads: bool = True
+
+    def body(self, body: Body, loads: dict[sp.Symbol, str], store: Store) -> list[str]:
+        """Read what is used, compute, and store; `loads` says where each state is, `store` writes a result."""
+        lines = [self.declare.format(s.name, loads[s]) for s in body.uses(loads)]
+        lines += [self.declare.format(s.name, write(e, self.dialect)) for s, e in body.steps]
+        return lines + [store(place, write(e, self.dialect)) for place, e in body.results]
+
+
+def node_body(equations: Equations, jacobian: bool = False, i: int = 0) -> Body:
+    """The right-hand side of node `i` (component -> value), or its block of the Jacobian (place -> value)."""
+    if jacobian:
+        return _body({place: e for place, e in node_places(equations, i).items()})
+    return _body(dict(enumerate(equations.node_at(i).rhs)), every=True)
+
+
+def node_places(equations: Equations, i: int = 0) -> dict[Place, sp.Expr]:
+    """The entries of a node's own block of the Jacobian that are not zero."""
+    return _places(equations.node_at(i).jacobian())
+
+
+def link_places(equations: Equations, link: Link | None = None) -> tuple[dict[Place, sp.Expr], dict[Place, sp.Expr]]:
+    """The entries that a link adds to the block of its target, and those in the block (target, source)."""
+    edge = _edge(equations, link)
+    if edge is None:
+        return {}, {}
+    here, there = (_places(_at_rates(edge, block, ends)) for block, ends in
+                   ((edge.jacobian_here(), edge.here), (edge.jacobian_there(), edge.there)))  # fmt: skip
+    return here, there
+
+
+def rate_symbols(edge: Edge) -> tuple[sp.Symbol, ...]:
+    """Symbols for the rates of the states at both ends of a link."""
+    ends = (("i", edge.here), ("j", edge.there))
+    return tuple(sp.Symbol(f"rate_{end}{k}", real=True) for end, states in ends for k in range(len(states)))
+
+
+def _at_rates(edge: Edge, block: Block, states: tuple[sp.Symbol, ...]) -> Block:
+    """A block of d(rhs)/d(state) - d(M rates)/d(state) at fixed rates, the derivatives by some states of a link."""
+    if not edge.inertia:
+        return block
+    masses = sp.Matrix.hstack(*(sp.Matrix(part) for part in edge.inertia))
+    push = masses * sp.Matrix(rate_symbols(edge))
+    return tuple(
+        tuple(e - derivative(push[r], s) for e, s in zip(row, states, strict=True)) for r, row in enumerate(block)
+    )
+
+
+def mass_body(equations: Equations, link: Link | None = None) -> Body:
+    """What a link adds to M in M d(state)/dt = rhs, ((False or True for there, place) -> value)."""
+    edge = _edge(equations, link)
+    if edge is None:
+        return Body((), ())
+    weight = {} if link is None else {edge.weight: sp.Rational(link[2].numerator, link[2].denominator)}
+    blocks = enumerate(edge.inertia)
+    return _body(
+        {(bool(end), place): e.xreplace(weight) for end, block in blocks for place, e in _places(block).items()}
+    )
+
+
+def constant_mass(equations: Equations) -> bool:
+    """True where M depends on parameters alone."""
+    ends = ((edge, {*edge.here, *edge.there}) for edge in equations.edges)
+    return not any(e.free_symbols & states for edge, states in ends for b in edge.inertia for row in b for e in row)
+
+
+def check_inertia(equations: Equations, language: str) -> None:
+    """Raise ValueError where a source text of many nodes cannot solve for the rates."""
+    if equations.inertial and not (equations.mixed or equations.n <= LARGEST_UNROLLED):
+        if language == "python" and constant_mass(equations):
+            return
+        other = "" if language == "python" else "; export Python, which has sparse solvers"
+        raise ValueError(
+            f"links with inertia in {language}: expected at most {LARGEST_UNROLLED} nodes, found {equations.n}{other}"
+        )
+
+
+def _edge(equations: Equations, link: Link | None) -> Edge | None:
+    if link is None:
+        return equations.edge if equations.links else None
+    return equations.edge_at(link)
+
+
+def link_body(equations: Equations, link: Link | None = None, jacobian: bool = False) -> Body:
+    """What a link adds to its target (component -> value), or to the Jacobian ((False or True for there, place) -> value).
+
+    Without a `link` the weight stays a symbol.
+    """
+    edge = _edge(equations, link)
+    if edge is None:
+        return Body((), ())
+    table: dict[Any, sp.Expr] = dict(enumerate(edge.rhs))
+    if jacobian:
+        table = {
+            (there, place): e for there in (False, True) for place, e in link_places(equations, link)[there].items()
+        }
+    if link is not None:
+        weight = {edge.weight: sp.Rational(link[2].numerator, link[2].denominator)}
+        table = {place: e.xreplace(weight) for place, e in table.items()}
+    return _body(table)
+
+
+def parameters(equations: Equations, bodies: Iterable[Body]) -> list[int]:
+    """The places, in Equations.parameters, of the parameters that all nodes share and some bodies use."""
+    used = {s.name for body in bodies for s in body.uses(_parameter_symbols(equations))}
+    return [k for k, name in enumerate(equations.parameters) if name in used]
+
+
+def own_parameters(equations: Equations, i: int) -> dict[sp.Symbol, int]:
+    """The parameters that node `i` has for itself, with their places in Equations.parameters."""
+    names = equations.parameters
+    own = (s for s in equations.node_at(i).parameters if s.name in equations.varied)
+    return {s: names.index(f"{s.name}_{i + 1}") for s in own}
+
+
+def _parameter_symbols(equations: Equations) -> list[sp.Symbol]:
+    return [sp.Symbol(name, real=True) for name in equations.parameters]
+
+
+def _places(block: tuple[tuple[sp.Expr, ...], ...]) -> dict[Place, sp.Expr]:
+    table = {(r, c): e for r, row in enumerate(block) for c, e in enumerate(row)}
+    return {place: e for place, e in table.items() if e != 0}
+
+
+def _body(table: dict, every: bool = False) -> Body:
+    """Common parts are computed once: w1, w2, …, which no symbol of a portable model is called."""
+    kept = {place: sp.sympify(e) for place, e in table.items() if every or e != 0}
+    names = (sp.Symbol(f"w{k}", real=True) for k in range(1, 1_000_000))
+    conditions = {pair.cond for e in kept.values() for choice in e.atoms(sp.Piecewise) for pair in choice.args}
+    hidden = {
+        c: sp.Symbol(f"condition {k}") for k, c in enumerate(sorted(conditions - {sp.true}, key=sp.default_sort_key))
+    }
+    shown = {symbol: c for c, symbol in hidden.items()}  # a temporary is a number: conditions stay where they are
+    steps, results = sp.cse([e.xreplace(hidden) for e in kept.values()], symbols=names, order="canonical")
+    values = [e.xreplace(shown) for e in results]
+    return Body(tuple((s, e.xreplace(shown)) for s, e in steps), tuple(zip(kept, values, strict=True)))
+
+
+def wrapped(numbers: Iterable[str], indent: str = "    ", width: int = 110) -> list[str]:
+    """Numbers of a long table with commas between them, broken into lines."""
+    lines, line = [], indent
+    for number in numbers:
+        if len(line) + len(number) > width:
+            lines.append(line.rstrip())
+            line = indent
+        line += f"{number}, "
+    return [*lines, line.rstrip()]
+
+
+def weights(equations: Equations) -> list[str]:
+    """The weights of the links as decimals."""
+    return [decimal(weight) for _, _, weight in equations.links]

@@ -1,0 +1,176 @@
+"""The equations as a C99 source file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from synchain.models.dynamics.equations import Equations
+
+from .body import Syntax, check_inertia, constant_mass, link_places, node_places, weights, wrapped
+from .header import given_values, header
+from .loops import is_unrolled, jacobian_lines, mass_lines, rhs_lines
+from .names import portable
+from .printer import C
+
+__all__ = ["to_c"]
+
+SYNTAX = Syntax(
+    C,
+    declare="const double {} = {};",
+    whole="const int {} = {};",
+    assign="{} {} {};",
+    comment="/* {} */",
+    entry="matrix[{}*DIMENSION + {}]",
+    braces=True,
+)
+ARGUMENTS = "double t, const double *state, const double *numbers, double *"
+SIGN = ["static double sign(double x)", "{", "    return (double)((x > 0.0) - (x < 0.0));", "}", ""]
+
+
+SOLVE = """static void solve(double *mass, double *right, int columns)
+{
+    for (int k = 0; k < DIMENSION; k++) { /* Gaussian elimination with row exchanges */
+        int pivot = k;
+        for (int i = k + 1; i < DIMENSION; i++)
+            if (fabs(mass[i*DIMENSION + k]) > fabs(mass[pivot*DIMENSION + k])) pivot = i;
+        for (int j = 0; j < DIMENSION; j++) {
+            const double old = mass[k*DIMENSION + j];
+            mass[k*DIMENSION + j] = mass[pivot*DIMENSION + j];
+            mass[pivot*DIMENSION + j] = old;
+        }
+        for (int j = 0; j < columns; j++) {
+            const double old = right[k*columns + j];
+            right[k*columns + j] = right[pivot*columns + j];
+            right[pivot*columns + j] = old;
+        }
+        for (int i = k + 1; i < DIMENSION; i++) {
+            const double factor = mass[i*DIMENSION + k]/mass[k*DIMENSION + k];
+            for (int j = k; j < DIMENSION; j++) mass[i*DIMENSION + j] -= factor*mass[k*DIMENSION + j];
+            for (int j = 0; j < columns; j++) right[i*columns + j] -= factor*right[k*columns + j];
+        }
+    }
+    for (int k = DIMENSION - 1; k >= 0; k--)
+        for (int j = 0; j < columns; j++) {
+            for (int i = k + 1; i < DIMENSION; i++) right[k*columns + j] -= mass[k*DIMENSION + i]*right[i*columns + j];
+            right[k*columns + j] /= mass[k*DIMENSION + k];
+        }
+}
+"""
+"""Solves a dense system of DIMENSION equations for several right-hand sides in place."""
+
+
+def to_c(equations: Equations, values: Mapping[str, float] | None = None) -> str:
+    """Return a C99 source with `rhs` and `jacobian`; up to eight nodes are written out, more are loops.
+
+    `values` (name -> number) are written as PARAMETERS' defaults.  Raises ValueError for functions that C99 lacks and for
+    unknown or missing values.
+    """
+    known = given_values(equations, values)
+    model, changed = portable(equations)
+    known = dict(zip(model.parameters, known.values(), strict=bool(known)))
+    small = is_unrolled(model)
+    check_inertia(model, "c")
+    functions = [*_rhs(model), "", *_jacobian(model, small)]
+    lines = [
+        "/*",
+        *(f" * {_safe(line)}".rstrip() for line in header(equations, model, changed, known)),
+        *_usage(small),
+        " */",
+        "",
+    ]
+    lines += ["#include <math.h>", *(["#include <string.h>"] if small else []), ""]
+    lines += _sizes(model, small)
+    if known:
+        lines += ["/* values of the scene, in the order of `numbers` */"]
+        lines += ["const double defaults[PARAMETERS] = {", *wrapped(map(repr, known.values())), "};", ""]
+    lines += [*SOLVE.splitlines(), ""] if model.inertial else []
+    lines += [*(SIGN if _occurs("sign", "\n".join(functions)) else []), *functions]
+    return "\n".join(lines) + "\n"
+
+
+def _safe(line: str) -> str:
+    """Text that cannot end the comment it stands in."""
+    return line.replace("\\", "/").replace("*/", "* /").replace("/*", "/ *")
+
+
+def _usage(small: bool) -> list[str]:
+    lines = [
+        " *",
+        " * rhs writes d(state)/dt to rates; state and rates have DIMENSION numbers, numbers has PARAMETERS.",
+    ]
+    if small:
+        return [*lines, " * jacobian writes d(rates)/d(state) to matrix, row by row, DIMENSION*DIMENSION numbers."]
+    return [
+        *lines,
+        " * jacobian writes the ENTRIES entries of d(rates)/d(state) to values; jacobian_places writes their rows and",
+        " * columns (from 0).  Entries at one place add up, as in the coordinate format of sparse matrices.",
+    ]
+
+
+def _sizes(model: Equations, small: bool) -> list[str]:
+    names = {"NODES": model.n, "DIMENSION": model.dimension, "PARAMETERS": len(model.parameters)}
+    if not small:
+        here, there = link_places(model)
+        links = len(model.links)
+        names |= {"LINKS": links, "ENTRIES": len(node_places(model)) * model.n + (len(here) + len(there)) * links}
+    lines = [f"enum {{ {', '.join(f'{name} = {value}' for name, value in names.items())} }};", ""]
+    if small or not model.links:
+        return lines
+    tables = {"TARGET": [str(i) for i, _, _ in model.links], "SOURCE": [str(j) for _, j, _ in model.links]}
+    for name, table in tables.items():
+        lines += [f"static const int {name}[LINKS] = {{", *wrapped(table), "};"]
+    if model.edge is not None and any(e.has(model.edge.weight) for e in model.edge.rhs):
+        lines += ["static const double WEIGHT[LINKS] = {", *wrapped(weights(model)), "};"]
+    return [*lines, ""]
+
+
+def _function(head: str, lines: list[str]) -> list[str]:
+    """A function; arguments that are not used are named, so that compilers do not warn."""
+    text = "\n".join(lines)
+    arguments = re.findall(r"(\w+)[,)]", head)
+    unused = [f"(void){name};" for name in arguments if not _occurs(name, text)]
+    return [head, "{", *(f"    {line}" for line in (*unused, *lines)), "}"]
+
+
+def _occurs(name: str, text: str) -> bool:
+    return re.search(rf"\b{name}\b", text) is not None
+
+
+def _rhs(model: Equations) -> list[str]:
+    return _function(f"void rhs({ARGUMENTS}rates)", [*rhs_lines(model, SYNTAX), *_solved(model, "rates", 1)])
+
+
+def _solved(model: Equations, name: str, columns: int) -> list[str]:
+    """Statements that multiply by the inverse of the mass matrix where it is not the identity."""
+    if not model.inertial:
+        return []
+    lines = ["double mass_[DIMENSION*DIMENSION] = {0.0};"]
+    lines += ["for (int k_ = 0; k_ < DIMENSION; k_++) mass_[k_*DIMENSION + k_] = 1.0;", *mass_lines(model, SYNTAX)]
+    return [*lines, f"solve(mass_, {name}, {columns if columns == 1 else 'DIMENSION'});"]
+
+
+def _jacobian(model: Equations, small: bool) -> list[str]:
+    lines = jacobian_lines(model, SYNTAX)
+    if small:
+        lines.insert(0, "memset(matrix, 0, sizeof(double)*DIMENSION*DIMENSION);")
+        if model.inertial and not constant_mass(model):
+            lines[:0] = ["double rates[DIMENSION];", "rhs(t, state, numbers, rates);"]
+        lines += _solved(model, "matrix", model.dimension)
+        return _function(f"void jacobian({ARGUMENTS}matrix)", lines)
+    return [*_function(f"void jacobian({ARGUMENTS}values)", lines), "", *_places(model)]
+
+
+def _places(model: Equations) -> list[str]:
+    """The function that says where the entries of the Jacobian are."""
+    lines = []
+    for r, c in node_places(model):
+        lines.append(_place("i", "NODES", f"{r}*NODES + i", f"{c}*NODES + i"))
+    for source, block in zip(("TARGET", "SOURCE"), link_places(model), strict=True):
+        for r, c in block:
+            lines.append(_place("link", "LINKS", f"{r}*NODES + TARGET[link]", f"{c}*NODES + {source}[link]"))
+    return _function("void jacobian_places(int *rows, int *columns)", [*(["int k = 0;"] if lines else []), *lines])
+
+
+def _place(index: str, end: str, row: str, column: str) -> str:
+    return f"for (int {index} = 0; {index} < {end}; {index}++) {{ rows[k] = {row}; columns[k++] = {column}; }}"

@@ -1,0 +1,124 @@
+"""Names that C99, Python and Numba all accept for the symbols of a model."""
+
+from __future__ import annotations
+
+import builtins
+import keyword
+import re
+import unicodedata
+from dataclasses import replace
+
+import sympy as sp
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import Edge, Node
+
+__all__ = ["portable"]
+
+_C = """auto break case char const continue default do double else enum extern float for goto if inline int long register
+restrict return short signed sizeof static struct switch typedef union unsigned void volatile while asm typeof bool true
+false main NULL EOF errno INFINITY NAN HUGE_VAL HUGE_VALF HUGE_VALL OVERFLOW UNDERFLOW DOMAIN SING PLOSS TLOSS linux unix
+i386 vax sun alignas alignof catch char16_t char32_t constexpr decltype delete dynamic_cast explicit export friend
+mutable namespace new noexcept nullptr operator private protected public static_assert template this thread_local throw
+typeid typename using virtual wchar_t and_eq bitand bitor compl not_eq or_eq xor xor_eq near far"""
+_MATH = """acos acosh asin asinh atan atan2 atanh cbrt ceil copysign cos cosh erf erfc exp exp2 exp10 expm1 fabs fdim floor
+fma fmax fmin fmod frexp gamma hypot ilogb ldexp lgamma llrint llround log log10 log1p log2 logb lrint lround modf nan
+nearbyint nextafter nexttoward pow pow10 remainder remquo rint round scalb scalbln scalbn significand sin sinh sqrt tan tanh
+tgamma trunc drem finite isinf isnan isfinite isnormal signbit fpclassify signgam j0 j1 jn y0 y1 yn float_t double_t"""
+_OWN = """np math types cfunc carray csc_matrix lsoda_sig address rhs jac jacobian jacobian_places sparsity state rates
+numbers matrix mass_ solve right_ values sign i_ j_ k_ link_ weight_ NODES DIMENSION PARAMETERS LINKS ENTRIES TARGET SOURCE
+WEIGHT ROWS COLUMNS STATE NODE HEAVY defaults memset"""
+RESERVED = {*f"{_C} {_MATH} {_OWN}".split(), *keyword.kwlist, *keyword.softkwlist, *dir(builtins)}
+"""Words of the languages, of their mathematics and of the exported text; a symbol of that name gets an underscore."""
+
+_MACRO = re.compile(r"(M|FP|MATH)_\w+")
+_LATER = re.compile(r"w[0-9]+|rate_[ij][0-9]+|mass_[0-9]+_")
+
+
+def portable(equations: Equations) -> tuple[Equations, dict[str, str]]:
+    """Return the same equations in names that every exported language accepts, and the names that changed."""
+    swap: dict[sp.Symbol, sp.Symbol] = {}
+    shown = dict.fromkeys(s for node in equations.nodes for s in (*node.state, *node.parameters))
+    taken = {s.name for s in shown if _fine(s.name)} | {"t"}
+    for s in shown:
+        swap[s] = _renamed(s, taken)
+    first, *others = (_node(node, swap) for node in equations.nodes)
+    changed = {s.name: new.name for s, new in swap.items() if s.name != new.name}
+    edges = {}
+    for edge in equations.edges:
+        edges[edge], more = _edge(edge, swap, taken)
+        swap |= dict(zip(edge.parameters, edges[edge].parameters, strict=True))  # other links share them
+        changed |= more
+    made = replace(
+        equations,
+        node=first,
+        others=tuple(others),
+        edge=edges.get(equations.edge) if equations.edge is not None else None,
+        joints=tuple((pair, edges[edge]) for pair, edge in equations.joints),
+        varied=tuple(swap[sp.Symbol(name, real=True)].name for name in equations.varied),
+    )
+    return made, changed
+
+
+def _node(node: Node, swap: dict[sp.Symbol, sp.Symbol]) -> Node:
+    law = None if node.law is None else node.law.xreplace(swap)
+    return Node(_all(node.state, swap), _all(node.rhs, swap), _all(node.parameters, swap), law=law)
+
+
+def _edge(edge: Edge, outer: dict[sp.Symbol, sp.Symbol], taken: set[str]) -> tuple[Edge, dict[str, str]]:
+    """The edge in portable names: parameters that the node shares keep theirs, states and weight get free ones."""
+    swap: dict[sp.Symbol, sp.Symbol] = {}
+    changed = {}
+    for s in edge.parameters:
+        if s in outer:
+            swap[s] = outer[s]
+        else:
+            free = s.name not in taken and _fine(s.name)
+            swap[s] = sp.Symbol(s.name, real=True) if free else _renamed(s, taken, True)
+            taken.add(swap[s].name)
+            if swap[s].name != s.name:
+                changed[s.name] = swap[s].name
+    for s in (*edge.here, *edge.there):
+        swap[s] = _renamed(s, taken, s.name in taken)
+        taken.add(swap[s].name)
+    swap[edge.weight] = sp.Symbol("weight_", real=True)
+    return Edge(
+        _all(edge.here, swap),
+        _all(edge.there, swap),
+        swap[edge.weight],
+        _all(edge.rhs, swap),
+        _all(edge.parameters, swap),
+        tuple(tuple(_all(row, swap) for row in block) for block in edge.inertia),
+    ), changed
+
+
+def _all(expressions: tuple[sp.Expr, ...], swap: dict[sp.Symbol, sp.Symbol]) -> tuple[sp.Expr, ...]:
+    return tuple(sp.sympify(e).xreplace(swap) for e in expressions)
+
+
+def _fine(name: str) -> bool:
+    plain = re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) is not None and "__" not in name
+    return plain and name not in RESERVED and not _MACRO.fullmatch(name) and not _LATER.fullmatch(name)
+
+
+def _renamed(s: sp.Symbol, taken: set[str], occupied: bool = False) -> sp.Symbol:
+    """The symbol itself where its name is fine and free, else one of a similar name."""
+    if _fine(s.name) and not occupied:
+        return sp.Symbol(s.name, real=True)
+    name = re.sub("_+", "_", "".join(map(_ascii, unicodedata.normalize("NFKC", s.name)))).strip("_") or "symbol"
+    name = name if name[0].isalpha() else f"s_{name}"
+    base, number = name if _fine(name) else f"{name}_", 2
+    name = base
+    while name in taken or not _fine(name):
+        name, number = f"{base.rstrip('_')}_{number}", number + 1
+    taken.add(name)
+    return sp.Symbol(name, real=True)
+
+
+def _ascii(letter: str) -> str:
+    """A letter of C: Greek ones by their names, whatever else there is as an underscore."""
+    if letter.isascii():
+        return letter if letter.isalnum() else "_"
+    words = unicodedata.name(letter, "").split()
+    greek = words[:1] == ["GREEK"] and "LETTER" in words
+    return words[words.index("LETTER") + 1].lower() if greek else "_"

@@ -1,0 +1,56 @@
+"""The right-hand side as Python text that Numba compiles to a C function with the signature of NumbaLSODA."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from synchain.models.dynamics.equations import Equations
+
+from .body import Syntax, check_inertia, weights, wrapped
+from .header import given_values, header
+from .loops import is_unrolled, mass_lines, rhs_lines
+from .names import portable
+from .printer import NUMBA
+
+__all__ = ["to_numba"]
+
+SYNTAX = Syntax(
+    NUMBA, declare="{} = {}", whole="{} = {}", assign="{} {} {}", comment="# {}", entry="matrix[{}, {}]"
+)  # fmt: skip
+
+
+def to_numba(equations: Equations, values: Mapping[str, float] | None = None) -> str:
+    """Return a module whose `rhs` is a Numba cfunc of (t, state, rates, numbers), the signature lsoda_sig of NumbaLSODA.
+
+    Up to eight nodes are written out, more are loops; `values` (name -> number) become the array PARAMETERS.  Raises
+    ValueError for functions that Python's math lacks and for unknown or missing values.
+    """
+    known = given_values(equations, values)
+    model, changed = portable(equations)
+    known = dict(zip(model.parameters, known.values(), strict=bool(known)))
+    lines = [f"# {line}".rstrip() for line in header(equations, model, changed, known)]
+    lines += ["#", "# Use: numbalsoda.lsoda(rhs.address, state, times, data=numbers); numbers in the order above."]
+    lines += ["", "import math", "", "import numpy as np", "from numba import cfunc, types", ""]
+    lines += [f"NODES, DIMENSION = {model.n}, {model.dimension}"]
+    if known:
+        lines += ["PARAMETERS = np.array([", *wrapped(map(repr, known.values())), "])"]
+    if not is_unrolled(model) and model.links:
+        ends = {"TARGET": [str(i) for i, _, _ in model.links], "SOURCE": [str(j) for _, j, _ in model.links]}
+        lines += [f"LINKS = {len(model.links)}"]
+        for name, table in {**ends, "WEIGHT": weights(model)}.items():
+            lines += [f"{name} = np.array([", *wrapped(table), "])"]
+    pointer = "types.CPointer(types.double)"
+    lines += [f"lsoda_sig = types.void(types.double, {pointer}, {pointer}, {pointer})", "", ""]
+    check_inertia(model, "numba")
+    lines += ["@cfunc(lsoda_sig)", "def rhs(t, state, rates, numbers):"]
+    inner = rhs_lines(model, SYNTAX)
+    if model.inertial:
+        inner += ["mass_ = np.eye(DIMENSION)", *mass_lines(model, SYNTAX), "right_ = np.empty(DIMENSION)"]
+        inner += [
+            "for k_ in range(DIMENSION):",
+            "    right_[k_] = rates[k_]",
+            "right_ = np.linalg.solve(mass_, right_)",
+        ]
+        inner += ["for k_ in range(DIMENSION):", "    rates[k_] = right_[k_]"]
+    lines += ['    """Write d(state)/dt to `rates`."""', *(f"    {line}" for line in inner)]
+    return "\n".join(lines) + "\n"

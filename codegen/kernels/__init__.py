@@ -1,0 +1,1 @@
+"""Whole kernel modules: step and driver put together, kept on disk, compiled and loaded."""

@@ -1,0 +1,190 @@
+"""The folder of compiled kernels.  Code is loaded from it, so a folder that others can change is refused.
+
+The folder is opened once and its files are reached through it, so that nobody can put another folder in its place between
+a check and what is read.  A wrong bit in machine code is a crash or a wrong number, so the machine code of a kernel is one
+file that begins with a checksum; it is read once, and the bytes that were checked are those that are loaded.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import secrets
+import shutil
+import stat
+import sys
+from contextlib import suppress
+from dataclasses import dataclass
+from io import FileIO
+from pathlib import Path
+from types import TracebackType
+
+from synchain.models.inputs.regular_file import open_regular
+
+__all__ = ["Folder", "cache_folder", "clear", "describe", "open_folder"]
+
+DIGEST = hashlib.sha256().digest_size
+
+
+def cache_folder() -> Path:
+    """Return where kernels are kept: SYNCHAIN_CACHE, or `synchain` in the user's cache folder (it may not exist yet)."""
+    wish = os.environ.get("SYNCHAIN_CACHE", "")
+    if wish:
+        return Path(wish).expanduser().absolute()
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "synchain"
+
+
+@dataclass(frozen=True, slots=True)
+class Folder:
+    """A cache folder that is open: `path` names it, and `descriptor` is what its files are reached through.
+
+    Windows has no such descriptors; there it is None, and files are reached by their paths.
+    """
+
+    path: Path
+    descriptor: int | None
+
+    def __enter__(self) -> Folder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, problem: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.descriptor is not None:
+            os.close(self.descriptor)
+
+    def read(self, name: str) -> bytes | None:
+        """Return what a file holds, None if there is none.
+
+        Raises PermissionError if it belongs to another user or others may write to it, OSError if it is no file.
+        """
+        try:
+            file = open_regular(self._at(name), flags=getattr(os, "O_NOFOLLOW", 0), folder=self.descriptor)
+        except FileNotFoundError:
+            return None
+        with file:
+            _check_owner(self.path / name, os.fstat(file.fileno()))
+            return file.readall()
+
+    def write(self, name: str, data: bytes) -> None:
+        """Write a file that appears whole or not at all, for its owner alone."""
+        temporary = f"{name}-{secrets.token_hex(8)}.tmp"
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+        descriptor = os.open(self._at(temporary), flags, 0o600, dir_fd=self.descriptor)
+        try:
+            with FileIO(descriptor, "wb") as file:
+                left = memoryview(data)
+                while left:
+                    left = left[file.write(left) :]
+            here = self.descriptor
+            os.replace(self._at(temporary), self._at(name), src_dir_fd=here, dst_dir_fd=here)
+        except BaseException:
+            self.delete(temporary)
+            raise
+
+    def machine_code(self, name: str) -> bytes | None:
+        """Return the machine code of the kernel `name` as it was kept; None if there is none or it has changed since."""
+        data = self.read(f"{name}.code")
+        if data is None or data[:DIGEST] != _digest(name, data[DIGEST:]):
+            return None
+        return data[DIGEST:]
+
+    def keep(self, name: str, code: bytes) -> None:
+        """Write the machine code of the kernel `name` with its checksum."""
+        self.write(f"{name}.code", _digest(name, code) + code)
+
+    def delete(self, name: str) -> None:
+        """Delete a file if it is there."""
+        with suppress(FileNotFoundError):
+            os.unlink(self._at(name), dir_fd=self.descriptor)
+
+    def _at(self, name: str) -> str:
+        return name if self.descriptor is not None else str(self.path / name)
+
+
+def _digest(name: str, code: bytes) -> bytes:
+    return hashlib.sha256(f"{name}\n".encode() + code).digest()
+
+
+def open_folder(folder: Path) -> Folder:
+    """Create the folder if it is missing and open it.
+
+    Raises PermissionError if it belongs to another user, or if others may write to it or put another one in its place;
+    OSError if it cannot be made or written to.
+    """
+    for place in reversed(folder.parents):
+        if not place.exists():
+            place.mkdir(mode=0o700, exist_ok=True)
+    folder.mkdir(mode=0o700, exist_ok=True)
+    if not hasattr(os, "getuid"):
+        opened = Folder(folder, None)
+    else:
+        real = folder.resolve(strict=True)
+        _check_way(real)
+        opened = Folder(folder, os.open(real, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC))
+    try:
+        if opened.descriptor is not None:
+            _check_owner(folder, os.fstat(opened.descriptor))
+        if not os.access(folder, os.W_OK):
+            raise PermissionError(f"kernel cache {folder} is read-only; set SYNCHAIN_CACHE to a folder you can write")
+    except BaseException:
+        opened.__exit__(None, None, None)
+        raise
+    return opened
+
+
+def _check_owner(place: Path, status: os.stat_result) -> None:
+    if not hasattr(os, "getuid"):
+        return
+    if status.st_uid != os.getuid():
+        raise PermissionError(f"kernel cache {place} belongs to another user; set SYNCHAIN_CACHE to a folder of yours")
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        raise PermissionError(f"kernel cache {place} can be written by others; run: chmod go-w '{place}'")
+
+
+def _check_way(real: Path) -> None:
+    """Refuse a folder, given without symbolic links, if another user can put a folder in the place of it or its parents.
+
+    The owner of a parent can, and so can all who may write to it, unless it is sticky (/tmp).
+    """
+    for place in real.parents:
+        status = place.stat()
+        if status.st_uid not in (os.getuid(), 0):
+            raise PermissionError(
+                f"kernel cache {real} lies in {place}, which belongs to another user; "
+                "set SYNCHAIN_CACHE to a folder of yours"
+            )
+        if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not status.st_mode & stat.S_ISVTX:
+            raise PermissionError(
+                f"kernel cache {real} lies in {place}, which others can write; run: chmod go-w '{place}', "
+                "or set SYNCHAIN_CACHE to a folder of yours"
+            )
+
+
+def describe() -> dict[str, str | int]:
+    """Return folder, number of kernels and bytes on disk."""
+    folder = cache_folder()
+    found = [p for p in folder.rglob("*") if p.is_file()] if folder.is_dir() else []
+    return {
+        "folder": str(folder),
+        "kernels": sum(p.suffix == ".py" for p in found),
+        "bytes": sum(p.stat().st_size for p in found),
+    }
+
+
+def clear() -> int:
+    """Delete all cached kernels and return how many there were; other files in the folder stay."""
+    folder = cache_folder()
+    if not folder.is_dir():
+        return 0
+    kernels = len(list(folder.glob("kernel_*.py")))
+    for path in folder.glob("kernel_*"):
+        path.unlink(missing_ok=True)
+    shutil.rmtree(folder / "__pycache__", ignore_errors=True)
+    return kernels

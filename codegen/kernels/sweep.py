@@ -1,0 +1,284 @@
+"""From equations, an integrator and a list of records to the text of one self-contained kernel module."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import sympy as sp
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.periodicity import angular_frequency
+
+from .. import driver, simd
+from ..integrators import Integrator, integrator
+from ..printing.blocks import Names, NodeBlocks, analyse
+from ..printing.names import tidy
+from ..printing.printer import FUNCTIONS, show
+from ..simd import lanes
+from ..steps.contacts import write_pushes
+from ..steps.explicit import write_explicit
+from ..steps.looped import LoopWriter
+from ..steps.program import program, workspace
+from ..steps.rosenbrock import write_rosenbrock
+from ..steps.step import PAIR, SCALED, StepWriter, function_name, write_function
+
+__all__ = ["RECORDS", "KernelSource", "describe", "emit", "imports", "node_functions"]
+
+RECORDS = ("sync_error", "section", "trajectory")
+"""What a kernel can record besides the final state."""
+
+AUTO = "rodas5p"
+"""The integrator that "auto" stands for."""
+
+LARGEST_UNROLLED = 8
+"""Nodes up to which a step is written out; larger networks are stepped through in loops."""
+
+
+@dataclass(frozen=True, slots=True)
+class KernelSource:
+    """The text of a kernel module and what its arrays mean."""
+
+    text: str = field(repr=False)
+    equations: Equations = field(repr=False)
+    integrator: str
+    records: tuple[str, ...]
+    width: int
+    kind: str = "sweep"
+
+    @property
+    def digest(self) -> str:
+        """Hexadecimal SHA-256 of the text."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+
+def emit(
+    equations: Equations,
+    method: str | Integrator = "auto",
+    records: Sequence[str] = ("sync_error",),
+    section: sp.Expr | None = None,
+    width: int | None = None,
+    multiplicity: Sequence[int] | None = None,
+) -> KernelSource:
+    """Write the kernel of these equations for one integrator, one set of records and one lane width.
+
+    The integrator "auto" is "rodas5p", the fastest at equal error in full lanes (docs/performance.md).
+    `section` is an expression in the state symbols (x_1 …), the parameters and t whose zeros are recorded; it is needed
+    with the record "section".  `multiplicity` says for each node how many oscillators it stands for in the synchronisation
+    error (default: one).  Raises ValueError for an unknown record or integrator, a section function that uses other
+    symbols, and UnprintableError where the equations cannot be printed.
+    """
+    method = AUTO if method == "auto" else method
+    method = integrator(method) if isinstance(method, str) else method
+    unknown = [r for r in records if r not in RECORDS]
+    if unknown:
+        raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(RECORDS)}")
+    if "section" in records and section is None:
+        raise ValueError("the record 'section' needs a section function, for example v_1")
+    # a small system does not keep the pipelines of the processor busy with one register: it gets two
+    width = lanes.native_width(2 if equations.dimension <= 2 else 1) if width is None else width
+    ordered = tuple(r for r in RECORDS if r in records)
+    weights = tuple(multiplicity) if multiplicity is not None and "sync_error" in ordered else None
+    if "sync_error" in ordered and not equations.common:
+        raise ValueError("the record 'sync_error' compares states of one name, and these nodes have none in common")
+    if weights is not None and len(weights) != equations.n:
+        raise ValueError(f"multiplicity has {len(weights)} entries; expected one for each of {equations.n} nodes")
+    text = _module(equations, method, ordered, section if "section" in ordered else None, width, weights)
+    return KernelSource(text, equations, method.name, ordered, width)
+
+
+def _module(
+    equations: Equations,
+    method: Integrator,
+    records: tuple[str, ...],
+    section: sp.Expr | None,
+    width: int,
+    multiplicity: tuple[int, ...] | None,
+) -> str:
+    plain = tidy(equations)
+    weight = [edge.weight.name for edge in plain.edges]
+    states = [s.name for node in plain.nodes for s in node.state]
+    names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
+    blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
+    looped = equations.n > LARGEST_UNROLLED
+    sticking = ("contacts",) if plain.node.contact is not None else ()
+    if looped:
+        method = _for_many(method, equations)
+    steps = _steps(plain, blocks, method, looped)
+    lines = [line for writer in steps.values() for line in writer.lines]
+    functions = [f for k in range(len(blocks)) for f in node_functions(list(steps.values()), blocks[k], k)]
+    solves = method.kind == "rosenbrock" or equations.inertial
+    entries = program(equations).entries if looped and solves else 0
+    scratch = workspace(steps["step"], entries) if looped else 0
+    parts = [
+        describe(equations, plain, method, records, lines),
+        imports(functions, lines, section),
+        _constants(plain, method, records, width, multiplicity)
+        + (f"\nENTRIES = {entries}" if looped else "")
+        + f"\nLOOPED = {looped}\nWORKSPACE = {scratch}\nREPEATS = {angular_frequency(plain) is not None}",
+        *("\n".join(f) for f in functions),
+        SCALED,
+        *([PAIR, driver.text("sparse")] if looped else []),
+        *(_step(name, writer.lines, looped) for name, writer in steps.items()),
+        write_pushes(plain, names, looped),
+        _section(equations, plain, section),
+        *(driver.text(name) for name in ("recording", "cells", "control", *sticking, "sweep")),
+    ]
+    return "\n\n\n".join(part for part in parts if part) + "\n"
+
+
+def _for_many(method: Integrator, equations: Equations) -> Integrator:
+    """The method as looped kernels have it; ValueError for what only written-out kernels can."""
+    if method.inexact:
+        raise ValueError(
+            f"integrator {method.name}: steps at most {LARGEST_UNROLLED} nodes, found {equations.n}; use rodas5p"
+        )
+    return replace(method, smooth=None)
+
+
+def _steps(plain: Equations, blocks: Sequence[NodeBlocks], method: Integrator, looped: bool) -> dict[str, StepWriter]:
+    """The steps of a kernel by the name of their function, written."""
+    methods = {"step": method} if method.smooth is None else {"step": method, "step_smooth": method.smooth}
+    first, *more = blocks
+    bounded = len(methods) > 1
+    steps = {name: StepWriter(plain, first, m, bounded, more) for name, m in methods.items()}
+    for writer in steps.values():
+        if looped:
+            LoopWriter(writer).lines()
+        else:
+            (write_rosenbrock if writer.method.kind == "rosenbrock" else write_explicit)(writer)
+    return steps
+
+
+def node_functions(steps: list[StepWriter], blocks: NodeBlocks, kind: int = 0) -> list[list[str]]:
+    """The right-hand side of one node of some kind, and its linearisations where a step wants one."""
+    made = []
+    first = [writer.first_of(blocks) for writer in steps]
+    for name, doc, body in (
+        ("node", "Right-hand side of one oscillator.", blocks.rhs),
+        ("node_linear", "Right-hand side of one oscillator and the parts of its Jacobian that move.", blocks.linear),
+        ("node_local", "Right-hand side of one oscillator and the parts of its Jacobian that move.", blocks.local),
+    ):
+        results = [e for e in body.results if not steps[0].is_plain(e)]
+        if results and (name == "node" or any(body is b for b in first)):
+            arguments = [s.name for s in steps[0].arguments(body, results)]
+            made.append(write_function(function_name(name, kind), doc, body, arguments, results))
+    return made
+
+
+def describe(
+    equations: Equations,
+    plain: Equations,
+    method: Integrator,
+    records: tuple[str, ...],
+    lines: list[str],
+    more: str = "",
+) -> str:
+    """The docstring at the head of a kernel module."""
+    named, written = ((*eq.state, *eq.parameters) for eq in (equations, plain))
+    swapped = tuple(f"{a} as {b}" for a, b in zip(named, written, strict=True) if a != b)
+    rows = [
+        f"Generated kernel: {equations.n} oscillator{'s' * (equations.n > 1)}, {len(equations.links)} links, {method.name}.",
+        "",
+        f"Equations   {equations.digest[:16]}",
+        f"Integrator  {method.name}, order {method.order}: {method.source}",
+        f"State       {_listed(equations.state)}",
+        f"Parameters  {_listed(equations.parameters) or 'none'}",
+        f"Records     {', '.join(('final state', *records))}",
+        *([f"Modes       {more}"] if more else []),
+        f"Step        {_operations(lines)} operations outside the node functions",
+    ]
+    if swapped:
+        rows.append(f"Renamed     {_listed(swapped)}")
+    return '"""' + "\n".join(rows) + '\n"""'
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    """Names with commas; of many the first and the last few."""
+    if len(names) <= 40:
+        return ", ".join(names)
+    return f"{', '.join(names[:6])}, … {', '.join(names[-3:])} ({len(names)} variables)"
+
+
+def _operations(lines: list[str]) -> int:
+    return sum(line.count(f" {sign} ") for line in lines for sign in "+-") + sum(
+        line.count(sign) for line in lines for sign in "*/"
+    )
+
+
+def imports(functions: list[list[str]], lines: list[str], section: sp.Expr | None, more: Sequence[str] = ()) -> str:
+    """The import statements of a kernel module."""
+    text = "\n".join([*(line for f in functions for line in f), *lines, show(section) if section is not None else ""])
+    used = sorted(
+        n for n in {*FUNCTIONS.values(), "sqrt", "exp", "log"} if f"{n}(" in text or n in ("sqrt", "exp", "log")
+    )
+    needed = {"absolute", "any_lane", "broadcast", "lane_bits", "load", "maximum", "minimum", "njit", "one_lane"}
+    needed |= {"select", "store", "sqrt", "truncated", *more, *(n for n in used if n in simd.__all__)}
+    return "\n".join(
+        ["import math", "", "import numpy as np", "", f"from synchain.codegen.simd import {', '.join(sorted(needed))}"]
+    )
+
+
+def _constants(
+    equations: Equations,
+    method: Integrator,
+    records: tuple[str, ...],
+    width: int,
+    multiplicity: tuple[int, ...] | None,
+) -> str:
+    flags = {name.upper(): name in records for name in RECORDS}
+    rows = {
+        "WIDTH": width,
+        "NODES": equations.n,
+        "COMPONENTS": 2 if equations.node.contact is not None else len(equations.common),
+        "DIMENSION": equations.dimension,
+        "PARAMETERS": len(equations.parameters),
+        "DENSE_ROWS": max(len(m.dense) for m in (method, method.smooth) if m is not None),
+        "ERROR_ORDER": method.error_order,
+        "SWITCHING": method.smooth is not None,
+        **({"SMOOTH_ERROR_ORDER": method.smooth.error_order} if method.smooth is not None else {}),
+        "WEIGHTED": multiplicity is not None,
+        **flags,
+        "DENSE": any(flags.values()) or equations.node.contact is not None,
+        "CONTACTS": equations.node.contact is not None,
+    }
+    text = "\n".join(f"{name} = {value!r}" for name, value in rows.items())
+    return text if multiplicity is None else f"{text}\nMULTIPLICITY = np.array({[float(m) for m in multiplicity]!r})"
+
+
+def _step(name: str, lines: list[str], looped: bool) -> str:
+    more = ", graph, weights" if looped else ""
+    head = [
+        "@njit(error_model='numpy')",
+        f"def {name}(t, h, y, p, y_new, dense, rtol, atol{more}):",
+        '    """One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."""',
+    ]
+    return "\n".join([*head, *(f"    {line}" for line in lines)])
+
+
+def _section(equations: Equations, plain: Equations, section: sp.Expr | None) -> str:
+    """The section function at a fraction of the step; a kernel without sections has none."""
+    if section is None:
+        return ""
+    swap = dict(zip(map(_real, (*equations.state, *equations.parameters)), map(_real, (*plain.state, *plain.parameters)),
+                    strict=True))  # fmt: skip
+    section = section.xreplace({s: _real(s.name) for s in section.free_symbols})
+    used = {s.name for s in section.free_symbols}
+    unknown = sorted(used - set(equations.state) - set(equations.parameters) - {"t"})
+    if unknown:
+        raise ValueError(f"section function {section}: unknown symbol {unknown[0]!r}; use the state, parameters and t")
+    lines = ["@njit(error_model='numpy', forceinline=True)", "def section(theta, t, h, bank, y_new, dense):",
+             '    """The section function at the fraction theta of the step."""']  # fmt: skip
+    for slot, (name, shown) in enumerate(zip(equations.state, plain.state, strict=True)):
+        if name in used:
+            lines.append(f"    {shown} = inside(theta, {slot}, bank, y_new, dense)")
+    for slot, (name, shown) in enumerate(zip(equations.parameters, plain.parameters, strict=True)):
+        if name in used:
+            lines.append(f"    {shown} = load(bank, {equations.dimension + slot}, WIDTH)")
+    text = show(section.xreplace({_real("t"): sp.Symbol("(t + theta*h)")}).xreplace(swap))
+    return "\n".join([*lines, f"    return {text}"])
+
+
+def _real(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)

@@ -1,0 +1,113 @@
+"""Which names a kernel uses for the user's symbols: their own, unless the kernel needs that word itself."""
+
+from __future__ import annotations
+
+import builtins
+import keyword
+import re
+import unicodedata
+from dataclasses import replace
+
+import sympy as sp
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import Edge, Node
+
+from ..simd import elementary, lanes
+
+__all__ = ["NAMES", "RESERVED", "tidy"]
+
+NAMES = (
+    "target", "source", "node_slot", "here_slot", "there_slot", "order", "place", "row_start", "after_start", "column",
+)  # fmt: skip
+"""What the arrays of a program are called, in the order in which a kernel takes them."""
+
+RESERVED = frozenset(
+    {"i", "j", "k", "e", "old", "new", "graph", "weights", "pair", "factorise", "solve", "NODES", "DIMENSION",
+     "DENSE_ROWS",
+     "ENTRIES", "STATE", "SLOPE", "TIME_SLOPE", "MATRIX", *(f"K{i}" for i in range(1, 32)),
+     "MASS", "RATES", "where", "t", "h", "y", "y_new", "dense",
+     "shift", "reach", "rate", "error", "size", "rtol", "atol", "node", "node_linear",
+     "node_local", "bound", "bank", "step", "step_smooth", "section", "theta", "now",
+     "njit", "p", "drive", "scaled", "inside", "total", "e3", "e5", "np", "math",
+     "WIDTH", "DENSE", "LANES", "MODE_SIZE", "STRENGTHS", "SHARED", "shared", "steady", "moving", "bent", "lag",
+     "strengths", "which", "mode_step", "march", "pushes", "out", "network", "release",
+     "after", "modes"}
+    | set(NAMES)
+    | set(keyword.kwlist) | set(dir(builtins)) | set(elementary.__all__) | set(lanes.__all__)
+)  # fmt: skip
+"""Words of the generated code; a user's symbol of that name gets an underscore behind it."""
+
+PREFIXES = (
+    "m_", "l_", "inv_", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "u_", "f_", "r_", "at_", "ft_", "n_", "j_",
+    "e_", "_", "along_", "value_", "bend_", "steady_", "g_", "mass_", *(f"node{k}" for k in range(2, 10)),
+)  # fmt: skip
+
+SUFFIXES = ("_here", "_there")
+
+NUMBERED = re.compile(r"_\d+$")
+"""The end of a name that numbers a node: x_1 is x of the first one."""
+
+
+def tidy(equations: Equations) -> Equations:
+    """Return the same equations with symbols that the generated code can use as names."""
+    nodes, edges = equations.nodes, equations.edges
+    weights = {edge.weight for edge in edges}
+    own = {s for node in nodes for s in (*node.state, *node.parameters)}
+    states = {s for node in nodes for s in node.state}
+    shown = own | weights | {s for edge in edges for s in edge.parameters}
+    taken = {s.name for s in shown} | {s.name for edge in edges for s in (*edge.here, *edge.there)}
+    swap: dict[sp.Symbol, sp.Symbol] = {}
+    for s in sorted(shown, key=str):
+        numbered = s in states or s.name in equations.varied
+        if _clashes(s.name) or (numbered and NUMBERED.search(s.name)):
+            name = _free(s.name, taken)
+            taken.add(name)
+            swap[s] = sp.Symbol(name, real=True)
+    node, *others = (_node(node, swap) for node in nodes)
+    for weight in sorted(weights & own, key=str):  # within the edge this name means the weight
+        swap[weight] = sp.Symbol(_free(f"{weight.name}_of_link", taken), real=True)
+    if not swap:
+        return equations
+    return replace(
+        equations,
+        node=node,
+        others=tuple(others),
+        edge=None if equations.edge is None else _edge(equations.edge, swap),
+        joints=tuple((pair, _edge(edge, swap)) for pair, edge in equations.joints),
+        varied=tuple(swap.get(s, s).name for s in (sp.Symbol(name, real=True) for name in equations.varied)),
+    )
+
+
+def _node(node: Node, swap: dict[sp.Symbol, sp.Symbol]) -> Node:
+    contact = None if node.contact is None else node.contact.map(lambda e: e.xreplace(swap))
+    return Node(_all(node.state, swap), _all(node.rhs, swap), _all(node.parameters, swap), contact)
+
+
+def _edge(edge: Edge, swap: dict[sp.Symbol, sp.Symbol]) -> Edge:
+    return Edge(
+        _all(edge.here, swap), _all(edge.there, swap), edge.weight.xreplace(swap),
+        _all(edge.rhs, swap), _all(edge.parameters, swap),
+        tuple(tuple(_all(row, swap) for row in block) for block in edge.inertia),
+    )  # fmt: skip
+
+
+def _all(expressions: tuple, swap: dict) -> tuple:
+    return tuple(e.xreplace(swap) for e in expressions)
+
+
+def _clashes(name: str) -> bool:
+    """True for words of the generated code and for names that Python would not read as they are written."""
+    written = name.isidentifier() and unicodedata.normalize("NFKC", name) == name
+    return name in RESERVED or not written or name.startswith(PREFIXES) or name.endswith(SUFFIXES)
+
+
+def _free(name: str, taken: set[str]) -> str:
+    plain = "".join(c if f"a{c}".isidentifier() else "_" for c in unicodedata.normalize("NFKC", name)) or "symbol"
+    if not plain.isidentifier() or plain.startswith("_"):
+        plain = f"s_{plain}"
+    elif f"{plain}_".startswith(PREFIXES):
+        plain = f"user_{plain}"
+    while plain in taken or _clashes(plain) or NUMBERED.search(plain):
+        plain += "_"
+    return plain

@@ -1,0 +1,249 @@
+"""Branch-free elementary functions of lanes, one polynomial for the whole reduced range.
+
+Reductions follow the classical scheme (Cody & Waite, *Software Manual for the Elementary Functions*, 1980; the
+logarithm's final sum as in Tang, ACM Trans. Math. Softw. 16, 378, 1990).  The polynomials are our own Remez fits, weighted
+by the relative error of the result.  `ATAN`, `SINE` and `EXP` are fitted in 40-digit arithmetic on 120 Chebyshev points;
+in the first two each of the three lowest coefficients is rounded to double precision before the higher ones are fitted
+anew.  Beside each stands its error with the rounded coefficients; tests/test_elementary_fits.py makes all three again.
+They are summed by halves of halves (Estrin, Proc. Western Joint Computer Conf. 17, 33, 1960), so that few operations wait
+for each other.
+The circular functions subtract three parts of pi: their error is below 1.5 units in the last place up to |x| = 1e9, below
+2e-15 up to 1e15, and beyond, where neighbouring doubles lie further apart than a radian matters, they stay within [-1, 1].
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit
+from numba.extending import intrinsic
+
+from .lane_types import INT64, Lane, constant, vector
+from .lanes import (
+    absolute,
+    copysign,
+    floor,  # re-exported: kernels take all their functions from here
+    fma,
+    round_even,
+    scale_binary,
+    select,
+    split_binary,
+    sqrt,
+)
+
+__all__ = ["atan", "cos", "exp", "expm1", "floor", "log", "sign", "sin", "sincos", "sqrt", "tanh"]
+
+MAGIC = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer and leaves that in the low bits
+LOG2E = 1.4426950408889634
+LN2_HIGH, LN2_LOW = 0.6931471805599453, 2.3190468138462996e-17
+LN2_SHORT, LN2_REST = 0.6931471803691238, 1.9082149292705877e-10  # the first has 21 trailing zero bits
+HALF_PI, HALF_PI_LOW, HALF_PI_REST = 1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33
+TWO_OVER_PI = 0.6366197723675814
+PI, PI_LOW, PI_REST = 3.141592653589793, 1.2246467991473532e-16, -2.9947698097183397e-33
+ONE_OVER_PI = 0.3183098861837907
+LARGE, SMALL = 2.0**64, 2.0**-64
+
+ATAN = (
+    -0.3333333333333307, 0.19999999999951767, -0.14285714282588532, 0.11111111007341806, -0.09090907007653506,
+    0.07692279886203458, -0.06666404395844483, 0.058805296233745794, -0.05253525896124795, 0.04722345218764209,
+    -0.042192351159500145, 0.03664298511646974, -0.029905468449123198, 0.021986734417333814, -0.013902253878486147,
+    0.007197654934215261, -0.0028854901193220857, 0.0008315171861774984, -0.000152201928520457, 1.3229077289707739e-05,
+)  # fmt: skip
+"""(atan(t)/t - 1)/z in powers of z = t**2 on [2**-20, 1]; error of atan(t) 7.1e-18 of it."""
+SINE = (
+    -0.16666666666666666, 0.008333333333333203, -0.0001984126984121048, 2.7557319211140833e-06, -2.5052106859338075e-08,
+    1.6058938506704054e-10, -7.642949572367172e-13, 2.720641811447777e-15,
+)  # fmt: skip
+"""(sin(r)/r - 1)/z in powers of z = r**2 on [2**-20, 2.5]; error of sin(r) 3.5e-19 of it."""
+EXP = (
+    0.5000000000000011, 0.16666666666666416, 0.041666666666530024, 0.008333333333493037, 0.0013888888943660216,
+    0.00019841269509323866, 2.4801493071126753e-05, 2.755758419712008e-06, 2.7630257481410706e-07, 2.5000675852100195e-08,
+)  # fmt: skip
+"""(exp(r) - 1 - r)/r**2 in powers of r for |r| <= 0.3466; error of exp(r) 1.1e-17 of it."""
+
+
+def lane_function(function: Any) -> Any:
+    """Compile for lanes and always inline."""
+    return njit(function, error_model="numpy", forceinline=True)
+
+
+@intrinsic
+def _flip_odd(typingctx: Any, value: Any, shifted: Any) -> Any:
+    """-value where shifted - 1.5 * 2**52 is an odd integer, else value."""
+    if not isinstance(value, Lane):
+        return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        whole = vector(INT64, value.width)
+        parity = builder.shl(builder.bitcast(args[1], whole), constant(INT64, value.width, 63))
+        return builder.bitcast(builder.xor(builder.bitcast(args[0], whole), parity), args[0].type)
+
+    return value(value, shifted), lower
+
+
+@lane_function
+def _four(c0, c1, c2, c3, x, square):
+    """c0 + c1 x + c2 x**2 + c3 x**3."""
+    return fma(fma(c3, x, c2), square, fma(c1, x, c0))
+
+
+@lane_function
+def _exp_series(r, z):
+    """(exp(r) - 1 - r)/z with z = r**2."""
+    c0, c1, c2, c3, c4, c5, c6, c7, c8, c9 = EXP
+    w = z * z
+    return fma(fma(fma(c9, r, c8), w, _four(c4, c5, c6, c7, r, z)), w, _four(c0, c1, c2, c3, r, z))
+
+
+@lane_function
+def exp(x):
+    """e**x; 0 below -745.2, inf above 709.8."""
+    y = select(x < -746.0, -746.0, x)
+    y = select(y > 710.0, 710.0, y)  # NaN passes
+    shifted = fma(y, LOG2E, MAGIC)
+    k = shifted - MAGIC
+    r = fma(k, -LN2_LOW, fma(k, -LN2_HIGH, y))
+    z = r * r
+    p = fma(z, _exp_series(r, z), r)
+    # 2**k in two factors, so that neither over- nor underflows
+    factor = scale_binary(select(x < 0.0, LARGE, SMALL), shifted)
+    return fma(factor, p, factor) * select(x < 0.0, SMALL, LARGE)
+
+
+@lane_function
+def _expm1_parts(x):
+    """e**x - 1 as the sum of a double and a small correction, for |x| <= 700 (clamped there)."""
+    y = select(x < -700.0, -700.0, x)
+    y = select(y > 700.0, 700.0, y)
+    shifted = fma(y, LOG2E, MAGIC)
+    k = shifted - MAGIC
+    high = fma(k, -LN2_HIGH, y)  # exact
+    r = fma(k, -LN2_LOW, high)
+    z = r * r
+    tail = z * _exp_series(r, z)
+    p = r + tail
+    rest = ((r - p) + tail) + fma(k, -LN2_LOW, high - r)
+    scale = scale_binary(r * 0.0 + 1.0, shifted)
+    base = scale - 1.0
+    whole = fma(scale, p, base)
+    return whole, fma(scale, rest, fma(scale, p, base - whole))
+
+
+@lane_function
+def expm1(x):
+    """e**x - 1 without cancellation, for |x| <= 700 (clamped there)."""
+    whole, rest = _expm1_parts(x)
+    return copysign(select(x == x, whole + rest, x), x)
+
+
+@lane_function
+def log(x):
+    """Natural logarithm; -inf at 0, NaN below."""
+    tiny = x < 2.2250738585072014e-308
+    m, k = split_binary(select(tiny, x * 18014398509481984.0, x), 0.7071067811865476)
+    k = select(tiny, k - 54.0, k)
+    f = m - 1.0
+    s = f / (2.0 + f)
+    z = s * s
+    w = z * z
+    even = fma(fma(0.06624980704723496, w, 0.09090887754046581), w, 0.1428571428453648)
+    odd = fma(fma(fma(0.06626380506870277, w, 0.07693548837276801), w, 0.11111111324377015), w, 0.20000000000003143)
+    tail = 2.0 * z * (0.3333333333333333 + z * fma(even, z, odd))
+    square = 0.5 * f * f
+    result = k * LN2_SHORT - ((square - fma(s, square + tail, k * LN2_REST)) - f)
+    result = select(x == 0.0, -1.0 / (x * x), result)
+    result = select(x > 1.7976931348623157e308, x, result)
+    return select(x >= 0.0, result, (x - x) / (x - x))
+
+
+@lane_function
+def _atan_series(z):
+    """(atan(t)/t - 1)/z with z = t**2."""
+    c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, d0, d1, d2, d3, d4, d5, d6, d7, d8, d9 = ATAN
+    z2 = z * z
+    z4 = z2 * z2
+    z8 = z4 * z4
+    low = fma(_four(c5, c6, c7, c8, z, z2), z4, _four(c1, c2, c3, c4, z, z2))
+    middle = fma(_four(d3, d4, d5, d6, z, z2), z4, _four(c9, d0, d1, d2, z, z2))
+    high = fma(d9, z2, fma(d8, z, d7))
+    return fma(fma(fma(high, z8, middle), z8, low), z, c0)  # c0 last: it is the largest, and so rounded but once
+
+
+@lane_function
+def atan(x):
+    """Inverse tangent, of t = -1/|x| and pi/2 further where |x| > 1."""
+    size = absolute(x)
+    beyond = size > 1.0
+    t = select(beyond, -1.0 / size, size)
+    z = t * t
+    p = fma(t * z, _atan_series(z), select(beyond, HALF_PI_LOW, 0.0))
+    return copysign((select(beyond, HALF_PI, 0.0) + t) + p, x)
+
+
+@lane_function
+def _alternating_sine(x, k, shifted):
+    """sin(x - k pi), its sign changed where `shifted` is odd; within [-1, 1] whatever k."""
+    r = fma(k, -PI_REST, fma(k, -PI_LOW, fma(k, -PI, x)))
+    z = r * r
+    w = z * z
+    c0, c1, c2, c3, c4, c5, c6, c7 = SINE
+    series = fma(fma(c7, w, fma(c6, z, c5)), w * w, _four(c1, c2, c3, c4, z, w))
+    cube = fma(r, z, r * fma(r, r, -z))  # with what rounding took from r**2: it would count near the crests
+    return _flip_odd(select(z < 3.25, fma(cube, fma(series, z, c0), r), r * 0.0), shifted)
+
+
+@lane_function
+def sin(x):
+    """Sine; NaN for infinite x, no accuracy for |x| > 1e15."""
+    shifted = fma(x, ONE_OVER_PI, MAGIC)
+    return select(x == 0.0, x, _alternating_sine(x, shifted - MAGIC, shifted))
+
+
+@lane_function
+def cos(x):
+    """Cosine, as the sine a quarter turn further; NaN for infinite x, no accuracy for |x| > 1e15."""
+    shifted = fma(x, ONE_OVER_PI, 0.5) + MAGIC
+    return _alternating_sine(x, (shifted - MAGIC) - 0.5, shifted)
+
+
+@lane_function
+def sincos(x):
+    """The pair (sin x, cos x), cheaper than both apart; NaN for infinite x, no accuracy for |x| > 1e15."""
+    k = round_even(x * TWO_OVER_PI)
+    r = fma(k, -HALF_PI_REST, fma(k, -HALF_PI_LOW, fma(k, -HALF_PI, x)))
+    r = select(absolute(r) < 1.0, r, r * 0.0)
+    z = r * r
+    s = fma(fma(1.5896681864241067e-10, z, -2.505075630735003e-08), z, 2.755731368145892e-06)
+    s = fma(fma(fma(s, z, -0.00019841269829780957), z, 0.008333333333322384), z, -0.16666666666666632)
+    s = fma(s, r * z, r)
+    c = fma(fma(-1.1359566430737872e-11, z, 2.0875721777215395e-09), z, -2.7557314341943445e-07)
+    c = fma(fma(fma(c, z, 2.4801587289448662e-05), z, -0.0013888888888874075), z, 0.0416666666666666)
+    half = 0.5 * z
+    top = 1.0 - half
+    c = top + (((1.0 - top) - half) + z * z * c)
+    turn = k - 4.0 * floor(k * 0.25)
+    swap = (turn == 1.0) | (turn == 3.0)
+    sine = select(swap, c, s)
+    cosine = select(swap, s, c)
+    sine = select(turn > 1.5, -sine, sine)
+    cosine = select((turn == 1.0) | (turn == 2.0), -cosine, cosine)
+    return sine, cosine
+
+
+@lane_function
+def tanh(x):
+    """Hyperbolic tangent, from e = exp(2|x|) - 1 as e/(e + 2) with the residual of the quotient."""
+    size = absolute(x)
+    e, e_rest = _expm1_parts(2.0 * select(size > 20.0, 20.0, size))
+    below = e + 2.0
+    part = below - 2.0
+    below_rest = ((2.0 - (below - part)) + (e - part)) + e_rest
+    inverse = 1.0 / below
+    q = e * inverse
+    return copysign(select(x == x, fma(fma(-q, below, e) + (e_rest - q * below_rest), inverse, q), x), x)
+
+
+@lane_function
+def sign(x):
+    """-1, 0 or 1; NaN stays NaN."""
+    return select(x == 0.0, x, copysign(select(x == x, 1.0, x), x))

@@ -1,0 +1,177 @@
+"""Sparse Gaussian elimination of (s - J), planned from the pattern of J and written out as statements.
+
+The plan picks pivots on the diagonal by least fill (Markowitz, Management Science 3, 255, 1957), so positions of a
+mechanical network are eliminated before velocities, a chain or any tree causes no fill, and a ring or a star costs
+what it must.  No numerical pivoting: s is chosen by the step control, and a bad pivot shows up as a rejected step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import sympy as sp
+
+from ..printing.printer import show
+
+__all__ = ["Plan", "plan", "write_elimination", "write_factors", "write_solve"]
+
+Entry = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Elimination order with, for each pivot, the rows below it and the columns after it in its row."""
+
+    order: tuple[int, ...]
+    below: tuple[tuple[int, ...], ...]
+    after: tuple[tuple[int, ...], ...]
+
+
+def plan(size: int, pattern: set[Entry]) -> Plan:
+    """Order the pivots 0 … size-1 and list the fill.
+
+    Two orders are tried, by least Markowitz cost from the start or after all rows without a diagonal entry of J, whose
+    pivots need no division; the one with fewer multiplications is taken, the second where they are equal.
+    """
+    first = frozenset(k for k in range(size) if (k, k) not in pattern)
+    return min((_order(size, pattern, first), _order(size, pattern, frozenset())), key=_multiplications)
+
+
+def _multiplications(steps: Plan) -> int:
+    """Cost of one factorisation and eight solves."""
+    pairs = list(zip(steps.below, steps.after, strict=True))
+    return sum(len(b) * (1 + len(a)) for b, a in pairs) + 8 * sum(1 + len(b) + len(a) for b, a in pairs)
+
+
+def _order(size: int, pattern: set[Entry], first: frozenset[int]) -> Plan:
+    rows = {i: {i} | {c for r, c in pattern if r == i} for i in range(size)}
+    columns = {i: {i} | {r for r, c in pattern if c == i} for i in range(size)}
+    left = set(range(size))
+    order, below, after = [], [], []
+    while left:
+        pivot = min(left, key=lambda k: (k not in first, (len(rows[k]) - 1) * (len(columns[k]) - 1), k))
+        left.remove(pivot)
+        down, right = sorted(columns[pivot] - {pivot}), sorted(rows[pivot] - {pivot})
+        for r in down:
+            rows[r] |= set(right)
+            rows[r].discard(pivot)
+        for c in right:
+            columns[c] |= set(down)
+            columns[c].discard(pivot)
+        order.append(pivot)
+        below.append(tuple(down))
+        after.append(tuple(right))
+    return Plan(tuple(order), tuple(below), tuple(after))
+
+
+class _Writer:
+    """Text of the factors; equal right-hand sides share one name."""
+
+    def __init__(self, labels: tuple[str, ...]) -> None:
+        self.labels = labels
+        self.lines: list[str] = []
+        self.names: dict[str, str] = {}
+
+    def let(self, name: str, text: str) -> str:
+        if text in self.names:
+            return self.names[text]
+        self.names[text] = name
+        self.lines.append(f"{name} = {text}")
+        return name
+
+    def entry(self, kind: str, r: int, c: int) -> str:
+        return f"{kind}_{self.labels[r]}" if r == c else f"{kind}_{self.labels[r]}_{self.labels[c]}"
+
+
+@dataclass(frozen=True, slots=True)
+class Factors:
+    """Statements that factorise, and the names (or 1.0, -1.0) that the solution uses."""
+
+    lines: tuple[str, ...]
+    lower: dict[Entry, str]
+    upper: dict[Entry, str]
+    inverse: dict[int, str]
+
+
+def write_factors(
+    steps: Plan, jacobian: Mapping[Entry, sp.Expr], labels: tuple[str, ...], mass: Mapping[Entry, sp.Expr] | None = None
+) -> Factors:
+    """Write the elimination of (shift M - J), `mass` the entries of M, None or empty where it is the identity.
+
+    `reach` is 1/shift, the inverse of the pivot shift where J has no diagonal entry.
+    """
+    shift = sp.Symbol("shift")
+    scaled = {(k, k): shift for k in steps.order} if not mass else {key: shift * e for key, e in mass.items()}
+    return write_elimination(steps, scaled, jacobian, labels)
+
+
+def write_elimination(
+    steps: Plan, matrix: Mapping[Entry, sp.Expr], taken: Mapping[Entry, sp.Expr], labels: tuple[str, ...]
+) -> Factors:
+    """Write the elimination of `matrix` minus `taken`."""
+    writer = _Writer(labels)
+    entries = {key: matrix.get(key, sp.S.Zero) - taken.get(key, sp.S.Zero) for key in sorted({*matrix, *taken})}
+    value = {
+        key: _atomic(writer, writer.entry("m", *key), e) for key, e in entries.items() if key[0] != key[1] and e != 0
+    }
+    diagonal = {k: show(entries[k, k]) for k in steps.order}
+    lower: dict[Entry, str] = {}
+    inverse: dict[int, str] = {}
+    for k, down, right in zip(steps.order, steps.below, steps.after, strict=True):
+        pivot = diagonal[k]
+        inverse[k] = "reach" if pivot == "shift" else writer.let(writer.entry("inv", k, k), f"1.0/({pivot})")
+        for r in down:
+            lower[r, k] = writer.let(writer.entry("l", r, k), times(value[r, k], inverse[k]))
+            for c in right:
+                old = diagonal[r] if r == c else value.get((r, c), "")
+                new = less(old, lower[r, k], value[k, c])
+                if r == c:
+                    diagonal[r] = new
+                else:
+                    value[r, c] = writer.let(writer.entry("m", r, c) + f"_{k}", new)
+    upper = {(k, c): value[k, c] for k, right in zip(steps.order, steps.after, strict=True) for c in right}
+    return Factors(tuple(writer.lines), lower, upper, inverse)
+
+
+def write_solve(steps: Plan, factors: Factors, right: Mapping[int, str], result: Mapping[int, str]) -> list[str]:
+    """Write the solution: names `right` of the right-hand sides are overwritten, `result` names the unknowns."""
+    lines = []
+    for k, down in zip(steps.order, steps.below, strict=True):
+        for r in down:
+            lines.append(f"{right[r]} = {less(right[r], factors.lower[r, k], right[k])}")
+    for k, after in zip(reversed(steps.order), reversed(steps.after), strict=True):
+        text = right[k]
+        for c in after:
+            text = less(text, factors.upper[k, c], result[c])
+        body = f"({text})" if after else text
+        lines.append(f"{result[k]} = {body}*{factors.inverse[k]}")
+    return lines
+
+
+def times(x: str, y: str) -> str:
+    """x*y with the signs of unit factors folded."""
+    if x in ("1.0", "-1.0"):
+        return y if x == "1.0" else negative(y)
+    if y in ("1.0", "-1.0"):
+        return x if y == "1.0" else negative(x)
+    return f"{x}*{y}"
+
+
+def negative(x: str) -> str:
+    """The text of -x for a name or a negated name."""
+    return x[1:] if x.startswith("-") else f"-{x}"
+
+
+def less(start: str, x: str, y: str) -> str:
+    """start - x*y, tidied."""
+    product = times(x, y)
+    if product.startswith("-"):
+        return f"{start} + {product[1:]}" if start else product[1:]
+    return f"{start} - {product}" if start else f"-{product}"
+
+
+def _atomic(writer: _Writer, name: str, e: sp.Expr) -> str:
+    """A name for an entry, or its text where that is a unit or already a name."""
+    text = show(e)
+    return text if text in ("1.0", "-1.0") or e.is_Symbol else writer.let(name, text)

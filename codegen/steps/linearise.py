@@ -1,0 +1,104 @@
+"""The statements of a step that linearise the equations at its start."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from ..printing.printer import show
+from .step import StepWriter
+
+__all__ = ["entry", "linearise", "write_bound"]
+
+
+def linearise(w: StepWriter) -> list[dict[str, sp.Expr]]:
+    """Write right-hand side and Jacobian at the start, and the time derivative where the method wants it.
+
+    Returns what stands for each, by node.
+    """
+    eq = w.equations
+    implicit = w.method.kind == "rosenbrock"
+    w.put(f"# right-hand side{', Jacobian and time derivative' if implicit else ' and Jacobian'} at the start")
+    function = "node_linear" if implicit else "node_local"
+    w.timed("t", w.wanted([w.first_of(blocks) for blocks in w.kinds]))
+    kept = keep_times(w)
+    own: list[dict[str, sp.Expr]] = []
+    for i in range(eq.n):
+        states, body = eq.node_at(i).state, w.first_of(w.of(i))
+        kinds = [f"f_{r}" for r in states] + [entry(r, c) for r in states for c in states]
+        kinds += [f"ft_{r}" for r in states] if implicit else []
+        coded = [e for e in body.results if not w.is_plain(e)]
+        named = {kind: sp.Symbol(f"{kind}_{i + 1}", real=True) for kind in kinds}
+        at = w.at(i, "")
+        plain = {kind: e.xreplace(at) for kind, e in zip(kinds, body.results, strict=True) if w.is_plain(e)}
+        if coded:
+            left = ", ".join(named[kind].name for kind in kinds if kind not in plain)
+            w.put(f"{left} = {w.call(function, body, coded, i, '')}")
+        w.put(*(f"{named[kind]} = {show(plain[kind])}" for kind in kinds[: len(states)] if kind in plain))
+        own.append({kind: plain.get(kind, named[kind]).xreplace(kept) for kind in kinds})
+    w.links("", "f_")
+    return own
+
+
+def keep_times(w: StepWriter) -> dict[sp.Symbol, sp.Symbol]:
+    """Keep time terms that stand for themselves in the linearisation, where stages give these names other values."""
+    plain = {s for blocks in w.kinds for e in w.first_of(blocks).results if w.is_plain(e) for s in e.free_symbols}
+    moved = w.wanted([blocks.rhs for blocks in w.kinds]) & plain
+    kept = {s: sp.Symbol(f"at_{s.name}", real=True) for s in sorted(moved, key=lambda s: s.name)}
+    w.put(*(f"{there} = {here}" for here, there in kept.items()))
+    return kept
+
+
+def entry(r: sp.Symbol, c: sp.Symbol) -> str:
+    """The name of d(rhs of r)/dc: j_vx, and j_speed_by_place where letters run together."""
+    return f"j_{r.name}{c.name}" if len(r.name) == len(c.name) == 1 else f"j_{r.name}_by_{c.name}"
+
+
+def write_bound(w: StepWriter, own: list[dict[str, sp.Expr]]) -> None:
+    """Write `bound`, above the absolute value of the eigenvalues at the start of the step.
+
+    In second-order form (rates of positions are the velocities) an eigenvalue solves z**2 = z D + K, hence
+    |z| <= |D| + sqrt|K| in any norm; otherwise the largest row sum is taken.
+    """
+    eq = w.equations
+    w.mass.refuse("a step that bounds the eigenvalues")
+    half = len(eq.node.state) // 2
+    second_order = not eq.mixed and len(eq.node.state) % 2 == 0 and eq.node.rhs[:half] == eq.node.state[half:]
+    slow: list[list[str]] = []
+    fast: list[list[str]] = []
+    links, places, rows = list(eq.link_jacobian()), eq.places(), []
+    for i in range(eq.n):
+        state = eq.node_at(i).state
+        first = half if second_order else 0
+        rows += [(places[i][a], i, a, r) for a, r in enumerate(state[first:], start=first)]
+    for row, i, _, r in sorted(rows, key=lambda found: found[0]):
+        state = eq.node_at(i).state
+        parts = {b: [size(own[i][entry(r, c)])] for b, c in enumerate(state)}
+        for (at, column), e in links:
+            if at == row:
+                parts[0 if eq.mixed else column // eq.n].append(size(e))
+        columns = list(parts.items())
+        slow.append([t for b, texts in columns if second_order and b < half for t in texts if t])
+        fast.append([t for b, texts in columns if not second_order or b >= half for t in texts if t])
+    w.put("# a bound of the eigenvalues")
+    damping, stiffness = largest(fast), largest(slow)
+    w.put(f"bound = {damping or 'broadcast(0.0, WIDTH)'}")
+    if stiffness:
+        w.put(f"bound = bound + sqrt({stiffness})")
+
+
+def size(e: sp.Expr) -> str:
+    """The text of an absolute value; empty for zero."""
+    if e == 0:
+        return ""
+    return show(sp.Abs(e)) if e.is_number else f"absolute({show(e)})"
+
+
+def largest(rows: list[list[str]]) -> str:
+    """The text of the largest of some sums; equal ones once."""
+    sums = list(dict.fromkeys(" + ".join(row) for row in rows if row))
+    if not sums:
+        return ""
+    text = sums[0] if "(" in "".join(sums[:1]) or len(sums) > 1 else f"broadcast({sums[0]}, WIDTH)"
+    for other in sums[1:]:
+        text = f"maximum({text}, {other})"
+    return text

@@ -1,0 +1,139 @@
+"""The mass matrix of a network whose links have inertia: M d(state)/dt = f, solved by a sparse elimination, never inverted.
+
+A Rosenbrock step for y' = F = M^-1 f solves (shift M - J) k = M (F(u) + rate sum c_j k_j) + d h f_t with M at the start of
+the step and J = df/dy - d(M F)/dy at fixed F: that is the exact Jacobian, multiplied by M.  Where M is constant, M F(u) is
+f(u) and no system in M is solved at all; otherwise F(u) takes one elimination of M a stage, of the links' structure (Hairer
+& Wanner, Solving Ordinary Differential Equations II (Springer, 1996), section IV.7: Rosenbrock methods and M y' = f).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import sympy as sp
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.calculus import derivative
+from synchain.models.mechanics.components import Edge
+
+from ..printing.printer import show
+from .elimination import Entry, Factors, plan, write_elimination, write_solve
+
+if TYPE_CHECKING:
+    from .step import StepWriter
+
+__all__ = ["Mass", "momentum_slopes"]
+
+Block = tuple[tuple[sp.Expr, ...], ...]
+
+
+def momentum_slopes(edge: Edge, here: Sequence[sp.Symbol], there: Sequence[sp.Symbol]) -> tuple[Block, Block]:
+    """Return d(M F)/dy of one link at fixed rates F of its target, `here`, and of its source, by the states of either."""
+    if not edge.inertia:
+        zero = tuple((sp.S.Zero,) * len(edge.here) for _ in edge.here)
+        return zero, tuple((sp.S.Zero,) * len(edge.there) for _ in edge.here)
+    pairs = zip(edge.inertia, (here, there), strict=True)
+    parts = [[sp.Add(*(e * f for e, f in zip(row, rates, strict=True))) for row in block] for block, rates in pairs]
+    carried = [a + b for a, b in zip(*parts, strict=True)]
+    own, other = (tuple(tuple(derivative(e, s) for s in end) for e in carried) for end in (edge.here, edge.there))
+    return own, other
+
+
+class Mass:
+    """The entries of M and what a step writes about it; without entries M is the identity and nothing is written."""
+
+    def __init__(self, equations: Equations) -> None:
+        self.equations = equations
+        self.inertial = equations.inertial
+        self._entries: dict[Entry, sp.Expr] | None = None if self.inertial else {}
+        self.factors: Factors | None = None
+
+    @property
+    def entries(self) -> dict[Entry, sp.Expr]:
+        """The non-zero entries of M by row and column; empty where it is the identity."""
+        if self._entries is None:
+            self._entries = self.equations.mass()
+        return self._entries
+
+    @property
+    def coupled(self) -> set[Entry]:
+        """The entries that are not those of the identity."""
+        return {key for key, e in self.entries.items() if e != sp.Integer(key[0] == key[1])}
+
+    @property
+    def rows(self) -> list[int]:
+        """The rows that are solved together: those with such entries, and those of the rates that these multiply."""
+        return sorted({k for key in self.coupled for k in key})
+
+    @property
+    def constant(self) -> bool:
+        """True where M depends on parameters alone."""
+        ends = (({*edge.here, *edge.there}, edge.inertia) for edge in self.equations.edges)
+        return not any(e.free_symbols & states for states, blocks in ends for b in blocks for row in b for e in row)
+
+    def refuse(self, what: str) -> None:
+        """Raise ValueError where M is not the identity."""
+        if self.inertial:
+            raise ValueError(f"{what}: found links with inertia; expected none; use integrator 'rodas5p' or 'dop853'")
+
+    def factorise(self, w: StepWriter, prefix: str) -> None:
+        """Write the elimination of M at the states of a stage."""
+        rows, at = self.rows, w.staged(prefix)
+        place = {row: k for k, row in enumerate(rows)}
+        matrix = {
+            (place[r], place[c]): e.xreplace(at) for (r, c), e in self.entries.items() if r in place and c in place
+        }
+        self.steps = plan(len(rows), set(matrix))
+        self.factors = write_elimination(self.steps, matrix, {}, tuple(f"mass_{w.state[row]}" for row in rows))
+        w.put("# factors of M", *self.factors.lines)
+
+    def solve(self, w: StepWriter, source: str, out: str) -> None:
+        """Write out = M^-1 source for the rows that M couples, by the factors at hand."""
+        if self.factors is None:
+            raise RuntimeError("the mass matrix has not been factorised; this is a mistake in the program")
+        names = [w.state[row] for row in self.rows]
+        w.put(*(f"r_{name} = {source}{name}" for name in names))
+        rights = {k: f"r_{name}" for k, name in enumerate(names)}
+        w.put(*write_solve(self.steps, self.factors, rights, {k: f"{out}{name}" for k, name in enumerate(names)}))
+
+    def explicit(self, w: StepWriter, prefix: str, out: str, first: bool) -> None:
+        """Turn the right-hand sides `out` of a stage into rates; a constant M is factorised in the first stage alone."""
+        if self.entries:
+            if first or not self.constant:
+                self.factorise(w, prefix)
+            self.solve(w, out, out)
+
+    def at_start(self, w: StepWriter, jacobian: dict[Entry, sp.Expr]) -> dict[Entry, sp.Expr]:
+        """J = df/dy - d(M F)/dy at fixed F, from the entries of df/dy."""
+        if not self.entries or self.constant:
+            return jacobian
+        self.factorise(w, "")
+        self.solve(w, "f_", "g_")
+        found, rows = dict(jacobian), set(self.rows)
+        states = [sp.Symbol(name, real=True) for name in w.state]
+        for (row, column), e in self.entries.items():
+            rate = sp.Symbol(f"{'g' if column in rows else 'f'}_{w.state[column]}", real=True)
+            for k, s in enumerate(states):
+                if e.has(s):
+                    found[row, k] = found.get((row, k), sp.S.Zero) - derivative(e, s) * rate
+        return {key: e for key, e in found.items() if e != 0}
+
+    def known(self, w: StepWriter, sums: Mapping[str, str], i: int) -> dict[str, str]:
+        """By state, M (F + rate sum c k) for the rows that M couples, in stage i; `sums` are the texts of sum c k."""
+        if not self.entries or i == 0:
+            return {}
+        rows, before = self.rows, "rate*"
+        if self.constant:
+            w.put(*(f"g_{w.state[row]} = {sums[w.state[row]]}" for row in rows))
+        else:
+            self.factorise(w, "u_")
+            self.solve(w, "f_", "g_")
+            w.put(*(f"g_{w.state[row]} = g_{w.state[row]} + rate*({sums[w.state[row]]})" for row in rows))
+            before = ""
+        found = {}
+        for row in rows:
+            terms = [e * sp.Symbol(f"g_{w.state[c]}") for (r, c), e in self.entries.items() if r == row]
+            text = f"{before}({show(sp.Add(*terms))})"
+            found[w.state[row]] = f"f_{w.state[row]} + {text}" if self.constant else text
+        return found

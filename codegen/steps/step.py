@@ -1,0 +1,241 @@
+"""The text of one integration step, unrolled over the nodes of a small network."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterator, Sequence
+from contextlib import contextmanager
+
+import sympy as sp
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import TIME
+
+from ..integrators import Integrator
+from ..printing.blocks import Body, NodeBlocks
+from ..printing.printer import show
+from .mass import Mass
+
+__all__ = ["PAIR", "SCALED", "StepWriter", "combine", "function_name", "indent_from", "write_function"]
+
+PAIR = '''
+@njit(error_model="numpy", forceinline=True)
+def pair(e5, e3, h):
+    """One error estimate out of two embedded ones."""
+    return h*e5*absolute(e5)/sqrt(e5*e5 + 0.01*(e3*e3) + 2.2250738585072014e-308)
+'''.strip()
+
+SCALED = '''
+@njit(error_model="numpy", forceinline=True)
+def scaled(error, old, new, rtol, atol):
+    """The error estimate of one state variable in units of its tolerance."""
+    return absolute(error)/(atol + rtol*maximum(absolute(old), absolute(new)))
+'''.strip()
+
+
+def function_name(name: str, kind: int) -> str:
+    """The name of a node function for nodes of some kind: node, node2, node2_linear."""
+    return name if kind == 0 else name.replace("node", f"node{kind + 1}", 1)
+
+
+def write_function(name: str, doc: str, body: Body, arguments: Sequence[str], results: Sequence[sp.Expr]) -> list[str]:
+    """A small inlined function of lanes: statements first, results last."""
+    lines = ["@njit(error_model='numpy', forceinline=True)", f"def {name}({', '.join(arguments)}):", f'    """{doc}"""']
+    lines += [f"    {s} = {show(e)}" for s, e in body.statements]
+    lines.append(f"    return {', '.join(show(e) for e in results)}")
+    return lines
+
+
+def combine(row: Sequence[float], names: Sequence[str], start: str = "") -> str:
+    """start + sum row_j * names_j without zero terms and unit factors; '' where nothing is left."""
+    text = start
+    for weight, name in zip(row, names, strict=False):
+        if weight == 0.0:
+            continue
+        term = name if abs(weight) == 1.0 else f"{abs(weight)!r}*{name}"
+        if not text:
+            text = term if weight > 0 else f"-{term}"
+        else:
+            text += f" + {term}" if weight > 0 else f" - {term}"
+    return text
+
+
+class StepWriter:
+    """Writes the statements of one step of `method` for `equations`, whose node was analysed into `blocks`.
+
+    Nodes of further kinds were analysed into `more`.  A `bounded` step returns a bound of the eigenvalues at its start
+    beside the error.
+    """
+
+    def __init__(
+        self,
+        equations: Equations,
+        blocks: NodeBlocks,
+        method: Integrator,
+        bounded: bool = False,
+        more: Sequence[NodeBlocks] = (),
+    ) -> None:
+        self.equations, self.blocks, self.method, self.bounded = equations, blocks, method, bounded
+        self.kinds = (blocks, *more)
+        self.state = equations.state
+        self.lines: list[str] = []
+        self.mass = Mass(equations)
+
+    def put(self, *lines: str) -> None:
+        """Append statements."""
+        self.lines += lines
+
+    def stages(self, name: str, count: int) -> list[str]:
+        """Names of the first `count` stage values of one state variable."""
+        return [f"k{j + 1}_{name}" for j in range(count)]
+
+    @property
+    def first_body(self) -> Body:
+        """What is evaluated of a node at the start of a step."""
+        return self.first_of(self.blocks)
+
+    def first_of(self, blocks: NodeBlocks) -> Body:
+        """What is evaluated of a node of some kind at the start of a step."""
+        if self.method.kind == "rosenbrock":
+            return blocks.linear
+        return blocks.local if self.bounded else blocks.rhs
+
+    def of(self, i: int) -> NodeBlocks:
+        """The blocks of node i."""
+        return self.kinds[self.equations.kind(i)]
+
+    # -- pieces of the right-hand side ------------------------------------------------------------------------
+
+    def is_plain(self, e: sp.Expr) -> bool:
+        """True where a result needs no function: a number, a parameter term, or one bare state symbol."""
+        own = {s for node in self.equations.nodes for s in node.state}
+        inner = own | self.inner | self.varied
+        return (e.is_Symbol and e not in self.inner) or not e.free_symbols & inner
+
+    @property
+    def inner(self) -> set[sp.Symbol]:
+        """Symbols defined inside the node functions."""
+        bodies = (body for blocks in self.kinds for body in (blocks.rhs, blocks.linear, blocks.local))
+        return {s for body in bodies for s, _ in body.statements}
+
+    @property
+    def varied(self) -> set[sp.Symbol]:
+        """The parameters of the template that have a value for each node."""
+        return {sp.Symbol(name, real=True) for name in self.equations.varied}
+
+    def arguments(self, body: Body, results: Sequence[sp.Expr]) -> list[sp.Symbol]:
+        """What a node function must be given: state first, then the rest by name."""
+        used = Body(body.statements, tuple(results)).symbols
+        states = dict.fromkeys(s for node in self.equations.nodes for s in node.state)
+        own = [s for s in states if s in used]
+        return own + sorted((s for s in used if s not in own), key=lambda s: s.name)
+
+    def at(self, i: int, prefix: str) -> dict[sp.Symbol, sp.Symbol]:
+        """The names of the states of node i in a stage, and of the parameters that it has for itself."""
+        states = self.equations.node_at(i).state
+        found = {s: sp.Symbol(f"{prefix}{s.name}_{i + 1}", real=True) for s in states}
+        return {**self.equations.at_node(i), **found}
+
+    def call(self, function: str, body: Body, results: Sequence[sp.Expr], i: int, prefix: str) -> str:
+        """The call of a node function for node i with the state names of a stage."""
+        at, kind = self.at(i, prefix), self.equations.kind(i)
+        names = (at.get(s, s).name for s in self.arguments(body, results))
+        return f"{function_name(function, kind)}({', '.join(names)})"
+
+    def timed(self, time: str, wanted: set[sp.Symbol]) -> None:
+        """Statements for the time terms in use, at the time of that name."""
+        for symbol, e in (pair for blocks in self.kinds for pair in blocks.timed):
+            if symbol in wanted:
+                self.put(f"{symbol} = {show(e.xreplace({TIME: sp.Symbol(time)}))}")
+
+    def stage_time(self, i: int, first: int) -> None:
+        """The time of stage i and the time terms of the right-hand side, unless the stage before had the same time.
+
+        `first` is the first stage that is evaluated at all.
+        """
+        c = self.method.c
+        if i == first or c[i] != c[i - 1]:
+            self.put(f"now = {combine((c[i],), ['h'], 't')}")
+            self.timed("now", self.wanted([blocks.rhs for blocks in self.kinds]))
+
+    def wanted(self, bodies: Sequence[Body]) -> set[sp.Symbol]:
+        """Time terms that some bodies use."""
+        return {s for blocks in self.kinds for s, _ in blocks.timed} & {s for body in bodies for s in body.symbols}
+
+    def slopes(self, prefix: str, out: str) -> None:
+        """Statements that give the right-hand side at the state `prefix`x_1 … under the names `out`x_1 …"""
+        for i in range(self.equations.n):
+            body, names = self.of(i).rhs, self.at(i, prefix)
+            coded = [e for e in body.results if not self.is_plain(e)]
+            targets = [f"{out}{s.name}_{i + 1}" for s in self.equations.node_at(i).state]
+            if coded:
+                left = [t for t, e in zip(targets, body.results, strict=True) if not self.is_plain(e)]
+                self.put(f"{', '.join(left)} = {self.call('node', body, coded, i, prefix)}")
+            for target, e in zip(targets, body.results, strict=True):
+                if self.is_plain(e):
+                    text = show(e.xreplace(names))
+                    self.put(f"{target} = broadcast({text}, WIDTH)" if e.is_number else f"{target} = {text}")
+        self.links(prefix, out)
+
+    def links(self, prefix: str, out: str) -> None:
+        """Add what the links contribute to the right-hand side."""
+        eq = self.equations
+        terms: dict[str, list[sp.Expr]] = {}
+        stage = self.staged(prefix)
+        for link in eq.links:
+            for s, e in zip(eq.node_at(link[0]).state, eq.edge_at(link).rhs, strict=True):
+                term = e.xreplace(eq.at_link(link)).xreplace(stage)
+                if term != 0:
+                    terms.setdefault(f"{out}{s.name}_{link[0] + 1}", []).append(term)
+        for target, parts in terms.items():
+            self.put(f"{target} = {target} + " + " + ".join(show(p) for p in parts))
+
+    def staged(self, prefix: str) -> dict[sp.Symbol, sp.Symbol]:
+        """The names of all states in a stage."""
+        return {sp.Symbol(n, real=True): sp.Symbol(prefix + n, real=True) for n in self.state}
+
+    # -- beginning and end ------------------------------------------------------------------------------------
+
+    def opening(self) -> None:
+        """Load the state and the parameters."""
+        for slot, name in enumerate(self.state):
+            self.put(f"{name} = load(y, {slot}, WIDTH)")
+        self.parameters()
+
+    def parameters(self, but: Container[str] = ()) -> None:
+        """Load the parameters, `but` some, and compute what depends on them alone."""
+        for slot, name in enumerate(self.equations.parameters):
+            if name not in but:
+                self.put(f"{name} = load(p, {len(self.state) + slot}, WIDTH)")
+        for blocks in self.kinds:
+            used = self.first_of(blocks).symbols
+            wanted = used.union(*(e.free_symbols for s, e in blocks.timed if s in used))
+            self.put(*(f"{symbol} = {show(e)}" for symbol, e in blocks.constants if symbol in wanted))
+
+    def closing(self, errors: Sequence[str]) -> None:
+        """Store the new state and reduce the error to one number a lane."""
+        terms = []
+        for slot, (name, e) in enumerate(zip(self.state, errors, strict=True)):
+            self.put(f"store(y_new, {slot}, n_{name})", f"e_{name} = scaled({e}, {name}, n_{name}, rtol, atol)")
+            terms.append(f"e_{name}")
+        self.put(f"total = {' + '.join(terms)}", f"error = {terms[0]}")
+        self.put(*(f"error = maximum(error, {term})" for term in terms[1:]))
+        self.put(f"return error + 0.0*total{', bound' * self.bounded}  # NaN or infinite where any estimate is")
+
+    def dense(self, scale: str = "") -> None:
+        """Store the coefficients of the dense output."""
+        for j, row in enumerate(self.method.dense):
+            for slot, name in enumerate(self.state):
+                text = combine(row, [f"k{i + 1}_{name}" for i in range(len(row))]) or "broadcast(0.0, WIDTH)"
+                self.put(
+                    f"store(dense, {j * len(self.state) + slot}, {scale}({text}))"
+                    if scale
+                    else f"store(dense, {j * len(self.state) + slot}, {text})"
+                )
+
+
+@contextmanager
+def indent_from(writer: StepWriter) -> Iterator[None]:
+    """Indent whatever is written inside the with block."""
+    mark = len(writer.lines)
+    yield
+    writer.lines[mark:] = ["    " + line for line in writer.lines[mark:]] or ["    pass"]

@@ -1,0 +1,205 @@
+"""Numbers a + 2 b cos(2πk/m) and a + b exp(2πik/m), a and b rational: form, recognition, polynomials.
+
+Short real radicals where they exist (m = 1 … 6, 8, 10, 12, 16, 20, 24), otherwise the sine or cosine itself:
+the radicals of other angles are long or need complex cube roots (casus irreducibilis).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from math import gcd, isqrt
+
+import sympy as sp
+from flint import fmpq, fmpq_poly, fmpz_poly
+
+from . import cosines
+
+__all__ = [
+    "biquadratic",
+    "cosine",
+    "cosine_roots",
+    "exponential",
+    "exponential_roots",
+    "is_short",
+    "linear_cosine",
+    "linear_exponential",
+    "minimal_polynomial",
+    "minus_four_sine_squared",
+    "written",
+]
+
+_SHORT = {
+    (0, 1): "2", (1, 2): "-2", (1, 3): "-1", (1, 4): "0", (1, 6): "1",
+    (1, 5): "-1/2 + sqrt(5)/2", (2, 5): "-1/2 - sqrt(5)/2",
+    (1, 10): "1/2 + sqrt(5)/2", (3, 10): "1/2 - sqrt(5)/2",
+    (1, 8): "sqrt(2)", (3, 8): "-sqrt(2)", (1, 12): "sqrt(3)", (5, 12): "-sqrt(3)",
+    (1, 16): "sqrt(2 + sqrt(2))", (3, 16): "sqrt(2 - sqrt(2))",
+    (5, 16): "-sqrt(2 - sqrt(2))", (7, 16): "-sqrt(2 + sqrt(2))",
+    (1, 20): "sqrt(5/2 + sqrt(5)/2)", (3, 20): "sqrt(5/2 - sqrt(5)/2)",
+    (7, 20): "-sqrt(5/2 - sqrt(5)/2)", (9, 20): "-sqrt(5/2 + sqrt(5)/2)",
+    (1, 24): "sqrt(6)/2 + sqrt(2)/2", (5, 24): "sqrt(6)/2 - sqrt(2)/2",
+    (7, 24): "sqrt(2)/2 - sqrt(6)/2", (11, 24): "-sqrt(6)/2 - sqrt(2)/2",
+}  # fmt: skip
+"""2 cos(2πk/m) by (k, m)."""
+
+
+def is_short(k: int, m: int) -> bool:
+    """True where cos(2πk/m), 0 <= k/m <= 1/2 in lowest terms, is written as a short real radical."""
+    return (k, m) in _SHORT
+
+
+def exponential(shift: int, k: int, m: int) -> sp.Expr:
+    """shift + exp(2πik/m), as radicals where m (in lowest terms) is at most 4, or 6."""
+    turn = Fraction(2 * k, m) % 2
+    angle = sp.Rational(*(turn - 2 if turn > 1 else turn).as_integer_ratio()) * sp.pi
+    if 2 * turn % 1 == 0 or 3 * turn % 1 == 0:
+        return shift + sp.cos(angle) + sp.I * sp.sin(angle)
+    return shift + sp.exp(sp.I * angle, evaluate=False)
+
+
+def minus_four_sine_squared(k: int, m: int) -> sp.Expr:
+    """-4 sin²(kπ/m) = -2 + 2 cos(2πk/m), as radicals where they are short."""
+    return cosine(Fraction(-2), Fraction(1), k, m)
+
+
+def cosine(a: Fraction, b: Fraction, k: int, m: int) -> sp.Expr:
+    """a + 2 b cos(2πk/m), as radicals where they are short, as a multiple of sin² where a = -2 b."""
+    k = min(k % m, -k % m)
+    k, m = k // gcd(k, m), m // gcd(k, m)
+    shift, factor = sp.Rational(a.numerator, a.denominator), sp.Rational(b.numerator, b.denominator)
+    if (k, m) in _SHORT:
+        return sp.expand(shift + factor * sp.sympify(_SHORT[k, m]))
+    if a == -2 * b:
+        return -4 * factor * sp.sin(sp.Rational(k, m) * sp.pi, evaluate=False) ** 2
+    return shift + 2 * factor * sp.cos(sp.Rational(2 * k, m) * sp.pi, evaluate=False)
+
+
+def linear_cosine(expression: sp.Expr) -> tuple[Fraction, Fraction, int, int] | None:
+    """The a, b, k, m of an expression a + 2 b cos(2πk/m), also with sin² or cos²; None for any other."""
+    shift, rest = expression.as_coeff_Add()
+    factor, core = rest.as_coeff_Mul()
+    squared = isinstance(core, sp.Pow) and core.exp == 2
+    function = core.base if squared else core
+    if not (shift.is_Rational and factor.is_Rational and isinstance(function, (sp.sin, sp.cos))):
+        return None
+    turn = function.args[0] / (2 * sp.pi)
+    if not turn.is_Rational or (isinstance(function, sp.sin) and not squared):
+        return None
+    a, b, angle = Fraction(int(shift.p), int(shift.q)), Fraction(int(factor.p), int(factor.q)) / 2, turn
+    if squared:  # 2 cos² = 1 + cos 2x, 2 sin² = 1 - cos 2x
+        a, b, angle = a + b, (-b if isinstance(function, sp.sin) else b) / 2, 2 * turn
+    return a, b, int(angle.p) % int(angle.q), int(angle.q)
+
+
+def linear_exponential(expression: sp.Expr) -> tuple[Fraction, Fraction, int, int] | None:
+    """The a, b, k, m of an expression written a + b exp(2πik/m); None for any other."""
+    shift, rest = expression.as_coeff_Add()
+    factor, core = rest.as_coeff_Mul()
+    if not (shift.is_Rational and factor.is_Rational and isinstance(core, sp.exp)):
+        return None
+    turn = core.args[0] / (2 * sp.pi * sp.I)
+    if not turn.is_Rational:
+        return None
+    a, b = Fraction(int(shift.p), int(shift.q)), Fraction(int(factor.p), int(factor.q))
+    return a, b, int(turn.p) % int(turn.q), int(turn.q)
+
+
+def minimal_polynomial(a: Fraction, b: Fraction, m: int, conjugates: fmpz_poly | None = None) -> fmpq_poly:
+    """The monic polynomial whose roots are a + 2 b cos(2πk/m) for all k prime to m, each once; b not 0.
+
+    With `conjugates`, the roots are a + b r for its roots r instead.
+    """
+    psi = fmpq_poly(fmpz_poly.cos_minpoly(m) if conjugates is None else conjugates)
+    scale = fmpq(b.numerator, b.denominator)
+    inner = fmpq_poly([-fmpq(a.numerator, a.denominator) / scale, 1 / scale])
+    return psi(inner) * scale ** psi.degree()
+
+
+def exponential_roots(polynomial: fmpq_poly) -> list[sp.Expr] | None:
+    """All roots of a monic irreducible polynomial of degree >= 2 if they are a + exp(2πik/m)."""
+    degree = polynomial.degree()
+    for m in _moduli(degree):
+        cyclotomic = fmpz_poly.cyclotomic(m)
+        shift = (fmpq(cyclotomic[degree - 1]) - polynomial[degree - 1]) / degree
+        if minimal_polynomial(Fraction(int(shift.p), int(shift.q)), Fraction(1), m, cyclotomic) == polynomial:
+            a = sp.Rational(int(shift.p), int(shift.q))
+            turns = [sp.Rational(2 * k, m) for k in range(m) if gcd(k, m) == 1]
+            return [a + sp.exp(sp.I * sp.pi * turn) for turn in turns]
+    return None
+
+
+def cosine_roots(polynomial: fmpq_poly) -> list[sp.Expr] | None:
+    """All roots, descending, of a monic irreducible polynomial of degree >= 2 if they are a + 2 b cos(2πk/m).
+
+    Mean and spread of the roots give a and b for each m of the right degree; an equal polynomial proves it.
+    """
+    degree = polynomial.degree()
+    for m in _moduli(2 * degree):
+        fit = _fit(polynomial, fmpq_poly(fmpz_poly.cos_minpoly(m)))
+        if fit is not None and minimal_polynomial(*fit, m) == polynomial:
+            return [cosine(*fit, k, m) for k in range(m // 2 + 1) if gcd(k, m) == 1]
+    return None
+
+
+def _moduli(value: int) -> Iterator[int]:
+    """All m >= 3 with φ(m) = value; m < 6 φ(m) holds far beyond the degrees in reach."""
+    last = 6 * value
+    totient = list(range(last + 1))
+    for p in range(2, last + 1):
+        if totient[p] == p:
+            for multiple in range(p, last + 1, p):
+                totient[multiple] -= totient[multiple] // p
+    return (m for m in range(3, last + 1) if totient[m] == value)
+
+
+def _fit(polynomial: fmpq_poly, psi: fmpq_poly) -> tuple[Fraction, Fraction] | None:
+    """The rational (a, b), b > 0, that map mean and spread of the roots of psi to those of the polynomial.
+
+    b < 0 is not needed: it is b > 0 with another m, since -2 cos x = 2 cos(π - x).
+    """
+    (mean, spread), (psi_mean, psi_spread) = _moments(polynomial), _moments(psi)
+    square = spread / psi_spread
+    top, bottom = isqrt(max(int(square.p), 0)), isqrt(int(square.q))
+    if top and top * top == int(square.p) and bottom * bottom == int(square.q):
+        b = Fraction(top, bottom)
+        return Fraction(int(mean.p), int(mean.q)) - b * Fraction(int(psi_mean.p), int(psi_mean.q)), b
+    return None
+
+
+def _moments(polynomial: fmpq_poly) -> tuple[fmpq, fmpq]:
+    """Mean and mean square deviation of the roots of a monic polynomial, from its leading coefficients."""
+    d = polynomial.degree()
+    first, second = polynomial[d - 1], polynomial[d - 2]
+    mean = -first / d
+    return mean, (first * first - 2 * second) / d - mean * mean
+
+
+def written(factor: fmpq_poly) -> list[sp.Expr] | None:
+    """The roots of an irreducible polynomial in closed form, where a short one is known."""
+    monic = factor / factor[factor.degree()]
+    c = [sp.Rational(int(x.p), int(x.q)) for x in monic.coeffs()]
+    if len(c) == 2:
+        return [-c[0]]
+    if len(c) == 3:
+        root = sp.sqrt(c[1] ** 2 / 4 - c[0])
+        return [sp.expand(-c[1] / 2 + root), sp.expand(-c[1] / 2 - root)]
+    quartic = biquadratic(monic) if len(c) == 5 else None
+    return cosines.cosine_roots(monic) or quartic or cosines.exponential_roots(monic)
+
+
+def biquadratic(monic: fmpq_poly) -> list[sp.Expr] | None:
+    """Real nested roots a ± sqrt(b ± sqrt(c)), or a ± sqrt(b) ± sqrt(c), of a quartic that has them."""
+    shift = monic[3] / 4
+    even = monic(fmpq_poly([-shift, 1]))
+    p, q, discriminant = even[2], even[0], even[2] ** 2 - 4 * even[0]
+    if even[1] != 0 or discriminant < 0 or p > 0 or q < 0:
+        return None
+    a, b, c = (sp.Rational(int(x.p), int(x.q)) for x in (-shift, -p / 2, discriminant / 4))
+    product = sp.sqrt(sp.Rational(int(q.p), int(q.q)))
+    if product.is_Rational:
+        parts = [sp.sqrt((b + product) / 2), sp.sqrt((b - product) / 2)]
+        roots = [a + s * parts[0] + t * parts[1] for s in (1, -1) for t in (1, -1)]
+    else:
+        roots = [a + s * sp.sqrt(b + t * sp.sqrt(c)) for s in (1, -1) for t in (1, -1)]
+    return roots if all(len(sp.sstr(root)) <= 60 for root in roots) else None

@@ -1,0 +1,172 @@
+"""Whether two algebraic numbers are equal, decided exactly by a bound on how near to zero a difference can be.
+
+Every number is written as U/L with algebraic integers U and L; u and l bound all conjugates of U and L, and D bounds the
+degree of the field that holds them.  Where U is not 0 its norm is a whole number other than 0, so |U| >= u**(1 - D) and the
+number is at least 1/(l u**(D - 1)) in modulus.  One certified ball smaller than that decides.
+After Burnikel, Funke, Mehlhorn, Schirra & Schmitt, Algorithmica 55, 14 (2009).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import sympy as sp
+from flint import acb, arb
+
+from .balls import Ball, enclose, precision
+from .roots import ComplexRoot, RealRoot
+
+__all__ = ["Number", "check_size", "equal", "sign"]
+
+Number: TypeAlias = sp.Expr | RealRoot | ComplexRoot
+"""Rationals, roots, I, sin and cos of rational multiples of pi, exp of those of I*pi and what is made of them."""
+
+MOST_BITS = 2**19
+"""Numbers whose bound needs more bits than this are refused."""
+
+
+@dataclass(slots=True)
+class _Field:
+    """What generates the field of some numbers: one root of unity, radicals (base, q), and roots of polynomials."""
+
+    unity: int = 1
+    radicals: set[tuple[sp.Expr, int]] = field(default_factory=set)
+    roots: dict[tuple[tuple[int, ...], int], int] = field(default_factory=dict)
+
+    @property
+    def degree(self) -> int:
+        """A bound on the degree of the field."""
+        return int(sp.totient(self.unity)) * math.prod(q for _, q in self.radicals) * math.prod(self.roots.values())
+
+
+def equal(a: Number, b: Number) -> bool:
+    """Return whether two algebraic numbers are the same, without any tolerance.
+
+    Raises ValueError where the bound needs more than MOST_BITS bits, and TypeError on numbers of another kind.
+    """
+    if a is b or (isinstance(a, sp.Expr) and isinstance(b, sp.Expr) and a == b):
+        return True
+    return _compared((a,), (b,)) == 0
+
+
+def sign(a: tuple[Number, ...], b: tuple[Number, ...]) -> int:
+    """The sign of one product of real algebraic numbers less another: 0 where they are equal, without any tolerance.
+
+    Raises ValueError and TypeError as `equal`.
+    """
+    gap = _compared(a, b)
+    if isinstance(gap, acb) and not gap.imag.contains(0):
+        raise ValueError(f"{_shown(a[0])} or {_shown(b[0])} is complex; expected real numbers")
+    return 0 if gap == 0 else 1 if gap.real > 0 else -1
+
+
+def _compared(a: tuple[Number, ...], b: tuple[Number, ...]) -> Ball:
+    """A ball around the difference of two products that does not hold 0, or 0 where they are equal."""
+    needed = _bits((a, b))
+    bits = 64
+    while True:
+        with precision(bits):
+            gap = _product_ball(a, bits) - _product_ball(b, bits)
+            if abs(gap).lower() > 0:
+                return gap
+            if abs(gap).upper() < arb(2) ** (-needed):
+                return 0
+        if bits > 4 * MOST_BITS:
+            raise ValueError(
+                f"{_shown(a[0])} and {_shown(b[0])} cannot be told apart at {bits} bits; write them simpler"
+            )
+        bits = min(4 * bits, 2 * bits + needed)
+
+
+def _product_ball(factors: tuple[Number, ...], bits: int) -> acb:
+    found = acb(1)
+    for factor in factors:
+        found = found * acb(_ball(factor, bits))
+    return found
+
+
+def check_size(number: sp.Expr) -> None:
+    """Raise ValueError where a number is too involved to be compared, TypeError where it is of another kind."""
+    _bits(((number,),))
+
+
+def _bits(products: tuple[tuple[Number, ...], ...]) -> int:
+    """So many bits that a sum or difference of these products below 2**-bits is 0."""
+    generated = _Field()
+    up, low = _sum([_measured(factors, generated) for factors in products])
+    needed = (generated.degree - 1) * up + low
+    if needed > MOST_BITS:
+        raise ValueError(
+            f"{_shown(products[0][0])} needs {needed:.3g} bits to be compared exactly; expected at most {MOST_BITS}; "
+            "write it simpler, or as an approximation such as ~-3.414"
+        )
+    return math.ceil(needed * (1 + 1e-9)) + 8
+
+
+def _measured(factors: tuple[Number, ...], generated: _Field) -> tuple[float, float]:
+    """(log2 u, log2 l) of a product."""
+    parts = [_measure(x, generated) for x in factors]
+    return sum(up for up, _ in parts), sum(low for _, low in parts)
+
+
+def _measure(x: Number, generated: _Field) -> tuple[float, float]:
+    """(log2 u, log2 l) of a number, both at least 0; what it is made of goes into the field."""
+    if isinstance(x, (RealRoot, ComplexRoot)):
+        generated.roots[(x.polynomial, x.index)] = len(x.polynomial) - 1
+        leading = x.polynomial[-1]
+        return math.log2(leading + max(map(abs, x.polynomial))), math.log2(leading)
+    if x.is_Rational:
+        return math.log2(max(abs(int(x.p)), 1)), math.log2(int(x.q))
+    if x is sp.I:
+        generated.unity = math.lcm(generated.unity, 4)
+        return 0.0, 0.0
+    if isinstance(x, (sp.Add, sp.Mul)):
+        parts = [_measure(part, generated) for part in x.args]
+        return _sum(parts) if isinstance(x, sp.Add) else (sum(up for up, _ in parts), sum(low for _, low in parts))
+    if isinstance(x, (sp.sin, sp.cos)):
+        _unity(x.args[0] / sp.pi, generated)
+        return 1.0, 1.0
+    if isinstance(x, sp.exp):
+        _unity(x.args[0] / (sp.pi * sp.I), generated)
+        return 0.0, 0.0
+    if isinstance(x, sp.Pow) and x.exp.is_Rational:
+        return _power(x, generated)
+    raise TypeError(
+        f"{_shown(x)} is not an algebraic number of rationals, roots, I, sin, cos and exp of multiples of pi"
+    )
+
+
+def _sum(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """(log2 u, log2 l) of a sum: over the common denominator each U meets the L of all others."""
+    low = sum(low for _, low in parts)
+    return max(up + low - own for up, own in parts) + math.log2(len(parts)), low
+
+
+def _unity(turn: sp.Expr, generated: _Field) -> None:
+    if not turn.is_Rational:
+        raise TypeError(f"{turn} times pi is no rational multiple of pi; expected one, so that the number is algebraic")
+    generated.unity = math.lcm(generated.unity, 4, 2 * int(turn.q))  # 4: sines need I
+
+
+def _power(x: sp.Pow, generated: _Field) -> tuple[float, float]:
+    up, low = _measure(x.base, generated)
+    p, q = int(x.exp.p), int(x.exp.q)
+    if p < 0:
+        up, low = low, up
+    up, low = up * abs(p), low * abs(p)
+    if q > 1:
+        generated.radicals.add((x.base, q))
+        up = (up + (q - 1) * low) / q
+    return up, low
+
+
+def _ball(x: Number, bits: int) -> Ball:
+    return x.enclosure(bits) if isinstance(x, (RealRoot, ComplexRoot)) else enclose(x, bits)
+
+
+def _shown(x: Number) -> str:
+    text = x.text if isinstance(x, (RealRoot, ComplexRoot)) else sp.sstr(x)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,90 @@
+"""The polynomial of numbers a + 2 b cos(2πk/m) that come with all their conjugates, without looking at any of their values.
+
+Two such numbers with b > 0 and one a, b and m (k/m in lowest terms) are conjugate; all of them multiply to one polynomial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from functools import lru_cache
+
+import sympy as sp
+from flint import fmpq, fmpq_poly, fmpz, fmpz_poly
+
+from . import cosine_sums, cosines
+from .cosine_sums import AngleSum
+from .roots import ComplexRoot, RealRoot
+
+__all__ = ["minimal_polynomial", "multiplied"]
+
+_X = sp.Symbol("x")
+
+
+def multiplied(numbers: Iterable[tuple[AngleSum, int]]) -> fmpq_poly | None:
+    """The product of (z - number)^times; None where a number has several cosines or not all conjugates as often as itself.
+
+    The same number may be listed several times.
+    """
+    rationals: dict[Fraction, int] = {}
+    classes: dict[tuple[Fraction, Fraction, int], dict[int, int]] = {}
+    for number, times in numbers:
+        if not number.terms:
+            rationals[number.shift] = rationals.get(number.shift, 0) + times
+            continue
+        ((turn, b),) = number.terms if len(number.terms) == 1 else ((Fraction(0), Fraction(0)),)
+        if not b:
+            return None
+        if b < 0:
+            turn, b = Fraction(1, 2) - turn, -b
+        members = classes.setdefault((number.shift, b, turn.denominator), {})
+        members[turn.numerator] = members.get(turn.numerator, 0) + times
+    product = fmpq_poly([1])
+    for value, times in rationals.items():
+        product *= fmpq_poly([-value.numerator, value.denominator]) ** times / fmpz(value.denominator) ** times
+    for (a, b, m), members in classes.items():
+        counts = set(members.values())
+        if len(counts) != 1 or 2 * len(members) != int(fmpz(m).euler_phi()):
+            return None
+        product *= _factor(a, b, m) ** counts.pop()
+    return product
+
+
+@lru_cache(maxsize=1024)
+def _factor(a: Fraction, b: Fraction, m: int) -> fmpq_poly:
+    return cosines.minimal_polynomial(a, b, m)
+
+
+def _monic(coefficients: Sequence[int]) -> fmpq_poly:
+    return fmpq_poly(list(coefficients)) / coefficients[-1]
+
+
+def minimal_polynomial(number: sp.Expr | RealRoot | ComplexRoot) -> fmpq_poly:
+    """The monic irreducible polynomial over the rationals of which a number is a root."""
+    if isinstance(number, (RealRoot, ComplexRoot)):
+        return _monic(number.polynomial)
+    if number.is_Rational:
+        return fmpq_poly([fmpq(-int(number.p), int(number.q)), 1])
+    form = cosines.linear_cosine(number)
+    if form is not None:
+        a, b, _, m = form
+        return fmpq_poly(list(_cosine(a, b, m)))
+    form = cosines.linear_exponential(number)
+    if form is not None:
+        a, b, _, m = form
+        return cosines.minimal_polynomial(a, b, m, fmpz_poly.cyclotomic(m))
+    terms = cosine_sums.read(number)
+    if terms is not None:
+        return cosine_sums.minimal_polynomial(terms)
+    return fmpq_poly(list(_radical(number)))
+
+
+@lru_cache(maxsize=256)
+def _cosine(a: Fraction, b: Fraction, m: int) -> tuple[fmpq, ...]:
+    return tuple(cosines.minimal_polynomial(a, b, m).coeffs())
+
+
+@lru_cache(maxsize=1024)
+def _radical(number: sp.Expr) -> tuple[fmpq, ...]:
+    polynomial = sp.Poly(sp.minimal_polynomial(number, _X), _X).monic()
+    return tuple(fmpq(int(c.p), int(c.q)) for c in polynomial.all_coeffs()[::-1])

@@ -1,0 +1,265 @@
+"""Real and complex algebraic numbers: an irreducible integer polynomial and what isolates one of its roots.
+
+A real root is held between two rationals where the polynomial changes sign, a complex root in a disc that holds no
+other; both are refined to any accuracy.  `isolation.py` isolates the roots or, should that fail, Arb (F. Johansson, IEEE
+Trans. Comput. 66, 1281, 2017).  Real roots are refined exactly: secant guesses, proved by signs (J. Abbott, ACM Commun.
+Comput. Algebra 48, 3, 2014).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from math import isqrt
+
+import sympy as sp
+from flint import acb, arb, fmpq, fmpz_poly
+
+from .balls import precision
+from .real_roots import Disc, discs, dyadic, sharpened, sign
+
+__all__ = ["ComplexRoot", "RealRoot", "coefficient_text", "complex_order", "roots"]
+
+Polynomial = tuple[int, ...]
+"""Integer coefficients, constant first; irreducible and primitive, the leading one positive."""
+
+_X = sp.Symbol("x")
+
+_WRITTEN = 14_000
+"""Bits up to which Python turns whole numbers into decimals and back by default (4300 digits)."""
+
+
+@dataclass(frozen=True, slots=True)
+class RealRoot:
+    """The only root of `polynomial` (irreducible, degree >= 2) between `low` and `high`.
+
+    `index` counts its real roots from the smallest, 0, as SymPy's CRootOf does.  Raises ValueError where the
+    polynomial does not change its sign between the ends.
+    """
+
+    polynomial: Polynomial
+    index: int
+    low: Fraction
+    high: Fraction
+
+    def __post_init__(self) -> None:
+        f = fmpz_poly(list(self.polynomial))
+        if not self.low < self.high or sign(f, _exact(self.low)) * sign(f, _exact(self.high)) >= 0:
+            raise ValueError(
+                f"{self.text}: no sign change from {_short(self.low)} to {_short(self.high)}; expected a bracket of one root"
+            )
+
+    @property
+    def text(self) -> str:
+        """SymPy's text of this number."""
+        return f"CRootOf({polynomial_text(self.polynomial)}, {self.index})"
+
+    @property
+    def expression(self) -> sp.Expr:
+        """This number as SymPy's CRootOf."""
+        return _expression(self.polynomial, self.index)
+
+    def enclosure(self, bits: int) -> arb:
+        """A ball that holds this number, of relative radius below 2**-bits."""
+        low, high = _refined(self, bits)
+        with precision(bits + 16):
+            return arb(low).union(arb(high))
+
+
+@dataclass(frozen=True, slots=True)
+class ComplexRoot:
+    """The only root of `polynomial` (irreducible, degree >= 2) within `room` of `near` = (real, imaginary); not real.
+
+    `index` is its place among SymPy's CRootOf, which lists real roots first.
+    """
+
+    polynomial: Polynomial
+    index: int
+    near: tuple[Fraction, Fraction]
+    room: Fraction
+
+    @property
+    def text(self) -> str:
+        """SymPy's text of this number."""
+        return f"CRootOf({polynomial_text(self.polynomial)}, {self.index})"
+
+    @property
+    def expression(self) -> sp.Expr:
+        """This number as SymPy's CRootOf."""
+        return _expression(self.polynomial, self.index)
+
+    def enclosure(self, bits: int) -> acb:
+        """A ball that holds this number, of radius below 2**-bits times its modulus."""
+        return _sharpened(self, bits)
+
+
+@lru_cache(maxsize=64)
+def polynomial_text(polynomial: Polynomial) -> str:
+    """The polynomial in x as SymPy prints it; in words if Python refuses to write or read its coefficients."""
+    longest = max(abs(c).bit_length() for c in polynomial)
+    if longest > _WRITTEN:
+        return f"polynomial of degree {len(polynomial) - 1} with coefficients of up to {longest} bits"
+    return sp.sstr(sp.Poly(list(polynomial[::-1]), _X).as_expr())
+
+
+def coefficient_text(c: int) -> str:
+    """A whole number as text for `int(text, 0)`: in decimals, or in hexadecimals if Python refuses so many decimals."""
+    return str(c) if abs(c).bit_length() <= _WRITTEN else hex(c)
+
+
+def _short(x: Fraction) -> str:
+    longest = max(abs(x.numerator).bit_length(), x.denominator.bit_length())
+    return str(x) if longest < 100 else f"a fraction of {longest} bits"
+
+
+class _Root(sp.CRootOf):
+    """SymPy's CRootOf of a polynomial whose coefficients Python refuses to write."""
+
+    __slots__ = ()
+
+    def _sympystr(self, printer: object) -> str:
+        return f"CRootOf({polynomial_text(tuple(int(c) for c in self.poly.all_coeffs()[::-1]))}, {self.index})"
+
+    _sympyrepr = _latex = _pretty = _sympystr
+
+
+@lru_cache(maxsize=512)
+def _expression(polynomial: Polynomial, index: int) -> sp.Expr:
+    kind = _Root if max(abs(c).bit_length() for c in polynomial) > _WRITTEN else sp.CRootOf
+    return kind(sp.Poly(list(polynomial[::-1]), _X), index)
+
+
+@lru_cache(maxsize=4096)
+def _sharpened(root: ComplexRoot, bits: int) -> acb:
+    disc = Disc(_exact(root.near[0]), _exact(root.near[1]), fmpq(0))
+    return sharpened(fmpz_poly(list(root.polynomial)), disc, _exact(root.room), bits)
+
+
+def _by_arb(f: fmpz_poly) -> list[Disc]:
+    """Discs around the roots by Arb's own isolation: a second at degree 100, minutes at 200."""
+    with precision(128):
+        found = [root for root, _ in f.complex_roots()]
+        reals = sorted((ball for ball in found if ball.imag == 0), key=lambda ball: dyadic(ball.real))
+        others = [ball for ball in found if ball.imag != 0]
+        radii = [dyadic((ball.real.rad() + ball.imag.rad()).upper()) for ball in reals + others]
+    return [
+        Disc(dyadic(ball.real), dyadic(ball.imag), radius) for ball, radius in zip(reals + others, radii, strict=True)
+    ]
+
+
+def roots(polynomial: Polynomial) -> tuple[RealRoot | ComplexRoot, ...]:
+    """All roots of an irreducible polynomial of degree >= 2, each isolated by a disc that is proved to hold it alone.
+
+    Real ones come first, ascending; conjugates are neighbours.
+    """
+    f = fmpz_poly(list(polynomial))
+    isolated = discs(f) or _by_arb(f)
+    reals = [disc for disc in isolated if disc.y == 0]
+    upper = [disc for disc in isolated if disc.y > 0]
+    found: list[RealRoot | ComplexRoot] = [
+        RealRoot(polynomial, i, _fraction(d.x - d.radius), _fraction(d.x + d.radius)) for i, d in enumerate(reals)
+    ]
+    with precision(256):
+        balls = [disc.ball for disc in upper]
+    for place, k in enumerate(complex_order(polynomial, balls)):
+        x, y, room = (_fraction(part) for part in (upper[k].x, upper[k].y, _room(upper[k], isolated)))
+        found.append(ComplexRoot(polynomial, len(reals) + 2 * place, (x, -y), room))
+        found.append(ComplexRoot(polynomial, len(reals) + 2 * place + 1, (x, y), room))
+    return tuple(found)
+
+
+def _room(disc: Disc, others: list[Disc]) -> fmpq:
+    """A quarter of the distance to the next disc, or somewhat less: within it there is no root but the disc's own."""
+    gaps = (max(abs(disc.x - other.x), abs(disc.y - other.y)) for other in others if other is not disc)
+    return max(min(gaps) / 4, disc.radius)
+
+
+@lru_cache(maxsize=4096)
+def _refined(root: RealRoot, bits: int) -> tuple[fmpq, fmpq]:
+    """Narrow the bracket to 2**-bits of its ends: guess by the secant, prove by signs, square the step."""
+    f, low, high = fmpz_poly(list(root.polynomial)), _exact(root.low), _exact(root.high)
+    if low * high > 0 and (high - low) * 2**bits <= min(abs(low), abs(high)):
+        return low, high
+    at_low, at_high = f(low), f(high)
+    pieces = 2**16
+    while low * high <= 0 or (high - low) * 2**bits > min(abs(low), abs(high)):
+        step = (high - low) / pieces
+        guess = (at_low / (at_low - at_high) * pieces + fmpq(1, 2)).floor()
+        end = low + step * min(max(guess, 1), pieces - 1)
+        value = f(end)
+        other = end + step if value * at_low > 0 else end - step
+        at_other = f(other)
+        if value * at_other < 0:
+            (low, at_low), (high, at_high) = sorted([(end, value), (other, at_other)])
+            pieces = min(pieces * pieces, 2**bits)
+        else:
+            pieces = max(4, isqrt(pieces))
+            middle = (low + high) / 2
+            value = f(middle)
+            if value * at_low < 0:
+                high, at_high = middle, value
+            else:
+                low, at_low = middle, value
+    return low, high
+
+
+def _exact(x: Fraction) -> fmpq:
+    return fmpq(x.numerator, x.denominator)
+
+
+def _fraction(x: fmpq) -> Fraction:
+    return Fraction(int(x.p), int(x.q))
+
+
+def complex_order(polynomial: tuple[int, ...], upper: Sequence[acb]) -> list[int]:
+    """The positions in `upper` (balls around the roots above the real axis) in SymPy's order."""
+    if len(upper) < 2:
+        return list(range(len(upper)))
+    given = sp.Poly(list(polynomial[::-1]), sp.Symbol("x"))
+    scale, inner = sp.CRootOf(given, 0).as_coeff_Mul()  # SymPy may count the roots of a rescaled polynomial
+    coefficients = [abs(int(c)) for c in inner.poly.all_coeffs()]
+    bound = 2 * max(Fraction(c, coefficients[0]) for c in coefficients)
+    shrink = acb(fmpq(int(scale.q), int(scale.p)))
+    boxes = _leaves({k: ball * shrink for k, ball in enumerate(upper)}, (-bound, Fraction(0), bound, bound))
+    if boxes is None:  # a root on the border of a box
+        return _ask_sympy(given, upper)
+    return [k for _, k in sorted(boxes)]
+
+
+def _leaves(
+    roots: dict[int, acb], box: tuple[Fraction, Fraction, Fraction, Fraction]
+) -> list[tuple[tuple[Fraction, Fraction], int]] | None:
+    """The lower left corner of the box of each root; None where a root cannot be told from a border."""
+    found, boxes = [], [(roots, box)]
+    while boxes:
+        inside, (left, low, right, top) = boxes.pop()
+        if len(inside) == 1:
+            found.append(((left, low), next(iter(inside))))
+            continue
+        upright = right - left > top - low
+        middle = (left + right) / 2 if upright else (low + top) / 2
+        border = arb(fmpq(middle.numerator, middle.denominator))
+        first: dict[int, acb] = {}
+        second: dict[int, acb] = {}
+        for k, ball in inside.items():
+            place = ball.real if upright else ball.imag
+            if place.overlaps(border):
+                return None
+            (first if place < border else second)[k] = ball
+        halves = (
+            ((left, low, middle, top), (middle, low, right, top))
+            if upright
+            else ((left, low, right, middle), (left, middle, right, top))
+        )
+        boxes += [(part, half) for part, half in zip((first, second), halves, strict=True) if part]
+    return found
+
+
+def _ask_sympy(polynomial: sp.Poly, upper: Sequence[acb]) -> list[int]:
+    """The same order from SymPy's own values: slow, but it knows on which side of a border a root counts."""
+    centres = [complex(float(ball.real.mid()), float(ball.imag.mid())) for ball in upper]
+    first = polynomial.degree() - 2 * len(upper)
+    values = [complex(sp.CRootOf(polynomial, first + 2 * i + 1).evalf(20)) for i in range(len(upper))]
+    return [min(range(len(centres)), key=lambda k: abs(centres[k] - value)) for value in values]

@@ -1,0 +1,175 @@
+"""The verdict on a claimed spectrum: every number compared exactly, what is wrong in sentences, and what is right."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+from flint import acb, arb, fmpq
+
+from ..algebra.balls import enclose, precision
+from ..algebra.cosine_sums import AngleSum, read
+from ..algebra.equality import equal
+from ..algebra.minimal_polynomials import multiplied
+from ..algebra.roots import ComplexRoot, RealRoot
+from ..spectra.characteristic import characteristic
+from ..spectra.eigenvalue import Eigenvalue, entry, times, words
+from ..spectra.solve import spectrum
+from .language import Claim, Claimed
+from .part_verdict import judged
+
+__all__ = ["Verdict", "verify"]
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What is wrong with a claim, in sentences; `proved` is False where a closed form was believed, not multiplied out."""
+
+    claim: Claim
+    problems: tuple[str, ...]
+    proved: bool = True
+    parts: str = ""
+
+    @property
+    def right(self) -> bool:
+        """True where the claim is exactly the spectrum (to its digits where it is approximate)."""
+        return not self.problems
+
+    @property
+    def eigenvalues(self) -> Sequence[Eigenvalue]:
+        """The eigenvalues of the graph."""
+        return spectrum(self.claim.graph, prove=bool(self.problems)).eigenvalues
+
+    @property
+    def expected(self) -> str:
+        """What would be right, in the words of a claims file."""
+        return self.parts or ", ".join(entry(e) for e in self.eigenvalues)
+
+
+def verify(claim: Claim) -> Verdict:
+    """Compare a claim with the proved spectrum of its graph.
+
+    Raises ValueError where a number is too involved to be compared, ProofError where the proof of the spectrum fails.
+    """
+    if claim.parts:
+        return Verdict(claim, *judged(claim))
+    if _multiplies_out(claim):
+        return Verdict(claim, ())
+    return Verdict(claim, _compared(claim))
+
+
+def _multiplies_out(claim: Claim) -> bool:
+    """True where the claimed numbers themselves multiply to the characteristic polynomial; False where that is not seen."""
+    numbers = [(claimed.sum, claimed.count) for claimed in claim.numbers]
+    if sum(count for _, count in numbers) != claim.graph.n:
+        return False
+    known = [(number, count) for number, count in numbers if number is not None]
+    return len(known) == len(numbers) and multiplied(known) == characteristic(claim.graph)
+
+
+def _compared(claim: Claim) -> tuple[str, ...]:
+    """What is wrong with a claim, number by number."""
+    found = spectrum(claim.graph, prove=True).eigenvalues
+    tally, problems = [0] * len(found), []
+    known = _angles(found) if any(c.angle is not None for c in claim.numbers) else {}
+    middles: list[complex] = []
+    for claimed in claim.numbers:
+        place = known.get(claimed.angle.folded) if claimed.angle is not None else None
+        if place is None and claimed.interval is None and claimed.number is not None:
+            middles = middles or [_middle(e.number) for e in found]
+            place = _find(claimed.number, found, middles)
+            if place is None:
+                near = found[_nearest(_middle(claimed.number), middles)]
+                problems.append(f"claimed {claimed.words}: no eigenvalue; the nearest is {words(near)}")
+        if place is not None:
+            tally[place] += claimed.count
+    exact = tuple(tally)
+    problems += _assign([c for c in claim.numbers if c.interval is not None], found, tally)
+    for e, before, count in zip(found, exact, tally, strict=True):
+        if count == 0:
+            problems.append(f"not claimed: {words(e)}, {times(e.multiplicity)}")
+        elif count != e.multiplicity:
+            how = "claimed" if before else "claimed (approximately)"
+            problems.append(f"{how} {words(e)} {times(count)}; it occurs {times(e.multiplicity)}")
+    return tuple(problems)
+
+
+def _angles(found: Sequence[Eigenvalue]) -> dict[AngleSum, int]:
+    """The places of the eigenvalues that are sums of cosines; equal sums are equal numbers, not the other way round."""
+    forms = (
+        (None if isinstance(e.number, (RealRoot, ComplexRoot)) else read(e.number), i) for i, e in enumerate(found)
+    )
+    return {form.folded: i for form, i in forms if form is not None}
+
+
+def _find(number: sp.Expr, found: Sequence[Eigenvalue], middles: Sequence[complex]) -> int | None:
+    """The place of the eigenvalue that is this number, None where there is none."""
+    middle = _middle(number)
+    for i, e in enumerate(found):
+        if abs(middles[i] - middle) <= 1e-9 * max(1.0, abs(middle)) and equal(number, e.number):
+            return i
+    return None
+
+
+def _middle(number: sp.Expr | RealRoot | ComplexRoot) -> complex:
+    """A number to more digits than are needed to tell which eigenvalues it may be."""
+    bits = 128
+    while True:
+        ball = acb(number.enclosure(bits) if isinstance(number, (RealRoot, ComplexRoot)) else enclose(number, bits))
+        with precision(bits):
+            radius = float(ball.real.rad() + ball.imag.rad())
+        if radius < 1e-18 * max(1.0, abs(complex(ball))):
+            return complex(ball)
+        if bits > 2**17:
+            raise ValueError(f"{number} loses all its digits to cancellation; write it simpler")
+        bits *= 2
+
+
+def _nearest(middle: complex, middles: Sequence[complex]) -> int:
+    return min(range(len(middles)), key=lambda i: abs(middles[i] - middle))
+
+
+def _assign(claims: Sequence[Claimed], found: Sequence[Eigenvalue], tally: list[int]) -> list[str]:
+    """Give each approximation an eigenvalue of its own where that is possible, and say where it is not.
+
+    Intervals by their upper end take the smallest free eigenvalue each: then as many as possible find one.
+    """
+    problems = []
+    rising = sorted(
+        (i for i, e in enumerate(found) if not isinstance(e.value, complex)), key=lambda i: found[i].value.real
+    )
+    for claimed in sorted(claims, key=lambda c: (c.interval or (0, 0))[1]):
+        inside = [i for i in rising if _rounds_to(found[i], claimed)]
+        left = claimed.count
+        for i in inside:
+            taken = min(left, max(0, found[i].multiplicity - tally[i]))
+            tally[i] += taken
+            left -= taken
+        if not inside:
+            near = found[min(rising, key=lambda i: abs(found[i].value.real - _centre(claimed)))] if rising else found[0]
+            problems.append(f"claimed {claimed.text}: no eigenvalue rounds to it; the nearest is {words(near)}")
+        elif left:
+            problems.append(f"claimed {claimed.text} {times(left)} more than eigenvalues are left that round to it")
+    return problems
+
+
+def _centre(claimed: Claimed) -> float:
+    low, high = claimed.interval or (0, 0)
+    return float((low + high) / 2)
+
+
+def _rounds_to(e: Eigenvalue, claimed: Claimed) -> bool:
+    """Whether a real eigenvalue lies in the closed interval of an approximation."""
+    low, high = (sp.Rational(end.numerator, end.denominator) for end in claimed.interval or (0, 0))
+    if not isinstance(e.number, (RealRoot, ComplexRoot)) and e.number.is_Rational:
+        return bool(low <= e.number <= high)
+    for bits in (64, 512, 4096):
+        with precision(bits + 16):
+            ball = arb(0) if e.number == 0 else e.enclosure(bits)
+            below, above = (arb(fmpq(int(end.p), int(end.q))) for end in (low, high))
+            if ball > below and ball < above:
+                return True
+            if ball < below or ball > above:
+                return False
+    return equal(e.number, low) or equal(e.number, high)

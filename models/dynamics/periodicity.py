@@ -1,0 +1,97 @@
+"""How time enters the equations of a network: at which frequencies, and after which time they repeat themselves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import sympy as sp
+
+from ..mechanics.components import TIME, Node
+from .equations import Equations
+
+__all__ = ["Drive", "angular_frequency", "as_function", "drive_of", "names_in", "period_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """The drive of a network, derived from its equations.
+
+    waves: the angular frequencies of the sines and cosines of time, expressions of the parameters; frequency: the largest
+    of which all waves are whole multiples, so that the right-hand side has the period 2 pi over its absolute value.  It is
+    None if there is no such frequency, and `problem` says why, as a predicate of the oscillator.
+    """
+
+    waves: tuple[sp.Expr, ...] = ()
+    frequency: sp.Expr | None = None
+    problem: str = ""
+
+
+def angular_frequency(equations: Equations) -> sp.Expr | None:
+    """The angular frequency of the drive, an expression of parameters; None if no period is known (see `Drive`)."""
+    return drive_of(equations.nodes, equations.varied).frequency
+
+
+@lru_cache(maxsize=64)
+def drive_of(nodes: tuple[Node, ...], varied: tuple[str, ...] = ()) -> Drive:
+    """The drive of a network of these nodes, whose parameters in `varied` differ from node to node; links have no time."""
+    if not any(node.forced for node in nodes):
+        return Drive(problem="is not driven")
+    waves: set[sp.Expr] = set()
+    rest = [_without_waves(e, node, waves) for node in nodes for e in node.rhs]
+    found = tuple(sorted(waves, key=sp.default_sort_key))
+    if any(e.has(TIME) for e in rest):
+        return Drive(found, problem="depends on time other than by sines and cosines of a t + b, a constant")
+    own = sorted({s.name for wave in found for s in wave.free_symbols} & set(varied))
+    if own:
+        return Drive(found, problem=f"is driven at a frequency that differs from node to node ({', '.join(own)})")
+    ratios = [sp.cancel(wave / found[0]) for wave in found]
+    strange = next((wave for wave, ratio in zip(found, ratios, strict=True) if not ratio.is_Rational), None)
+    if strange is not None:
+        return Drive(found, problem=f"is driven at {found[0]} and {strange}, which have no common period")
+    share = sp.Rational(math.gcd(*(int(r.p) for r in ratios)), math.lcm(*(int(r.q) for r in ratios)))
+    return Drive(found, share * found[0])
+
+
+def _without_waves(e: sp.Expr, node: Node, found: set[sp.Expr]) -> sp.Expr:
+    """The expression with a symbol for each sine and cosine of a t + b; the frequencies a are collected."""
+    states = set(node.state)
+
+    def note(wave: sp.Expr) -> sp.Expr:
+        phase = wave.args[0]
+        slope = sp.diff(phase, TIME)
+        if slope.has(TIME, *states) or slope == 0 or sp.expand(phase - slope * TIME).has(TIME):
+            return wave
+        found.add(slope)
+        return sp.Symbol("wave")
+
+    return e.replace(lambda a: isinstance(a, sp.sin | sp.cos) and a.has(TIME), note)
+
+
+@lru_cache(maxsize=64)
+def as_function(frequency: sp.Expr) -> Callable[..., float]:
+    """A frequency as a function of numbers, in the order of the names of its parameters; nan if it has no value there."""
+    written = sp.lambdify([sp.Symbol(name, real=True) for name in names_in(frequency)], frequency, "math")
+
+    def value(*numbers: float) -> float:
+        try:
+            return float(written(*numbers))
+        except (ArithmeticError, TypeError, ValueError):
+            return math.nan
+
+    return value
+
+
+def names_in(frequency: sp.Expr) -> tuple[str, ...]:
+    """Names of the parameters that a frequency depends on."""
+    return tuple(sorted(s.name for s in frequency.free_symbols))
+
+
+def period_of(frequency: float) -> float | None:
+    """The period 2 pi over the absolute value of an angular frequency; None if there is none, as at the frequency 0."""
+    if not frequency:
+        return None
+    found = 2 * math.pi / abs(frequency)
+    return found if 0.0 < found < math.inf else None

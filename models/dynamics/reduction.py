@@ -1,0 +1,125 @@
+"""Exact reductions of a network: parameters that are numbers go into the equations, nodes that move as one become one node.
+
+Nodes that start equal stay equal where the links treat them alike: where a partition of the nodes is balanced, that is
+where all nodes of a class feel every other class with the same total weight.  The quotient network has one node for each
+class and the same solutions.  Links inside a class drop out, because they are zero between equal states; such partitions
+are also called external equitable partitions.
+
+Sources: Golubitsky & Stewart, Bull. Amer. Math. Soc. 43, 305 (2006): balanced partitions and quotients; Schaub, O'Clery,
+Billeh, Delvenne, Lambiotte & Barahona, Chaos 26, 094821 (2016): those of difference couplings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from functools import lru_cache
+
+import sympy as sp
+
+from ..graphs.partitions import class_links, coarsest_balanced
+from ..mechanics.components import Edge, Node
+from ..mechanics.stick_slip import Contact
+from .equations import Equations
+
+__all__ = ["NoQuotient", "collapse", "fold", "quotient"]
+
+
+class NoQuotient(ValueError):
+    """The coupling has no exact quotient network, whatever the partition."""
+
+
+def fold(equations: Equations, values: Mapping[str, int | Fraction]) -> Equations:
+    """Return the equations with some parameters replaced by exact numbers; parameters that occur no more leave as well.
+
+    Links whose right-hand side has become zero leave too.  Raises TypeError for a number that is not exact, ValueError for
+    an unknown parameter and where a right-hand side is undefined at the numbers.
+    """
+    for name, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, (int, Fraction)):
+            raise TypeError(f"fold {name}: found {value!r} ({type(value).__name__}); expected an int or a Fraction")
+        if name not in equations.parameters:
+            raise ValueError(f"fold: unknown parameter {name!r}; known: {', '.join(equations.parameters) or 'none'}")
+        if any(name in (f"{own}_{i + 1}" for i in range(equations.n)) for own in equations.varied):
+            raise ValueError(f"fold {name}: the nodes have different values of it; it stays a parameter")
+    if not values:
+        return equations
+    if equations.mixed:
+        raise ValueError(f"fold {', '.join(values)}: found nodes of several kinds; they stay parameters")
+    numbers = {sp.Symbol(name, real=True): sp.Rational(v.numerator, v.denominator) for name, v in values.items()}
+    node = equations.node
+    rates = _folded("node", node.rhs, numbers)
+    conditions = () if node.contact is None else _folded("contact", node.contact.expressions, numbers)
+    contact = Contact(*conditions) if conditions else None
+    single = Node(node.state, rates, _occurring(node.parameters, (*rates, *conditions)), contact)
+    left = {s.name for s in single.parameters}
+    made = replace(equations, node=single, varied=tuple(name for name in equations.varied if name in left))
+    edge = equations.edge
+    if edge is not None:
+        pushes = _folded("edge", edge.rhs, numbers)
+        inertia = tuple(tuple(_folded("edge", row, numbers) for row in block) for block in edge.inertia)
+        inertia = inertia if any(e != 0 for block in inertia for row in block for e in row) else ()
+        used = _occurring(edge.parameters, (*pushes, *(e for block in inertia for row in block for e in row)))
+        edge = Edge(edge.here, edge.there, edge.weight, pushes, used, inertia)
+    if edge is None or not equations.links or not (any(edge.rhs) or edge.inertia):
+        return replace(made, edge=None, links=())
+    return replace(made, edge=edge)
+
+
+def _folded(what: str, rhs: Iterable[sp.Expr], numbers: Mapping[sp.Symbol, sp.Rational]) -> tuple[sp.Expr, ...]:
+    made = tuple(e.xreplace(dict(numbers)) for e in rhs)
+    for e in made:
+        if e.has(sp.nan, sp.zoo, sp.oo, -sp.oo):
+            found = ", ".join(f"{symbol} = {number}" for symbol, number in numbers.items())
+            raise ValueError(f"fold: a right-hand side of the {what} is undefined at {found}; leave it a parameter")
+    return made
+
+
+def _occurring(parameters: tuple[sp.Symbol, ...], rhs: tuple[sp.Expr, ...]) -> tuple[sp.Symbol, ...]:
+    used = set().union(*(e.free_symbols for e in rhs))
+    return tuple(p for p in parameters if p in used)
+
+
+def quotient(equations: Equations, colours: Sequence[Hashable]) -> tuple[Equations, tuple[int, ...]]:
+    """Return the smallest network that moves like this one where nodes of equal colour start equal, and each node's class.
+
+    `colours` has one entry for each node, its initial state; classes are numbered by their first nodes, so node 0 belongs to
+    class 0.  Raises NoQuotient where the coupling does not vanish between equal states or is not proportional to the weight
+    of a link (then no exact quotient is known), ValueError where there is not one colour for each node.
+    """
+    classes = coarsest_balanced(equations.n, equations.links, colours)
+    return collapse(equations, classes), classes
+
+
+def collapse(equations: Equations, classes: Sequence[int]) -> Equations:
+    """Return the network with one node for each class, its links those of any node of the class to the other classes.
+
+    Raises ValueError where the classes are not 0 … k-1, where two nodes of a class feel another class with different total
+    weights, NoQuotient for a coupling that `quotient` refuses.
+    """
+    if len(classes) != equations.n:
+        raise ValueError(f"partition: found {len(classes)} classes for {equations.n} nodes; expected one for each node")
+    count = len(set(classes))
+    if set(classes) != set(range(count)):
+        raise ValueError(f"partition: found the classes {sorted(set(classes))}; expected 0 … {count - 1}")
+    if count == equations.n and list(classes) == list(range(count)):
+        return equations
+    if equations.mixed or equations.inertial:
+        raise NoQuotient("quotient: nodes of several kinds or links with inertia are stepped one by one")
+    if equations.edge is not None and equations.links:
+        _check_coupling(equations.edge)
+    links = class_links(equations.n, equations.links, classes)
+    return replace(equations, edge=equations.edge if links else None, n=count, links=links)
+
+
+@lru_cache(maxsize=64)
+def _check_coupling(edge: Edge) -> None:
+    """Prove that links add up by their weights and vanish between equal states."""
+    if not edge.diffusive:
+        raise NoQuotient(
+            "quotient: the coupling is not zero between equal states, so links inside a class would remain"
+        )
+    for e in edge.rhs:
+        if sp.simplify(e - edge.weight * e.xreplace({edge.weight: sp.S.One})) != 0:
+            raise NoQuotient(f"quotient: the coupling {e} is not proportional to its weight; links cannot be added up")

@@ -1,0 +1,281 @@
+"""Tangent dynamics: what a small deviation does, along the orbit it deviates from.
+
+`mode`, `whole` and `clustered` part the orbit from the linear equation of the deviations, so that one orbit carries any
+number of them; `tangent` and `transversal` return equations like any others, orbit and deviation in one state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import sympy as sp
+
+from ..mechanics.calculus import derivative
+from ..mechanics.components import TIME, Edge, Node
+from .equations import Equations
+from .mode_inertia import effective_slope, inertia_of_modes
+from .reduction import collapse
+from .saltation import Entry, Events, of_blocks, of_mode, of_network
+
+if TYPE_CHECKING:
+    from ..graphs.clusters import Block, Clusters
+
+__all__ = [
+    "ALPHA", "LOG_VOLUME", "MODE", "PHASE", "STRENGTH", "Variation", "clustered", "deviation_names", "mode", "phased",
+    "tangent", "transversal", "whole", "with_volume",
+]  # fmt: skip
+
+ALPHA = sp.Symbol("alpha", real=True)
+"""Coupling strength of a mode with its sign turned, alpha = -sigma gamma >= 0 for undirected networks."""
+
+MODE = (sp.Symbol("mode_alpha", real=True), sp.Symbol("mode_beta", real=True))
+"""Real and imaginary part of the strength of a mode, alpha + i beta = -sigma gamma."""
+
+STRENGTH = sp.Symbol("mode_sigma", real=True)
+"""Coupling strength sigma in the variational equation of a cluster state."""
+
+PHASE = sp.Symbol("phase", real=True)
+"""Time at which the clock of shifted equations stands at 0."""
+
+LOG_VOLUME = sp.Symbol("log_volume", real=True)
+"""One oscillator's share of the logarithm of a volume of states that is carried along."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variation:
+    """A linear system d' = A d along an orbit: what small deviations from it do.
+
+    `matrix` holds the non-zero entries ((row, column), expression) of A, in the symbols of the whole orbit (x_1 …), its
+    parameters, t, and `parameters`, numbers that differ from mode to mode and enter A linearly.  `events` say what stick and
+    slip do to a deviation; modes of contacts themselves do not deviate.
+    Raises ValueError for an entry outside the matrix or with an unknown symbol, or one that is not linear in `parameters`.
+    """
+
+    orbit: Equations
+    size: int
+    matrix: tuple[Entry, ...]
+    parameters: tuple[sp.Symbol, ...] = ()
+    events: Events | None = None
+
+    def __post_init__(self) -> None:
+        names = {*self.orbit.state, *self.orbit.parameters, "t"}
+        taken = names & {s.name for s in self.parameters}
+        if taken:
+            raise ValueError(f"the symbol {min(taken)!r} is needed for the strength of a mode; rename it in the model")
+        if (self.events is None) != (self.orbit.node.contact is None):
+            raise ValueError("variation: events belong to set-valued friction, and to nothing else")
+        for (row, column), e in self.matrix:
+            if not (0 <= row < self.size and 0 <= column < self.size):
+                raise ValueError(f"variation: entry ({row}, {column}) is outside the {self.size} x {self.size} matrix")
+            unknown = {s.name for s in e.free_symbols} - names - {s.name for s in self.parameters}
+            if unknown:
+                raise ValueError(f"variation: unknown symbol {min(unknown)!r} in entry ({row}, {column})")
+            slopes = [e.diff(s) for s in self.parameters]
+            if any(slope.has(*self.parameters) for slope in slopes):
+                raise ValueError(f"variation: entry ({row}, {column}) is not linear in the strengths of a mode: {e}")
+
+
+def mode(equations: Equations, plane: bool = False) -> Variation:
+    """Return the variational equation of one transversal mode along the synchronous orbit, d' = (J - alpha H) d.
+
+    With `plane` the strength is complex, alpha + i beta, and the deviation has its real parts first, then its imaginary
+    parts.  J and H as in `transversal`, which raises the same errors.  Where links have inertia H stands for H + B J, and
+    the strength for tau = alpha/(1 + b alpha) (`synchain.models.dynamics.mode_inertia`).
+    """
+    slope = coupling_slope(equations)
+    node = equations.node
+    orbit = Equations(node, None, 1)
+    here = orbit.at_node(0)
+    size = _deviating(node)
+    own = sp.Matrix(node.jacobian())[:size, :size].xreplace(here)
+    push = slope[:size, :size].xreplace(here)
+    alpha, beta = MODE
+    real, aside = own - alpha * push, beta * push
+    if not plane:
+        return Variation(orbit, size, _entries(real), (alpha,), of_mode(equations, orbit, slope, MODE, plane))
+    both = sp.Matrix(sp.BlockMatrix([[real, aside], [-aside, real]]))
+    return Variation(orbit, 2 * size, _entries(both), (alpha, beta), of_mode(equations, orbit, slope, MODE, plane))
+
+
+def _deviating(node: Node) -> int:
+    """The components of a node that deviate: all but the mode of a contact."""
+    return 2 if node.contact is not None else len(node.state)
+
+
+def whole(equations: Equations) -> Variation:
+    """Return the variational equation of the whole network, d' = J d, in state order (without the modes of contacts).
+
+    Raises ValueError for nodes of several kinds and for links with inertia.
+    """
+    if equations.mixed or equations.inertial:
+        equations.expect_alike("variational equation of the whole network")
+    size = equations.n * _deviating(equations.node)
+    matrix = tuple((key, e) for key, e in equations.jacobian().items() if max(key) < size)
+    return Variation(equations, size, matrix, (), of_network(equations))
+
+
+def clustered(equations: Equations, found: Clusters) -> Variation:
+    """Return the variational equation of a cluster state: first that of the clusters' own motion, then its blocks in turn.
+
+    The orbit is that of the quotient network.  Coordinate k of a block lives on the orbit of its cluster c and obeys
+    d_k' = J(s_c) d_k + sigma sum_l B_kl H d_l, B the block's matrix and `STRENGTH` the place of sigma; a block of b
+    coordinates has b rows for each component (Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014)).
+
+    Raises ValueError as `transversal` does, for a link whose derivative depends on the state, and for a partition that is
+    not balanced.
+    """
+    if equations.inertial:
+        equations.expect_alike("cluster states")
+    slope = _constant_slope(equations)
+    orbit = collapse(equations, found.classes)
+    components = _deviating(orbit.node)
+    first = orbit.n * components
+    entries = {key: e for key, e in orbit.jacobian().items() if max(key) < first}
+    for block in found.blocks:
+        for (row, column), e in _of_block(block, orbit, slope):
+            key = (first + row, first + column)
+            entries[key] = entries.get(key, sp.S.Zero) + e
+        first += len(block.nodes) * components
+    kept = tuple((key, e) for key, e in sorted(entries.items()) if e != 0)
+    return Variation(orbit, first, kept, (STRENGTH,), of_blocks(equations, found.blocks, orbit, slope, STRENGTH))
+
+
+def _of_block(block: Block, orbit: Equations, slope: sp.Matrix) -> Iterator[tuple[tuple[int, int], sp.Expr]]:
+    """Yield ((row, column), entry) of one block, component by component; keys repeat."""
+    size, own, components = len(block.nodes), orbit.node.jacobian(), _deviating(orbit.node)
+    for r, line in enumerate(own[:components]):
+        for c, entry in enumerate(line[:components]):
+            for k, cluster in enumerate(block.nodes):
+                yield (r * size + k, c * size + k), entry.xreplace(orbit.at_node(cluster))
+                for j, weight in enumerate(block.matrix[k]):
+                    factor = sp.Rational(weight.numerator, weight.denominator)
+                    push = slope[r, c].xreplace(orbit.at_node(cluster))
+                    yield (r * size + k, c * size + j), STRENGTH * factor * push
+
+
+def _constant_slope(equations: Equations) -> sp.Matrix:
+    """H of a link that is linear in the difference of the states it joins."""
+    slope = coupling_slope(equations)
+    edge = equations.edge
+    if edge is None:
+        raise ValueError("these equations have no coupling; differences within clusters need links")
+    size = len(edge.here) if equations.node.contact is None else 2
+    slips = dict.fromkeys(edge.here[size:], sp.S.One)
+    here, there = (
+        sp.Matrix(block)[:size, :size].xreplace(slips) for block in (edge.jacobian_here(), edge.jacobian_there())
+    )
+    if there.has(*edge.here, *edge.there) or (here + there).applyfunc(sp.simplify) != sp.zeros(*here.shape):
+        raise ValueError(
+            f"a link {', '.join(map(str, edge.rhs))} has a derivative that depends on the states it joins; cluster states "
+            "need one that is linear in their difference"
+        )
+    return slope
+
+
+def phased(variation: Variation) -> Variation:
+    """Return the same equations with a clock that is set to 0 at the time `PHASE`, a new parameter."""
+    later = {TIME: TIME + PHASE}
+    orbit = variation.orbit
+    rates = tuple(e.xreplace(later) for e in orbit.node.rhs)
+    contact = None if orbit.node.contact is None else orbit.node.contact.map(lambda e: e.xreplace(later))
+    node = Node(orbit.node.state, rates, (*orbit.node.parameters, PHASE), contact)
+    matrix = tuple((key, e.xreplace(later)) for key, e in variation.matrix)
+    events = None if variation.events is None else variation.events.map(lambda e: e.xreplace(later))
+    moved = replace(orbit, node=node)
+    return Variation(moved, variation.size, matrix, variation.parameters, events)
+
+
+def with_volume(equations: Equations) -> Equations:
+    """Return the equations with one more state of each oscillator, `LOG_VOLUME`, its share of the divergence summed up.
+
+    The sum over the oscillators is the logarithm of a volume of states carried along (Liouville's formula).
+    Raises ValueError for set-valued friction, under which volumes vanish in stick.
+    """
+    if equations.node.contact is not None:
+        raise ValueError("volumes of states: found set-valued friction, whose stick makes them zero")
+    if equations.mixed or equations.inertial:
+        equations.expect_alike("volumes of states")
+    node = equations.node
+    rate = sp.Add(*(derivative(e, s) for e, s in zip(node.rhs, node.state, strict=True)))
+    single = Node((*node.state, LOG_VOLUME), (*node.rhs, rate), node.parameters)
+    edge = equations.edge
+    if edge is not None:
+        share = sp.Add(*(derivative(e, s) for e, s in zip(edge.rhs, edge.here, strict=True)))
+        ends = (sp.Symbol(f"{LOG_VOLUME}_here", real=True), sp.Symbol(f"{LOG_VOLUME}_there", real=True))
+        here, there = (*edge.here, ends[0]), (*edge.there, ends[1])
+        edge = Edge(here, there, edge.weight, (*edge.rhs, share), edge.parameters)
+    return replace(equations, node=single, edge=edge)
+
+
+def _entries(matrix: sp.Matrix) -> tuple[Entry, ...]:
+    rows, columns = matrix.shape
+    return tuple(((r, c), matrix[r, c]) for r in range(rows) for c in range(columns) if matrix[r, c] != 0)
+
+
+def deviation_names(node: Node) -> tuple[sp.Symbol, ...]:
+    """The symbols of the deviation: d_x, d_v for the state x, v."""
+    return tuple(sp.Symbol(f"d_{s.name}", real=True) for s in node.state)
+
+
+def tangent(node: Node) -> Equations:
+    """Return one uncoupled oscillator together with its linearisation: state x, v, d_x, d_v."""
+    return Equations(_extend(node, sp.zeros(len(node.state)), ()), None, 1)
+
+
+def transversal(equations: Equations) -> Equations:
+    """Return the synchronous orbit together with one transversal mode of the network, its strength `alpha` a parameter.
+
+    With links that vanish between equal states, a deviation along an eigenvector of G with eigenvalue gamma obeys
+    d' = (J + sigma gamma H) d, J the Jacobian of one oscillator and sigma H the derivative of a link with respect to the
+    state at its source (Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998)); alpha = -sigma gamma.  Links with inertia:
+    `synchain.models.dynamics.mode_inertia`.
+
+    Raises ValueError where there is no coupling, where a link does not vanish between equal states (the synchronous state
+    is no solution), or where links are not proportional to sigma.
+    """
+    slope = coupling_slope(equations)
+    strength = ALPHA / (1 + inertia_of_modes(equations)[1] * ALPHA)
+    return Equations(_extend(equations.node, -strength * slope, (ALPHA,)), None, 1)
+
+
+def coupling_slope(equations: Equations) -> sp.Matrix:
+    """Return H: the derivative of a link of weight 1 with respect to the state at its source, over sigma, at equal states.
+
+    Of links with inertia it is H + B J.  Raises ValueError as `transversal` does.
+    """
+    if equations.mixed or equations.varied:
+        equations.expect_alike("transversal modes of complete synchronisation")
+    edge = equations.edge
+    if edge is None:
+        raise ValueError("these equations have no coupling; a transversal mode needs links")
+    if not edge.diffusive:
+        raise ValueError("a link acts between equal states, so complete synchronisation is no solution of this network")
+    strength = next((s for s in edge.parameters if s.name == "sigma"), None)
+    if strength is None:
+        raise ValueError(f"links depend on {', '.join(s.name for s in edge.parameters)}; expected sigma alone")
+    equal = dict(zip((*edge.here, *edge.there), equations.node.state * 2, strict=True))
+    matrix = sp.Matrix(edge.jacobian_there()).xreplace({edge.weight: sp.S.One}).xreplace(equal)
+    slope = matrix.diff(strength)
+    if (matrix - strength * slope).applyfunc(sp.simplify) != sp.zeros(*matrix.shape):
+        raise ValueError("links are not proportional to sigma; a mode has no single strength alpha")
+    more = {s.name for s in slope.free_symbols} - {s.name for s in (*equations.node.state, *equations.node.parameters)}
+    if more:
+        raise ValueError(
+            f"between equal states links depend on {', '.join(sorted(more))} as well; expected sigma alone"
+        )
+    return effective_slope(equations, slope)
+
+
+def _extend(node: Node, coupling: sp.Matrix, parameters: tuple[sp.Symbol, ...]) -> Node:
+    """The node with its deviation d' = (J + coupling) d appended to the state."""
+    names = deviation_names(node)
+    taken = {s.name for s in (*node.state, *node.parameters)} & {s.name for s in (*names, *parameters)}
+    if taken:
+        raise ValueError(f"the symbol {sorted(taken)[0]!r} is needed for the deviation; rename it in the model")
+    rows = []
+    for i, rhs in enumerate(node.rhs):
+        slopes = (derivative(rhs, s) + coupling[i, j] for j, s in enumerate(node.state))
+        rows.append(sp.Add(*(slope * d for slope, d in zip(slopes, names, strict=True))))
+    return Node((*node.state, *names), (*node.rhs, *rows), (*node.parameters, *parameters), law=node.law)

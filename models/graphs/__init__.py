@@ -1,0 +1,1 @@
+"""Topologies: families, products, readers, symmetries, partitions and closed forms of graphs. Knows no oscillator."""

@@ -1,0 +1,255 @@
+"""Spectra of whole families in closed form, with the number of nodes as a symbol, and eigenvectors where they are simple.
+
+A family's file may have `formula()`, which returns a ClosedForm made of the symbols below.  The tests prove each one for
+all sizes up to 30 against the exact characteristic polynomial.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import product
+from typing import Any
+
+import sympy as sp
+
+from ..algebra.number_text import exact_number
+from .families import family, names, topology
+from .topology import Topology
+
+__all__ = ["NODE", "ClosedForm", "D", "J", "K", "M", "N", "P", "Q", "Term", "closed_form", "entries", "formulas"]
+
+N, K, J, P, Q, D, M, NODE = sp.symbols("n k j p q d m i", integer=True, nonnegative=True)
+"""Nodes; indices of eigenvalues; sizes of directions or groups; dimension; number of an eigenvector; of a node, from 0."""
+
+Index = tuple[sp.Symbol, sp.Expr, sp.Expr]
+
+_ENTRY = re.compile(r"[0-9]{1,9}|[a-hj-wyz][0-9]?")
+"""A whole number or a letter: not i, the node, and not x, which stands between the sizes of directions."""
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """Eigenvalues `value`, each `times` times, for every value low … high of the `indices` (symbol, low, high).
+
+    `vector` is entry NODE of an eigenvector of each, where one is given; where an eigenvalue occurs several times the
+    values of `numbered`, (symbol, low, high), for which `where` holds give as many independent ones.
+    """
+
+    value: sp.Expr
+    times: sp.Expr = sp.S.One
+    indices: tuple[Index, ...] = ()
+    vector: sp.Expr | None = None
+    numbered: tuple[Index, ...] = ()
+    where: sp.Basic = sp.true
+
+    @property
+    def text(self) -> str:
+        """The term in words: value (times) for k = low … high."""
+        often = "" if self.times == 1 else f", {sp.sstr(self.times)} times"
+        return f"{sp.sstr(self.value)}{often}{_ranges(self.indices)}"
+
+    def vector_text(self, size: sp.Expr) -> str:
+        """The eigenvectors in words, of a graph with `size` nodes."""
+        on = "" if self.where == sp.true else f", {sp.sstr(self.where)}"
+        return f"{sp.sstr(self.vector)} at node i = 0 … {sp.sstr(size - 1)}{_ranges(self.numbered)}{on}"
+
+    @property
+    def symbols(self) -> set[sp.Symbol]:
+        """All symbols but that of the node."""
+        parts = [
+            self.value,
+            self.times,
+            self.where,
+            *(end for index in (*self.indices, *self.numbered) for end in index),
+        ]
+        return set().union(*(sp.S(part).free_symbols for part in parts))
+
+    def at(self, numbers: Mapping[sp.Symbol, int]) -> Iterator[tuple[sp.Expr, int, dict[sp.Symbol, int]]]:
+        """(eigenvalue, multiplicity, all numbers) for numbers in place of the sizes; nothing for multiplicity 0."""
+        text = sp.sstr(self.value)
+        for chosen in _chosen(self.indices, dict(numbers)):
+            count = int(self.times.subs(chosen))
+            if count:
+                yield exact_number(text, {str(s): k for s, k in chosen.items()}), count, chosen
+
+    def vectors(self, chosen: Mapping[sp.Symbol, int]) -> Iterator[sp.Expr]:
+        """The eigenvectors of one eigenvalue as expressions in NODE, for all numbers as `at` gives them."""
+        if self.vector is not None:
+            for all_numbers in _chosen(self.numbered, dict(chosen)):
+                if self.where.subs(all_numbers).doit() == sp.true:
+                    yield self.vector.subs(all_numbers).doit()
+
+    def replaced(self, new: Mapping[sp.Symbol, sp.Expr]) -> Term:
+        """The term with other symbols or expressions for some of its symbols, all at once."""
+
+        def put(part: Any) -> Any:
+            return sp.S(part).xreplace(dict(new))
+
+        indices, numbered = (
+            tuple((put(s), put(low), put(high)) for s, low, high in group) for group in (self.indices, self.numbered)
+        )
+        vector = None if self.vector is None else put(self.vector)
+        return Term(put(self.value), put(self.times), indices, vector, numbered, put(self.where))
+
+
+def _ranges(indices: tuple[Index, ...]) -> str:
+    many = ", ".join(f"{s} = {sp.sstr(low)} … {sp.sstr(high)}" for s, low, high in indices)
+    return f" for {many}" if many else ""
+
+
+def _chosen(indices: tuple[Index, ...], given: dict[sp.Symbol, int]) -> Iterator[dict[sp.Symbol, int]]:
+    """The numbers with every choice of the indices."""
+    ends = [[int(end.subs(given)) for end in index[1:]] for index in indices]
+    for place in product(*(range(low, high + 1) for low, high in ends)):
+        yield given | {index[0]: k for index, k in zip(indices, place, strict=True)}
+
+
+@dataclass(frozen=True, slots=True)
+class ClosedForm:
+    """The spectrum of a family or product: its terms and the number of nodes `size` in its symbols.
+
+    `blocks` says which Jordan blocks are larger than 1; it does not hold for products.
+    `options` are those of the family, in these symbols; `least` is the smallest number for each symbol that is not in
+    `lowest`, and `where` what they must obey; `degree` is the in-degree of every node where it is one for all.
+    """
+
+    terms: tuple[Term, ...]
+    size: sp.Expr = N
+    options: Mapping[str, Any] = field(default_factory=dict)
+    least: int = 1
+    note: str = ""
+    blocks: str = ""
+    degree: sp.Expr | None = None
+    where: sp.Basic = sp.true
+    lowest: Mapping[sp.Symbol, int] = field(default_factory=dict)
+    name: str = ""
+    build: Callable[[Mapping[sp.Symbol, int]], Topology] | None = field(default=None, compare=False)
+
+    @property
+    def symbols(self) -> tuple[sp.Symbol, ...]:
+        """The symbols for which numbers are to be put, sorted by name."""
+        return tuple(sorted(self.size.free_symbols | self.where.free_symbols, key=str))
+
+    def least_of(self, symbol: sp.Symbol) -> int:
+        """The smallest number for a symbol."""
+        return self.lowest.get(symbol, self.least)
+
+    def at(self, **numbers: int) -> list[tuple[sp.Expr, int]]:
+        """Eigenvalues and multiplicities for numbers such as n=5 or p=3, q=4; equal ones are not merged.
+
+        Raises ValueError where a number is missing, not known or too small.
+        """
+        given = self.given(numbers)
+        return [(value, count) for term in self.terms for value, count, _ in term.at(given)]
+
+    def graph(self, **numbers: int) -> Topology:
+        """The graph for the same numbers."""
+        return self.made(self.given(numbers))
+
+    def made(self, given: Mapping[sp.Symbol, int]) -> Topology:
+        """The graph for numbers by symbols."""
+        if self.build is None:
+            raise ValueError("this closed form has no graph; expected one made by closed_form or a product of such")
+        return self.build(given)
+
+    def as_dict(self) -> dict[str, Any]:
+        """What `synchain spectrum FAMILY --symbolic --json` prints."""
+        return {"n": sp.sstr(self.size), "terms": [_term_dict(term) for term in self.terms], "note": self.words}
+
+    @property
+    def words(self) -> str:
+        """The note and what is known of Jordan blocks."""
+        return "; ".join(filter(None, (self.note, self.blocks)))
+
+    @property
+    def text(self) -> str:
+        """The form as lines."""
+        rows = [f"{self.name}, n = {sp.sstr(self.size)} nodes" if self.size != N else f"{self.name} of n nodes"]
+        for term in self.terms:
+            rows.append(f"  {term.text}")
+            if term.vector is not None:
+                rows.append(f"    eigenvector{'s' * bool(term.numbered)}: {term.vector_text(self.size)}")
+        return "\n".join([*rows, *([f"  {self.words}"] if self.words else [])])
+
+    def given(self, numbers: Mapping[str, int]) -> dict[sp.Symbol, int]:
+        """The numbers by symbols; ValueError as `at`."""
+        known = {str(symbol): symbol for symbol in self.symbols}
+        if set(numbers) != set(known):
+            raise ValueError(f"found numbers for {sorted(numbers)}; expected them for {sorted(known)}")
+        for key, value in numbers.items():
+            if value < self.least_of(known[key]):
+                raise ValueError(f"found {key} = {value}; expected at least {self.least_of(known[key])}")
+        found = {known[key]: value for key, value in numbers.items()}
+        if self.where.subs(found) != sp.true:
+            raise ValueError(f"found {numbers}; expected {sp.sstr(self.where)}")
+        return found
+
+
+def _term_dict(term: Term) -> dict[str, Any]:
+    def listed(indices: tuple[Index, ...]) -> list[list[str]]:
+        return [[str(s), sp.sstr(low), sp.sstr(high)] for s, low, high in indices]
+
+    return {
+        "value": sp.sstr(term.value),
+        "multiplicity": sp.sstr(term.times),
+        "indices": listed(term.indices),
+        "vector": None if term.vector is None else sp.sstr(term.vector),
+        "numbered": listed(term.numbered),
+        "where": None if term.where == sp.true else sp.sstr(term.where),
+    }
+
+
+def _filled(value: Any, given: Mapping[sp.Symbol, int]) -> Any:
+    return tuple(_filled(part, given) for part in value) if isinstance(value, tuple) else int(sp.S(value).subs(given))
+
+
+def entries(what: str, given: Any) -> tuple[sp.Expr, ...]:
+    """Whole numbers and letters: a list or a text such as "pxq" or "1,3,s"; letters become symbols.
+
+    Raises ValueError on anything else.
+    """
+    parts = re.split("[,x]", given.replace(" ", "")) if isinstance(given, str) else list(given)
+    wrong = next((part for part in parts if not _ENTRY.fullmatch(str(part))), None)
+    if wrong is not None or not parts:
+        raise ValueError(f"{what} = {given!r}; expected whole numbers or letters other than i and x, e.g. pxq or 1,3,s")
+    return tuple(
+        sp.Integer(str(part)) if str(part).isdigit() else sp.Symbol(str(part), integer=True, nonnegative=True)
+        for part in parts
+    )
+
+
+def formulas() -> tuple[str, ...]:
+    """The families that have a closed form with symbols."""
+    return tuple(name for name in names() if hasattr(family(name), "formula"))
+
+
+def closed_form(name: str, **options: Any) -> ClosedForm:
+    """The spectrum of a family with symbols for its size; options as numbers or letters, e.g. shape="pxqxr".
+
+    Raises ValueError where the family has none, or not with these options.
+    """
+    module = family(name)
+    if not hasattr(module, "formula"):
+        raise ValueError(f"topology {name}: no closed form with symbols; known for {', '.join(formulas())}")
+    known = tuple(inspect.signature(module.formula).parameters)
+    unknown = sorted(set(options) - set(known))
+    if unknown:
+        raise ValueError(f"topology {name}: option {unknown[0]!r} with symbols; known: {', '.join(known) or 'none'}")
+    try:
+        found: ClosedForm = module.formula(**options)
+    except ValueError as error:
+        raise ValueError(f"topology {name}: {error}") from None
+    more = ", ".join(f"{key}={_shown(value)}" for key, value in found.options.items() if key in options)
+
+    def build(given: Mapping[sp.Symbol, int]) -> Topology:
+        filled = {key: _filled(value, given) for key, value in found.options.items()}
+        return topology(name, int(found.size.subs(given)), **filled)
+
+    return replace(found, name=f"{name}({more})" if more else name, build=build)
+
+
+def _shown(value: Any) -> str:
+    return f"({', '.join(map(str, value))})" if isinstance(value, tuple) else str(value)

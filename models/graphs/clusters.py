@@ -1,0 +1,175 @@
+"""Cluster states of a small graph: which oscillators can move as one, and the exact equations of their differences.
+
+A symmetry of the graph maps solutions to solutions, so the nodes of an orbit of any group of symmetries may stay equal.
+The differences within the clusters obey a linear equation of their own: with x_i - x_first(cluster) as coordinates it is
+rational, and it falls into blocks, one for each set of clusters that are intertwined.  The row sums of G are zero, so the
+partitions that G leaves invariant are the external equitable ones.
+
+Sources: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014): clusters from symmetries, blocks,
+isolated desynchronisation; Golubitsky & Stewart, Bull. Amer. Math. Soc. 43, 305 (2006): balanced partitions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass
+from fractions import Fraction
+
+from flint import fmpq, fmpq_mat, fmpq_poly
+
+from ..inputs.checks import typed
+from ..spectra.proof import ProofError
+from .families import a_graph
+from .partitions import class_links
+from .symmetry import automorphisms
+from .topology import Topology
+
+__all__ = ["Block", "Clusters", "clusters", "orbital_partitions"]
+
+NODE_LIMIT = 64
+"""Largest graph whose symmetries are looked for."""
+
+PARTITION_LIMIT = 5000
+"""Most partitions that are listed."""
+
+Rows = tuple[tuple[Fraction, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Differences that influence each other and no others.
+
+    `clusters` are the intertwined ones; coordinate k is x_i - x_j for pairs[k] = (i, j) and lives on the orbit of cluster
+    nodes[k]; `matrix` (b x b) takes the place of G in its variational equation.
+    """
+
+    clusters: tuple[int, ...]
+    nodes: tuple[int, ...]
+    pairs: tuple[tuple[int, int], ...]
+    matrix: Rows
+
+
+@dataclass(frozen=True, slots=True)
+class Clusters:
+    """A balanced partition: the cluster of each node, the network of the clusters, and the blocks of the differences.
+
+    Clusters are numbered by their first nodes.  The eigenvalues of the quotient and of the blocks are together those of G.
+    """
+
+    classes: tuple[int, ...]
+    quotient: Topology
+    blocks: tuple[Block, ...]
+
+    @property
+    def members(self) -> tuple[tuple[int, ...], ...]:
+        """The nodes of each cluster, ascending."""
+        return tuple(tuple(i for i, k in enumerate(self.classes) if k == c) for c in range(self.quotient.n))
+
+
+def orbital_partitions(graph: Topology, limit: int = 20_000) -> tuple[Clusters, ...]:
+    """All partitions into orbits of a group of symmetries, from single nodes to the coarsest.
+
+    The orbits of one symmetry are its cycles; the orbits of a group are the join of those of its elements.
+    Raises ValueError for more than NODE_LIMIT nodes, `limit` automorphisms or PARTITION_LIMIT partitions.
+    """
+    if a_graph("orbital_partitions", graph).n > NODE_LIMIT:
+        raise ValueError(
+            f"{graph.name}({graph.n}): expected at most {NODE_LIMIT} nodes to look for symmetries; describe single "
+            "partitions with `clusters`"
+        )
+    cycles = {_joined(graph.n, enumerate(g)) for g in automorphisms(graph, limit)}
+    closed = {tuple(range(graph.n))}
+    for partition in sorted(cycles, key=_fine_first):
+        if partition not in closed:  # else a join of finer ones
+            closed |= {_joined(graph.n, [*_stars(partition), *_stars(other)]) for other in closed}
+        if len(closed) > PARTITION_LIMIT:
+            raise ValueError(
+                f"{graph.name}({graph.n}) has more than {PARTITION_LIMIT} orbital partitions; describe single ones with "
+                "`clusters`"
+            )
+    characteristic = _polynomial(graph.rows)
+    return tuple(_described(graph, partition, characteristic) for partition in sorted(closed, key=_fine_first))
+
+
+def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
+    """The cluster state of any balanced partition, with or without symmetry; `classes` has the cluster of each node.
+
+    Raises ValueError where the partition is not balanced, or has not one class for each node.
+    """
+    a_graph("clusters", graph)
+    if not isinstance(classes, Collection) or isinstance(classes, Set | Mapping):
+        raise TypeError(f"partition: found {typed(classes)}; expected the cluster of each node, e.g. [0, 0, 1]")
+    if len(classes) != graph.n:
+        raise ValueError(f"partition: found {len(classes)} classes for {graph.n} nodes; expected one for each node")
+    order: dict[int, int] = {}
+    numbered = tuple(order.setdefault(k, len(order)) for k in classes)
+    return _described(graph, numbered, _polynomial(graph.rows))
+
+
+def _described(graph: Topology, classes: tuple[int, ...], characteristic: fmpq_poly) -> Clusters:
+    """Quotient and blocks, proved by characteristic polynomials."""
+    quotient = Topology(f"{graph.name} quotient", max(classes) + 1, class_links(graph.n, graph.links, classes))
+    made = Clusters(classes, quotient, _blocks(graph, classes))
+    product = _polynomial(quotient.rows)
+    for block in made.blocks:
+        product *= _polynomial(block.matrix)
+    if product != characteristic:
+        raise ProofError(
+            f"clusters {classes} of {graph.name}({graph.n}): quotient and blocks multiply out to {product}; expected the "
+            f"characteristic polynomial {characteristic}"
+        )
+    return made
+
+
+def _blocks(graph: Topology, classes: tuple[int, ...]) -> tuple[Block, ...]:
+    """T G L of the differences from the first node of each cluster, split where no entry joins two clusters."""
+    first = {k: i for i, k in reversed(list(enumerate(classes)))}
+    pairs = [(i, first[k]) for i, k in enumerate(classes) if i != first[k]]
+    rows = graph.rows
+    matrix = [[rows[i][column] - rows[j][column] for column, _ in pairs] for i, j in pairs]
+    on = [classes[i] for i, _ in pairs]
+    met = [(on[a], on[b]) for a, row in enumerate(matrix) for b, entry in enumerate(row) if entry]
+    group = _joined(max(classes) + 1, met)
+    found = []
+    for part in sorted({group[k] for k in on}):
+        chosen = [a for a, k in enumerate(on) if group[k] == part]
+        found.append(
+            Block(
+                tuple(sorted({on[a] for a in chosen})),
+                tuple(on[a] for a in chosen),
+                tuple(pairs[a] for a in chosen),
+                tuple(tuple(matrix[a][b] for b in chosen) for a in chosen),
+            )
+        )
+    return tuple(found)
+
+
+def _joined(n: int, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
+    """The finest partition of 0 … n - 1 in which the two of every pair are together, numbered by first members."""
+    parent = list(range(n))
+
+    def root(i: int) -> int:
+        while parent[i] != i:
+            parent[i] = parent[parent[i]]
+            i = parent[i]
+        return i
+
+    for i, j in pairs:
+        a, b = root(i), root(j)
+        parent[max(a, b)] = min(a, b)
+    order: dict[int, int] = {}
+    return tuple(order.setdefault(root(i), len(order)) for i in range(n))
+
+
+def _stars(classes: tuple[int, ...]) -> list[tuple[int, int]]:
+    """Each node with the first of its class."""
+    first: dict[int, int] = {}
+    return [(i, first.setdefault(k, i)) for i, k in enumerate(classes)]
+
+
+def _fine_first(classes: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
+    return -max(classes), classes
+
+
+def _polynomial(rows: Rows) -> fmpq_poly:
+    return fmpq_mat([[fmpq(x.numerator, x.denominator) for x in row] for row in rows]).charpoly()

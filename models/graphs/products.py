@@ -1,0 +1,281 @@
+"""Graphs from graphs: products, unions, complements and scaled weights, with their spectra in closed form where known.
+
+The rules: A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), sections 1.3.6 (union), 1.3.8 (complement),
+1.4.6 (Cartesian product) and 1.4.7 (Kronecker product).  Sums and products of eigenvalues are merged exactly where all of
+them are rational, cosines or their short radicals; other spectra come from the matrix itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import product
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from ..inputs.rationals import rational
+from .families import a_graph
+from .links import LINK_LIMIT
+from .topology import Rule, Topology
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from ..algebra.cosine_sums import AngleSum
+    from .links import Link
+
+__all__ = ["cartesian", "complement", "factors", "kronecker", "union", "weighted"]
+
+Listed: TypeAlias = "list[tuple[AngleSum, int]]"
+Closed: TypeAlias = "list[tuple[sp.Expr, int]] | None"
+
+
+def cartesian(first: Topology, second: Topology) -> Topology:
+    """The Cartesian product: node (i, k) is number i n + k of second's n; links change one of the two as in its graph.
+
+    Every eigenvalue is a sum of one of each graph.  Raises ValueError on more than LINK_LIMIT links.
+    """
+    a_graph("cartesian: first", first)
+    a_graph("cartesian: second", second)
+    return _made(f"cartesian({_named(first)}, {_named(second)})", first.n * second.n, Cartesian(first, second))
+
+
+def kronecker(first: Topology, second: Topology) -> Topology:
+    """The tensor product of the adjacency matrices: (i, k) feels (j, m) where i feels j and k feels m; weights multiply.
+
+    Where all nodes of each graph have one in-degree, d and e, the eigenvalues are (a + d)(b + e) - d e.  Raises
+    ValueError on more than LINK_LIMIT links.
+    """
+    a_graph("kronecker: first", first)
+    a_graph("kronecker: second", second)
+    return _made(f"kronecker({_named(first)}, {_named(second)})", first.n * second.n, Kronecker(first, second))
+
+
+def union(first: Topology, second: Topology) -> Topology:
+    """Both graphs side by side, without links between them: the eigenvalues of both.
+
+    Raises ValueError on more than LINK_LIMIT links.
+    """
+    a_graph("union: first", first)
+    a_graph("union: second", second)
+    return _made(f"union({_named(first)}, {_named(second)})", first.n + second.n, Union(first, second))
+
+
+def complement(graph: Topology) -> Topology:
+    """The graph that joins exactly the pairs which this one does not: eigenvalues 0 and -(n + γ).
+
+    Raises ValueError where a link is one-way or has a weight other than 1, or on more than LINK_LIMIT links.
+    """
+    a_graph("complement", graph)
+    name, rule = f"complement({_named(graph)})", Complement(graph)
+    _small(name, rule.link_count)
+    odd = next((link for link in graph.links if link[2] != 1), None)
+    if odd is not None or not graph.symmetric:
+        found = f"a link of weight {odd[2]}" if odd is not None else "one-way links"
+        raise ValueError(f"{name}: found {found}; expected undirected links of weight 1")
+    return _made(name, graph.n, rule)
+
+
+def weighted(graph: Topology, factor: Any) -> Topology:
+    """The graph with all weights times a rational number other than 0 (a float means its shortest decimal)."""
+    a_graph("weighted", graph)
+    by = rational(factor, "factor")
+    if not by:
+        raise ValueError(f"weighted({_named(graph)}): factor = 0; expected another number: no link would be left")
+    return _made(f"weighted({_named(graph)}, {by})", graph.n, Weighted(graph, by))
+
+
+def factors(graph: Topology) -> tuple[Topology, Topology] | None:
+    """The two graphs of which `cartesian` made a graph; None for any other."""
+    rule = graph.rule
+    return (rule.first, rule.second) if isinstance(rule, Cartesian) else None
+
+
+@dataclass(frozen=True, slots=True)
+class _OfTwo:
+    """What the rules of graphs from two graphs have in common."""
+
+    first: Topology
+    second: Topology
+
+    @property
+    def undirected(self) -> bool:
+        """True if both graphs are known to be symmetric."""
+        return self.first.undirected and self.second.undirected
+
+    def spectra(self) -> tuple[Listed, Listed] | None:
+        """The closed spectra of both graphs; None if one of them has none."""
+        a, b = _listed(self.first), _listed(self.second)
+        return None if a is None or b is None else (a, b)
+
+
+@dataclass(frozen=True, slots=True)
+class Cartesian(_OfTwo):
+    """The rule of a Cartesian product: eigenvalues are sums."""
+
+    @property
+    def link_count(self) -> int:
+        """The number of links."""
+        return self.first.n * self.second.link_count + self.second.n * self.first.link_count
+
+    def links(self) -> tuple[Link, ...]:
+        """Build the sorted links."""
+        n = self.second.n
+        links = [(i * n + k, j * n + k, w) for i, j, w in self.first.links for k in range(n)]
+        links += [(i * n + k, i * n + m, w) for i in range(self.first.n) for k, m, w in self.second.links]
+        return tuple(sorted(links))
+
+    def eigenvalues(self) -> Closed:
+        """List the sums of the eigenvalues."""
+        known = self.spectra()
+        return None if known is None else _written([(x + y, m * k) for (x, m), (y, k) in product(*known)])
+
+
+@dataclass(frozen=True, slots=True)
+class Kronecker(_OfTwo):
+    """The rule of a tensor product: eigenvalues are known if each graph has one in-degree."""
+
+    @property
+    def link_count(self) -> int:
+        """The number of links."""
+        return self.first.link_count * self.second.link_count
+
+    def links(self) -> tuple[Link, ...]:
+        """Build the sorted links."""
+        n = self.second.n
+        links = [(i * n + k, j * n + m, v * w) for i, j, v in self.first.links for k, m, w in self.second.links]
+        return tuple(sorted(links))
+
+    def eigenvalues(self) -> Closed:
+        """List (a + d)(b + e) - d e, d and e the in-degrees."""
+        from ..algebra.cosine_sums import AngleSum
+
+        first, second = _degree(self.first), _degree(self.second)
+        if first is None or second is None or (known := self.spectra()) is None:
+            return None
+        d, e = AngleSum.rational(first), AngleSum.rational(second)
+        return _written([((x + d) * (y + e) + -(d * e), m * k) for (x, m), (y, k) in product(*known)])
+
+
+@dataclass(frozen=True, slots=True)
+class Union(_OfTwo):
+    """The rule of two graphs side by side."""
+
+    @property
+    def link_count(self) -> int:
+        """The number of links."""
+        return self.first.link_count + self.second.link_count
+
+    def links(self) -> tuple[Link, ...]:
+        """Build the sorted links."""
+        n = self.first.n
+        return (*self.first.links, *((i + n, j + n, w) for i, j, w in self.second.links))
+
+    def eigenvalues(self) -> Closed:
+        """List the eigenvalues of both."""
+        known = self.spectra()
+        return None if known is None else _written([*known[0], *known[1]])
+
+
+@dataclass(frozen=True, slots=True)
+class Complement:
+    """The rule of the graph that joins what another does not: of 0 one stays, all others become -(n + γ)."""
+
+    graph: Topology
+
+    @property
+    def link_count(self) -> int:
+        """The number of links."""
+        return self.graph.n * (self.graph.n - 1) - self.graph.link_count
+
+    @property
+    def undirected(self) -> bool:
+        """True: only undirected graphs have a complement here."""
+        return True
+
+    def links(self) -> tuple[Link, ...]:
+        """Build the sorted links."""
+        n, present = self.graph.n, {(i, j) for i, j, _ in self.graph.links}
+        return tuple((i, j, Fraction(1)) for i in range(n) for j in range(n) if i != j and (i, j) not in present)
+
+    def eigenvalues(self) -> Closed:
+        """List 0 and the numbers -(n + γ)."""
+        from ..algebra.cosine_sums import AngleSum
+
+        known = _listed(self.graph)
+        if known is None:
+            return None
+        whole = AngleSum.rational(-self.graph.n)
+        others = [(whole + -a, times - a.vanishes()) for a, times in known]
+        return _written([(AngleSum.rational(0), 1), *((a, times) for a, times in others if times)])
+
+
+@dataclass(frozen=True, slots=True)
+class Weighted:
+    """The rule of a graph with all weights times one number."""
+
+    graph: Topology
+    factor: Fraction
+
+    @property
+    def link_count(self) -> int:
+        """The number of links."""
+        return self.graph.link_count
+
+    @property
+    def undirected(self) -> bool:
+        """True if the graph is known to be symmetric."""
+        return self.graph.undirected
+
+    def links(self) -> tuple[Link, ...]:
+        """Build the sorted links."""
+        return tuple((i, j, w * self.factor) for i, j, w in self.graph.links)
+
+    def eigenvalues(self) -> Closed:
+        """List the eigenvalues times the factor."""
+        from ..algebra.cosine_sums import AngleSum
+
+        known = _listed(self.graph)
+        return None if known is None else _written([(AngleSum.rational(self.factor) * a, times) for a, times in known])
+
+
+def _named(graph: Topology) -> str:
+    more = "".join(f", {key}={value}" for key, value in graph.options)
+    return graph.name if "(" in graph.name else f"{graph.name}({graph.n}{more})"
+
+
+def _small(name: str, links: int) -> None:
+    if links > LINK_LIMIT:
+        raise ValueError(f"{name}: {links} links; expected at most {LINK_LIMIT}: take smaller graphs")
+
+
+def _made(name: str, n: int, rule: Rule) -> Topology:
+    _small(name, rule.link_count or 0)
+    return Topology(name, n, rule=rule)
+
+
+def _degree(graph: Topology) -> Fraction | None:
+    """The sum of weights that every node feels, where it is one for all; else None."""
+    sums = [Fraction(0)] * graph.n
+    for target, _, weight in graph.links:
+        sums[target] += weight
+    return sums[0] if len(set(sums)) == 1 else None
+
+
+def _listed(graph: Topology) -> Listed | None:
+    """The closed spectrum of a graph, or that of a small matrix, as sums of cosines; None where it is not of them."""
+    from ..algebra.cosine_sums import read
+
+    rule = graph.closed_form()
+    if rule is None:
+        rule = [(e.exact, e.multiplicity) for e in graph.spectrum.eigenvalues] if graph.n <= 100 else None
+    if rule is None:
+        return None
+    found = [(read(number), times) for number, times in rule]
+    return None if any(a is None for a, _ in found) else [(a, times) for a, times in found if a is not None]
+
+
+def _written(numbers: Listed) -> Closed:
+    """Equal numbers merged, written as SymPy expressions."""
+    from ..algebra.cosine_sums import expression, merged
+
+    return [(expression(a), times) for a, times in merged(numbers)]

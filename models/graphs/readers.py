@@ -1,0 +1,251 @@
+"""Graphs out of what users have: lists of edges, networkx graphs, sparse matrices, edge lists and GraphML files.
+
+Everything is taken by what it can do, so that none of those packages is needed here.  An edge from u to v means that v
+feels u: it becomes the link v <- u.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from ..inputs.checks import flag, printable, shown, typed, whole
+from ..inputs.rationals import file_text, rational
+from .links import LINK_LIMIT
+from .topology import Topology
+
+__all__ = ["from_edges", "from_graph", "from_sparse", "parsed", "read_edges", "read_graphml"]
+
+Weights = dict[tuple[int, int], Fraction]
+
+
+def from_edges(
+    edges: Iterable[Sequence[Any]], n: int | None = None, directed: bool = False, name: str = "edges"
+) -> Topology:
+    """The graph of edges (i, j) or (i, j, weight), nodes 0 … n - 1; `directed`: j feels i, not the other way round.
+
+    Without `n` the largest node is the last.  Raises ValueError on a wrong node, a loop, a repeated edge, a weight that
+    is not rational or 0, and TypeError on nodes that are no whole numbers.
+    """
+    if isinstance(edges, str | bytes | Mapping) or not isinstance(edges, Iterable):
+        raise TypeError(f"{name}: found {typed(edges)}; expected a list of edges, e.g. [(0, 1), (1, 2, 0.5)]")
+    flag("directed", directed)
+    found = [_edge(edge, f"{name}: edge {k + 1}") for k, edge in enumerate(edges)]
+    size = 1 + max((max(i, j) for i, j, _ in found), default=-1) if n is None else whole(f"{name}: n", n, 1)
+    weights: Weights = {}
+    called = _Names(name, range(size))
+    for i, j, weight in found:
+        _put(weights, j, i, weight, directed, called)
+    return _graph(name, size, weights)
+
+
+def from_graph(graph: Any, weight: str = "weight", name: str = "graph") -> Topology:
+    """The graph of a networkx graph, nodes in its order; weights by their decimal text, 1 where there is none.
+
+    Edges of a directed graph act from their first node on their second; parallel edges of a multigraph add up.
+    Raises TypeError on another object, ValueError on loops and on weights that are not rational.
+    """
+    if not all(hasattr(graph, need) for need in ("nodes", "edges", "is_directed")):
+        raise TypeError(f"{name} is a {type(graph).__name__}; expected a networkx graph (nodes, edges, is_directed)")
+    nodes = list(graph.nodes())
+    place = {node: k for k, node in enumerate(nodes)}
+    many = bool(graph.is_multigraph()) if hasattr(graph, "is_multigraph") else False
+    weights, called = Weights(), _Names(name, [repr(node) for node in nodes])
+    for u, v, data in graph.edges(data=True):
+        value = rational(data.get(weight, 1), f"{name}: weight of edge {u!r} - {v!r}")
+        _put(weights, place[v], place[u], value, graph.is_directed(), called, many)
+    return _graph(name, len(nodes), weights)
+
+
+def from_sparse(matrix: Any, adjacency: bool = False, name: str = "matrix") -> Topology:
+    """The graph of a SciPy sparse connectivity matrix G with row sums of zero, or with `adjacency` of weights A_ij, j on i.
+
+    Raises TypeError where there is no `tocoo`, ValueError where it is not square, a row sum is not zero (beyond 1e-12
+    of its entries) or an adjacency matrix has a diagonal.
+    """
+    if not hasattr(matrix, "tocoo"):
+        raise TypeError(f"{name} is a {type(matrix).__name__}; expected a SciPy sparse matrix (one that has tocoo)")
+    entries = matrix.tocoo()
+    if len(entries.shape) != 2:
+        raise ValueError(f"{name} has the shape {entries.shape}; expected a square matrix")
+    rows, columns = entries.shape
+    if rows != columns:
+        raise ValueError(f"{name} has {rows} rows and {columns} columns; expected a square matrix")
+    weights, sums, sizes = Weights(), [Fraction(0)] * rows, [Fraction(0)] * rows
+    for i, j, value in zip(entries.row.tolist(), entries.col.tolist(), entries.data.tolist(), strict=True):
+        number = rational(value, f"{name}: entry ({i + 1}, {j + 1})")
+        sums[i], sizes[i] = sums[i] + number, sizes[i] + abs(number)
+        if i != j:
+            weights[i, j] = weights.get((i, j), Fraction(0)) + number
+        elif adjacency and number:
+            raise ValueError(
+                f"{name}: entry ({i + 1}, {i + 1}) is {number}; expected no diagonal in an adjacency matrix"
+            )
+    wrong = next((i for i in range(rows) if abs(sums[i]) * 10**12 > sizes[i]), None)
+    if wrong is not None and not adjacency:
+        raise ValueError(
+            f"{name}: row {wrong + 1} sums to {sums[wrong]}; expected 0, or the synchronous state is no solution: "
+            "correct its diagonal, or say adjacency=True"
+        )
+    return _graph(name, rows, weights)
+
+
+def read_edges(path: str | Path, directed: bool = False) -> Topology:
+    """The graph of a text file with an edge a line: two nodes and, if wanted, a weight; `#` starts a comment.
+
+    Nodes are any words; whole numbers are put in ascending order, other names in that of their first mention.  A line
+    with one word is a node without edges.  Raises FileNotFoundError, and ValueError on what `from_edges` refuses.
+    """
+    text, name = file_text(path, "edge file")
+    one, most = Fraction(1), LINK_LIMIT if directed else LINK_LIMIT // 2
+    edges: list[tuple[str, str, Fraction]] = []
+    order: dict[str, None] = {}
+    for number, line in enumerate(text.splitlines(), 1):
+        words = line.partition("#")[0].replace(",", " ").split()
+        if len(words) > 3:
+            raise ValueError(f"{name}: line {number} has {len(words)} words; expected two nodes and perhaps a weight")
+        order.update(dict.fromkeys(words[:2]))
+        if len(words) > 1:
+            edges.append((words[0], words[1], rational(words[2], f"{name}: line {number}") if words[2:] else one))
+            if len(edges) > most:
+                raise ValueError(f"{name}: line {number} has edge {most + 1}; expected at most {LINK_LIMIT} links")
+    numbers = all(word.isascii() and word.isdecimal() and len(word) < 19 for word in order)
+    nodes = sorted(order, key=int) if numbers else list(order)
+    return assembled(nodes, [(u, v, weight, directed) for u, v, weight in edges], name)
+
+
+def read_graphml(path: str | Path, weight: str = "weight") -> Topology:
+    """The graph of a GraphML file, nodes in its order; the weight of an edge is its data of that name, 1 without.
+
+    Raises FileNotFoundError, and ValueError on a document type, on nested graphs, hyperedges, unknown nodes and
+    whatever `from_edges` refuses.  (U. Brandes et al., Graph Drawing 2001, LNCS 2265, 501.)
+    """
+
+    text, name = file_text(path, "GraphML file")
+    nodes, edges = parsed(text, name, weight)
+    return assembled(nodes, edges, name)
+
+
+def assembled(nodes: Sequence[Hashable], edges: Iterable[tuple[Hashable, Hashable, Any, bool]], name: str) -> Topology:
+    """The graph of named nodes and edges (from, to, weight, one-way)."""
+    for node in nodes:
+        printable(f"{name}: node name", str(node))
+    place = {node: k for k, node in enumerate(nodes)}
+    weights, called = Weights(), _Names(name, nodes)
+    for u, v, value, directed in edges:
+        number = value if type(value) is Fraction else rational(value, f"{name}: weight of edge {u} - {v}")
+        _put(weights, place[v], place[u], number, directed, called)
+    return _graph(name, len(nodes), weights)
+
+
+@dataclass(frozen=True, slots=True)
+class _Names:
+    """What a graph and its nodes are called, for messages."""
+
+    graph: str
+    nodes: Sequence[Hashable]
+
+    def edge(self, source: int, target: int) -> str:
+        return f"{self.graph}: edge {self.nodes[source]} - {self.nodes[target]}"
+
+
+def _put(
+    weights: Weights, target: int, source: int, value: Fraction, directed: bool, called: _Names, many: bool = False
+) -> None:
+    """Add an edge; ValueError where it is a loop, has no weight or is there already."""
+    if target == source:
+        raise ValueError(
+            f"{called.edge(source, target)} joins a node to itself; it has no effect on a difference: leave it out"
+        )
+    if not value:
+        raise ValueError(f"{called.edge(source, target)} has weight 0; leave it out or give it a weight")
+    for link in ((target, source),) if directed else ((target, source), (source, target)):
+        if link not in weights:
+            weights[link] = value
+        elif many:
+            weights[link] += value
+        else:
+            raise ValueError(
+                f"{called.edge(source, target)} is given twice; expected each edge once: add the weights up"
+            )
+
+
+def _edge(edge: Sequence[Any], where: str) -> tuple[int, int, Fraction]:
+    unordered = isinstance(edge, str | bytes | Set | Mapping)
+    if unordered or not hasattr(edge, "__len__") or len(edge) not in (2, 3):
+        raise ValueError(f"{where} is {shown(edge)}; expected (i, j) or (i, j, weight)")
+    i, j = (whole(f"{where}: node", node, 0) for node in edge[:2])
+    return i, j, rational(edge[2], where) if len(edge) == 3 else Fraction(1)
+
+
+def _graph(name: str, n: int, weights: Weights) -> Topology:
+    if len(weights) > LINK_LIMIT:
+        raise ValueError(f"{name}: {len(weights)} links; expected at most {LINK_LIMIT}")
+    return Topology(name, n, tuple((i, j, weights[i, j]) for i, j in sorted(weights) if weights[i, j]))
+
+
+Edge = tuple[str, str, Any, bool]
+
+
+def parsed(text: str, name: str, weight: str) -> tuple[list[str], list[Edge]]:
+    """The node names in order, and edges (from, to, weight as text, one-way); ValueError on anything else."""
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:  # anywhere: what looks like a comment may be none
+        raise ValueError(f"{name} declares a document type or entities; expected plain GraphML: remove <!DOCTYPE …>")
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise ValueError(f"{name} is no XML: {error}") from None
+    graphs = [element for element in root.iter() if _tag(element) == "graph"]
+    if _tag(root) != "graphml" or len(graphs) != 1:
+        raise ValueError(f"{name} holds {len(graphs)} graphs in <{_tag(root)}>; expected one, not nested, in <graphml>")
+    graph = graphs[0]
+    keys, default = _keys(root, weight)
+    nodes = [_attribute(element, "id", name) for element in graph if _tag(element) == "node"]
+    if len(set(nodes)) != len(nodes):
+        raise ValueError(f"{name} has two nodes of one id; expected each id once")
+    return nodes, list(_edges(graph, set(nodes), keys, default, name))
+
+
+def _edges(graph: ElementTree.Element, nodes: set[str], keys: set[str], default: str, name: str) -> Iterator[Edge]:
+    directed = graph.get("edgedefault", "undirected") == "directed"
+    for element in graph:
+        if _tag(element) == "hyperedge":
+            raise ValueError(f"{name} has a hyperedge; expected edges of two nodes")
+        if _tag(element) != "edge":
+            continue
+        ends = [_attribute(element, end, name) for end in ("source", "target")]
+        unknown = next((end for end in ends if end not in nodes), None)
+        if unknown is not None:
+            raise ValueError(f"{name} has an edge to node {unknown!r}, which it does not list")
+        given = [child.text or "" for child in element if _tag(child) == "data" and child.get("key") in keys]
+        one_way = {"true": True, "false": False}.get(element.get("directed", ""), directed)
+        yield ends[0], ends[1], given[0].strip() if given else default, one_way
+
+
+def _keys(root: ElementTree.Element, weight: str) -> tuple[set[str], str]:
+    """The ids under which edges hold their weight (one for each type of number), and its default."""
+    ids, default = set[str](), "1"
+    for element in root:
+        if (
+            _tag(element) == "key"
+            and element.get("for", "all") in ("edge", "all")
+            and element.get("attr.name") == weight
+        ):
+            ids.add(element.get("id", ""))
+            default = next((child.text or "" for child in element if _tag(child) == "default"), default).strip()
+    return ids, default
+
+
+def _attribute(element: ElementTree.Element, key: str, name: str) -> str:
+    value = element.get(key)
+    if value is None:
+        raise ValueError(f"{name}: <{_tag(element)}> has no {key!r}; expected one")
+    return value
+
+
+def _tag(element: ElementTree.Element) -> str:
+    return element.tag.rpartition("}")[2]

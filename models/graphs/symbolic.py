@@ -1,0 +1,274 @@
+"""Graphs whose weights are rational functions of symbols: characteristic polynomial, factors, and roots where it factors.
+
+What is said holds for symbols as such: for particular numbers eigenvalues may coincide, and `SymbolicTopology.at` gives the
+graph for them, with its own proved spectrum.  Texts are read by a whitelist over `ast`: nothing in them is run.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import reduce
+from math import comb
+from operator import add, mul
+from pathlib import Path
+from typing import Any
+
+import sympy as sp
+from sympy.polys.matrices import DomainMatrix
+
+from ..inputs.rationals import file_text, parse_rows, rational, square
+from ..spectra.proof import ProofError
+from .topology import Topology, from_matrix
+
+__all__ = ["SymbolicSpectrum", "SymbolicTopology", "from_symbols", "read_symbols", "weight"]
+
+LARGEST, LENGTH, DEPTH, EXPONENT = 30, 200, 20, 12
+DEGREE, TERMS, BITS = 60, 2000, 10_000
+"""Largest degree, number of terms and bits of a number that a weight may have once it is multiplied out."""
+
+Z = sp.Symbol("z")
+"""The variable of characteristic polynomials; no weight may be called so."""
+
+_LETTERS = re.compile(r"[A-Za-z0-9_+\-*/(). ]*", re.ASCII)
+_EXPECTED = "expected whole numbers, fractions, letters, + - * / **, e.g. a/2 or 1/(1+b)"
+
+
+@dataclass(frozen=True, slots=True)
+class SymbolicSpectrum:
+    """The monic characteristic polynomial in z and its irreducible factors with multiplicities, for generic symbols."""
+
+    polynomial: sp.Poly
+    factors: tuple[tuple[sp.Poly, int], ...]
+
+    @property
+    def eigenvalues(self) -> tuple[tuple[sp.Expr, int], ...]:
+        """(root, multiplicity) of every factor of degree 1 or 2."""
+        return tuple((root, count) for factor, count in self.factors for root in _roots(factor))
+
+    @property
+    def unsolved(self) -> tuple[tuple[sp.Poly, int], ...]:
+        """The factors of higher degree."""
+        return tuple((factor, count) for factor, count in self.factors if factor.degree() > 2)
+
+    @property
+    def text(self) -> str:
+        """The spectrum as lines."""
+        rows = [f"characteristic polynomial: {sp.sstr(_product(self.factors))}"]
+        rows += [f"  {sp.sstr(root)}{_often(count)}" for root, count in self.eigenvalues]
+        rows += [f"  the roots of {sp.sstr(f.as_expr())}{_often(count)}" for f, count in self.unsolved]
+        return "\n".join(rows)
+
+    def as_dict(self) -> dict[str, Any]:
+        """What `synchain spectrum --symbolic --matrix FILE --json` prints."""
+        return {
+            "n": self.polynomial.degree(),
+            "polynomial": sp.sstr(self.polynomial.as_expr()),
+            "factors": [{"factor": sp.sstr(f.as_expr()), "multiplicity": count} for f, count in self.factors],
+            "eigenvalues": [{"exact": sp.sstr(root), "multiplicity": count} for root, count in self.eigenvalues],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class SymbolicTopology:
+    """`n` nodes and links (target, source, weight), the weights rational functions of symbols; made by `from_symbols`."""
+
+    name: str
+    n: int
+    links: tuple[tuple[int, int, sp.Expr], ...]
+
+    @property
+    def symbols(self) -> tuple[sp.Symbol, ...]:
+        """The symbols of all weights, sorted by name."""
+        return tuple(sorted(set().union(*(w.free_symbols for _, _, w in self.links)), key=str))
+
+    @property
+    def matrix(self) -> sp.ImmutableDenseMatrix:
+        """G, every row of which sums to zero."""
+        rows = sp.zeros(self.n)
+        for target, source, w in self.links:
+            rows[target, source] = w
+            rows[target, target] -= w
+        return sp.ImmutableDenseMatrix(rows.applyfunc(sp.cancel))
+
+    @property
+    def spectrum(self) -> SymbolicSpectrum:
+        """The characteristic polynomial, factored; ProofError where the factors do not multiply to it."""
+        given = DomainMatrix.from_Matrix(self.matrix)
+        coefficients = [given.domain.to_sympy(c) for c in given.charpoly()]
+        polynomial = sp.Poly(coefficients, Z)
+        whole = sp.numer(sp.together(polynomial.as_expr()))
+        factors = [(sp.Poly(f, Z), count) for f, count in sp.factor_list(whole)[1] if f.has(Z)]
+        monic = tuple((_monic(f), count) for f, count in sorted(factors, key=lambda f: (f[0].degree(), str(f[0]))))
+        if sp.cancel(sp.expand(_product(monic)) - polynomial.as_expr()) != 0:
+            raise ProofError(f"spectrum of {self.name}: the factors do not multiply to the characteristic polynomial")
+        return SymbolicSpectrum(polynomial, monic)
+
+    def at(self, **values: Any) -> Topology:
+        """The graph with rational numbers for all symbols; weights that become 0 are left out.
+
+        Raises ValueError on a missing or unknown symbol, a number that is not rational and a division by zero.
+        """
+        known = {str(symbol): symbol for symbol in self.symbols}
+        if set(values) != set(known):
+            raise ValueError(f"{self.name}: found values of {sorted(values)}; expected them of {sorted(known)}")
+        numbers = {known[key]: rational(value, f"{self.name}: {key}") for key, value in values.items()}
+        exact = {symbol: sp.Rational(x.numerator, x.denominator) for symbol, x in numbers.items()}
+        rows = [[sp.S.Zero] * self.n for _ in range(self.n)]
+        for target, source, w in self.links:
+            value = w.subs(exact)
+            if not value.is_Rational:
+                raise ValueError(
+                    f"{self.name}: weight {w} of {target} <- {source} divides by zero; choose other values"
+                )
+            rows[target][source] = value
+            rows[target][target] -= value
+        return from_matrix(rows, self.name)
+
+
+def from_symbols(rows: Iterable[Iterable[Any]] | sp.MatrixBase, name: str = "matrix") -> SymbolicTopology:
+    """The graph of a connectivity matrix of rational functions: SymPy expressions, numbers or texts such as "a/2".
+
+    Every row must sum to zero.  Raises ValueError on another shape, a row sum that is not 0, more than LARGEST nodes and
+    an entry that is no rational function.
+    """
+    table = square(rows, name)
+    n = len(table)
+    if n > LARGEST:
+        raise ValueError(f"{name}: found {n} rows; expected a square of up to {LARGEST}")
+    entries = [[weight(x, f"{name}: entry ({i + 1}, {j + 1})") for j, x in enumerate(r)] for i, r in enumerate(table)]
+    for i, row in enumerate(entries):
+        total = sp.cancel(sp.Add(*row))
+        if total != 0:
+            raise ValueError(
+                f"{name}: row {i + 1} sums to {total}; expected 0, or the synchronous state is no solution"
+            )
+    links = tuple((i, j, x) for i, row in enumerate(entries) for j, x in enumerate(row) if i != j and x != 0)
+    return SymbolicTopology(name, n, links)
+
+
+def read_symbols(path: str | Path) -> SymbolicTopology:
+    """The graph of a text file, as `topology.read_matrix` reads it, with letters in its entries; nothing in it is run."""
+    text, name = file_text(path, "matrix file")
+    return from_symbols(parse_rows(text, name), name)
+
+
+def weight(entry: Any, where: str) -> sp.Expr:
+    """A rational function in lowest terms; ValueError on anything else, and on the letter z."""
+    if isinstance(entry, str):
+        found = _read(entry.strip(), where)
+    elif isinstance(entry, sp.Expr) and entry.free_symbols:
+        found = entry
+    else:
+        number = rational(entry, where)
+        found = sp.Rational(number.numerator, number.denominator)
+    if found.has(sp.zoo, sp.nan) or not found.is_rational_function(*found.free_symbols) or found.atoms(sp.Float):
+        raise ValueError(f"{where} is {entry}; {_EXPECTED}")
+    if Z in found.free_symbols or any(str(s) == "z" for s in found.free_symbols):
+        raise ValueError(f"{where} is {entry}; z is the variable of the characteristic polynomial: rename the weight")
+    _check_size(found, where)
+    return sp.cancel(found)
+
+
+@dataclass(frozen=True, slots=True)
+class _Size:
+    """At most so many terms above and below the line, and so high a degree, of an expression that is multiplied out."""
+
+    above: int = 1
+    below: int = 1
+    degree: int = 0
+
+    def __add__(self, other: _Size) -> _Size:
+        above = self.above * other.below + other.above * self.below
+        below = self.below * other.below
+        join = max if below == 1 else add
+        return _Size(above, below, join(self.degree, other.degree))
+
+    def __mul__(self, other: _Size) -> _Size:
+        return _Size(self.above * other.above, self.below * other.below, self.degree + other.degree)
+
+    def __pow__(self, power: int) -> _Size:
+        if power < 0:
+            return _Size(self.below, self.above, self.degree) ** -power
+        return _Size(comb(self.above + power - 1, power), comb(self.below + power - 1, power), self.degree * power)
+
+
+def _check_size(found: sp.Expr, where: str) -> None:
+    """Refuse an expression that is too large multiplied out, before it is."""
+
+    def size(e: sp.Expr) -> _Size:
+        if e.is_Symbol:
+            return _Size(degree=1)
+        if e.is_Pow and e.exp.is_Integer:
+            inner = size(e.base)
+            made = inner ** int(e.exp) if inner.degree * abs(int(e.exp)) <= DEGREE else _Size(degree=DEGREE + 1)
+        elif e.is_Add or e.is_Mul:
+            parts = [size(part) for part in e.args]
+            made = reduce(add if e.is_Add else mul, parts)
+        else:
+            return _Size()
+        if made.degree > DEGREE or max(made.above, made.below) > TERMS:
+            raise ValueError(
+                f"{where} may have more than {TERMS} terms or a degree above {DEGREE} when multiplied out; "
+                "write it shorter or give the weight a letter of its own"
+            )
+        return made
+
+    size(found)
+
+
+def _read(text: str, where: str) -> sp.Expr:
+    if len(text) > LENGTH or not _LETTERS.fullmatch(text):
+        raise ValueError(f"{where} is {text[:40]!r}; {_EXPECTED}")
+    try:
+        tree = ast.parse(text, mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ValueError(f"{where} is {text!r}; {_EXPECTED}") from None
+    return _value(tree, text, where, 0)
+
+
+def _value(node: ast.AST, text: str, where: str, depth: int) -> sp.Expr:
+    if depth > DEPTH:
+        raise ValueError(f"{where} is {text!r}, nested more than {DEPTH} times; write it shorter")
+    match node:
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            number = rational(value, where)
+            return sp.Rational(number.numerator, number.denominator)
+        case ast.Name(id=name):
+            return sp.Symbol(name)
+        case ast.UnaryOp(op=ast.USub(), operand=inner):
+            return -_value(inner, text, where, depth + 1)
+        case ast.BinOp(left=left, op=ast.Pow(), right=ast.Constant(value=int() as power)) if 0 < power <= EXPONENT:
+            base = _value(left, text, where, depth + 1)
+            if base.is_Rational and power * max(int(base.p).bit_length(), int(base.q).bit_length()) > BITS:
+                raise ValueError(f"{where} is {text!r}, a number of more than {BITS} bits; expected a smaller one")
+            return base**power
+        case ast.BinOp(left=left, op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div() as op, right=right):
+            a, b = (_value(side, text, where, depth + 1) for side in (left, right))
+            return {ast.Add: a + b, ast.Sub: a - b, ast.Mult: a * b}[type(op)] if not isinstance(op, ast.Div) else a / b
+    raise ValueError(f"{where} is {text!r}; {_EXPECTED}")
+
+
+def _monic(f: sp.Poly) -> sp.Poly:
+    return sp.Poly([sp.cancel(c / f.LC()) for c in f.all_coeffs()], Z)
+
+
+def _roots(factor: sp.Poly) -> list[sp.Expr]:
+    """The roots of a monic factor of degree 1 or 2; none of a higher one."""
+    c = factor.all_coeffs()
+    if len(c) == 2:
+        return [-c[1]]
+    if len(c) == 3:
+        middle, root = -c[1] / 2, sp.sqrt(sp.factor(c[1] ** 2 / 4 - c[2]))
+        return [middle + root, middle - root]
+    return []
+
+
+def _product(factors: Iterable[tuple[sp.Poly, int]]) -> sp.Expr:
+    return sp.Mul(*(f.as_expr() ** count for f, count in factors))
+
+
+def _often(count: int) -> str:
+    return "" if count == 1 else f", {count} times"

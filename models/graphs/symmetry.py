@@ -1,0 +1,97 @@
+"""The symmetries of a small graph: permutations of its nodes that keep every weight."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+
+from .partitions import coarsest_balanced
+from .topology import Topology
+
+__all__ = ["Permutation", "automorphisms"]
+
+Permutation = tuple[int, ...]
+"""The image of each node."""
+
+TRY_LIMIT = 2_000_000
+"""Images tried before the search is given up."""
+
+
+def automorphisms(graph: Topology, limit: int = 20_000) -> tuple[Permutation, ...]:
+    """All automorphisms of a graph with weights and directions, the identity first.
+
+    Raises ValueError where there are more than `limit`, or where the search takes more than TRY_LIMIT steps.
+    """
+    found: list[Permutation] = []
+    for permutation in _search(graph):
+        if len(found) == limit:
+            raise ValueError(
+                f"{graph.name}({graph.n}) has more than {limit} automorphisms; expected at most {limit}: raise "
+                "the limit, or describe single partitions with `clusters`"
+            )
+        found.append(permutation)
+    return tuple(sorted(found))
+
+
+def _search(graph: Topology) -> Iterator[Permutation]:
+    """Assign images node by node along the links, so that each image is next to one that is already fixed."""
+    weights = graph.rows
+    colour = coarsest_balanced(graph.n, graph.links, [row[i] for i, row in enumerate(weights)])
+    order, anchor = _order(graph, colour)
+    near = _neighbours(graph)
+    image: dict[int, int] = {}
+    used: set[int] = set()
+    tries = 0
+
+    def extend(place: int) -> Iterator[Permutation]:
+        nonlocal tries
+        if place == graph.n:
+            yield tuple(image[i] for i in range(graph.n))
+            return
+        i = order[place]
+        for j in near[image[anchor[i]]] if i in anchor else range(graph.n):
+            tries += 1
+            if tries > TRY_LIMIT:
+                raise ValueError(
+                    f"{graph.name}({graph.n}): automorphisms not found in {TRY_LIMIT} steps; describe "
+                    "single partitions with `clusters`"
+                )
+            if j in used or colour[i] != colour[j]:
+                continue
+            if all(weights[i][o] == weights[j][p] and weights[o][i] == weights[p][j] for o, p in image.items()):
+                image[i] = j
+                used.add(j)
+                yield from extend(place + 1)
+                used.discard(image.pop(i))
+
+    return extend(0)
+
+
+def _order(graph: Topology, colour: tuple[int, ...]) -> tuple[list[int], dict[int, int]]:
+    """All nodes, part by part, breadth first from a rare colour; and for each that has one an earlier neighbour."""
+    near = _neighbours(graph)
+    rare = sorted(range(graph.n), key=lambda i: (colour.count(colour[i]), i))
+    order: list[int] = []
+    anchor: dict[int, int] = {}
+    seen: set[int] = set()
+    for start in rare:
+        queue = deque([start] if start not in seen else [])
+        seen.add(start)
+        while queue:
+            i = queue.popleft()
+            order.append(i)
+            for j in near[i]:
+                if j not in seen:
+                    seen.add(j)
+                    anchor[j] = i
+                    queue.append(j)
+    return order, anchor
+
+
+def _neighbours(graph: Topology) -> list[list[int]]:
+    """Nodes joined by a link in either direction, ascending."""
+    near: list[set[int]] = [set() for _ in range(graph.n)]
+    for target, source, _ in graph.links:
+        near[target].add(source)
+        near[source].add(target)
+    return [sorted(nodes) for nodes in near]

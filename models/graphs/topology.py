@@ -1,0 +1,245 @@
+"""Who feels whom: a graph with exact weights, by name, from a matrix or from a file.
+
+The connectivity matrix is G = weighted adjacency minus in-degree, so that every row sums to zero and the
+coupling term is sigma * G * x.  Building a graph costs no algebra: only `matrix` and `spectrum` load SymPy; and a
+family that counts its edges builds them when they are first asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from ..inputs.options import Options
+from ..inputs.rationals import file_text, parse_rows, rational_rows, total
+from .links import check_links
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from ..spectra.spectrum import Spectrum
+    from .links import Link
+
+__all__ = ["Rule", "Topology", "from_matrix", "read_matrix"]
+
+
+class Rule(Protocol):
+    """How a graph came about: what is known of it without its links, and the links when they are asked for.
+
+    Equal rules make equal graphs.
+    """
+
+    @property
+    def link_count(self) -> int | None:
+        """The number of links; None if it is not known without building them."""
+
+    @property
+    def undirected(self) -> bool:
+        """True if G is known to be symmetric."""
+
+    def links(self) -> tuple[Link, ...]:
+        """Build the sorted links."""
+
+    def eigenvalues(self) -> Sequence[tuple[sp.Expr, int]] | None:
+        """List the eigenvalues of G with multiplicities, without repetition; None if there is no closed form."""
+
+
+@dataclass(frozen=True, slots=True, init=False, eq=False)
+class Topology:
+    """`n` nodes and their sorted links (target, source, weight); an undirected edge is two links.
+
+    Parameters
+    ----------
+    name : str
+        What the graph is called.
+    n : int
+        Number of nodes.
+    links : tuple of (int, int, Fraction), optional
+        Target, source and weight of each link, sorted.  A graph with a `rule` builds them when they are first asked for.
+    options : tuple of (str, value)
+        Keywords with which its family made the graph.
+    rule : Rule, optional
+        The family or operation that made the graph.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If a link is outside the nodes, joins a node to itself, is repeated, out of order or without weight.
+    """
+
+    name: str
+    n: int
+    options: Options
+    rule: Rule | None
+    _links: tuple[Link, ...] | None
+
+    def __init__(
+        self,
+        name: str,
+        n: int,
+        links: tuple[Link, ...] | None = None,
+        options: Options = (),
+        rule: Rule | None = None,
+    ) -> None:
+        if links is not None or rule is None:
+            check_links(name, n, links)
+        for key, value in (("name", name), ("n", n), ("options", options), ("rule", rule), ("_links", links)):
+            object.__setattr__(self, key, value)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Topology):
+            return NotImplemented
+        if (self.name, self.n, self.options) != (other.name, other.n, other.options):
+            return False
+        return (self.rule is not None and self.rule == other.rule) or self.links == other.links
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.n, self.options))
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """The links (target, source, weight), sorted; those of a rule are built when they are first asked for."""
+        if self._links is None and self.rule is not None:
+            links = self.rule.links()
+            check_links(self.name, self.n, links)
+            object.__setattr__(self, "_links", links)
+        return self._links or ()
+
+    @property
+    def link_count(self) -> int:
+        """The number of links, counted without building them if the graph has a rule that can."""
+        count = None if self.rule is None else self.rule.link_count
+        return len(self.links) if count is None else count
+
+    @property
+    def undirected(self) -> bool:
+        """True if G is known to be symmetric: by its rule, or else by its links."""
+        return self.symmetric if self.rule is None else self.rule.undirected
+
+    def closed_form(self) -> Sequence[tuple[sp.Expr, int]] | None:
+        """List the eigenvalues of G with multiplicities, without repetition; None if no closed form is known."""
+        return None if self.rule is None else self.rule.eigenvalues()
+
+    @property
+    def symmetric(self) -> bool:
+        """True where every link has its mirror image of equal weight, so that G = transpose(G)."""
+        known = {(target, source): weight for target, source, weight in self.links}
+        return all(known.get((source, target)) == weight for (target, source), weight in known.items())
+
+    @property
+    def components(self) -> int:
+        """Number of weakly connected parts; where it is not 1 complete synchronisation is impossible."""
+        parent = list(range(self.n))
+
+        def root(i: int) -> int:
+            while parent[i] != i:
+                parent[i] = parent[parent[i]]
+                i = parent[i]
+            return i
+
+        count = self.n
+        for target, source, _ in self.links:
+            a, b = root(target), root(source)
+            if a != b:
+                parent[max(a, b)] = min(a, b)
+                count -= 1
+        return count
+
+    @property
+    def leading_groups(self) -> int:
+        """Number of groups of nodes that reach one another and that no other node acts on; at least 1.
+
+        The starts of a search along the links cover all nodes; no start is reached from an earlier one.  Searched again
+        from the last start backwards, those that are not reached yet are in groups of their own.
+        """
+        followers: list[list[int]] = [[] for _ in range(self.n)]
+        for target, source, _ in self.links:
+            followers[source].append(target)
+
+        def starts(order: Iterable[int]) -> list[int]:
+            found, reached = [], [False] * self.n
+            for start in order:
+                if not reached[start]:
+                    found.append(start)
+                    reached[start], waiting = True, [start]
+                    while waiting:
+                        new = [i for i in followers[waiting.pop()] if not reached[i]]
+                        for i in new:
+                            reached[i] = True
+                        waiting += new
+            return found
+
+        return len(starts(reversed(starts(range(self.n)))))
+
+    @property
+    def rows(self) -> tuple[tuple[Fraction, ...], ...]:
+        """G as n rows of n fractions."""
+        zero = Fraction(0)
+        table = [[zero] * self.n for _ in range(self.n)]
+        for target, source, weight in self.links:
+            table[target][source] = weight
+            table[target][target] -= weight
+        return tuple(tuple(row) for row in table)
+
+    @property
+    def matrix(self) -> sp.ImmutableDenseMatrix:
+        """G as an immutable SymPy matrix, n x n."""
+        import sympy as sp
+
+        entries = [[sp.Rational(x.numerator, x.denominator) for x in row] for row in self.rows]
+        return sp.ImmutableDenseMatrix(entries)
+
+    @property
+    def spectrum(self) -> Spectrum:
+        """The exact eigenvalues of G with multiplicities (see `synchain.models.spectra.solve`)."""
+        from ..spectra.solve import spectrum
+
+        return spectrum(self)
+
+    def __repr__(self) -> str:
+        more = "".join(f", {key}={value!r}" for key, value in self.options)
+        return f"Topology({self.name!r}, n={self.n}{more}, {self.link_count} links)"
+
+
+def from_matrix(rows: Iterable[Iterable[Any]] | sp.MatrixBase, name: str = "matrix") -> Topology:
+    """The graph of a connectivity matrix G: square, rational, every row sum zero; one-way links are allowed.
+
+    Entries are integers, fractions, decimals, floats (read through their shortest decimal text: 0.1 is 1/10),
+    texts such as "1/2", or SymPy rationals.  A row with floats whose sum is zero but for rounding (1e-12 of its
+    entries) gets the diagonal entry that makes it exactly zero.  Raises ValueError on a wrong shape, a wrong number
+    or a row sum other than zero, and TypeError on anything that is no number.
+    """
+    table = [list(row) for row in rational_rows(rows, name)]
+    given = rows.tolist() if hasattr(rows, "tolist") else rows  # an iterator is used up by now: its numbers are exact
+    for i, row in enumerate(table):
+        excess = total(row)
+        if not excess:
+            continue
+        rounded = isinstance(given, list | tuple) and any(map(_rounded, given[i]))
+        if not rounded or abs(excess) > total(map(abs, row)) / 10**12:
+            raise ValueError(
+                f"{name}: row {i + 1} sums to {excess}; expected 0, or the synchronous state is no solution: "
+                f"set its diagonal entry {row[i]} to {row[i] - excess}"
+            )
+        row[i] -= excess
+    links = tuple((i, j, weight) for i, row in enumerate(table) for j, weight in enumerate(row) if weight and i != j)
+    return Topology(name, len(table), links)
+
+
+def _rounded(entry: Any) -> bool:
+    """True for a float, or a text that may be one: its decimals can be those of a rounded number."""
+    return isinstance(entry, float) or (isinstance(entry, str) and not set(entry).isdisjoint(".eE"))
+
+
+def read_matrix(path: str | Path) -> Topology:
+    """The graph of a connectivity matrix in a text file: one row a line, entries as 1/2, -3 or 0.25.
+
+    Entries are separated by blanks or commas; `#` starts a comment; empty lines are skipped.  Nothing in the
+    file is evaluated.  Raises FileNotFoundError, and ValueError on a folder, on more than FILE_LIMIT bytes,
+    on text that is no number and on whatever `from_matrix` refuses.
+    """
+    text, name = file_text(path, "matrix file", "a text file of rows")
+    return from_matrix(parse_rows(text, name), name)

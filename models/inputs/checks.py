@@ -1,0 +1,205 @@
+"""Checks of what a user wrote; errors name the thing, what was found, what was expected, what to do."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import numbers
+import operator
+import os
+import re
+import reprlib
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import TypeVar
+
+from .arithmetic import constant
+
+__all__ = [
+    "a_callable",
+    "a_path",
+    "choice",
+    "flag",
+    "instance",
+    "integer",
+    "known_keys",
+    "number",
+    "positive",
+    "printable",
+    "shown",
+    "suggestion",
+    "table",
+    "text",
+    "typed",
+    "whole",
+]
+
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+"""Control characters, ends of lines, changes of direction, and halves of characters."""
+
+
+def shown(value: object) -> str:
+    """Return a short one-line text of any value, for an error message."""
+    short = reprlib.Repr()
+    short.maxstring = short.maxother = 60
+    short.maxlevel = 2
+    try:
+        words = " ".join(short.repr(value).split())
+    except Exception:  # a broken __repr__ or an integer beyond Python's limit of digits must not hide the message
+        words = f"<{type(value).__name__}>"
+    return words if len(words) <= 120 else words[:117] + "..."
+
+
+def suggestion(found: object, known: Iterable[str], other: Mapping[str, str] | None = None) -> str:
+    """Return "; did you mean 'x'?" where a known name is close to the one found, else nothing.
+
+    `other` gives the known name for names that are used elsewhere: what is close to one of those means it.
+    """
+    if not isinstance(found, str):
+        return ""
+    meant = {name: name for name in known}
+    meant = {name: here for name, here in (other or {}).items() if here in meant} | meant
+    close = difflib.get_close_matches(found, sorted(meant), 1)
+    return f"; did you mean {meant[close[0]]!r}?" if close else ""
+
+
+def known_keys(what: str, given: Mapping[object, object], known: Iterable[str]) -> None:
+    """Raise where a mapping has a key that is not text or not known."""
+    known = tuple(known)
+    for key in given:
+        if not isinstance(key, str):
+            raise TypeError(f"{what}: key {shown(key)} is a {type(key).__name__}; expected text")
+        if key not in known:
+            close = suggestion(key, known)
+            raise ValueError(f"{what}: unknown key {shown(key)}; known: {', '.join(known) or 'none'}{close}")
+
+
+def table(what: str, value: object) -> Mapping[object, object]:
+    """Return the value where it is a mapping, else raise TypeError."""
+    if not isinstance(value, Mapping):
+        raise TypeError(f"{what}: found {typed(value)}; expected a table of names and values")
+    return value
+
+
+def text(what: str, value: object, limit: int = 200) -> str:
+    """Return the value where it is text of at most `limit` characters, all of which can be printed on one line."""
+    if not isinstance(value, str):
+        raise TypeError(f"{what}: found {typed(value)}; expected text in quotation marks")
+    if len(value) > limit:
+        raise ValueError(f"{what}: found {len(value)} characters; expected at most {limit}; shorten it")
+    return printable(what, str(value))
+
+
+def printable(what: str, value: str) -> str:
+    """Return the text where it has no control character: a terminal obeys those, and a name may come from anywhere."""
+    found = _CONTROL.search(value)
+    if found:
+        raise ValueError(
+            f"{what}: found the control character {found[0]!a}; expected letters, digits and signs on one line; "
+            "remove it"
+        )
+    return value
+
+
+def choice(what: str, value: object, known: tuple[str, ...]) -> str:
+    """Return the value where it is one of the known names."""
+    name = text(what, value)
+    if name not in known:
+        raise ValueError(f"unknown {what} {shown(name)}; known: {', '.join(known)}{suggestion(name, known)}")
+    return name
+
+
+def number(what: str, value: object, low: float | None = None, high: float | None = None) -> float:
+    """Return a finite float within [low, high] from a real number or the text of a constant expression."""
+    if isinstance(value, str):
+        try:
+            result = constant(value)
+        except ValueError as error:
+            raise ValueError(f"{what}: {error}") from None
+    elif isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise TypeError(f'{what}: found {typed(value)}; expected a number, e.g. 0.1 or "2*pi/1.15"')
+    else:
+        try:
+            result = float(value)
+        except OverflowError:
+            result = math.inf
+    if not math.isfinite(result):
+        raise ValueError(f"{what}: found {shown(value)}; expected a finite number; correct the value")
+    if (low is not None and result < low) or (high is not None and result > high):
+        raise ValueError(f"{what}: found {result!r}; expected {span(low, high)}; correct the value")
+    return result
+
+
+def integer(what: str, value: object, low: int, high: int) -> int:
+    """Return an int within [low, high]; a float is refused even where it is whole."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
+        raise TypeError(f"{what}: found {typed(value)}; expected a whole number, e.g. {low}")
+    result = operator.index(value)
+    if not low <= result <= high:
+        raise ValueError(f"{what}: found {shown(result)}; expected a whole number from {low} to {high}; correct it")
+    return result
+
+
+def span(low: float | None, high: float | None) -> str:
+    """Return the words for a closed range with optional ends."""
+    if high is None:
+        return "a number" if low is None else f"a number of at least {low:g}"
+    return f"a number of at most {high:g}" if low is None else f"a number from {low:g} to {high:g}"
+
+
+def typed(value: object) -> str:
+    """Return a short text of any value with its type, for an error message."""
+    name = type(value).__name__
+    words = shown(value)
+    return words if name in words or value is None else f"{words} ({name})"
+
+
+T = TypeVar("T")
+
+
+def instance(what: str, value: object, kind: type[T] | tuple[type[T], ...], expected: str) -> T:
+    """Return the value where it is of a kind, else raise TypeError that says what was expected."""
+    if not isinstance(value, kind):
+        raise TypeError(f"{what}: found {typed(value)}; expected {expected}")
+    return value
+
+
+def a_callable(what: str, value: object) -> Callable[..., object]:
+    """Return the value where it can be called, else raise TypeError."""
+    if not callable(value):
+        raise TypeError(f"{what}: found {typed(value)}; expected a function")
+    return value
+
+
+def flag(what: str, value: object) -> bool:
+    """Return the value where it is True or False, else raise TypeError."""
+    return instance(what, value, bool, "True or False")
+
+
+def whole(what: str, value: object, least: int, most: int | None = None) -> int:
+    """Return a whole number in its range; TypeError for another type, also a float that happens to be whole."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
+        raise TypeError(f"{what} = {shown(value)}; expected a whole number, e.g. {max(least, 1)}")
+    found = operator.index(value)
+    if found < least:
+        raise ValueError(f"{what} = {found}; expected at least {least}")
+    if most is not None and found > most:
+        raise ValueError(f"{what} = {shown(found)}; expected at most {most}")
+    return found
+
+
+def positive(what: str, value: object, zero: bool = False) -> float:
+    """Return a finite number above 0, or with `zero` not below it."""
+    found = number(what, value, 0.0)
+    if found == 0.0 and not zero:
+        raise ValueError(f"{what}: found 0; expected a number above 0")
+    return found
+
+
+def a_path(what: str, value: object) -> Path:
+    """Return a path of text or a path object; TypeError for anything else, ValueError for an empty one."""
+    if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
+        raise TypeError(f"{what}: found {typed(value)}; expected a path, e.g. 'data/G.txt'")
+    if not os.fspath(value).strip() or "\0" in os.fspath(value):
+        raise ValueError(f"{what}: found {shown(os.fspath(value))}; expected the name of a file")
+    return Path(value)

@@ -1,0 +1,41 @@
+"""An immutable mapping that can be hashed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Generic, TypeVar
+
+__all__ = ["Frozen"]
+
+T = TypeVar("T")
+
+
+class Frozen(Mapping[str, T], Generic[T]):
+    """A mapping that cannot change: reads like a dict and can be hashed, compared and pickled."""
+
+    __slots__ = ("_items",)
+    _items: dict[str, T]
+
+    def __init__(self, items: Mapping[str, T] | Iterable[tuple[str, T]] = ()) -> None:
+        object.__setattr__(self, "_items", dict(items))
+
+    def __getitem__(self, key: str) -> T:
+        return self._items[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._items.items()))
+
+    def __repr__(self) -> str:
+        return repr(self._items)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError("this mapping is frozen; build a new one with {**old, name: value}")
+
+    def __reduce__(self) -> tuple[type[Frozen[T]], tuple[dict[str, T]]]:
+        return type(self), (self._items,)

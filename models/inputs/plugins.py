@@ -1,0 +1,333 @@
+"""One-file plug-ins: found by listing their directory, called with the symbols their functions ask for by name.
+
+Besides the files of this package there are entry points of installed packages (groups ``synchain.oscillators``,
+``synchain.frictions``, ``synchain.couplings``, ``synchain.topologies``), and files anywhere, named by a path that ends in
+``.py``.  Such a file is run only after `allow_code` has been called for it, so that a scene, which is data, never runs code
+by itself.
+
+A file outside the package is known by its place and its text (`OwnFile`), so that an edited file is another model.  What
+such a file imports is not looked at: write a model in one file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import pkgutil
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import lru_cache, wraps
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any, ParamSpec, TypeVar
+
+from .checks import shown, suggestion, text
+
+__all__ = [
+    "OwnFile",
+    "allow_code",
+    "allowed_code",
+    "blamed",
+    "call",
+    "load",
+    "located",
+    "named",
+    "names",
+    "part",
+    "remembered",
+]
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+PACKAGE = "synchain.models"
+"""The package whose folders hold the plug-ins that are shipped."""
+
+OTHERWISE = {"coupling": ", or components such as 'x->x'"}
+"""What a kind can be besides the name of a file, for the message that refuses a name."""
+
+
+class OwnFile(str):
+    """The name of a plug-in file outside the package, as it was written, with the file and the text that it stands for.
+
+    Two of them are equal where name, place and text are equal; none is equal to a plain text.  So whatever is kept for a
+    name is kept for one text of one file.
+    """
+
+    __slots__ = ("digest", "place")
+    place: str
+    digest: str
+
+    def __new__(cls, name: str, place: str, digest: str) -> OwnFile:
+        made = super().__new__(cls, name)
+        made.place, made.digest = place, digest
+        return made
+
+    def spelt(self, name: str) -> OwnFile:
+        """The same file and text with another name: "law.py" of "law.py on x"."""
+        return OwnFile(name, self.place, self.digest)
+
+    def _key(self) -> tuple[str, str, str]:
+        return str(self), self.place, self.digest
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, OwnFile) and self._key() == other._key()
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def __reduce__(self) -> tuple[type[OwnFile], tuple[str, str, str]]:
+        return OwnFile, self._key()
+
+
+_modules: dict[tuple[str, str, str], ModuleType] = {}
+"""Kind, place and digest of the text -> what came of it; scenes keep the model that they were made with."""
+
+ALSO = {
+    "topology": {
+        "all_to_all": "complete",
+        "biclique": "complete_bipartite",
+        "clique": "complete",
+        "cubic": "random_cubic",
+        "cycle": "ring",
+        "gilbert": "erdos_renyi",
+        "gnp": "erdos_renyi",
+        "hamming": "hypercube",
+        "lattice": "grid",
+        "line": "chain",
+        "newman_watts": "small_world",
+        "open_chain": "chain",
+        "path": "chain",
+        "watts_strogatz": "small_world",
+    },
+    "oscillator": {"roessler": "rossler", "vdp": "van_der_pol"},
+    "coupling": {"dashpot": "damper"},
+}
+"""Other names of the field for what is here: they serve suggestions only."""
+
+_allowed: set[Path] = set()
+
+
+def names(kind: str) -> tuple[str, ...]:
+    """Return the names of all plug-ins of a kind (``oscillator``, ``friction``, ``coupling``, ``topology``), sorted."""
+    return tuple(sorted({*_own(kind), *_entry_points(kind)}))
+
+
+def allow_code(*paths: str | Path) -> None:
+    """Allow files outside the package to be run as plug-ins, from now on; ValueError where one is no .py file.
+
+    Afterwards their paths are names: Scene(friction="./my_law.py").  Only allow what you have read.
+    """
+    for path in paths:
+        place = Path(path)
+        if place.suffix != ".py" or not place.is_file():
+            raise ValueError(f"plug-in {str(path)!r} is no file that ends in .py; check the path")
+        _allowed.add(place.resolve())
+
+
+def allowed_code() -> tuple[str, ...]:
+    """The files outside the package that may be run as plug-ins, sorted."""
+    return tuple(sorted(map(str, _allowed)))
+
+
+def named(kind: str, name: str) -> str:
+    """Return the name of a plug-in as it is; that of a file outside the package as an `OwnFile` of its present text.
+
+    What is an `OwnFile` already stays what it is, whatever has become of its file.
+    """
+    if isinstance(name, OwnFile) or not (isinstance(name, str) and name.endswith(".py")):
+        return name
+    place = Path(name).resolve()
+    text = _text(kind, name, place)
+    own = OwnFile(name, str(place), hashlib.sha256(text).hexdigest())
+    _module(kind, own, text)
+    return own
+
+
+def load(kind: str, name: str) -> ModuleType:
+    """Return the plug-in module `name`; raises ValueError with the known names where there is none.
+
+    A path that ends in ".py" is loaded where `allow_code` has allowed it, as its text is now; an error in that file names
+    its line.  An `OwnFile` gives the text that it was made of: ValueError where that is neither known nor in the file.
+    """
+    if name in _own(kind):
+        return import_module(f"{PACKAGE}.{_home(kind)}.{name}")
+    own = named(kind, name)
+    if isinstance(own, OwnFile):
+        return _module(kind, own)
+    entries = _entry_points(kind)
+    if name in entries:
+        return _entry(kind, name)
+    known = names(kind)
+    hint = suggestion(name, known, ALSO.get(kind))
+    raise ValueError(f"unknown {kind} {shown(name)}; known: {', '.join(known)}{OTHERWISE.get(kind, '')}{hint}")
+
+
+def part(what: str, value: object) -> str:
+    """Return the name of a part of the model where it is text; it may be a long path to a file of code."""
+    words = text(what, value, 1000 if isinstance(value, str) and ".py" in value else 200)
+    return value if isinstance(value, OwnFile) else words
+
+
+def remembered(**parts: Callable[[str], str]) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Let a function keep its answers; `parts` says how its arguments that name plug-ins are `named`, so by their text."""
+
+    def decorate(function: Callable[P, T]) -> Callable[P, T]:
+        signature, answers = inspect.signature(function), lru_cache(maxsize=64)(function)
+
+        @wraps(function)
+        def answer(*positional: P.args, **keywords: P.kwargs) -> T:
+            given = signature.bind(*positional, **keywords)
+            given.apply_defaults()
+            for argument, naming in parts.items():
+                if given.arguments[argument] is not None:
+                    given.arguments[argument] = naming(given.arguments[argument])
+            return answers(*given.args)
+
+        return answer
+
+    return decorate
+
+
+def call(function: Callable[..., Any], symbols: Mapping[str, Any]) -> Any:
+    """Call a plug-in's function with those of `symbols` that its signature names.
+
+    Raises ValueError where it asks for a name that is not among them, and where a function from outside the package
+    fails, with its file and line.
+    """
+    wanted = inspect.signature(function).parameters
+    for name in wanted:
+        if name not in symbols:
+            where = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
+            raise ValueError(f"{where} asks for {name!r}; known: {', '.join(symbols)}{_instead(name, symbols)}")
+    with blamed(function):
+        return function(**{name: symbols[name] for name in wanted})
+
+
+@contextmanager
+def blamed(function: Callable[..., Any]) -> Iterator[None]:
+    """Within it, an error of a function from outside the package becomes a ValueError with its file and line."""
+    try:
+        yield
+    except Exception as error:
+        told = located(error, function)
+        if told is error:
+            raise
+        raise told from error
+
+
+def _instead(name: str, known: Iterable[str]) -> str:
+    """What to do about a name that a plug-in's function asks for in vain; the states of a link's ends have fixed names."""
+    ends = [other for other in known if other.endswith(("_i", "_j"))]
+    if ends and name.endswith(("_i", "_j")):
+        return f"; the ends of a link are {', '.join(ends)} whatever the coordinate is; use these names"
+    return "; correct the name or declare it as a parameter"
+
+
+def _home(kind: str) -> str:
+    """The folder of a kind, which also names its entry points."""
+    return "topologies" if kind == "topology" else f"{kind}s"
+
+
+def located(error: Exception, function: Callable[..., Any]) -> Exception:
+    """The error of a plug-in's function: as it is from this package, else a ValueError with file and line."""
+    if str(function.__module__).startswith(f"{PACKAGE}."):
+        return error
+    return _located(error, inspect.getsourcefile(function) or function.__module__)
+
+
+def _own(kind: str) -> tuple[str, ...]:
+    package = import_module(f"{PACKAGE}.{_home(kind)}")
+    return tuple(m.name for m in pkgutil.iter_modules(package.__path__) if not m.name.startswith("_"))
+
+
+@lru_cache(maxsize=8)
+def _entry_points(kind: str) -> Mapping[str, Any]:
+    """The plug-ins that installed packages announce; none is loaded for this."""
+    from importlib.metadata import entry_points
+
+    return {entry.name: entry for entry in entry_points(group=f"synchain.{_home(kind)}")}
+
+
+def _entry(kind: str, name: str) -> ModuleType:
+    entry = _entry_points(kind)[name]
+    where = f"{kind} {name!r} of the entry point {entry.value!r}"
+    try:
+        module = entry.load()
+    except Exception as error:
+        raise _located(error, "", where) from error
+    if not isinstance(module, ModuleType):
+        raise ValueError(f"{where}: found no module; expected a {kind} file; see: synchain new {kind} NAME")
+    _check_installed(kind, module, where)
+    return module
+
+
+@lru_cache(maxsize=64)
+def _check_installed(kind: str, module: ModuleType, where: str) -> None:
+    """Check a module of an installed package, once."""
+    try:
+        text = inspect.getsource(module).encode()
+    except (OSError, TypeError):  # it has no source, and so no names that could be looked at
+        text = b""
+    _check(kind, module, where, text)
+
+
+def _text(kind: str, name: str, place: Path) -> bytes:
+    """What stands in a file that may be run; ValueError where it may not, or cannot be read."""
+    if not place.is_file():
+        raise ValueError(f"{kind} {name!r}: no such file: {place}; expected a .py file; check the path")
+    if place not in _allowed:
+        raise ValueError(
+            f"{kind} {name!r} is a file of code, which is not run unasked; read it, then allow it: "
+            f"synchain.models.inputs.plugins.allow_code({name!r}), or --allow-code where a command has it"
+        )
+    try:
+        return place.read_bytes()
+    except OSError as error:
+        raise ValueError(f"{kind} {name!r}: cannot be read ({error.strerror}); check the rights of {place}") from None
+
+
+def _module(kind: str, own: OwnFile, text: bytes | None = None) -> ModuleType:
+    """What the text of a file of code defines, run once for each text."""
+    key = (kind, own.place, own.digest)
+    if key in _modules:
+        return _modules[key]
+    if text is None:
+        text = _text(kind, own, Path(own.place))
+        if hashlib.sha256(text).hexdigest() != own.digest:
+            raise ValueError(
+                f"{kind} {str(own)!r}: found another text in {own.place} than when its scene was made; "
+                "expected the same text; make the scene anew, or restore the file"
+            )
+    module = ModuleType(f"synchain_{kind}_{Path(own.place).stem}")
+    module.__file__ = own.place
+    try:
+        exec(compile(text, own.place, "exec", dont_inherit=True), module.__dict__)
+    except Exception as error:
+        raise _located(error, own.place) from error
+    _check(kind, module, own.place, text)
+    _modules[key] = module
+    return module
+
+
+def _check(kind: str, module: ModuleType, where: str, text: bytes) -> None:
+    """Raise ValueError where a module from outside is not what its kind must be."""
+    from ..mechanics.definition import check
+
+    check(kind, module, where, text)
+
+
+def _located(error: Exception, file: str, what: str = "") -> ValueError:
+    """An error in a plug-in with the file and the line where it arose; without `file`, the innermost one."""
+    frames = traceback.extract_tb(error.__traceback__)
+    places = [(frame.filename, frame.lineno) for frame in frames if file in ("", frame.filename)]
+    if isinstance(error, SyntaxError) and error.filename and file in ("", error.filename):
+        places.append((error.filename, error.lineno))
+    place = f"{places[-1][0]}, line {places[-1][1]}" if places else file
+    where = f"{what}: {place}" if what else place
+    return ValueError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}; correct the file")

@@ -1,0 +1,155 @@
+"""Rows of exact rational numbers out of whatever a user has: lists, arrays, SymPy matrices, text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from decimal import Decimal
+from fractions import Fraction
+from functools import lru_cache
+from math import lcm
+from numbers import Complex, Integral, Rational, Real
+from pathlib import Path
+from typing import Any
+
+from .checks import a_path, printable
+
+__all__ = ["FILE_LIMIT", "ROWS", "file_text", "parse_rows", "rational", "rational_rows", "square", "total"]
+
+FILE_LIMIT = 32 * 2**20
+"""Largest matrix file that is read, in bytes."""
+ROWS = 2000
+"""Most rows of a matrix: larger graphs are made of their links."""
+
+_TEXT = re.compile(r"[+-]?(?:\d+/0*[1-9]\d*|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)", re.ASCII)
+_BY_ZERO = re.compile(r"[+-]?\d+/0+", re.ASCII)
+_LONGEST = 1000
+_EXPECTED = "expected a rational number such as 1/2, -3 or 0.25"
+
+
+def rational(entry: Any, where: str) -> Fraction:
+    """One exact number; ValueError where it is not finite, real and rational, TypeError for no number."""
+    if isinstance(entry, bool):
+        raise TypeError(f"{where} is {entry}, a bool; {_EXPECTED}")
+    if isinstance(entry, str):
+        return _from_text(entry.strip(), where)
+    if isinstance(entry, Integral):
+        return Fraction(int(entry))
+    if getattr(entry, "is_Rational", False):  # SymPy
+        return Fraction(int(entry.p), int(entry.q))
+    if isinstance(entry, Rational):
+        return Fraction(int(entry.numerator), int(entry.denominator))
+    if isinstance(entry, (Decimal, Real)) or getattr(entry, "is_Float", False):
+        return _from_text(str(entry), where)
+    if isinstance(entry, Complex):
+        raise ValueError(f"{where} is complex: {entry}; {_EXPECTED}: connectivity is real")
+    if hasattr(entry, "free_symbols"):  # another SymPy expression
+        raise ValueError(f"{where} is {entry}, not a rational number; {_EXPECTED}")
+    raise TypeError(f"{where} is {entry!r}, a {type(entry).__name__}; {_EXPECTED}")
+
+
+@lru_cache(maxsize=4096)
+def _number(text: str) -> Fraction | None:
+    """The number that a text is; None where it is none."""
+    return Fraction(text) if len(text) <= _LONGEST and _TEXT.fullmatch(text) else None
+
+
+def _from_text(text: str, where: str) -> Fraction:
+    found = _number(text)
+    if found is not None:
+        return found
+    shown = text if len(text) <= 40 else f"{text[:40]}… ({len(text)} characters)"
+    if _BY_ZERO.fullmatch(text):
+        raise ValueError(f"{where} is {shown}, a division by zero; {_EXPECTED}")
+    if text.lstrip("+-").lower() in {"nan", "snan", "inf", "infinity", "oo"}:
+        raise ValueError(f"{where} is {shown}, not finite; {_EXPECTED}")
+    raise ValueError(f"{where} is {shown!r}, not a number; {_EXPECTED}")
+
+
+def rational_rows(rows: Any, name: str) -> list[list[Fraction]]:
+    """A square table of fractions; ValueError where it is empty or not square, TypeError for no table."""
+    return [[_entry(entry, name, i, j) for j, entry in enumerate(line)] for i, line in enumerate(square(rows, name))]
+
+
+def _entry(entry: Any, name: str, i: int, j: int) -> Fraction:
+    found = _number(entry) if type(entry) is str else None
+    return rational(entry, f"{name}: entry ({i + 1}, {j + 1})") if found is None else found
+
+
+def total(numbers: Iterable[Fraction]) -> Fraction:
+    """The sum of many fractions: their numerators over one denominator, reduced once."""
+    found = list(filter(None, numbers))
+    below = lcm(*(x.denominator for x in found))
+    return Fraction(sum(x.numerator * (below // x.denominator) for x in found), below)
+
+
+def square(rows: Any, name: str) -> list[list[Any]]:
+    """A table with as many columns as rows; ValueError where it is empty or not square, TypeError for no table."""
+    symbolic = hasattr(rows, "tolist") and not hasattr(rows, "dtype")  # SymPy lists a matrix entry by entry
+    listed = rows.tolist() if symbolic else rows
+    if isinstance(listed, (str, bytes)) or not isinstance(listed, Iterable) or hasattr(rows, "tocoo"):
+        hint = "; a sparse matrix is read by from_sparse" if hasattr(rows, "tocoo") else ""
+        raise TypeError(f"{name} is a {type(rows).__name__}; expected rows of numbers: [[-1, 1], [1, -1]]{hint}")
+    lines = []
+    for i, line in enumerate(listed):
+        if i == ROWS:
+            raise _too_large(name)
+        if isinstance(line, (str, bytes)) or not isinstance(line, Iterable):
+            raise TypeError(f"{name}: row {i + 1} is {line!r}; expected a list of numbers")
+        lines.append(list(line))
+    if not lines:
+        raise ValueError(f"{name} is empty; expected at least one row")
+    for i, line in enumerate(lines):
+        if len(line) != len(lines):
+            raise ValueError(
+                f"{name}: row {i + 1} has {len(line)} entries; expected {len(lines)}, as many as there are "
+                "rows: a connectivity matrix is square"
+            )
+    return lines
+
+
+def _too_large(name: str) -> ValueError:
+    return ValueError(
+        f"{name} has more than {ROWS} rows or columns; expected at most {ROWS}; give its edges, which are fewer: "
+        "read_edges or from_sparse (--edges)"
+    )
+
+
+def file_text(path: str | Path, what: str, expected: str = "a text file") -> tuple[str, str]:
+    """The text of a file of at most FILE_LIMIT bytes, and its name; FileNotFoundError, TypeError or ValueError else."""
+    place = a_path(what, path)
+    printable(what, place.name)
+    if not place.exists():
+        raise FileNotFoundError(f"{what} {str(place)!r} does not exist; expected {expected}: check the path")
+    if not place.is_file():
+        raise ValueError(f"{what} {str(place)!r} is a folder or device; expected {expected}")
+    size = place.stat().st_size
+    if size > FILE_LIMIT:
+        raise ValueError(
+            f"{what} {str(place)!r} has {size} bytes; expected at most {FILE_LIMIT}: larger graphs are made from lists"
+        )
+    try:
+        return place.read_text(encoding="utf-8-sig"), place.name
+    except UnicodeDecodeError:
+        raise ValueError(f"{what} {str(place)!r} is not UTF-8; expected {expected} in that encoding") from None
+
+
+def parse_rows(text: str, name: str) -> list[list[str]]:
+    """Split a matrix text into entries: blanks or commas between them, `#` comments, empty lines skipped.
+
+    Raises ValueError on an empty entry and on more than ROWS rows or columns.
+    """
+    rows: list[list[str]] = []
+    for number, line in enumerate(text.splitlines(), 1):
+        bare = line.partition("#")[0].strip()
+        if not bare:
+            continue
+        if len(rows) == ROWS:
+            raise _too_large(name)
+        cells = [cell for part in bare.split(",") for cell in (part.split() or [""])]
+        if len(cells) > ROWS:
+            raise _too_large(name)
+        if "" in cells:
+            raise ValueError(f"{name}: line {number} has an empty entry between commas; write 0 for no link")
+        rows.append(cells)
+    return rows

@@ -1,0 +1,120 @@
+"""The equations of one oscillator and of one link: the templates that a network is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import sympy as sp
+
+from .calculus import derivative
+from .stick_slip import SLIP, Contact
+
+__all__ = ["SLIDING", "TIME", "Edge", "Node"]
+
+TIME = sp.Symbol("t", real=True)
+"""Non-dimensional time, the one time symbol of all equations."""
+
+SLIDING = sp.Symbol("w", real=True)
+"""The sliding velocity, the argument of a friction law."""
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One uncoupled oscillator: d(state)/dt = rhs(state, t; parameters).
+
+    Raises ValueError where the right-hand side uses a symbol that is not declared, contains a floating-point number
+    (numbers are parameters or rationals), has not one entry for each state symbol, or where two names are the same.
+    With set-valued friction (`contact`) the third state is the mode, which only events change.  `law` is the friction
+    coefficient as a function of `SLIDING`, None where the model has no friction law; it is for printing alone.
+    """
+
+    state: tuple[sp.Symbol, ...]
+    rhs: tuple[sp.Expr, ...]
+    parameters: tuple[sp.Symbol, ...]
+    contact: Contact | None = None
+    law: sp.Expr | None = field(default=None, compare=False)
+
+    def __post_init__(self) -> None:
+        _differ("node", (TIME, *self.state, *self.parameters))
+        known = {TIME, *self.state, *self.parameters}
+        _check("node", self.rhs, len(self.state), known)
+        if self.contact is not None:
+            if self.state[2:3] != (SLIP,):
+                raise ValueError(f"a node with set-valued friction has the states x, v, slip, …; found {self.state}")
+            _check("contact", self.contact.expressions, len(self.contact.expressions), known)
+
+    @property
+    def forced(self) -> bool:
+        """True where time occurs explicitly."""
+        return any(e.has(TIME) for e in self.rhs)
+
+    def jacobian(self) -> tuple[tuple[sp.Expr, ...], ...]:
+        """d(rhs)/d(state), one-sided at kinks (see `synchain.models.mechanics.calculus`)."""
+        return tuple(tuple(derivative(e, s) for s in self.state) for e in self.rhs)
+
+    def time_derivative(self) -> tuple[sp.Expr, ...]:
+        """The partial derivative of rhs with respect to time."""
+        return tuple(derivative(e, TIME) for e in self.rhs)
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """What one link adds to the right-hand side of its target: rhs(here, there; weight, parameters).
+
+    `here` are the state symbols of the target, `there` those of the source, both in the order of Node.state.  `inertia` is
+    empty, or two blocks, rows those of the target: what the link adds to M in M d(state)/dt = rhs by the rates of the target
+    and by those of the source.
+    """
+
+    here: tuple[sp.Symbol, ...]
+    there: tuple[sp.Symbol, ...]
+    weight: sp.Symbol
+    rhs: tuple[sp.Expr, ...]
+    parameters: tuple[sp.Symbol, ...]
+    inertia: tuple[tuple[tuple[sp.Expr, ...], ...], ...] = ()
+
+    def __post_init__(self) -> None:
+        _differ("edge", (TIME, self.weight, *self.here, *self.there, *self.parameters))
+        known = {self.weight, *self.here, *self.there, *self.parameters}
+        _check("edge", self.rhs, len(self.here), known)
+        for block in self.inertia:
+            for row in block:
+                _check("edge inertia", row, len(row), known)
+
+    def jacobian_here(self) -> tuple[tuple[sp.Expr, ...], ...]:
+        """d(rhs)/d(here)."""
+        return tuple(tuple(derivative(e, s) for s in self.here) for e in self.rhs)
+
+    def jacobian_there(self) -> tuple[tuple[sp.Expr, ...], ...]:
+        """d(rhs)/d(there)."""
+        return tuple(tuple(derivative(e, s) for s in self.there) for e in self.rhs)
+
+    @property
+    def diffusive(self) -> bool:
+        """True where the link vanishes between equal states, so that synchronous motion solves the network."""
+        equal = dict(zip(self.there, self.here, strict=True))
+        return all(sp.simplify(e.xreplace(equal)) == 0 for e in self.rhs)
+
+
+def _differ(what: str, symbols: tuple[sp.Symbol, ...]) -> None:
+    names = [s.name for s in symbols]
+    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
+    if twice is not None:
+        meaning = "is the time" if twice == TIME.name else "stands for two things"
+        raise ValueError(f"{what}: the name {twice!r} {meaning}; rename that state or parameter")
+
+
+def _check(what: str, rhs: tuple[sp.Expr, ...], size: int, known: set[sp.Symbol]) -> None:
+    if len(rhs) != size:
+        raise ValueError(f"{what}: {len(rhs)} equations for {size} states; expected one each")
+    for expression in rhs:
+        unknown = sorted(s.name for s in expression.free_symbols - known)
+        if unknown:
+            raise ValueError(
+                f"{what}: undeclared symbol {unknown[0]!r} in {expression}; declare it as a state or parameter"
+            )
+        floats = sorted(expression.atoms(sp.Float), key=str)
+        if floats:
+            raise ValueError(
+                f"{what}: floating-point number {floats[0]} in {expression}; use a parameter or a Rational"
+            )

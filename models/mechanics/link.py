@@ -1,0 +1,253 @@
+"""The equations of one link: what a coupling adds to the rates of its target, between nodes of one kind or of two."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from types import ModuleType
+
+import sympy as sp
+
+from ..inputs.plugins import call, load, named, remembered
+from . import coupling_text
+from .components import TIME, Edge, Node
+from .coupling_text import coordinates_of, split
+from .coupling_text import named as named_coupling
+from .lagrangian import balance, mass_matrix, solve_masses
+from .nondimensional import nondimensional
+from .orientation import link_energy
+from .stick_slip import SLIP
+
+__all__ = ["check_coupling", "edge", "link_energies"]
+
+Symbols = tuple[sp.Symbol, ...]
+
+
+def check_coupling(coupling: str, single: Node, other: Node | None = None) -> None:
+    """Raise ValueError where a coupling cannot join nodes: an unknown name or component, a spring without velocities."""
+    for node in (single,) if other is None else (single, other):
+        if coupling_text.is_matrix(coupling):
+            if other is None:
+                coupling_text.entries(coupling, _names(single))
+            continue
+        model, half = load("coupling", split(coupling)[0]), len(node.state) // 2
+        if hasattr(model, "BETWEEN") and other is None:
+            raise ValueError(f"coupling {coupling!r} joins {' and '.join(model.BETWEEN)}; found nodes of one kind")
+        if node.contact is None and node.rhs[:half] != node.state[half:]:
+            name = node.state[0].name
+            raise ValueError(
+                f"coupling {coupling!r} joins coordinates with velocities; found a node of {node.state} without them; "
+                f"name the components that a link joins, e.g. coupling = '{name}->{name}'"
+            )
+        if other is None:
+            coordinates_of(coupling, _names(node)[: max(half, 1)])
+
+
+@remembered(coupling=named_coupling, oscillator=partial(named, "oscillator"), partner=partial(named, "oscillator"))
+def edge(
+    coupling: str, single: Node, oscillator: str | None = None, other: Node | None = None, partner: str | None = None
+) -> Edge:
+    """Derive what one link adds to the rates of its target.
+
+    A text of entries such as "x->x, 1/2 y->z" adds sigma w factor (a_j - a_i) to the rate of its second component, whatever
+    the node is.  Other couplings act on coordinates followed by their velocities, by the Euler-Lagrange equations of a
+    pair with that link alone, on all coordinates or, as in "spring on x", on those it names.  `oscillator` names the model
+    whose mass matrix, at the target, turns forces into accelerations; without it the masses are 1, as they are in the units
+    of every oscillator with one mass.  A coupling with kinetic energy adds inertia.
+    The force is kept as a function of differences, sigma w (x_j - x_i), so that equal states feel exactly nothing.
+
+    An undirected edge is two links, and the template is symmetric, so the two forces are those of the potential.  A one-way
+    link has no potential: the force that the template gives its target acts there, and nothing acts back on the source.
+
+    Where the source is of another kind, it is `other`, an oscillator `partner`: components of equal names are joined.
+    Set-valued friction takes up the force of a link while its target sticks.
+    Raises ValueError as `check_coupling` does, and where nothing is joined.
+    """
+    if single.contact is not None:
+        plain = Node(single.state[:2], (single.state[1], sp.S.Zero), single.parameters)
+        return _on_sliding(edge(coupling, plain, oscillator))
+    check_coupling(coupling, single, other)
+    here = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in single.state)
+    there = tuple(sp.Symbol(f"{s.name}_j", real=True) for s in (other or single).state)
+    weight = sp.Symbol("weight", real=True)
+    if coupling_text.is_matrix(coupling):
+        sigma = sp.Symbol("sigma", real=True)
+        rates = _entry_rates(coupling, (single, other or single), sigma * weight, here, there)
+        return Edge(here, there, weight, rates, (sigma,))
+    model, half = load("coupling", split(coupling)[0]), len(single.state) // 2
+    strengths = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
+    ends = _Ends(single, other or single, oscillator, partner or oscillator, here, there)
+    rates, inertia = _by_lagrange(ends, ends.energies(coupling, model, {"weight": weight, **strengths}), oscillator)
+    used = (*rates, *(e for block in inertia for row in block for e in row))
+    symbols = tuple(s for s in single.parameters if s not in strengths.values() and any(e.has(s) for e in used))
+    return Edge(here, there, weight, (*[sp.S.Zero] * half, *rates), (*strengths.values(), *symbols), inertia)
+
+
+def _by_lagrange(
+    ends: _Ends, energies: tuple[sp.Expr, sp.Expr, sp.Expr], oscillator: str | None
+) -> tuple[tuple[sp.Expr, ...], tuple[tuple[tuple[sp.Expr, ...], ...], ...]]:
+    """Accelerations of the target by the energies of a link alone, and the blocks of its inertia, empty without one."""
+    kinetic, potential, dissipation = energies
+    coordinates, moving, half, speeds = ends.coordinates, ends.velocities, ends.halves[0], ends.here[ends.halves[0] :]
+    forces = tuple(-dissipation.diff(v) for v in moving)
+    rest, masses = balance(kinetic, potential, forces, coordinates, moving)
+    own = _masses(oscillator, ends.nodes[0], ends.here)
+    rates = solve_masses(own, [_in_differences(e, ends.pairs, ends.here) for e in rest[:half]], speeds)
+    if all(e == 0 for e in masses):
+        return rates, ()
+    columns = [solve_masses(own, list(masses[:half, c]), speeds) for c in range(masses.cols)]
+    return rates, ends.inertia(sp.Matrix(columns).T)
+
+
+class _Ends:
+    """The two ends of a link between Lagrangian nodes."""
+
+    def __init__(
+        self, single: Node, other: Node, oscillator: str | None, partner: str | None, here: Symbols, there: Symbols
+    ) -> None:
+        self.nodes, self.oscillators, self.here, self.there = (single, other), (oscillator, partner), here, there
+        self.halves = (len(here) // 2, len(there) // 2)
+        a, b = self.halves
+        self.coordinates, self.velocities = (*here[:a], *there[:b]), (*here[a:], *there[b:])
+        names = dict(zip(_names(other), there, strict=True))
+        self.pairs = [(p, names[name]) for name, p in zip(_names(single), here, strict=True) if name in names]
+
+    def energies(
+        self, coupling: str, model: ModuleType, given: dict[str, sp.Symbol]
+    ) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+        """The kinetic energy, the potential and the Rayleigh function of a link."""
+        if hasattr(model, "BETWEEN"):
+            return self._between(coupling, model, given)
+        half = self.halves[0]
+        known = [str(p)[:-2] for p, _ in self.pairs if p in self.here[:half]]
+        if not known:
+            raise ValueError(
+                f"coupling {coupling!r}: {self._described()} have no coordinate of one name; nothing is joined"
+            )
+        joined = [known[k] for k in coordinates_of(coupling, tuple(known))]
+        places = [(_names(self.nodes[0]).index(name), _names(self.nodes[1]).index(name)) for name in joined]
+        strengths = {name: s for name, s in given.items() if name != "weight"}
+        return _energies(model, self.here, self.there, given["weight"], strengths, places)
+
+    def _between(
+        self, coupling: str, model: ModuleType, given: dict[str, sp.Symbol]
+    ) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+        """The energies of a coupling that joins two named kinds of oscillator, in the names of their states."""
+        if set(map(str, self.oscillators)) != set(model.BETWEEN):
+            wanted = " and ".join(model.BETWEEN)
+            raise ValueError(f"coupling {coupling!r} joins {wanted}; found a link between {self._described()}")
+        names = dict(zip(_names(self.nodes[0]), self.here, strict=True))
+        names |= dict(zip(_names(self.nodes[1]), self.there, strict=True))
+        kinetic, potential, dissipation = (
+            call(getattr(model, name), {**names, **given}) if hasattr(model, name) else sp.S.Zero
+            for name in ("kinetic", "potential", "dissipation")
+        )
+        return kinetic, potential, dissipation
+
+    def _described(self) -> str:
+        return " and ".join(str(name or node.state) for name, node in zip(self.oscillators, self.nodes, strict=True))
+
+    def inertia(self, masses: sp.Matrix) -> tuple[tuple[tuple[sp.Expr, ...], ...], ...]:
+        """The blocks of a link's mass matrix, with rows and columns for coordinates too."""
+        a, b = self.halves
+        blocks = []
+        for first, half in ((0, a), (a, b)):
+            rows = [[sp.S.Zero] * (2 * half) for _ in range(a)]
+            rows += [[*[sp.S.Zero] * half, *(masses[r, first + c] for c in range(half))] for r in range(a)]
+            blocks.append(tuple(map(tuple, rows)))
+        return tuple(blocks)
+
+
+def _energies(
+    model: ModuleType,
+    here: Symbols,
+    there: Symbols,
+    weight: sp.Symbol,
+    given: Mapping[str, sp.Symbol],
+    places: Sequence[tuple[int, int]],
+) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """The kinetic energy, the potential and the Rayleigh function, summed over pairs of coordinates by number."""
+    kinetic = potential = dissipation = sp.S.Zero
+    for a, b in places:
+        coordinates = {"q_i": here[a], "q_j": there[b]}
+        speeds = {"v_i": here[len(here) // 2 + a], "v_j": there[len(there) // 2 + b]}
+        if hasattr(model, "kinetic"):
+            kinetic += link_energy(model.kinetic, speeds, weight, given)
+        if hasattr(model, "potential"):
+            potential += link_energy(model.potential, coordinates, weight, given)
+        if hasattr(model, "dissipation"):
+            dissipation += link_energy(model.dissipation, speeds, weight, given)
+    return kinetic, potential, dissipation
+
+
+def link_energies(
+    coupling: str, joint: Edge, nodes: tuple[Node, Node], oscillators: tuple[str, str]
+) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """Return the kinetic energy, the potential and the Rayleigh function of a link, in the symbols of its edge.
+
+    `nodes` and `oscillators` are those of its target and its source.
+    """
+    model = load("coupling", split(coupling)[0])
+    strengths = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
+    ends = _Ends(*nodes, *oscillators, joint.here, joint.there)
+    return ends.energies(coupling, model, {"weight": joint.weight, **strengths})
+
+
+def _names(node: Node) -> tuple[str, ...]:
+    return tuple(s.name for s in node.state)
+
+
+def _on_sliding(plain: Edge) -> Edge:
+    """A link between nodes with a mode: it acts on the velocity of a target that slips."""
+    if plain.rhs[0] != 0:
+        raise ValueError("set-valued contact: a link acts on the rate of the position; expected forces alone")
+    if plain.inertia:
+        raise ValueError("set-valued contact: a link has inertia; expected forces alone; use contact 'atan'")
+    modes = (sp.Symbol(f"{SLIP.name}_i", real=True), sp.Symbol(f"{SLIP.name}_j", real=True))
+    here, there = (*plain.here, modes[0]), (*plain.there, modes[1])
+    return Edge(here, there, plain.weight, (sp.S.Zero, modes[0] ** 2 * plain.rhs[1], sp.S.Zero), plain.parameters)
+
+
+def _entry_rates(
+    coupling: str, nodes: tuple[Node, Node], strength: sp.Expr, here: Symbols, there: Symbols
+) -> tuple[sp.Expr, ...]:
+    """strength H (there - here), each difference a factor of its own: a sum over all of them would feel round-off.
+
+    Between nodes of two kinds the entries apply whose components there are.
+    """
+    own, others = (_names(node) for node in nodes)
+    rates = [sp.S.Zero] * len(own)
+    found = coupling_text.entries(coupling)
+    fitting = {pair: factor for pair, factor in found.items() if set(pair) <= set(own) and pair[0] in others}
+    if not fitting:
+        raise ValueError(
+            f"coupling {coupling!r} joins nothing between nodes of {', '.join(own)} and {', '.join(others)}"
+        )
+    for (source, target), factor in fitting.items():
+        share = sp.Rational(factor.numerator, factor.denominator)
+        gap = there[others.index(source)] - here[own.index(source)]
+        rates[own.index(target)] += sp.Mul(share, *strength.args, gap)
+    return tuple(rates)
+
+
+def _in_differences(e: sp.Expr, pairs: list[tuple[sp.Symbol, sp.Symbol]], here: Symbols) -> sp.Expr:
+    """The expression in terms of `there` - `here` where it depends on nothing else of both, unchanged otherwise."""
+    gaps = [sp.Dummy(f"d{k}", real=True) for k in range(len(pairs))]
+    shifted = sp.expand(e.xreplace({q: p + d for (p, q), d in zip(pairs, gaps, strict=True)}))
+    if shifted.free_symbols & set(here):
+        return e
+    return sp.factor_terms(shifted).xreplace({d: q - p for (p, q), d in zip(pairs, gaps, strict=True)})
+
+
+def _masses(oscillator: str | None, single: Node, here: Symbols) -> sp.Matrix:
+    """The mass matrix of the target by itself, in the symbols of a link's target."""
+    half = len(here) // 2
+    if oscillator is None or hasattr(load("oscillator", oscillator), "field"):
+        return sp.eye(half)
+    system = nondimensional(load("oscillator", oscillator))
+    masses = mass_matrix(system.kinetic, system.velocities)
+    if masses.has(TIME):
+        raise ValueError(
+            f"oscillator {oscillator!r}: a coupling needs masses that do not depend on time, found {masses}"
+        )
+    return masses.xreplace(dict(zip(single.state, here, strict=True)))

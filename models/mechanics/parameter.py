@@ -1,0 +1,102 @@
+"""What is known about a parameter before it has a value: default, unit, meaning, allowed range."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+__all__ = ["Dimension", "Parameter", "dimension"]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A number of the non-dimensional equations that gets its value at run time.
+
+    `default`, `minimum` and `maximum` are non-dimensional.  `unit` is the SI unit of the physical quantity behind
+    the number, and `scale` says, in the physical symbols of the oscillator, how much of that quantity the value 1
+    stands for: a belt speed theta_b = 0.1 with unit m/s and scale g*sqrt(m)/sqrt(k) is 0.1 g sqrt(m/k) metres per
+    second.  Both ends of the range are allowed values, except zero where `positive` is set.
+
+    Raises ValueError where the default is not finite or outside the range, or where the unit cannot be read.
+    """
+
+    default: float
+    unit: str
+    meaning: str
+    minimum: float | None = None
+    maximum: float | None = None
+    positive: bool = False
+    scale: str = "1"
+
+    def __post_init__(self) -> None:
+        dimension(self.unit)
+        if not self.meaning.strip():
+            raise ValueError("a parameter has no meaning; expected a phrase that says what it is")
+        if self.minimum is not None and self.maximum is not None and self.minimum > self.maximum:
+            raise ValueError(f"parameter range is empty: minimum {self.minimum} above maximum {self.maximum}")
+        self.check(f"default of {self.meaning!r}", self.default)
+
+    def check(self, name: str, value: float) -> float:
+        """Return `value` as a float, or raise ValueError (TypeError: no number) that names it and the range."""
+        if isinstance(value, bool) or not hasattr(value, "__float__"):
+            raise TypeError(f"{name} = {value!r} is no number; expected {self.range}")
+        number = float(value)
+        low = self.minimum is not None and number < self.minimum
+        high = self.maximum is not None and number > self.maximum
+        if not math.isfinite(number) or low or high or (self.positive and number <= 0):
+            raise ValueError(f"{name} = {value} is not allowed; expected {self.range}")
+        return number
+
+    @property
+    def range(self) -> str:
+        """The allowed values in words."""
+        words = []
+        if self.positive:
+            words.append("above 0")
+        if self.minimum is not None and not (self.positive and self.minimum <= 0):
+            words.append(f"at least {self.minimum:g}")
+        if self.maximum is not None:
+            words.append(f"at most {self.maximum:g}")
+        return "a finite number" + (" " + " and ".join(words) if words else "")
+
+
+Dimension = tuple[int, int, int]
+"""Powers of (kg, m, s)."""
+
+UNITS: dict[str, Dimension] = {
+    "1": (0, 0, 0),
+    "rad": (0, 0, 0),
+    "kg": (1, 0, 0),
+    "m": (0, 1, 0),
+    "s": (0, 0, 1),
+    "N": (1, 1, -2),
+}
+
+
+def dimension(unit: str) -> Dimension:
+    """Return the powers of (kg, m, s) in a unit such as ``N/m``, ``kg*m/s^2`` or ``1``.
+
+    Raises ValueError on a name outside kg, m, s, N, rad, 1 and on a power that is not an integer, TypeError on no text.
+    """
+    if not isinstance(unit, str):
+        raise TypeError(f"unit {unit!r} is a {type(unit).__name__}; expected text such as 'N/m' or '1'")
+    total = [0, 0, 0]
+    sign, rest = 1, unit.replace(" ", "")
+    while True:
+        cut = min((i for i in (rest.find("*"), rest.find("/")) if i >= 0), default=len(rest))
+        name, raised, power = rest[:cut].partition("^")
+        power = power if raised else "1"
+        if name not in UNITS or not _is_integer(power):
+            raise ValueError(
+                f"unit {unit!r}: cannot read {rest[:cut]!r}; expected products and quotients of "
+                f"{', '.join(UNITS)} with integer powers, such as 'N/m' or 'kg*m/s^2'"
+            )
+        for k, exponent in enumerate(UNITS[name]):
+            total[k] += sign * int(power) * exponent
+        if cut == len(rest):
+            return (total[0], total[1], total[2])
+        sign, rest = (1 if rest[cut] == "*" else -1), rest[cut + 1 :]
+
+
+def _is_integer(text: str) -> bool:
+    return text.removeprefix("-").isascii() and text.removeprefix("-").isdigit()

@@ -1,0 +1,89 @@
+"""Wrong physics is refused early: friction that feeds energy without saying so, and masses that are not positive."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+
+import sympy as sp
+
+from ..inputs.plugins import load
+from .lagrangian import mass_matrix
+from .nondimensional import friction_coefficient, nondimensional
+
+__all__ = ["check_masses", "check_power"]
+
+SPEEDS = tuple(side * 10.0 ** (k / 4) for k in range(-24, 9) for side in (1.0, -1.0))
+"""Sliding velocities at which a law is looked at, from 1e-6 to 100 and both ways."""
+
+
+def check_power(law: str, values: Mapping[str, float]) -> None:
+    """Raise ValueError where friction pushes against the ground's motion, w f(w) < 0, and so feeds energy.
+
+    A law that is meant to do so has SELF_EXCITING = True.
+    """
+    if getattr(load("friction", law), "SELF_EXCITING", False):
+        return
+    coefficient, names = _coefficient(law)
+    given = [values[name] for name in names]
+    for w in SPEEDS:
+        try:
+            f = coefficient(w, *given)
+        except (ArithmeticError, ValueError):  # a pole or an overflow is for the integration to report
+            continue
+        if w * f < 0.0:
+            raise ValueError(
+                f"friction law {law!r}: f({w:.3g}) = {f:.3g} has the sign against the sliding velocity and feeds energy; "
+                "expected w f(w) >= 0; turn the sign of `force`, correct the parameters, or declare SELF_EXCITING = True"
+            )
+
+
+@lru_cache(maxsize=64)
+def _coefficient(law: str) -> tuple[Callable[..., float], tuple[str, ...]]:
+    """f(w, …) as a plain function, and the names of its parameters."""
+    names = tuple(load("friction", law).PARAMETERS)
+    w = sp.Symbol("w", real=True)
+    value = friction_coefficient(load("friction", law), "sign")(w)
+    symbols = [w, *(sp.Symbol(name, real=True) for name in names)]
+    sign = {"sign": lambda x: (x > 0) - (x < 0)}
+    return sp.lambdify(symbols, value, [sign, "math"]), names
+
+
+def check_masses(oscillator: str, values: Mapping[str, float]) -> None:
+    """Raise ValueError where the kinetic energy of an oscillator is not positive for every velocity (Sylvester).
+
+    A mass that depends on the state is not looked at.
+    """
+    found = _masses(oscillator)
+    if found is None:
+        return
+    used = {s.name for s in found[0].free_symbols}
+    _check_masses(oscillator, tuple((name, value) for name, value in values.items() if name in used))
+
+
+@lru_cache(maxsize=1024)
+def _check_masses(oscillator: str, values: tuple[tuple[str, float], ...]) -> None:
+    """The check in the parameters that the masses depend on: nodes that differ in others need none of their own."""
+    found = _masses(oscillator)
+    if found is None:
+        return
+    masses, velocities = found
+    numbers = masses.subs({sp.Symbol(name, real=True): sp.Float(value) for name, value in values})
+    if numbers.free_symbols:
+        return
+    for k, velocity in enumerate(velocities):
+        if not numbers[: k + 1, : k + 1].det() > 0:
+            raise ValueError(
+                f"oscillator {oscillator!r}: the mass of the velocity {velocity} is {numbers[k, k]}, and its kinetic energy "
+                "not positive; expected T > 0 for every motion; correct `kinetic` or the parameters"
+            )
+
+
+@lru_cache(maxsize=64)
+def _masses(oscillator: str) -> tuple[sp.Matrix, tuple[sp.Symbol, ...]] | None:
+    """The mass matrix in the parameters, None for a vector field."""
+    model = load("oscillator", oscillator)
+    if hasattr(model, "field"):
+        return None
+    system = nondimensional(model)
+    return mass_matrix(system.kinetic, system.velocities), system.velocities

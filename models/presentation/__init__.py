@@ -1,0 +1,1 @@
+"""Equations as LaTeX and as plain text. Knows no scene."""

@@ -1,0 +1,92 @@
+"""One direction of a sweep: a parameter or an initial state and the values it takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sized
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import islice
+
+from ..inputs.checks import integer, known_keys, number, shown, text
+
+__all__ = ["Axis", "known_length"]
+
+LIMIT = 10_000_000
+"""Most values on one axis."""
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """A parameter ("sigma") or an initial state ("x_1") and its values in the order of the sweep.
+
+    `values` may be any iterable of finite numbers, a NumPy array included; it is kept as a tuple of floats.
+    Raises TypeError or ValueError on an empty axis, anything but finite numbers, or more than LIMIT values.
+    """
+
+    name: str
+    values: tuple[float, ...]
+
+    def __init__(self, name: str, values: Iterable[float]) -> None:
+        object.__setattr__(self, "name", text("axis name", name))
+        object.__setattr__(self, "values", _values(self.name, values))
+
+    @classmethod
+    def between(cls, name: str, first: float, last: float, count: int) -> Axis:
+        """Return `count` equally spaced values, both ends included, each the float nearest to its decimal."""
+        what = f"axis {name}"
+        ends = [Fraction(repr(number(f"{what}: {end}", value))) for end, value in (("from", first), ("to", last))]
+        size = integer(f"{what}: count", count, 1, LIMIT)
+        if size == 1 and ends[0] != ends[1]:
+            raise ValueError(f"{what}: count = 1 with two different ends; expected at least 2 values; raise count")
+        return cls(name, _spaced(ends[0], ends[1], size))
+
+    @classmethod
+    def from_table(cls, name: str, values: object) -> Axis:
+        """Return the axis of a scene file: a list of numbers or {from = …, to = …, count = …}."""
+        if not isinstance(values, Mapping):
+            return cls(name, values)  # type: ignore[arg-type]  # checked at birth
+        known_keys(f"axis {name}", values, ("from", "to", "count"))
+        missing = [key for key in ("from", "to", "count") if key not in values]
+        if missing:
+            found = shown(dict(values))
+            raise ValueError(f"axis {name}: {missing[0]!r} is missing in {found}; expected {{from, to, count}}")
+        return cls.between(name, values["from"], values["to"], values["count"])
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __repr__(self) -> str:
+        if len(self.values) < 5:
+            return f"Axis({self.name!r}, {list(self.values)})"
+        return f"Axis({self.name!r}, {len(self.values)} values from {self.values[0]:g} to {self.values[-1]:g})"
+
+
+def known_length(values: object) -> int:
+    """Return how many values the entry of an axis in a table will have; 1 if only the axis can tell, or refuses it."""
+    size = values.get("count") if isinstance(values, Mapping) else len(values) if isinstance(values, Sized) else 1
+    return size if isinstance(size, int) and 0 < size <= LIMIT else 1
+
+
+def _spaced(first: Fraction, last: Fraction, count: int) -> Iterator[float]:
+    base = first.denominator * last.denominator
+    a, b = first.numerator * last.denominator, last.numerator * first.denominator
+    steps = max(count - 1, 1)
+    return ((a * (steps - i) + b * i) / (base * steps) for i in range(count))
+
+
+def _values(name: str, values: object) -> tuple[float, ...]:
+    what = f"axis {name}"
+    if getattr(values, "ndim", 1) > 1:
+        shape = getattr(values, "shape", "")
+        raise ValueError(f"{what}: found an array of shape {shape}; expected one row of numbers, e.g. its ravel()")
+    listed = values.tolist() if hasattr(values, "tolist") else values
+    if isinstance(listed, (str, bytes, Mapping)) or not isinstance(listed, Iterable):
+        raise TypeError(f"{what}: found {shown(values)}; expected a list of numbers, e.g. [0.1, 0.2]")
+    if isinstance(listed, (set, frozenset)):
+        raise TypeError(f"{what}: found a set, which has no order; expected a list of numbers")
+    floats = tuple(number(what, value) for value in islice(listed, LIMIT + 1))
+    if len(floats) > LIMIT:
+        raise ValueError(f"{what}: more than {LIMIT} values; expected at most {LIMIT}; split the sweep")
+    if not floats:
+        raise ValueError(f"{what}: no values; expected at least one number; leave the axis out or fill it")
+    return floats

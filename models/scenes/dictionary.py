@@ -1,0 +1,113 @@
+"""A scene as names and values in JSON types, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from ..graphs.families import defaults, family, names, topology
+from ..graphs.topology import Topology, from_matrix, read_matrix
+from ..inputs.checks import integer, known_keys, shown, table, text
+from ..inputs.plugins import part
+from ..mechanics.coupling_text import split
+from .parameters import collected
+from .scene import Scene
+
+__all__ = ["as_dict", "from_dict"]
+
+NODES = 100_000
+"""Largest number of oscillators that a scene file may ask for."""
+
+
+def from_dict(values: Mapping[str, Any], folder: Path | None = None) -> Scene:
+    """Return the scene of names and values as in a scene file; paths in it start in `folder`."""
+    found = table("scene", values)
+    keys = ["sweep" if field.name == "axes" else field.name for field in fields(Scene)]
+    known_keys("scene", found, keys)
+    given: dict[str, Any] = {str(key): value for key, value in found.items()}
+    if "topology" in given:
+        given["topology"] = _topology(table("topology", given["topology"]), folder)
+    if "sweep" in given:
+        sweep = dict(table("sweep", given.pop("sweep")))
+        if "zipped" in sweep and "zipped" in given:
+            raise ValueError("zipped is given twice, in [sweep] and above; expected it once; remove one")
+        given["zipped"] = sweep.pop("zipped", given.get("zipped", False))
+        given["axes"] = sweep
+    for name in ("parameters", "initial"):
+        if name in given:
+            table(name, given[name])
+    for name in ("oscillator", "friction", "coupling"):
+        if name in given:
+            given[name] = _placed(given[name], folder)
+    if isinstance(given.get("nodes"), list):
+        given["nodes"] = [_placed_group(group, folder) for group in given["nodes"]]
+    return Scene(**given)
+
+
+def _placed(name: object, folder: Path | None) -> object:
+    """The name of a part; a path to a file of code starts in the folder of the scene file."""
+    if not isinstance(name, str) or folder is None or not split(name)[0].endswith(".py"):
+        return name
+    return str(folder / name)
+
+
+def _placed_group(group: object, folder: Path | None) -> object:
+    """A group of nodes, its paths to files of code too."""
+    if not isinstance(group, Mapping):
+        return group
+    return {key: _placed(value, folder) if key in ("oscillator", "friction") else value for key, value in group.items()}
+
+
+def _topology(given: Mapping[object, Any], folder: Path | None) -> Topology:
+    name = _placed(given.get("name"), folder)
+    known = isinstance(name, str) and "matrix" not in given and (name in names() or name.endswith(".py"))
+    options = defaults(family(str(name))) if known else {}
+    known_keys("topology", given, ("name", "n", *options, "matrix", "file"))
+    if "file" in given:
+        if len(given) > 1:
+            raise ValueError(f"topology: found {shown(dict(given))}; expected 'file' alone; remove the other keys")
+        path = Path(folder or ".", text("topology file", given["file"], 4096))
+        try:
+            return read_matrix(path)
+        except OSError as error:
+            raise ValueError(f"topology: {' '.join(str(error).split())}") from None
+    if "matrix" in given:
+        graph = from_matrix(given["matrix"], name=text("topology name", given.get("name", "matrix")))
+        if "n" in given and integer("topology n", given["n"], 1, NODES) != graph.n:
+            raise ValueError(f"topology: n = {given['n']} but the matrix has {graph.n} rows; remove n")
+        return graph
+    for key in ("name", "n"):
+        if key not in given:
+            found = shown(dict(given))
+            raise ValueError(f"topology: {key!r} is missing in {found}; expected name and n, or matrix, or file")
+    chosen = {key: given[key] for key in options if key in given}
+    return topology(part("topology name", name), integer("topology n", given["n"], 0, NODES), **chosen)
+
+
+def as_dict(scene: Scene) -> dict[str, Any]:
+    """Return the whole scene in JSON types, in the names of a scene file."""
+    made = {field.name: getattr(scene, field.name) for field in fields(scene)}
+    made["oscillator"] = str(scene.oscillator)
+    made["friction"] = "none" if scene.friction is None else str(scene.friction)
+    made["coupling"] = "none" if scene.coupling is None else str(scene.coupling)
+    made["topology"] = _graph(scene.topology)
+    made["nodes"] = [group.as_dict() for group in scene.nodes]
+    made["parameters"] = collected(scene.parameters, scene.varied)
+    made["initial"] = {name: list(values) for name, values in scene.initial.items()}
+    made["record"] = list(scene.record)
+    made["section"] = str(scene.section)
+    made["sweep"] = {axis.name: list(axis.values) for axis in made.pop("axes")}
+    return made
+
+
+def _graph(graph: Topology) -> dict[str, Any]:
+    try:
+        same = topology(graph.name, graph.n, **dict(graph.options)) == graph
+    except (ValueError, TypeError):
+        same = False
+    if same:
+        options = {key: list(value) if isinstance(value, tuple) else value for key, value in graph.options}
+        return {"name": str(graph.name), "n": graph.n, **options}
+    return {"name": str(graph.name), "matrix": [[str(entry) for entry in row] for row in graph.rows]}

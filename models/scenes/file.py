@@ -1,0 +1,117 @@
+"""Scenes as text: TOML files and JSON-ready dictionaries with the names of `Scene`'s keywords."""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from importlib import resources
+from pathlib import Path
+
+from ..inputs.checks import shown, suggestion
+from .dictionary import from_dict
+from .scene import Scene
+
+__all__ = ["load_scene", "scene_names"]
+
+BYTES = 1_000_000
+"""Largest scene file that is read."""
+
+KEY_PARTS = 8
+"""Most parts of a dotted key in a scene file."""
+
+_STRINGS = (
+    r'"""(?:\\.|[^\\])*?(?:"""|\Z)',
+    r"'''.*?(?:'''|\Z)",
+    r'"(?:\\.|[^"\\\n])*"?',
+    r"'[^'\n]*'?",
+)
+
+_TOKEN = re.compile(rf"(?P<word>{'|'.join(_STRINGS)}|[\w+-]+|[ \t]+)|(?P<dot>\.)|(?P<end>#[^\n]*|.)", re.DOTALL)
+"""What stands in a TOML text: strings, bare words and blanks, which go on with a key, dots, and whatever ends one."""
+
+
+def scene_names() -> tuple[str, ...]:
+    """Return the names of the scenes that come with the package: the files of the folder `scenes`."""
+    folder = resources.files(f"{__package__}.library")
+    return tuple(sorted(item.name[:-5] for item in folder.iterdir() if item.name.endswith(".toml")))
+
+
+def load_scene(name_or_path: str | os.PathLike[str]) -> Scene:
+    """Return the scene of a shipped name ("figure_4a") or of a file whose path ends in ".toml".
+
+    Raises ValueError or TypeError, with the file's name in front, on a missing or unreadable file and on
+    whatever `Scene` refuses.  Nothing in the file is run.
+    """
+    if not isinstance(name_or_path, (str, os.PathLike)):
+        raise TypeError(f"scene: found {shown(name_or_path)}; expected the name of a scene or a path to a .toml file")
+    name = os.fspath(name_or_path)
+    if not isinstance(name, str):
+        raise TypeError(f"scene: found {shown(name)}; expected text, not bytes")
+    if name.endswith(".toml"):
+        path = Path(name)
+        return _scene(path.name, _read(path), path.parent)
+    known = scene_names()
+    if name not in known:
+        raise ValueError(
+            f"unknown scene {shown(name)}; known: {', '.join(known)}, or a path to a .toml file"
+            + suggestion(name, known)
+        )
+    source = resources.files(f"{__package__}.library").joinpath(f"{name}.toml")
+    return _scene(f"{name}.toml", source.read_bytes(), None)
+
+
+def _read(path: Path) -> bytes:
+    try:
+        if path.is_dir():
+            raise ValueError(f"scene {shown(str(path))}: found a folder; expected a TOML file; name a file in it")
+        if not path.is_file():
+            close = f"; {path.stem!r} without .toml names a shipped scene" if path.stem in scene_names() else ""
+            raise ValueError(f"scene {shown(str(path))}: no such file; expected a TOML file; check the path{close}")
+        with path.open("rb") as file:
+            content = file.read(BYTES + 1)
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise ValueError(
+            f"scene {shown(str(path))}: cannot be read ({reason}); check the path and its rights"
+        ) from None
+    if len(content) > BYTES:
+        raise ValueError(
+            f"scene {shown(str(path))}: found more than {BYTES} bytes; expected a short text; check the path"
+        )
+    return content
+
+
+def _scene(name: str, content: bytes, folder: Path | None) -> Scene:
+    try:
+        words = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError(
+            f"{name}: byte {error.start} is not UTF-8; expected UTF-8 text; save the file in that encoding"
+        ) from None
+    _check_keys(name, words)
+    try:
+        values = tomllib.loads(words)
+    except (ValueError, RecursionError) as error:
+        reason = str(error) if isinstance(error, tomllib.TOMLDecodeError) else "too deep or too long a value"
+        raise ValueError(f"{name}: not TOML: {' '.join(reason.split())[:300]}; correct the file there") from None
+    try:
+        return from_dict(values, folder)
+    except (ValueError, TypeError) as error:
+        raise type(error)(f"{name}: {error}") from None
+
+
+def _check_keys(name: str, words: str) -> None:
+    """Refuse a dotted key of more than KEY_PARTS parts: the parser's time and memory rise with their square."""
+    dots = 0
+    for found in _TOKEN.finditer(words):
+        if found.lastgroup == "dot":
+            dots += 1
+        elif found.lastgroup == "end":
+            dots = 0
+        if dots >= KEY_PARTS:
+            line = words.count("\n", 0, found.start()) + 1
+            raise ValueError(
+                f"{name}: line {line} has a key of more than {KEY_PARTS} parts with dots between them; expected at most "
+                "3, as in sweep.sigma.from; correct the file there"
+            )

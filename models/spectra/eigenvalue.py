@@ -1,0 +1,169 @@
+"""One exact eigenvalue: a SymPy expression or an algebraic number, its multiplicity, its float and any digits of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from decimal import Decimal, localcontext
+from fractions import Fraction
+from functools import cmp_to_key
+from typing import TypeAlias
+
+import sympy as sp
+from flint import acb, fmpq
+
+from ..algebra.balls import Ball, accurate, decimals, enclose, nearest, precision
+from ..algebra.roots import ComplexRoot, RealRoot
+from .proof import ProofError, distinct
+
+__all__ = ["Blocks", "Eigenvalue", "decimal", "entry", "ordered", "rounded", "times", "words"]
+
+
+@dataclass(frozen=True, slots=True)
+class Eigenvalue:
+    """An exact number with its algebraic multiplicity.
+
+    `number` is a SymPy expression or an algebraic number that is not written as radicals; `blocks` are its Jordan
+    blocks, (size, count), the largest first, None where nobody looked; `value` is the nearest float, or complex.
+    """
+
+    number: sp.Expr | RealRoot | ComplexRoot
+    multiplicity: int
+    blocks: Blocks | None = field(default=None, compare=False)
+    value: float | complex = field(init=False, compare=False)
+
+    def __post_init__(self) -> None:
+        count = self.multiplicity
+        if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+            raise ValueError(f"eigenvalue {self.text}: multiplicity {count!r}; expected an integer >= 1")
+        if self.blocks is None and count == 1:
+            object.__setattr__(self, "blocks", ((1, 1),))
+        if self.blocks is not None and sum(size * times for size, times in self.blocks) != count:
+            raise ValueError(f"eigenvalue {self.text}: blocks {self.blocks} do not add up to multiplicity {count}")
+        object.__setattr__(self, "value", nearest(self._ball))
+
+    @property
+    def exact(self) -> sp.Expr:
+        """The number as a SymPy expression (CRootOf where no shorter form is known)."""
+        return self.number.expression if isinstance(self.number, (RealRoot, ComplexRoot)) else self.number
+
+    @property
+    def text(self) -> str:
+        """The exact number as text that SymPy reads back."""
+        return self.number.text if isinstance(self.number, (RealRoot, ComplexRoot)) else sp.sstr(self.number)
+
+    @property
+    def geometric(self) -> int | None:
+        """How many independent eigenvectors there are: one for each Jordan block; None where nobody looked."""
+        return None if self.blocks is None else sum(times for _, times in self.blocks)
+
+    @property
+    def defective(self) -> bool:
+        """True where eigenvectors are known to be missing: a Jordan block is larger than 1."""
+        return self.blocks is not None and self.blocks[0][0] > 1
+
+    def enclosure(self, bits: int) -> Ball:
+        """A certified ball (flint.arb or flint.acb) of radius below 2**-bits times the modulus."""
+        return accurate(self._ball, bits)
+
+    def evaluate(self, digits: int) -> sp.Expr:
+        """The value as a SymPy Float, within one unit of the last of `digits` significant digits."""
+        if isinstance(digits, bool) or not isinstance(digits, int) or digits < 1:
+            raise ValueError(f"digits = {digits!r}; expected a positive integer")
+        return decimals(self._ball, digits)
+
+    def _ball(self, bits: int) -> Ball:
+        if isinstance(self.number, (RealRoot, ComplexRoot)):
+            return self.number.enclosure(bits)
+        return enclose(self.number, bits)
+
+    def __str__(self) -> str:
+        text = self.text
+        if len(text) <= 60 or not isinstance(self.number, (RealRoot, ComplexRoot)):
+            return text
+        return f"{decimal(self.value)} (degree {len(self.number.polynomial) - 1})"
+
+
+def ordered(claims: Sequence[Eigenvalue]) -> tuple[Eigenvalue, ...]:
+    """From 0 downwards by real part, conjugates side by side; what floats cannot tell apart, certified balls do."""
+    if any(isinstance(e.value, complex) for e in claims):
+        return tuple(sorted(claims, key=cmp_to_key(_complex_order)))
+    if len({e.value for e in claims}) == len(claims):
+        return tuple(sorted(claims, key=lambda e: e.value.real, reverse=True))
+    if not distinct(claims):
+        raise ProofError(f"two of {len(claims)} eigenvalues coincide; expected distinct ones")
+    return tuple(sorted(claims, key=_midpoint, reverse=True))
+
+
+def _complex_order(a: Eigenvalue, b: Eigenvalue) -> int:
+    """Below 0 if `a` comes first: by real part, downwards, then by |imaginary part|, then the lower conjugate.
+
+    Parts that agree to 1024 bits of the moduli are taken to be equal.
+    """
+    gap, room = b.value.real - a.value.real, 2.0**-50 * (abs(a.value) + abs(b.value))
+    if room < abs(gap) < math.inf:
+        return 1 if gap > 0 else -1
+    if a.value != b.value.conjugate() or not _conjugate(a, b):
+        for part in (lambda ball: -ball.real, lambda ball: abs(ball.imag)):
+            for bits in (72, 256, 1024):
+                with precision(2 * bits):
+                    first, second = (part(acb(e.enclosure(bits))) for e in (a, b))
+                    if not first.overlaps(second):
+                        return -1 if first < second else 1
+    return -1 if a.value.imag < b.value.imag else 1
+
+
+def _conjugate(a: Eigenvalue, b: Eigenvalue) -> bool:
+    """True if one number is the mirror image of the other, to 256 bits."""
+    with precision(512):
+        return bool(acb(a.enclosure(256)).conjugate().overlaps(acb(b.enclosure(256))))
+
+
+def _midpoint(e: Eigenvalue) -> fmpq:
+    mantissa, exponent = e.enclosure(4200).mid().man_exp()
+    return fmpq(mantissa) * fmpq(2) ** int(exponent)
+
+
+def decimal(value: float | complex) -> str:
+    if isinstance(value, complex):
+        return f"{value.real:.15g} {'-' if value.imag < 0 else '+'} {abs(value.imag):.15g}i"
+    return f"{value:.16g}"
+
+
+def entry(e: Eigenvalue) -> str:
+    """An eigenvalue in the words of a claims file; decimals where no short exact form is known."""
+    text = e.text
+    if isinstance(e.number, RealRoot):
+        text = f"~{rounded(e)}"
+    elif isinstance(e.number, ComplexRoot):
+        text = f"({e.evaluate(12)})"
+    return text if e.multiplicity == 1 else f"{text}^{e.multiplicity}"
+
+
+def rounded(e: Eigenvalue, digits: int = 12) -> str:
+    """A real eigenvalue rounded to so many digits, each of them right."""
+    mantissa, exponent = e.enclosure(256).mid().man_exp()
+    value = Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+    with localcontext() as context:
+        context.prec = digits
+        return str(Decimal(value.numerator) / Decimal(value.denominator))
+
+
+def words(e: Eigenvalue) -> str:
+    """An eigenvalue as a sentence names it."""
+    if isinstance(e.number, (RealRoot, ComplexRoot)):
+        value = rounded(e) if isinstance(e.number, RealRoot) else e.evaluate(12)
+        return f"{value} (a root of degree {len(e.number.polynomial) - 1})"
+    if e.number.is_Rational:
+        return e.text
+    return f"{e.text} = {e.evaluate(12) if isinstance(e.value, complex) else rounded(e)}"
+
+
+def times(count: int) -> str:
+    """A multiplicity as a sentence names it."""
+    return "once" if count == 1 else f"{count} times"
+
+
+Blocks: TypeAlias = tuple[tuple[int, int], ...]
+"""(size, how many blocks of it), the largest first."""

@@ -1,0 +1,79 @@
+"""Jordan blocks of a connectivity matrix by exact ranks, with nothing rounded.
+
+Of an eigenvalue with minimal polynomial p the nullity of p(G)**k, over the degree of p, is the sum of min(size, k) over its
+blocks (F. R. Gantmacher, The Theory of Matrices 1, Chelsea, New York, 1959, chapter VI).  A mode in a block of size s grows
+or dies as t**(s - 1) exp(λt), λ its exponent (T. Nishikawa, A. E. Motter, Phys. Rev. E 73, 065106, 2006).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import lcm
+
+from flint import fmpq_poly, fmpz_mat
+
+from ..algebra.minimal_polynomials import minimal_polynomial
+from .eigenvalue import Blocks, Eigenvalue
+from .matrix import Matrix
+
+__all__ = ["blocks", "geometric_multiplicity", "nullity"]
+
+
+def blocks(graph: Matrix, polynomial: fmpq_poly, multiplicity: int) -> Blocks:
+    """The Jordan blocks of each root of an irreducible factor of G's characteristic polynomial, of that multiplicity."""
+    if multiplicity == 1 or graph.undirected:
+        return ((1, multiplicity),)
+    first = power = _value(graph, polynomial)
+    sums, longer = [0], [multiplicity]  # of min(size, k); how many blocks are longer than k
+    while sums[-1] < multiplicity:
+        sums.append((graph.n - int(power.rank())) // polynomial.degree())
+        longer.append(sums[-1] - sums[-2])
+        if longer[-1] <= 0:
+            raise RuntimeError(
+                f"{graph.name}: blocks of {polynomial} end at {sums[-1]} of {multiplicity}; it is no factor"
+            )
+        if longer[-1] == 1:  # the last block takes what is left
+            size = len(sums) - 1 + multiplicity - sums[-1]
+            longer += [1] * (size - len(sums) + 1)
+            break
+        power = power * first
+    sizes = [*longer[1:], 0]
+    counted = [(k + 1, sizes[k] - sizes[k + 1]) for k in range(len(sizes) - 1)]
+    return tuple((size, count) for size, count in reversed(counted) if count)
+
+
+def nullity(graph: Matrix, polynomial: fmpq_poly) -> int:
+    """How many independent vectors p(G) makes zero, p a polynomial with rational coefficients."""
+    return graph.n - int(_value(graph, polynomial).rank())
+
+
+@lru_cache(maxsize=4)
+def _whole(graph: Matrix) -> tuple[fmpz_mat, int]:
+    """G times the common denominator of its weights, and that denominator."""
+    scale = lcm(*(weight.denominator for _, _, weight in graph.links))
+    rows = [[int(x * scale) for x in row] for row in graph.rows]
+    return fmpz_mat(rows), scale
+
+
+def _value(graph: Matrix, polynomial: fmpq_poly) -> fmpz_mat:
+    """A multiple of p(G) with whole entries."""
+    g, scale = _whole(graph)
+    whole = polynomial.numer()
+    d, n = whole.degree(), graph.n
+    value = fmpz_mat(n, n)
+    for k in range(d, -1, -1):
+        value = value * g
+        shift = int(whole[k]) * scale ** (d - k)
+        value = value + fmpz_mat([[shift * (i == j) for j in range(n)] for i in range(n)])
+    return value
+
+
+def geometric_multiplicity(graph: Matrix, eigenvalue: Eigenvalue) -> int:
+    """How many independent eigenvectors an eigenvalue of a graph has, by an exact rank.
+
+    All roots of the minimal polynomial p share that number, so it is the nullity of p(G) over the degree of p.
+    """
+    if eigenvalue.multiplicity == 1 or graph.undirected:
+        return eigenvalue.multiplicity
+    p = minimal_polynomial(eigenvalue.number)
+    return nullity(graph, p) // int(p.degree())

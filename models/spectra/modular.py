@@ -1,0 +1,141 @@
+"""Whether a closed form multiplies out to the characteristic polynomial modulo large primes: the check of large graphs.
+
+Modulo a prime p = 1 mod m there is a root of unity ζ of order m among the whole numbers, so that 2 cos(2πk/m) is ζ^k + ζ^-k
+and a wrong closed form is found without any cyclotomic algebra.  A polynomial over the cyclotomic field that is not zero is
+zero modulo few primes only (L. C. Washington, Introduction to Cyclotomic Fields, Springer, 1997, chapter 2): the norm of one
+of its coefficients, which is bounded by the eigenvalues, has few large divisors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from hashlib import sha256
+from math import lcm, log, log2
+
+import sympy as sp
+from flint import fmpz, nmod_mat, nmod_poly
+
+from ..algebra import cosines
+from ..algebra.cosine_sums import read
+from .characteristic import banded, cyclic
+from .matrix import Matrix
+from .proof import ProofError
+
+__all__ = ["check_modulo"]
+
+PRIMES = 3
+BITS = 61
+"""Primes lie between 2**BITS and twice that."""
+
+Powers = tuple[Fraction, tuple[tuple[Fraction, Fraction], ...]]
+"""shift + Σ b exp(2πit) as (shift, ((t, b), …))."""
+
+
+def check_modulo(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]]) -> float | None:
+    """Compare modulo PRIMES primes that a hash of the claim picks; None where a number is no sum of roots of unity.
+
+    Returns about the largest chance that as many random primes would show no difference where there is one.  Raises
+    ProofError where the polynomials differ.
+    """
+    numbers = [(_powers(sp.sympify(number)), times) for number, times in pairs]
+    known = [(powers, times) for powers, times in numbers if powers is not None]
+    if len(known) != len(numbers):
+        return None
+    m = lcm(1, *(t.denominator for (_, terms), _ in known for t, _ in terms))
+    seed = f"{graph.name} {graph.n} {graph.options} {graph.link_count} {m}"
+    for p, _ in zip(_primes(m, seed), range(PRIMES), strict=False):
+        found = _claimed(known, m, p)
+        if found != _characteristic(graph, p):
+            raise ProofError(
+                f"spectrum of {graph.name} {graph.n}: the eigenvalues do not multiply out to the characteristic "
+                f"polynomial modulo {p}: correct the closed form"
+            )
+    return _chance(graph, known, m) ** PRIMES
+
+
+def _powers(number: sp.Expr) -> Powers | None:
+    """A number as a sum of roots of unity."""
+    form = cosines.linear_exponential(number)
+    if form is not None:
+        a, b, k, m = form
+        return a, ((Fraction(k, m), b),)
+    real = read(number)
+    if real is not None:
+        return real.shift, tuple((turn, b) for t, b in real.terms for turn in (t, 1 - t))
+    re, im = number.as_real_imag()  # radicals of short angles: a + b I with a, b real sums
+    first, second, quarter = read(re), read(sp.expand(im)), Fraction(1, 4)
+    if first is None or second is None:
+        return None
+    terms = [(turn, b) for t, b in first.terms for turn in (t, 1 - t)]
+    terms += [((turn + quarter) % 1, b) for t, b in second.terms for turn in (t, 1 - t)]
+    return first.shift, (*terms, (quarter, second.shift))
+
+
+def _primes(m: int, seed: str) -> Iterator[int]:
+    """Primes p = 1 mod m of BITS + 1 bits, each search begun at a place that a hash gives."""
+    count = 0
+    while True:
+        place = int.from_bytes(sha256(f"{seed} {count}".encode()).digest()[:8], "big") % 2**BITS
+        p = 2**BITS + place - place % m + (1 - 2**BITS) % m
+        while not fmpz(p).is_prime():
+            p += m
+        count += 1
+        if p < 2 ** (BITS + 1):
+            yield p
+
+
+def _unit(m: int, p: int) -> int:
+    """A root of unity of order m modulo p."""
+    parts = [int(q) for q, _ in fmpz(m).factor()]
+    candidates = (pow(g, (p - 1) // m, p) for g in range(2, p))
+    return next(z for z in candidates if all(pow(z, m // q, p) != 1 for q in parts))
+
+
+def _residue(x: Fraction, p: int) -> int:
+    return x.numerator * (1 if x.denominator == 1 else pow(x.denominator, -1, p)) % p
+
+
+def _claimed(numbers: Sequence[tuple[Powers, int]], m: int, p: int) -> nmod_poly:
+    """The product of (z - number)^times modulo p."""
+    unit = _unit(m, p)
+    factors = []
+    for (shift, terms), times in numbers:
+        value = _residue(shift, p) + sum(_residue(b, p) * pow(unit, int(t * m), p) for t, b in terms)
+        factors.append(nmod_poly([-value % p, 1], p) ** times)
+    while len(factors) > 1:
+        odd = factors[-1:] if len(factors) % 2 else []
+        factors = [a * b for a, b in zip(factors[::2], factors[1::2], strict=False)] + odd
+    return factors[0]
+
+
+def _characteristic(graph: Matrix, p: int) -> nmod_poly:
+    """det(z - G) modulo p."""
+    residues: dict[Fraction, int] = {}
+    entries, sums = dict[tuple[int, int], int](), [0] * graph.n
+    for target, source, weight in graph.links:
+        value = residues.get(weight)
+        if value is None:
+            value = residues[weight] = _residue(weight, p)
+        entries[target, source] = value
+        sums[target] -= value
+    entries.update({(i, i): total % p for i, total in enumerate(sums)})
+    if banded(graph.n, entries):
+        return cyclic(graph.n, entries, lambda c: nmod_poly([x % p for x in c], p))
+    flat = [0] * graph.n**2
+    for (i, j), value in entries.items():
+        flat[i * graph.n + j] = value
+    return nmod_mat(graph.n, graph.n, flat, p).charpoly()
+
+
+def _chance(graph: Matrix, numbers: Sequence[tuple[Powers, int]], m: int) -> float:
+    """About the largest share of the primes that can divide the norm of a coefficient of the difference."""
+    parts = [x for (a, terms), _ in numbers for x in (a, *(b for _, b in terms))]
+    scale = lcm(*{x.denominator for x in (*parts, *(w for _, _, w in graph.links))})
+    rows = [0.0] * graph.n
+    for target, _, weight in graph.links:
+        rows[target] += 2.0 * abs(weight.numerator) / weight.denominator
+    largest = max(*rows, *(float(abs(a) + sum(abs(b) for _, b in c)) for (a, c), _ in numbers))
+    units = int(fmpz(m).euler_phi())
+    bad = units * (graph.n * log2(1 + scale * largest) + 1) / BITS
+    return bad * units * (BITS + 1) * log(2.0) / 2.0**BITS  # of the primes, about 2**BITS / (units * log of one)

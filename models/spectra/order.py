@@ -1,0 +1,61 @@
+"""Exact comparison of coupling strengths at which modes of a network are lost, and modes that lack eigenvectors.
+
+A mode with the real eigenvalue gamma reaches the strength alpha at sigma = alpha / |gamma|.  Two such values are told apart
+by certified balls; that they are equal is proved by minimal polynomials, never believed.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from flint import arb, arb_poly, fmpq, fmpq_poly
+
+from ..algebra.balls import Ball, precision
+from ..algebra.minimal_polynomials import minimal_polynomial
+from .eigenvalue import Eigenvalue
+
+__all__ = ["compare"]
+
+
+def compare(alpha: Fraction, gamma: Eigenvalue, other_alpha: Fraction, other_gamma: Eigenvalue) -> int:
+    """The sign (-1, 0, 1) of alpha / |gamma| - other_alpha / |other_gamma|, for alpha >= 0 and real gamma < 0.
+
+    Raises ValueError for a negative alpha, and for an eigenvalue that is not a negative real number.
+    """
+    for strength, mode in ((alpha, gamma), (other_alpha, other_gamma)):
+        if strength < 0 or isinstance(mode.value, complex) or not mode.value < 0:
+            raise ValueError(
+                f"alpha = {strength} of the eigenvalue {mode}: expected alpha >= 0 and a real eigenvalue < 0"
+            )
+    if alpha == 0 or other_alpha == 0 or gamma.number == other_gamma.number:
+        return (alpha > other_alpha) - (alpha < other_alpha)
+    bits, polynomial = 64, None
+    while True:
+        here, there = gamma.enclosure(bits), other_gamma.enclosure(bits)
+        with precision(bits + 16):
+            scaled = there * arb(_exact(alpha / other_alpha))
+            if scaled < here or scaled > here:
+                return 1 if scaled < here else -1
+        if bits == 256:
+            polynomial = _one_polynomial(gamma, other_gamma, alpha / other_alpha)
+        if polynomial is not None and _one_root(polynomial, here.union(scaled), bits):
+            return 0
+        bits *= 2
+
+
+def _one_polynomial(gamma: Eigenvalue, other: Eigenvalue, factor: Fraction) -> fmpq_poly | None:
+    """The minimal polynomial of gamma where it is also that of factor * other."""
+    p, q = minimal_polynomial(gamma.number), minimal_polynomial(other.number)
+    ratio = _exact(factor)
+    return p if p == q(fmpq_poly([0, 1 / ratio])) * ratio ** q.degree() else None
+
+
+def _one_root(polynomial: fmpq_poly, ball: Ball, bits: int) -> bool:
+    """True where the polynomial is proved monotone on the ball, so that it has at most one root there."""
+    with precision(2 * bits + 64):
+        slope = arb_poly(polynomial.derivative())(ball)
+        return bool(slope > 0 or slope < 0)
+
+
+def _exact(x: Fraction) -> fmpq:
+    return fmpq(x.numerator, x.denominator)

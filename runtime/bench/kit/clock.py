@@ -1,0 +1,114 @@
+"""How long a peer takes and how far off it is: one row for each of its tolerances."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+
+from ..peers._problem import Problem, Solve
+from .cases import Case
+
+__all__ = ["LONGEST", "SHORTEST", "Point", "best_time", "curve"]
+
+SHORTEST = 0.2
+"""A timed run lasts at least this many seconds of CPU time, by repetition."""
+LONGEST = 1.0
+"""A slower run than this is shortened to fewer periods, down to FEWEST, and not repeated."""
+FEWEST = 5
+GIVE_UP = 2.0
+"""A peer that needs more seconds of CPU time for one period is not tried at tighter tolerances."""
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One method at one tolerance: error (largest over times and components), seconds per period and core.
+
+    `periods` is how much of the case was run, `compile` the seconds of preparation, `remark` why numbers are NaN or few.
+    """
+
+    method: str
+    lanes: int
+    rtol: float
+    atol: float
+    error: float
+    seconds: float
+    periods: int
+    compile: float
+    steps: float = float("nan")
+    remark: str = ""
+
+
+def best_time(run: Callable[[], object], quick: bool) -> float:
+    """CPU seconds of one call: the best of three groups of repetitions of at least SHORTEST seconds each, or one call
+    where that takes LONGEST or more."""
+    first = _seconds(run, 1)
+    if quick or first >= LONGEST:
+        return first
+    repetitions = max(1, int(np.ceil(SHORTEST / max(first, 1e-9))))
+    return min(first, *(_seconds(run, repetitions) for _ in range(3)))
+
+
+def _seconds(run: Callable[[], object], repetitions: int) -> float:
+    begin = time.process_time()
+    for _ in range(repetitions):
+        run()
+    return (time.process_time() - begin) / repetitions
+
+
+def curve(peer: ModuleType, case: Case, quick: bool) -> Iterator[Point]:
+    """Yield a point for each tolerance of a peer, loose first; a failure is a point with NaN and a remark."""
+    lanes = getattr(peer, "CELLS", 1)
+    tolerances = peer.TOLERANCES[:: max(2, len(peer.TOLERANCES) // 2)] if quick else peer.TOLERANCES
+    begin = time.perf_counter()
+    try:
+        solve = peer.prepare(Problem(case.scene))
+    except Exception as problem:  # a peer may fail in any way; the table says how
+        yield _failed(peer.NAME, lanes, tolerances[0], time.perf_counter() - begin, problem)
+        return
+    prepared = time.perf_counter() - begin
+    for rtol, atol in tolerances:
+        begin = time.perf_counter()
+        try:
+            cost = _pilot(solve, rtol, atol, case.period)
+            compiled = prepared + max(0.0, time.perf_counter() - begin - 2.0 * cost)
+            periods, error, seconds = _measure(solve, rtol, atol, case, cost, quick)
+        except Exception as problem:
+            yield _failed(peer.NAME, lanes, (rtol, atol), prepared, problem)
+            continue
+        remark = "" if periods == case.periods else f"{periods} of {case.periods} periods"
+        yield Point(peer.NAME, lanes, rtol, atol, error, seconds / lanes, periods, compiled, remark=remark)
+        if cost > (0.05 * GIVE_UP if quick else GIVE_UP):
+            return
+
+
+def _pilot(solve: Solve, rtol: float, atol: float, period: float) -> float:
+    """CPU seconds of one period, the second time."""
+    one = np.array([period])
+    solve(rtol, atol, one)
+    return _seconds(lambda: solve(rtol, atol, one), 1)
+
+
+def _measure(solve: Solve, rtol: float, atol: float, case: Case, cost: float, quick: bool) -> tuple[int, float, float]:
+    """Periods run, error and CPU seconds a period; the timed run has one end, as the pilot had, for which JAX compiled."""
+    longest = 0.1 * LONGEST if quick else LONGEST
+    fewest = max(
+        2 if quick else FEWEST, int(np.ceil(case.times[1] / case.period * (1.0 - 1e-12)))
+    )  # two times at least
+    periods = min(case.periods, max(fewest, int(longest / max(cost, 1e-9))))
+    part = case.within(periods)
+    states = solve(rtol, atol, part.times)
+    if states.shape != part.states.shape or not np.isfinite(states).all():
+        raise RuntimeError(f"states {states.shape} that are not all finite; expected {part.states.shape}")
+    end = np.array([periods * case.period])
+    seconds = best_time(lambda: solve(rtol, atol, end), quick)
+    return periods, float(np.abs(states - part.states).max()), seconds / periods
+
+
+def _failed(name: str, lanes: int, tolerances: tuple[float, float], compiled: float, problem: Exception) -> Point:
+    words = " ".join(str(problem).split()) or type(problem).__name__
+    nan = float("nan")
+    return Point(name, lanes, *tolerances, nan, nan, 0, compiled, remark=f"failed: {words[:120]}")

@@ -1,0 +1,81 @@
+"""How long this program's own kernels take and how far off they are; the peers' counterpart is `_clock.curve`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...cells.buffers import Buffers
+from ...cells.initial_modes import with_modes
+from ...cells.kernels import kernel
+from ...cells.plan import control_array
+from .cases import Case
+from .clock import Point, best_time
+
+__all__ = ["REFILLS", "Own", "prepare"]
+
+Ends = tuple[np.ndarray, np.ndarray]
+"""States at the ends (m, dimension) and counts (m, …) of the kernel."""
+Integrate = Callable[[float, float, np.ndarray], Ends]
+
+REFILLS = 8
+"""Cells that each lane works through in the rows with full lanes: the last ones cost what they do in a sweep."""
+
+
+def prepare(case: Case, integrator: str, width: int) -> Integrate:
+    """Compile or load the kernel of a case; returns solve(rtol, atol, ends) -> (states (m, dimension), counts).
+
+    `solve` integrates one cell to each of the end times and raises RuntimeError where a cell did not reach its end.
+    """
+    compiled = kernel(case.scene.replace(integrator=integrator), width, skip=False)
+    one = np.array([case.scene.parameters[name] for name in case.scene.equations.parameters])
+    (y0,) = with_modes(case.scene.equations, np.array([case.scene.y0]), one[None])
+
+    def solve(rtol: float, atol: float, ends: np.ndarray) -> Ends:
+        cells = len(ends)
+        spans = np.ascontiguousarray(
+            np.stack([np.zeros(cells), ends, np.full(cells, case.period), np.zeros(cells)], axis=1)
+        )
+        control = control_array(rtol, atol, 0.5 * case.period, 1e12, jumps=False)
+        buffers = Buffers.empty(cells, len(y0), room=0, samples=0)
+        compiled.drive(0, cells, np.tile(y0, (cells, 1)), np.tile(one, (cells, 1)), spans, control, *buffers.arrays())
+        if not np.isfinite(buffers.end).all():
+            raise RuntimeError(f"{integrator}: a cell did not finish at rtol = {rtol:g}")
+        return buffers.end, buffers.counts
+
+    return solve
+
+
+@dataclass(frozen=True, slots=True)
+class Own:
+    """An integrator with its kernel for a case: `cells` in `lanes` run over `periods` of the drive when they are timed."""
+
+    case: Case
+    integrator: str
+    lanes: int
+    cells: int
+    periods: int
+    compile: float
+    solve: Integrate
+
+    @classmethod
+    def compiled(cls, case: Case, integrator: str, lanes: int, cells: int, periods: int) -> Own:
+        """Compile or load the kernel and note the seconds that takes."""
+        begin = time.perf_counter()
+        solve = prepare(case, integrator, lanes)
+        return cls(case, integrator, lanes, cells, periods, time.perf_counter() - begin, solve)
+
+    def point(self, rtol: float, atol: float, quick: bool) -> Point:
+        """Error, seconds and steps per period at one tolerance."""
+        case, periods = self.case, self.periods
+        part = case.within(periods)
+        states, _ = self.solve(rtol, atol, part.times)
+        ends = np.full(self.cells, periods * case.period)
+        _, counts = self.solve(rtol, atol, ends)
+        seconds = best_time(lambda: self.solve(rtol, atol, ends), quick) / (periods * self.cells)
+        error, steps = float(np.abs(states - part.states).max()), float(counts[0, 1] + counts[0, 2]) / periods
+        remark = "" if periods == case.periods else f"{periods} of {case.periods} periods"
+        return Point(self.integrator, self.lanes, rtol, atol, error, seconds, periods, self.compile, steps, remark)

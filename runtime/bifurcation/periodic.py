@@ -1,0 +1,215 @@
+"""Periodic orbits of one driven oscillator by Newton's method on its stroboscopic map, and their stability.
+
+The derivative of the map is the propagator of a deviation along the orbit (`synchain.runtime.stability.orbits`), through stick and
+slip where friction is set-valued, so Newton's method converges quadratically for both forms of the law.
+
+Sources: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapter 7; for orbits with stick:
+Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer, 2004), chapters 7-8.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from synchain.models.inputs.checks import shown
+from synchain.models.mechanics.stick_slip import SLIP
+from synchain.models.scenes.scene import Scene
+
+from ..stability.attractor import over_one_cycle
+from ..stability.orbits import Orbits, unit_of_time
+from ..stability.transversal import one_cell, single
+from .phases import Phases, phases_of
+
+__all__ = ["SAME", "PeriodicOrbit", "check_periods", "orbit_through", "periodic_orbit", "stability_end", "strobe"]
+
+TOLERANCE = 1e-12
+"""Relative tolerance of the integration."""
+
+SAME = 1e-7
+"""Orbits this close to each other are one."""
+
+ROUNDING = 1e-12
+"""A sliding speed this small, of an orbit that sticks, is one of rounding."""
+
+MOST_STEPS = 30
+LONGEST = 10_000
+"""Most drive periods that an orbit is looked for over; far shorter unstable ones lose all their digits."""
+
+
+@dataclass(frozen=True, slots=True)
+class PeriodicOrbit:
+    """A motion that repeats itself after `periods` periods of the drive.
+
+    state (components,): at the beginning of a period of the drive; multipliers: the Floquet multipliers of the oscillator
+    by itself, the largest first; residual: largest distance of the state from its image; steps: those of Newton's method.
+    """
+
+    scene: Scene = field(repr=False)
+    periods: int
+    state: np.ndarray
+    multipliers: np.ndarray
+    residual: float
+    steps: int
+
+    @property
+    def stable(self) -> bool:
+        """True where every multiplier lies inside the unit circle."""
+        return bool(abs(self.multipliers[0]) < 1.0)
+
+    @property
+    def phases(self) -> Phases | None:
+        """The phases of stick and slip of one cycle (`synchain.runtime.bifurcation.phases`), None for friction without them."""
+        return phases_of(self.scene, self.state, self.periods)
+
+    @property
+    def points(self) -> np.ndarray:
+        """The states (periods, components) at the beginning of each period of the drive."""
+        found = [self.state]
+        for _ in range(self.periods - 1):
+            found.append(_strobe(self.scene, found[-1], 1, 0.0)[0][: len(self.state)])
+        return np.array(found)
+
+    @property
+    def least(self) -> int:
+        """The least number of drive periods after which the motion repeats itself, to SAME."""
+        points = self.points
+        divisors = (k for k in range(1, self.periods) if self.periods % k == 0)
+        return next((k for k in divisors if np.abs(points[k] - points[0]).max() < SAME), self.periods)
+
+    def transversal(self, alpha: float) -> np.ndarray:
+        """The multipliers of a transversal mode of strength alpha along the orbit, the largest first."""
+        return _sorted(_strobe(self.scene, self.state, self.periods, alpha)[1])
+
+
+def periodic_orbit(
+    scene: Scene, periods: int = 1, start: Sequence[float] | np.ndarray | None = None, **parameters: float
+) -> PeriodicOrbit:
+    """Find a periodic orbit of a scene's oscillator near `start` (default: the scene's, after its transient).
+
+    Raises ValueError for an oscillator that is not driven, periods out of range, an unknown parameter or a start that is not
+    a state, ArithmeticError where Newton's method does not converge.
+    """
+    scene = _driven(periodic_orbit, scene, parameters)
+    check_periods(periods)
+    state = _settled(scene) if start is None else _state(scene, start)
+    best, steps, kept = np.inf, 0, state
+    while steps < MOST_STEPS:
+        image, matrix = _strobe(scene, state, periods, 0.0)
+        gap = image[: len(state)] - state
+        if _nearly_sticks(image, gap):
+            state = image[: len(state)] - np.array([gap[0], 0.0])
+            continue
+        residual = float(np.abs(gap).max())
+        if not residual < best:
+            break
+        best, kept, found = residual, state, matrix
+        if residual == 0.0:
+            break
+        state = state + _correction(matrix, gap)
+        steps += 1
+    if not best < 1e-9 * max(1.0, float(np.abs(kept).max())):
+        raise ArithmeticError(f"no orbit of {periods} drive periods near the start: the best residual was {best:.1e}")
+    return PeriodicOrbit(scene, int(periods), kept, _sorted(found), best, steps)
+
+
+def _nearly_sticks(image: np.ndarray, gap: np.ndarray) -> bool:
+    """True where a state's image sticks and the state itself slips at a speed of rounding errors, as if it landed there."""
+    return len(image) > len(gap) and image[-1] == 0.0 and 0.0 < abs(gap[1]) < ROUNDING
+
+
+def check_periods(periods: object) -> None:
+    """Refuse what is not a number of drive periods."""
+    if not isinstance(periods, Integral) or not 1 <= int(periods) <= LONGEST:
+        raise ValueError(f"periods = {shown(periods)}; expected a whole number, at least 1, at most {LONGEST}")
+
+
+def orbit_through(scene: Scene, periods: int, state: np.ndarray, **parameters: float) -> PeriodicOrbit:
+    """The orbit through a state (components,) that is known to return to itself; its residual says how well."""
+    scene = _driven(orbit_through, scene, parameters)
+    image, matrix = _strobe(scene, state, periods, 0.0)
+    return PeriodicOrbit(scene, periods, state, _sorted(matrix), float(np.abs(image[: len(state)] - state).max()), 0)
+
+
+def strobe(scene: Scene, state: np.ndarray, periods: int, **parameters: float) -> tuple[np.ndarray, np.ndarray]:
+    """The state (components,) some drive periods later, and its derivative (components, components) by the first one."""
+    image, matrix = _strobe(_driven(strobe, scene, parameters), state, periods, 0.0)
+    return image[: len(state)], matrix
+
+
+def _driven(function: Callable[..., Any], scene: Scene, parameters: dict[str, float]) -> Scene:
+    """The scene with its parameters, to the tolerance of orbits; ValueError where it is not driven."""
+    scene = one_cell(function, scene, TOLERANCE, parameters)
+    unit_of_time(scene)
+    if not scene.period:
+        raise ValueError(
+            "periodic orbits are looked for on the stroboscopic map of a drive; found an oscillator without one"
+        )
+    return single(function, scene, TOLERANCE, {})
+
+
+def _settled(scene: Scene) -> np.ndarray:
+    """The state (components,) after the scene's transient, from its initial one."""
+    state = np.zeros(len(scene.initial))
+    state[:] = [values[0] for values in scene.initial.values()]
+    orbits = Orbits.make(scene, np.zeros(1), state[None], 1)
+    orbits.settle(scene.transient)
+    return orbits.state[0][: orbits.components]
+
+
+def _state(scene: Scene, start: Sequence[float] | np.ndarray) -> np.ndarray:
+    """A start given by the caller, as the state (components,) of one oscillator."""
+    names = tuple(name for name in scene.components if name != SLIP.name)
+    try:
+        state = np.array(start, dtype=float)
+    except (TypeError, ValueError):
+        state = np.empty(0)
+    if state.ndim != 1 or len(state) not in (len(names), len(scene.components)) or not np.all(np.isfinite(state)):
+        raise ValueError(f"start: found {shown(start)}; expected a number for each of {', '.join(names)}")
+    return state[: len(names)]
+
+
+def _correction(matrix: np.ndarray, gap: np.ndarray) -> np.ndarray:
+    """The step of Newton's method; ArithmeticError where the orbit is not isolated."""
+    try:
+        return np.asarray(np.linalg.solve(np.eye(len(gap)) - matrix, gap))
+    except np.linalg.LinAlgError:
+        raise ArithmeticError("Newton's method: a multiplier is 1 to rounding, so the orbit is not isolated") from None
+
+
+def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
+    """The strength alpha between `low` and `high` at which the largest transversal multiplier has modulus 1, to rounding.
+
+    Raises ValueError for ends that are not finite numbers, and where the modulus is on the same side of 1 at both ends.
+    """
+
+    for name, value in (("low", low), ("high", high)):
+        if not isinstance(value, Real) or not math.isfinite(value):
+            raise ValueError(f"{name} = {shown(value)}; expected a finite strength alpha")
+
+    def growth(alpha: float) -> float:
+        return float(np.log(abs(orbit.transversal(alpha)[0])))
+
+    if growth(low) * growth(high) > 0.0:
+        raise ValueError(f"alpha: the mode grows, or decays, at {low} and at {high}; expected a change between them")
+    return float(brentq(growth, low, high, xtol=1e-14, rtol=1e-14))
+
+
+def _strobe(scene: Scene, state: np.ndarray, periods: int, alpha: float) -> tuple[np.ndarray, np.ndarray]:
+    """The state some periods later, and the propagator of a deviation of strength alpha."""
+    start = np.zeros(len(scene.initial))
+    start[: len(state)] = state
+    orbits = Orbits.make(scene, np.array([alpha]), start[None], 1)
+    matrix = over_one_cycle(orbits, periods)[0, 0]
+    return orbits.state[0], matrix
+
+
+def _sorted(matrix: np.ndarray) -> np.ndarray:
+    found = np.linalg.eigvals(matrix)
+    return np.asarray(found[np.argsort(-np.abs(found), kind="stable")])

@@ -1,0 +1,135 @@
+"""The phases of stick and slip that a periodic orbit passes through, and how far it is from having others.
+
+Phases are read off samples of one cycle, and distances between them from polynomials through neighbouring samples, whose
+error is far below that of the orbit.  A stick shorter than the distance of two samples is known by the load where it begins;
+a slip as short as that is not seen.
+
+Source: di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth Dynamical Systems (Springer, 2008), chapters 7-8.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+import sympy as sp
+from numpy.polynomial import Polynomial
+
+from synchain.models.graphs.families import topology
+from synchain.models.mechanics.components import TIME
+from synchain.models.mechanics.stick_slip import Contact
+from synchain.models.scenes.scene import Scene
+
+from ..sweeps.run import run
+
+__all__ = ["Phases", "phases_of"]
+
+SAMPLES = 2000
+"""Samples for each period of the drive."""
+
+REACH = 3
+"""Samples to each side of the one in the middle of a polynomial."""
+
+
+@dataclass(frozen=True, slots=True)
+class Phases:
+    """The modes of one cycle in their order, 0 for stick, +1 and -1 for slip, from the one that makes the list smallest.
+
+    gap: the least minimum, inside a phase, of the sliding speed in slip and of the distance of the load from the limits of
+    static friction in stick; inf where there is none.  landing: how far the load is from those limits where slip ends, at
+    the landing that is nearest to them, positive where it sticks; inf where slip never ends.
+    """
+
+    modes: tuple[int, ...]
+    gap: float
+    landing: float
+
+    @property
+    def words(self) -> str:
+        """In words, for example "stick, slip +"."""
+        return ", ".join({0: "stick", 1: "slip +", -1: "slip -"}[mode] for mode in self.modes)
+
+
+def phases_of(scene: Scene, state: np.ndarray, periods: int) -> Phases | None:
+    """The phases of the orbit of a scene's oscillator from `state` (components,) over `periods` of the drive; None for
+    friction that is not set-valued."""
+    contact = scene.equations.node.contact
+    if contact is None:
+        return None
+    one = scene.replace(
+        topology=topology("chain", 1), record=("trajectory",), samples=SAMPLES * periods + 1, transient=0.0, axes=(),
+        window=float(periods), time_unit="period", initial={"x": [float(state[0])], "v": [float(state[1])]},
+    )  # fmt: skip
+    once = np.asarray(run(one, show_progress=False, workers=1).trajectory.values, dtype=float)[:-1]
+    path = np.concatenate([once, once])  # two cycles, so that each phase is seen whole
+    t, slip = np.arange(len(path)) * ((scene.period or 0.0) / SAMPLES), np.round(path[:, 2]).astype(int)
+    held, slides = _margins(scene, contact)
+    values = np.where(slip == 0, held(path[:, 0], t), slip * slides(path[:, 1]))
+    changes = np.flatnonzero(slip[1:] != slip[:-1]) + 1
+    if len(changes) == 0:
+        return Phases((int(slip[0]),), _least(np.concatenate([values[-1:], values])), math.inf)
+    modes, gaps, landings = [], [math.inf], [math.inf]
+    for a, b in pairwise(changes.tolist()):
+        if a > len(once):
+            break
+        modes.append(int(slip[a]))
+        gaps.append(_least(values[a:b]))
+        if slip[a] != 0:
+            landings.append(_landing(slice(a, b), t, path, slides, held))
+            if landings[-1] > 0.0 and slip[b] != 0:
+                modes.append(0)  # it sticks for less than the distance of two samples
+    return Phases(_canonical(modes), min(gaps), min(landings, key=abs))
+
+
+Function = Callable[..., np.ndarray]
+
+
+def _margins(scene: Scene, contact: Contact) -> tuple[Function, Function]:
+    """How far the load at a position and time is from the limits of static friction; the sliding velocity."""
+    up, down, sliding = _functions(contact, tuple(scene.equations.node.state), tuple(scene.parameters))
+    numbers = list(scene.parameters.values())
+    return (
+        lambda place, t: np.minimum(up(place, 0.0, t, *numbers), -down(place, 0.0, t, *numbers)),
+        lambda speed: np.asarray(sliding(0.0, speed, 0.0, *numbers)),
+    )
+
+
+@lru_cache(maxsize=16)
+def _functions(contact: Contact, state: tuple[sp.Symbol, ...], names: tuple[str, ...]) -> tuple[Function, ...]:
+    """Both limits and the sliding velocity as functions of position, velocity, time and parameters."""
+    symbols = [*state[:2], TIME, *(sp.Symbol(name, real=True) for name in names)]
+    return tuple(sp.lambdify(symbols, e, "numpy") for e in (contact.up, contact.down, contact.sliding))
+
+
+def _least(values: np.ndarray) -> float:
+    """The least of the minima inside a row of equally spaced values, each from a polynomial through its neighbours."""
+    inner = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] < values[2:])) + 1
+    found = math.inf
+    for k in map(int, inner):
+        a = min(max(k - REACH, 0), max(len(values) - 2 * REACH - 1, 0))
+        near = values[a : a + 2 * REACH + 1]
+        bent = Polynomial.fit(np.arange(len(near)) - float(k - a), near, len(near) - 1)
+        turns = [r.real for r in bent.deriv().roots() if abs(r.imag) < 1e-9 and abs(r.real) <= 1.0]
+        found = min([found, *(float(bent(turn)) for turn in turns)])
+    return found
+
+
+def _landing(piece: slice, t: np.ndarray, path: np.ndarray, slides: Function, held: Function) -> float:
+    """The margin of the load where a phase of slip ends: both are continued from its last samples."""
+    first = max(piece.stop - 2 * REACH, piece.start)
+    steps = np.arange(first, piece.stop) - (piece.stop - 1.0)
+    sliding = Polynomial.fit(steps, slides(path[first : piece.stop, 1]), len(steps) - 1)
+    place = Polynomial.fit(steps, path[first : piece.stop, 0], len(steps) - 1)
+    zeros = [(float(r.real), float(r.imag)) for r in sliding.roots()]
+    roots = [real for real, imaginary in zeros if abs(imaginary) < 1e-6 and -1e-9 <= real <= 1.0 + 1e-9]
+    at = min(roots, default=0.5)
+    return float(held(place(at), t[piece.stop - 1] + at * (t[1] - t[0])))
+
+
+def _canonical(modes: list[int]) -> tuple[int, ...]:
+    """The rotation of a cycle that comes first in order."""
+    return min(tuple(modes[k:] + modes[:k]) for k in range(len(modes)))

@@ -1,0 +1,81 @@
+"""Whether each oscillator sticks or slips at its start, and the clock by which its events are timed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+import sympy as sp
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import TIME
+
+__all__ = ["CLOCK", "local_clock", "with_modes"]
+
+CLOCK = 8.0
+"""After so much time the clock of an oscillator without a drive starts anew: a power of two, so that no digit is lost."""
+
+
+def with_modes(equations: Equations, start: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """The rows of `start` (cells, 3 n) with the modes that their velocities and loads ask for at the time 0.
+
+    An oscillator at exactly the ground's velocity sticks where static friction can hold it.
+    """
+    contact, n = equations.node.contact, equations.n
+    if contact is None:
+        return start
+    made = np.array(start, dtype=float)
+    given = {sp.Symbol(p, real=True): c[:, None] for p, c in zip(equations.parameters, numbers.T, strict=True)}
+    given[TIME] = np.zeros((len(made), 1))
+    own = given | {s: made[:, k * n : (k + 1) * n] for k, s in enumerate(equations.node.state)}
+    sliding, up, down = (_at(e, own, (len(made), n)) for e in (contact.sliding, contact.up, contact.down))
+    push = _link_forces(equations, contact.speed, made, given)
+    stuck = np.where(up + push < 0.0, 1.0, np.where(down + push > 0.0, -1.0, 0.0))
+    made[:, 2 * n :] = np.where(sliding == 0.0, stuck, np.sign(sliding))
+    return made
+
+
+def _link_forces(
+    equations: Equations, speed: sp.Expr, state: np.ndarray, given: dict[sp.Symbol, np.ndarray]
+) -> np.ndarray:
+    """What the links push each oscillator with, if it moves with the ground (cells, n)."""
+    edge, n = equations.edge, equations.n
+    total = np.zeros((len(state), n))
+    if edge is None or not equations.links:
+        return total
+    target, source = (np.array([link[side] for link in equations.links]) for side in (0, 1))
+    given = {**given, edge.weight: np.array([float(link[2]) for link in equations.links])}
+    for symbols, nodes in ((edge.here, target), (edge.there, source)):
+        given |= {s: state[:, k * n + nodes] for k, s in enumerate(symbols)}
+    force = edge.rhs[1].xreplace({edge.here[2]: sp.S.One, edge.here[1]: speed})
+    np.add.at(total.T, target, _at(force, given, (len(state), len(target))).T)
+    return total
+
+
+def local_clock(equations: Equations, period: np.ndarray) -> np.ndarray:
+    """The times after which the clocks of cells start anew: their `period` (cells,), 0 for none.
+
+    Events are located on the clock, to rounding.  Where time does not enter the equations any length is a period, and a
+    short one keeps the digits of events in long runs.
+    """
+    if equations.node.contact is None or any(e.has(TIME) for e in (*equations.node.rhs, *_conditions(equations))):
+        return period
+    return np.full(len(period), CLOCK)
+
+
+def _conditions(equations: Equations) -> tuple[sp.Expr, ...]:
+    contact = equations.node.contact
+    return () if contact is None else contact.expressions
+
+
+def _at(e: sp.Expr, given: dict[sp.Symbol, np.ndarray], shape: tuple[int, int]) -> np.ndarray:
+    value = _function(e, tuple(given))(*given.values())
+    return np.array(np.broadcast_to(value, shape), dtype=float)
+
+
+@lru_cache(maxsize=64)
+def _function(e: sp.Expr, symbols: tuple[sp.Symbol, ...]) -> Callable[..., np.ndarray]:
+    """An expression as a function: the blocks of a sweep share it."""
+    made: Callable[..., np.ndarray] = sp.lambdify(list(symbols), e, "numpy")
+    return made

@@ -1,0 +1,74 @@
+"""How the cells of a sweep are cut into numbered blocks: what is run, stored and resumed as one piece."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from synchain.models.scenes.scene import Scene
+
+__all__ = ["Layout", "block_size"]
+
+REFILLS = 16
+"""Most cells of a block for each lane: enough that the lanes which idle at its end do not count."""
+
+SHARE = 8
+"""A block is at most this part of what one worker has to do, so that all are busy to the end."""
+
+LONGEST = 1e7
+"""A block of more oscillators times periods is cut smaller, to what the lanes need: about a minute of work."""
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Blocks of `size` cells, in C order over the axes.
+
+    In a continued sweep (`columns` values of the last axis, `falling` where it runs downwards) a block is one column of up
+    to `size` rows, and each block needs the one before it in its row.
+    """
+
+    cells: int
+    size: int
+    columns: int = 0
+    falling: bool = False
+
+    @classmethod
+    def of(cls, scene: Scene, size: int) -> Layout:
+        """The layout of a scene's sweep in blocks of this size."""
+        if scene.continuation == "none":
+            return cls(scene.cells, size)
+        return cls(scene.cells, size, scene.shape[-1], scene.continuation == "down")
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        steps = max(self.columns, 1)
+        return math.ceil(self.cells / steps / self.size) * steps
+
+    def rows(self, block: int) -> np.ndarray:
+        """Numbers of the cells of a block."""
+        if not self.columns:
+            return np.arange(block * self.size, min((block + 1) * self.size, self.cells))
+        group, place = divmod(block, self.columns)
+        column = self.columns - 1 - place if self.falling else place
+        last = min((group + 1) * self.size, self.cells // self.columns)
+        return np.arange(group * self.size, last) * self.columns + column
+
+    def after(self, block: int) -> int | None:
+        """The block that needs this one, if there is one."""
+        return block + 1 if self.columns and (block + 1) % self.columns else None
+
+    def before(self, block: int) -> int | None:
+        """The block that this one needs, if there is one."""
+        return block - 1 if self.columns and block % self.columns else None
+
+
+def block_size(scene: Scene, width: int, workers: int) -> int:
+    """Cells of a block, a multiple of the number of lanes: large enough for the lanes, small enough to lose."""
+    cells = scene.cells // (scene.shape[-1] if scene.continuation != "none" else 1)
+    lengths = scene.transient + scene.window
+    work = scene.n * max(lengths if scene.time_unit == "period" else lengths / (2.0 * math.pi), 1.0)
+    most = min(REFILLS * width, int(LONGEST / work) // width * width)
+    return max(width, min(most, math.ceil(cells / (SHARE * workers) / width) * width))

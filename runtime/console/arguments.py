@@ -1,0 +1,136 @@
+"""Values on the command line, read strictly: whole numbers, finite numbers, grids and settings."""
+
+from __future__ import annotations
+
+import re
+from argparse import ArgumentParser, ArgumentTypeError
+from typing import Any
+
+from synchain.models.inputs.arithmetic import constant
+from synchain.models.inputs.checks import shown
+from synchain.models.scenes.axis import LIMIT as AXIS_LIMIT
+from synchain.models.scenes.axis import Axis
+
+__all__ = [
+    "add_allow_code",
+    "add_scene",
+    "add_workers",
+    "folder",
+    "grid",
+    "number",
+    "positive",
+    "setting",
+    "tolerance",
+    "whole",
+]
+
+NODES = 100_000
+"""Largest number of oscillators that can be asked for."""
+
+
+def whole(text: str, most: int = NODES) -> int:
+    """A whole number of at most NODES, or of at most another limit."""
+    if not re.fullmatch(r"[+-]?[0-9]+", text):
+        raise ArgumentTypeError(f"found {shown(text)}; expected a whole number")
+    if len(text) > 9 or int(text) > most:
+        raise ArgumentTypeError(f"found {shown(text)}; expected at most {most}")
+    return int(text)
+
+
+def positive(text: str, most: int = NODES) -> int:
+    """A whole number of at least 1."""
+    value = whole(text, most)
+    if value < 1:
+        raise ArgumentTypeError(f"found {value}; expected at least 1")
+    return value
+
+
+def folder(text: str) -> str:
+    """The name of a folder, which may not exist yet."""
+    if not text.strip():
+        raise ArgumentTypeError("found an empty name; expected a folder, e.g. results")
+    return text
+
+
+def number(text: str) -> float:
+    """A finite number, or a constant such as 2*pi/5."""
+    try:
+        return constant(text)
+    except ValueError:
+        raise ArgumentTypeError(f"found {shown(text)}; expected a finite number, e.g. 1.15 or 2*pi/5") from None
+
+
+def above_zero(text: str) -> float:
+    """A finite number above 0."""
+    value = number(text)
+    if not value > 0:
+        raise ArgumentTypeError(f"found {text}; expected a number above 0")
+    return value
+
+
+def tolerance(text: str) -> float:
+    """A relative tolerance, above 0 and at most 0.1."""
+    value = number(text)
+    if not 0 < value <= 0.1:
+        raise ArgumentTypeError(f"found {text}; expected a number above 0 and at most 0.1, e.g. 1e-8")
+    return value
+
+
+def span(text: str) -> dict[str, Any]:
+    """LO:HI:N as the table from, to and count of an axis, none of whose values is built."""
+    parts = text.split(":")
+    if len(parts) != 3:
+        raise ArgumentTypeError(f"found {shown(text)}; expected LO:HI:N, e.g. 0:0.6:241")
+    low, high, count = number(parts[0]), number(parts[1]), positive(parts[2], AXIS_LIMIT)
+    if count < 2 or not low < high:
+        raise ArgumentTypeError(f"found {shown(text)}; expected LO below HI and at least 2 values")
+    return {"from": low, "to": high, "count": count}
+
+
+def spaced(text: str) -> tuple[float, ...]:
+    """LO:HI:N as N equally spaced numbers."""
+    return Axis.from_table("grid", span(text)).values
+
+
+def grid(text: str) -> tuple[float, ...]:
+    """LO:HI:N with nothing below 0: a grid of the coupling."""
+    values = spaced(text)
+    if values[0] < 0:
+        raise ArgumentTypeError(f"found {shown(text)}; expected LO of at least 0: negative coupling drives apart")
+    return values
+
+
+def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, Any]]:
+    """name=value, name=a,b,c or name=LO:HI:N."""
+    name, equals, value = text.partition("=")
+    if not (name.isidentifier() and equals and value):
+        raise ArgumentTypeError(f"found {shown(text)}; expected name=value, name=a,b,c or name=LO:HI:N, after SCENE")
+    if ":" in value:
+        return name, span(value)
+    if "," in value:
+        return name, tuple(number(part) for part in value.split(","))
+    return name, number(value)
+
+
+def add_scene(parser: ArgumentParser) -> None:
+    """Add the argument SCENE."""
+    parser.add_argument(
+        "scene", metavar="SCENE", help="a shipped name (see: synchain scenes) or a path to a .toml file"
+    )
+    add_allow_code(parser)
+
+
+def add_allow_code(parser: ArgumentParser) -> None:
+    """Add the option --allow-code, which every command obeys before it reads a scene."""
+    parser.add_argument(
+        "--allow-code",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="let the scene name this .py file as a part of its own, e.g. friction = './my_law.py'; the file is run",
+    )
+
+
+def add_workers(parser: ArgumentParser) -> None:
+    """Add the option --workers."""
+    parser.add_argument("--workers", metavar="N", type=positive, help="number of threads (default: all cores)")

@@ -1,0 +1,42 @@
+"""The frequency of the drive on the command line: set by `--omega`, whatever the model calls it, and told in reports."""
+
+from __future__ import annotations
+
+from synchain.models.scenes.scene import Scene
+
+from .outcome import WrongUse
+
+__all__ = ["at_frequency", "drive_words"]
+
+
+def at_frequency(scene: Scene, omega: float | None, where: str | None) -> dict[str, float]:
+    """The parameter that puts the drive of a scene at the frequency `omega` of the arguments, none if that is None.
+
+    Raises WrongUse if the scene of the file `where` has no drive whose frequency is a parameter, and without `omega` if an
+    axis of the scene moves the frequency or there is neither a file nor `omega`.
+    """
+    frequency = scene.drive.frequency
+    if omega is not None:
+        if frequency is None:
+            raise WrongUse(f"--omega: the oscillator of {where} {scene.drive.problem}; leave it out")
+        if not frequency.is_Symbol:
+            raise WrongUse(
+                f"--omega: the drive of {where} has the frequency {frequency}; expected one that is a parameter; "
+                "leave it out"
+            )
+        return {frequency.name: omega}
+    if where is None:
+        raise WrongUse("expected a frequency of the drive, e.g. --omega 1.4, or a SCENE")
+    names = set() if frequency is None else {s.name for s in frequency.free_symbols}
+    swept = next((axis.name for axis in scene.axes if axis.name in names), None)
+    if swept is not None:
+        raise WrongUse(f"{where} sweeps {swept}; expected one frequency of the drive, e.g. --omega 1.4")
+    return {}
+
+
+def drive_words(scene: Scene) -> str:
+    """The frequency of the drive in a headline, such as ", omega = 1.4"; nothing without one."""
+    frequency, value = scene.drive.frequency, scene.angular_frequency
+    if frequency is None or value is None:
+        return ""
+    return f", {frequency} = {value:g}" if frequency.free_symbols else f", drive frequency {value:g}"

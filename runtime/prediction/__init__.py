@@ -1,0 +1,1 @@
+"""Intervals, windows and verdicts from a spectrum alone. Simulates nothing."""

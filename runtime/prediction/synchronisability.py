@@ -1,0 +1,198 @@
+"""Whether and where a network synchronises, from the stable ranges of a master stability function, decided exactly.
+
+A transversal mode with the eigenvalue gamma < 0 sees alpha = sigma |gamma|.  The network is stable at sigma where every mode
+lies in a stable range.  For one range from a to b that is possible where the eigenratio, largest over smallest non-zero
+|gamma|, is at most b / a.  Ranges are closed here: a ratio that is exactly b / a leaves a single sigma.  Ends count as the
+exact binary numbers that the floats are, eigenvalues are exact algebraic numbers; only the reported sigma are rounded.
+
+Sources: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); Barahona & Pecora, Phys. Rev. Lett. 89, 054101 (2002): the
+eigenratio; Stefański, Perlikowski & Kapitaniak, Phys. Rev. E 75, 016210 (2007): several ranges.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import sympy as sp
+
+from synchain.models.graphs.topology import Topology
+from synchain.models.spectra.order import compare
+
+from .modes import Mode, loose_parts, transversal
+from .stable_ranges import Range, stated, widened
+
+__all__ = ["Verdict", "Window", "possible", "verdict", "windows"]
+
+ANSWERS = ("no", "undecided within the error", "yes")
+LONGEST = 60
+"""An exact ratio with more letters than this is not written out."""
+
+_EVERYTHING = Range(Fraction(0), None)
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """One interval of sigma on which every transversal mode is stable.
+
+    `low_mode` and `high_mode` are lost first beyond the ends, None where an end is 0, infinite, or the end of a grid;
+    `low_error` and `high_error` are the uncertainties of the ends, in sigma.
+    """
+
+    low: float
+    high: float
+    low_error: float
+    high_error: float
+    low_mode: Mode | None
+    high_mode: Mode | None
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Whether a network can synchronise for some sigma > 0, and why.
+
+    `answer` is one of ANSWERS; `ratio` is the exact eigenratio where it is short, `ratio_value` its float (nan without
+    coupled modes), `allowed` the largest ratio of the ends of a range; `slowest` and `fastest` are the modes of smallest and
+    largest |gamma|; `windows` hold for the ranges as stated.
+    """
+
+    answer: str
+    ratio: sp.Expr | None
+    ratio_value: float
+    allowed: float
+    slowest: Mode | None
+    fastest: Mode | None
+    windows: tuple[Window, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _End:
+    """sigma = alpha / |gamma| of a mode at an end of a range; without a mode it is 0, or infinite for an open range."""
+
+    range: Range
+    upper: bool
+    mode: Mode | None
+
+    @property
+    def sigma(self) -> float:
+        alpha = self.range.high if self.upper else self.range.low
+        if alpha is None:
+            return math.inf
+        return float(alpha) / self.mode.size if self.mode else 0.0
+
+    @property
+    def error(self) -> float:
+        return self.range.errors[self.upper] / self.mode.size if self.mode else 0.0
+
+
+def windows(
+    ranges: Sequence[tuple[float, float]], graph: Topology, errors: Sequence[tuple[float, float]] | None = None
+) -> tuple[Window, ...]:
+    """The intervals of sigma >= 0, ascending, on which every transversal mode lies in one of the stable ranges of alpha.
+
+    `ranges` are disjoint and ascending, the last may end at math.inf; `errors` are the uncertainties of their ends, which
+    those of sigma follow to first order.  A part of the network that nothing couples to the rest asks that alpha = 0 be
+    stable.  Raises ValueError for ranges or errors that are no such intervals, and for eigenvalues that are complex or
+    positive.
+    """
+    return tuple(_window(low, high) for low, high in _intersection(stated(ranges, errors), graph))
+
+
+def verdict(
+    ranges: Sequence[tuple[float, float]], graph: Topology, errors: Sequence[tuple[float, float]] | None = None
+) -> Verdict:
+    """Whether a network can synchronise for some sigma > 0, decided exactly; arguments and errors as of `windows`.
+
+    "yes" holds for all, "no" for none of the ranges within the errors, otherwise it is "undecided within the error".
+    """
+    given = stated(ranges, errors)
+    modes = sorted(_real_modes(graph), key=lambda mode: mode.size)
+    slowest, fastest = (modes[0], modes[-1]) if modes else (None, None)
+    certain, maybe = (possible(widened(given, sign), graph) for sign in (-1, 1))
+    return Verdict(
+        ANSWERS[certain + maybe],
+        _exact_ratio(slowest, fastest),
+        fastest.size / slowest.size if slowest and fastest else math.nan,
+        max((r.ratio for r in given), default=math.nan),
+        slowest,
+        fastest,
+        windows(ranges, graph, errors),
+    )
+
+
+def possible(ranges: Sequence[Range], graph: Topology) -> bool:
+    """True where some sigma > 0 puts every mode of a graph into one of the exact ranges."""
+    return any(_follows(high) for _, high in _intersection(ranges, graph))
+
+
+def _follows(high: _End) -> bool:
+    """True where an upper end lies above sigma = 0."""
+    return high.range.high is None or (high.mode is not None and high.range.high > 0)
+
+
+def _intersection(ranges: Sequence[Range], graph: Topology) -> list[tuple[_End, _End]]:
+    """The windows by their exact ends."""
+    modes = _real_modes(graph)
+    if loose_parts(graph) and not any(r.low == 0 for r in ranges):
+        return []
+    allowed = [(_End(_EVERYTHING, False, None), _End(_EVERYTHING, True, None))]
+    for mode in modes:
+        ends = [(_End(r, False, mode), _End(r, True, mode)) for r in ranges]
+        met = [(_later(a, c), _earlier(b, d)) for a, b in allowed for c, d in ends]
+        allowed = [(low, high) for low, high in met if _order(low, high) <= 0]
+    return allowed
+
+
+def _later(x: _End, y: _End) -> _End:
+    return y if _order(y, x) > 0 else x
+
+
+def _earlier(x: _End, y: _End) -> _End:
+    return y if _order(y, x) < 0 else x
+
+
+def _order(x: _End, y: _End) -> int:
+    """The sign of the sigma of one end minus that of another, exactly."""
+    alphas = [end.range.high if end.upper else end.range.low for end in (x, y)]
+    if alphas[0] is None or alphas[1] is None:
+        return (alphas[0] is None) - (alphas[1] is None)
+    if x.mode is None or y.mode is None:  # an end at 0
+        return (alphas[0] > 0) - (alphas[1] > 0)
+    return compare(alphas[0], x.mode.eigenvalue, alphas[1], y.mode.eigenvalue)
+
+
+def _window(low: _End, high: _End) -> Window:
+    return Window(low.sigma, high.sigma, low.error, high.error, low.mode, high.mode)
+
+
+def _real_modes(graph: Topology) -> tuple[Mode, ...]:
+    """The transversal modes; ValueError where one is complex or positive."""
+    modes = transversal(graph)
+    for mode in modes:
+        gamma = mode.eigenvalue.value
+        if isinstance(gamma, complex):
+            raise ValueError(
+                f"{graph.name}({graph.n}) has the complex eigenvalue {gamma:.6g}; expected real ones: stable ranges of real "
+                "alpha say nothing about it. Use synchain.runtime.prediction.one_way.windows_complex"
+            )
+        if gamma > 0:
+            raise ValueError(
+                f"{graph.name}({graph.n}) has the positive eigenvalue {gamma:g}, which drives oscillators apart; expected "
+                "none. If the matrix is a Laplacian D - A, negate it: the connectivity matrix is A - D"
+            )
+    return modes
+
+
+def _exact_ratio(slowest: Mode | None, fastest: Mode | None) -> sp.Expr | None:
+    """The eigenratio as a short SymPy expression, or None."""
+    if slowest is None or fastest is None:
+        return None
+    top, bottom = fastest.eigenvalue.number, slowest.eigenvalue.number
+    if not (isinstance(top, sp.Expr) and isinstance(bottom, sp.Expr)):
+        return None
+    ratio = top / bottom
+    if not ratio.has(sp.sin, sp.cos):
+        ratio = sp.expand(sp.radsimp(ratio))
+    return ratio if len(sp.sstr(ratio)) <= LONGEST else None

@@ -1,0 +1,1 @@
+"""Lyapunov and transversal exponents, master stability functions and the orbits that carry them."""

@@ -1,0 +1,132 @@
+"""What kind of motion an orbit has settled on: a fixed point, a periodic orbit locked to the drive, or neither."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import sympy as sp
+
+from synchain.models.dynamics.variational import MODE, Variation
+
+from .interpolation import exact
+from .orbits import Orbits
+
+__all__ = ["Attractor", "find_attractor", "over_one_cycle"]
+
+LONGEST = 32
+"""Longest cycle, in periods of the drive, that is looked for."""
+
+RETURN = 1e-9
+"""A cycle is closed where the state returns to within this distance relative to its size, or to within a tenth of
+rtol."""
+
+
+@dataclass(frozen=True, slots=True)
+class Attractor:
+    """The motion of one start: `kind` in words, its cycle in units of time (0: none).
+
+    propagators (2, m, p, p): those of all modes over two successive cycles; for a fixed point the matrices of the
+    variational equation, twice; None where the motion is neither.
+    """
+
+    kind: str
+    cycle: float
+    propagators: np.ndarray | None = field(default=None, repr=False)
+
+    def exponents(self) -> tuple[np.ndarray, np.ndarray]:
+        """Exponents (m,), and the difference between the two cycles as their error."""
+        if self.propagators is None:
+            raise ValueError(f"{self.kind} motion has no eigenvalues to take exponents from")
+        values = np.linalg.eigvals(self.propagators)
+        if self.cycle == 0.0:
+            found = values.real.max(axis=-1)
+        else:
+            with np.errstate(divide="ignore"):
+                found = np.log(np.abs(values).max(axis=-1)) / self.cycle
+        return found[1], np.abs(found[1] - found[0])
+
+
+def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
+    """Look for a fixed point or a cycle of 1 … LONGEST drive periods of one start, which is moved on meanwhile.
+
+    A state that comes back, but not yet closely enough, is given `patience` more periods, twice.
+    """
+    own = orbits.part([row])
+    if not any(e.has(sp.Symbol("t", real=True), *_states(own.variation)) for _, e in own.variation.matrix):
+        return _steady(own, "linear")
+    if not own.scene.forced:
+        return _fixed_point(own)
+    carrier = own.carry(own.strengths[:1])
+    closed = max(RETURN, 0.1 * own.scene.rtol)
+    for _ in range(3):
+        states = [carrier.state[0]]
+        for _ in range(LONGEST):
+            carrier.advance(own.unit)
+            states.append(carrier.state[0])
+        gaps = [_distance(state, states[-1]) for state in states[-2::-1]]
+        cycle = next((k + 1 for k, gap in enumerate(gaps) if gap < closed), 0)
+        orbits.state[row] = own.state[0] = states[-1]
+        if cycle:
+            found = np.concatenate([over_one_cycle(own, cycle) for _ in range(2)])
+            words = "periodic" if cycle == 1 else f"periodic, {cycle} drive periods"
+            return Attractor(words, cycle * own.unit, found)
+        if min(gaps) > 1e-3:
+            break
+        carrier.advance(max(1, round(patience)) * own.unit)
+    return Attractor("aperiodic", 0.0)
+
+
+def _distance(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.abs(a - b).max() / max(1e-3, np.abs(b).max()))
+
+
+def over_one_cycle(own: Orbits, cycle: int) -> np.ndarray:
+    """Propagators (1, m, p, p) of all modes over one cycle, from where the orbit is."""
+    own.chosen, own.block = exact(own.strengths), 1.0
+    own.carrier = own.carry(own.strengths)
+    total = own.propagators()
+    for _ in range(cycle - 1):
+        total = own.propagators() @ total
+    own.state = own.carrier.state
+    return total
+
+
+def _states(variation: Variation) -> list[sp.Symbol]:
+    return [sp.Symbol(name, real=True) for name in variation.orbit.state]
+
+
+def _fixed_point(own: Orbits) -> Attractor:
+    """Whether the orbit rests; the matrices of the variational equation there."""
+    rates = sp.lambdify(_symbols(own.variation), list(own.variation.orbit.rhs()), "numpy")(*_values(own))
+    if not np.abs(rates).max() < RETURN * max(1.0, np.abs(own.state).max()):
+        return Attractor("aperiodic", 0.0)
+    return _steady(own, "fixed point")
+
+
+def _steady(own: Orbits, kind: str) -> Attractor:
+    """Motion along which the variational equation does not change."""
+    matrix = _matrix(own.variation, _symbols(own.variation), _values(own), own.strengths)
+    return Attractor(kind, 0.0, np.stack([matrix, matrix]))
+
+
+def _symbols(variation: Variation) -> list[sp.Symbol]:
+    names = [*variation.orbit.state, *variation.orbit.parameters, "t"]
+    return [sp.Symbol(name, real=True) for name in names]
+
+
+def _values(own: Orbits) -> list[float]:
+    """Numbers for `_symbols` at the orbit's state."""
+    return [*own.state[0], *(own.scene.parameters[name] for name in own.variation.orbit.parameters), 0.0]
+
+
+def _matrix(variation: Variation, symbols: list[sp.Symbol], values: list[float], strengths: np.ndarray) -> np.ndarray:
+    """The matrix A (m, p, p) of the variational equation at a state, for each strength."""
+    p = variation.size // len(variation.parameters)
+    made = np.zeros((len(strengths), p, p), dtype=strengths.dtype)
+    for (r, c), e in variation.matrix:
+        if r < p and c < p:
+            at = sp.lambdify([*symbols, *MODE[:1]], e, "numpy")
+            base, slope = at(*values, 0.0), at(*values, 1.0) - at(*values, 0.0)
+            made[:, r, c] = base + slope * strengths
+    return made

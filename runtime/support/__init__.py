@@ -1,0 +1,1 @@
+"""Files, threads, status codes and checks of arrays. Knows no scene."""

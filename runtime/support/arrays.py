@@ -1,0 +1,49 @@
+"""Rows of numbers that users give: finite, in one row and, where it matters, rising."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from synchain.models.inputs.checks import positive, shown, whole
+
+__all__ = ["averaging", "numbers", "row"]
+
+
+def numbers(what: str, values: Any, *, complex_too: bool = False) -> np.ndarray:
+    """The values as an array of any shape, of floats or, where that is allowed, complex numbers; else ValueError."""
+    try:
+        found = np.asarray(values)
+        if found.dtype.kind in ("US" if complex_too else "USc") or (found.dtype.kind == "O" and None in found):
+            raise ValueError
+        return found if found.dtype.kind == "c" else found.astype(float)
+    except (TypeError, ValueError):
+        kind = "numbers" if complex_too else "real numbers"
+        raise ValueError(f"{what}: found {shown(values)}; expected {kind}") from None
+
+
+def averaging(precision: Any, periods: Any, transient: Any, seed: Any) -> tuple[float, float, float, int]:
+    """The four settings of an average along an orbit, checked: how sure, how long, after what, and the random seed."""
+    return (
+        positive("precision", precision, zero=True), positive("periods", periods),
+        positive("transient", transient, zero=True), whole("seed", seed, 0),
+    )  # fmt: skip
+
+
+def row(what: str, values: Any, least: int = 1, *, rising: bool = False, complex_too: bool = False) -> np.ndarray:
+    """The values (m,) as floats, or complex where one of them is and that is allowed; a single number is a row of one.
+
+    Raises ValueError for anything but at least `least` finite numbers in one row, with `rising` from low to high.
+    """
+    found = np.atleast_1d(numbers(what, values, complex_too=complex_too))
+    if found.ndim != 1 or len(found) < least:
+        wanted = f"a row of at least {least} number{'s' * (least > 1)}"
+        raise ValueError(
+            f"{what}: found an array of shape {np.shape(found) if np.ndim(values) else ()}; expected {wanted}"
+        )
+    if not np.all(np.isfinite(found)):
+        raise ValueError(f"{what}: found {found[~np.isfinite(found)][0]}; expected finite numbers")
+    if rising and not np.all(np.diff(found) > 0.0):
+        raise ValueError(f"{what}: found numbers that do not increase; expected them from low to high")
+    return found

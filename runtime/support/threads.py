@@ -1,0 +1,16 @@
+"""How many threads to use."""
+
+from __future__ import annotations
+
+import os
+
+from synchain.models.inputs.checks import whole
+
+__all__ = ["worker_count"]
+
+
+def worker_count(workers: int | None) -> int:
+    """Number of threads to use; ValueError for less than one, TypeError where it is no whole number."""
+    if workers is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return whole("workers", workers, 1)

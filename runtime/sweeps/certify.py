@@ -1,0 +1,83 @@
+"""What the transversal exponents say about each cell of a sweep: whether its synchronous state is stable.
+
+Two oscillators can become equal bit for bit by rounding and then stay together although the state is unstable (Pikovsky,
+Phys. Rev. Lett. 73, 2931 (1994)), and a cell that starts outside the basin or waits too short a time is not synchronous
+although the state is stable.  The exponents tell these cases apart, and let a cell that is certain to stay synchronous
+end early.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+
+from synchain.models.dynamics.variational import mode
+from synchain.models.scenes.scene import Scene
+from synchain.models.scenes.sweep import rest_in_sweep
+
+from ..cells.plan import axis_columns
+from ..results.certificate import Certificate
+from ..stability.orbits import unit_of_time
+from ..stability.transversal import Exponents, exponents
+
+__all__ = ["certify", "check_certifiable"]
+
+MOST = 10**7
+"""Cells of the largest certified sweep: exponents and verdicts of all of them are held in memory."""
+
+
+def certify(scene: Scene, *, precision: float = 2e-3, periods: float = 2000, workers: int | None = None) -> Certificate:
+    """Return the exponents of every cell's synchronous state; cells that differ only in sigma and starts share one orbit.
+
+    Of several kinds of attractor found by four starts the least stable counts.  Raises ValueError as `exponents` does.
+    """
+    check_certifiable(scene)
+    columns = axis_columns(scene)
+    own = [name for name in columns if name in scene.parameters and name != "sigma"]
+    sigma = np.broadcast_to(columns.get("sigma", np.array(scene.parameters["sigma"])), (scene.cells,))
+    groups: dict[tuple[float, ...], list[int]] = defaultdict(list)
+    for cell in range(scene.cells):
+        groups[tuple(float(columns[name][cell]) for name in own)].append(cell)
+    gamma = _transversal(scene)
+    exponent, stderr, diffusion = (np.empty(scene.cells) for _ in range(3))
+    for values, cells in groups.items():
+        asked = -sigma[cells][:, None] * gamma
+        strengths, place = np.unique(asked, return_inverse=True)
+        single = scene.replace(axes=(), zipped=False, continuation="none", **dict(zip(own, values, strict=True)))
+        found = exponents(single, strengths, precision=precision, periods=periods, workers=workers)
+        worst, error = _least_stable(found)
+        table = worst[place].reshape(asked.shape)
+        rows, worst_mode = np.arange(len(cells)), table.argmax(axis=1)
+        exponent[cells] = table[rows, worst_mode]
+        stderr[cells] = error[place].reshape(asked.shape)[rows, worst_mode]
+        diffusion[cells] = stderr[cells] ** 2 * found.time * found.averaged
+    return Certificate(exponent, stderr, diffusion)
+
+
+def check_certifiable(scene: Scene) -> None:
+    """Raise ValueError where the synchronous state of a scene has no transversal exponents."""
+    if not scene.equations.links:
+        raise ValueError("a certificate needs coupled oscillators; found a scene without links")
+    if scene.cells > MOST:
+        raise ValueError(f"a certificate needs memory for every cell; found {scene.cells}, expected at most {MOST}")
+    mode(scene.equations)
+    unit_of_time(scene)
+    frequency = scene.drive.frequency
+    rest = None if frequency is None else rest_in_sweep(frequency, scene.parameters, scene.axes, scene.zipped)
+    if rest is not None:
+        raise ValueError(f"a certificate needs a drive with a period; found {rest[0]} = {rest[1]:g} in the sweep")
+
+
+def _transversal(scene: Scene) -> np.ndarray:
+    """The transversal eigenvalues: all but one zero."""
+    spectrum = scene.topology.spectrum
+    values = [complex(v) for v, m in zip(spectrum.values, spectrum.multiplicities, strict=True) if v != 0.0 or m > 1]
+    found = np.array(values)
+    return found.real if np.all(found.imag == 0.0) else found
+
+
+def _least_stable(found: Exponents) -> tuple[np.ndarray, np.ndarray]:
+    """Exponent and error (m,) of the attractor that is least stable at each strength."""
+    means = [found.by_start[rows].mean(axis=0) for rows in found.groups]
+    return np.max(means, axis=0), found.stderr

@@ -1,0 +1,1 @@
+"""Thresholds, the universal probe, basins and the agreement of prediction and simulation."""

@@ -1,0 +1,205 @@
+"""The three-oscillator universal probe: which complex strengths of a mode synchronise, by direct simulation.
+
+Three cells in a ring with the weights a and b in its two directions have the transversal eigenvalues
+gamma = -(3/2)(a + b) ± i (sqrt(3)/2)(a - b).  With alpha + i beta = -sigma gamma and sigma = 1, a and b are
+alpha/3 ± beta/sqrt(3): the weights reach every point of the complex plane, and a network whose -sigma gamma_k all lie where
+the three synchronise should synchronise too, one-way links included (Fink, Johnson, Carroll, Mar & Pecora, Phys. Rev. E 61,
+5080 (2000)).  a and b are parameters of one kernel, so that a whole plane needs one compilation.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+import sympy as sp
+from numpy.typing import ArrayLike
+
+from synchain.codegen.kernels.sweep import emit
+from synchain.models.dynamics.equations import Equations
+from synchain.models.graphs.families import topology
+from synchain.models.mechanics.components import Edge
+from synchain.models.scenes.scene import Scene, a_scene
+
+from ..cells.buffers import Buffers
+from ..cells.plan import Plan, control_array, longest_step, plan, tolerances
+from ..support.arrays import numbers
+from ..support.status import CODES, Status, tally
+from ..sweeps.crew import Crew, Task, crew_size, feed
+from ..sweeps.progress import Hook, Reporter
+from ..sweeps.worker import Recipe, Rows
+from .threshold import Criterion, checked, offsets
+
+__all__ = ["MODE_ALPHA", "MODE_BETA", "Probe", "integrate", "ring_of_three", "universal_probe"]
+
+MODE_ALPHA = sp.Symbol("mode_alpha", real=True)
+MODE_BETA = sp.Symbol("mode_beta", real=True)
+"""Real and imaginary part of a mode's strength alpha + i beta = -sigma gamma."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Probe:
+    """Verdicts of the probe over complex strengths alpha + i beta.
+
+    alpha, beta, error and share have one shape: error is the median over the starts of the mean synchronisation error
+    (infinite where a cell did not finish), share the part of the starts that synchronised.  status (…, starts) says how each
+    cell ended.
+    """
+
+    scene: Scene
+    criterion: Criterion
+    alpha: np.ndarray = field(repr=False)
+    beta: np.ndarray = field(repr=False)
+    error: np.ndarray = field(repr=False)
+    share: np.ndarray = field(repr=False)
+    status: np.ndarray = field(repr=False)
+
+    @property
+    def synchronous(self) -> np.ndarray:
+        """True where at least half of the starts synchronised, as in `synchain.runtime.synchronisation.threshold`."""
+        return self.share >= 0.5
+
+
+def universal_probe(
+    scene: Scene,
+    alpha: ArrayLike,
+    beta: ArrayLike,
+    *,
+    criterion: Criterion | None = None,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    show_progress: bool | None = None,
+    progress: Hook | None = None,
+) -> Probe:
+    """Simulate three oscillators at the mode strengths alpha + i beta: arrays that are broadcast, negative numbers allowed.
+
+    Oscillator, coupling and parameters are those of the scene; its network, axes, start and sigma are not used.  The starts
+    are those of `synchain.runtime.synchronisation.threshold`; `workers`, `executor`, `show_progress` and `progress` those of `run`.
+
+    Raises ValueError for strengths that are not finite or none at all, for a scene without coupling, and for a coupling that
+    is not proportional to sigma and to the weight of a link.
+    """
+    criterion = checked(criterion)
+    real, imaginary = _broadcast(alpha, beta)
+    three = a_scene(scene).replace(
+        topology=topology("ring", 3), initial=None, axes=(), zipped=False, continuation="none", record=("sync_error",),
+        transient=criterion.transient, window=criterion.window, rtol=criterion.rtol,
+    )  # fmt: skip
+    equations = ring_of_three(three.equations)
+    cells = _cells(three, equations.parameters, real.reshape(-1), imaginary.reshape(-1), criterion)
+    limits = tolerances(three, np.empty((0, 0)))
+    control = control_array(*limits, longest_step(three), three.max_steps)
+    error, status = integrate(
+        Rows(equations, three.integrator, cells, control), workers=workers, executor=executor, show_progress=show_progress,
+        progress=progress,
+    )  # fmt: skip
+    shape = (*real.shape, criterion.starts)
+    error, status = error.reshape(shape), status.reshape(shape)
+    share = np.asarray((error < criterion.tolerance).mean(axis=-1))
+    return Probe(scene, criterion, real, imaginary, np.asarray(np.median(error, axis=-1)), share, status)
+
+
+def ring_of_three(equations: Equations) -> Equations:
+    """Return three nodes in a ring, with links of the weight alpha/3 + beta/sqrt(3) one way and alpha/3 - beta/sqrt(3) back.
+
+    The parameters `mode_alpha` and `mode_beta` take the place of sigma; the weight of a link, 1 or -1, is its direction.
+    Raises ValueError where there is no coupling, where a link is not proportional to sigma and to its weight or does not
+    vanish between equal states, and where the model uses one of the two names itself.
+    """
+    equations.expect_alike("the three-oscillator probe")
+    edge = equations.edge
+    if edge is None:
+        raise ValueError("these equations have no coupling; the probe needs links")
+    _check_coupling(edge)
+    taken = {s.name for s in (*equations.node.state, *equations.node.parameters, *edge.parameters)}
+    for symbol in (MODE_ALPHA, MODE_BETA):
+        if symbol.name in taken:
+            raise ValueError(f"the name {symbol.name!r} is needed for the probe; rename it in the model")
+    strength = MODE_ALPHA / 3 + edge.weight * MODE_BETA / sp.sqrt(3)
+    unit = {edge.weight: sp.S.One, _sigma(edge): sp.S.One}
+    others = tuple(s for s in edge.parameters if s != _sigma(edge))
+    rates = tuple(strength * e.xreplace(unit) for e in edge.rhs)
+    turned = Edge(edge.here, edge.there, edge.weight, rates, (*others, MODE_ALPHA, MODE_BETA))
+    there = [(i, (i + 1) % 3, Fraction(1)) for i in range(3)]
+    back = [(i, (i + 2) % 3, Fraction(-1)) for i in range(3)]
+    return Equations(equations.node, turned, 3, (*there, *back))
+
+
+def _check_coupling(edge: Edge) -> None:
+    """Prove that a link is sigma times its weight times a function that is zero between equal states."""
+    strength = _sigma(edge)
+    if not edge.diffusive:
+        raise ValueError("a link acts between equal states, so complete synchronisation is no solution of this network")
+    for e in edge.rhs:
+        unit = e.xreplace({edge.weight: sp.S.One, strength: sp.S.One})
+        if sp.simplify(e - strength * edge.weight * unit) != 0:
+            raise ValueError(f"the coupling {e} is not proportional to sigma and the weight; a mode has no strength")
+
+
+def _sigma(edge: Edge) -> sp.Symbol:
+    found = [s for s in edge.parameters if s.name == "sigma"]
+    if not found:
+        names = ", ".join(s.name for s in edge.parameters) or "nothing"
+        raise ValueError(f"links depend on {names}; expected sigma, the strength of a coupling")
+    return found[0]
+
+
+def _broadcast(alpha: ArrayLike, beta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Both parts of the strengths in one shape; ValueError where they have none, are empty or not finite."""
+    parts = numbers("alpha", alpha), numbers("beta", beta)
+    for part in parts:
+        if part.size == 0:
+            raise ValueError("alpha and beta: found no values; expected at least one of each")
+        if not np.isfinite(part).all():
+            raise ValueError("alpha and beta: found a value that is not finite; expected numbers")
+    try:
+        real, imaginary = np.broadcast_arrays(*parts)
+    except ValueError:
+        shapes = " and ".join(str(part.shape) for part in parts)
+        raise ValueError(f"alpha and beta: found the shapes {shapes}; expected shapes that fit together") from None
+    return np.array(real), np.array(imaginary)
+
+
+def _cells(scene: Scene, names: tuple[str, ...], alpha: np.ndarray, beta: np.ndarray, criterion: Criterion) -> Plan:
+    """Rows of every strength and start, the starts fastest; a start moves all oscillators alike in the position."""
+    one, starts = plan(scene), criterion.starts
+    count = len(alpha) * starts
+    values = {**scene.parameters, MODE_ALPHA.name: 0.0, MODE_BETA.name: 0.0}
+    numbers = np.tile([values[name] for name in names], (count, 1))
+    numbers[:, names.index(MODE_ALPHA.name)] = np.repeat(alpha, starts)
+    numbers[:, names.index(MODE_BETA.name)] = np.repeat(beta, starts)
+    start = np.tile(one.start, (count, 1))
+    start[:, : scene.n] += np.tile(offsets(criterion), len(alpha))[:, None]
+    return Plan(start, numbers, np.tile(one.spans, (count, 1)))
+
+
+def integrate(
+    rows: Rows, width: int | None = None, *, workers: int | None = None, executor: Executor | None = None,
+    show_progress: bool | None = None, progress: Hook | None = None,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Run all rows; returns mean synchronisation error (cells,), infinite where unfinished, and status (cells,)."""
+    count, threads = len(rows.plan.start), crew_size(executor, workers)
+    reporter = Reporter(count, show_progress, progress)
+    source = emit(rows.equations, rows.integrator, ("sync_error",), width=width)
+    crew = Crew(Recipe.of(rows, source.width, source.digest).opened(), executor, threads)
+    error, status = np.full(count, np.inf), np.full(count, int(Status.NOT_RUN))
+    size = source.width * min(
+        16, math.ceil(count / (8 * threads * source.width))
+    )  # whole lanes, enough blocks to share
+
+    def finish(task: Task, made: Buffers) -> None:
+        status[task.cells] = made.counts[:, 0]
+        error[task.cells] = np.where(made.counts[:, 0] == Status.FINISHED, made.sums[:, 0], np.inf)
+        reporter.add(tally(made.counts[:, 0]))
+
+    try:
+        reporter.start(np.zeros(CODES, dtype=np.int64))
+        cells = (np.arange(first, min(first + size, count)) for first in range(0, count, size))
+        feed(crew, (Task(block, own) for block, own in enumerate(cells)), finish)
+    finally:
+        crew.close()
+        reporter.close()
+    return error, status

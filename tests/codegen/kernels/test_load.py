@@ -1,0 +1,450 @@
+"""Compiled kernels on disk: loaded again, repaired, refused, and shared between processes."""
+
+from __future__ import annotations
+
+import dataclasses
+import errno
+import importlib.util
+import json
+import math
+import os
+import pickle
+import py_compile
+import shutil
+import stat
+import subprocess
+import sys
+import textwrap
+import warnings
+from pathlib import Path
+
+import numba
+import pytest
+import sympy as sp
+from samples import drive, friction_chain, harmonic_chain, real
+
+from synchain.codegen.kernels import cache
+from synchain.codegen.kernels import compile as loading
+from synchain.codegen.kernels.sweep import emit
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import Node
+
+x, v = real("x", "v")
+SWING = Equations(Node((x, v), (v, -x), ()), None, 1)
+REAL = emit(SWING, "cash_karp", (), width=1)
+MORE = ", ".join(f"more_{i}" for i in range(len(loading.SIGNATURE.args) - 7))
+TINY = """
+from numba import njit
+
+
+@njit(error_model="numpy", nogil=True, cache=True)
+def drive(first, last, start, numbers, spans, control, end, MORE):
+    for i in range(first, last):
+        end[i, 0] = 2.0 * start[i, 0]
+        end[i, 1] = 3.0 * start[i, 1]
+""".replace("MORE", MORE)
+SOURCE = dataclasses.replace(REAL, text=TINY)
+"""A module with the entry point of a kernel that compiles ten times faster than one."""
+
+HERE = Path(__file__).parent
+
+PROGRAM = textwrap.dedent(
+    """
+    import json, os, sys, warnings
+    sys.path[:0] = sys.argv[1].split(os.pathsep)
+    from test_load import REAL, SOURCE, drive
+    from synchain.codegen.kernels.compile import load
+    source = REAL if sys.argv[2:] else SOURCE
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        k = load(source)
+    end = drive(k, [[1.0, 2.0]], [[]], [(0.0, 1.0)], 1e-9).end[0]
+    stats = k.entry.stats
+    print(json.dumps({"end": list(end), "hits": sum(stats.cache_hits.values()), "from_cache": k.from_cache,
+                      "misses": sum(stats.cache_misses.values()), "path": k.path, "digest": k.digest,
+                      "warnings": [str(w.message) for w in caught]}))
+    """
+)
+
+
+def start(folder: Path, *arguments: str) -> subprocess.Popen:
+    """A process that loads the kernel and runs it; with an argument, the real one."""
+    return subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, os.pathsep.join(map(str, (HERE, HERE.parents[1]))), *arguments],
+        env={**os.environ, "SYNCHAIN_CACHE": str(folder)}, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+
+
+def finish(process: subprocess.Popen, end: tuple[float, float] = (2.0, 6.0)) -> dict:
+    text, _ = process.communicate(timeout=120)
+    assert process.returncode == 0
+    report = json.loads(text)
+    assert report["end"] == pytest.approx(end, abs=1e-8)
+    return report
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch) -> Path:
+    """An empty cache folder for this process."""
+    place = tmp_path / "kernels"
+    monkeypatch.setenv("SYNCHAIN_CACHE", str(place))
+    return place
+
+
+def fresh(source=SOURCE):
+    """Load without what this process remembers."""
+    loading._load.cache_clear()
+    return loading.load(source)
+
+
+def works(compiled) -> bool:
+    return drive(compiled, [[1.0, 2.0]], [[]], [(0.0, 1.0)], 1e-9).end[0].tolist() == [2.0, 6.0]
+
+
+def machine_code(place: Path) -> list[Path]:
+    return sorted(place.glob("kernel_*.code"))
+
+
+@pytest.fixture(scope="module")
+def compiled_folder(tmp_path_factory) -> Path:
+    """A folder that a first process has filled."""
+    place = tmp_path_factory.mktemp("shared") / "kernels"
+    report = finish(start(place))
+    assert (report["hits"], report["misses"], report["from_cache"]) == (0, 1, False)
+    assert Path(report["path"]).parent == place
+    return place
+
+
+def copied(source: Path, target: Path) -> None:
+    """Copy a cache with its times: Numba compares those of the module file."""
+    shutil.copytree(source, target)
+
+
+# -- the good cases ------------------------------------------------------------------------------------------
+
+
+def test_a_second_process_loads_without_compiling(compiled_folder):
+    report = finish(start(compiled_folder))
+    assert (report["hits"], report["misses"], report["from_cache"]) == (1, 0, True)
+    assert report["warnings"] == []
+    assert report["digest"] == SOURCE.digest
+
+
+def test_a_real_kernel_is_loaded_without_compiling(tmp_path):
+    exact = (math.cos(1.0) + 2 * math.sin(1.0), 2 * math.cos(1.0) - math.sin(1.0))
+    reports = [finish(start(tmp_path / "kernels", "real"), exact) for _ in range(2)]
+    assert [(r["hits"], r["misses"], r["from_cache"]) for r in reports] == [(0, 1, False), (1, 0, True)]
+    assert reports[0]["end"] == reports[1]["end"]
+
+
+def test_two_processes_may_compile_at_once(folder):
+    jobs = [start(folder), start(folder)]
+    reports = [finish(job) for job in jobs]
+    assert all(r["warnings"] == [] for r in reports)
+    assert not list(folder.glob("*.tmp"))
+    assert len(list(folder.glob("kernel_*.py"))) == 1
+    assert works(fresh())
+
+
+def test_the_kernel_keeps_its_text(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    compiled = fresh()
+    assert compiled.source == SOURCE.text == Path(compiled.path).read_text(encoding="utf-8")
+    assert compiled.digest == SOURCE.digest
+    assert compiled.equations is SWING
+    assert loading.load(SOURCE) is compiled, "the same kernel is loaded once"
+    assert stat.S_IMODE(Path(compiled.path).stat().st_mode) & 0o077 == 0
+
+
+def test_digests_are_stable_and_tell_kernels_apart():
+    assert emit(SWING, "cash_karp", (), width=1).digest == REAL.digest
+    others = [
+        emit(SWING, "dop853", (), width=1),
+        emit(SWING, "cash_karp", (), width=2),
+        emit(SWING, "cash_karp", ("trajectory",), width=1),
+        emit(SWING, "cash_karp", ("section",), sp.Symbol("v_1"), width=1),
+        emit(friction_chain(1), "cash_karp", (), width=1),
+        emit(harmonic_chain(2), "cash_karp", (), width=1),
+    ]
+    assert len({REAL.digest, *(o.digest for o in others)}) == len(others) + 1
+
+
+def test_the_file_name_follows_everything_that_shapes_machine_code(monkeypatch):
+    names = {loading._fingerprint(SOURCE)}
+    import llvmlite.binding as llvm
+    import numba
+
+    from synchain.codegen.simd import elementary, lanes
+
+    def changed(*change) -> None:
+        with monkeypatch.context() as m:
+            m.setattr(*change)
+            loading._surroundings.cache_clear()
+            names.add(loading._fingerprint(SOURCE))
+        loading._surroundings.cache_clear()
+
+    changed(numba, "__version__", "9.9")
+    changed(sys, "version", "4.0")
+    changed(llvm, "get_host_cpu_name", lambda: "abacus")
+    changed(llvm, "get_host_cpu_features", lambda: {"beads": True})
+    changed(lanes, "__file__", __file__)
+    changed(elementary, "__file__", __file__)
+    changed(loading.importlib.metadata, "version", lambda name: "9.9")
+    changed(loading.platform, "machine", lambda: "sun dial")
+    names.add(loading._fingerprint(dataclasses.replace(SOURCE, text=SOURCE.text + "\n")))
+    assert len(names) == 10
+    assert loading._fingerprint(SOURCE) in names
+
+
+# -- damage --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("damage", ["empty", "half", "noise"])
+def test_damaged_files_are_compiled_anew(compiled_folder, folder, damage):
+    copied(compiled_folder, folder)
+    (path,) = machine_code(folder)
+    whole = path.read_bytes()
+    path.write_bytes({"empty": b"", "half": whole[: len(whole) // 2], "noise": b"\x93noise" * 40}[damage])
+    compiled = fresh()
+    assert works(compiled)
+    assert not compiled.from_cache
+    assert fresh().from_cache, "the repaired cache is used"
+
+
+def test_a_changed_module_file_is_written_anew(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    path = next(folder.glob("kernel_*.py"))
+    path.write_text(path.read_text().replace("2.0", "2.5") + "\nraise SystemExit('not ours')\n")
+    assert works(fresh())
+    assert path.read_text() == SOURCE.text
+
+
+def test_missing_machine_code_is_no_problem(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    for path in machine_code(folder):
+        path.unlink()
+    assert works(fresh())
+
+
+def test_one_wrong_bit_in_machine_code_is_not_run(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    (path,) = machine_code(folder)
+    content = bytearray(path.read_bytes())
+    content[2 * len(content) // 3] ^= 4
+    path.write_bytes(content)
+    compiled = fresh()
+    assert not compiled.from_cache
+    assert works(compiled)
+    assert fresh().from_cache
+
+
+def test_machine_code_of_another_kernel_is_not_run(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    other = dataclasses.replace(SOURCE, text=TINY.replace("2.0", "5.0"))
+    (theirs,) = machine_code(folder)
+    mine = Path(fresh(other).path).with_suffix(".code")
+    shutil.copyfile(theirs, mine)
+    again = fresh(other)
+    assert drive(again, [[1.0, 2.0]], [[]], [(0.0, 1.0)], 1e-9).end[0].tolist() == [5.0, 6.0]
+
+
+def test_an_index_of_numba_is_not_read(compiled_folder, folder, tmp_path):
+    """Numba's index is a pickle, which may run anything when it is read."""
+    copied(compiled_folder, folder)
+    (folder / "__pycache__").mkdir(exist_ok=True)
+    touch = f"import pathlib; pathlib.Path({str(tmp_path / 'ran')!r}).touch()"
+    evil = pickle.dumps(numba.__version__) + pickle.dumps(Runs(touch))
+    (name,) = (path.stem for path in folder.glob("kernel_*.py"))
+    line = TINY[: TINY.index("@njit")].count("\n") + 1
+    version = f"py{sys.version_info.major}{sys.version_info.minor}"
+    (folder / "__pycache__" / f"{name}.drive-{line}.{version}.nbi").write_bytes(evil)
+    for path in machine_code(folder):
+        path.unlink()
+    assert works(fresh())
+    assert not (tmp_path / "ran").exists()
+
+
+class Runs:
+    """An object whose pickle runs a line of Python when it is read."""
+
+    def __init__(self, line: str) -> None:
+        self.line = line
+
+    def __reduce__(self):
+        return exec, (self.line,)
+
+
+def test_what_python_keeps_beside_a_module_is_not_run(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    path = next(folder.glob("kernel_*.py"))
+    status = path.stat()
+    evil = folder / "evil.py"
+    evil.write_text("raise SystemExit('not ours')")
+    py_compile.compile(str(evil), importlib.util.cache_from_source(path))
+    stale = Path(importlib.util.cache_from_source(path))
+    head = stale.read_bytes()
+    stamp = (int(status.st_mtime) & 0xFFFFFFFF).to_bytes(4, "little") + status.st_size.to_bytes(4, "little")
+    stale.write_bytes(head[:8] + stamp + head[16:])
+    assert works(fresh())
+
+
+def test_a_cache_of_numba_elsewhere_is_not_used(folder, tmp_path, monkeypatch):
+    elsewhere = tmp_path / "elsewhere"
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(elsewhere))
+    assert works(fresh())
+    assert not elsewhere.exists()
+    assert machine_code(folder)
+    assert str(elsewhere) == numba.config.CACHE_DIR
+
+
+def test_another_processor_compiles_its_own(compiled_folder, folder, monkeypatch):
+    copied(compiled_folder, folder)
+    monkeypatch.setattr("llvmlite.binding.get_host_cpu_name", lambda: "abacus")
+    loading._surroundings.cache_clear()
+    try:
+        compiled = fresh()
+        assert not compiled.from_cache
+        assert works(compiled)
+    finally:
+        monkeypatch.undo()
+        loading._surroundings.cache_clear()
+    assert len(list(folder.glob("kernel_*.py"))) == 2
+
+
+def test_a_full_disk_is_no_problem(folder, monkeypatch):
+    def full(opened: cache.Folder, name: str, data: bytes) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", name)
+
+    monkeypatch.setattr(cache.Folder, "write", full)
+    warned("No space left on device")
+
+
+def test_a_kernel_that_cannot_be_compiled_is_an_error(folder):
+    broken = dataclasses.replace(SOURCE, text=TINY.replace("2.0", "undefined_name"))
+    with pytest.raises(Exception, match="undefined_name"):
+        fresh(broken)
+
+
+# -- places that cannot be used ------------------------------------------------------------------------------
+
+posix = pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs POSIX permissions")
+
+
+def warned(match: str):
+    with pytest.warns(RuntimeWarning, match=match) as caught:
+        compiled = fresh()
+    assert len(caught) == 1
+    assert "kernels are not kept on disk" in str(caught[0].message)
+    assert works(compiled)
+    return compiled
+
+
+@posix
+@pytest.mark.parametrize("mode", [0o777, 0o720, 0o702])
+def test_a_folder_that_others_can_write_is_refused(compiled_folder, folder, mode):
+    copied(compiled_folder, folder)
+    folder.chmod(mode)
+    compiled = warned(r"can be written by others; run: chmod go-w")
+    assert Path(compiled.path).parent != folder
+    assert not compiled.from_cache
+
+
+@posix
+@pytest.mark.parametrize("suffix", ["code", "py"])
+def test_a_file_that_others_can_write_is_refused(compiled_folder, folder, suffix):
+    copied(compiled_folder, folder)
+    next(folder.glob(f"kernel_*.{suffix}")).chmod(0o666)
+    assert not warned("can be written by others; run: chmod go-w").from_cache
+
+
+@posix
+@pytest.mark.parametrize("mode", [0o777, 0o775])
+def test_a_folder_that_others_can_replace_is_refused(mode, tmp_path, monkeypatch):
+    (tmp_path / "open" / "inner").mkdir(parents=True)
+    (tmp_path / "open").chmod(mode)
+    monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path / "open" / "inner" / "kernels"))
+    warned("which others can write; run: chmod go-w")
+    (tmp_path / "open").chmod(0o1777)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert works(fresh())
+
+
+@posix
+@pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="only root gives folders away")
+def test_a_folder_in_the_folder_of_another_user_is_refused(tmp_path, monkeypatch):
+    """The owner of a folder can put another one in the place of any that lies in it."""
+    (tmp_path / "theirs" / "inner").mkdir(parents=True)
+    os.chown(tmp_path / "theirs", 4711, 4711)
+    (tmp_path / "link").symlink_to(tmp_path / "theirs" / "inner")
+    for way in ("theirs/inner", "link"):
+        monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path / way / "kernels"))
+        warned(f"lies in {tmp_path / 'theirs'}, which belongs to another user; set SYNCHAIN_CACHE")
+
+
+@posix
+def test_another_folder_in_the_place_of_an_open_one_is_not_read(tmp_path):
+    """A swap between the check of a folder and the reading of its files changes nothing."""
+    with cache.open_folder(tmp_path / "kernels") as opened:
+        opened.keep("kernel_a", b"mine")
+        (tmp_path / "kernels").rename(tmp_path / "aside")
+        with cache.open_folder(tmp_path / "kernels") as evil:
+            evil.keep("kernel_a", b"theirs")
+        assert opened.machine_code("kernel_a") == b"mine"
+        opened.write("kernel_b.py", b"b")
+    assert (tmp_path / "aside" / "kernel_b.py").exists()
+
+
+@posix
+def test_missing_parents_are_made_for_the_user_alone(tmp_path, monkeypatch):
+    before = os.umask(0o002)
+    try:
+        with cache.open_folder(tmp_path / "a" / "b" / "kernels"):
+            assert stat.S_IMODE((tmp_path / "a").stat().st_mode) == 0o700
+    finally:
+        os.umask(before)
+
+
+@posix
+@pytest.mark.parametrize("suffix", ["code", "py"])
+def test_a_pipe_in_the_place_of_a_file_does_not_keep_anybody_waiting(compiled_folder, folder, suffix):
+    copied(compiled_folder, folder)
+    path = next(folder.glob(f"kernel_*.{suffix}"))
+    path.unlink()
+    os.mkfifo(path, 0o600)
+    assert not warned("is a pipe or device; expected a file").from_cache
+
+
+def test_a_read_only_folder_is_no_problem(folder, monkeypatch):
+    folder.mkdir()
+    monkeypatch.setattr(cache.os, "access", lambda path, mode: False)
+    warned("is read-only; set SYNCHAIN_CACHE to a folder you can write")
+    assert not list(folder.iterdir())
+
+
+def test_a_folder_of_somebody_else_is_refused(folder, monkeypatch):
+    monkeypatch.setattr(cache.os, "getuid", lambda: 4711, raising=False)
+    warned("belongs to another user; set SYNCHAIN_CACHE to a folder of yours")
+
+
+def test_a_file_in_the_place_of_the_folder_is_no_problem(folder):
+    folder.write_text("no folder")
+    warned("exists")
+    assert folder.read_text() == "no folder"
+
+
+def test_a_missing_home_is_no_problem(monkeypatch):
+    def homeless() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("SYNCHAIN_CACHE", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", homeless)
+    warned("Could not determine home directory")
+
+
+def test_a_good_folder_gives_no_warning(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert fresh().from_cache

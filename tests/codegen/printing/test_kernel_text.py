@@ -1,0 +1,118 @@
+"""The text of kernels: the same everywhere, what its header says, what it leaves out, and what is refused."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import sympy as sp
+from samples import CASES, TABLE, friction_chain, real
+
+from synchain.codegen.kernels.sweep import emit
+from synchain.codegen.printing import printer
+from synchain.models import chain
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import Node
+from synchain.models.scenes.scene import Scene
+
+V_1 = sp.Symbol("v_1", real=True)
+
+
+def test_golden_kernels(golden):
+    golden("chain_2_rodas5p.txt", emit(friction_chain(2), "rodas5p", ("sync_error", "section"), V_1, width=8).text)
+    golden("chain_1_dop853.txt", emit(friction_chain(1), "dop853", (), width=4).text)
+
+
+def test_text_does_not_depend_on_the_hash_seed():
+    program = (
+        "import sys; sys.path.insert(0, sys.argv[1]); from samples import *\n"
+        "from synchain.codegen.kernels.sweep import emit\n"
+        "for eq in (CASES['looped'], CASES['friction 3']):\n"
+        "    for m in ('cash_karp', 'rodas5p'): print(emit(eq, m, ('section', 'trajectory'), "
+        "sp.Symbol(eq.state[-1], real=True) - sp.Rational(1, 3), width=2).text)\n"
+    )
+    here = str(Path(__file__).parents[2])
+    jobs = [
+        subprocess.Popen(
+            [sys.executable, "-c", program, here], env={**os.environ, "PYTHONHASHSEED": seed}, stdout=subprocess.PIPE
+        )
+        for seed in ("0", "4711")
+    ]
+    texts = [job.communicate(timeout=120)[0] for job in jobs]
+    assert all(job.returncode == 0 for job in jobs)
+    assert len(texts[0]) > 100_000
+    assert texts[0] == texts[1]
+
+
+def test_the_header_says_what_runs():
+    source = emit(friction_chain(2), "rodas5p", ("section", "sync_error"), V_1)
+    head = source.text.split('"""')[1]
+    assert "2 oscillators, 2 links, rodas5p" in head
+    assert source.equations.digest[:16] in head
+    assert "State       x_1, x_2, v_1, v_2\n" in head
+    assert f"Parameters  {', '.join(TABLE)}\n" in head
+    assert "Records     final state, sync_error, section\n" in head
+    assert "BIT Numerical Mathematics 63, 27 (2023)" in head
+
+
+def test_records_that_are_not_wanted_cost_nothing():
+    text = emit(friction_chain(1), "cash_karp", (), width=4).text
+    for flag in ("SYNC_ERROR", "SECTION", "TRAJECTORY", "DENSE"):
+        assert f"\n{flag} = False\n" in text
+    assert "def section(" not in text
+    assert "\nDENSE = True\n" in emit(friction_chain(1), "cash_karp", ("trajectory",), width=4).text
+
+
+def test_unforced_equations_have_no_time_terms():
+    x, v = real("x", "v")
+    text = emit(Equations(Node((x, v), (v, -sp.sin(x)), ()), None, 1), "rodas5p").text.split("def step")[1]
+    assert "cos(t" not in text
+    assert "*h*w" not in text
+
+
+def test_slopes_without_state_are_lanes():
+    # where all stages were plain numbers, the functions of lanes would refuse them
+    for method in ("cash_karp", "dop853"):
+        assert "k1_phase_1 = broadcast(1.0, WIDTH)" in emit(CASES["tanh pair"], method).text
+
+
+# -- refusals ------------------------------------------------------------------------------------------------
+
+
+def test_unknown_names_are_refused():
+    with pytest.raises(ValueError, match=r"unknown record 'sync'; known: sync_error, section, trajectory"):
+        emit(friction_chain(1), "rodas5p", ("sync",))
+    with pytest.raises(
+        ValueError,
+        match=r"unknown integrator 'rk4'; known: cash_karp, dop853, rodas4, rodas5p, rodas6p, ros34pw2, switching",
+    ):
+        emit(friction_chain(1), "rk4")
+
+
+def test_sections_are_checked():
+    with pytest.raises(ValueError, match="record 'section' needs a section function, for example v_1"):
+        emit(friction_chain(1), "rodas5p", ("section",))
+    with pytest.raises(
+        ValueError, match=r"section function v_2: unknown symbol 'v_2'; use the state, parameters and t"
+    ):
+        emit(friction_chain(1), "rodas5p", ("section",), sp.Symbol("v_2", real=True))
+    with pytest.raises(printer.UnprintableError, match="floating-point number"):
+        emit(friction_chain(1), "rodas5p", ("section",), V_1 - sp.Float(0.5))
+
+
+def test_what_cannot_be_printed_is_refused():
+    x = real("x")[0]
+    with pytest.raises(printer.UnprintableError, match="no printing rule for gamma"):
+        emit(Equations(Node((x,), (sp.gamma(x),), ()), None, 1))
+
+
+def test_the_head_of_a_kernel_names_the_states_that_are_called_otherwise():
+    for n in (2, 9):
+        head = emit(Scene(oscillator="lorenz", topology=chain(n), coupling="x->x").equations).text.split("import math")[
+            0
+        ]
+        (line,) = (row for row in head.splitlines() if row.startswith("Renamed"))
+        assert line == "Renamed     " + ", ".join(f"y_{i + 1} as y__{i + 1}" for i in range(n))

@@ -1,0 +1,278 @@
+"""Generated text, run by Python itself in 50 digits, against the equations it was made from."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import random
+import sys
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+from mpmath import mp, mpf
+from samples import (
+    CASES,
+    DIGITS,
+    TABLE,
+    UNEQUAL,
+    friction_chain,
+    harmonic_chain,
+    plain,
+    real,
+    take_step,
+    third_order,
+    waving,
+)
+
+from synchain.codegen import integrators
+from synchain.codegen.kernels.sweep import emit
+from synchain.codegen.printing import printer
+from synchain.codegen.steps.places import by_joint
+from synchain.codegen.steps.program import program
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import TIME
+
+SMALL = mpf(10) ** -38
+NETWORKS = {**CASES, **UNEQUAL}
+
+
+@pytest.fixture(autouse=True)
+def _fifty_digits():
+    with mp.workdps(50):
+        yield
+
+
+@pytest.fixture
+def exact_numbers(monkeypatch):
+    """Print every constant as a product that keeps all digits, so that only the structure of the text is tested."""
+    rounded = printer._number
+
+    def exact(e: sp.Expr) -> tuple[str, int]:
+        if e.is_Integer or (e.is_Rational and float(e) == e):
+            return rounded(e)
+        return f"exact({str(e)!r})", printer.ATOM
+
+    monkeypatch.setattr(printer, "_number", exact)
+
+
+EXACT = {**DIGITS, "exact": lambda text: mpmath.mpmathify(sp.N(sp.sympify(text), 60))}
+
+
+# -- references that know nothing of the code generator -------------------------------------------------------
+
+
+@dataclasses.dataclass(frozen=True)
+class Right:
+    """Right-hand side by mpmath; its derivatives by differences in 100 digits."""
+
+    rhs: object
+    p: list
+
+    @classmethod
+    def of(cls, eq: Equations, p: list) -> Right:
+        symbols = [TIME, *(sp.Symbol(s, real=True) for s in (*eq.state, *eq.parameters))]
+        forces = sp.lambdify(symbols, list(eq.rhs()), "mpmath")
+        if not eq.inertial:
+            return cls(forces, p)
+        mass = sp.lambdify(symbols, sp.Matrix(sp.SparseMatrix(len(eq.state), len(eq.state), eq.mass())), "mpmath")
+        return cls(lambda *at: mpmath.lu_solve(mass(*at), mpmath.matrix(forces(*at))), p)
+
+    def __call__(self, t, y) -> list:
+        return [mpf(f) for f in self.rhs(t, *y, *self.p)]
+
+    def jacobian(self, t, y) -> mpmath.matrix:
+        size = len(y)
+        table = mpmath.matrix(size, size)
+        for c in range(size):
+            for r, d in enumerate(self.slope(lambda e, c=c: self(t, [u + e * (k == c) for k, u in enumerate(y)]))):
+                table[r, c] = d
+        return table
+
+    def time_derivative(self, t, y) -> list:
+        return self.slope(lambda e: self(t + e, y))
+
+    @staticmethod
+    def slope(function) -> list:
+        with mp.workdps(100):
+            e = mpf(10) ** -25
+            return [(8 * (a - b) - (c - d)) / (12 * e) for a, b, c, d in
+                    zip(function(e), function(-e), function(2 * e), function(-2 * e), strict=True)]  # fmt: skip
+
+
+def weighted(row, stages, size):
+    return [mpmath.fsum(mpf(w) * k[i] for w, k in zip(row, stages, strict=False)) for i in range(size)]
+
+
+def explicit_reference(m, f: Right, t, h, y) -> tuple[list, list, list]:
+    """New state, error and dense coefficients from the definition in the docstring of Integrator."""
+    size, k = len(y), []
+    for a, c in zip(m.a, m.c, strict=True):
+        k.append(f(t + mpf(c) * h, [u + h * d for u, d in zip(y, weighted(a, k, size), strict=True)]))
+    new = [u + h * d for u, d in zip(y, weighted(m.b, k, size), strict=True)]
+    rows = [weighted(e, k, size) for e in m.e]
+    error = [abs(h * e) for e in rows[0]]
+    if len(rows) == 2:
+        pairs, tiny = zip(*rows, strict=True), mpf(2.2250738585072014e-308)
+        error = [h * e**2 / mpmath.sqrt(e**2 + mpf(0.01) * g**2 + tiny) for e, g in pairs]
+    return new, error, [h * d for row in m.dense for d in weighted(row, k, size)]
+
+
+def rosenbrock_reference(m, f: Right, t, h, y, eq: Equations) -> tuple[list, list, list]:
+    size, k = len(y), []
+    shift = 1 / (h * mpf(m.gamma))
+    jacobian = f.jacobian(t, y)
+    node = [int(name.rpartition("_")[2]) for name in eq.state]
+    for i, j in itertools.product(range(size), repeat=2):
+        if m.inexact and node[i] != node[j]:
+            jacobian[i, j] = 0
+    matrix = shift * mpmath.eye(size) - jacobian
+    slope = f.time_derivative(t, y)
+    for i, c in enumerate(m.c):
+        at = [u + d for u, d in zip(y, weighted(m.a[i], k, size), strict=True)]
+        right, old = f(t + mpf(c) * h, at), weighted(m.big_c[i], k, size)
+        right = [r + o / h + h * mpf(m.d[i]) * s for r, o, s in zip(right, old, slope, strict=True)]
+        k.append(list(mpmath.lu_solve(matrix, mpmath.matrix(right))))
+    new = [u + d for u, d in zip(y, weighted(m.b, k, size), strict=True)]
+    return new, [abs(e) for e in weighted(m.e[0], k, size)], [d for row in m.dense for d in weighted(row, k, size)]
+
+
+def states(eq: Equations, seed: int) -> tuple[list, list]:
+    """Random state and parameters; those of the friction oscillator have all sizes of |v_r|, some below 1/kappa."""
+    dice = random.Random(seed)
+    p = [mpf(dice.uniform(0.2, 1.5)) for _ in eq.parameters]
+    y = [mpf(dice.uniform(-1.0, 1.0)) for _ in eq.state]
+    if "kappa" in eq.parameters:
+        p = [mpf(TABLE[name]) for name in eq.parameters]
+        reach = [mpf("0.3"), mpf("3e-6"), mpf("-7e-6"), mpf("-2e-5"), mpf("1e-9"), mpf("-0.8")]
+        for i in range(eq.n):
+            y[eq.n + i] = p[0] - reach[(seed + i) % len(reach)]
+    return y, p
+
+
+def close(found: list, expected: list, allowed=SMALL) -> bool:
+    size = max(map(abs, expected), default=mpf(0)) + 1
+    return len(found) == len(expected) and all(
+        abs(a - b) <= allowed * size for a, b in zip(found, expected, strict=True)
+    )
+
+
+def refused(eq: Equations, m: integrators.Integrator, looped: bool) -> str:
+    """What a kernel says that cannot step a network; empty where it can."""
+    if not eq.inertial or looped:
+        return ""
+    return "found links with inertia" if m.inexact or m.smooth is not None else ""
+
+
+@pytest.mark.parametrize("looped", [False, True], ids=["written out", "looped"])
+@pytest.mark.parametrize("method", integrators.names())
+@pytest.mark.parametrize("case", NETWORKS)
+def test_a_step_is_what_its_definition_says(case, method, looped, exact_numbers, monkeypatch):
+    eq, m = NETWORKS[case], integrators.integrator(method)
+    refusal = refused(eq, m, looped)
+    if refusal:
+        monkeypatch.setattr(sys.modules["synchain.codegen.kernels.sweep"], "LARGEST_UNROLLED", 0 if looped else 8)
+        with pytest.raises(ValueError, match=refusal):
+            emit(eq, method, (), width=1)
+        return
+    if looped and m.inexact:
+        monkeypatch.setattr(sys.modules["synchain.codegen.kernels.sweep"], "LARGEST_UNROLLED", 0)
+        with pytest.raises(ValueError, match="steps at most 0 nodes"):
+            emit(eq, method, (), width=1)
+        return
+    if looped:
+        monkeypatch.setattr(sys.modules["synchain.codegen.kernels.sweep"], "LARGEST_UNROLLED", 0)
+    space = plain(emit(eq, method, ("trajectory",), width=1).text, EXACT)
+    assert space["LOOPED"] is looped
+    weights = [mpf(w.numerator) / w.denominator for _, _, w in by_joint(eq)]
+    graph = (program(eq).arrays, np.array(weights, object)) if looped else ()
+    steps = {"step": m} if m.smooth is None or looped else {"step": m, "step_smooth": m.smooth}
+    for seed, name in itertools.product(range(6 if "friction" in case else 3), steps):
+        y, p = states(eq, seed)
+        m = steps[name]
+        t, h = mpf(seed) / 3, mpf(1) / (20 + 30 * seed)
+        if m.kind == "rosenbrock":
+            new, error, dense = rosenbrock_reference(m, Right.of(eq, p), t, h, y, eq)
+        else:
+            new, error, dense = explicit_reference(m, Right.of(eq, p), t, h, y)
+        rtol, atol = mpf(1) / 7, mpf(1) / 1000
+        step = take_step(space, t, h, y, p, rtol, atol, *graph, name=name)
+        assert close(step.y_new, new)
+        assert close(step.dense[: len(dense)], dense)
+        if len(steps) > 1:
+            values = mpmath.eig(Right.of(eq, p).jacobian(t, y), left=False, right=False)
+            largest = max(abs(z) for z in values)
+            assert step.bound >= largest * (1 - SMALL)
+            assert step.bound <= 6 * largest + 3
+        scaled = [e / (atol + rtol * max(abs(a), abs(b))) for e, a, b in zip(error, y, new, strict=True)]
+        assert abs(step.error - max(scaled)) <= SMALL * (1 + max(scaled))
+
+
+@pytest.mark.parametrize("case", NETWORKS)
+def test_equations_agree_with_differences(case):
+    eq = NETWORKS[case]
+    names = [sp.Symbol(s, real=True) for s in (*eq.state, *eq.parameters)]
+    for seed in range(6):
+        y, p = states(eq, seed)
+        f, t = Right(sp.lambdify([TIME, *names], list(eq.rhs()), "mpmath"), p), mpf(seed) / 3
+        table = mpmath.matrix(len(y), len(y))
+        for (r, c), e in eq.jacobian().items():
+            table[r, c] = sp.lambdify([TIME, *names], e, "mpmath")(t, *y, *p)
+        expected = f.jacobian(t, y)
+        assert max(abs(d) for d in table - expected) <= SMALL * (1 + mpmath.norm(expected))
+        slope = sp.lambdify([TIME, *names], list(eq.time_derivative()), "mpmath")(t, *y, *p)
+        assert close([mpf(s) for s in slope], f.time_derivative(t, y))
+
+
+def test_node_functions_of_the_friction_oscillator(exact_numbers):
+    # `node` and `node_linear` by themselves; what they are given is computed at the beginning of the step
+    eq = friction_chain(1)
+    text = emit(eq, "rodas5p", (), width=1).text
+    head, rest = text.split("    # factors of shift - J\n")
+    space = plain(head + "    return locals()\n\n" + rest[rest.index("\n\n\n") :].replace("\n\n\n", "", 1), EXACT)
+    for seed in range(6):
+        y, p = states(eq, seed)
+        found, f = space["step"](mpf(2), mpf(1) / 9, y, [*y, *p], [0, 0], [], 0, 1), Right.of(eq, p)
+        assert close([found["f_x_1"], found["f_v_1"]], f(mpf(2), y))
+        expected = f.jacobian(mpf(2), y)
+        assert abs(found["j_vv_1"] - expected[1, 1]) <= SMALL * abs(expected[1, 1])
+        passed = {name: found[name] for name in space["node"].__code__.co_varnames if name in found and name[0] != "z"}
+        passed.update(x=y[0], v=y[1])
+        arguments = space["node"].__code__.co_varnames[: space["node"].__code__.co_argcount]
+        assert abs(space["node"](*(passed[a] for a in arguments)) - found["f_v_1"]) <= SMALL
+
+
+def test_a_section_function_is_evaluated_inside_the_step(exact_numbers):
+    eq = third_order()
+    x, z, a = real("x_1", "z_1", "a")
+    section = x * z - a * TIME**2 + sp.Rational(1, 10)
+    space = plain(emit(eq, "rodas5p", ("section",), section, width=1).text, EXACT)
+    y, p = states(eq, 4)
+    t, h, theta = mpf(1) / 3, mpf(1) / 8, mpf(3) / 7
+    step = take_step(space, t, h, y, p)
+    inside = [space["inside"](theta, c, y, step.y_new, step.dense) for c in range(3)]
+    expected = inside[0] * inside[2] - p[0] * (t + theta * h) ** 2 + mpf(1) / 10
+    assert abs(space["section"](theta, t, h, [*y, *p], step.y_new, step.dense) - expected) < SMALL
+
+
+def test_dense_output_meets_both_ends():
+    space = plain(emit(waving(), "dop853", ("trajectory",), width=1).text, DIGITS)
+    y = [mpf(1), mpf(0)]
+    step = take_step(space, mpf(0), mpf(1) / 4, y, [mpf(1) / 5])
+    for c in range(2):
+        assert space["inside"](mpf(0), c, y, step.y_new, step.dense) == y[c]
+        assert space["inside"](mpf(1), c, y, step.y_new, step.dense) == step.y_new[c]
+
+
+@pytest.mark.parametrize("method", integrators.names())
+@pytest.mark.parametrize("broken", [mpf("nan"), mpf("inf")])
+def test_an_undefined_estimate_is_never_accepted(broken, method):
+    # two nodes without links: what is wrong with one leaves the estimates of the other small
+    space = plain(emit(Equations(harmonic_chain(2).node, None, 2), method, (), width=1).text, DIGITS)
+    tiny = mpf(10) ** -6
+    assert take_step(space, mpf(0), tiny, [mpf(1)] * 4, [], mpf(1), mpf(1)).error < 1
+    for slot in range(4):
+        y = [mpf(1)] * 4
+        y[slot] = broken
+        assert not take_step(space, mpf(0), tiny, y, [], mpf(1), mpf(1)).error <= 1

@@ -1,0 +1,139 @@
+"""Deviations through stick and slip: laws with a jump at rest, whole networks and cluster states."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+from event_reference import Reference
+from mpmath import mp, mpf
+
+from synchain.models.dynamics.saltation import of_network
+from synchain.models.dynamics.variational import MODE, clustered, mode, whole
+from synchain.models.graphs.clusters import clusters
+from synchain.models.graphs.families import topology
+from synchain.models.graphs.topology import Topology
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.bifurcation.periodic import periodic_orbit
+from synchain.runtime.stability.clusters import cluster_exponents
+from synchain.runtime.stability.lyapunov import lyapunov_spectrum
+from synchain.runtime.stability.orbits import Orbits
+
+ONE, PAIR = topology("chain", 1), topology("chain", 2)
+JUMP = {"theta_b": 0.1, "epsilon": 1.0, "u": 0.1, "omega": 1.15, "mu_s": 0.3, "mu_k": 0.2}
+
+
+def jumping(graph: Topology = PAIR, **more: float) -> Scene:
+    return Scene(
+        topology=graph, friction="coulomb_static", contact="set-valued", parameters={**JUMP, **more},
+        initial={"x": 0.1, "v": 0.1},
+    )  # fmt: skip
+
+
+def symbols(text: str) -> tuple[sp.Symbol, ...]:
+    return tuple(sp.Symbol(name, real=True) for name in text.split())
+
+
+def test_the_exit_factor_is_that_of_the_theory() -> None:
+    """xi'+ = Delta a (1 + alpha) xi / (theta_b + u omega sin omega t), at the load where slip with w > 0 begins."""
+    variation = mode(jumping().equations)
+    assert variation.events is not None
+    ((up, down),) = variation.events.exits
+    epsilon, mu_s, mu_k, u, omega, theta_b, t, x = symbols("epsilon mu_s mu_k u omega theta_b t x_1")
+    for (entry,), sign in ((up, 1), (down, -1)):
+        load = sp.solve(-x + u * sp.cos(omega * t) + sign * epsilon * mu_s, x)[0]
+        jump = -sign * epsilon * (mu_s - mu_k)
+        expected = jump * (1 + MODE[0]) / (theta_b + u * omega * sp.sin(omega * t))
+        assert entry[0] == (1, 0)
+        assert sp.simplify(entry[1].xreplace({x: load}) - expected) == 0
+
+
+def test_exits_of_clusters_are_those_of_the_network() -> None:
+    """Two of three oscillators move as one: the exits of the quotient and of the difference, put together from the whole."""
+    chain = topology("chain", 3)
+    equations = jumping(chain).equations
+    found = clustered(equations, clusters(chain, (0, 1, 0)))
+    full = of_network(equations)
+    assert found.events is not None
+    assert full is not None
+    assert found.events.owners == (-1, -1, 0, 1, -1, 0)
+    x1, x2, x3, v1, v2, v3, a, b, c, d, s, m = symbols("x_1 x_2 x_3 v_1 v_2 v_3 a b c d sigma mode_sigma")
+    on = {x1: a, x2: b, x3: a, v1: c, v2: d, v3: c}
+    own = {x1: a, x2: b, v1: c, v2: d, m: s}
+    first = {column: e.xreplace(on) for (_, column), e in full.exits[0][0]}
+    made = {key: e.xreplace(own) for key, e in found.events.exits[0][0]}
+    assert sp.simplify(made[5, 4] - first[0]) == 0  # the difference x_3 - x_1 of the two that move as one
+    assert sp.simplify(made[2, 0] - first[0]) == 0
+    assert sp.simplify(made[2, 1] - first[1]) == 0
+
+
+def test_dampers_and_a_jump_have_no_tangent() -> None:
+    scene = Scene(topology=PAIR, friction="coulomb_static", contact="set-valued", coupling="damper")
+    for refused in (mode, whole):
+        with pytest.raises(ValueError, match="links act on velocities, so the order of simultaneous releases matters"):
+            refused(scene.equations)
+
+
+def far(x: float, v: float, length: float) -> tuple[mpf, mpf]:
+    """One block by the Taylor series, in the digits that are set."""
+    numbers = {**JUMP, "hold": JUMP["mu_s"], "mu_s": JUMP["mu_k"], "a": 1.0, "sigma": 0.0}
+    reference = Reference(numbers, [], [x], [v])  # type: ignore[list-item]
+    reference.advance(mpf(length))
+    assert {new for _, _, new in reference.events} == {0, 1}
+    return reference.x[0], reference.v[0]
+
+
+def test_the_propagator_of_a_law_with_a_jump_against_fifty_digits() -> None:
+    """A release, slip, a landing and another release: differences of the flow, 1e-15 apart, right to 15 digits."""
+    scene = jumping().replace(rtol=1e-12)
+    orbits = Orbits.make(scene, np.array([0.0]), np.array([[0.1, 0.1, 0.0]]), 1)
+    orbits.block, orbits.carrier = 2.0, orbits.carry(orbits.strengths)
+    found = orbits.propagators()[0, 0]
+    length = 4.0 * np.pi / JUMP["omega"]
+    with mp.workdps(50):
+        step = mpf(10) ** -15
+        there, back = (far(mpf("0.1") + s * step, JUMP["theta_b"], length) for s in (1, -1))  # type: ignore[arg-type]
+        by_x = [float((p - q) / (2 * step)) for p, q in zip(there, back, strict=True)]
+    np.testing.assert_allclose(found[:, 0], by_x, rtol=1e-8)
+    assert np.all(found[:, 1] == 0.0)  # a deviation of the velocity is lost in stick
+
+
+def test_a_pair_out_of_phase_follows_its_mode() -> None:
+    """Two coupled oscillators a hair apart, let go one after the other: their difference is the mode alpha = 2 sigma."""
+    from synchain.runtime.sweeps.run import run
+
+    scene = jumping(sigma=0.15).replace(transient=0.0, window=2.0, record=(), rtol=1e-12)
+    orbits = Orbits.make(scene, np.array([0.3]), np.array([[0.1, 0.1, 0.0]]), 1)
+    orbits.block, orbits.carrier = 2.0, orbits.carry(orbits.strengths)
+    found = orbits.propagators()[0, 0][:, 0]
+    d = 1e-6
+    end = run(scene, skip=False, show_progress=False, x_1=0.1 + d, x_2=0.1 - d).end.values
+    np.testing.assert_allclose(found, (end[[0, 2]] - end[[1, 3]]) / (2 * d), rtol=1e-4)
+
+
+def exponents_of(scene: Scene, periods: int, *alpha: float) -> np.ndarray:
+    orbit = periodic_orbit(scene, periods)
+    length = periods * 2 * np.pi / scene.parameters["omega"]
+    return np.array([np.log(abs(orbit.transversal(a)[0])) / length for a in alpha])
+
+
+def test_the_spectrum_of_a_synchronous_pair_is_that_of_its_periodic_orbit() -> None:
+    """omega = 1.15, period two: multipliers of the modes 0 and 2 sigma, and -inf for each velocity, which dies in stick."""
+    scene = Scene(
+        topology=PAIR, contact="set-valued", parameters={"omega": 1.15, "sigma": 0.2}, initial={"x": [0.3] * 2}
+    )
+    expected = exponents_of(scene, 2, 0.0, 0.4)
+    found = lyapunov_spectrum(scene, transient=400, periods=64)
+    np.testing.assert_allclose(found.exponent[:2], np.sort(expected)[::-1], rtol=0, atol=1e-6)
+    assert found.exponent[2:].tolist() == [-np.inf, -np.inf]
+    assert found.resolved.tolist() == [True, True, False, False]
+    assert found.divergence == -np.inf
+    assert found.components == 4
+
+
+@pytest.mark.long
+def test_a_cluster_of_two_has_the_exponent_of_its_mode() -> None:
+    scene = Scene(topology=PAIR, contact="set-valued", parameters={"omega": 1.15, "sigma": 0.2})
+    found = cluster_exponents(scene, (0, 0), transient=400, periods=64)
+    expected = exponents_of(scene, 2, 0.0, 0.4)
+    np.testing.assert_allclose([found.motion, found.exponent[0]], expected, rtol=0, atol=1e-6)

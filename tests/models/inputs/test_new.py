@@ -1,0 +1,493 @@
+"""Starting files pass the tests of their kind; files from outside run only when allowed, and say where they fail."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import sympy as sp
+import test_frictions
+import test_lagrangian
+import test_network
+import test_topologies
+
+from synchain.models import chain
+from synchain.models.dynamics.network import node
+from synchain.models.graphs.families import names, topology
+from synchain.models.inputs import plugins
+from synchain.models.mechanics.definition import check
+from synchain.models.mechanics.friction import CONTACTS
+from synchain.models.scenes.file import load_scene
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.cli import main
+
+KINDS = ("topology", "friction", "oscillator", "coupling")
+NAME = "my_own_part"
+
+
+@pytest.fixture
+def placed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """All four starting files, as if they lay in the folders of the package."""
+    for kind in KINDS:
+        home = f"synchain.models.{'topologies' if kind == 'topology' else f'{kind}s'}"
+        assert main(["new", kind, NAME, "--dir", str(tmp_path / kind)]) == 0
+        package = importlib.import_module(home)
+        monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path / kind)])
+    yield NAME
+    for name in [name for name in sys.modules if name.endswith(f".{NAME}")]:
+        del sys.modules[name]
+
+
+def test_the_starting_files_conform(placed: str) -> None:
+    test_frictions.test_declarations(placed)
+    test_frictions.test_parameters_have_no_name_of_an_oscillator_or_coupling(placed)
+    test_frictions.test_odd(placed)
+    test_frictions.test_drags_along_and_never_drives(placed)
+    test_frictions.test_jump_is_finite_and_numbers_are_exact(placed)
+    for contact in CONTACTS[:2]:
+        test_frictions.test_units_cancel(placed, contact)
+    for form in (test_lagrangian.physical, test_lagrangian.nondimensional):
+        test_lagrangian.test_energy_balance_of_every_oscillator(placed, form)
+    test_network.test_couplings_are_symmetric_and_called_sigma(placed)
+    test_network.test_connectivity_of_one_way_links_is_the_jacobian_of_the_forces(placed)
+    test_topologies.test_every_family_says_what_it_is_and_where_it_comes_from(placed)
+    for n in (3, 4, 9):
+        test_topologies.test_every_family_gives_a_connected_graph_with_zero_row_sums(placed, n)
+
+
+def test_the_starting_files_work_together(placed: str) -> None:
+    graph = topology(placed, 5)
+    assert placed in names()
+    assert graph.spectrum.verified
+    driven = Scene(oscillator=placed, coupling=placed, topology=graph)
+    assert driven.equations.edge is not None
+    assert driven.equations.edge.diffusive
+    rubbed = Scene(friction=placed, topology=graph)
+    assert "mu_0" in rubbed.equations.parameters
+
+
+def test_the_pendulum_is_a_pendulum(placed: str) -> None:
+    x, v, t, delta, u, omega = sp.symbols("x v t delta u omega", real=True)
+    _, rate = Scene(oscillator=placed).equations.node.rhs
+    assert sp.expand(rate - (-sp.sin(x) + u * sp.cos(omega * t) - delta * v)) == 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_is_overwritten(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new", kind, NAME, "--dir", str(tmp_path)]) == 0
+    path = tmp_path / f"{NAME}.py"
+    assert str(path) in capsys.readouterr().out
+    assert "NAME" not in path.read_text("utf-8")
+    path.write_text("mine")
+    assert main(["new", kind, NAME, "--dir", str(tmp_path)]) == 2
+    assert path.read_text() == "mine"
+    assert "exists" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "words"),
+    [
+        ("friction", "../x", "small letters"), ("friction", "lambda", "no word of Python"), ("friction", "X", "small"),
+        ("friction", "_x", "small letters"), ("friction", "x.py", "small letters"), ("friction", "a" * 41, "at most 40"),
+        ("friction", "none", "neither"), ("friction", "coulomb", "exists already"), ("topology", "chain", "exists already"),
+        ("oscillator", "lorenz", "exists already"), ("coupling", "spring", "exists already"), ("graph", "x", "invalid"),
+    ],
+)  # fmt: skip
+def test_wrong_names(kind: str, name: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new", kind, name, "--dir", str(tmp_path)]) == 2
+    assert words in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+# -- files from outside -------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def law(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(plugins, "_allowed", set())
+    assert main(["new", "friction", "my_law", "--dir", str(tmp_path)]) == 0
+    return tmp_path / "my_law.py"
+
+
+def test_a_path_is_run_only_where_it_is_allowed(law: Path) -> None:
+    law.write_text("raise SystemExit('ran')\n" + law.read_text("utf-8"))
+    with pytest.raises(ValueError, match="not run unasked"):
+        Scene(friction=str(law))
+
+
+def test_an_allowed_path_is_a_name(law: Path) -> None:
+    plugins.allow_code(law)
+    scene = Scene(friction=str(law), topology=chain(2))
+    assert scene.parameters["mu_0"] == 0.3
+    assert Scene.from_dict(scene.as_dict()) == scene
+    with pytest.raises(ValueError, match="no file that ends in"):
+        plugins.allow_code("none.py")
+
+
+def test_a_scene_file_runs_code_only_with_the_option(law: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene = law.parent / "own.toml"
+    scene.write_text(f'friction = "{law.as_posix()}"\n')
+    assert main(["equations", str(scene)]) == 2
+    assert "--allow-code" in capsys.readouterr().err
+    assert main(["equations", str(scene), "--allow-code", str(law)]) == 0
+    assert "ε f(ϑ_b - χ')\nf(w) = 2 μ_0 atan(κ w)/(π (1 + |w|/w_0))\n" in capsys.readouterr().out
+    assert main(["equations", str(scene), "--allow-code", str(law.parent)]) == 2
+
+
+TROUBLE = ("1 +", "1/0", "return sp.nothing * mu_0 * sp.sign(w) / (1 + sp.Abs(w) / w_0)")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("import sympy as sp", "import sympy as sp\n1 +", "line 4: SyntaxError"),
+        ("import sympy as sp", "import sympy as sp\n1/0", "line 4: ZeroDivisionError"),
+        ("return mu_0", "return sp.nothing * mu_0", "line 25: AttributeError"),
+        ("return mu_0", "return sp.Integer('deep in SymPy') * mu_0", "line 25: ValueError"),
+        ("def force", "def strength", "no force"),
+        ("def force(w: sp.Expr", "def force(z: sp.Expr", "asks for 'z'"),
+    ],
+)
+def test_an_error_names_file_and_line(law: Path, old: str, new: str, words: str) -> None:
+    law.write_text(law.read_text("utf-8").replace(old, new), encoding="utf-8")
+    plugins.allow_code(law)
+    line = next((k for k, text in enumerate(law.read_text("utf-8").splitlines(), 1) if text.strip() in TROUBLE), None)
+    assert line is None or f"line {line}" in words
+    with pytest.raises(ValueError, match=words) as caught:
+        _ = Scene(friction=str(law)).equations
+    assert "my_law" in str(caught.value)
+
+
+def test_a_name_that_no_file_can_declare_is_not_asked_for_as_a_parameter() -> None:
+    def potential(x_i: Any, sigma: Any) -> Any:
+        return sigma * x_i
+
+    known = {"q_i": 1, "q_j": 2, "weight": 3}
+    with pytest.raises(ValueError, match=r"asks for 'x_i'; .*; the ends of a link are q_i, q_j .*; use these names$"):
+        plugins.call(potential, {**known, "sigma": 4})
+    with pytest.raises(ValueError, match=r"asks for 'sigma'; .*; correct the name or declare it as a parameter$"):
+        plugins.call(potential, {**known, "x_i": 1})
+
+
+def test_entry_points_are_plug_ins(law: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    plugins.allow_code(law)
+    module = plugins.load("friction", str(law))
+
+    def broken() -> Any:
+        raise RuntimeError("out of order")
+
+    entries = {
+        "from_elsewhere": SimpleNamespace(value="elsewhere:law", load=lambda: module),
+        "broken": SimpleNamespace(value="elsewhere:broken", load=broken),
+        "empty": SimpleNamespace(value="elsewhere:empty", load=lambda: SimpleNamespace()),
+    }
+    monkeypatch.setattr(plugins, "_entry_points", lambda kind: entries if kind == "friction" else {})
+    assert "from_elsewhere" in plugins.names("friction")
+    assert plugins.load("friction", "from_elsewhere") is module
+    with pytest.raises(ValueError, match=r"elsewhere:broken.*test_new.py, line \d+: RuntimeError: out of order"):
+        plugins.load("friction", "broken")
+    with pytest.raises(ValueError, match="found no module"):
+        plugins.load("friction", "empty")
+    with pytest.raises(ValueError, match="unknown friction 'nope'; known: broken, coulomb"):
+        plugins.load("friction", "nope")
+
+
+def test_topologies_from_outside(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By a path that was allowed, in a scene and on the command line; errors name file and line."""
+    monkeypatch.setattr(plugins, "_allowed", set())
+    assert main(["new", "topology", "my_graph", "--dir", str(tmp_path)]) == 0
+    assert "plugins.allow_code" in capsys.readouterr().out
+    path = tmp_path / "my_graph.py"
+    with pytest.raises(ValueError, match="not run unasked"):
+        topology(str(path), 5)
+    assert main(["spectrum", str(path), "5"]) == 2
+    assert main(["spectrum", str(path), "5", "--allow-code", str(path)]) == 0
+    assert "5 eigenvalues" in capsys.readouterr().out
+    graph = topology(str(path), 5)
+    assert [(i, j) for i, j, _ in graph.links if i < j] == [(0, 1), (0, 2), (1, 2), (1, 3), (2, 3), (2, 4), (3, 4)]
+    scene = Scene(topology=graph)
+    assert Scene.from_dict(scene.as_dict()).topology == graph
+    wrong = tmp_path / "wrong.py"
+    wrong.write_text('SUMMARY, MINIMUM = "", 1\n\n\ndef edges(n):\n    yield 0, 1, 1 / (n - n)\n', encoding="utf-8")
+    plugins.allow_code(wrong)
+    with pytest.raises(ValueError, match=r"wrong.py, line 5: ZeroDivisionError"):
+        _ = topology(str(wrong), 3).links
+    wrong.with_name("none.py").write_text("MINIMUM = 1\n", encoding="utf-8")
+    plugins.allow_code(wrong.with_name("none.py"))
+    with pytest.raises(ValueError, match="found no SUMMARY, no edges; expected a topology file"):
+        topology(str(wrong.with_name("none.py")), 3)
+
+
+def test_topologies_of_entry_points_have_options_and_closed_forms(monkeypatch: pytest.MonkeyPatch) -> None:
+    from synchain.models.topologies import circulant
+
+    entries = {"elsewhere": SimpleNamespace(value="elsewhere:ring", load=lambda: circulant)}
+    monkeypatch.setattr(plugins, "_entry_points", lambda kind: entries if kind == "topology" else {})
+    assert "elsewhere" in names()
+    graph = topology("elsewhere", 10, offsets=(1, 3))
+    assert graph.links == topology("circulant", 10, offsets=(1, 3)).links
+    assert graph.spectrum.exact == topology("circulant", 10, offsets=(1, 3)).spectrum.exact
+    assert Scene.from_dict(Scene(topology=graph).as_dict()).topology == graph
+
+
+def test_the_groups_of_entry_points_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    import importlib.metadata
+
+    asked = []
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: asked.append(group) or [])
+    plugins._entry_points.cache_clear()
+    plugins.names("oscillator")
+    plugins.names("topology")
+    plugins._entry_points.cache_clear()
+    assert asked == ["synchain.oscillators", "synchain.topologies"]
+
+
+# -- a file is its text ---------------------------------------------------------------------------------------
+
+HEAD = 'import sympy as sp\nfrom synchain.models import Parameter\nSUMMARY = "s"\nSOURCE = "s, 2000"\n'
+WELL = (
+    "FRICTION = False\nPARAMETERS = {}\ndef kinetic(v):\n    return v**2 / 2\ndef potential(x):\n    return x**2 / 2\n"
+)
+PULL = (
+    'PARAMETERS = {"sigma": Parameter(0.1, "N/m", "stiffness")}\n'
+    "def potential(q_i, q_j, weight, sigma):\n    return sigma * weight * (q_i - q_j) ** 2 / 2\n"
+)
+RUB = 'ODD = True\nPARAMETERS = {"c": Parameter(0.3, "s/m", "growth")}\ndef force(w, c):\n    return c * w\n'
+X = sp.Symbol("x", real=True)
+
+
+def written(path: Path, text: str) -> str:
+    """The path of a file with this text, allowed to run."""
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(HEAD + text, encoding="utf-8")
+    plugins.allow_code(path)
+    return str(path)
+
+
+def test_an_edited_file_is_another_model_and_a_scene_keeps_its_own(tmp_path: Path) -> None:
+    """Also where neither the length of the file nor its time tells of the change."""
+    path = written(tmp_path / "well.py", WELL)
+    stamp = os.stat(path).st_mtime
+    first = Scene(oscillator=path)
+    assert first.equations.node.rhs[1] == -X
+    written(tmp_path / "well.py", WELL.replace("x**2", "x**4"))
+    os.utime(path, (stamp, stamp))
+    second = Scene(oscillator=path)
+    assert second.equations.node.rhs[1] == -2 * X**3
+    assert node(path).rhs[1] == -2 * X**3
+    assert first != second
+    assert first.replace(topology=chain(2), coupling="spring").equations.node.rhs[1] == -X
+    assert first.replace(oscillator=path) == second
+    assert Scene.from_dict(first.as_dict()) == second
+    written(tmp_path / "well.py", WELL)
+    assert Scene(oscillator=path) == first
+
+
+def test_an_edited_law_coupling_or_group_of_nodes_is_another_model(tmp_path: Path) -> None:
+    well, rub, pull = (
+        written(tmp_path / f"{name}.py", text) for name, text in (("well", WELL), ("rub", RUB), ("pull", PULL))
+    )
+
+    def scene() -> Scene:
+        nodes = [{"oscillator": "harmonic", "at": [1]}]
+        coupling = f"{pull} on x"
+        assert Scene(friction=rub).coupling == "spring"
+        return Scene(oscillator=well, nodes=nodes, coupling=coupling, topology=chain(2))
+
+    before, law = scene(), Scene(friction=rub)
+    digest = before.equations.digest
+    written(tmp_path / "rub.py", RUB.replace("c * w", "2 * c * w"))
+    assert Scene(friction=rub).equations.digest != law.equations.digest
+    written(tmp_path / "pull.py", PULL.replace("/ 2", "/ 8"))
+    after = scene()
+    assert after.equations.digest != digest
+    written(tmp_path / "well.py", WELL.replace("x**2", "x**4"))
+    assert scene().equations.digest not in (digest, after.equations.digest)
+    assert before.replace(rtol=1e-6).equations.digest == digest
+
+
+def test_one_relative_name_in_two_folders_is_two_models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A star must not get the spectrum of a chain, whatever the names of their files."""
+    edges = (
+        "MINIMUM = 1\ndef edges(n):\n    return (({}, i, 1) for i in range(1, n))\ndef count(n):\n    return n - 1\n"
+    )
+    graphs, scenes = [], []
+    for folder, first, power in (("a", "0", "x**2"), ("b", "i - 1", "x**4")):
+        written(tmp_path / folder / "graph.py", edges.format(first))
+        written(tmp_path / folder / "well.py", WELL.replace("x**2", power))
+        monkeypatch.chdir(tmp_path / folder)
+        graphs.append(topology("./graph.py", 5))
+        scenes.append(Scene(oscillator="./well.py"))
+        assert graphs[-1].spectrum.exact == topology("star" if folder == "a" else "chain", 5).spectrum.exact
+    assert graphs[0] != graphs[1]
+    assert len({*graphs}) == 2
+    assert [scene.equations.node.rhs[1] for scene in scenes] == [-X, -2 * X**3]
+    assert graphs[0].links == topology("star", 5).links
+    assert pickle.loads(pickle.dumps(scenes[0])) == scenes[0]
+
+
+def test_another_process_refuses_a_scene_whose_file_has_changed(tmp_path: Path) -> None:
+    path = written(tmp_path / "well.py", WELL)
+    packed = tmp_path / "scene"
+    packed.write_bytes(pickle.dumps(Scene(oscillator=path)))
+    words = (
+        f"import pickle; from synchain.models.inputs.plugins import allow_code; allow_code({path!r})\n"
+        f"print(pickle.load(open({str(packed)!r}, 'rb')).equations.node.rhs)"
+    )
+
+    def elsewhere() -> subprocess.CompletedProcess[str]:
+        return subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, timeout=240, check=False)
+
+    assert elsewhere().stdout == "(v, -x)\n"
+    written(tmp_path / "well.py", WELL.replace("x**2", "x**4"))
+    assert "found another text in" in elsewhere().stderr.splitlines()[-1]
+
+
+# -- what a file says takes effect, or is refused --------------------------------------------------------------
+
+
+def test_everything_in_the_package_is_what_a_file_may_be() -> None:
+    for kind in KINDS:
+        for name in plugins.names(kind):
+            module = plugins.load(kind, name)
+            check(kind, module, name, Path(str(module.__file__)).read_bytes())
+
+
+def refusal(kind: str, path: Path, text: str) -> str:
+    """Why a file is refused, without its folder."""
+    with pytest.raises(ValueError) as caught:  # noqa: PT011  (the caller looks at the words)
+        plugins.load(kind, written(path, text))
+    assert "\n" not in str(caught.value)
+    return str(caught.value).replace(f"{path.parent}{os.sep}", "")
+
+
+FIELD = "FRICTION = False\nPARAMETERS = {}\nSTATE = ('x', 'y')\ndef field(x, y):\n    return y, -x\n"
+DAMPED = 'PARAMETERS = {"delta": Parameter(0.1, "1", "damping")}\n'
+DOUBLE = (
+    WELL.replace("kinetic(v)", "kinetic(v, w)")
+    .replace("v**2", "(v**2 + w**2)")
+    .replace("potential(x)", "potential(x, y)")
+    + "COORDINATES = {'x': ('v', 'm'), 'y': ('w', 'm')}\ndef force(v, w):\n    return -v, -w\n"
+)
+SCALED = (
+    'FRICTION = False\nPARAMETERS = {"delta": Parameter(0.1, "kg/s", "damping")}\nPHYSICAL = {"delta": "d"}\n'
+    'UNITS = {"m": "kg", "k": "N/m", "l": "m"}\ndef kinetic(v, m):\n    return m * v**2 / 2\n'
+    "def potential(x, k):\n    return k * x**2 / 2\ndef force(v, d):\n    return -d * v\n"
+    'def scales(m, k, l):\n    return {"kg": m, "m": l, "s": sp.sqrt(m / k)}\n'
+)
+FAMILY = (
+    "MINIMUM = 1\ndef edges(n, *, step=1):\n    return ((i, i + step, 1) for i in range(n - step))\n"
+    "def settle(n, step):\n    return {'step': step}\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "words"),
+    [
+        ("oscillator", WELL + "def forces(v):\n    return -v\n", "part.py, line 11: found 'forces'; an oscillator"),
+        ("oscillator", WELL + "def forces(v):\n    return -v\n", "did you mean 'force'?"),
+        ("oscillator", WELL + "damping = 3\n", "line 11: found 'damping'"),
+        ("oscillator", WELL + "if True:\n    damping = 3\n", "line 12: found 'damping'"),
+        ("coupling", PULL + "def force(v_i, v_j):\n    return 0\n", "line 8: found 'force'; a coupling file knows"),
+        ("friction", RUB.replace("def force", "def forces"), "no force; expected a friction file; found 'forces' in line 7"),
+        ("topology", FAMILY + "def conut(n, *, step=1):\n    return n\n", "did you mean 'count'?"),
+        ("oscillator", FIELD + "def kinetic(v):\n    return v**2\n", "line 10: found kinetic beside field"),
+        ("oscillator", WELL + "STATE = ('x', 'v')\n", "line 11: found STATE without field"),
+        ("oscillator", WELL + "UNITS = {'m': 'kg'}\n", "line 11: found UNITS without scales"),
+        ("oscillator", DAMPED + WELL.replace("PARAMETERS = {}\n", ""), "line 5: no function uses the parameter 'delta'"),
+        ("oscillator", SCALED.replace("-d * v", "-v"), "no function uses the parameter 'delta' (d in the"),
+        ("friction", RUB.replace("return c * w", "return w"), "line 6: no function uses the parameter 'c'"),
+        ("coupling", PULL.replace("sigma * weight", "weight"), "line 5: no function uses the parameter 'sigma'"),
+        ("coupling", PULL.replace("sigma * weight", "sigma"), "line 6: potential does not use weight"),
+        ("oscillator", WELL.replace("False", "True"), "line 5: FRICTION is True, but no function uses friction"),
+        ("oscillator", WELL + "def force(v, friction):\n    return friction(v)\n", "FRICTION is False, but a function uses"),
+        ("topology", FAMILY.replace(", *, step=1", "", 1).replace("step", "1", 2), "found settle without options"),
+    ],
+)  # fmt: skip
+def test_what_would_be_ignored_is_refused(kind: str, text: str, words: str, tmp_path: Path) -> None:
+    assert words in refusal(kind, tmp_path / "part.py", text)
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "words"),
+    [
+        ("oscillator", WELL.replace("{}", '{"k": 2.0}'), "line 6: PARAMETERS['k'] is 2.0; expected Parameter(2.0, \"1\","),
+        ("oscillator", WELL.partition("def potential")[0], "part.py: found no potential; expected an oscillator file"),
+        ("oscillator", FIELD.replace("STATE = ('x', 'y')\n", ""), "part.py: found no STATE"),
+        ("oscillator", FIELD.replace("('x', 'y')", "'xy'"), "line 7: STATE is 'xy'; expected a tuple of names"),
+        ("oscillator", FIELD.replace("y, -x", "-x").replace("'x', 'y'", "'x',").replace("x, y", "x"),
+         "line 8: field returns -x alone; expected a tuple of 1, one for each of x"),
+        ("oscillator", WELL + "COORDINATES = {'x': 'v'}\n", "line 11: COORDINATES has 'x': 'v'; expected a"),
+        ("oscillator", DOUBLE.replace("-v, -w", "-v"),
+         "line 12: force returns -v alone; expected a tuple of 2, one for each of x, y"),
+        ("oscillator", WELL.replace("return x**2 / 2", "x**2 / 2"), "line 9: potential returns None (NoneType)"),
+        ("oscillator", WELL.replace("def potential(x):\n    return x**2 / 2", "potential = 3"), "line 9: potential is 3"),
+        ("oscillator", SCALED.replace('"kg": m, ', ""), "line 15: scales returns a dict of 'm', 's'"),
+        ("oscillator", SCALED.replace('{"delta": "d"}', "{}"), "line 7: PHYSICAL is {}; expected the physical"),
+        ("oscillator", SCALED.replace('UNITS = {"m": "kg", "k": "N/m", "l": "m"}\n', ""), "part.py: found no UNITS"),
+        ("oscillator", SCALED.replace('"m": "kg"', '"m": 1'), "line 8: UNITS is {'m': 1, 'k': 'N/m', 'l': 'm'}; expected"),
+        ("oscillator", WELL + "INITIAL = {'y': 1}\n", "line 11: INITIAL is {'y': 1}; expected a dict with keys out of x, v"),
+        ("friction", RUB + "ORDER = (('c', 'd'),)\n", "line 9: ORDER is (('c', 'd'),); expected pairs of parameters"),
+        ("friction", RUB.replace("True", "'yes'"), "line 5: ODD is 'yes'; expected True or False"),
+        ("friction", RUB.replace('"s/m"', "1"), "line 6: TypeError: unit 1 is a int; expected text such as 'N/m'"),
+        ("coupling", PULL.replace("sigma", "k"), "line 5: PARAMETERS has no 'sigma'"),
+        ("coupling", PULL.replace("weight *", "weight * x_i *"), "line 7: NameError: name 'x_i' is not defined"),
+        ("topology", FAMILY.partition("def settle")[0], "part.py: found no settle; expected a topology file"),
+        ("topology", FAMILY + "def count(n):\n    return n\n", "line 10: count lacks the option 'step' of edges"),
+        ("topology", FAMILY.replace("step=1", "step"), "line 6: the option 'step' of edges has no default"),
+    ],
+)  # fmt: skip
+def test_an_incomplete_file_is_refused_in_one_line(kind: str, text: str, words: str, tmp_path: Path) -> None:
+    assert words in refusal(kind, tmp_path / "part.py", text)
+
+
+def test_wrong_answers_of_a_family_are_those_of_its_file(tmp_path: Path) -> None:
+    spectrum = "def spectrum(n, *, step=1):\n    return {}\n"
+    for returned, words in (
+        ("[(sp.Integer(0), n)]", "family.py: spectrum of .*: correct the closed form"),
+        ("[1, 2]", r"family.py: spectrum\(3\) has 1; expected a list of \(eigenvalue, multiplicity\)"),
+        ("1 / 0", r"family.py, line 11: ZeroDivisionError"),
+    ):
+        path = written(tmp_path / "family.py", FAMILY + spectrum.format(returned))
+        with pytest.raises(ValueError, match=words):
+            _ = topology(path, 3).spectrum
+    path = written(tmp_path / "family.py", FAMILY.replace("return {'step': step}", "return step.nothing"))
+    with pytest.raises(ValueError, match=r"family.py, line 9: AttributeError"):
+        topology(path, 3)
+    path = written(tmp_path / "family.py", FAMILY.replace("return {'step': step}", "pass"))
+    with pytest.raises(ValueError, match="settle returns None; expected a dict of the options"):
+        topology(path, 3)
+
+
+# -- paths ----------------------------------------------------------------------------------------------------
+
+
+def test_a_file_that_does_not_exist_is_said_to_be_missing() -> None:
+    with pytest.raises(ValueError, match=r"friction '\./none\.py': no such file: .*none\.py; expected a \.py file"):
+        Scene(friction="./none.py")
+
+
+def test_paths_in_a_scene_file_start_in_its_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "study"
+    written(folder / "well.py", WELL)
+    written(folder / "pull.py", PULL)
+    written(folder / "family.py", FAMILY)
+    (folder / "own.toml").write_text(
+        'oscillator = "./well.py"\ncoupling = "pull.py on x"\n[topology]\nname = "family.py"\nn = 3\nstep = 2\n'
+        '[[nodes]]\noscillator = "./well.py"\nat = [2]\n'
+    )
+    monkeypatch.chdir(tmp_path)
+    scene = load_scene("study/own.toml")
+    assert scene.equations.node.rhs[1] == -X
+    assert scene.topology.link_count == 2
+    assert Scene.from_dict(scene.as_dict()) == scene

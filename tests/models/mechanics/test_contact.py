@@ -1,0 +1,147 @@
+"""Set-valued friction: what is derived, what is refused, and that kernels, networks and exponents work with it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from synchain.models.dynamics.network import node
+from synchain.models.dynamics.reduction import fold
+from synchain.models.graphs.families import topology
+from synchain.models.mechanics.stick_slip import SLIP, set_valued
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.sweeps.run import run
+
+X, V, W = (sp.Symbol(name, real=True) for name in ("x", "v", "w"))
+FORCE = sp.Function("f", real=True)
+
+
+def scene(n: int = 1, **more: object) -> Scene:
+    settings = {"topology": topology("chain", n), "contact": "set-valued", "transient": 0.0, "window": 20.0}
+    return Scene(**{**settings, **more})  # type: ignore[arg-type]
+
+
+def test_the_derived_node_is_the_smooth_one_away_from_the_jump() -> None:
+    exact, plain = node("friction", "exponential", "set-valued"), node("friction", "exponential", "sign")
+    ground = sp.Symbol("theta_b", real=True)
+    for sign in (1, -1):
+        at = {V: ground - sign * sp.Rational(1, 3)}
+        found = exact.rhs[1].xreplace({SLIP: sp.Integer(sign)}).xreplace(at)
+        assert sp.simplify(found - plain.rhs[1].xreplace(at)) == 0
+    assert exact.rhs[1].xreplace({SLIP: sp.S.Zero}) == 0
+    assert exact.contact is not None
+    assert exact.contact.speed == ground
+    epsilon, mu_s = (sp.Symbol(name, real=True) for name in ("epsilon", "mu_s"))
+    assert sp.simplify(exact.contact.up - exact.contact.down - 2 * epsilon * mu_s) == 0
+    assert not exact.contact.jumps
+
+
+@pytest.mark.parametrize(
+    ("acceleration", "law", "words"),
+    [
+        (-X, sp.sign(W), "friction acts 0 times"),
+        (-X + FORCE(X), sp.sign(W), "must fall with v"),
+        (-X + FORCE(V), sp.sign(W), "must fall with v"),
+        (-X + FORCE(sp.Symbol("t", real=True) - V), sp.sign(W), "changes with time"),
+        (-X + FORCE(-V) ** 2, sp.sign(W), "nonlinearly"),
+        (-X + FORCE(-V), W, "has no jump"),
+        (-X + FORCE(-V), sp.sign(W) + 1, "is not odd"),
+    ],
+)
+def test_what_has_no_set_valued_form(acceleration: sp.Expr, law: sp.Expr, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        set_valued(acceleration, FORCE, law, W, None, V)
+
+
+def test_the_smooth_law_tends_to_the_exact_one() -> None:
+    """Period two at omega = 1.15: the distance after 20 periods falls like 1/sqrt(kappa), the exact law's error does not
+    count."""
+    exact = run(scene(rtol=1e-12), show_progress=False).end.values[0]
+    gaps = []
+    for kappa in (1e5, 1e7, 1e9):
+        smooth = run(scene(contact="atan", rtol=1e-10, parameters={"kappa": kappa}), show_progress=False)
+        gaps.append(abs(smooth.end.values[0] - exact))
+    assert gaps[0] < 3e-3
+    ratios = [gaps[0] / gaps[1], gaps[1] / gaps[2]]
+    assert all(8.0 < ratio < 30.0 for ratio in ratios)
+
+
+@pytest.mark.long
+def test_results_converge_with_the_tolerance_and_stick_is_exact() -> None:
+    ends = [
+        run(scene(2, rtol=rtol, parameters={"sigma": 0.1}), show_progress=False).end.values
+        for rtol in (1e-6, 1e-9, 1e-13)
+    ]
+    assert np.abs(ends[0] - ends[2]).max() < 1e-6
+    assert np.abs(ends[1] - ends[2]).max() < 1e-9
+    path = run(scene(record=("trajectory",), samples=2001), show_progress=False).data.trajectory.values
+    stuck = path[path[:, 2] == 0.0]
+    assert 0.1 * len(path) < len(stuck) < 0.9 * len(path)
+    assert np.all(stuck[:, 1] == 0.1)
+    slipping = path[path[:, 2] != 0.0]
+    assert np.all(np.sign(0.1 - slipping[:, 1]) * slipping[:, 2] >= 0.0)
+
+
+def test_equal_oscillators_stay_equal_although_the_state_is_unstable() -> None:
+    whole = run(scene(3, initial={"x": [0.3, 0.3, 0.3]}, parameters={"sigma": 0.9, "omega": 1.4}, window=300.0),
+                skip=False, show_progress=False)  # fmt: skip
+    assert whole.sync_error.item() == 0.0
+    assert np.ptp(whole.end.values.reshape(3, 3), axis=1).max() == 0.0
+
+
+@pytest.mark.parametrize("width", [1, *(pytest.param(width, marks=pytest.mark.long) for width in (2, 4))])
+def test_lanes_do_not_change_a_bit(width: int) -> None:
+    cells = {"sigma": np.linspace(0.0, 0.4, 11), "show_progress": False}
+    s = scene(2, rtol=1e-8, window=50.0)
+    np.testing.assert_array_equal(run(s, width=width, **cells).end, run(s, width=8, workers=2, **cells).end)
+
+
+def test_exponents_of_the_exact_law_are_the_limit_of_the_smooth_one() -> None:
+    """omega = 1.15: where the exponent changes sign, at kappa = 1e7 and 1e9 and in the exact law."""
+    alpha = np.linspace(0.46, 0.47, 11)
+    zeros = []
+    for more in ({"kappa": 1e7}, {"kappa": 1e9}, {}):
+        s = Scene(
+            topology=topology("chain", 2), contact="atan" if more else "set-valued", parameters={"omega": 1.15, **more}
+        )
+        zeros.append(exponents(s, alpha, starts=1, rtol=1e-8).intervals[0][1])
+    assert abs(zeros[1] - zeros[2]) < abs(zeros[0] - zeros[2]) < 2e-6
+    assert abs(zeros[1] - zeros[2]) < 3e-7
+
+
+def test_starts_on_the_ground_stick_or_slip_by_their_load() -> None:
+    cells = run(scene(window=1e-6, time_unit="time", parameters={"u": 0.0}), x_1=[0.0, 0.59, 0.61, -0.61], v_1=0.1,
+                show_progress=False)  # fmt: skip
+    assert list(cells.end.values[:, 2]) == [0.0, 0.0, 1.0, -1.0]
+
+
+def test_slip_that_begins_slower_than_a_step_can_tell_does_not_chatter() -> None:
+    """The load passes its limit by 9e-6 where the drive turns: the sliding velocity grows from zero at that rate."""
+    s = scene(integrator="rodas5p", rtol=1e-6, window=4.0, parameters={"omega": 1.4}, record=())
+    start = {"x_1": [float.fromhex("0x1.d3815b289d0f8p-2")], "v_1": 0.1}
+    loose = run(s, show_progress=False, **start)
+    tight = run(s.replace(rtol=1e-12, integrator="auto"), show_progress=False, **start)
+    assert loose.success
+    assert np.abs(loose.end.values - tight.end.values).max() < 1e-3
+
+
+def test_a_static_coefficient_below_the_kinetic_one_is_refused() -> None:
+    words = "friction coulomb_static: found mu_s = 0.1 below mu_k = 0.2; expected mu_k <= mu_s"
+    with pytest.raises(ValueError, match=words):
+        scene(friction="coulomb_static", parameters={"mu_s": 0.1})
+    with pytest.raises(ValueError, match=words):
+        scene(friction="coulomb_static", axes={"mu_s": [0.1, 0.5]})
+    scene(friction="coulomb_static", axes={"mu_s": [0.1, 0.5], "mu_k": [0.05, 0.5]}, zipped=True)
+    scene(friction="coulomb_static", contact="atan", parameters={"mu_s": 0.1})
+
+
+def test_the_clock_starts_anew_where_there_is_no_drive() -> None:
+    from synchain.runtime.cells.initial_modes import CLOCK, local_clock
+
+    driven, rows = scene().equations, np.zeros(3)
+    alone = fold(driven, {"u": 0})
+    np.testing.assert_array_equal(local_clock(driven, rows + 5.0), rows + 5.0)
+    np.testing.assert_array_equal(local_clock(alone, rows), rows + CLOCK)
+    assert np.frexp(CLOCK)[0] == 0.5

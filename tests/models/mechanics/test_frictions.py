@@ -1,0 +1,160 @@
+"""Every friction law of the directory: odd, passive, finite at the jump, with units and a source; the four laws by value."""
+
+from __future__ import annotations
+
+import inspect
+import random
+from types import ModuleType
+
+import pytest
+import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from synchain.models.inputs.plugins import load, names
+from synchain.models.mechanics.friction import CONTACTS, KAPPA, regularise
+from synchain.models.mechanics.nondimensional import friction_coefficient
+from synchain.models.mechanics.parameter import Parameter
+
+LAWS = names("friction")
+W = sp.Symbol("w", real=True)
+FAST = sp.Symbol("w", positive=True)
+SPEEDS = [sp.Rational(10) ** k for k in range(-6, 4)]
+
+
+def coefficient(name: str, w: sp.Expr = W) -> sp.Expr:
+    """The law with its default parameters, exactly as fractions."""
+    law = load("friction", name)
+    return law.force(w, **{p: sp.Rational(str(value.default)) for p, value in law.PARAMETERS.items()})
+
+
+def test_the_four_laws_are_found() -> None:
+    assert {"coulomb", "exponential", "stribeck", "viscous"} <= set(LAWS)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_declarations(name: str) -> None:
+    law = load("friction", name)
+    assert law.SUMMARY.strip()
+    assert any(character.isdigit() for character in law.SOURCE), "a source has a year or a volume"
+    assert list(inspect.signature(law.force).parameters) == ["w", *law.PARAMETERS]
+    assert all(isinstance(p, Parameter) and p.meaning for p in law.PARAMETERS.values())
+    assert inspect.getdoc(law.force)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_parameters_have_no_name_of_an_oscillator_or_coupling(name: str) -> None:
+    others: set[str] = {"kappa", "t", "x", "v", "weight"}
+    for oscillator in names("oscillator"):
+        module = load("oscillator", oscillator)
+        others |= set(module.PARAMETERS) if module.FRICTION else set()
+    for coupling in names("coupling"):
+        others |= set(load("coupling", coupling).PARAMETERS)
+    assert not others & set(load("friction", name).PARAMETERS)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_odd(name: str) -> None:
+    law = load("friction", name)
+    symbols = {p: sp.Symbol(p, real=True) for p in law.PARAMETERS}
+    odd = sp.simplify(law.force(-W, **symbols) + law.force(W, **symbols)) == 0
+    assert odd is law.ODD
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_drags_along_and_never_drives(name: str) -> None:
+    f = coefficient(name)
+    assert f.subs(W, 0) == 0
+    for speed in SPEEDS:
+        assert f.subs(W, speed) > 0
+        assert f.subs(W, -speed) < 0
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("contact", CONTACTS)
+@given(st.integers(0, 10**6), st.floats(1e-9, 1e3))
+@settings(max_examples=25, deadline=None)
+def test_never_drives_with_any_allowed_parameters(name: str, contact: str, seed: int, speed: float) -> None:
+    """w f(w) >= 0 also where friction grows with speed, mu_s < mu_k, and f(0) = 0 exactly, smoothed or not."""
+    numbers, law = random.Random(seed), load("friction", name)
+    values = {
+        sp.Symbol(p, real=True): sp.Rational(allowed.check(p, numbers.choice([0.01, 0.3, 2.0, 50.0])))
+        for p, allowed in {**law.PARAMETERS, "kappa": KAPPA}.items()
+    }
+    f = friction_coefficient(law, contact)(W).xreplace(values)
+    assert f.xreplace({W: sp.S.Zero}) == 0
+    assert f.xreplace({W: sp.Rational(speed)}).evalf() >= 0
+    assert f.xreplace({W: -sp.Rational(speed)}).evalf() <= 0
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_jump_is_finite_and_numbers_are_exact(name: str) -> None:
+    start = sp.limit(coefficient(name, FAST), FAST, 0, "+")
+    assert start.is_finite
+    assert start >= 0
+    assert not coefficient(name).atoms(sp.Float)
+
+
+@pytest.mark.parametrize(
+    ("name", "start", "end"),
+    [
+        ("exponential", "3/10", "3/20"),
+        ("coulomb", "3/10", "3/10"),
+        ("stribeck", "3/10", "3/20"),
+        ("viscous", "0", "oo"),
+    ],
+)
+def test_limits(name: str, start: str, end: str) -> None:
+    f = coefficient(name, FAST)
+    assert sp.limit(f, FAST, 0, "+") == sp.Rational(start)
+    assert sp.limit(f, FAST, sp.oo) == sp.sympify(end)
+
+
+def test_values_between_the_limits() -> None:
+    """f(1) by hand: 0.15 + 0.15 e^-2.5, 0.15 + 0.15 e^-(1/0.4)^2, and the viscous part of Stribeck's law."""
+    half = sp.Rational(3, 20)
+    assert sp.expand(coefficient("exponential", sp.S.One) - half - half * sp.exp(-sp.Rational(5, 2))) == 0
+    assert sp.expand(coefficient("stribeck", sp.S.One) - half - half * sp.exp(-sp.Rational(25, 4))) == 0
+    stribeck = load("friction", "stribeck").force
+    mu_s, mu_k, v_s, c = sp.symbols("mu_s mu_k v_s c", positive=True)
+    assert sp.simplify(stribeck(FAST, mu_s, mu_k, v_s, c) - stribeck(FAST, mu_s, mu_k, v_s, 0) - c * FAST) == 0
+    assert coefficient("viscous", sp.Integer(2)) == sp.Rational(3, 5)
+
+
+def test_regularised_jump_is_smooth_and_close() -> None:
+    kappa = sp.Symbol("kappa", positive=True)
+    smooth = regularise(sp.sign(W), kappa)
+    assert smooth == 2 * sp.atan(kappa * W) / sp.pi
+    assert smooth.diff(W).subs(W, 0) == 2 * kappa / sp.pi
+    assert sp.limit((1 - smooth.subs(W, FAST)) * sp.pi * kappa * FAST / 2, FAST, sp.oo) == 1
+    assert regularise(W**2 * sp.Abs(W), kappa) == W**2 * sp.Abs(W)
+
+
+def test_default_steepness_is_the_papers() -> None:
+    assert KAPPA.default == 1e5
+    with pytest.raises(ValueError, match=r"kappa = 0 is not allowed; expected a finite number above 0"):
+        KAPPA.check("kappa", 0)
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("contact", CONTACTS)
+def test_units_cancel(name: str, contact: str) -> None:
+    """A law in scaled parameters and the scaled velocity is the law itself: nothing of M, L and T is left over."""
+    law = load("friction", name)
+    expected = law.force(W, **{p: sp.Symbol(p, real=True) for p in law.PARAMETERS})
+    if contact == "atan":
+        expected = regularise(expected, sp.Symbol("kappa", real=True))
+    assert sp.simplify(friction_coefficient(law, contact)(W) - expected) == 0
+
+
+def test_a_wrong_unit_is_noticed() -> None:
+    law = ModuleType("careless")
+    law.PARAMETERS = {"a": Parameter(1.0, "m/s", "rate of decay")}  # type: ignore[attr-defined]
+    law.force = lambda w, a: sp.exp(-a * sp.Abs(w)) * sp.sign(w)  # type: ignore[attr-defined]
+    with pytest.raises(ValueError, match="friction law careless: the unit m does not cancel"):
+        friction_coefficient(law, "sign")
+
+
+def test_unknown_contact() -> None:
+    with pytest.raises(ValueError, match="unknown contact 'tanh'; known: atan, sign"):
+        friction_coefficient(load("friction", "coulomb"), "tanh")

@@ -1,0 +1,324 @@
+"""Nodes with parameters of their own, nodes of several kinds: scenes, equations, sweeps, what is refused and what merges."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.integrate import solve_ivp
+
+from synchain.codegen.export.python import to_python
+from synchain.codegen.kernels.sweep import emit
+from synchain.models import chain, ring, star
+from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.variational import transversal
+from synchain.models.graphs.topology import from_matrix
+from synchain.models.mechanics.components import TIME, Node
+from synchain.models.presentation.equations import text
+from synchain.models.scenes.file import load_scene
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.cells.reduce import decide
+from synchain.runtime.results.open import open_result
+from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.sweeps.certify import certify
+from synchain.runtime.sweeps.run import run
+from synchain.runtime.synchronisation.probe import ring_of_three
+
+DUFFING = {"delta": [0.1, 0.2, 0.3], "omega": [1.0, 1.5, 2.0]}
+
+
+def real(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)
+
+
+def scene(**changes: object) -> Scene:
+    given = {"oscillator": "duffing", "topology": chain(3), "parameters": {"sigma": 0.1, **DUFFING}, "transient": 0,
+             "window": 20, "record": (), "rtol": 1e-10}  # fmt: skip
+    return Scene(**{**given, **changes})
+
+
+def mixed(**changes: object) -> Scene:
+    given = {"nodes": [{"oscillator": "van_der_pol", "at": [2]}], "parameters": {"sigma": 0.1}, "time_unit": "time"}
+    return scene(**{**given, **changes})
+
+
+def by_scipy(found: Scene, end: float) -> np.ndarray:
+    """The state at the end by SciPy from the exported source."""
+    space: dict = {}
+    exec(compile(to_python(found.equations, found.parameters), "<export>", "exec"), space)
+    return solve_ivp(space["rhs"], (0, end), found.y0, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+
+
+# -- scenes ----------------------------------------------------------------------------------------------------
+
+
+def test_a_list_is_one_parameter_for_each_node() -> None:
+    made = scene()
+    assert made.varied == ("delta", "omega")
+    assert made.equations.parameters == (
+        "delta_1", "delta_2", "delta_3", "beta", "u", "omega_1", "omega_2", "omega_3", "sigma")  # fmt: skip
+    assert made.time_unit == "time"
+    assert made.period is None
+    assert made.as_dict()["parameters"]["delta"] == [0.1, 0.2, 0.3]
+    assert Scene.from_dict(made.as_dict()) == made == made.replace(title="")
+
+
+def test_equations_of_nodes_with_their_own_parameters() -> None:
+    x, v = ([real(f"{c}_{i}") for i in (1, 2, 3)] for c in "xv")
+    beta, u, sigma = (real(name) for name in ("beta", "u", "sigma"))
+    rows = []
+    for i in range(3):
+        felt = sum(sigma * (x[j] - x[i]) for j in (i - 1, i + 1) if 0 <= j < 3)
+        drive = u * sp.cos(real(f"omega_{i + 1}") * TIME)
+        rows.append(-x[i] - beta * x[i] ** 3 - real(f"delta_{i + 1}") * v[i] + drive + felt)
+    assert [sp.expand(a - b) for a, b in zip(scene().equations.rhs(), [*v, *rows], strict=True)] == [0] * 6
+    assert "δ_2 x_2'" in text(scene().equations)
+    assert "ω_3" in text(scene().equations)
+
+
+def test_equal_numbers_are_equal_nodes() -> None:
+    same = scene(parameters={"sigma": 0.1, "delta": [0.1, 0.1, 0.1], "omega": 1.0})
+    assert same == scene(parameters={"sigma": 0.1})
+    assert emit(same.equations, width=2).text == emit(scene(parameters={}).equations, width=2).text
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"delta": [0.1, 0.2]}, "parameter 'delta': found 2 values for 3 oscillators; expected 3 values or one number"),
+        ({"delta": range(5)}, "found more than 3 values"),
+        ({"delta": {0.1, 0.2, 0.3}}, "a set, which has no order"),
+        ({"sigma": [0.1, 0.2, 0.3]}, "'sigma' belongs to the links, which share it; expected one number"),
+        ({"delta_4": 0.1}, "unknown parameter 'delta_4'"),
+        ({"sigma_1": 0.1}, "unknown parameter 'sigma_1'"),
+        ({"omega": [1, -1, 2]}, "omega_2"),
+    ],
+)
+def test_lists_that_fit_no_network(given: dict, message: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=re.escape(message)):
+        scene(parameters=given)
+
+
+def test_a_name_that_two_parameters_would_have() -> None:
+    x, v, a, twin = (real(name) for name in ("x", "v", "a", "a_2"))
+    node = Node((x, v), (v, -a * x - twin * v), (a, twin))
+    assert Equations(node, None, 2).parameters == ("a", "a_2")
+    with pytest.raises(ValueError, match="'a_2' stands for two parameters"):
+        Equations(node, None, 2, varied=("a",))
+
+
+def test_a_swept_parameter_of_one_node() -> None:
+    made = scene(parameters={"sigma": 0.1}, axes={"delta_2": [0.1, 0.2]}, time_unit="time")
+    assert made.varied == ("delta",)
+    assert made.replace(axes={}).varied == ()
+    with pytest.raises(ValueError, match="axis 'delta': the nodes have different values"):
+        scene(axes={"delta": [0.1, 0.2]})
+    with pytest.raises(ValueError, match="delta has values for 3 nodes"):
+        scene().replace(topology=chain(4))
+    assert scene().replace(delta=0.1).varied == ("omega",)
+    assert scene().replace(delta_2=0.7).parameters["delta_2"] == 0.7
+
+
+# -- sweeps ----------------------------------------------------------------------------------------------------
+
+
+def test_a_sweep_over_one_node_and_what_it_resumes(tmp_path) -> None:
+    made = scene(axes={"delta_2": [0.1, 0.4]})
+    found = run(made)
+    for k, value in enumerate((0.1, 0.4)):
+        np.testing.assert_allclose(found.end[k], by_scipy(made.replace(axes={}, delta_2=value), 20), atol=2e-8)
+    found.save(tmp_path / "made.nc")
+    again = open_result(tmp_path / "made.nc")
+    assert again.scene == made
+    assert run(made, resume=again).end.values.tolist() == found.end.values.tolist()
+
+
+def test_nodes_merge_where_their_parameters_agree() -> None:
+    """A ring of four with dampings a, b, a, b: opposite nodes start equal, and only with equal dampings they stay so."""
+    given = {"topology": ring(4), "initial": {"x": [0.3, 0.1, 0.3, 0.1], "v": 0}, "time_unit": "time"}
+    pairs = scene(parameters={"sigma": 0.1, "delta": [0.1, 0.2, 0.1, 0.2]}, **given)
+    chosen = decide(pairs)
+    assert chosen.equations.n == 2
+    assert [pairs.equations.parameters[k] for k in chosen.numbers][:2] == ["delta_1", "delta_2"]
+    assert decide(scene(parameters={"sigma": 0.1, "delta": [0.1, 0.2, 0.3, 0.2]}, **given)).equations.n == 3
+    swept = scene(parameters={"sigma": 0.1}, axes={"delta_3": [0.1, 0.2]}, **given)
+    assert decide(swept).equations.n == 3
+    np.testing.assert_allclose(run(pairs).end, by_scipy(pairs, 20), atol=2e-8)
+
+
+def test_what_needs_equal_nodes_says_so() -> None:
+    made = scene(parameters={"sigma": 0.1, "delta": [0.1, 0.2, 0.3]})
+    for refuse in (lambda: transversal(made.equations), lambda: ring_of_three(made.equations), lambda: certify(made),
+                   lambda: exponents(made, [0.1])):  # fmt: skip
+        with pytest.raises(ValueError, match="nodes that differ in delta; expected equal nodes"):
+            refuse()
+    with pytest.raises(ValueError, match="nodes of several kinds; expected equal nodes"):
+        transversal(mixed().equations)
+    assert any("differ in delta" in words and "no complete synchronisation" in words for words in made.warnings)
+
+
+# -- nodes of several kinds ------------------------------------------------------------------------------------
+
+
+def test_nodes_of_two_kinds_move_as_their_own_equations_say() -> None:
+    x, v = ([real(f"{c}_{i}") for i in (1, 2, 3)] for c in "xv")
+    beta, delta, mu, omega, sigma = (real(name) for name in ("beta", "delta", "mu", "omega", "sigma"))
+    made = mixed(record=("sync_error",))
+    drive = [real(f"u_{i + 1}") * sp.cos(omega * TIME) for i in range(3)]
+    rows = [-x[i] - beta * x[i] ** 3 - delta * v[i] + drive[i] + sigma * (x[1] - x[i]) for i in range(3)]
+    rows[1] = -x[1] + mu * (1 - x[1] ** 2) * v[1] + drive[1] + sigma * (x[0] + x[2] - 2 * x[1])
+    assert [sp.expand(a - b) for a, b in zip(made.equations.rhs(), [*v, *rows], strict=True)] == [0] * 6
+    assert made.parameters["u_1"] == 0.3  # each node has the default of its kind
+    assert made.parameters["u_2"] == 0.0
+    found = run(made)
+    np.testing.assert_allclose(found.end, by_scipy(made, 20), atol=2e-8)
+    assert found.sync_error > 0
+
+
+def test_scenes_with_groups_are_read_and_written() -> None:
+    made = mixed()
+    assert Scene.from_dict(made.as_dict()) == made == made.replace(title="")
+    assert made.replace(nodes=None).equations == scene(parameters={"sigma": 0.1}).equations
+    everywhere = scene(nodes=[{"oscillator": "van_der_pol", "at": [1, 2, 3]}], parameters={"sigma": 0.1})
+    assert everywhere.equations == scene(oscillator="van_der_pol", parameters={"sigma": 0.1}).equations
+
+
+@pytest.mark.parametrize(
+    ("nodes", "message"),
+    [
+        ([{"oscillator": "van_der_pol"}], "nodes 1: 'at' is missing"),
+        ([{"oscillator": "van_der_pool", "at": [1]}], "unknown oscillator 'van_der_pool'"),
+        ([{"oscillator": "van_der_pol", "at": [4]}], "a whole number from 1 to 3"),
+        ([{"oscillator": "van_der_pol", "at": [2, 2]}], "each node once"),
+        ([{"oscillator": "van_der_pol", "at": []}], "at least one node"),
+        ([{"oscillator": "harmonic", "at": [1]}, {"oscillator": "van_der_pol", "at": [1]}], "in another group too"),
+        ([{"oscillator": "lorenz", "at": [2]}], "coupling 'spring' joins coordinates with velocities"),
+        ([{"oscillator": "friction", "friction": "exponental", "at": [2]}], "unknown friction 'exponental'"),
+        ("van_der_pol", "expected tables"),
+    ],
+)
+def test_groups_that_fit_no_network(nodes: object, message: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=re.escape(message)):
+        mixed(nodes=nodes)
+
+
+def test_components_of_one_name_are_joined_and_compared() -> None:
+    made = scene(oscillator="lorenz", nodes=[{"oscillator": "van_der_pol", "at": [2]}], coupling="x->x, y->y",
+                 parameters={"sigma": 1}, record=("sync_error",))  # fmt: skip
+    assert made.equations.state == ("x_1", "x_2", "x_3", "y_1", "y_3", "z_1", "z_3", "v_2")
+    assert made.initial["y"] == made.initial["z"] == (0.0, 0.0) or len(made.initial["y"]) == 2
+    sigma, x, y = real("sigma"), real("x_1"), real("y_1")
+    forces = dict(zip(made.equations.state, made.equations.rhs(), strict=True))
+    assert sp.diff(forces["x_1"], real("x_2")) == sigma
+    assert not forces["y_1"].has(sigma)  # the neighbour has no y
+    assert forces["x_1"].has(x, y)
+    with pytest.raises(ValueError, match="coupling 'y->y' joins nothing between nodes of"):
+        made.replace(coupling="y->y")
+    with pytest.raises(ValueError, match="unknown section variable 'y_2'"):
+        made.replace(section="y_2 falling")
+
+
+def test_a_coupling_between_other_kinds_is_refused() -> None:
+    with pytest.raises(ValueError, match="coupling 'hanging' joins clock and beam; found nodes of one kind"):
+        Scene(oscillator="clock", coupling="hanging", topology=chain(2))
+    with pytest.raises(ValueError, match="no states of one name to compare"):
+        load_scene("huygens").replace(record=("sync_error",))
+
+
+def test_friction_laws_of_two_kinds() -> None:
+    made = Scene(topology=chain(2), nodes=[{"oscillator": "friction", "friction": "coulomb", "at": [2]}])
+    words = text(made.equations)
+    assert "of node 1" in words
+    assert "of node 2" in words
+    with pytest.raises(ValueError, match="nodes of several kinds: found set-valued friction"):
+        Scene(topology=chain(2), contact="set-valued", nodes=made.nodes).equations  # noqa: B018
+
+
+def test_the_equations_of_ten_thousand_nodes_cost_no_algebra(monkeypatch) -> None:
+    """What is derived does not grow with the network: SymPy substitutes no more for ten thousand nodes than for ten."""
+    plain, calls = sp.Basic.xreplace, []
+
+    def counted(self, rule):
+        calls.append(self)
+        return plain(self, rule)
+
+    monkeypatch.setattr(sp.Basic, "xreplace", counted)
+    made = scene(topology=chain(10_000), parameters={"delta": np.linspace(0.1, 0.2, 10_000), "sigma": 0.1})
+    assert made.equations.dimension == 20_000
+    assert len(calls) < 100
+
+
+def test_the_text_of_a_kernel_does_not_grow_with_the_network() -> None:
+    texts = []
+    for n in (30, 300):
+        made = scene(topology=chain(n), parameters={"sigma": 0.1, "delta": np.linspace(0.1, 0.2, n)})
+        texts.append(emit(made.equations, "rodas5p", (), width=2).text)
+    assert abs(len(texts[1]) - len(texts[0])) < 300  # numbers of three digits in place of two
+
+
+def test_a_star_of_two_kinds_may_be_one_way() -> None:
+    graph = from_matrix([[0, 0, 0], [1, -1, 0], [1, 0, -1]])
+    made = mixed(topology=graph, nodes=[{"oscillator": "van_der_pol", "at": [1]}])
+    assert [pair for pair, _ in made.equations.joints] == [(1, 0)]
+    assert star(3).n == made.n
+
+
+# -- oscillators and laws that `nodes` gives alone -------------------------------------------------------------------
+
+STATIC = {"oscillator": "friction", "friction": "coulomb_static", "at": [1, 2]}
+BOTH = {"nodes": [STATIC], "topology": chain(2), "contact": "set-valued"}
+
+
+def test_a_law_that_nodes_give_is_checked_as_that_of_the_scene() -> None:
+    wrong = {"parameters": {"mu_s": 0.1, "mu_k": 0.3}}
+    refusal = "friction coulomb_static: found mu_s = 0.1 below mu_k = 0.3"
+    with pytest.raises(ValueError, match=refusal):
+        Scene(friction="coulomb_static", topology=chain(2), contact="set-valued", **wrong)
+    with pytest.raises(ValueError, match=refusal):
+        Scene(**BOTH, **wrong)
+    unused = {"friction": "coulomb_static", "nodes": [{**STATIC, "friction": "coulomb"}]}
+    assert "mu_s" not in Scene(**{**BOTH, **unused}).parameters
+
+
+def test_static_and_sliding_friction_are_compared_node_by_node() -> None:
+    Scene(**BOTH, parameters={"mu_s": [0.2, 0.4], "mu_k": [0.1, 0.3]})
+    with pytest.raises(ValueError, match=r"found mu_s_1 = 0\.2 below mu_k_1 = 0\.25"):
+        Scene(**BOTH, parameters={"mu_s": [0.2, 0.4], "mu_k": [0.25, 0.3]})
+    with pytest.raises(ValueError, match=r"found mu_s_2 = 0\.2 below mu_k = 0\.3"):
+        Scene(**BOTH, parameters={"mu_s": [0.5, 0.4], "mu_k": 0.3}, axes={"mu_s_2": [0.2, 0.6]})
+
+
+def test_coordinates_are_those_of_the_nodes() -> None:
+    pendulums = [{"oscillator": "double_pendulum", "at": [1, 2]}]
+    by_nodes = Scene(nodes=pendulums, topology=chain(2), coupling="spring on phi")
+    assert (
+        by_nodes.equations == Scene(oscillator="double_pendulum", topology=chain(2), coupling="spring on phi").equations
+    )
+    with pytest.raises(ValueError, match="unknown coordinate 'x'; known: phi, psi"):
+        Scene(nodes=pendulums, topology=chain(2), coupling="spring on x")
+
+
+def test_the_repr_names_the_laws_of_the_nodes() -> None:
+    assert repr(Scene(**BOTH)) == "Scene(friction/coulomb_static/spring, chain(2))"
+    one = {**STATIC, "at": [2]}
+    assert (
+        repr(Scene(nodes=[one], topology=chain(2))) == "Scene(friction/exponential and coulomb_static/spring, chain(2))"
+    )
+
+
+def test_what_is_not_driven_is_named_as_the_nodes_are() -> None:
+    with pytest.raises(ValueError, match="found 'period', but 'lorenz' is not driven"):
+        Scene(nodes=[{"oscillator": "lorenz", "at": [1]}], time_unit="period")
+
+
+def test_the_warning_of_a_coupling_that_does_not_vanish_reads_the_oscillator_of_the_nodes() -> None:
+    pendulums = [{"oscillator": "double_pendulum", "at": [1, 2]}]
+    assert Scene(nodes=pendulums, topology=chain(2), coupling="spring on phi").warnings == ()
+
+
+def test_set_valued_friction_beside_another_kind_is_refused_by_the_scene() -> None:
+    for other in ({"oscillator": "harmonic"}, {"oscillator": "friction", "friction": "viscous"}):
+        with pytest.raises(ValueError, match="several kinds: found set-valued friction; expected smooth contacts"):
+            Scene(contact="set-valued", topology=chain(2), nodes=[{**other, "at": [2]}])

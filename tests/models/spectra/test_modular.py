@@ -1,0 +1,128 @@
+"""Closed forms multiplied out modulo large primes: right ones agree, and every planted mistake shows."""
+
+from __future__ import annotations
+
+import re
+from itertools import islice
+from math import lcm
+
+import pytest
+import sympy as sp
+
+from synchain.models import chain, one_way_ring, ring, star
+from synchain.models.graphs.families import family, names, topology
+from synchain.models.graphs.products import cartesian, complement, kronecker, union, weighted
+from synchain.models.graphs.topology import Topology
+from synchain.models.spectra.characteristic import characteristic
+from synchain.models.spectra.modular import _characteristic, _claimed, _powers, _primes, _unit, check_modulo
+from synchain.models.spectra.proof import ProofError
+from synchain.models.spectra.solve import spectrum
+from synchain.models.spectra.spectrum import table
+from synchain.runtime.cli import main
+
+CLOSED = [name for name in names() if hasattr(family(name), "spectrum")]
+COMPOSED = [
+    cartesian(chain(4), ring(5)),
+    kronecker(ring(5), ring(7)),
+    union(star(4), chain(5)),
+    complement(ring(9)),
+    weighted(cartesian(chain(4), ring(3)), "-5/7"),
+]
+
+
+def listed(graph: Topology) -> list[tuple[sp.Expr, int]]:
+    found = graph.closed_form()
+    assert found is not None
+    return list(found)
+
+
+@pytest.mark.parametrize("graph", [topology(name, n) for name in CLOSED for n in (12, 30)] + COMPOSED, ids=str)
+def test_closed_forms_agree(graph: Topology) -> None:
+    chance = check_modulo(graph, listed(graph))
+    assert chance is not None
+    assert 0 < chance < 1e-40
+
+
+@pytest.mark.parametrize("graph", [ring(12), one_way_ring(9), topology("torus", 30), *COMPOSED], ids=str)
+def test_any_small_mistake_shows(graph: Topology) -> None:
+    right = listed(graph)
+    (first, count), (second, other) = right[0], right[-1]
+    tiny = sp.Rational(1, 10**30)
+    wrong = [
+        [(first + tiny, count), *right[1:]],
+        [*right[:-1], (second - tiny, other)],
+        [(first, count + 1), *right[1:]],
+        [(first, count + 1), *right[1:-1], *([(second, other - 1)] if other > 1 else [])],
+    ]
+    for pairs in wrong:
+        with pytest.raises(ProofError, match=r"do not multiply out to the characteristic polynomial modulo \d{19}"):
+            check_modulo(graph, pairs)
+
+
+def test_an_angle_of_another_ring_shows() -> None:
+    with pytest.raises(ProofError):
+        check_modulo(ring(300), listed(ring(301)))
+    with pytest.raises(ProofError):
+        check_modulo(topology("torus", 30), listed(topology("grid", 30)))
+
+
+def test_the_polynomial_modulo_a_prime_is_that_of_the_whole_numbers() -> None:
+    for graph in (chain(9), star(7), topology("wheel", 8), one_way_ring(6), weighted(topology("grid", 9), "2/3")):
+        (p,) = islice(_primes(8, "a"), 1)
+        whole = characteristic(graph)
+        expected = [int(c.p) * pow(int(c.q), -1, p) % p for c in whole.coeffs()]
+        assert [int(c) for c in _characteristic(graph, p).coeffs()] == expected
+
+
+def test_a_claim_modulo_a_prime_is_that_of_the_whole_numbers() -> None:
+    """-2 ± sqrt(2), -2 and -1 ± I: z^5 + 8 z^4 + 24 z^3 + 36 z^2 + 28 z + 8, multiplied by hand."""
+    numbers = [-2 + sp.sqrt(2), -2 - sp.sqrt(2), sp.Integer(-2), -1 + sp.I, -1 - sp.I]
+    found = [_powers(number) for number in numbers]
+    known = [(powers, 1) for powers in found if powers is not None]
+    m = lcm(*(t.denominator for (_, terms), _ in known for t, _ in terms))
+    (p,) = islice(_primes(m, "b"), 1)
+    assert [int(c) for c in _claimed(known, m, p).coeffs()] == [8, 28, 36, 24, 8, 1]
+
+
+@pytest.mark.parametrize("m", [1, 2, 7, 360, 2000])
+def test_primes_and_roots_of_unity(m: int) -> None:
+    found = list(islice(_primes(m, "seed"), 3))
+    assert len(set(found)) == 3
+    assert found == list(islice(_primes(m, "seed"), 3))
+    assert found != list(islice(_primes(m, "other"), 3))
+    for p in found:
+        assert sp.isprime(p)
+        assert p % m == 1 % m
+        assert 2**61 <= p < 2**62
+        z = _unit(m, p)
+        assert [k for k in range(1, m + 1) if pow(z, k, p) == 1] == [m]
+
+
+def test_numbers_that_are_no_sums_of_roots_of_unity_are_not_checked() -> None:
+    assert check_modulo(chain(2), [(sp.sqrt(7), 1), (-sp.sqrt(7), 1)]) is None
+
+
+def test_large_spectra_say_how_they_were_checked(capsys: pytest.CaptureFixture[str]) -> None:
+    fresh = spectrum.__wrapped__
+    assert (fresh(ring(200)).verified, fresh(ring(200)).chance) == (True, None)
+    middle = fresh(topology("hypercube", 256))
+    assert not middle.verified
+    assert middle.chance is not None
+    assert middle.chance < 1e-40
+    assert fresh(topology("hypercube", 512)).chance is None
+    assert fresh(topology("hypercube", 512), prove="primes").chance is not None
+    assert fresh(chain(600), prove=False).chance is None
+    assert "the same modulo three large primes" in table(middle)
+    assert main(["spectrum", "ring", "600"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert re.fullmatch(
+        r"600 eigenvalues, 301 distinct; .* the same modulo three large primes \(.* of \de-\d\d\)", last
+    )
+
+
+def test_a_wrong_closed_form_of_a_large_graph_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    wrong = listed(topology("star", 300))
+    wrong[1:] = [(sp.Integer(-1), 297), (sp.Integer(-300), 2)]
+    monkeypatch.setattr(family("star"), "spectrum", lambda n: wrong)
+    with pytest.raises(ProofError, match="star 300"):
+        spectrum.__wrapped__(topology("star", 300))

@@ -1,0 +1,210 @@
+"""Periodic orbits by Newton's method against closed forms, and bifurcations on their branches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.bifurcation.branches import follow
+from synchain.runtime.bifurcation.periodic import PeriodicOrbit, periodic_orbit, stability_end
+from synchain.runtime.bifurcation.skeleton import skeleton
+
+PAIR = topology("chain", 2)
+
+
+def scene(**more: object) -> Scene:
+    return Scene(**{"topology": PAIR, "contact": "set-valued", **more})  # type: ignore[arg-type]
+
+
+@pytest.mark.long
+def test_den_hartogs_motion() -> None:
+    """x'' + x + r sgn x' = cos(beta t), no stops: amplitude sqrt(V^2 - r^2 U^2) (Phil. Mag. 9, 801 (1930))."""
+    beta, r = 1.4, 0.3
+    v, u = 1 / (1 - beta**2), np.sin(np.pi / beta) / (beta * (1 + np.cos(np.pi / beta)))
+    amplitude = np.sqrt(v**2 - (r * u) ** 2)
+    s = scene(
+        friction="coulomb",
+        parameters={"theta_b": 0.0, "epsilon": 1.0, "mu": r, "u": 1.0, "omega": beta},
+        transient=200.0,
+    )
+    orbit = periodic_orbit(s)
+    assert orbit.residual < 1e-13
+    assert orbit.stable
+    # the phase at the beginning of a period is where the drive is largest: sin phi = -r U / V
+    phase = np.arctan2(-r * u / v, np.sign(v) * np.sqrt(1 - (r * u / v) ** 2))
+    turning = phase / beta  # time of the turning point, where x is largest
+    assert abs(orbit.state[0]) < amplitude
+    later = _position(s, orbit.state, turning % (2 * np.pi / beta))
+    assert abs(abs(later) - amplitude) < 1e-11
+
+
+def _position(s: Scene, state: np.ndarray, length: float) -> float:
+    from synchain.runtime.sweeps.run import run
+
+    one = s.replace(
+        topology=topology("chain", 1), transient=0.0, window=length, time_unit="time", record=(), rtol=1e-12
+    )
+    return float(run(one, x_1=float(state[0]), v_1=float(state[1]), show_progress=False).end.values[0])
+
+
+def test_a_linear_oscillator_has_the_multipliers_of_its_damping() -> None:
+    s = Scene(oscillator="duffing", topology=PAIR, parameters={"beta": 1e-12, "delta": 0.2, "omega": 1.3})
+    orbit = periodic_orbit(s)
+    expected = np.exp(-0.1 * 2 * np.pi / 1.3)
+    np.testing.assert_allclose(np.abs(orbit.multipliers), expected, rtol=1e-9)
+
+
+def test_the_end_of_the_stable_range_to_rounding() -> None:
+    """omega = 1.15, period two: the smoothed law approaches the exact one, and another start gives the same ten
+    digits."""
+    exact = stability_end(periodic_orbit(scene(), 2, omega=1.15), 0.4, 0.5)
+    again = stability_end(periodic_orbit(scene(initial={"x": [0.1, 0.1]}, transient=401.0), 2, omega=1.15), 0.4, 0.5)
+    assert abs(exact - again) < 1e-10
+    gaps = [abs(stability_end(periodic_orbit(scene(contact="atan"), 2, omega=1.15, kappa=k), 0.4, 0.5) - exact)
+            for k in (1e5, 1e7, 1e9)]  # fmt: skip
+    assert gaps[0] > 50 * gaps[1]
+    assert gaps[2] < 1e-6
+    with pytest.raises(ValueError, match="expected a change between them"):
+        stability_end(periodic_orbit(scene(), 2, omega=1.15), 0.6, 0.7)
+
+
+def test_a_period_doubling_is_found_where_the_double_period_is_born() -> None:
+    first = periodic_orbit(scene(), 2, omega=1.2)
+    branch = follow(scene(), "omega", np.linspace(1.2, 1.24, 5), first)
+    ((at, words),) = branch.bifurcations
+    assert words == "period doubling"
+    assert len(branch.orbits) == 5
+    assert [orbit.stable for orbit in branch.orbits] == [bool(value < at) for value in branch.values]
+    far = scene(transient=3000.0)
+    gaps = []
+    for value in (at - 0.002, at + 0.002):
+        twice = periodic_orbit(far, 2, branch.orbits[2].state, omega=value)
+        gaps.append(np.abs(periodic_orbit(far, 4, omega=value).state - twice.state).max())
+    below, above = gaps
+    assert below < 1e-9  # the period of four is that of two below, and another motion above
+    assert above > 1e-3
+
+
+def coulomb(drive: float) -> Scene:
+    """The exponential law without a fall is Coulomb's; a block on ground at rest."""
+    numbers = {"theta_b": 0.0, "epsilon": 1.0, "mu_s": 0.3, "mu_k": 0.3, "omega": 1.4, "u": drive}
+    return scene(parameters=numbers, transient=100.0)
+
+
+@pytest.mark.long
+def test_stops_begin_where_den_hartogs_motion_ends() -> None:
+    """No stops while X beta^2 >= r: V beta^2 = r sqrt(1 + U^2 beta^4)/P, P the drive (Phil. Mag. 9, 801 (1930))."""
+    beta, r = 1.4, 0.3
+    v, u = 1 / (1 - beta**2), np.sin(np.pi / beta) / (beta * (1 + np.cos(np.pi / beta)))
+    last = r * np.sqrt(1 + u**2 * beta**4) / (abs(v) * beta**2)
+    first = periodic_orbit(coulomb(1.2 * last))
+    assert first.phases is not None
+    assert first.phases.modes == (-1, 1)
+    branch = follow(coulomb(1.2 * last), "u", np.linspace(1.2 * last, 0.9 * last, 3), first)
+    ((at, words),) = branch.bifurcations
+    assert words == "stick loss"
+    assert at == pytest.approx(last, abs=1e-8)
+    assert branch.residuals[0] < 1e-8
+    assert [len(phases.modes) for phases in branch.phases] == [2, 2, 4]
+    load = np.sqrt((v * branch.values[0]) ** 2 - (r * u) ** 2) * beta**2  # at the turning point
+    assert branch.phases[0].landing == pytest.approx(r - load, abs=1e-9)
+
+
+def test_a_branch_goes_through_a_graze_to_its_fold() -> None:
+    """omega = 0.7: as the drive grows the load in stick of period one comes up to the limit of static friction, at the rate
+    at which its gap has fallen; beyond, the orbit lets go twice, and ends where it meets another one."""
+    made = scene(transient=60.0, parameters={"omega": 0.7, "u": 0.15})
+    branch = follow(made, "u", [0.15, 0.25, 0.35, 0.45, 0.5, 0.55], periodic_orbit(made))
+    assert [words for _, words in branch.bifurcations] == ["period doubling", "grazing", "period doubling", "fold"]
+    assert len(branch.orbits) == 5
+    gaps = [phases.gap for phases in branch.phases[-2:]]
+    at = branch.bifurcations[1][0]
+    assert at == pytest.approx(0.5 + 0.05 * gaps[1] / (gaps[0] - gaps[1]), abs=2e-4)
+    assert max(branch.residuals) < 3e-12
+    assert [len(orbit.phases.modes) for orbit in branch.at if orbit.phases] == [2, 2, 4, 4]
+    edge, turn = branch.bifurcations[-1][0], branch.at[-1].state
+    here = follow(made, "u", [0.5, 0.53, edge - 1e-4], branch.orbits[-1]).orbits[-1]
+    other = periodic_orbit(made, 1, 2.0 * turn - here.state, u=edge - 1e-4)  # the sheets lie on both sides of the fold
+    assert sum(orbit.multipliers[0].real > 1.0 for orbit in (here, other)) == 1
+    with pytest.raises(ArithmeticError):
+        periodic_orbit(made, 1, turn, u=edge + 1e-4)
+
+
+@pytest.mark.long
+def test_the_skeleton_of_a_diagram_has_stable_and_unstable_orbits() -> None:
+    """Period two loses its stability between 1.2 and 1.24 and lives on; the orbit of period one is followed both ways."""
+    found = skeleton(scene(transient=1000.0), "omega", [1.2, 1.22, 1.24], periods=(2,))
+    (branch,) = found
+    assert [orbit.periods for orbit in branch.orbits] == [2, 2, 2]
+    assert [orbit.stable for orbit in branch.orbits] == [True, True, False]
+    assert [words for _, words in branch.bifurcations] == ["period doubling"]
+    assert branch.residuals[0] < 1e-9
+    assert {phases.modes for phases in branch.phases} == {(0, 1)}
+    assert {phases.words for phases in branch.phases} == {"stick, slip +"}
+
+
+def test_what_is_refused() -> None:
+    with pytest.raises(ValueError, match="an oscillator without one"):
+        periodic_orbit(Scene(oscillator="lorenz", coupling="x->x", topology=PAIR))
+    with pytest.raises(ValueError, match="periods = 0; expected a whole number, at least 1"):
+        periodic_orbit(scene(), 0)
+    with pytest.raises(ArithmeticError, match="no orbit of 1 drive periods near the start"):
+        periodic_orbit(scene(), 1, start=[50.0, -40.0], omega=1.55)
+
+
+@pytest.mark.parametrize(
+    ("call", "kind", "message"),
+    [
+        (lambda s, o: periodic_orbit(s, 1.5), ValueError, "periods = 1.5; expected a whole number, at least 1"),
+        (lambda s, o: periodic_orbit(s, "2"), ValueError, "periods = '2'; expected a whole number"),
+        (lambda s, o: periodic_orbit("figure_3"), TypeError, "'figure_3'.*expected a Scene"),
+        (
+            lambda s, o: periodic_orbit(s, 2, omga=1.0),
+            ValueError,
+            "unknown parameter or keyword 'omga' of periodic_orbit; known: theta_b, epsilon, u",
+        ),
+        (
+            lambda s, o: periodic_orbit(s, 2, [0.1]),
+            ValueError,
+            r"start: found \[0.1\]; expected a number for each of x, v",
+        ),
+        (lambda s, o: periodic_orbit(s, 2, ["a", 1]), ValueError, "expected a number for each of x, v"),
+        (lambda s, o: periodic_orbit(s, 2, [np.nan, 0]), ValueError, "expected a number for each of x, v"),
+        (lambda s, o: stability_end(o, "a", 1), ValueError, "low = 'a'; expected a finite strength alpha"),
+        (lambda s, o: stability_end(o, 0.1, np.inf), ValueError, "high = inf; expected a finite strength alpha"),
+        (lambda s, o: follow(s, "omga", [1.0], o), ValueError, "unknown parameter 'omga'; known: theta_b"),
+        (lambda s, o: follow(s, "omega", [], o), ValueError, r"values: found \[\]; expected at least one number"),
+        (lambda s, o: follow(s, "omega", [1.15, 1.16, 1.1], o), ValueError, "rising or falling all the way"),
+        (
+            lambda s, o: follow(s, "omega", ["a"], o),
+            ValueError,
+            r"values: found \['a'\]; expected finite numbers for omega",
+        ),
+        (lambda s, o: follow(s, "omega", 1.15, o), ValueError, "values: found 1.15; expected finite numbers for omega"),
+        (lambda s, o: follow(s, "omega", [1.15], None), TypeError, "first: found None; expected a PeriodicOrbit"),
+        (lambda s, o: skeleton(s, "omga", [1.15]), ValueError, "unknown parameter 'omga'"),
+        (
+            lambda s, o: skeleton(s, "omega", [1.15], looks=0),
+            ValueError,
+            "looks = 0; expected a whole number, at least 1",
+        ),
+        (lambda s, o: skeleton(s, "omega", [1.15], (0,)), ValueError, "periods = 0; expected a whole number"),
+        (lambda s, o: skeleton(s, "omega", [1.15], 2), ValueError, "periods = 2; expected numbers of drive periods"),
+        (lambda s, o: skeleton(s, "omega", [1.15], ()), ValueError, "expected numbers of drive periods"),
+        (lambda s, o: skeleton("figure_3", "omega", [1.15]), TypeError, r"scene: found 'figure_3' \(str\); expected"),
+    ],
+)
+def test_misuse_is_answered_in_one_line(call: Callable[..., object], kind: type, message: str) -> None:
+    with pytest.raises(kind, match=message) as found:
+        call(scene(), known())
+    assert "\n" not in str(found.value)
+
+
+@cache
+def known() -> PeriodicOrbit:
+    return periodic_orbit(scene(), 2, [0.04373869, 0.1], omega=1.15)

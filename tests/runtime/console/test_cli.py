@@ -1,0 +1,662 @@
+"""The command line: what it prints, where, and with which exit code."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from synchain.models import chain
+from synchain.models.graphs.families import names as families
+from synchain.models.scenes.file import load_scene, scene_names
+from synchain.runtime import commands
+from synchain.runtime.cells import kernels
+from synchain.runtime.cli import main
+from synchain.runtime.console.outcome import print_json
+from synchain.runtime.results.open import open_result
+from synchain.runtime.sweeps import run as sweep
+from synchain.runtime.sweeps import stream, worker
+from synchain.runtime.synchronisation import threshold
+
+SCENE = """
+title = "short"
+record = ["sync_error"]
+transient = 2
+window = 2
+[topology]
+name = "chain"
+n = 2
+[sweep]
+sigma = {from = 0, to = 0.5, count = 20}
+"""
+
+SEPARATE = "-1 1 0 0\n1 -1 0 0\n0 0 -1 1\n0 0 1 -1\n"
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> str:
+    path = tmp_path / "short.toml"
+    path.write_text(SCENE)
+    return str(path)
+
+
+def matrix(folder: Path, text: str) -> str:
+    path = folder / "G.txt"
+    path.write_text(text)
+    return str(path)
+
+
+BUFFERED = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+"""The environment of a user, whose output waits in a buffer until the end."""
+
+
+def synchain(words: str, **options: Any) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "synchain.runtime", *words.split()]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, **options)
+
+
+def test_help_names_every_command_and_is_fast_because_nothing_heavy_is_loaded(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["--help"]) == 0
+    out = capsys.readouterr().out
+    assert {"figures", "spectrum", "equations", "kernel", "run", "thresholds", "cache"} <= set(commands.names())
+    assert all(f"\n  {name} " in out for name in commands.names())
+    assert not loaded_after("--help") & {"sympy", "numpy", "numba", "matplotlib", "flint", "scipy", "tqdm"}
+
+
+@pytest.mark.parametrize("name", commands.names())
+def test_every_command_has_a_help_with_an_example(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([name, "--help"]) == 0
+    captured = capsys.readouterr()
+    assert f"usage: synchain {name}" in captured.out
+    examples = captured.out.partition("example")[2].splitlines()[1:]
+    assert examples
+    assert all(line.startswith(f"  synchain {name}") for line in examples)
+    assert captured.err == ""
+
+
+def loaded_after(words: str) -> set[str]:
+    """Top-level modules in a fresh interpreter after a command."""
+    code = (
+        "import sys\nfrom synchain.runtime.cli import main\n"
+        f"code = main({words.split()!r})\nprint(*{{n.split('.')[0] for n in sys.modules}}, file=sys.stderr)\nsys.exit(code)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    return set(done.stderr.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "absent"),
+    [
+        ("spectrum star 6 --json", {"numpy", "numba", "matplotlib", "scipy", "xarray"}),
+        ("equations figure_4a", {"numpy", "numba", "matplotlib", "scipy", "xarray"}),
+        ("scenes", {"sympy", "numpy", "numba", "matplotlib"}),
+        ("topologies", {"sympy", "numpy", "numba", "matplotlib"}),
+        ("--version", {"sympy", "numpy", "numba", "matplotlib", "argparse.py"}),
+    ],
+)
+def test_a_command_loads_only_what_it_needs(words: str, absent: set[str]) -> None:
+    loaded = loaded_after(words)
+    assert "argparse" in loaded
+    assert not loaded & absent
+
+
+def test_spectrum_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["spectrum", "--json", "chain", "4"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["n"] == 4
+    assert found["verified"] is True
+    exact = [sp.sympify(e["exact"]) for e in found["eigenvalues"]]
+    assert exact == [0, -2 + sp.sqrt(2), -2, -2 - sp.sqrt(2)]
+    assert [e["value"] for e in found["eigenvalues"]] == [float(e) for e in exact]
+    assert [e["multiplicity"] for e in found["eigenvalues"]] == [1, 1, 1, 1]
+
+
+def test_spectrum_of_one_way_links_is_complex(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["spectrum", "--json", "--matrix", matrix(tmp_path, "-1 1 0\n0 -1 1\n1 0 -1")]) == 0
+    values = [e["value"] for e in json.loads(capsys.readouterr().out)["eigenvalues"]]
+    assert values == [0.0, [-1.5, pytest.approx(-(0.75**0.5))], [-1.5, pytest.approx(0.75**0.5)]]
+
+
+def test_a_large_closed_form_is_proved_as_well(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["spectrum", "star", "300", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["verified"] is True
+
+
+def test_spectrum_of_separate_parts_is_allowed_but_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = matrix(tmp_path, SEPARATE)
+    assert main(["spectrum", "--matrix", path]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.splitlines()[1].split() == ["0", "0", "2"]
+    assert captured.err.startswith("warning: zero is an eigenvalue of multiplicity 2")
+    assert "never synchronises it completely" in captured.err
+    assert main(["spectrum", "--matrix", matrix(tmp_path, "-1 1\n1 -1")]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_long_tables_are_abbreviated_unless_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["spectrum", "chain", "30000"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 203
+    assert lines[101] == "… (29800 more)"
+    assert lines[-1].startswith("30000 eigenvalues, 30000 distinct;")
+    assert main(["spectrum", "chain", "201", "--all"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 203
+    assert main(["spectrum", "chain", "201", "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["eigenvalues"]) == 201
+
+
+def test_several_parts_are_said_with_negative_weights_as_well(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = matrix(tmp_path, "1 -1 0 0\n-1 1 0 0\n0 0 -1 1\n0 0 1 -1")
+    assert main(["spectrum", "--matrix", path]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.splitlines()[1].split() == ["2", "2", "1"]
+    assert captured.err.startswith("warning: zero is an eigenvalue of multiplicity 2: the graph falls into 2 parts")
+
+
+def test_scenes_and_topologies_list_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scenes"]) == 0
+    listed = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
+    assert set(listed) == set(scene_names())
+    assert load_scene("figure_4b").title in listed["figure_4b"]
+    assert main(["topologies"]) == 0
+    listed = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
+    assert {"chain", "complete", "ring", "star"} <= set(listed)
+    assert "3 or more" in listed["ring"]
+
+
+def test_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
+    from importlib.metadata import version
+
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"synchain {version('synchain')}\n"
+
+
+def test_equations_in_three_forms(capsys: pytest.CaptureFixture[str]) -> None:
+    from synchain.models.presentation import equations as present
+
+    equations = load_scene("two_oscillators").equations
+    for option, expected in (([], present.text(equations)), (["--latex"], present.latex(equations))):
+        assert main(["equations", "two_oscillators", *option]) == 0
+        assert capsys.readouterr().out == expected + "\n"
+    assert main(["equations", "two_oscillators", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(present.as_dict(equations)))
+
+
+def test_kernel_prints_the_source_without_compiling(
+    scene: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(kernels, "load")
+    assert main(["kernel", scene]) == 0
+    out = capsys.readouterr().out
+    assert out == sweep.kernel_source(load_scene(scene)).text
+    compile(out, "kernel", "exec")
+
+
+def test_run_writes_a_result_and_a_figure(scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "new" / "folder"
+    assert main(["run", scene, "--out", str(out), "--rtol", "1e-6", "--set", "omega=1.4", "sigma=0:0.5:3"]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    assert captured.out.splitlines()[0].startswith("short: 3 cells of 2 oscillators in ")
+    assert captured.out.splitlines()[1:] == [
+        "  3 cells: reached the end of the window",
+        f"  {out / 'short.nc'}",
+        f"  {out / 'short.png'}",
+    ]
+    assert sorted(path.name for path in out.iterdir()) == ["short.nc", "short.png"]
+    assert (out / "short.png").read_bytes().startswith(b"\x89PNG")
+    result = open_result(out / "short.nc")
+    assert result.scene.rtol == 1e-6
+    assert result.scene.parameters["omega"] == 1.4
+    assert result.data.sigma.values.tolist() == [0.0, 0.25, 0.5]
+    assert float(result.end[0, 0]) != float(result.end[1, 0])
+
+
+def test_a_figure_that_fails_says_that_the_result_is_complete(
+    scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "short.png").mkdir()
+    assert main(["run", scene, "--out", str(tmp_path), "--set", "sigma=0:0.5:3"]) == 1
+    (words,) = capsys.readouterr().err.splitlines()
+    assert words.startswith(
+        f"synchain run: the result is complete: {tmp_path / 'short.nc'}; its figure was not drawn: "
+    )
+    assert words.endswith("; the same command again draws it")
+    assert open_result(tmp_path / "short.nc").success
+    (tmp_path / "short.png").rmdir()
+    assert main(["run", scene, "--out", str(tmp_path), "--set", "sigma=0:0.5:3"]) == 0
+    assert (tmp_path / "short.png").is_file()
+
+
+def test_a_numba_that_does_not_compile_is_no_bug(scene: str, tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "synchain.runtime", "run", scene, "--out", str(tmp_path)]
+    surroundings = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run(words, capture_output=True, text=True, check=False, env=surroundings)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].endswith("unset NUMBA_DISABLE_JIT")
+    assert "bug" not in done.stderr
+
+
+def test_settings_reach_the_scene(scene: str, tmp_path: Path) -> None:
+    settings = ["--set", "sigma=0.1", "--set", "x_1=0.1,0.2", "window=3", "max_steps=5000"]
+    assert main(["run", scene, "--out", str(tmp_path), *settings]) == 0
+    found = open_result(tmp_path / "short.nc").scene
+    assert [(axis.name, axis.values) for axis in found.axes] == [("x_1", (0.1, 0.2))]
+    assert (found.parameters["sigma"], found.window, found.max_steps) == (0.1, 3.0, 5000)
+
+
+def test_cells_that_fail_are_said_and_the_file_is_still_written(
+    scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", scene, "--out", str(tmp_path), "--set", "max_steps=10"]) == 1
+    captured = capsys.readouterr()
+    assert captured.err.startswith("synchain run: 20 cells: used up max_steps")
+    assert "reached" not in captured.out
+    assert (open_result(tmp_path / "short.nc").status == 2).all()
+
+
+def interrupt_after(monkeypatch: pytest.MonkeyPatch, chunks: int) -> list[int]:
+    """Press Ctrl-C when so many chunks of cells have run; the list counts the cells that were driven."""
+    real, driven = worker.Workshop.run, []
+
+    def run(shop: worker.Workshop, cells: np.ndarray, *more: Any) -> Any:
+        if len(driven) == chunks:
+            raise KeyboardInterrupt
+        driven.append(len(cells))
+        return real(shop, cells, *more)
+
+    monkeypatch.setattr(worker.Workshop, "run", run)
+    return driven
+
+
+def test_an_interrupted_run_is_kept_and_resumed(
+    scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = ["run", scene, "--out", str(tmp_path / "cut"), "--workers", "1"]
+    with monkeypatch.context() as patch:
+        driven = interrupt_after(patch, 1)
+        assert main(words) == 1
+    err = capsys.readouterr().err
+    done = driven[0]
+    assert 0 < done < 20
+    assert f"interrupted with {done} of 20 cells finished" in err
+    assert [path.name for path in (tmp_path / "cut").iterdir()] == ["short.partial"]
+    again = err.rpartition("continue with: synchain ")[2].split()
+    assert again == [*words, "--resume"]
+    with monkeypatch.context() as patch:
+        driven = interrupt_after(patch, -1)
+        assert main(again) == 0
+    assert sum(driven) == 20 - done
+    assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == ["short.nc", "short.png"]
+    assert main(["run", scene, "--out", str(tmp_path / "whole")]) == 0
+    whole, resumed = (open_result(tmp_path / name / "short.nc") for name in ("whole", "cut"))
+    np.testing.assert_array_equal(whole.end, resumed.end)
+    np.testing.assert_array_equal(whole.sync_error, resumed.sync_error)
+
+
+def test_an_interrupt_before_the_first_cell_writes_nothing(
+    scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    interrupt_after(monkeypatch, 0)
+    assert main(["run", scene, "--out", str(tmp_path / "out")]) == 1
+    assert "nothing was written" in capsys.readouterr().err
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_resume_refuses_another_scene_and_a_missing_file(
+    scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["run", scene, "--out", str(tmp_path / "out")]
+    assert main([*words, "--resume"]) == 2
+    assert "nothing to resume" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    assert main(words) == 0
+    assert main([*words, "--resume", "--rtol", "1e-7"]) == 2
+    assert "another scene" in capsys.readouterr().err
+    (tmp_path / "out" / "short.nc").write_bytes(b"no netCDF")
+    assert main([*words, "--resume"]) == 2
+    assert "short.nc" in capsys.readouterr().err
+
+
+def fake_thresholds(found: list[dict[str, Any]]) -> Any:
+    """In place of minutes of simulation: ranges with open and closed ends, and a record of what was asked for."""
+
+    def thresholds(scene: Any, *, criterion: Any, **options: Any) -> threshold.Thresholds:
+        found.append({"scene": scene, "criterion": criterion, **options})
+        x = np.linspace(0.0, 0.6, 3)
+        nothing = np.zeros(3)
+        pair = threshold.Sweep(2 * x, nothing, nothing, ((0.0, 0.466), (0.9, 1.2)))
+        direct = threshold.Sweep(x, nothing, nothing, ((0.0, 0.15), (0.3, 0.6)))
+        return threshold.Thresholds(scene, pair, ((0.0, 0.155), (0.3, 0.4)), direct, criterion, ("a warning",))
+
+    return thresholds
+
+
+def test_thresholds_as_json_and_as_a_table(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    asked: list[dict[str, Any]] = []
+    monkeypatch.setattr(threshold, "thresholds", fake_thresholds(asked))
+    words = ["thresholds", "--n", "3", "--omega", "1.15", "--sigma", "0:0.4:5", "--workers", "2"]
+    assert main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {
+        "intervals": [[0.0, 0.15], [0.3, 0.6]],
+        "probe": [[0.0, 0.466], [0.9, 1.2]],
+        "predicted": [[0.0, 0.155], [0.3, 0.4]],
+        "warnings": ["a warning"],
+    }
+    assert main(words) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "chain(3), omega = 1.15: where all oscillators synchronise"
+    assert lines[1].split(maxsplit=2)[2] == "[0.0000, 0.1500], [0.3000, 0.6000...]"
+    assert lines[2].endswith("[0.0000, 0.1550], [0.3000, 0.4000...]")  # the probe ends at 1.2 / 3
+    assert next(line for line in lines if "Wu-Chua" in line).endswith(" [0.0000, 0.1553]")  # 0.466 / 3
+    assert asked[0]["sigma"] == (0.0, 0.1, 0.2, 0.3, 0.4)
+    assert asked[0]["workers"] == 2
+    assert asked[0]["scene"].topology == chain(3)
+    assert asked[0]["scene"].parameters["omega"] == 1.15
+
+
+def test_thresholds_of_a_scene_of_a_matrix_and_of_other_graphs(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked: list[dict[str, Any]] = []
+    monkeypatch.setattr(threshold, "thresholds", fake_thresholds(asked))
+    own = matrix(tmp_path, "-2 2\n2 -2")
+    (tmp_path / "ring.toml").write_text('topology = {name = "ring", n = 3}')
+    for words in (
+        "--scene figure_6 --transient 50 --starts 3",
+        "--scene figure_6 --n 4 --topology ring --omega 1.2",
+        f"--matrix {own} --omega 1.15",
+        "--scene harmonic_chain",
+        f"--scene {tmp_path}/ring.toml --n 5",
+        "--scene figure_6 --topology ring",
+    ):
+        assert main(["thresholds", *words.split(), "--json"]) == 0
+    graphs = [(a["scene"].topology.name, a["scene"].n, a["scene"].angular_frequency) for a in asked]
+    assert graphs == [
+        ("chain", 3, 1.55),
+        ("ring", 4, 1.2),
+        ("G.txt", 2, 1.15),
+        ("chain", 5, None),
+        ("ring", 5, 1.15),
+        ("ring", 3, 1.55),
+    ]
+    assert (asked[0]["criterion"].transient, asked[0]["criterion"].starts) == (50.0, 3)
+    assert asked[3]["scene"].parameters["sigma"] == 0.5
+
+
+def test_thresholds_in_a_hurry(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    asked: list[dict[str, Any]] = []
+    monkeypatch.setattr(threshold, "thresholds", fake_thresholds(asked))
+    for words in ("", "--quick", "--quick --starts 2 --sigma 0:1:3"):
+        assert main(["thresholds", "--n", "2", "--omega", "1.15", *words.split()]) == 0
+    full, quick, own = (a["criterion"] for a in asked)
+    assert full == threshold.Criterion()
+    assert (quick.starts, quick.transient) == (5, 400.0)
+    assert (own.starts, own.transient) == (2, 400.0)
+    assert [len(a["sigma"]) for a in asked] == [241, 121, 3]
+    assert asked[0]["resolution"] < asked[1]["resolution"] == asked[2]["resolution"]
+
+
+def test_thresholds_really_simulates(capsys: pytest.CaptureFixture[str]) -> None:
+    words = "thresholds --n 2 --omega 1.15 --sigma 0.1:0.15:2 --transient 5 --starts 1 --workers 1 --json"
+    assert main(words.split()) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert set(found) == {"intervals", "probe", "predicted", "warnings"}
+    assert all(0.2 <= low <= high <= 0.3 for low, high in found["probe"])
+
+
+def test_figures_are_made_by_their_names(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from synchain.runtime.figures import make
+
+    asked: list[Any] = []
+    monkeypatch.setattr(make, "make", lambda *words: asked.append(words) or [tmp_path / "out" / "figure_4b.png"])
+    assert main(["figures", "--quick", "4b", "--out", str(tmp_path / "out"), "thresholds", "--workers", "1"]) == 0
+    assert capsys.readouterr().out == f"{tmp_path / 'out' / 'figure_4b.png'}\n"
+    assert asked == [(["figure_4b", "thresholds"], tmp_path / "out", True, 1, None)]
+
+
+def test_benchmarks_print_a_table_each(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    from synchain.runtime.bench import precision
+
+    asked: list[bool] = []
+    monkeypatch.setattr(precision, "measure", lambda quick: asked.append(quick) or [(2, "scalar", 0.25)])
+    assert main(["bench", "--quick", "precision"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "Numba" in lines[0]
+    assert lines[2] == "precision"
+    assert lines[-1] == "| 2 | scalar | 0.25 |"
+    assert asked == [True]
+
+
+def test_the_cache_is_described_and_emptied(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "cache"
+    monkeypatch.setenv("SYNCHAIN_CACHE", str(folder))
+    assert main(["cache", "info"]) == 0
+    assert "kernels  0" in capsys.readouterr().out
+    folder.mkdir()
+    (folder / "kernel_1.py").write_text("x" * 2000)
+    (folder / "note.txt").write_text("not a kernel")
+    assert main(["cache", "info"]) == 0
+    assert capsys.readouterr().out.splitlines() == [f"folder   {folder}", "kernels  1", "size     2 kB"]
+    assert main(["cache", "clear"]) == 0
+    assert capsys.readouterr().out == f"deleted 1 kernel from {folder}\n"
+    assert [path.name for path in folder.iterdir()] == ["note.txt"]
+
+
+WRONG = [
+    ("", "expected a command"),
+    ("spectum chain 4", "did you mean 'spectrum'?"),
+    ("--quick", "unknown option --quick"),
+    ("spectrum chain", "expected TOPOLOGY and N"),
+    ("spectrum chain 0", "n = 0; expected at least 1"),
+    ("spectrum chain -3", "n = -3; expected at least 1"),
+    ("spectrum ring 2", "n = 2; expected at least 3"),
+    ("spectrum rnig 4", "unknown topology 'rnig'; known: chain, circulant, complete"),
+    ("spectrum chain 4.0", "expected a whole number"),
+    ("spectrum chain 1_000", "expected a whole number"),
+    ("spectrum chain 99999999999", "expected at most 100000"),
+    ("spectrum chain 4 5", "unrecognized arguments: 5"),
+    ("spectrum chain 4 --js", "unrecognized arguments: --js"),
+    ("spectrum chain 4 --matrix {own}", "expected one of them"),
+    ("spectrum --matrix {folder}/none.txt", "does not exist"),
+    ("spectrum --matrix {folder}", "is a folder"),
+    ("kernel nope", "unknown scene 'nope'; known: burridge_knopoff"),
+    ("equations {folder}/none.toml", "no such file"),
+    ("equations figure_4a --latex --json", "not allowed with"),
+    ("run {scene}", "the following arguments are required: --out"),
+    ("run --out {folder}", "the following arguments are required: SCENE"),
+    ("run {scene} --out {folder}/o --rtol -1e-8", "above 0"),
+    ("run {scene} --out {folder}/o --rtol 0", "above 0"),
+    ("run {scene} --out {folder}/o --rtol 0.11", "at most 0.1"),
+    ("run {scene} --out {folder}/o --rtol nan", "expected a finite number"),
+    ("run {scene} --out {folder}/o --rtol 1e-30", "rtol"),
+    ("run {scene} --out {folder}/o --workers 0", "expected at least 1"),
+    ("run {scene} --out {folder}/o --set omega", "expected name=value"),
+    ("run {scene} --out {folder}/o --set omega=inf", "expected a finite number"),
+    ("run {scene} --out {folder}/o --set omega=0", "omega"),
+    ("run {scene} --out {folder}/o --set omga=1", "did you mean 'omega'?"),
+    ("run {scene} --out {folder}/o --set x_3=1", "unknown initial state 'x_3'"),
+    ("run {scene} --out {folder}/o --set rtol=1e-7", "use --rtol"),
+    ("run {scene} --out {folder}/o --set window=1,2", "can be swept"),
+    ("run {scene} --out {folder}/o --set max_steps=1.5", "whole number"),
+    ("run {scene} --out {folder}/o --set omega=1 omega=2", "omega twice"),
+    ("run {scene} --out {folder}/o --set omega=2:1:5", "LO below HI"),
+    ("run figure_3 --out {folder}/o --set sigma=1", "no links: there is nothing to couple"),
+    ("run {scene} --out {scene}/o", "cannot make the folder"),
+    ("thresholds", "expected a network"),
+    ("thresholds --n 4", "expected a frequency of the drive"),
+    ("thresholds --n 0 --omega 1.15", "n = 0"),
+    ("thresholds --n 1 --omega 1.15", "no links"),
+    ("thresholds --n 4 --omega 0", "above 0"),
+    ("thresholds --n 4 --omega nan", "finite number"),
+    ("thresholds --n 4 --omega 1.15 --sigma 0:0.5", "expected LO:HI:N"),
+    ("thresholds --n 4 --omega 1.15 --sigma=-1:0.5:4", "at least 0"),
+    ("thresholds --n 2 --matrix {own} --omega 1.15", "the matrix alone"),
+    ("thresholds --scene figure_3", "--omega"),
+    ("thresholds --scene harmonic_chain --omega 1", "not driven"),
+    ("figures nope", "unknown figure 'nope'"),
+    ("figures 4b --out {scene}", "cannot make the folder"),
+    ("cache empty", "invalid choice"),
+    ("bench nope", "unknown benchmark 'nope'; known: agreement, "),
+]
+
+
+@pytest.mark.parametrize(("words", "expected"), WRONG)
+def test_wrong_use_is_one_or_two_lines_on_stderr_and_code_2(
+    words: str, expected: str, scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = matrix(tmp_path, "-1 1\n1 -1\n")
+    before = sorted(tmp_path.rglob("*"))
+    assert main(words.format(scene=scene, folder=tmp_path, own=own).split()) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert expected in captured.err
+    assert captured.err.startswith("synchain")
+    assert captured.err.count("\n") <= 2
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_an_empty_folder_name_is_refused(scene: str, capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (["run", scene, "--out", ""], ["figures", "4b", "--out", " "]):
+        assert main(words) == 2
+        assert "expected a folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("-1 1\n", "square"),
+        ("-1 1\n1 0\n", "row 2 sums to 1; expected 0"),
+        ("nan 1\n1 -1\n", "nan"),
+        ("", "G.txt"),
+        ("__import__('os')\n", "G.txt"),
+    ],
+)
+def test_matrices_that_are_none(text: str, expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = matrix(tmp_path, text)
+    for words in (["spectrum", "--matrix", path], ["thresholds", "--matrix", path, "--omega", "1.15"]):
+        assert main(words) == 2
+        assert expected in capsys.readouterr().err
+
+
+def test_a_scene_in_separate_parts_is_allowed_but_said(
+    scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*words: Any, **options: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(stream, "stream", stop)
+    matrix(tmp_path, SEPARATE)
+    Path(scene).write_text(SCENE.replace('name = "chain"\nn = 2', 'file = "G.txt"'))
+    assert main(["run", scene, "--out", str(tmp_path / "out")]) == 1
+    err = capsys.readouterr().err
+    assert err.startswith("warning: topology G.txt(4) is not connected (2 parts)")
+    assert err.endswith("synchain run: interrupted\n")
+
+
+class Planted(ModuleType):
+    SUMMARY, EXAMPLES = "planted", ("synchain cache",)
+    problem: BaseException = TypeError("planted")
+
+    @staticmethod
+    def configure(parser: Any) -> None:
+        """No arguments."""
+
+    def execute(self, arguments: Any) -> int:
+        raise self.problem
+
+
+@pytest.mark.parametrize(
+    ("problem", "code", "expected"),
+    [
+        (TypeError("planted"), 1, "internal error, a bug in synchain: TypeError: planted"),
+        (ValueError("planted"), 1, "a bug in synchain"),
+        (OSError(28, "No space left on device", "file.nc"), 1, "file.nc: No space left on device"),
+        (MemoryError(), 1, "not enough memory"),
+        (KeyboardInterrupt(), 1, "interrupted"),
+        (ModuleNotFoundError("no", name="xarray.core"), 1, "python -m pip install xarray"),
+    ],
+)
+def test_errors_of_ours_and_of_the_system_are_no_tracebacks(
+    problem: BaseException,
+    code: int,
+    expected: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    planted = Planted("planted")
+    planted.problem = problem
+    monkeypatch.setattr("synchain.runtime.cli.command", lambda name: planted)
+    monkeypatch.delenv("SYNCHAIN_DEBUG", raising=False)
+    assert main(["cache"]) == code
+    err = capsys.readouterr().err
+    assert expected in err
+    assert "Traceback" not in err
+    assert err.count("\n") <= 2
+    monkeypatch.setenv("SYNCHAIN_DEBUG", "1")
+    assert main(["cache"]) == code
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_json_never_holds_nan() -> None:
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        print_json({"value": float("nan")})
+
+
+def test_warnings_are_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    import warnings
+
+    class Warns(Planted):
+        def execute(self, arguments: Any) -> int:
+            warnings.warn("the cache\nis read-only", RuntimeWarning, stacklevel=1)
+            return 0
+
+    monkeypatch.setattr("synchain.runtime.cli.command", lambda name: Warns("warns"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        assert main(["cache"]) == 0
+    assert capsys.readouterr().err == "warning: the cache is read-only\n"
+
+
+@pytest.mark.parametrize("words", ["topologies", "kernel two_oscillators", "equations figure_4a", "spectrum chain 40"])
+def test_a_reader_that_leaves_early_ends_it_quietly(words: str) -> None:
+    command = f"'{sys.executable}' -m synchain.runtime {words} | true; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=60, env=BUFFERED)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
+def test_output_that_cannot_be_written_is_a_failure() -> None:
+    with open("/dev/full", "w") as full:
+        command = [sys.executable, "-m", "synchain.runtime", "scenes"]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, env=BUFFERED)
+    assert done.returncode == 1
+    assert done.stderr == "synchain scenes: No space left on device\n"
+
+
+def test_exit_codes_and_streams_of_the_real_program() -> None:
+    done = synchain("spectrum rnig 4")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert (
+        done.stderr
+        == f"synchain spectrum: unknown topology 'rnig'; known: {', '.join(families())}; did you mean 'ring'?\n"
+    )
+    done = synchain("equations two_oscillators", env={**os.environ, "PYTHONIOENCODING": "ascii"})
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "cos(\\u03c9" in done.stdout  # the escape of an omega

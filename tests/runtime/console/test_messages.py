@@ -1,0 +1,161 @@
+"""Words for the user: lines while something compiles, hints, limits before memory is taken, names as formulas."""
+
+from __future__ import annotations
+
+import logging
+from argparse import ArgumentTypeError
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_load import SOURCE
+
+from synchain.codegen.kernels import compile as loading
+from synchain.models import chain
+from synchain.models.presentation.writer import Latex
+from synchain.models.scenes.scene import Scene
+from synchain.runtime import cli
+from synchain.runtime.cells.reduce import decide
+from synchain.runtime.cli import main
+from synchain.runtime.commands.run import _nothing_to_do
+from synchain.runtime.console.arguments import grid, spaced
+from synchain.runtime.stability import interpolation
+from synchain.runtime.sweeps import run as sweep
+from synchain.runtime.sweeps import worker
+from synchain.runtime.sweeps.certify import check_certifiable
+from synchain.runtime.sweeps.run import run
+from synchain.runtime.sweeps.sitting import prepare
+from synchain.runtime.sweeps.stream import claim
+
+PAIR = Scene(oscillator="harmonic", topology=chain(2), transient=1, window=1)
+LARGE = {"sigma": np.linspace(0, 1, 1000), "x_1": np.linspace(0, 1, 1000), "x_2": np.linspace(0, 1, 1000)}
+
+
+def test_compiling_is_told_and_loading_is_not(tmp_path, monkeypatch, caplog):
+    monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path / "kernels"))
+    said = "compiling a kernel for 1 oscillator (cash_karp), "
+    with caplog.at_level(logging.INFO, "synchain"):
+        for _ in range(2):
+            loading._load.cache_clear()
+            loading.load(SOURCE)
+        assert [record.getMessage() for record in caplog.records] == [said + "kept for later runs"]
+        monkeypatch.setenv("SYNCHAIN_CACHE", __file__)
+        loading._load.cache_clear()
+        with pytest.warns(RuntimeWarning, match="not kept on disk"):
+            loading.load(SOURCE)
+    assert caplog.records[-1].getMessage() == said + "for this process alone"
+
+
+def test_the_command_line_prints_what_is_told_and_leaves_no_trace(capsys):
+    logger = logging.getLogger("synchain")
+    before = logger.level, list(logger.handlers)
+    with cli._news("synchain run"):
+        logging.getLogger("synchain.codegen.kernels.compile").info("compiling a kernel")
+    assert capsys.readouterr().err == "synchain run: compiling a kernel\n"
+    assert (logger.level, logger.handlers) == before
+
+
+@pytest.mark.parametrize(
+    ("name", "written", "indexed"),
+    [
+        ("mu_k_2", r"\mu_{k,2}", r"\mu_{k,2,i}"),
+        ("u_0", "u_0", "u_{0,i}"),
+        ("u0", "u_0", "u_{0,i}"),
+        ("theta_b", r"\vartheta_b", r"\vartheta_{b,i}"),
+        ("mass_ratio", r"\mathrm{mass}_{\mathrm{ratio}}", r"\mathrm{mass}_{\mathrm{ratio},i}"),
+        ("c_alpha", r"c_{\alpha}", r"c_{\alpha,i}"),
+        ("Alpha", r"\mathrm{A}", r"\mathrm{A}_i"),
+        ("a1b", r"\mathrm{a1b}", r"\mathrm{a1b}_i"),
+    ],
+)
+def test_names_have_one_subscript(name, written, indexed):
+    assert Latex().letter(name) == written
+    assert Latex().letter(name, "i") == indexed
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [("--symbolic --matrix {file} --value a", "--value: found 'a'; expected NAME=NUMBER, e.g. a=1/2"),
+     ("circulant 9 --option a", "--option: found 'a'; expected NAME=VALUE, e.g. offsets=1,3")],
+)  # fmt: skip
+def test_a_hint_shows_the_option_that_was_used(words, expected, tmp_path, capsys):
+    (tmp_path / "S.txt").write_text("a -a\n-b b\n")
+    assert main(["spectrum", *words.format(file=tmp_path / "S.txt").split()]) == 2
+    assert expected in capsys.readouterr().err
+
+
+def test_grids_of_the_command_line_have_the_limit_of_an_axis():
+    assert len(spaced("0:1:200001")) == 200001
+    with pytest.raises(ArgumentTypeError, match="expected at most 10000000"):
+        grid("0:1:10000001")
+
+
+def test_a_sweep_that_does_not_fit_is_refused_before_memory_is_taken(monkeypatch):
+    scene = PAIR.replace(axes=LARGE)
+    with pytest.raises(ValueError, match=r"1000000000 cells, 112 GB in memory; expected at most 8 GB; .* with stream"):
+        sweep._fits(scene, 4)
+    sweep._fits(PAIR.replace(axes={name: values[:400] for name, values in LARGE.items()}), 4)
+    monkeypatch.setattr(sweep, "prepare", lambda given, *rest: SimpleNamespace(
+        shop=SimpleNamespace(recipe=SimpleNamespace(chosen=decide(given, skip=False)), samples=0)))  # fmt: skip
+    with pytest.raises(ValueError, match="expected at most 8 GB"):
+        run(scene)
+    with pytest.raises(ValueError, match="found 1000000000, expected at most 10000000"):
+        check_certifiable(scene)
+    with pytest.raises(ValueError, match="found 1001000000 cells; expected at most 1000000000; use fewer"):
+        PAIR.replace(axes={**LARGE, "x_2": range(1001)})
+
+
+def test_the_room_for_section_points_is_bounded():
+    """Two a period, and never more than LARGEST numbers for the cells of a block together."""
+    short = PAIR.replace(record=("section",), window=100 * np.pi)
+    assert worker._room(short, 64 * 5) == 200 + 8
+    assert worker._room(PAIR, 64 * 5) == 0
+    long = PAIR.replace(record=("section",), window=1e8)
+    assert 64 * 5 * (worker._room(long, 64 * 5) - 8) <= worker.LARGEST
+    assert worker._room(long, 5) == 1_000_000 + 8
+
+
+@pytest.mark.filterwarnings("error")
+def test_records_between_steps_of_straight_lines_are_warned_of():
+    scene = PAIR.replace(integrator="rodas6p", record=("trajectory",), samples=5, parameters={"sigma": 1})
+    with pytest.warns(RuntimeWarning, match="rodas6p draws straight lines .* errors of trajectory"):
+        _prepared(scene)
+    for other in (scene.replace(integrator="rodas5p"), scene.replace(record=("sync_error",))):
+        _prepared(other)  # a warning would be an error
+
+
+def _prepared(scene):
+    """As far as before the kernel is compiled."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("synchain.runtime.sweeps.sitting.Workshop", lambda recipe: recipe)
+        return prepare(scene, False, None, 1, None, False)
+
+
+def test_a_result_without_its_figure_is_drawn(tmp_path, monkeypatch, capsys):
+    target = tmp_path / "a.nc"
+    kept = SimpleNamespace(data=SimpleNamespace(attrs={"versions": "v"}), message="m", success=True)
+    monkeypatch.setattr("synchain.runtime.results.open.open_result", lambda path: kept)
+    monkeypatch.setattr("synchain.runtime.commands.run._draw", lambda path: path.with_suffix(".png").write_text("x"))
+    assert _nothing_to_do(target) == 0
+    assert target.with_suffix(".png").exists()
+    monkeypatch.setattr("synchain.runtime.commands.run._draw", lambda path: pytest.fail("drawn again"))
+    assert _nothing_to_do(target) == 0
+    assert "nothing was run" in capsys.readouterr().out
+
+
+def test_messages_about_files_name_the_keyword_and_the_option(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"run without resume \(--resume\)"):
+        claim(decide(PAIR), tmp_path / "a.nc", resume=True)
+    (tmp_path / "a.nc").write_bytes(b"no netCDF")
+    with pytest.raises(OSError, match=r"a\.nc is no netCDF file; expected a netCDF 3 result"):
+        claim(decide(PAIR), tmp_path / "a.nc")
+
+
+@pytest.mark.parametrize("size", [1, 2, 4, 40])
+def test_products_in_pieces_are_those_of_the_whole(size, monkeypatch):
+    random = np.random.default_rng(0)
+    weights, found = random.normal(size=(301, 17)), random.normal(size=(4, 17, 2, 2))
+    whole = np.einsum("mk,ckpq->cmpq", weights, found)
+    monkeypatch.setattr(interpolation, "SINGLE", 17 * 16 * size)
+    np.testing.assert_allclose(interpolation._combine(weights, found), whole, rtol=1e-13, atol=1e-13)
+    assert interpolation._combine(np.zeros((0, 17)), found).shape == (4, 0, 2, 2)

@@ -1,0 +1,448 @@
+"""`synchain msf`: what it prints, writes and refuses; functions stand in for the integration except in the last tests."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from figure_samples import rows
+
+import synchain.runtime
+from synchain.models import chain, complete
+from synchain.models.graphs.topology import Topology, read_matrix
+from synchain.models.inputs.plugins import allow_code
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.cli import main
+from synchain.runtime.console.line_report import GRID_ENDS, LineReport
+from synchain.runtime.console.plane_report import plane_windows
+from synchain.runtime.stability import orbits
+from synchain.runtime.stability.attractor import Attractor
+from synchain.runtime.stability.msf import MSF, Plane
+from synchain.runtime.stability.transversal import Exponents
+
+ONE_WAY = "-1 1 0\n0 -1 1\n1 0 -1\n"
+LOW, HIGH = 0.1, 0.6
+"""Where the stand-in changes its sign."""
+
+
+def line(alpha: np.ndarray, low: float = LOW, high: float = HIGH, error: float = 1e-3) -> Exponents:
+    value = (alpha - low) * (alpha - high)
+    kinds = (Attractor("aperiodic", 0.0), Attractor("periodic", 1.0), Attractor("aperiodic", 0.0))
+    return Exponents(alpha, value, np.full(len(alpha), error), 500.0, 3, value[None], kinds)
+
+
+def function(scene: Scene, low: float = LOW, high: float = HIGH, end: float = 1.2, error: float = 1e-3) -> MSF:
+    alpha = np.linspace(0.0, end, 241)
+    return MSF(scene, alpha, line(alpha, low, high, error))
+
+
+def disc(scene: Scene, alpha: np.ndarray, beta: np.ndarray) -> Plane:
+    """Negative inside a circle round 0.35 of radius 0.25."""
+    value = np.add.outer((alpha - LOW) * (alpha - HIGH), beta**2)
+    return Plane(scene, alpha, beta, value, np.full(value.shape, 1e-3), ("aperiodic",), 500.0)
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+    """What the stand-ins for msf and plane were asked for."""
+    found: list[dict[str, Any]] = []
+    module = importlib.import_module("synchain.runtime.stability.msf")
+
+    def msf(scene: Scene, alpha: np.ndarray, **options: Any) -> MSF:
+        found.append({"scene": scene, "alpha": alpha, **options})
+        return MSF(scene, alpha, line(alpha))
+
+    def plane(scene: Scene, alpha: np.ndarray, beta: np.ndarray, **options: Any) -> Plane:
+        found.append({"scene": scene, "alpha": alpha, "beta": beta, **options})
+        return disc(scene, alpha, beta)
+
+    monkeypatch.setattr(module, "msf", msf)
+    monkeypatch.setattr(module, "plane", plane)
+    return found
+
+
+def matrix(folder: Path, text: str = ONE_WAY) -> str:
+    path = folder / "G.txt"
+    path.write_text(text)
+    return str(path)
+
+
+def value(text: str, name: str) -> str:
+    """The words behind a name in a report."""
+    return next(row.strip()[len(name) :].strip() for row in text.splitlines() if row.strip().startswith(name))
+
+
+# -- a line of strengths -----------------------------------------------------------------------------------------
+
+
+def test_report_of_a_chain(asked: list[dict[str, Any]], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["msf", "figure_8"]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("friction oscillator, spring coupling, omega = 1.4: exponents per unit of time")
+    assert value(text, "class").startswith("bounded interval, for alpha from 0 to 1.2")
+    assert value(text, "negative for alpha") == "0.1000 ± 0.0020 … 0.6000 ± 0.0020"  # 0.001 over the slope 0.5
+    assert value(text, "attractor") == "aperiodic (2 of 3 starts); periodic (1 of 3 starts)"
+    assert "500 units of time (111 drive periods) for each start" in value(text, "average")  # 500 * 1.4 / 2 pi
+    assert "chain(4): every mode dies out for" in text
+    low, high = LOW / (2 - math.sqrt(2)), HIGH / (2 + math.sqrt(2))
+    sigma = value(text, "sigma")
+    assert sigma.startswith(f"{low:.4f} ± 0.0034 … {high:.5f} ± 0.00060; ")  # 0.002 over |gamma|
+    assert "lost below: gamma = -2 + sqrt(2); lost above: gamma = -2 - sqrt(2)" in sigma
+    assert value(text, "possible").startswith(
+        "yes (largest over smallest |gamma|: 2*sqrt(2) + 3 = 5.82843; allowed: 6)"
+    )
+    assert len(asked[0]["alpha"]) == 241
+    assert (asked[0]["alpha"][0], asked[0]["alpha"][-1]) == (0.0, 1.2)
+    assert {"precision", "periods", "starts"}.isdisjoint(asked[0])
+
+
+def test_json_of_a_star_and_what_was_asked_for(asked: list[dict[str, Any]], capsys: pytest.CaptureFixture[str]) -> None:
+    effort = "--precision 0.01 --periods 99 --starts 2 --workers 1"
+    assert main(f"msf --omega 1.4 --topology star --n 5 --json --alpha 0:1.2:25 {effort}".split()) == 0
+    captured = capsys.readouterr()
+    found = json.loads(captured.out)
+    assert captured.err == ""
+    assert len(found["alpha"]) == len(found["exponent"]) == len(found["stderr"]) == 25
+    assert found["class"] == "bounded interval"
+    np.testing.assert_allclose(found["intervals"], [[LOW, HIGH]], atol=1e-12)
+    (window,) = found["windows"]
+    assert (window["low"], window["high"]) == pytest.approx((0.1, 0.12))
+    assert (window["low_mode"], window["high_mode"]) == ("-1", "-5")
+    assert found["verdict"] == {
+        "answer": "yes", "ratio": "5", "ratio_value": 5.0, "allowed": pytest.approx(6.0), "slowest": "-1", "fastest": "-5"
+    }  # fmt: skip
+    assert {k: asked[0][k] for k in ("precision", "periods", "starts", "workers")} == {
+        "precision": 0.01, "periods": 99.0, "starts": 2, "workers": 1
+    }  # fmt: skip
+    assert asked[0]["scene"].parameters["omega"] == 1.4
+
+
+@pytest.mark.parametrize(
+    ("words", "network", "omega"),
+    [
+        ("figure_8", chain(4), 1.4),
+        ("figure_8 --omega 1.2 --n 3", chain(3), 1.2),
+        ("figure_8 --topology complete", complete(4), 1.4),
+        ("figure_3 --omega 1.15", None, 1.15),
+        ("figure_3 --omega 1.15 --topology complete --n 3", complete(3), 1.15),
+        ("--omega 1.15", None, 1.15),
+        ("--omega 1.15 --n 5", chain(5), 1.15),
+        ("harmonic_chain", chain(5), None),
+    ],
+)
+def test_oscillator_and_network_are_those_asked_for(
+    words: str,
+    network: Topology | None,
+    omega: float | None,
+    asked: list[dict[str, Any]],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["msf", *words.split(), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert asked[0]["scene"].angular_frequency == omega
+    assert asked[0]["scene"].axes == ()
+    assert (found["windows"] is None) == (network is None)
+    assert (found["verdict"] is None) == (network is None)
+    if network is not None:
+        assert asked[0]["scene"].topology == network
+
+
+def own_drive(folder: Path, wave: str) -> Path:
+    """A scene file with a driven oscillator of its own, whose parameter omega is no frequency of the drive."""
+    code = folder / "own.py"
+    names = ("omega", "Omega") if "Omega" in wave else ("omega",)
+    code.write_text(
+        "import sympy as sp\nfrom synchain.models import Parameter\n"
+        'SUMMARY = SOURCE = "a harmonic oscillator with a drive"\nFRICTION = False\n'
+        f'PARAMETERS = {{name: Parameter(1.0, "1", "a number") for name in {names!r}}}\n'
+        "def kinetic(v): return v**2 / 2\n"
+        f"def potential(x, t, {', '.join(names)}): return omega**2 * x**2 / 2 - x * {wave}\n"
+        "def force(v): return -v\n"
+    )
+    allow_code(code)
+    file = folder / "own.toml"
+    file.write_text(f'oscillator = "{code}"\ntopology = {{name = "chain", n = 2}}\n')
+    return file
+
+
+def test_the_option_omega_sets_the_frequency_of_the_drive_whatever_its_name(
+    asked: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = own_drive(tmp_path, "sp.cos(Omega * t)")
+    assert main(["msf", str(file), "--omega", "1.4"]) == 0
+    assert asked[0]["scene"].parameters == {"omega": 1.0, "Omega": 1.4, "sigma": asked[0]["scene"].parameters["sigma"]}
+    assert "spring coupling, Omega = 1.4: exponents" in capsys.readouterr().out
+    file.write_text(file.read_text() + "[sweep]\nomega = [1.0, 2.0]\n")
+    assert main(["msf", str(file)]) == 0
+    file.write_text(file.read_text().replace("omega = [", "Omega = ["))
+    assert main(["msf", str(file)]) == 2
+    assert "sweeps Omega; expected one frequency" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("wave", "words", "headline"),
+    [
+        ("sp.cos(2 * Omega * t)", "2*Omega", ", 2*Omega = 2:"),
+        ("sp.cos(2 * t)", "the frequency 2;", ", drive frequency 2:"),
+    ],
+)
+def test_a_frequency_that_is_no_parameter_is_told_but_cannot_be_set(
+    wave: str,
+    words: str,
+    headline: str,
+    asked: list[dict[str, Any]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    file = own_drive(tmp_path, wave)
+    assert main(["msf", str(file), "--omega", "1.4"]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert "expected one that is a parameter" in error
+    assert main(["msf", str(file)]) == 0
+    assert headline in capsys.readouterr().out
+
+
+def test_where_the_grid_ends_no_mode_is_lost_and_no_is_not_said() -> None:
+    scene = Scene(topology=chain(4))
+    cut = LineReport(function(scene, end=0.4), True)
+    assert cut.verdict[0] == GRID_ENDS
+    assert cut.found.windows == ()
+    assert "0.1000 ± 0.0020 … 0.4..." in cut.text()
+    pair = LineReport(function(Scene(topology=chain(2)), end=0.4), True)
+    assert pair.verdict[0] == "yes"
+    (window,) = pair.found.windows
+    assert window.low_mode is not None
+    assert window.high_mode is None
+    assert "0.2000..." in pair.text()
+    assert LineReport(function(scene), True).verdict[0] == "yes"
+    assert LineReport(function(scene, high=0.3), True).verdict[0] == "no"
+    assert LineReport(function(scene, low=-0.1), True).found.windows[0].low == 0.0
+
+
+def test_windows_in_python_are_those_of_the_command() -> None:
+    for end, error in ((0.4, 1e-3), (1.2, math.inf)):
+        found = function(Scene(topology=chain(2)), end=end, error=error)
+        (window,) = found.windows
+        (told,) = LineReport(found, True).as_dict()["windows"]
+        assert window.low_mode is not None
+        assert told["low_mode"] == window.low_mode.eigenvalue.text
+        assert (window.high_mode is None) == (told["high_mode"] is None) == (end < HIGH)
+        assert (told["low"], told["high"]) == (window.low, window.high)
+
+
+def test_a_ratio_within_the_error_is_undecided() -> None:
+    scene = Scene(topology=chain(4))
+    high = LOW * (3 + 2 * math.sqrt(2)) + 1e-4
+    assert LineReport(function(scene, high=high, error=1e-3), True).verdict[0] == "undecided within the error"
+
+
+def test_numbers_that_are_not_finite_are_null_in_json() -> None:
+    report = LineReport(function(Scene(topology=chain(3)), error=math.inf), True)
+    report.found.fine.exponent[60] = -math.inf
+    found = report.as_dict()
+    assert found["exponent"][60] is None
+    assert set(found["stderr"]) == {None}
+    json.dumps(found, allow_nan=False)
+    assert "too short for an error: raise --periods" in report.text()
+    assert len(found["windows"]) == 1
+
+
+def test_a_network_without_stable_range_is_said_to_have_none() -> None:
+    text = LineReport(function(Scene(topology=chain(3)), low=2.0, high=3.0), True).text()
+    assert value(text, "negative for alpha") == "none"
+    assert value(text, "sigma") == "none"
+    assert value(text, "possible").startswith("no")
+
+
+def test_complex_eigenvalues_need_beta(
+    asked: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["msf", "--omega", "1.4", "--matrix", matrix(tmp_path), "--json"]) == 0
+    captured = capsys.readouterr()
+    found = json.loads(captured.out)
+    assert found["windows"] is None
+    assert found["verdict"] is None
+    assert captured.err.startswith("warning: ")
+    assert "complex eigenvalues" in captured.err
+    assert "add --beta, e.g. --beta 0:0.69:61" in captured.err  # 1.2 / sqrt(3)
+
+
+# -- a plane of strengths ----------------------------------------------------------------------------------------
+
+
+def test_report_of_a_plane(asked: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["msf", "--omega", "1.4", "--matrix", matrix(tmp_path), "--alpha", "0:1.2:241", "--beta", "0:0.7:141"]
+    assert main(words) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    assert value(captured.out, "zero contour") == "alpha 0.1000 … 0.6000, beta 0.0000 … 0.2500"
+    a, b = np.meshgrid(np.linspace(0.0, 1.2, 241), np.linspace(0.0, 0.7, 141))
+    inside = np.count_nonzero((a - 0.35) ** 2 + b**2 < 0.25**2 - 1e-12)
+    assert abs(int(value(captured.out, "negative").split()[1]) - inside) <= 4  # points on the circle round either way
+    # the ray 3/2 + i sqrt(3)/2 crosses the circle where 3 s^2 - 1.05 s + 0.06 = 0
+    root = math.sqrt(1.05**2 - 12 * 0.06)
+    ends = [(1.05 - root) / 6, (1.05 + root) / 6]
+    assert value(captured.out, "sigma").startswith(
+        f"{ends[0]:.4f} … {ends[1]:.4f}; lost below: gamma = -3/2 - sqrt(3)*I/2"
+    )
+    assert main([*words, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (len(found["exponent"]), len(found["exponent"][0])) == (241, 141)
+    assert (found["windows"][0]["low"], found["windows"][0]["high"]) == pytest.approx(ends, abs=2e-4)
+    assert found["contours"]
+    assert asked[1]["beta"][-1] == 0.7
+
+
+def test_windows_in_the_plane_are_those_of_the_line_for_real_eigenvalues() -> None:
+    scene = Scene(topology=chain(4))
+    alpha, beta = np.linspace(0.0, 1.2, 241), np.linspace(-0.1, 0.3, 9)
+    (window,) = plane_windows(disc(scene, alpha, beta))
+    (expected,) = function(scene).windows
+    assert (window.low, window.high) == pytest.approx((expected.low, expected.high), abs=1e-4)
+    assert window.high_mode is not None
+    assert window.high_mode.eigenvalue.value == expected.high_mode.eigenvalue.value
+
+
+def test_a_mode_that_leaves_the_plane_ends_the_search_and_not_the_window(tmp_path: Path) -> None:
+    scene = Scene(topology=read_matrix(matrix(tmp_path)))
+    alpha, wide, low = np.linspace(0.0, 1.2, 121), np.linspace(0.0, 0.7, 71), np.linspace(0.0, 0.1, 11)
+    (whole,) = plane_windows(disc(scene, alpha, wide))
+    (cut,) = plane_windows(disc(scene, alpha, low))
+    assert cut.low == pytest.approx(whole.low, abs=1e-4)
+    assert cut.high == pytest.approx(0.1 / (math.sqrt(3) / 2))
+    assert whole.high > cut.high
+    assert cut.high_mode is None
+    assert whole.high_mode is not None
+    mirrored = plane_windows(disc(scene, alpha, -wide[::-1]))
+    assert (mirrored[0].low, mirrored[0].high) == pytest.approx((whole.low, whole.high), abs=1e-6)
+
+
+# -- files, errors, names ----------------------------------------------------------------------------------------
+
+
+def test_files_are_written_and_said(
+    asked: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "new" / "folder"
+    assert main(["msf", "figure_8", "--alpha", "0:1:5", "--out", str(out)]) == 0
+    assert capsys.readouterr().out.splitlines()[-2:] == [f"  {out / 'msf.csv'}", f"  {out / 'msf.png'}"]
+    found = rows(out / "msf.csv")
+    assert list(found[0]) == ["alpha", "exponent", "stderr"]
+    assert [row["alpha"] for row in found] == ["0", "0.25", "0.5", "0.75", "1"]
+    assert float(found[2]["exponent"]) == pytest.approx(0.4 * -0.1)
+    assert main(["msf", "figure_8", "--alpha", "0:1:5", "--beta", "0:1:3", "--out", str(out), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["files"] == [str(out / "plane.csv"), str(out / "plane.png")]
+    assert len(rows(out / "plane.csv")) == 15
+    assert sorted(path.name for path in out.iterdir()) == ["msf.csv", "msf.png", "plane.csv", "plane.png"]
+    assert all((out / f"{name}.png").read_bytes().startswith(b"\x89PNG") for name in ("msf", "plane"))
+
+
+WRONG = [
+    ("", "expected a frequency of the drive, e.g. --omega 1.4, or a SCENE"),
+    ("figure_3", "sweeps omega; expected one frequency"),
+    ("figure_33", "did you mean 'figure_3'?"),
+    ("harmonic_chain --omega 1", "not driven"),
+    ("figure_8 --alpha 1:0:5", "LO below HI"),
+    ("figure_8 --alpha 0:1:1", "at least 2 values"),
+    ("figure_8 --alpha 0:nan:5", "finite number"),
+    ("figure_8 --alpha 0:1", "expected LO:HI:N"),
+    ("figure_8 --beta 1:1:5", "LO below HI"),
+    ("figure_8 --alpha 0:1:2000 --beta 0:1:2000", "coarser grids"),
+    ("figure_8 --omega nan", "finite number"),
+    ("figure_8 --precision 0", "above 0"),
+    ("figure_8 --periods -1", "above 0"),
+    ("figure_8 --starts 0", "at least 1"),
+    ("figure_8 --n 1", "no links"),
+    ("--omega 1.4 --topology star", "expected its number of oscillators too"),
+    ("--omega 1.4 --topology strar --n 4", "unknown topology 'strar'"),
+    ("--omega 1.4 --n 3 --matrix {own}", "the matrix alone"),
+    ("--omega 1.4 --matrix {laplacian}", "negate it"),
+    ("--omega 1.4 --matrix {own}.missing", "missing"),
+    ("figure_8 --out {own}", "cannot make the folder"),
+    ("{alone}", "the scene has no coupling, by which modes differ"),
+]
+
+
+@pytest.mark.parametrize(("words", "expected"), WRONG)
+def test_wrong_use_is_said_before_anything_is_computed(
+    words: str, expected: str, asked: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = matrix(tmp_path)
+    (tmp_path / "laplacian.txt").write_text("1 -1\n-1 1\n")
+    (tmp_path / "alone.toml").write_text(
+        'coupling = "none"\ntopology = {name = "chain", n = 1}\nparameters = {omega = 1.4}\n'
+    )
+    places = {"own": own, "laplacian": tmp_path / "laplacian.txt", "alone": tmp_path / "alone.toml"}
+    assert main(["msf", *words.format(**places).split()]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("synchain msf: ")
+    assert expected in captured.err
+    assert captured.err.count("\n") <= 2
+    assert asked == []
+
+
+def test_equations_without_modes_are_refused_before_anything_is_computed(
+    asked: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def mode(equations: Any, plane: bool = False) -> Any:
+        raise ValueError(f"no synchronous state, plane {plane}")
+
+    monkeypatch.setattr(orbits, "mode", mode)
+    orbits._variation.cache_clear()
+    for words, plane in (("", False), ("--beta 0:1:3", True)):
+        assert main(["msf", "figure_8", *words.split()]) == 2
+        assert f"no synchronous state, plane {plane}" in capsys.readouterr().err
+    assert asked == []
+
+
+def test_an_orbit_that_cannot_be_integrated_is_a_failed_run(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def msf(*given: Any, **options: Any) -> MSF:
+        raise FloatingPointError("the orbit cannot be integrated")
+
+    monkeypatch.setattr(importlib.import_module("synchain.runtime.stability.msf"), "msf", msf)
+    assert main(["msf", "figure_8"]) == 1
+    assert capsys.readouterr().err == "synchain msf: the orbit cannot be integrated\n"
+
+
+def test_public_names_are_offered_and_go_before_modules_of_the_same_name() -> None:
+    for name in synchain.runtime.__all__:
+        assert getattr(synchain.runtime, name).__name__ == name
+    code = (
+        "import synchain.runtime.stability.msf, synchain.runtime.synchronisation.basin\nfrom synchain.runtime import basin, msf\n"
+        "print(type(msf).__name__, type(basin).__name__)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.split() == ["function", "function"]
+
+
+def test_the_real_function_of_linear_oscillators(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """x'' + x + alpha x' = 0: the exponent is -alpha/2 up to alpha = 2."""
+    scene = tmp_path / "damped.toml"
+    scene.write_text('oscillator = "harmonic"\ncoupling = "damper"\ntopology = {name = "ring", n = 4}\n')
+    assert main(["msf", str(scene), "--alpha", "0.5:1.5:3", "--periods", "8", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(found["exponent"], [-0.25, -0.5, -0.75], atol=1e-9)
+    assert found["windows"][0]["high_mode"] is None  # the grid ends at sigma = 1.5 / 4
+    assert found["windows"][0]["high"] == pytest.approx(1.5 / 4)
+
+
+def test_the_real_function_of_the_friction_oscillator(capsys: pytest.CaptureFixture[str]) -> None:
+    words = "msf --omega 1.15 --alpha 0.4:0.5:3 --starts 1 --workers 1 --n 4 --json"
+    assert main(words.split()) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["attractors"] == ["periodic, 2 drive periods"]
+    assert found["exponent"][0] < found["exponent"][1] < 0 < found["exponent"][2]
+    assert found["intervals"][0][1] == pytest.approx(
+        2 * 0.233, abs=2e-3
+    )  # Marszal et al. 2016: sigma = 0.233 of a pair

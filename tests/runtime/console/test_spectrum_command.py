@@ -1,0 +1,72 @@
+"""`synchain spectrum` with options of families and files of edges, `synchain topologies` with the options."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import networkx as nx
+import pytest
+
+from synchain.models.graphs.families import defaults, family, names
+from synchain.runtime.cli import main
+
+
+def printed(capsys: pytest.CaptureFixture[str], *words: str) -> dict[float, int]:
+    assert main(["spectrum", "--json", *words]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verified"] is True
+    return {e["exact"]: e["multiplicity"] for e in found["eigenvalues"]}
+
+
+def test_options_of_a_family(capsys: pytest.CaptureFixture[str]) -> None:
+    assert printed(capsys, "circulant", "6", "--option", "offsets=1,3") == {"0": 1, "-3": 4, "-6": 1}
+    assert printed(capsys, "torus", "27", "--option", "shape=3x3x3") == {"0": 1, "-3": 6, "-6": 12, "-9": 8}
+    assert printed(capsys, "erdos_renyi", "4", "--option", "p=1", "--option", "seed=2") == {"0": 1, "-4": 3}
+
+
+def test_files_of_edges(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    edges, graphml = tmp_path / "g.edges", tmp_path / "g.graphml"
+    edges.write_text("1 2\n2 3\n")
+    assert printed(capsys, "--edges", str(edges)) == {"0": 1, "-1": 1, "-3": 1}
+    assert printed(capsys, "--edges", str(edges), "--directed") == {"0": 1, "-1": 2}
+    nx.write_graphml(nx.petersen_graph(), graphml)
+    assert printed(capsys, "--graphml", str(graphml)) == {"0": 1, "-2": 5, "-5": 4}
+
+
+WRONG = [
+    ("circulant 9 --option offsets", "--option: found 'offsets'; expected NAME=VALUE, e.g. offsets=1,3"),
+    ("circulant 9 --option =1", "expected NAME=VALUE"),
+    ("circulant 9 --option offsets=x", "offsets = 'x'; expected a whole number"),
+    ("circulant 9 --option offset=1", "unknown option 'offset'; known: offsets"),
+    ("circulant 9 --option offsets=1 --option offsets=2", "--option offsets is given twice"),
+    ("erdos_renyi 9 --option p=2", "p = 2; expected a probability from 0 to 1"),
+    ("--edges {file} --graphml {file}", "found --edges and --graphml; expected one of them"),
+    ("--edges {file} --option p=1", "found both a topology and --edges; expected one of them"),
+    ("--graphml {file} --directed", "found --directed without --edges"),
+    ("chain 4 --directed", "found --directed without --edges"),
+    ("--graphml {file}", "g.txt is no XML"),
+    ("--edges {folder}/none", "does not exist"),
+    ("--edges {file}", "line 1 has 4 words"),
+]
+
+
+@pytest.mark.parametrize(("words", "message"), WRONG)
+def test_wrong_words(words: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "g.txt").write_text("a b c d\n")
+    with_paths = words.format(file=tmp_path / "g.txt", folder=tmp_path).split()
+    try:
+        code = main(["spectrum", *with_paths])
+    except SystemExit as end:
+        code = int(str(end.code))
+    assert code == 2
+    assert message in capsys.readouterr().err
+
+
+def test_topologies_name_their_options(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["topologies"]) == 0
+    lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
+    assert set(lines) == set(names())
+    assert lines["small_world"].endswith("; options: neighbours, p, seed")
+    for name in names():
+        assert ("options: " in lines[name]) == bool(defaults(family(name)))

@@ -1,0 +1,111 @@
+"""Pictures of any result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from figure_samples import pretend, words
+
+from synchain.models import chain
+from synchain.models.scenes.file import load_scene
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.figures import result_plot, style
+from synchain.runtime.results.result import Result
+
+SWEPT = {"error": {"sigma": (0.3, 0.1, 0.2)}, "map": {"omega": (1.0, 1.1), "sigma": (0.1, 0.2, 0.3)}}
+
+
+@pytest.fixture
+def pair() -> Callable[..., Result]:
+    def made(failed: tuple[int, ...] = (), **changes: Any) -> Result:
+        return pretend(Scene(**{"topology": chain(2), "record": ("sync_error", "section"), **changes}), failed)
+
+    return made
+
+
+def test_an_error_curve_is_sorted_and_leaves_failures_out(pair: Callable[..., Result]) -> None:
+    axes = result_plot.draw_result(pair((1,), axes=SWEPT["error"]))
+    x, y = axes.lines[0].get_data()
+    assert list(x) == [0.1, 0.2, 0.3]
+    assert np.isnan(y).tolist() == [True, False, False]
+    assert axes.get_xlabel() == r"$\sigma$"
+    assert words(axes) == ["1 of 3 cells failed and are left out"]
+
+
+def test_two_axes_make_a_map(pair: Callable[..., Result]) -> None:
+    result = pair((0,), axes=SWEPT["map"])
+    axes = result_plot.draw_result(result)
+    (mesh,) = axes.collections
+    assert mesh.get_array().shape == (2, 3)
+    assert np.ma.getmaskarray(np.ma.masked_invalid(mesh.get_array())).sum() == 1
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (r"$\sigma$", r"$\omega$")
+    first = result_plot.draw_result(result, kind="error")
+    assert words(first) == [r"$\omega$ = 1; 1 of 6 cells failed and are left out"]
+
+
+def test_zipped_axes_run_along_the_first(pair: Callable[..., Result]) -> None:
+    result = pair(axes={"sigma": (0.1, 0.2), "omega": (1.0, 1.2)}, zipped=True)
+    axes = result_plot.draw_result(result)
+    assert axes.get_xlabel() == r"$\sigma$"
+    assert list(axes.lines[0].get_xdata()) == [0.1, 0.2]
+
+
+def test_section_points_against_the_axis_and_against_the_next(pair: Callable[..., Result]) -> None:
+    axes = result_plot.draw_result(pair(axes=SWEPT["error"]), kind="section")
+    assert axes.get_ylabel() == "$x_1$ at $v_1$ falling"
+    assert np.isfinite(axes.lines[0].get_ydata()).sum() == 0 + 1 + 2
+    alone = result_plot.draw_result(pair())
+    assert alone.get_ylabel() == "$x_1$ the next time"
+    low, high = alone.get_xlim()
+    assert high - low >= 1e-5 * 0.99
+
+
+def test_a_trajectory_makes_a_phase_portrait(pair: Callable[..., Result]) -> None:
+    result = pair(record=("trajectory",), samples=20)
+    given = style.new_figure((3, 3)).add_subplot()
+    axes = result_plot.draw_result(result, given)
+    assert axes is given
+    assert len(axes.lines) == 2
+    np.testing.assert_array_equal(axes.lines[1].get_ydata(), result.trajectory.sel(state="v_2"))
+
+
+def test_a_result_with_nothing_but_end_states_is_drawn(pair: Callable[..., Result]) -> None:
+    alone = result_plot.draw_result(pair(record=()), kind="end")
+    assert [line.get_xydata().tolist() for line in alone.lines] == [[[0.0, 2.0]], [[1.0, 3.0]]]
+    swept = result_plot.draw_result(pair(record=(), axes=SWEPT["error"]), kind="end")
+    assert swept.get_ylabel() == "$x$ at the end"
+
+
+def test_plots_that_cannot_be_made_are_refused(pair: Callable[..., Result]) -> None:
+    with pytest.raises(ValueError, match="unknown kind of plot 'pie'; known: error, section, map, phase, end"):
+        result_plot.draw_result(pair(), kind="pie")
+    with pytest.raises(ValueError, match="no numbers for the plot 'map'; it has them for: section, end"):
+        result_plot.draw_result(pair(), kind="map")
+    assert not plt.get_fignums()
+
+
+def test_oscillators_of_several_kinds_show_states_of_their_own() -> None:
+    clocks = load_scene("huygens")
+    axes = result_plot.draw_result(pretend(clocks.replace(record=("trajectory",), axes=())))
+    assert [line.get_label() for line in axes.lines] == ["oscillator 1", "2", "3"]
+    assert axes.get_xlabel() == r"$x$, $\vartheta$"
+    ends = result_plot.draw_result(pretend(clocks.replace(record=(), axes=())))
+    assert ends.get_ylabel() == r"$v$, $\vartheta_{\mathrm{rate}}$ at the end"
+
+
+def test_many_oscillators_are_shown_over_time(pair: Callable[..., Result]) -> None:
+    axes = result_plot.draw_result(pair(topology=chain(9), record=("trajectory",), samples=20))
+    (mesh,) = axes.collections
+    assert mesh.get_array().shape == (9, 20)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time", "oscillator")
+
+
+def test_rounding_is_drawn_as_zero(pair: Callable[..., Result]) -> None:
+    result = pair(axes=SWEPT["error"])
+    assert result_plot.draw_result(result).get_ylim()[1] > 0.01
+    result.data["sync_error"] = result.data.sync_error * 0.0 + 1e-14
+    assert result_plot.draw_result(result).get_ylim() == pytest.approx((-5e-11, 1e-9))

@@ -1,0 +1,219 @@
+"""Master stability functions against closed forms, exact relations and published values."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.stability.averages import Batches
+from synchain.runtime.stability.interpolation import interpolation
+from synchain.runtime.stability.msf import classify, msf, plane
+from synchain.runtime.stability.transversal import exponents
+
+PAIR = topology("chain", 2)
+
+
+def scene(name: str, coupling: str, **parameters: float) -> Scene:
+    return Scene(oscillator=name, coupling=coupling, topology=PAIR, parameters=parameters)
+
+
+def test_linear_nodes_in_closed_form() -> None:
+    """x'' = -x - alpha v: exponent -alpha/2, above alpha = 2 the slower of two real roots."""
+    alpha = np.linspace(0.0, 6.0, 61)
+    found = exponents(scene("harmonic", "damper"), alpha)
+    root = np.sqrt(np.maximum(alpha**2 / 4 - 1, 0.0))
+    np.testing.assert_allclose(found.exponent, -alpha / 2 + root, atol=1e-8)
+    assert {a.kind for a in found.attractors} == {"linear"}
+
+
+def test_a_fixed_point_has_the_eigenvalues_of_its_jacobian() -> None:
+    """Lorenz at rest, Rayleigh number below one: z decays by itself, x and y by a 2 x 2 matrix."""
+    s = scene("lorenz", "x->x", rayleigh=0.5)
+    alpha = np.array([0.0, 0.5, 20.0])
+    found = exponents(s, alpha, transient=100, starts=2)
+    p, b = s.parameters["prandtl"], s.parameters["b"]
+    expected = [max(*np.linalg.eigvals([[-p - a, p], [0.5, -1.0]]).real, -b) for a in alpha]
+    np.testing.assert_allclose(found.exponent, expected, atol=1e-8)
+    assert {a.kind for a in found.attractors} == {"fixed point"}
+
+
+def test_a_driven_linear_oscillator_through_its_floquet_multipliers() -> None:
+    """Duffing without cubic term: the variational equation of a linear damped oscillator, integrated over a cycle."""
+    s = scene("duffing", "spring", beta=1e-9, delta=0.2)
+    alpha = np.array([0.0, 0.4, 3.0])
+    found = exponents(s, alpha, rtol=1e-9, starts=1, transient=200)
+    np.testing.assert_allclose(found.exponent, -0.1, atol=1e-8)
+    assert [a.kind for a in found.attractors] == ["periodic"]
+
+
+def test_coupling_by_the_identity_lowers_every_exponent_by_alpha() -> None:
+    alpha = np.linspace(0.0, 4.0, 41)
+    found = exponents(scene("lorenz", "x->x, y->y, z->z"), alpha, periods=64, precision=1.0, starts=2)
+    np.testing.assert_allclose(found.exponent, found.exponent[0] - alpha, atol=1e-6)
+    assert found.exponent[0] > 0.8
+
+
+def test_interpolated_strengths_agree_with_integrated_ones() -> None:
+    s = scene("friction", "spring", omega=1.4)
+    many = exponents(s, np.linspace(0.0, 1.2, 301), periods=64, starts=1, transient=20)
+    few = exponents(s, many.alpha[::50], periods=64, starts=1, transient=20)
+    # the orbits are two realisations of one chaotic motion: equal within their errors, not bit by bit
+    assert np.all(np.abs(many.exponent[::50] - few.exponent) < 5 * np.hypot(many.stderr[::50], few.stderr))
+
+
+def test_an_interpolation_is_as_good_as_its_check_says() -> None:
+    def propagators(strengths: np.ndarray) -> np.ndarray:
+        root = np.sqrt(1.0 + strengths + 0j)
+        found = np.empty((1, len(strengths), 2, 2), dtype=complex)
+        found[0, :, 0, 0] = found[0, :, 1, 1] = np.cos(5.5 * root)
+        found[0, :, 0, 1], found[0, :, 1, 0] = np.sin(5.5 * root) / root, -root * np.sin(5.5 * root)
+        return found if np.iscomplexobj(strengths) else found.real
+
+    square = (np.linspace(0.0, 4.0, 40)[:, None] + 1j * np.linspace(0.0, 3.0, 40)).reshape(-1)
+    for strengths in (np.linspace(0.0, 30.0, 500), square):
+        errors = []
+        for nodes, parts in ((6, 1), (10, 1), (20, 1), (40, 1)):
+            made = interpolation(strengths, nodes, parts)
+            assert not made.exact
+            own = propagators(made.nodes)
+            exact = propagators(strengths)
+            size = np.abs(exact).max(axis=(2, 3), keepdims=True)
+            errors.append((np.abs(made.apply(own) - exact) / size).max())
+            assert errors[-1] < 30 * made.error(own) + 1e-12
+        assert errors[0] > 1e-3
+        assert errors[-1] < 1e-6
+
+
+@pytest.mark.long
+def test_published_zeros_of_the_rossler_function() -> None:
+    """a = b = 0.2, c = 9, x -> x: 0.186 and 4.614 (Huang, Chen, Lai & Pecora, Phys. Rev. E 80, 036204 (2009))."""
+    found = msf(scene("rossler", "x->x"), np.linspace(0.0, 6.0, 61), periods=400, precision=5e-3, starts=4)
+    ((low, high),) = found.intervals
+    ((low_error, high_error),) = found.uncertainties
+    assert abs(low - 0.186) < 4 * low_error < 0.06
+    assert abs(high - 4.614) < 4 * high_error < 0.08
+    assert found.kind == "bounded interval"
+
+
+def test_published_zero_of_the_lorenz_function() -> None:
+    """10, 28, 2, x -> x: one zero, at 7.3 (same source), a half-line above it."""
+    found = msf(scene("lorenz", "x->x", b=2.0), np.linspace(0.0, 20.0, 41), periods=200, precision=5e-3, starts=4)
+    ((low, high),) = found.intervals
+    assert abs(low - 7.3) < 4 * found.uncertainties[0][0] < 0.5
+    assert high == 20.0
+    assert found.kind == "half-line"
+
+
+def test_the_friction_oscillator_at_the_published_end() -> None:
+    """omega = 1.15: two oscillators synchronise up to sigma = 0.233, alpha = 0.466 (Marszal et al. (2016), fig. 4)."""
+    found = msf(scene("friction", "spring", omega=1.15), np.linspace(0.0, 1.0, 11), starts=2)
+    ((low, high),) = found.intervals
+    assert low == 0.0
+    assert abs(high - 0.466) < 0.002
+    assert found.attractors == ("periodic, 2 drive periods",) * 2
+    assert found.kind == "bounded interval"
+
+
+def test_the_plane_agrees_with_the_line_and_is_symmetric() -> None:
+    s = scene("friction", "spring", omega=1.15)
+    alpha = np.array([0.1, 0.3, 0.6])
+    table = plane(s, alpha, [-0.2, 0.0, 0.2], starts=1)
+    np.testing.assert_array_equal(table.exponent[:, 0], table.exponent[:, 2])
+    np.testing.assert_allclose(table.exponent[:, 1], exponents(s, alpha, starts=1).exponent, atol=2e-6)
+
+
+def test_complex_strengths_of_linear_nodes() -> None:
+    """z^2 = -1 - alpha - i beta: the exponent is the larger real part of z."""
+    table = plane(scene("harmonic", "spring"), [0.0, 0.5], [0.0, 0.4, 2.0])
+    expected = np.abs(np.sqrt(-1.0 - np.array([0.0, 0.5])[:, None] - 1j * np.array([0.0, 0.4, 2.0])).real)
+    np.testing.assert_allclose(table.exponent, expected, atol=1e-12)
+    assert table.contours == ()
+
+
+def test_the_error_bar_covers_correlated_noise() -> None:
+    """Blocks of a slow autoregressive process, whose mean is 0: the error must not be that of white noise."""
+    random = np.random.default_rng(1)
+    hits, ratio = 0, []
+    for _ in range(60):
+        batches, value = Batches(1.0), 0.0
+        for _ in range(4096):
+            value = 0.9 * value + random.normal()
+            batches.add(np.array([[value]]))
+        hits += abs(batches.mean()[0, 0]) < 2 * batches.error()[0]
+        ratio.append(batches.error()[0] / (10.0 / 64.0))  # exact: 1/(1 - 0.9)/sqrt(4096)
+    assert hits >= 54
+    assert 0.9 < np.mean(ratio) < 1.3
+
+
+def test_the_average_stops_when_it_is_precise_and_not_before() -> None:
+    s = scene("friction", "spring", omega=1.4)
+    quick = exponents(s, [0.2, 0.3], precision=0.05, starts=2, transient=50)
+    slow = exponents(s, [0.2, 0.3], precision=0.004, starts=2, transient=50)
+    assert quick.stderr.max() <= 0.05
+    assert slow.stderr.max() <= 0.004
+    assert slow.time > 2 * quick.time
+
+
+def test_threads_do_not_change_a_bit() -> None:
+    s = scene("friction", "spring", omega=1.55)
+    one, two = (exponents(s, [0.1, 0.4], periods=64, transient=10, starts=3, workers=w) for w in (1, 2))
+    np.testing.assert_array_equal(one.by_start, two.by_start)
+
+
+@pytest.mark.parametrize(
+    ("intervals", "kind"),
+    [
+        ([], "never stable"),
+        ([(0.0, 1.0)], "stable everywhere"),
+        ([(0.3, 1.0)], "half-line"),
+        ([(0.0, 0.5)], "bounded interval"),
+        ([(0.1, 0.5)], "bounded interval"),
+        ([(0.1, 0.2), (0.4, 1.0)], "several intervals"),
+    ],
+)
+def test_classes(intervals: list[tuple[float, float]], kind: str) -> None:
+    assert classify(intervals, 1.0) == kind
+
+
+def test_a_grid_that_begins_inside_a_stable_range_shows_no_zero() -> None:
+    assert classify([(0.3, 1.0)], 1.0, 0.3) == "stable everywhere"
+
+
+def test_two_periodic_attractors_are_not_averaged() -> None:
+    """omega = 1.07: two motions of period two, one transversally stable at alpha = 0.1, the other not."""
+    found = exponents(scene("friction", "spring", omega=1.07), [0.1], starts=8)
+    assert len(found.groups) > 1
+    for rows in found.groups:
+        assert np.ptp(found.by_start[rows]) < 1e-3
+    assert found.exponent[0] == found.by_start[max(found.groups, key=len)].mean()
+    assert np.ptp(found.by_start) > 0.3
+
+
+def test_what_is_refused() -> None:
+    s = scene("friction", "spring")
+    with pytest.raises(ValueError, match="alpha: found nan; expected finite numbers"):
+        exponents(s, [0.1, np.nan])
+    with pytest.raises(ValueError, match="alpha: found numbers that do not increase"):
+        msf(s, [0.3, 0.1])
+    with pytest.raises(ValueError, match="beta: found numbers that do not increase"):
+        plane(s, [0.0, 0.1], [0.2, 0.1])
+    with pytest.raises(ValueError, match="starts = 0; expected at least 1"):
+        exponents(s, [0.1], starts=0)
+    with pytest.raises(ValueError, match="coupling: found none"):
+        exponents(Scene(coupling=None), [0.1])
+
+
+@pytest.mark.parametrize(
+    ("strengths", "words"),
+    [
+        ([0.0, np.nan, 1.0], "found nan; expected finite numbers"),
+        ([[0.0, 1.0]], r"found an array of shape \(1, 2\); expected a row"),
+        ("a", "found 'a'; expected real numbers"),
+        (0.5, "at least 2 numbers"),
+    ],
+)
+def test_a_line_of_strengths_that_is_none_is_named(strengths: object, words: str) -> None:
+    with pytest.raises(ValueError, match=f"alpha: .*{words}"):
+        msf(scene("harmonic", "spring"), strengths)  # type: ignore[arg-type]

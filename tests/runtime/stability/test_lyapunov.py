@@ -1,0 +1,162 @@
+"""Lyapunov spectra of networks against published values, exact sums and closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.variational import PHASE, phased, whole, with_volume
+from synchain.models.graphs.families import topology
+from synchain.models.graphs.topology import from_matrix
+from synchain.models.mechanics.components import Node
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.stability.lyapunov import Lyapunov, Walk, lyapunov_spectrum
+from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.sweeps.run import run
+
+pytestmark = pytest.mark.long
+
+PAIR = topology("chain", 2)
+APART = from_matrix([[1, -1], [-1, 1]])
+"""A link of weight -1, which drives two oscillators apart: gamma = 2."""
+
+
+def lone(name: str, **parameters: float) -> Scene:
+    return Scene(oscillator=name, coupling=None, parameters=parameters)
+
+
+@pytest.fixture(scope="module")
+def lorenz() -> Lyapunov:
+    return lyapunov_spectrum(lone("lorenz"), transient=20, periods=250)
+
+
+@pytest.fixture(scope="module")
+def rossler() -> Lyapunov:
+    return lyapunov_spectrum(lone("rossler", c=5.7), transient=20, periods=300)
+
+
+def test_the_published_spectrum_of_lorenz(lorenz: Lyapunov) -> None:
+    """0.9056, 0, -14.5723, dimension 2.062 (Sprott, Chaos and Time-Series Analysis (Oxford, 2003), app. A)."""
+    np.testing.assert_array_less(np.abs(lorenz.exponent - [0.9056, 0.0, -14.5723]), 4 * lorenz.stderr + 1e-3)
+    assert lorenz.stderr[0] < 0.01
+    assert lorenz.dimension == pytest.approx(2.062, abs=2e-3)
+    assert lorenz.resolved.all()
+
+
+def test_the_published_spectrum_of_rossler(rossler: Lyapunov) -> None:
+    """0.0714, 0, -5.3943 at a = b = 0.2, c = 5.7 (Sprott, same place)."""
+    np.testing.assert_array_less(np.abs(rossler.exponent - [0.0714, 0.0, -5.3943]), 4 * rossler.stderr + 1e-3)
+    assert rossler.stderr[0] < 0.01
+
+
+def test_the_sum_is_the_mean_divergence(lorenz: Lyapunov, rossler: Lyapunov) -> None:
+    """-10 - 1 - 8/3 at every state of Lorenz; of Rössler the mean along the same orbit."""
+    assert lorenz.exponent.sum() == pytest.approx(-41 / 3, abs=1e-7)
+    assert rossler.exponent.sum() == pytest.approx(rossler.divergence, abs=1e-7)
+    assert abs(rossler.rest) < 1e-7
+
+
+def test_the_divergence_is_that_of_a_separate_trajectory(rossler: Lyapunov) -> None:
+    """a - c + mean of x, from the samples of an ordinary run; its error is at least that of the long average."""
+    scene = lone("rossler", c=5.7).replace(
+        record=("trajectory",), samples=40_000, transient=200.0, window=4000.0, time_unit="time"
+    )
+    x = run(scene, skip=False).trajectory.sel(state="x_1").values
+    assert 0.2 - 5.7 + x.mean() == pytest.approx(rossler.divergence, abs=6 * rossler.divergence_error)
+
+
+def test_damping_is_the_sum_of_a_driven_oscillator() -> None:
+    """Duffing: divergence -delta everywhere, both exponents -delta/2 on a small periodic motion."""
+    found = lyapunov_spectrum(lone("duffing", delta=0.2), transient=60, periods=200)
+    assert found.exponent.sum() == pytest.approx(-0.2, abs=1e-7)
+    assert found.divergence == pytest.approx(-0.2, abs=1e-10)
+    np.testing.assert_allclose(found.exponent, -0.1, atol=4e-3)
+
+
+def test_blocks_of_a_part_of_a_period_see_the_drive_at_its_phase() -> None:
+    """The same orbit in one block a period and in eight: end and divergence agree, and the growth of all directions."""
+    made = []
+    for parts in (1, 8):
+        walk = Walk.make(lone("duffing", u=4.0), 2, seed=0)
+        walk.parts = parts
+        growth = [walk.advance() for _ in range(5 * parts)]
+        made.append((walk.carrier.state[0], sum(g[0].sum() for g in growth), sum(g[2] for g in growth)))
+    for whole_block, eighths in zip(*made, strict=True):
+        np.testing.assert_allclose(eighths, whole_block, atol=1e-6)
+
+
+def test_hamiltonian_exponents_come_in_pairs() -> None:
+    """x'' = -x and, at sigma = 1, y'' = -y + 2 y for the difference: 1, 0, 0, -1, sum 0."""
+    scene = Scene(oscillator="harmonic", topology=APART, initial={"x": 0.0}, parameters={"sigma": 1.0})
+    found = lyapunov_spectrum(scene, transient=20, periods=64)
+    np.testing.assert_allclose(found.exponent, [1.0, 0.0, 0.0, -1.0], atol=1e-9)
+    np.testing.assert_allclose(found.exponent + found.exponent[::-1], 0.0, atol=1e-9)
+    assert found.divergence == 0.0
+
+
+def test_modes_of_the_synchronous_state_make_up_the_whole_spectrum() -> None:
+    """Two Lorenz systems coupled by H = I: every exponent once as it is and once lowered by 2 sigma."""
+    scene = Scene(oscillator="lorenz", coupling="x->x, y->y, z->z", topology=PAIR, parameters={"sigma": 1.5})
+    found = lyapunov_spectrum(scene, transient=20, periods=64)
+    np.testing.assert_allclose(found.exponent[[2, 3, 5]], found.exponent[[0, 1, 4]] - 3.0, atol=0.02)
+    assert found.exponent.sum() == pytest.approx(-2 * 41 / 3 - 9, abs=1e-6)
+    assert found.exponent[0] == pytest.approx(0.9056, abs=4 * found.stderr[0])
+
+
+def test_friction_leaves_as_many_exponents_as_oscillators_and_says_what_the_rest_sums_to() -> None:
+    """omega = 1.15, sigma = 0.2: the modes alpha = 0 and 0.4 of a periodic motion; velocities die in stick."""
+    scene = Scene(topology=PAIR, parameters={"omega": 1.15, "sigma": 0.2})
+    found = lyapunov_spectrum(scene, transient=2000, periods=64)  # 0.002 apart: the two part slowly
+    expected = exponents(scene, [0.0, 0.4], starts=1).exponent
+    np.testing.assert_allclose(found.exponent[:2], np.sort(expected)[::-1], atol=1e-5)
+    assert found.resolved.tolist() == [True, True, False, False]
+    assert found.exponent[2:].tolist() == [-np.inf, -np.inf]
+    assert np.isfinite(found.rest)
+    assert -4e4 < found.rest / 2 < -1e3  # part of the time in stick, at -epsilon mu_s (2/pi) kappa = -3.8e4 there
+    first = lyapunov_spectrum(scene, periods=64, count=1, precision=1.0)
+    assert first.exponent.shape == (1,)
+    assert first.exponent[0] == pytest.approx(expected.max(), abs=2e-3)
+
+
+def test_the_log_of_a_volume_grows_by_the_divergence_of_the_network() -> None:
+    equations = Scene(oscillator="lorenz", coupling="y->y, x->z", topology=topology("star", 4)).equations
+    extended = with_volume(equations)
+    rates = sp.Add(*extended.rhs()[equations.dimension :])
+    own = sp.Add(*(e for (r, c), e in equations.jacobian().items() if r == c))
+    assert sp.simplify(rates - own) == 0
+    assert extended.rhs()[: equations.dimension] == equations.rhs()
+
+
+def test_a_clock_set_later_shifts_equations_and_matrix() -> None:
+    made = phased(whole(lone("duffing").equations))
+    t, omega, u = sp.Symbol("t", real=True), sp.Symbol("omega", real=True), sp.Symbol("u", real=True)
+    assert made.orbit.node.rhs[1].coeff(u) == sp.cos(omega * (t + PHASE))
+    assert made.orbit.parameters[-1] == "phase"
+    x, d = sp.symbols("x d", real=True)
+    wave = Equations(Node((x,), (sp.cos(omega * t) * x - d * x,), (omega, d)), None, 1)
+    assert dict(phased(whole(wave)).matrix) == {(0, 0): sp.cos(omega * (t + PHASE)) - d}
+
+
+def test_dimension_by_hand() -> None:
+    def of(*values: float, components: int = 3) -> float:
+        known = np.array(values)
+        return Lyapunov(known, np.zeros(len(known)), known > -np.inf, 0.0, 0.0, 1.0, 1.0, components).dimension
+
+    assert of(1.0, 0.0, -2.0) == 2.5
+    assert of(-1.0, -2.0, -3.0) == 0.0
+    assert of(1.0, -np.inf, -np.inf) == 1.0
+    assert of(1.0, 0.0, -1.0) == 3.0
+    assert np.isnan(of(1.0, 0.0))
+
+
+def test_what_is_refused() -> None:
+    with pytest.raises(ValueError, match="count = 3; expected 1 … 2"):
+        lyapunov_spectrum(lone("duffing"), count=3)
+    with pytest.raises(ValueError, match="count = 3; expected 1 … 2"):
+        lyapunov_spectrum(Scene(contact="set-valued"), count=3)
+    with pytest.raises(ValueError, match="found set-valued friction, whose stick makes them zero"):
+        with_volume(Scene(contact="set-valued").equations)
+    with pytest.raises(ValueError, match="9 oscillators; expected at most 8"):
+        lyapunov_spectrum(Scene(topology=topology("chain", 9)))

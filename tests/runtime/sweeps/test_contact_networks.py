@@ -1,0 +1,96 @@
+"""Set-valued friction of more oscillators than are written out: the looped kernel does what the written-out one does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import synchain.codegen.kernels.compile as load_module
+import synchain.codegen.kernels.sweep as emit_module
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.cli import main
+from synchain.runtime.support.status import Status
+from synchain.runtime.sweeps.run import run
+
+NINE = topology("chain", 9)
+WIDTH = 4
+"""One width for all runs of the nine, so that they share a kernel."""
+
+
+def nine(x: list[float], v: list[float], window: float, **more: float) -> Scene:
+    return Scene(
+        topology=NINE, contact="set-valued", transient=0.0, window=window, rtol=1e-10, initial={"x": x, "v": v},
+        parameters={"omega": 1.4, **more},
+    )  # fmt: skip
+
+
+def ran(scene: Scene, **more: Any) -> np.ndarray:
+    """The states (component, oscillator) at the end of the only cell."""
+    result = run(scene, skip=False, show_progress=False, width=WIDTH, **more)
+    assert np.all(result.status == Status.FINISHED)
+    return np.asarray(result.end.values.reshape(3, -1))
+
+
+@pytest.mark.parametrize("coupling", ["spring", pytest.param("damper", marks=pytest.mark.long)])
+def test_looped_events_are_those_of_the_kernel_that_is_written_out(
+    coupling: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the tolerance: sums of forces are fused differently, and a step that differs by a rounding differs for good."""
+    scene = Scene(
+        topology=topology("ring", 3), contact="set-valued", transient=0.0, window=20.0, rtol=1e-12, record=(),
+        coupling=coupling, initial={"x": [0.3, -0.2, 0.1], "v": [0.0, 0.2, -0.1]}, parameters={"sigma": 0.3},
+    )  # fmt: skip
+    plain = run(scene, skip=False, show_progress=False)
+    for module in (emit_module, load_module):
+        monkeypatch.setattr(module, "LARGEST_UNROLLED", 0)
+    load_module._load.cache_clear()
+    looped = run(scene, skip=False, show_progress=False)
+    load_module._load.cache_clear()
+    np.testing.assert_allclose(looped.end.values, plain.end.values, rtol=0, atol=1e-10)
+    np.testing.assert_array_equal(looped.end.values[6:], plain.end.values[6:])
+    assert abs(int(looped.steps) - int(plain.steps)) <= 0.1 * int(plain.steps)
+
+
+def test_equal_starts_stay_equal_bit_for_bit_and_fire_at_once() -> None:
+    """Coupled where synchrony is unstable, and free: three of nine that start equal stay so, whatever the others do."""
+    end = ran(nine([0.3] * 9, [0.0] * 9, 100.0, sigma=0.01))
+    assert np.ptp(end, axis=1).max() == 0.0
+    x = [0.3, -0.2, 0.3, 0.1, 0.3, 0.0, -0.4, 0.2, 0.4]
+    free = ran(nine(x, [0.0] * 9, 40.0, sigma=0.0))
+    assert np.ptp(free[:, [0, 2, 4]], axis=1).max() == 0.0
+    assert np.ptp(free[0]) > 0.01
+
+
+def test_a_mirrored_chain_has_the_mirrored_end() -> None:
+    x, v = np.random.default_rng(1).uniform(-0.5, 0.5, (2, 9))
+    there = ran(nine(x.tolist(), v.tolist(), 10.0, sigma=0.2))
+    back = ran(nine(x[::-1].tolist(), v[::-1].tolist(), 10.0, sigma=0.2))
+    np.testing.assert_allclose(back[:, ::-1], there, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(back[2, ::-1], there[2])
+
+
+def test_a_sweep_finds_the_end_of_the_synchronous_range() -> None:
+    """omega = 1.15: the largest mode of nine, sigma (2 + 2 cos(pi/9)) = 0.465, leaves the stable range at 0.1199."""
+    x = [0.3 + 1e-6 * i for i in range(9)]
+    scene = nine(x, [0.0] * 9, 20.0, omega=1.15).replace(transient=300.0, rtol=1e-8)
+    result = run(scene, skip=False, show_progress=False, width=WIDTH, sigma=[0.1, 0.11, 0.13, 0.14])
+    assert np.all(result.status == Status.FINISHED)
+    assert list(result.sync_error.values < 1e-6) == [True, True, False, False]
+
+
+@pytest.mark.parametrize(("friction", "end"), [("exponential", "0.04650"), ("coulomb_static", "0.05831")])
+def test_modes_of_ten_oscillators_from_the_command_line(
+    friction: str, end: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A star's strongest mode has gamma = -n: its range of sigma is that of alpha over 10, 0.465033877 at omega = 1.15."""
+    scene = tmp_path / "star.toml"
+    scene.write_text(f'friction = "{friction}"\ncontact = "set-valued"\n[topology]\nname = "star"\nn = 10\n'
+                     "[parameters]\nomega = 1.15\n")  # fmt: skip
+    assert main(f"msf {scene} --alpha 0:1.2:25 --periods 100 --starts 1 --workers 1".split()) == 0
+    said = capsys.readouterr().out
+    assert f"sigma     0 … {end} ± 0.00001; lost above: gamma = -10" in said
+    assert "star(10): every mode dies out for" in said

@@ -1,0 +1,257 @@
+"""Probe, projection and direct simulation against each other and against what is known exactly."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from synchain.models import chain, complete, star
+from synchain.models.graphs.topology import from_matrix
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.support.status import Status
+from synchain.runtime.synchronisation import threshold
+from synchain.runtime.synchronisation.threshold import (
+    Criterion,
+    Sweep,
+    check_probe,
+    critical_ratio,
+    default_grid,
+    offsets,
+    probe,
+    project,
+    simulate,
+    thresholds,
+    wu_chua,
+)
+
+PARTS = from_matrix([[-1, 1, 0, 0], [1, -1, 0, 0], [0, 0, -1, 1], [0, 0, 1, -1]])
+SHORT = Criterion(transient=100, window=20, starts=2, tolerance=1e-3)
+
+
+def test_projection_is_the_intersection_over_all_modes():
+    spectrum = chain(3).spectrum  # 0, -1, -3
+    for ranges, expected in (
+        ([(0.3, 1.2)], [(0.3, 0.4)]),
+        ([(0.3, 0.8)], []),
+        ([(0.0, 0.9)], [(0.0, 0.3)]),
+        ([(0.0, 0.1), (0.33, 1.2)], [(0.0, 0.1 / 3), (0.33, 0.4)]),
+    ):
+        found = project(ranges, spectrum)
+        assert np.shape(found) == np.shape(expected)
+        np.testing.assert_allclose(np.ravel(found), np.ravel(expected), rtol=1e-14)
+    assert critical_ratio(spectrum) == pytest.approx(3)
+    assert critical_ratio(star(6).spectrum) == 6
+    assert critical_ratio(complete(7).spectrum) == 1.0
+
+
+def test_parts_of_a_network_synchronise_only_where_uncoupled_oscillators_do():
+    spectrum = PARTS.spectrum  # 0, 0, -2, -2
+    assert project([(0.3, 1.2)], spectrum) == []
+    assert project([(0.0, 0.9)], spectrum) == [(0.0, 0.45)]
+
+
+def test_network_in_parts_is_allowed_and_said():
+    found = thresholds(
+        Scene(topology=PARTS), omega=1.15, sigma=np.linspace(0, 0.3, 7), criterion=SHORT, resolution=0.05
+    )
+    assert any("no complete synchronisation" in words for words in found.warnings)
+
+
+@pytest.mark.parametrize(
+    ("ranges", "expected"),
+    [([(0.0, 0.0)], [(0.0, 0.0)]), ([(0.1, 0.2)], []), ([(0.0, 9.0)], [(0.0, 2.0)])],
+)
+def test_parts_ask_for_stability_at_zero_ends_included(ranges, expected):
+    assert project(ranges, PARTS.spectrum, 2.0) == expected
+
+
+def test_the_default_grid_ends_where_the_largest_mode_is_at_1_2():
+    grid = default_grid(chain(2).spectrum)
+    assert (grid[0], grid[-1], len(grid)) == (0.0, 0.6, 241)
+    assert np.diff(grid) == pytest.approx(np.full(240, 0.0025))
+    grid = default_grid(complete(100).spectrum)
+    assert (grid[0], grid[-1], len(grid)) == (0.0, pytest.approx(0.012), 61)
+
+
+@pytest.fixture
+def swept(monkeypatch):
+    """The calls of `simulate` as (scene, sigma, options); it finds the range 0.1 … 0.2."""
+    calls = []
+
+    def fake(scene, sigma, **options):
+        sigma = np.asarray(sigma, dtype=float)
+        calls.append((scene, sigma, options))
+        return Sweep(sigma, np.zeros(len(sigma)), np.ones(len(sigma)), ((0.1, 0.2),))
+
+    monkeypatch.setattr(threshold, "simulate", fake)
+    return calls
+
+
+def test_the_probe_covers_every_mode_and_the_network_is_swept_as_asked(swept):
+    found = thresholds(Scene(topology=chain(3)), sigma=[0.1, 0.2, 0.3], resolution=1e-3, criterion=SHORT, workers=1)
+    (pair, half, options), (network, sigma, direct) = swept
+    assert (pair.topology.n, network.topology.n) == (2, 3)
+    assert (2 * half[0], 2 * half[-1]) == (pytest.approx(0.1), pytest.approx(0.9))
+    assert np.diff(2 * half).max() <= 0.01 + 1e-12
+    assert 81 <= len(half) <= 82
+    assert sigma.tolist() == [0.1, 0.2, 0.3]
+    asked = {"resolution": 1e-3, "criterion": SHORT, "workers": 1, "show_progress": None}
+    assert options == direct == {**asked, "executor": None, "progress": None}
+    assert found.probe.intervals == ((0.2, 0.4),)
+    np.testing.assert_array_equal(found.probe.x, 2 * half)
+    assert found.predicted == ()  # 0.2 … 0.4 holds no number and its triple
+    assert found.as_dict()["probe"] == [[0.2, 0.4]]
+
+
+@pytest.mark.parametrize(
+    ("graph", "sigma", "low", "count"),
+    [(chain(3), [0.0, 0.01], 0.0, 4), (PARTS, [0.1, 0.11], 0.0, 23), (chain(2), [0.1, 0.1 + 1e-9], 0.2, 2)],
+)
+def test_the_grid_of_the_probe_begins_at_zero_where_zero_is_asked_for(swept, graph, sigma, low, count):
+    thresholds(Scene(topology=graph), sigma=sigma)
+    assert 2 * swept[0][1][0] == pytest.approx(low)
+    assert len(swept[0][1]) == count
+    thresholds(Scene(topology=graph), sigma=np.linspace(sigma[0], sigma[1], 40))
+    assert len(swept[2][1]) == 40
+    assert swept[0][2]["criterion"] == Criterion()
+
+
+def test_the_prediction_ends_with_the_grid_of_sigma(swept):
+    assert thresholds(Scene(topology=chain(2)), sigma=[0.05, 0.15]).predicted == ((0.1, 0.15),)
+    assert thresholds(Scene(topology=chain(2)), sigma=[0.05, 0.5]).predicted == ((0.1, 0.2),)
+
+
+def test_the_criterion_is_that_of_the_published_table():
+    """docs/thresholds.md rests on it: 8 starts, 1000 periods and 100 more, a mean error below 1e-3."""
+    found = Criterion()
+    assert (found.tolerance, found.starts, found.reach) == (1e-3, 8, 0.4)
+    assert (found.transient, found.window, found.rtol, found.seed) == (1000.0, 100.0, 1e-8, 0)
+
+
+def test_at_least_half_of_the_starts_must_fall_below_the_tolerance(monkeypatch):
+    def errors(scene, points, moves, *rest):
+        assert len(moves) == SHORT.starts
+        other = np.where(points < 0.5, 0.0, SHORT.tolerance)  # an error of the tolerance itself is not below it
+        return np.stack([np.where(points < 0.25, 0.0, 1.0), other], axis=1)
+
+    monkeypatch.setattr(threshold, "_errors", errors)
+    found = simulate(Scene(topology=chain(2)), [0.0, 0.3, 0.6], resolution=1e-3, criterion=SHORT)
+    assert found.share.tolist() == [1.0, 0.5, 0.0]
+    assert found.error.tolist() == [0.0, 0.5, 0.5 * (1 + SHORT.tolerance)]
+    assert found.x.tolist() == [0.0, 0.3, 0.6]
+    ((low, high),) = found.intervals
+    assert (low, high) == (0.0, pytest.approx(0.5, abs=1e-3))
+
+
+def test_cells_are_every_coupling_with_every_start_and_failed_ones_count_as_infinite(monkeypatch):
+    seen = []
+
+    def run(cells, **options):
+        seen.append((cells, options))
+        return SimpleNamespace(
+            status=np.array([Status.FINISHED, Status.FINISHED, Status.STEP_BUDGET, Status.FINISHED]),
+            sync_error=np.array([0.0, 1.0, 2.0, 3.0]),
+        )
+
+    monkeypatch.setattr(threshold, "run", run)
+    moves = np.array([0.0, 0.125])
+    criterion, options = Criterion(transient=7, window=3, rtol=1e-5), {"workers": 2, "show_progress": False}
+    found = threshold._errors(Scene(topology=chain(2)), np.array([0.1, 0.2]), moves, criterion, options)
+    assert found.tolist() == [[0.0, 1.0], [np.inf, 3.0]]
+    ((cells, given),) = seen
+    assert {name: tuple(axis.values) for name, axis in zip(("sigma", "x_1", "x_2"), cells.axes, strict=True)} == {
+        "sigma": (0.1, 0.1, 0.2, 0.2), "x_1": (0.3, 0.425, 0.3, 0.425), "x_2": (0.28, 0.405, 0.28, 0.405)
+    }  # fmt: skip
+    assert (cells.zipped, cells.record, cells.transient, cells.window, cells.rtol) == (
+        True,
+        ("sync_error",),
+        7,
+        3,
+        1e-5,
+    )
+    assert given == {"workers": 2, "show_progress": False}
+
+
+def test_starts_are_moved_by_at_most_the_reach_and_the_first_not_at_all():
+    moves = offsets(Criterion(starts=2000, reach=0.5, seed=3))
+    assert moves[0] == 0.0
+    assert len(moves) == 2000
+    assert (-0.5 <= moves.min() < -0.49, 0.49 < moves.max() <= 0.5) == (True, True)
+    assert offsets(Criterion(starts=2000, reach=0.5, seed=3)).tolist() == moves.tolist()
+    assert offsets(Criterion(starts=2000, reach=0.5, seed=4)).tolist() != moves.tolist()
+    assert offsets(Criterion(starts=1)).tolist() == [0.0]
+
+
+def test_wu_chua_keeps_the_product_of_coupling_and_eigenvalue():
+    assert wu_chua(0.233, chain(2).spectrum, chain(3).spectrum) == pytest.approx(0.233 * 2 / 3)
+
+
+def test_probe_of_the_periodic_case_meets_the_published_range():
+    found = probe(
+        Scene(topology=chain(2)), np.linspace(0, 0.8, 9), criterion=Criterion(transient=400, window=20, starts=1)
+    )
+    ((low, high),) = found.intervals
+    assert low == 0.0
+    assert high == pytest.approx(2 * 0.233, abs=0.015)  # 400 periods leave about 0.01 in alpha undecided
+    assert found.share.min() == 0.0
+    assert found.error[0] < 1e-3 < found.error[-1]
+
+
+def test_direct_range_of_a_star_lies_where_the_probe_says():
+    found = thresholds(
+        Scene(topology=star(4)), omega=1.15, sigma=np.linspace(0, 0.3, 13), criterion=SHORT, resolution=2e-3
+    )
+    assert found.predicted[0][1] == pytest.approx(found.probe.intervals[0][1] / 4, abs=1e-9)
+    assert found.direct.intervals[0][1] == pytest.approx(found.predicted[0][1], abs=0.01)
+    numbers = found.as_dict()
+    assert set(numbers) == {"intervals", "probe", "predicted", "warnings"}
+    assert numbers["intervals"][0][1] == found.direct.intervals[0][1]
+
+
+def test_failed_cells_never_count_as_synchronous():
+    stopped = Scene(topology=chain(2), max_steps=50)
+    assert simulate(stopped, [0.0, 0.1], criterion=SHORT).intervals == ()
+
+
+@pytest.mark.parametrize(
+    ("graph", "words"),
+    [
+        (chain(1), "at least two"),
+        (from_matrix([[-1, 1, 0], [0, -1, 1], [1, 0, -1]]), "complex"),
+        (from_matrix([[2, -1, -1], [-1, 2, -1], [-1, -1, 2]]), "negate it"),
+    ],
+)
+def test_networks_that_the_probe_cannot_judge_are_refused(graph, words):
+    with pytest.raises(ValueError, match=words):
+        thresholds(Scene(topology=graph), omega=1.15)
+
+
+def test_nodes_without_links_are_refused():
+    graph = from_matrix([[0, 0], [0, 0]])
+    with pytest.raises(ValueError, match="no links"):
+        check_probe(graph, graph.spectrum)
+
+
+@pytest.mark.parametrize(
+    "bad", [{"tolerance": 0}, {"rtol": float("inf")}, {"starts": 0}, {"transient": float("nan")}, {"window": -1}]
+)
+def test_senseless_criteria_are_refused(bad):
+    with pytest.raises(ValueError, match="criterion"):
+        Criterion(**bad)
+
+
+def test_exponent_changes_sign_where_the_probe_does():
+    found = exponents(Scene(topology=chain(2)), np.linspace(0.40, 0.54, 8), starts=1)
+    assert found.intervals[0][1] == pytest.approx(0.4653, abs=2e-3)
+    assert np.all(np.diff(found.exponent) > 0)
+    assert np.all(found.stderr < 2e-3)
+
+
+@pytest.mark.parametrize("changed", [{"coupling": "inerter"}, {"parameters": {"mu_k": [0.15, 0.16, 0.14]}}])
+def test_networks_that_the_probe_says_nothing_about_are_refused_at_once(changed, swept):
+    with pytest.raises(ValueError, match=r"^thresholds: found (links with inertia|nodes that differ in mu_k)"):
+        thresholds(Scene(topology=chain(3), **changed), omega=1.15)
+    assert swept == []

@@ -1,0 +1,245 @@
+"""The rooms and their doors: which room may import which, that every room is installed, what a start costs."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from dataclasses import is_dataclass
+from pathlib import Path
+
+import pytest
+
+import synchain.models
+
+ROOT = Path(next(iter(synchain.models.__path__))).resolve().parent
+PACKAGES = ("models", "codegen", "runtime")
+
+ARROWS = {
+    "models.inputs": "",
+    "models.algebra": "",
+    "models.mechanics": "inputs",
+    "models.spectra": "algebra inputs",
+    "models.graphs": "spectra algebra inputs",
+    "models.dynamics": "graphs mechanics inputs",
+    "models.claims": "graphs spectra algebra inputs",
+    "models.presentation": "dynamics mechanics inputs",
+    "models.scenes": "dynamics graphs spectra mechanics inputs",
+    "models.scenes.library": "",
+    "models.topologies": "graphs spectra algebra inputs",
+    "models.oscillators": "mechanics",
+    "models.frictions": "mechanics",
+    "models.couplings": "mechanics",
+    "codegen.simd": "",
+    "codegen.integrators": "",
+    "codegen.driver": "simd",
+    "codegen.printing": "simd models",
+    "codegen.steps": "printing integrators models",
+    "codegen.kernels": "steps printing driver integrators simd models",
+    "codegen.export": "printing models",
+    "runtime.support": "models.inputs",
+    "runtime.cells": "support codegen models",
+    "runtime.prediction": "support models",
+    "runtime.stability": "cells prediction support codegen models",
+    "runtime.results": "cells support codegen models",
+    "runtime.sweeps": "stability results prediction cells support codegen models",
+    "runtime.synchronisation": "sweeps stability results prediction cells support codegen models",
+    "runtime.bifurcation": "sweeps stability results cells support models",
+    "runtime.figures": "bifurcation synchronisation sweeps stability results prediction cells support codegen models",
+    "runtime.bench": "bench.kit bench.peers figures bifurcation synchronisation sweeps stability results "
+    "prediction cells support codegen models",
+    "runtime.bench.kit": "bench.peers figures synchronisation sweeps stability results prediction cells support "
+    "codegen models",
+    "runtime.bench.peers": "support codegen models",
+    "runtime.console": "bench.kit figures bifurcation synchronisation sweeps stability results prediction cells "
+    "support codegen models",
+    "runtime.commands": "console bench figures bifurcation synchronisation sweeps stability results prediction cells "
+    "support codegen models",
+}
+"""The rooms that a room may import, beside itself; names without a package are rooms of the same package, a package
+stands for all of its rooms."""
+
+FRONT = {"models", "codegen", "runtime"}
+"""The packages themselves offer names of their rooms, and the command line is the top of the house."""
+
+
+def sources() -> list[Path]:
+    return sorted(p for package in PACKAGES for p in (ROOT / package).rglob("*.py") if "__pycache__" not in p.parts)
+
+
+def rooms() -> set[str]:
+    """Every folder with sources, as a dotted name."""
+    return {".".join(path.relative_to(ROOT).parts[:-1]) for path in sources()}
+
+
+def imported(path: Path, tree: ast.AST) -> Iterator[tuple[int, str]]:
+    """Yield (line, absolute dotted name) of every import in a file, at any depth, those for type checks too."""
+    package = ("synchain", *path.relative_to(ROOT).parts[:-1])
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = list(package[: len(package) - node.level + 1]) if node.level else []
+            name = ".".join([*base, *(node.module or "").split(".")]).strip(".")
+            yield from ((node.lineno, f"{name}.{alias.name}") for alias in node.names)
+
+
+def room_of(name: str) -> str:
+    """The room that holds an absolute dotted name of a module or of something in it."""
+    parts = name.split(".")[1:]
+    while parts and ".".join(parts) not in KNOWN:
+        parts.pop()
+    return ".".join(parts)
+
+
+KNOWN = rooms()
+
+
+def allowed(room: str) -> set[str]:
+    """All rooms that a room may import."""
+    package = room.partition(".")[0]
+    names = {word if word.partition(".")[0] in PACKAGES else f"{package}.{word}" for word in ARROWS[room].split()}
+    whole = {name for name in names if name in PACKAGES}
+    return names | {other for other in KNOWN if other.partition(".")[0] in whole} | {room}
+
+
+DEBTS = {"models.inputs": {"models.mechanics"}, "models.mechanics": {"models.graphs"}}
+"""Arrows that are still to be cut: the loader of plug-ins asks the rooms of their kinds what a file must hold."""
+
+
+def wrong_imports(path: Path, text: str) -> list[str]:
+    room = ".".join(path.relative_to(ROOT).parts[:-1])
+    found = []
+    for line, name in imported(path, ast.parse(text)):
+        top = name.partition(".")[0]
+        if top == "synchain" and room not in FRONT and room_of(name) not in allowed(room) | DEBTS.get(room, set()):
+            found.append(f"{path.relative_to(ROOT)}:{line} imports {name} of {room_of(name) or 'synchain'}")
+        if room.startswith("models") and top not in sys.stdlib_module_names | {"synchain", "sympy", "flint"}:
+            found.append(f"{path.relative_to(ROOT)}:{line} imports {name}")
+    return found
+
+
+def test_every_room_has_a_row_in_the_table_of_arrows() -> None:
+    assert rooms() - FRONT == set(ARROWS)
+
+
+def test_a_room_imports_only_the_rooms_of_its_row() -> None:
+    assert [line for path in sources() for line in wrong_imports(path, path.read_text("utf-8"))] == []
+
+
+def test_the_table_of_arrows_has_no_circle() -> None:
+    reach = {room: allowed(room) - {room} for room in ARROWS}
+    left = set(ARROWS)
+    while ground := {room for room in left if not reach[room] & left}:
+        left -= ground
+    assert left == set()
+
+
+@pytest.mark.parametrize(
+    ("place", "text"),
+    [
+        ("models/graphs", "from ..dynamics.equations import Equations"),
+        ("models/algebra", "if TYPE_CHECKING:\n    from ..graphs.topology import Topology"),
+        ("models/scenes", "from ...codegen import kernels"),
+        ("models/scenes", "from ... import codegen"),
+        ("models/inputs", "def f():\n    import synchain.runtime.sweeps.run"),
+        ("models/inputs", "import numpy as np"),
+        ("models/graphs", "def f():\n    from scipy import linalg"),
+        ("codegen/steps", "from ..kernels.cache import x"),
+        ("codegen/kernels", "from ...runtime.sweeps.run import run"),
+        ("codegen/kernels", "from synchain import runtime"),
+        ("runtime/cells", "from ..sweeps import run"),
+        ("runtime/prediction", "from ...codegen.kernels import compile"),
+    ],
+)
+def test_a_wrong_import_is_seen(place: str, text: str) -> None:
+    assert wrong_imports(ROOT / place / "planted.py", text) != []
+
+
+def test_every_room_says_what_it_may_know() -> None:
+    silent = [
+        room
+        for room in KNOWN
+        if not ast.get_docstring(ast.parse((ROOT / room.replace(".", "/") / "__init__.py").read_text("utf-8")))
+    ]
+    assert silent == []
+
+
+def test_every_room_is_installed() -> None:
+    project = ROOT / "pyproject.toml"
+    if not project.is_file():
+        pytest.skip("an installed package has no pyproject.toml beside it")
+    listed = tomllib.loads(project.read_text("utf-8"))["tool"]["setuptools"]["packages"]
+    assert sorted(listed) == sorted(f"synchain.{room}" for room in KNOWN)
+
+
+def test_values_of_the_models_cannot_be_changed() -> None:
+    found = []
+    for path in sorted((ROOT / "models").rglob("*.py")):
+        dotted = ".".join(("synchain", *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(".__init__")
+        module = importlib.import_module(dotted)
+        kinds = [kind for kind in vars(module).values() if isinstance(kind, type) and is_dataclass(kind)]
+        found += [kind for kind in kinds if kind.__module__ == dotted]
+    assert len(found) > 20
+    own = [kind for kind in found if not kind.__name__.startswith("_")]
+    assert [kind for kind in own if "__slots__" not in vars(kind)] == []
+    assert [kind for kind in own if not kind.__dataclass_params__.frozen] == []  # type: ignore[attr-defined]
+
+
+def test_every_package_that_is_imported_is_declared() -> None:
+    """Peers of the benchmark and the extra `dask` aside, which may be missing."""
+    found = {
+        name.partition(".")[0]
+        for path in sources()
+        if path.parent.name != "peers"
+        for _, name in imported(path, ast.parse(path.read_text("utf-8")))
+    }
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    declared = {re.match("[a-z-]+", line).group().removeprefix("python-") for line in project["dependencies"]}
+    assert found - sys.stdlib_module_names - {"synchain", "distributed"} == declared
+
+
+def loaded_by(statement: str) -> set[str]:
+    """The top-level modules in a fresh interpreter after a statement."""
+    code = f"{statement}\nimport sys\nprint(*sorted({{name.split('.')[0] for name in sys.modules}}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    return set(done.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("statement", "absent"),
+    [
+        ("import synchain.models", {"sympy", "flint", "numpy", "numba", "matplotlib"}),
+        ("from synchain.models import chain; chain(4)", {"sympy", "flint", "numpy", "numba", "matplotlib"}),
+        ("import synchain.models.spectra.solve", {"numpy", "numba", "matplotlib", "scipy"}),
+        ("from synchain.models import star; star(6).spectrum", {"numpy", "numba", "matplotlib", "scipy"}),
+        (
+            "from synchain.models import load_scene; load_scene('figure_4a').equations",
+            {"numpy", "numba", "matplotlib", "scipy"},
+        ),
+    ],
+)
+def test_start_loads_only_what_it_needs(statement: str, absent: set[str]) -> None:
+    assert loaded_by(statement) & absent == set()
+
+
+def test_the_package_offers_its_names_on_first_use() -> None:
+    for name in synchain.models.__all__:
+        assert getattr(synchain.models, name).__name__ == name
+    families = {path.stem for path in (ROOT / "models" / "topologies").glob("*.py")} - {"__init__"}
+    assert families
+    assert families | set(synchain.models.__all__) <= set(dir(synchain.models))
+    for name in families:
+        assert getattr(synchain.models, name)(6).name == name
+    with pytest.raises(AttributeError, match="no attribute 'chian'"):
+        _ = synchain.models.chian
+
+
+def test_the_packages_and_their_names_go_together() -> None:
+    code = "from synchain.models import *; from synchain.runtime import *; from synchain.runtime import msf, basin; print(msf, basin)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.startswith("<function msf")
