@@ -150,16 +150,28 @@ def _kept(source: KernelSource, name: str, folder: Folder) -> Kernel:
     path, text = folder.path / f"{name}.py", source.text.encode()
     if folder.read(path.name) != text:
         folder.write(path.name, text)
-    if (found := folder.machine_code(name)) is not None:
-        try:
-            return _compile(source, path, _MachineCode(found))
-        except Exception:
-            sys.modules.pop(name, None)
-    _tell(source, "kept for later runs")
-    code = _MachineCode()
-    kernel = _compile(source, path, code)
-    folder.keep(name, code.data)
+    if (kernel := _found(source, name, folder, path)) is not None:
+        return kernel
+    with folder.turn(name):
+        if (kernel := _found(source, name, folder, path)) is not None:
+            return kernel
+        _tell(source, "kept for later runs")
+        code = _MachineCode()
+        kernel = _compile(source, path, code)
+        folder.keep(name, code.data)
     return kernel
+
+
+def _found(source: KernelSource, name: str, folder: Folder, path: Path) -> Kernel | None:
+    """The kernel by the machine code in the folder, None if there is none that can be loaded."""
+    code = folder.machine_code(name)
+    if code is None:
+        return None
+    try:
+        return _compile(source, path, _MachineCode(code))
+    except Exception:
+        sys.modules.pop(name, None)
+        return None
 
 
 class _MachineCode:
