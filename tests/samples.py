@@ -20,6 +20,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.scenes.scene import Scene
+from synchain.runtime.cells.plan import control_array, longest_step, plan, tolerances
 
 TABLE = {"theta_b": 0.1, "mu_s": 0.3, "mu_k": 0.15, "a": 2.5, "kappa": 1e5, "epsilon": 2.0, "u": 0.1, "omega": 1.15,
          "sigma": 0.1}  # fmt: skip
@@ -163,11 +164,15 @@ def numbers(equations: Equations, **changed: float) -> list[float]:
 
 @functools.cache
 def kernel(
-    equations: Equations, method: str = "rodas5p", records: tuple[str, ...] = (), section: sp.Expr | None = None,
+    equations: Equations,
+    method: str = "rodas5p",
+    records: tuple[str, ...] = (),
+    section: sp.Expr | None = None,
     width: int | None = None,
-) -> Kernel:  # fmt: skip
-    """The compiled kernel; tests that ask for the same one share it."""
-    return load(emit(equations, method, records, section, width))
+    **options: float,
+) -> Kernel:
+    """The compiled kernel; tests that ask for the same one share it.  `options` are `unroll` and `fill` of `emit`."""
+    return load(emit(equations, method, records, section, width, **options))
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,6 +188,11 @@ class Outcome:
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
         return self.end, self.sums, self.counts, self.points, self.samples
+
+    @property
+    def steps(self) -> np.ndarray:
+        """Accepted steps of each cell."""
+        return self.counts[:, 1]
 
     def section(self, cell: int) -> np.ndarray:
         """The section points of a cell: rows of time and state."""
@@ -206,9 +216,18 @@ def drive(
     spans = np.pad(spans, ((0, 0), (0, 4 - spans.shape[1])))
     cells = len(start)
     values = np.array(values, float).reshape(cells, -1)
-    control = np.array([rtol, rtol / 10 if atol is None else atol, 1e-4, max_step, max_steps, direction, 0.0])
+    control = np.array([rtol, rtol / 10 if atol is None else atol, 1e-4, max_step, max_steps, direction, 0.0, 0.0])
     outcome = blank(cells, start.shape[1], room, samples) if into is None else into
     compiled.drive(*(part or (0, cells)), start, values, spans, control, *outcome.arrays)
+    return outcome
+
+
+def run_cells(compiled: Kernel, scene: Scene) -> Outcome:
+    """All cells of a scene by a kernel of its equations, as `run` has them but without reductions and early ends."""
+    cells = plan(scene)
+    control = control_array(*tolerances(scene, cells.numbers), longest_step(scene), scene.max_steps, jumps=False)
+    outcome = blank(*cells.start.shape)
+    compiled.drive(0, scene.cells, cells.start, cells.numbers, cells.spans, control, *outcome.arrays)
     return outcome
 
 

@@ -10,11 +10,21 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from types import ModuleType
 
-__all__ = ["Integrator", "integrator", "names"]
+__all__ = ["Integrator", "IntegratorKind", "integrator", "names"]
 
 Row = tuple[float, ...]
+
+
+class IntegratorKind(StrEnum):
+    """What KIND says in the file of an integrator."""
+
+    ROSENBROCK = "rosenbrock"
+    EXPLICIT = "explicit"
+    SWITCHING = "switching"
+    """Two methods, of which each cell uses the one that suits its stiffness."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +41,7 @@ class Integrator:
     """
 
     name: str
-    kind: str
+    kind: IntegratorKind
     order: int
     error_order: int
     dense_order: int
@@ -50,12 +60,17 @@ class Integrator:
     """The explicit method for cells that are not stiff at the moment; None where there is only one method."""
 
     def __post_init__(self) -> None:
-        if self.kind not in ("rosenbrock", "explicit"):
-            raise ValueError(f"integrator {self.name}: kind {self.kind!r}; expected 'rosenbrock' or 'explicit'")
+        if self.kind not in (IntegratorKind.ROSENBROCK, IntegratorKind.EXPLICIT):
+            raise ValueError(f"integrator {self.name}: kind {str(self.kind)!r}; expected 'rosenbrock' or 'explicit'")
         if len(self.a) != len(self.c) or any(len(row) > i for i, row in enumerate(self.a)):
             raise ValueError(f"integrator {self.name}: the tableau is not strictly lower triangular")
-        if self.kind == "rosenbrock" and not self.gamma > 0:
+        if self.implicit and not self.gamma > 0:
             raise ValueError(f"integrator {self.name}: a Rosenbrock method needs gamma > 0")
+
+    @property
+    def implicit(self) -> bool:
+        """True for a Rosenbrock method, whose stages solve linear systems with the Jacobian."""
+        return self.kind is IntegratorKind.ROSENBROCK
 
     @property
     def stages(self) -> int:
@@ -73,7 +88,7 @@ def integrator(name: str) -> Integrator:
     if name not in names():
         raise ValueError(f"unknown integrator {name!r}; known: {', '.join(names())}")
     data = importlib.import_module(f".{name}", __name__)
-    if data.KIND != "switching":
+    if data.KIND != IntegratorKind.SWITCHING:
         return _read(name, data)
     stiff, smooth = integrator(data.STIFF), integrator(data.SMOOTH)
     return replace(stiff, name=name, smooth=smooth, source=f"{stiff.source}; {smooth.name}: {smooth.source}")
@@ -81,7 +96,7 @@ def integrator(name: str) -> Integrator:
 
 def _read(name: str, data: ModuleType) -> Integrator:
     return Integrator(
-        name=name, kind=data.KIND, order=data.ORDER, error_order=data.ERROR_ORDER, dense_order=data.DENSE_ORDER,
+        name=name, kind=IntegratorKind(data.KIND), order=data.ORDER, error_order=data.ERROR_ORDER, dense_order=data.DENSE_ORDER,
         source=data.SOURCE, a=data.A, b=data.B, c=data.C, e=data.E, dense=data.DENSE,
         gamma=getattr(data, "GAMMA", 0.0), d=getattr(data, "TIME_WEIGHTS", ()), big_c=getattr(data, "BIG_C", ()),
         inexact=getattr(data, "INEXACT", False),

@@ -13,7 +13,9 @@ import secrets
 import shutil
 import stat
 import sys
-from contextlib import suppress
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
@@ -21,9 +23,17 @@ from types import TracebackType
 
 from synchain.models.inputs.regular_file import open_regular
 
+try:
+    import fcntl
+except ImportError:  # Windows has no such locks
+    fcntl = None  # type: ignore[assignment]
+
 __all__ = ["Folder", "cache_folder", "clear", "describe", "open_folder"]
 
 DIGEST = hashlib.sha256().digest_size
+
+PATIENCE = 120.0
+"""Seconds for which a process waits for another one that compiles the same kernel; then it compiles for itself."""
 
 
 def cache_folder() -> Path:
@@ -99,6 +109,30 @@ class Folder:
         """Write the machine code of the kernel `name` with its checksum."""
         self.write(f"{name}.code", _digest(name, code) + code)
 
+    @contextmanager
+    def turn(self, name: str) -> Iterator[None]:
+        """Let processes that miss the kernel `name` compile it one after another, so that all but the first find it.
+
+        The operating system frees the lock of a process that ends.  If no lock can be had, nobody waits: a kernel may be
+        compiled twice, as both results are the same.
+        """
+        lock = f"{name}.lock"
+        flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
+        descriptor = None
+        if fcntl is not None:
+            with suppress(OSError):
+                descriptor = os.open(self._at(lock), flags, 0o600, dir_fd=self.descriptor)
+        if descriptor is None:
+            yield
+            return
+        try:
+            _wait_for(descriptor)
+            yield
+        finally:
+            with suppress(OSError):
+                self.delete(lock)
+            os.close(descriptor)
+
     def delete(self, name: str) -> None:
         """Delete a file if it is there."""
         with suppress(FileNotFoundError):
@@ -106,6 +140,20 @@ class Folder:
 
     def _at(self, name: str) -> str:
         return name if self.descriptor is not None else str(self.path / name)
+
+
+def _wait_for(descriptor: int) -> None:
+    """Lock an open file, or give up when patience ends or the file system has no locks."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            time.sleep(0.05)
+        except OSError:
+            return
+        else:
+            return
 
 
 def _digest(name: str, code: bytes) -> bytes:

@@ -21,7 +21,7 @@ import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, Protocol
 
 import numba
 import numpy as np
@@ -32,11 +32,11 @@ from synchain.models.dynamics.equations import Equations
 
 from ..printing.names import NAMES
 from ..simd import decorator, elementary, lane_types, lanes
-from ..steps.program import EMPTY, program
+from ..steps.program import EMPTY
 from .cache import Folder, cache_folder, open_folder
 from .installation import InstallationError
 from .processor import processor
-from .sweep import LARGEST_UNROLLED, KernelSource
+from .sweep import KernelKind, KernelSource
 
 __all__ = ["Kernel", "load"]
 
@@ -68,16 +68,24 @@ LOG = logging.getLogger(__name__)
 _lock = threading.Lock()
 
 
+class EntryPoint(Protocol):
+    """The compiled entry point of a kernel module: `drive` of a sweep, `march` of a kernel that carries modes.
+
+    It runs the cells first … last-1 on arrays that are described in the text of the module.
+    """
+
+    def __call__(self, first: int, last: int, /, *arrays: np.ndarray | tuple[np.ndarray, ...]) -> None: ...
+
+
 @dataclass(frozen=True, slots=True)
 class Kernel:
     """A compiled kernel that keeps its text: `print(kernel.source)` shows what runs.
 
-    `entry` is the compiled entry point of the kernel module, `drive` of a sweep and `march` of a kernel that carries modes;
-    their arrays are described there.
+    `graph` and `weights` are the links and the elimination program of a network that is stepped through in loops.
     """
 
     origin: KernelSource
-    entry: Any = field(repr=False)
+    entry: EntryPoint = field(repr=False)
     graph: tuple[np.ndarray, ...] = field(repr=False)
     weights: np.ndarray = field(repr=False)
     path: str
@@ -142,16 +150,28 @@ def _kept(source: KernelSource, name: str, folder: Folder) -> Kernel:
     path, text = folder.path / f"{name}.py", source.text.encode()
     if folder.read(path.name) != text:
         folder.write(path.name, text)
-    if (found := folder.machine_code(name)) is not None:
-        try:
-            return _compile(source, path, _MachineCode(found))
-        except Exception:
-            sys.modules.pop(name, None)
-    _tell(source, "kept for later runs")
-    code = _MachineCode()
-    kernel = _compile(source, path, code)
-    folder.keep(name, code.data)
+    if (kernel := _found(source, name, folder, path)) is not None:
+        return kernel
+    with folder.turn(name):
+        if (kernel := _found(source, name, folder, path)) is not None:
+            return kernel
+        _tell(source, "kept for later runs")
+        code = _MachineCode()
+        kernel = _compile(source, path, code)
+        folder.keep(name, code.data)
     return kernel
+
+
+def _found(source: KernelSource, name: str, folder: Folder, path: Path) -> Kernel | None:
+    """The kernel by the machine code in the folder, None if there is none that can be loaded."""
+    code = folder.machine_code(name)
+    if code is None:
+        return None
+    try:
+        return _compile(source, path, _MachineCode(code))
+    except Exception:
+        sys.modules.pop(name, None)
+        return None
 
 
 class _MachineCode:
@@ -170,13 +190,12 @@ class _MachineCode:
 
 def _compile(source: KernelSource, path: Path, code: _MachineCode) -> Kernel:
     module = _module(source.text, path)
-    graph, weights = EMPTY, np.zeros(0)
-    if source.kind == "sweep" and source.equations.n > LARGEST_UNROLLED:
-        made = program(source.equations)
-        graph, weights = made.arrays, made.weights
-    entry = module.march if source.kind == "modes" else module.drive
+    loops = source.elimination
+    graph, weights = (EMPTY, np.zeros(0)) if loops is None else (loops.arrays, loops.weights)
+    modes = source.kind is KernelKind.MODES
+    entry = module.march if modes else module.drive
     entry._cache._cache_file = code
-    entry.compile(MODES if source.kind == "modes" else _signature(len(graph)))
+    entry.compile(MODES if modes else _signature(len(graph)))
     entry.disable_compile()  # arrays of another type are a mistake of ours, not a reason to compile anew
     hits = sum(entry.stats.cache_hits.values())
     return Kernel(source, entry, graph, weights, str(path), hits > 0)

@@ -28,7 +28,7 @@ from ..steps.contacts import event_constants, write_events
 from ..steps.elimination import plan, write_factors, write_solve
 from ..steps.rosenbrock import stage_state, write_rosenbrock
 from ..steps.step import SCALED, StepWriter, combine, write_function
-from .sweep import LARGEST_UNROLLED, KernelSource, describe, imports, node_functions
+from .sweep import LARGEST_UNROLLED, KernelKind, KernelSource, describe, imports, node_functions
 
 __all__ = ["emit_modes"]
 
@@ -62,7 +62,7 @@ def emit_modes(variation: Variation, width: int | None = None) -> KernelSource:
     carry = _mode_step(variation, parts, method)
     bodies = [*node_functions([writer], blocks), *(f.lines for f in functions if f.lines)]
     text = _module(variation, plain, method, width, parts, writer.lines, bodies, carry, names)
-    return KernelSource(text, equations, method.name, (), width, "modes")
+    return KernelSource(text, equations, method.name, (), width, KernelKind.MODES)
 
 
 def _renamed(variation: Variation, plain: Equations) -> Variation:

@@ -16,7 +16,7 @@ def linearise(w: StepWriter) -> list[dict[str, sp.Expr]]:
     Returns what stands for each, by node.
     """
     eq = w.equations
-    implicit = w.method.kind == "rosenbrock"
+    implicit = w.method.implicit
     w.put(f"# right-hand side{', Jacobian and time derivative' if implicit else ' and Jacobian'} at the start")
     function = "node_linear" if implicit else "node_local"
     w.timed("t", w.wanted([w.first_of(blocks) for blocks in w.kinds]))

@@ -12,7 +12,6 @@ import sympy as sp
 from ..printing.printer import show
 from .mass import Mass, momentum_slopes
 from .places import Joint, named
-from .program import program
 
 if TYPE_CHECKING:
     from .looped import LoopWriter
@@ -34,9 +33,9 @@ class LoopMass:
 
     def bases(self, before: int) -> dict[str, str]:
         """Where a Rosenbrock step keeps the rates at its start and M in a stage, behind so many vectors and the matrix."""
-        if self.constant or self.writer.method.kind != "rosenbrock":
+        if self.constant or not self.writer.method.implicit:
             return {}
-        matrix = "ENTRIES" if program(self.equations).exact else "2*ENTRIES"
+        matrix = "ENTRIES" if self.writer.elimination.exact else "2*ENTRIES"
         start = f"DENSE_ROWS*DIMENSION + {before}*DIMENSION + {matrix}"
         return {"RATES": start, "MASS": f"{start} + DIMENSION"}
 
@@ -44,7 +43,7 @@ class LoopMass:
 
     def factorise(self, matrix: str = "MATRIX") -> None:
         """Factorise a matrix; STATE is lost."""
-        self.apart = "0" if program(self.equations).exact else "ENTRIES"
+        self.apart = "0" if self.writer.elimination.exact else "ENTRIES"
         self.writer.w.put(
             f"factorise(dense, {matrix}, {self.apart}, STATE, order, place, row_start, after_start, column)"
         )

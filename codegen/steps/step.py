@@ -95,7 +95,7 @@ class StepWriter:
 
     def first_of(self, blocks: NodeBlocks) -> Body:
         """What is evaluated of a node of some kind at the start of a step."""
-        if self.method.kind == "rosenbrock":
+        if self.method.implicit:
             return blocks.linear
         return blocks.local if self.bounded else blocks.rhs
 
