@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from .arcs import Arc
 from .periodic import PeriodicOrbit, orbit_through, strobe
 
-__all__ = ["fold"]
+__all__ = ["find_fold"]
 
 MOST_STEPS = 24
 """Steps along the arc on the way to a fold, each at most twice as long as the one before."""
@@ -30,13 +30,13 @@ DIFFERENCE = 1e-6
 """Step of the difference for the derivative by the parameter, relative to it."""
 
 
-def fold(arc: Arc, beyond: float) -> tuple[float, PeriodicOrbit] | None:
+def find_fold(arc: Arc, beyond: float) -> tuple[float, PeriodicOrbit] | None:
     """The value of the parameter and the orbit where the arc turns back before `beyond`; None where it does not."""
     if len(arc.values) < 2:
         return None
-    modes = None if arc.phases[-1] is None else arc.phases[-1].modes
+    modes = None if arc.phases[-1] is None else arc.phases[-1].slip_states
     here, before = (np.append(arc.orbits[k].state, arc.values[k]) for k in (-1, -2))
-    way = Way(arc, here, here - before)
+    way = ArclengthStep(arc, here, here - before)
     length, side = float(np.linalg.norm(here - before)), way.side(here)
     shortest = SHORTEST * length
     for _ in range(MOST_STEPS):
@@ -50,18 +50,18 @@ def fold(arc: Arc, beyond: float) -> tuple[float, PeriodicOrbit] | None:
             return way.root(length)
         if not (beyond - there[-1]) * (there[-1] - way.start[-1]) > 0.0:  # past the end, or back without a fold
             return None
-        way = Way(arc, there, there - way.start)
+        way = ArclengthStep(arc, there, there - way.start)
         length *= 2.0
     return None
 
 
 def _modes(orbit: PeriodicOrbit) -> tuple[int, ...] | None:
     phases = orbit.phases
-    return None if phases is None else phases.modes
+    return None if phases is None else phases.slip_states
 
 
 @dataclass(slots=True)
-class Way:
+class ArclengthStep:
     """From a point (state, parameter) of an arc on along a direction."""
 
     arc: Arc

@@ -16,8 +16,8 @@ import numpy as np
 from synchain.models.inputs.checks import shown
 from synchain.models.scenes.scene import Scene, a_scene
 
+from ..stability.exponents import coupled_cell, initial_states
 from ..stability.orbits import Orbits
-from ..stability.transversal import several_starts, single
 from .branches import Branch, checked_values, follow
 from .periodic import SAME, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit
 
@@ -46,7 +46,7 @@ def skeleton(
     grid = sorted(checked_values(a_scene(scene), name, values))
     if isinstance(periods, Integral | str) or len(periods) == 0:
         raise ValueError(f"periods = {shown(periods)}; expected numbers of drive periods, e.g. (1, 2)")
-    scene = single(skeleton, scene, TOLERANCE, {})
+    scene = coupled_cell(skeleton, scene, TOLERANCE, {})
     if not isinstance(looks, Integral) or looks < 1:
         raise ValueError(f"looks = {shown(looks)}; expected a whole number, at least 1")
     for each in periods:
@@ -70,7 +70,7 @@ def skeleton(
 
 def near_returns(scene: Scene, periods: Sequence[int], **parameters: float) -> list[PeriodicOrbit]:
     """The periodic orbits of these numbers of drive periods that motions from several starts nearly return to, each once."""
-    scene = single(near_returns, scene, TOLERANCE, parameters)
+    scene = coupled_cell(near_returns, scene, TOLERANCE, parameters)
     path = _path(scene)
     found: list[PeriodicOrbit] = []
     for count in periods:
@@ -88,13 +88,13 @@ def near_returns(scene: Scene, periods: Sequence[int], **parameters: float) -> l
 def _path(scene: Scene) -> np.ndarray:
     """States (LENGTH + 1, starts, components) at the beginning of each period of the drive."""
     loose = scene.replace(rtol=1e-8)
-    orbits = Orbits.make(loose, np.zeros(1), several_starts(loose, STARTS, 0), 1)
+    orbits = Orbits.make(loose, np.zeros(1), initial_states(loose, STARTS, 0), 1)
     orbits.settle(DROPPED)
-    carrier = orbits.carry(orbits.strengths)
-    states = [carrier.state]
+    integrator = orbits.integrator_of(orbits.strengths)
+    states = [integrator.state]
     for _ in range(LENGTH):
-        carrier.advance(orbits.unit)
-        states.append(carrier.state)
+        integrator.advance(orbits.unit)
+        states.append(integrator.state)
     return np.array(states)[:, :, : orbits.components]
 
 

@@ -23,7 +23,7 @@ from ..bifurcation.periodic import PeriodicOrbit
 from ..bifurcation.skeleton import skeleton
 from ..sweeps.run import run
 from .bifurcation import Diagram, points
-from .study import Study
+from .figure_runs import FigureRuns
 from .style import BLACK, BLUE, COLUMN, ORANGE, PURPLE
 from .tables import Table
 
@@ -69,15 +69,15 @@ class Skeleton:
     branches: tuple[tuple[Place, ...], ...]
 
 
-def compute(name: str, study: Study) -> Skeleton:
+def compute(name: str, runs: FigureRuns) -> Skeleton:
     """Run the scene of figure 3 with set-valued friction, and find its orbits of one, two and four drive periods."""
     scene = load_scene("figure_3").replace(contact="set-valued")
     cloud, values, looks = FULL
-    grid = study.quality.grid
+    grid = runs.quality.grid
     values, looks = (values, looks) if grid is None else (max(3, (grid + 1) // 3), max(1, grid // 12))
     swept = scene.replace(axes=(Axis.between("omega", LOW, HIGH, cloud),))
     found = skeleton(scene.replace(axes=()), "omega", np.linspace(LOW, HIGH, values), PERIODS, looks)
-    return Skeleton(Diagram(study.run(swept), "omega", ()), tuple(_placed(scene, branch) for branch in found))
+    return Skeleton(Diagram(runs.run(swept), "omega", ()), tuple(_placed(scene, branch) for branch in found))
 
 
 def _placed(scene: Scene, branch: Branch) -> tuple[Place, ...]:

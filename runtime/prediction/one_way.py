@@ -15,7 +15,7 @@ import numpy as np
 from synchain.models.graphs.topology import Topology
 
 from .intervals import find
-from .modes import Mode, loose_parts, transversal
+from .modes import NetworkMode, has_loose_parts, transversal_modes
 from .synchronisability import Window
 
 __all__ = ["OneWay", "windows_complex"]
@@ -28,7 +28,7 @@ class OneWay:
     """Windows of sigma, and the modes that lack eigenvectors: there errors may grow at first, but die out in the end."""
 
     windows: tuple[Window, ...]
-    defective: tuple[Mode, ...]
+    defective: tuple[NetworkMode, ...]
 
 
 def windows_complex(
@@ -40,8 +40,8 @@ def windows_complex(
     Windows that fit between two points of the grid are not seen.  Raises ValueError for a grid that does not increase, a
     resolution that is not positive, and a `stable` that does not answer every point.
     """
-    modes = tuple(mode for mode in transversal(graph) if complex(mode.eigenvalue.value).imag <= 0)
-    values = np.array([mode.eigenvalue.value for mode in modes] + [0.0] * loose_parts(graph), dtype=complex)
+    modes = tuple(mode for mode in transversal_modes(graph) if complex(mode.eigenvalue.value).imag <= 0)
+    values = np.array([mode.eigenvalue.value for mode in modes] + [0.0] * has_loose_parts(graph), dtype=complex)
 
     def verdicts(sigma: np.ndarray) -> np.ndarray:
         alpha = -np.multiply.outer(sigma, values)
@@ -52,7 +52,7 @@ def windows_complex(
             )
         return answer.reshape(alpha.shape)
 
-    def lost(sigma: float) -> Mode | None:
+    def lost(sigma: float) -> NetworkMode | None:
         bad = np.flatnonzero(~verdicts(np.array([sigma]))[0, : len(modes)])
         return modes[bad[0]] if len(bad) else None
 
@@ -68,4 +68,4 @@ def windows_complex(
                 lost(low - reach) if inner[0] else None, lost(high + reach) if inner[1] else None,
             )
         )  # fmt: skip
-    return OneWay(tuple(made), tuple(mode for mode in transversal(graph) if mode.defective))
+    return OneWay(tuple(made), tuple(mode for mode in transversal_modes(graph) if mode.defective))

@@ -21,8 +21,8 @@ import sympy as sp
 from synchain.models.graphs.topology import Topology
 from synchain.models.spectra.order import compare
 
-from .modes import Mode, loose_parts, transversal
-from .stable_ranges import Range, stated, widened
+from .modes import NetworkMode, has_loose_parts, transversal_modes
+from .stable_ranges import StableRange, exact_ranges, widen
 
 __all__ = ["Verdict", "Window", "possible", "verdict", "windows"]
 
@@ -30,7 +30,7 @@ ANSWERS = ("no", "undecided within the error", "yes")
 LONGEST = 60
 """An exact ratio with more letters than this is not written out."""
 
-_EVERYTHING = Range(Fraction(0), None)
+_EVERYTHING = StableRange(Fraction(0), None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +45,8 @@ class Window:
     high: float
     low_error: float
     high_error: float
-    low_mode: Mode | None
-    high_mode: Mode | None
+    low_mode: NetworkMode | None
+    high_mode: NetworkMode | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +62,8 @@ class Verdict:
     ratio: sp.Expr | None
     ratio_value: float
     allowed: float
-    slowest: Mode | None
-    fastest: Mode | None
+    slowest: NetworkMode | None
+    fastest: NetworkMode | None
     windows: tuple[Window, ...]
 
 
@@ -71,9 +71,9 @@ class Verdict:
 class _End:
     """sigma = alpha / |gamma| of a mode at an end of a range; without a mode it is 0, or infinite for an open range."""
 
-    range: Range
+    range: StableRange
     upper: bool
-    mode: Mode | None
+    mode: NetworkMode | None
 
     @property
     def sigma(self) -> float:
@@ -97,7 +97,7 @@ def windows(
     stable.  Raises ValueError for ranges or errors that are no such intervals, and for eigenvalues that are complex or
     positive.
     """
-    return tuple(_window(low, high) for low, high in _intersection(stated(ranges, errors), graph))
+    return tuple(_window(low, high) for low, high in _intersection(exact_ranges(ranges, errors), graph))
 
 
 def verdict(
@@ -107,10 +107,10 @@ def verdict(
 
     "yes" holds for all, "no" for none of the ranges within the errors, otherwise it is "undecided within the error".
     """
-    given = stated(ranges, errors)
+    given = exact_ranges(ranges, errors)
     modes = sorted(_real_modes(graph), key=lambda mode: mode.size)
     slowest, fastest = (modes[0], modes[-1]) if modes else (None, None)
-    certain, maybe = (possible(widened(given, sign), graph) for sign in (-1, 1))
+    certain, maybe = (possible(widen(given, sign), graph) for sign in (-1, 1))
     return Verdict(
         ANSWERS[certain + maybe],
         _exact_ratio(slowest, fastest),
@@ -122,7 +122,7 @@ def verdict(
     )
 
 
-def possible(ranges: Sequence[Range], graph: Topology) -> bool:
+def possible(ranges: Sequence[StableRange], graph: Topology) -> bool:
     """True where some sigma > 0 puts every mode of a graph into one of the exact ranges."""
     return any(_follows(high) for _, high in _intersection(ranges, graph))
 
@@ -132,10 +132,10 @@ def _follows(high: _End) -> bool:
     return high.range.high is None or (high.mode is not None and high.range.high > 0)
 
 
-def _intersection(ranges: Sequence[Range], graph: Topology) -> list[tuple[_End, _End]]:
+def _intersection(ranges: Sequence[StableRange], graph: Topology) -> list[tuple[_End, _End]]:
     """The windows by their exact ends."""
     modes = _real_modes(graph)
-    if loose_parts(graph) and not any(r.low == 0 for r in ranges):
+    if has_loose_parts(graph) and not any(r.low == 0 for r in ranges):
         return []
     allowed = [(_End(_EVERYTHING, False, None), _End(_EVERYTHING, True, None))]
     for mode in modes:
@@ -167,9 +167,9 @@ def _window(low: _End, high: _End) -> Window:
     return Window(low.sigma, high.sigma, low.error, high.error, low.mode, high.mode)
 
 
-def _real_modes(graph: Topology) -> tuple[Mode, ...]:
+def _real_modes(graph: Topology) -> tuple[NetworkMode, ...]:
     """The transversal modes; ValueError where one is complex or positive."""
-    modes = transversal(graph)
+    modes = transversal_modes(graph)
     for mode in modes:
         gamma = mode.eigenvalue.value
         if isinstance(gamma, complex):
@@ -185,7 +185,7 @@ def _real_modes(graph: Topology) -> tuple[Mode, ...]:
     return modes
 
 
-def _exact_ratio(slowest: Mode | None, fastest: Mode | None) -> sp.Expr | None:
+def _exact_ratio(slowest: NetworkMode | None, fastest: NetworkMode | None) -> sp.Expr | None:
     """The eigenratio as a short SymPy expression, or None."""
     if slowest is None or fastest is None:
         return None

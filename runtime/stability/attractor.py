@@ -9,10 +9,10 @@ import sympy as sp
 
 from synchain.models.dynamics.variational import MODE, Variation
 
-from .interpolation import exact
+from .interpolation import exact_interpolation
 from .orbits import Orbits
 
-__all__ = ["Attractor", "find_attractor", "over_one_cycle"]
+__all__ = ["Attractor", "cycle_propagators", "find_attractor"]
 
 LONGEST = 32
 """Longest cycle, in periods of the drive, that is looked for."""
@@ -57,23 +57,23 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
         return _steady(own, "linear")
     if not own.scene.forced:
         return _fixed_point(own)
-    carrier = own.carry(own.strengths[:1])
+    integrator = own.integrator_of(own.strengths[:1])
     closed = max(RETURN, 0.1 * own.scene.rtol)
     for _ in range(3):
-        states = [carrier.state[0]]
+        states = [integrator.state[0]]
         for _ in range(LONGEST):
-            carrier.advance(own.unit)
-            states.append(carrier.state[0])
+            integrator.advance(own.unit)
+            states.append(integrator.state[0])
         gaps = [_distance(state, states[-1]) for state in states[-2::-1]]
         cycle = next((k + 1 for k, gap in enumerate(gaps) if gap < closed), 0)
         orbits.state[row] = own.state[0] = states[-1]
         if cycle:
-            found = np.concatenate([over_one_cycle(own, cycle) for _ in range(2)])
+            found = np.concatenate([cycle_propagators(own, cycle) for _ in range(2)])
             words = "periodic" if cycle == 1 else f"periodic, {cycle} drive periods"
             return Attractor(words, cycle * own.unit, found)
         if min(gaps) > 1e-3:
             break
-        carrier.advance(max(1, round(patience)) * own.unit)
+        integrator.advance(max(1, round(patience)) * own.unit)
     return Attractor("aperiodic", 0.0)
 
 
@@ -81,14 +81,14 @@ def _distance(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.abs(a - b).max() / max(1e-3, np.abs(b).max()))
 
 
-def over_one_cycle(own: Orbits, cycle: int) -> np.ndarray:
+def cycle_propagators(own: Orbits, cycle: int) -> np.ndarray:
     """Propagators (1, m, p, p) of all modes over one cycle, from where the orbit is."""
-    own.chosen, own.block = exact(own.strengths), 1.0
-    own.carrier = own.carry(own.strengths)
+    own.interpolation, own.block = exact_interpolation(own.strengths), 1.0
+    own.integrator = own.integrator_of(own.strengths)
     total = own.propagators()
     for _ in range(cycle - 1):
         total = own.propagators() @ total
-    own.state = own.carrier.state
+    own.state = own.integrator.state
     return total
 
 

@@ -21,9 +21,9 @@ from synchain.models.scenes.scene import Scene
 from ..cells.initial_modes import with_modes
 from ..support.arrays import averaging
 from .averages import Batches
-from .carrier import Carrier
+from .exponents import single_cell
 from .orbits import unit_of_time
-from .transversal import one_cell
+from .variational_integrator import VariationalIntegrator
 
 __all__ = ["ClusterExponents", "cluster_exponents"]
 
@@ -106,17 +106,17 @@ def cluster_exponents(
     an integration fails.
     """
     precision, periods, transient, seed = averaging(precision, periods, transient, seed)
-    scene = one_cell(cluster_exponents, scene, rtol, parameters)
+    scene = single_cell(cluster_exponents, scene, rtol, parameters)
     found = _of_graph(scene, state)
     variation, unit = clustered(scene.equations, found), unit_of_time(scene)
-    carrier = _carrier(scene, found, variation, seed)
+    integrator = _integrator(scene, found, variation, seed)
     for _ in range(round(transient)):
-        carrier.advance(unit)
+        integrator.advance(unit)
     batches, apart = Batches(unit), np.zeros((found.quotient.n,) * 2)
     with tqdm(total=math.ceil(periods), unit="period", disable=not show_progress and show_progress is not None) as bar:
         while batches.blocks < periods:
-            batches.add(carrier.advance(unit))
-            apart = np.maximum(apart, _differences(carrier.state[0], found.quotient.n, _deviating(variation)))
+            batches.add(integrator.advance(unit))
+            apart = np.maximum(apart, _differences(integrator.state[0], found.quotient.n, _deviating(variation)))
             bar.update(1)
             if batches.due and np.all(batches.error() <= precision):
                 break
@@ -137,7 +137,7 @@ def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
     return found
 
 
-def _carrier(scene: Scene, found: Clusters, variation: Variation, seed: int) -> Carrier:
+def _integrator(scene: Scene, found: Clusters, variation: Variation, seed: int) -> VariationalIntegrator:
     """The quotient's orbit with one deviation along it and one in each block, which stay there."""
     firsts = [members[0] for members in found.members]
     state = np.array([[values[i] for values in scene.initial.values() for i in firsts]])
@@ -145,13 +145,15 @@ def _carrier(scene: Scene, found: Clusters, variation: Variation, seed: int) -> 
     state = with_modes(variation.orbit, state, numbers)
     components = _deviating(variation)
     parts = list(_parts(found, components))
-    carrier = Carrier.make(scene, variation, state, numbers, np.full((1, len(parts)), scene.parameters["sigma"]), 1)
+    integrator = VariationalIntegrator.make(
+        scene, variation, state, numbers, np.full((1, len(parts)), scene.parameters["sigma"]), 1
+    )
     random = np.random.default_rng(seed)
     deviations = np.zeros((1, variation.size, len(parts)))
     for k, part in enumerate(parts):
         deviations[0, part, k] = random.normal(size=part.stop - part.start)
-    carrier.point(deviations)
-    return carrier
+    integrator.set_deviations(deviations)
+    return integrator
 
 
 def _deviating(variation: Variation) -> int:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Interpolation", "exact", "interpolation"]
+__all__ = ["Interpolation", "exact_interpolation", "strength_interpolation"]
 
 SINGLE = 2**18
 """Multiplications of one matrix product; OpenBLAS takes more threads than one, whatever `workers` says, above this."""
@@ -40,7 +40,7 @@ class Interpolation:
 
     def apply(self, found: np.ndarray) -> np.ndarray:
         """Propagators (cells, m, p, p) of all strengths from those of the nodes (cells, k, p, p)."""
-        return found if self.exact else _combine(self.weights, found)
+        return found if self.is_exact else _combine(self.weights, found)
 
     def error(self, found: np.ndarray) -> float:
         """The largest difference between integrated and interpolated propagators, relative to their size."""
@@ -51,18 +51,18 @@ class Interpolation:
         return float((np.abs(_combine(self.checks, found) - own).max(axis=(2, 3)) / sizes).max())
 
     @property
-    def exact(self) -> bool:
+    def is_exact(self) -> bool:
         """True where every strength is integrated."""
         return self.nodes is self.strengths
 
 
-def exact(strengths: np.ndarray) -> Interpolation:
+def exact_interpolation(strengths: np.ndarray) -> Interpolation:
     """Integrate every strength."""
     nothing = np.zeros((0, len(strengths)))
     return Interpolation(strengths, strengths, nothing, np.zeros(0, dtype=int), nothing)
 
 
-def interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) -> Interpolation:
+def strength_interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) -> Interpolation:
     """Cut the range of strengths into panels, `parts` a side, each with Chebyshev points, or twice as many on a circle.
 
     The answer is `exact` where that takes as many nodes as there are strengths.
@@ -74,7 +74,7 @@ def interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) -> Interpol
     panels = list((_squares if np.iscomplexobj(strengths) else _pieces)(strengths, parts, nodes))
     total = sum(len(own) + len(extra) for _, own, _, extra in panels)
     if total >= len(strengths):
-        return exact(strengths)
+        return exact_interpolation(strengths)
     weights = np.zeros((len(strengths), total), dtype=strengths.dtype)
     found, checked, checks = [], [], []
     first = 0

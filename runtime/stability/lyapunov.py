@@ -26,9 +26,9 @@ from synchain.models.scenes.scene import Scene
 from ..cells.initial_modes import with_modes
 from ..support.arrays import averaging
 from .averages import Batches
-from .carrier import Carrier
+from .exponents import single_cell
 from .orbits import unit_of_time
-from .transversal import one_cell
+from .variational_integrator import VariationalIntegrator
 
 __all__ = ["Lyapunov", "lyapunov_spectrum"]
 
@@ -104,36 +104,36 @@ def lyapunov_spectrum(
     without a known period; FloatingPointError where an integration fails.
     """
     precision, periods, transient, seed = averaging(precision, periods, transient, seed)
-    scene = one_cell(lyapunov_spectrum, scene, rtol, parameters)
-    walk = Walk.make(scene, _counted(scene, count), seed)
+    scene = single_cell(lyapunov_spectrum, scene, rtol, parameters)
+    frame = TangentFrame.make(scene, _counted(scene, count), seed)
     for _ in range(round(transient)):
-        walk.advance()
-    walk.choose()
-    batches, lost = Batches(walk.unit / walk.parts), np.zeros(walk.count, dtype=bool)
+        frame.advance()
+    frame.choose_block()
+    batches, lost = Batches(frame.unit / frame.parts), np.zeros(frame.count, dtype=bool)
     hidden = None if show_progress is None else not show_progress
     with tqdm(total=math.ceil(periods), unit="period", disable=hidden) as bar:
-        while batches.blocks < periods * walk.parts:
-            growth, share, volume = walk.advance()
-            lost |= share < LOST * walk.rtol
+        while batches.blocks < periods * frame.parts:
+            growth, share, volume = frame.advance()
+            lost |= share < LOST * frame.rtol
             batches.add(np.append(np.where(np.isfinite(growth), growth, 0.0), volume)[None])
-            bar.update(1.0 / walk.parts)
+            bar.update(1.0 / frame.parts)
             if batches.due and np.all(batches.error()[:-1][~lost] <= precision):
                 break
-    return _report(walk, batches, lost)
+    return _report(frame, batches, lost)
 
 
-def _report(walk: Walk, batches: Batches, lost: np.ndarray) -> Lyapunov:
+def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray) -> Lyapunov:
     """Means and errors; what comes after a lost direction is lost as well."""
     resolved = ~np.logical_or.accumulate(lost)
     mean, error = batches.mean()[0], batches.error_by_start()[0]
     found, spread = np.where(resolved, mean[:-1], -np.inf), np.where(resolved, error[:-1], 0.0)
     order = np.argsort(-found, kind="stable")
     time, volume = batches.blocks * batches.length, (float(mean[-1]), float(error[-1]))
-    if walk.variation.events is not None:
-        known = len(found) == walk.variation.size
+    if frame.variation.events is not None:
+        known = len(found) == frame.variation.size
         volume = (float(found.sum()), float(np.hypot.reduce(spread))) if known else (math.nan, math.nan)
-    return Lyapunov(found[order], spread[order], resolved[order], *volume, time, walk.unit / walk.parts,
-                    walk.variation.size)  # fmt: skip
+    return Lyapunov(found[order], spread[order], resolved[order], *volume, time, frame.unit / frame.parts,
+                    frame.variation.size)  # fmt: skip
 
 
 def _counted(scene: Scene, count: int | None) -> int:
@@ -146,19 +146,19 @@ def _counted(scene: Scene, count: int | None) -> int:
 
 
 @dataclass(slots=True)
-class Walk:
+class TangentFrame:
     """One orbit with `count` orthogonal deviations, taken over blocks of 1/parts of a period; `phase` counts them."""
 
     scene: Scene
     variation: Variation
-    carrier: Carrier
+    integrator: VariationalIntegrator
     basis: np.ndarray
     unit: float
     parts: int = 1
     phase: int = 0
 
     @classmethod
-    def make(cls, scene: Scene, count: int, seed: int) -> Walk:
+    def make(cls, scene: Scene, count: int, seed: int) -> TangentFrame:
         """At the scene's start, with random directions; ValueError where time enters without a known period."""
         unit = unit_of_time(scene)
         own = whole_network(scene.equations)
@@ -169,9 +169,9 @@ class Walk:
         numbers = np.array([[values[name] for name in variation.orbit.parameters]])
         state = np.array([[*scene.y0, *(0.0 for _ in range(0 if sticks else scene.n))]])
         state = with_modes(variation.orbit, state, numbers)
-        carrier = Carrier.make(scene, variation, state, numbers, np.zeros((0, count)), 1)
+        integrator = VariationalIntegrator.make(scene, variation, state, numbers, np.zeros((0, count)), 1)
         basis = np.linalg.qr(np.random.default_rng(seed).normal(size=(own.size, count)))[0]
-        return cls(scene, variation, carrier, basis, unit)
+        return cls(scene, variation, integrator, basis, unit)
 
     @property
     def count(self) -> int:
@@ -181,7 +181,7 @@ class Walk:
     @property
     def rtol(self) -> float:
         """The tolerance integrated with."""
-        return float(self.carrier.control[0])
+        return float(self.integrator.control[0])
 
     def advance(self) -> tuple[np.ndarray, np.ndarray, float]:
         """Advance by one block.
@@ -192,21 +192,21 @@ class Walk:
         """
         names = self.variation.orbit.parameters
         if PHASE.name in names:
-            self.carrier.numbers[:, names.index(PHASE.name)] = self.phase * (self.unit / self.parts)
+            self.integrator.numbers[:, names.index(PHASE.name)] = self.phase * (self.unit / self.parts)
         self.phase = (self.phase + 1) % self.parts
-        self.carrier.point(self.basis[None])
-        whole_growth = self.carrier.advance(self.unit / self.parts)[0]
-        self.basis, triangle = np.linalg.qr(self.carrier.deviations[0])
+        self.integrator.set_deviations(self.basis[None])
+        whole_growth = self.integrator.advance(self.unit / self.parts)[0]
+        self.basis, triangle = np.linalg.qr(self.integrator.deviations[0])
         own = np.abs(np.diagonal(triangle))
         volume = np.nan
         if self.variation.events is None:
-            shares = self.carrier.state[:, -self.scene.n :]
+            shares = self.integrator.state[:, -self.scene.n :]
             volume = float(shares.sum())
             shares[:] = 0.0
         with np.errstate(divide="ignore"):
             return whole_growth + np.log(own), own * np.exp(np.minimum(whole_growth, 0.0)), volume
 
-    def choose(self) -> None:
+    def choose_block(self) -> None:
         """Take the fewest blocks a period that keep as many directions clear of the error as any number does."""
         best = -1
         chosen = 1

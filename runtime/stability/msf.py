@@ -18,7 +18,7 @@ from synchain.models.scenes.scene import Scene
 from ..prediction.intervals import Interval
 from ..prediction.synchronisability import Window, windows
 from ..support.arrays import row
-from .transversal import Exponents, exponents
+from .exponents import Exponents, exponents
 
 __all__ = ["MSF", "Plane", "classify", "msf", "plane"]
 

@@ -15,8 +15,8 @@ from synchain.models.dynamics.variational import Variation, mode
 from synchain.models.scenes.scene import Scene
 
 from ..cells.initial_modes import with_modes
-from .carrier import Carrier
-from .interpolation import Interpolation, exact, interpolation
+from .interpolation import Interpolation, exact_interpolation, strength_interpolation
+from .variational_integrator import VariationalIntegrator
 
 __all__ = ["Orbits", "unit_of_time"]
 
@@ -43,8 +43,8 @@ class Orbits:
     workers: int | None
     unit: float
     block: float = 1.0
-    chosen: Interpolation | None = None
-    carrier: Carrier | None = None
+    interpolation: Interpolation | None = None
+    integrator: VariationalIntegrator | None = None
     deviations: np.ndarray | None = None
     interpolation_error: float = 0.0
 
@@ -69,58 +69,60 @@ class Orbits:
         """The orbits of some starts."""
         return Orbits(self.scene, self.variation, self.strengths, self.state[rows], self.workers, self.unit)
 
-    def carry(self, strengths: np.ndarray, looseness: float = 1.0) -> Carrier:
-        """A carrier of these strengths along the orbits from where they are, one deviation for each component."""
+    def integrator_of(self, strengths: np.ndarray, looseness: float = 1.0) -> VariationalIntegrator:
+        """A integrator of these strengths along the orbits from where they are, one deviation for each component."""
         repeated = np.repeat(strengths, self.components)
         rows = np.stack([repeated.real, repeated.imag]) if np.iscomplexobj(self.strengths) else repeated[None]
         names = self.variation.orbit.parameters
         numbers = np.tile([self.scene.parameters[name] for name in names], (len(self.state), 1))
-        return Carrier.make(self.scene, self.variation, self.state, numbers, rows, self.workers, looseness)
+        return VariationalIntegrator.make(
+            self.scene, self.variation, self.state, numbers, rows, self.workers, looseness
+        )
 
     def settle(self, periods: float) -> None:
         """Run through a transient."""
-        carrier = self.carry(self.strengths[:1])
+        integrator = self.integrator_of(self.strengths[:1])
         for length in _stretches(round(periods)):
-            carrier.advance(length * self.unit)
-        self.state = carrier.state
+            integrator.advance(length * self.unit)
+        self.state = integrator.state
 
     def prepare(self) -> None:
         """Choose the block and the panels of strengths, tried on the next block of the orbits, and start the deviations."""
         limit = max(0.1 * self.scene.rtol, 1e-12)
         for block, nodes, parts in _choices(self.scene.forced):
-            self.block, self.chosen = block, interpolation(self.strengths, nodes, parts)
-            self.carrier = self.carry(self.chosen.nodes, LOOSENESS)
-            if self.chosen.exact or self.chosen.error(self.propagators()) < limit:
+            self.block, self.interpolation = block, strength_interpolation(self.strengths, nodes, parts)
+            self.integrator = self.integrator_of(self.interpolation.nodes, LOOSENESS)
+            if self.interpolation.is_exact or self.interpolation.error(self.propagators()) < limit:
                 break
         else:
-            self.chosen = exact(self.strengths)
-        self.carrier = self.carry(self.chosen.nodes, LOOSENESS)
+            self.interpolation = exact_interpolation(self.strengths)
+        self.integrator = self.integrator_of(self.interpolation.nodes, LOOSENESS)
         start = np.ones((len(self.state), len(self.strengths), self.components), dtype=self.strengths.dtype)
         self.deviations = start / math.sqrt(self.components)
 
     def propagators(self) -> np.ndarray:
         """Advance by one block; returns the propagators (starts, nodes, components, components)."""
-        carrier, p = self.carrier, self.components
-        if carrier is None:
+        integrator, p = self.integrator, self.components
+        if integrator is None:
             raise RuntimeError("orbits are not prepared")
         size = self.variation.size
-        basis = np.zeros((len(self.state), size, len(carrier.order)))
+        basis = np.zeros((len(self.state), size, len(integrator.order)))
         for k in range(p):
             basis[:, k, k::p] = 1.0
-        carrier.point(basis)
-        growth = carrier.advance(self.block * self.unit)
-        found = carrier.deviations * np.exp(growth)[:, None, :]
+        integrator.set_deviations(basis)
+        growth = integrator.advance(self.block * self.unit)
+        found = integrator.deviations * np.exp(growth)[:, None, :]
         if size != p:
             found = found[:, :p] + 1j * found[:, p:]
         return np.asarray(found.reshape(len(self.state), p, -1, p).transpose(0, 2, 1, 3))
 
     def advance(self) -> np.ndarray:
         """Advance orbits and deviations by one block; returns the logarithm of their growth (starts, m)."""
-        if self.chosen is None or self.deviations is None:
+        if self.interpolation is None or self.deviations is None:
             raise RuntimeError("orbits are not prepared")
         nodes = self.propagators()
-        self.interpolation_error = max(self.interpolation_error, self.chosen.error(nodes))
-        found = self.chosen.apply(nodes)
+        self.interpolation_error = max(self.interpolation_error, self.interpolation.error(nodes))
+        found = self.interpolation.apply(nodes)
         moved = sum(found[..., k] * self.deviations[..., k, None] for k in range(self.components))
         length = np.linalg.norm(moved, axis=2)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -104,13 +104,13 @@ def test_stops_begin_where_den_hartogs_motion_ends() -> None:
     last = r * np.sqrt(1 + u**2 * beta**4) / (abs(v) * beta**2)
     first = periodic_orbit(coulomb(1.2 * last))
     assert first.phases is not None
-    assert first.phases.modes == (-1, 1)
+    assert first.phases.slip_states == (-1, 1)
     branch = follow(coulomb(1.2 * last), "u", np.linspace(1.2 * last, 0.9 * last, 3), first)
     ((at, words),) = branch.bifurcations
     assert words == "stick loss"
     assert at == pytest.approx(last, abs=1e-8)
     assert branch.residuals[0] < 1e-8
-    assert [len(phases.modes) for phases in branch.phases] == [2, 2, 4]
+    assert [len(phases.slip_states) for phases in branch.phases] == [2, 2, 4]
     load = np.sqrt((v * branch.values[0]) ** 2 - (r * u) ** 2) * beta**2  # at the turning point
     assert branch.phases[0].landing == pytest.approx(r - load, abs=1e-9)
 
@@ -126,7 +126,7 @@ def test_a_branch_goes_through_a_graze_to_its_fold() -> None:
     at = branch.bifurcations[1][0]
     assert at == pytest.approx(0.5 + 0.05 * gaps[1] / (gaps[0] - gaps[1]), abs=2e-4)
     assert max(branch.residuals) < 3e-12
-    assert [len(orbit.phases.modes) for orbit in branch.at if orbit.phases] == [2, 2, 4, 4]
+    assert [len(orbit.phases.slip_states) for orbit in branch.at if orbit.phases] == [2, 2, 4, 4]
     edge, turn = branch.bifurcations[-1][0], branch.at[-1].state
     here = follow(made, "u", [0.5, 0.53, edge - 1e-4], branch.orbits[-1]).orbits[-1]
     other = periodic_orbit(made, 1, 2.0 * turn - here.state, u=edge - 1e-4)  # the sheets lie on both sides of the fold
@@ -144,7 +144,7 @@ def test_the_skeleton_of_a_diagram_has_stable_and_unstable_orbits() -> None:
     assert [orbit.stable for orbit in branch.orbits] == [True, True, False]
     assert [words for _, words in branch.bifurcations] == ["period doubling"]
     assert branch.residuals[0] < 1e-9
-    assert {phases.modes for phases in branch.phases} == {(0, 1)}
+    assert {phases.slip_states for phases in branch.phases} == {(0, 1)}
     assert {phases.words for phases in branch.phases} == {"stick, slip +"}
 
 

@@ -24,8 +24,8 @@ from synchain.runtime.console.line_report import GRID_ENDS, LineReport
 from synchain.runtime.console.plane_report import plane_windows
 from synchain.runtime.stability import orbits
 from synchain.runtime.stability.attractor import Attractor
+from synchain.runtime.stability.exponents import Exponents
 from synchain.runtime.stability.msf import MSF, Plane
-from synchain.runtime.stability.transversal import Exponents
 
 ONE_WAY = "-1 1 0\n0 -1 1\n1 0 -1\n"
 LOW, HIGH = 0.1, 0.6

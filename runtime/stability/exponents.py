@@ -32,7 +32,7 @@ from .attractor import Attractor, find_attractor
 from .averages import Batches
 from .orbits import Orbits
 
-__all__ = ["Exponents", "exponents", "group", "one_cell", "several_starts", "single"]
+__all__ = ["Exponents", "coupled_cell", "exponents", "group_by_attractor", "initial_states", "single_cell"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class Exponents:
     @property
     def groups(self) -> list[list[int]]:
         """The starts that reached the same attractor, by their numbers."""
-        return group(self.attractors, self.by_start)
+        return group_by_attractor(self.attractors, self.by_start)
 
     @property
     def intervals(self) -> tuple[Interval, ...]:
@@ -112,13 +112,13 @@ def exponents(
     Raises ValueError for a network without coupling or a coupling without synchronous state, and for time dependence
     without a known period; FloatingPointError where an integration fails.
     """
-    scene, strengths = single(exponents, scene, rtol, parameters), row_of("alpha", alpha, complex_too=True)
+    scene, strengths = coupled_cell(exponents, scene, rtol, parameters), row_of("alpha", alpha, complex_too=True)
     precision, periods, transient, seed = averaging(precision, periods, transient, seed)
-    orbits = Orbits.make(scene, strengths, several_starts(scene, starts, seed), worker_count(workers))
+    orbits = Orbits.make(scene, strengths, initial_states(scene, starts, seed), worker_count(workers))
     orbits.settle(transient)
     attractors = tuple(find_attractor(orbits, row, transient) for row in range(starts))
     by_start, error, length = _by_start(orbits, attractors, precision, periods, show_progress)
-    chosen = max(group(attractors, by_start), key=len)
+    chosen = max(group_by_attractor(attractors, by_start), key=len)
     mean, spread = by_start[chosen].mean(axis=0), np.sqrt((error[chosen] ** 2).sum(axis=0)) / len(chosen)
     return Exponents(strengths, mean, spread, length, starts, by_start, attractors)
 
@@ -140,15 +140,15 @@ def _by_start(
     return found, error, length
 
 
-def single(function: Callable[..., Any], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
+def coupled_cell(function: Callable[..., Any], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
     """The scene with fixed parameters and without records; a lone oscillator gets a partner, so that it has a
     coupling."""
     graph = scene.topology if a_scene(scene).topology.links else topology("chain", 2)
     coupled = scene.replace(topology=graph, axes=(), zipped=False, continuation="none")
-    return one_cell(function, coupled, rtol, parameters)
+    return single_cell(function, coupled, rtol, parameters)
 
 
-def one_cell(function: Callable[..., Any], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
+def single_cell(function: Callable[..., Any], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
     """A single cell of the scene without records, with parameters that `function` was given; TypeError where it is no
     Scene."""
     return with_parameters(
@@ -156,7 +156,7 @@ def one_cell(function: Callable[..., Any], scene: Scene, rtol: float, parameters
     )
 
 
-def several_starts(scene: Scene, starts: int, seed: int) -> np.ndarray:
+def initial_states(scene: Scene, starts: int, seed: int) -> np.ndarray:
     """Initial states (starts, components): the first oscillator's, and copies moved in the first component."""
     starts = whole("starts", starts, 1)
     state = np.tile([values[0] for values in scene.initial.values()], (starts, 1))
@@ -164,7 +164,7 @@ def several_starts(scene: Scene, starts: int, seed: int) -> np.ndarray:
     return state
 
 
-def group(attractors: Sequence[Attractor], by_start: np.ndarray) -> list[list[int]]:
+def group_by_attractor(attractors: Sequence[Attractor], by_start: np.ndarray) -> list[list[int]]:
     """The starts by attractor: of one kind and, where eigenvalues give the exponents, with the same exponents."""
     found: list[list[int]] = []
     for row, attractor in enumerate(attractors):

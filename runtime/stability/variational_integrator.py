@@ -20,11 +20,11 @@ from ..cells.plan import CANCEL, control_array, half_swing, periods, tolerances
 from ..support.status import Status
 from ..support.threads import worker_count
 
-__all__ = ["Carrier"]
+__all__ = ["VariationalIntegrator"]
 
 
 @dataclass(slots=True)
-class Carrier:
+class VariationalIntegrator:
     """Orbits (cells) with deviations, `modes` of them each, which differ in their strengths.
 
     state (cells, dimension), numbers (cells, parameters), period (cells,): after which the clock starts anew, 0 for none;
@@ -53,7 +53,7 @@ class Carrier:
         strengths: np.ndarray,
         workers: int | None = None,
         looseness: float = 1.0,
-    ) -> Carrier:
+    ) -> VariationalIntegrator:
         """Prepare the kernel and the arrays; tolerances and step budget are the scene's.
 
         strengths: (number of strengths, modes), any order.  Deviations start along (1, 1, …).  `looseness`: how many
@@ -83,7 +83,7 @@ class Carrier:
         """The deviations (cells, size, modes) in the caller's order, at unit length."""
         return self.vectors[:, :, self.order]
 
-    def point(self, vectors: np.ndarray) -> None:
+    def set_deviations(self, vectors: np.ndarray) -> None:
         """Set the deviations (cells, size, modes), in the caller's order; lengths other than 1 are kept."""
         self.vectors[:, :, self.order] = vectors
         spare = self.vectors.shape[2] - len(self.order)

@@ -8,9 +8,9 @@ import pytest
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.averages import Batches
-from synchain.runtime.stability.interpolation import interpolation
+from synchain.runtime.stability.exponents import exponents
+from synchain.runtime.stability.interpolation import strength_interpolation
 from synchain.runtime.stability.msf import classify, msf, plane
-from synchain.runtime.stability.transversal import exponents
 
 PAIR = topology("chain", 2)
 
@@ -75,8 +75,8 @@ def test_an_interpolation_is_as_good_as_its_check_says() -> None:
     for strengths in (np.linspace(0.0, 30.0, 500), square):
         errors = []
         for nodes, parts in ((6, 1), (10, 1), (20, 1), (40, 1)):
-            made = interpolation(strengths, nodes, parts)
-            assert not made.exact
+            made = strength_interpolation(strengths, nodes, parts)
+            assert not made.is_exact
             own = propagators(made.nodes)
             exact = propagators(strengths)
             size = np.abs(exact).max(axis=(2, 3), keepdims=True)
