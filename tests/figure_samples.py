@@ -14,7 +14,7 @@ import xarray as xr
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.figures import exponent, figure_runs, load, make, plane, style, synchronisability_map
 from synchain.runtime.results.result import Result
-from synchain.runtime.stability.attractor import Attractor
+from synchain.runtime.stability.attractor import Attractor, Motion
 from synchain.runtime.stability.exponents import Exponents
 from synchain.runtime.stability.msf import MSF, Plane
 from synchain.runtime.support.status import Status
@@ -116,7 +116,7 @@ def parabola(omega: float, alpha: np.ndarray) -> Exponents:
     low, high = RANGE.get(omega, RANGE[1.4])
     value = (alpha - low) * (alpha - high)
     return Exponents(
-        alpha, value, np.full(len(alpha), 1e-3), 500.0, 1, value[None], (Attractor("aperiodic", 0.0),)
+        alpha, value, np.full(len(alpha), 1e-3), 500.0, 1, value[None], (Attractor(Motion.APERIODIC, 0.0),)
     )  # fmt: skip
 
 

@@ -43,11 +43,10 @@ from synchain.runtime.bifurcation.branches import follow
 from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
 from synchain.runtime.results.open import open_result
-from synchain.runtime.stability import msf
 from synchain.runtime.stability.clusters import cluster_exponents
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum
-from synchain.runtime.stability.msf import plane
+from synchain.runtime.stability.msf import msf, plane
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import stream
 from synchain.runtime.synchronisation import basin
@@ -621,7 +620,7 @@ def _() -> Quantities:
     return orbit_of(found) | {
         "branch": np.array([orbit.state for orbit in branch.orbits]),
         "branch multipliers": np.array([orbit.multipliers for orbit in branch.orbits]),
-        "bifurcations": repr([words for _, words in branch.bifurcations]),
+        "bifurcations": repr([str(each.kind) for each in branch.bifurcations]),
     }
 
 

@@ -13,17 +13,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 from scipy.optimize import brentq
 
-from .arcs import Arc
-from .folds import find_fold
+from .continuation import Arc, find_fold
 from .periodic import PeriodicOrbit, periodic_orbit, strobe
 from .phases import Phases
 
-__all__ = ["Bifurcation", "bifurcations_at_end", "bifurcations_between"]
+__all__ = ["Bifurcation", "BifurcationKind", "bifurcations_at_end", "bifurcations_between"]
 
 CLOSED = 1e-6
 """A gap this small has closed: the branch ends by grazing."""
@@ -42,15 +42,24 @@ LEAST_REACH = 1e-4
 """Where Newton's method finds nothing this close to the last orbit, relative to the other end, it is given up."""
 
 
+class BifurcationKind(StrEnum):
+    """Kind of a bifurcation of periodic orbits."""
+
+    PERIOD_DOUBLING = "period doubling"
+    FOLD = "fold"
+    GRAZING = "grazing"
+    STICK_LOSS = "stick loss"
+
+
 @dataclass(frozen=True, slots=True)
 class Bifurcation:
     """A bifurcation: the value of the parameter, its kind in words, how far its test function is from zero, and the nearest
     orbit that was found."""
 
     value: float
-    words: str
+    kind: BifurcationKind
     residual: float
-    orbit: PeriodicOrbit
+    orbit: PeriodicOrbit = field(repr=False)
 
 
 def bifurcations_between(arc: Arc, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> list[Bifurcation]:
@@ -78,7 +87,7 @@ def bifurcations_at_end(arc: Arc, beyond: float) -> list[Bifurcation]:
     turn = find_fold(arc, beyond)
     if turn is not None:
         at, orbit = turn
-        return [Bifurcation(at, "fold", float(np.abs(orbit.multipliers - 1.0).min()), orbit)]
+        return [Bifurcation(at, BifurcationKind.FOLD, float(np.abs(orbit.multipliers - 1.0).min()), orbit)]
     if arc.phases[-1] is None:
         return []
     last = _graze(_copy(arc), beyond)
@@ -100,7 +109,7 @@ def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
         made = _crossings(single, (single.values[0], beyond), (single.orbits[0], single.orbits[1]))
     except ArithmeticError:
         return None
-    return next((each for each in made if each.words == "period doubling"), None)
+    return next((each for each in made if each.kind is BifurcationKind.PERIOD_DOUBLING), None)
 
 
 def _copy(arc: Arc) -> Arc:
@@ -110,7 +119,7 @@ def _copy(arc: Arc) -> Arc:
 def _crossings(arc: Arc, ends: tuple[float, float], orbits: tuple[PeriodicOrbit, PeriodicOrbit]) -> list[Bifurcation]:
     """The crossings of a real multiplier through -1 or 1 between two orbits of the same phases."""
     found = []
-    for point, words in ((-1.0, "period doubling"), (1.0, "fold")):
+    for point, kind in ((-1.0, BifurcationKind.PERIOD_DOUBLING), (1.0, BifurcationKind.FOLD)):
         if not _beyond(orbits[0], point) * _beyond(orbits[1], point) < 0.0:
             continue
 
@@ -118,7 +127,7 @@ def _crossings(arc: Arc, ends: tuple[float, float], orbits: tuple[PeriodicOrbit,
             return _beyond(orbits[ends.index(value)] if value in ends else arc.at(value), point)
 
         value, orbit = _root(distance, arc, ends)
-        found.append(Bifurcation(value, words, float(np.abs(orbit.multipliers - point).min()), orbit))
+        found.append(Bifurcation(value, kind, float(np.abs(orbit.multipliers - point).min()), orbit))
     return found
 
 
@@ -163,7 +172,7 @@ def _stick_loss(arc: Arc, value: float, orbit: PeriodicOrbit, before: Phases, af
         return phases.landing
 
     at, last = _root(landing, both, (arc.values[-1], value))
-    return Bifurcation(at, "stick loss", abs(landing(at)), last)
+    return Bifurcation(at, BifurcationKind.STICK_LOSS, abs(landing(at)), last)
 
 
 def _graze(arc: Arc, beyond: float) -> Bifurcation:
@@ -193,7 +202,7 @@ def _graze(arc: Arc, beyond: float) -> Bifurcation:
     at = _where(arc, 0.0)
     low = arc.values[-1]
     at = at if min(low, beyond) <= at <= max(low, beyond) else 0.5 * (low + beyond)
-    return Bifurcation(at, "grazing", abs(_known(arc).gap), arc.orbits[-1])
+    return Bifurcation(at, BifurcationKind.GRAZING, abs(_known(arc).gap), arc.orbits[-1])
 
 
 def _known(arc: Arc) -> Phases:

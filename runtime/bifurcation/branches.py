@@ -18,8 +18,8 @@ import numpy as np
 from synchain.models.inputs.checks import instance, shown
 from synchain.models.scenes.scene import Scene
 
-from .arcs import Arc
 from .bifurcations import Bifurcation, bifurcations_at_end, bifurcations_between
+from .continuation import Arc
 from .periodic import PeriodicOrbit, periodic_orbit
 from .phases import Phases
 
@@ -52,10 +52,8 @@ class Branch:
     name: str
     values: np.ndarray
     orbits: tuple[PeriodicOrbit, ...]
-    bifurcations: tuple[tuple[float, str], ...]
-    residuals: tuple[float, ...] = ()
+    bifurcations: tuple[Bifurcation, ...]
     phases: tuple[Phases, ...] = ()
-    at: tuple[PeriodicOrbit, ...] = ()
 
 
 def follow(scene: Scene, name: str, values: Sequence[float] | np.ndarray, first: PeriodicOrbit) -> Branch:
@@ -75,12 +73,13 @@ def follow(scene: Scene, name: str, values: Sequence[float] | np.ndarray, first:
             break
         orbits.append(orbit)
     phases = [tracer.phases[value] for value in wanted[: len(orbits)]]
-    found = tracer.found
     return Branch(
-        name, np.array(wanted[: len(orbits)]), tuple(orbits), tuple((each.value, each.words) for each in found),
-        tuple(each.residual for each in found), tuple(own for own in phases if own is not None),
-        tuple(each.orbit for each in found),
-    )  # fmt: skip
+        name,
+        np.array(wanted[: len(orbits)]),
+        tuple(orbits),
+        tuple(tracer.bifurcations),
+        tuple(each for each in phases if each is not None),
+    )
 
 
 def checked_values(scene: Scene, name: str, values: Sequence[float] | np.ndarray) -> list[float]:
@@ -101,7 +100,7 @@ class BranchTracer:
 
     def __init__(self, arc: Arc) -> None:
         self.arc = arc
-        self.found: list[Bifurcation] = []
+        self.bifurcations: list[Bifurcation] = []
         self.phases: dict[float, Phases | None] = {}
         self.least: int | None = None
 
@@ -114,7 +113,7 @@ class BranchTracer:
                 bifurcations_between(self.arc, value, orbit, phases),
                 key=lambda each: abs(each.value - self.arc.values[-1]),
             )
-            self.found += way
+            self.bifurcations += way
             last = self.arc.phases[-1]
             if last is not None and phases is not None and last.slip_states != phases.slip_states:
                 self.arc = self.arc.empty()
@@ -134,7 +133,7 @@ class BranchTracer:
             elif orbit is not None or abs(ahead[-1] - last) > SHORTEST * step:
                 ahead.append(0.5 * (last + ahead[-1]))
             else:
-                self.found += bifurcations_at_end(self.arc, ahead[-1])
+                self.bifurcations += bifurcations_at_end(self.arc, ahead[-1])
                 return None
         return self.arc.orbits[-1]
 

@@ -18,6 +18,7 @@ from synchain.models.scenes.scene import Scene, a_scene
 
 from ..stability.exponents import coupled_cell, initial_states
 from ..stability.orbits import Orbits
+from .bifurcations import BifurcationKind
 from .branches import Branch, checked_values, follow
 from .periodic import SAME, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit
 
@@ -127,10 +128,12 @@ def _both_ways(scene: Scene, name: str, grid: list[float], k: int, orbit: Period
     """The branch through an orbit at grid[k], in one piece."""
     up, down = (follow(scene, name, part, orbit) for part in (grid[k:], grid[k::-1]))
     return Branch(
-        name, np.concatenate([down.values[:0:-1], up.values]), (*down.orbits[:0:-1], *up.orbits),
-        (*down.bifurcations[::-1], *up.bifurcations), (*down.residuals[::-1], *up.residuals),
-        (*down.phases[:0:-1], *up.phases), (*down.at[::-1], *up.at),
-    )  # fmt: skip
+        name,
+        np.concatenate([down.values[:0:-1], up.values]),
+        (*down.orbits[:0:-1], *up.orbits),
+        (*down.bifurcations[::-1], *up.bifurcations),
+        (*down.phases[:0:-1], *up.phases),
+    )
 
 
 def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrbit]]:
@@ -139,14 +142,17 @@ def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrb
     Near a fold the sheets lie on both sides of it, at distances like the square root of that of the parameter.
     """
     found = []
-    for (fold, words), turn in zip(branch.bifurcations, branch.at, strict=True):
+    for turn in branch.bifurcations:
+        if turn.kind is not BifurcationKind.FOLD:
+            continue
+        fold = turn.value
         for k, inner in ((0, fold < branch.values[0]), (-1, fold > branch.values[-1])):
-            if words != "fold" or not inner:
+            if not inner:
                 continue
             end, last = float(branch.values[k]), branch.orbits[k]
             way = [fold + 4.0**-j * (end - fold) for j in range(NEARER, -1, -1)]
             try:
-                start = turn.state - 2.0**-NEARER * (last.state - turn.state)
+                start = turn.orbit.state - 2.0**-NEARER * (last.state - turn.orbit.state)
                 first = periodic_orbit(scene, last.periods, start, **{branch.name: way[0]})
                 sheet = follow(scene, branch.name, way, first)
             except ArithmeticError:

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..prediction.modes import transversal_modes
-from ..prediction.one_way import windows_complex
-from ..prediction.synchronisability import Window
+from ..prediction.synchronisability import Window, windows_complex
 from ..stability.msf import Plane
 from .words import defective_rows, finite, headline, how, rows_of, window_dict, window_text, write_files
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from fractions import Fraction
 
 from flint import arb, fmpq
@@ -22,7 +23,22 @@ from synchain.models.graphs.families import topology
 from .stable_ranges import StableRange, exact_ranges, widen
 from .synchronisability import possible
 
-__all__ = ["LargestNetwork", "eigenratio", "largest_network"]
+__all__ = ["LargestNetwork", "Method", "SizeUnit", "eigenratio", "largest_network"]
+
+
+class SizeUnit(StrEnum):
+    """What the size of a network counts."""
+
+    NODES = "nodes"
+    DIMENSION = "dimension"
+
+
+class Method(StrEnum):
+    """How the largest network was found."""
+
+    CLOSED_FORM = "closed form"
+    OPEN_RANGE = "open range"
+    SEARCH = "search"
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +55,8 @@ class LargestNetwork:
     n: int | None
     certain: int | None
     possible: int | None
-    counts: str
-    how: str
+    counts: SizeUnit
+    how: Method
     limit: int | None = None
 
 
@@ -61,14 +77,14 @@ def largest_network(
     directed = getattr(plugin(family), "DIRECTED", False)
     given = exact_ranges(ranges, errors)
     sets = [given, widen(given, -1), widen(given, 1)]
-    counts = "dimension" if family == "hypercube" else "nodes"
+    counts = SizeUnit.DIMENSION if family == "hypercube" else SizeUnit.NODES
     if not directed and all(_open(found) for found in sets):
-        return LargestNetwork(family, None, None, None, counts, "open range")
+        return LargestNetwork(family, None, None, None, counts, Method.OPEN_RANGE)
     if family in CLOSED and all(_open(found) or len(found) <= 1 for found in sets):
         n, certain, most = (_by_ratio(family, found) for found in sets)
-        return LargestNetwork(family, n, certain, most, counts, "closed form")
+        return LargestNetwork(family, n, certain, most, counts, Method.CLOSED_FORM)
     n, certain, most = (_by_search(family, found, limit) for found in sets)
-    return LargestNetwork(family, n, certain, most, counts, "search", limit)
+    return LargestNetwork(family, n, certain, most, counts, Method.SEARCH, limit)
 
 
 def _open(ranges: Sequence[StableRange]) -> bool:

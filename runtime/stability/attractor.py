@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 import sympy as sp
@@ -12,7 +13,7 @@ from synchain.models.dynamics.variational import MODE, Variation
 from .interpolation import exact_interpolation
 from .orbits import Orbits
 
-__all__ = ["Attractor", "cycle_propagators", "find_attractor"]
+__all__ = ["Attractor", "Motion", "cycle_propagators", "find_attractor"]
 
 LONGEST = 32
 """Longest cycle, in periods of the drive, that is looked for."""
@@ -20,6 +21,15 @@ LONGEST = 32
 RETURN = 1e-9
 """A cycle is closed where the state returns to within this distance relative to its size, or to within a tenth of
 rtol."""
+
+
+class Motion(StrEnum):
+    """Kind of motion on an attractor."""
+
+    LINEAR = "linear"
+    FIXED_POINT = "fixed point"
+    PERIODIC = "periodic"
+    APERIODIC = "aperiodic"
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,9 +40,15 @@ class Attractor:
     variational equation, twice; None where the motion is neither.
     """
 
-    kind: str
+    motion: Motion
     cycle: float
     propagators: np.ndarray | None = field(default=None, repr=False)
+    periods: int = 1
+
+    @property
+    def kind(self) -> str:
+        """The motion in words, with the drive periods of its cycle if there are several."""
+        return str(self.motion) if self.periods == 1 else f"{self.motion}, {self.periods} drive periods"
 
     def exponents(self) -> tuple[np.ndarray, np.ndarray]:
         """Exponents (m,), and the difference between the two cycles as their error."""
@@ -54,7 +70,7 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
     """
     own = orbits.part([row])
     if not any(e.has(sp.Symbol("t", real=True), *_states(own.variation)) for _, e in own.variation.matrix):
-        return _steady(own, "linear")
+        return _steady(own, Motion.LINEAR)
     if not own.scene.forced:
         return _fixed_point(own)
     integrator = own.integrator_of(own.strengths[:1])
@@ -69,12 +85,11 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
         orbits.state[row] = own.state[0] = states[-1]
         if cycle:
             found = np.concatenate([cycle_propagators(own, cycle) for _ in range(2)])
-            words = "periodic" if cycle == 1 else f"periodic, {cycle} drive periods"
-            return Attractor(words, cycle * own.unit, found)
+            return Attractor(Motion.PERIODIC, cycle * own.unit, found, cycle)
         if min(gaps) > 1e-3:
             break
         integrator.advance(max(1, round(patience)) * own.unit)
-    return Attractor("aperiodic", 0.0)
+    return Attractor(Motion.APERIODIC, 0.0)
 
 
 def _distance(a: np.ndarray, b: np.ndarray) -> float:
@@ -100,14 +115,14 @@ def _fixed_point(own: Orbits) -> Attractor:
     """Whether the orbit rests; the matrices of the variational equation there."""
     rates = sp.lambdify(_symbols(own.variation), list(own.variation.orbit.rhs()), "numpy")(*_values(own))
     if not np.abs(rates).max() < RETURN * max(1.0, np.abs(own.state).max()):
-        return Attractor("aperiodic", 0.0)
-    return _steady(own, "fixed point")
+        return Attractor(Motion.APERIODIC, 0.0)
+    return _steady(own, Motion.FIXED_POINT)
 
 
-def _steady(own: Orbits, kind: str) -> Attractor:
+def _steady(own: Orbits, motion: Motion) -> Attractor:
     """Motion along which the variational equation does not change."""
     matrix = _matrix(own.variation, _symbols(own.variation), _values(own), own.strengths)
-    return Attractor(kind, 0.0, np.stack([matrix, matrix]))
+    return Attractor(motion, 0.0, np.stack([matrix, matrix]))
 
 
 def _symbols(variation: Variation) -> list[sp.Symbol]:

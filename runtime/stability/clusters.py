@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -25,9 +26,15 @@ from .exponents import single_cell
 from .orbits import unit_of_time
 from .variational_integrator import VariationalIntegrator
 
-__all__ = ["ClusterExponents", "cluster_exponents"]
+__all__ = ["BlockVerdict", "ClusterExponents", "cluster_exponents"]
 
-ANSWERS = {-1: "stable", 0: "undecided within the error", 1: "unstable"}
+
+class BlockVerdict(StrEnum):
+    """Stability of one block of a cluster state."""
+
+    STABLE = "stable"
+    UNDECIDED = "undecided within the error"
+    UNSTABLE = "unstable"
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +56,11 @@ class ClusterExponents:
     time: float
 
     @property
-    def verdicts(self) -> tuple[str, ...]:
+    def verdicts(self) -> tuple[BlockVerdict, ...]:
         """In words for each block: stable or unstable by more than two standard errors, else undecided."""
         signs = np.where(np.abs(self.exponent) > 2.0 * self.stderr, np.sign(self.exponent), 0.0)
-        return tuple(ANSWERS[int(sign)] for sign in signs)
+        verdicts = {-1: BlockVerdict.STABLE, 0: BlockVerdict.UNDECIDED, 1: BlockVerdict.UNSTABLE}
+        return tuple(verdicts[int(sign)] for sign in signs)
 
     @property
     def intertwined(self) -> tuple[tuple[int, ...], ...]:
@@ -71,15 +79,20 @@ class ClusterExponents:
         return {
             "classes": list(self.state.classes),
             "blocks": [
-                {"clusters": list(block.clusters), "nodes": sorted({i for pair in block.pairs for i in pair}),
-                 "exponent": float(found), "stderr": float(error), "verdict": words}
-                for block, found, error, words in rows
+                {
+                    "clusters": list(block.clusters),
+                    "nodes": sorted({i for pair in block.pairs for i in pair}),
+                    "exponent": float(exponent),
+                    "stderr": float(error),
+                    "verdict": verdict.value,
+                }
+                for block, exponent, error, verdict in rows
             ],
             "motion": self.motion,
             "motion_stderr": self.motion_error,
             "merged": [list(pair) for pair in self.merged],
             "time": self.time,
-        }  # fmt: skip
+        }
 
 
 def cluster_exponents(

@@ -97,8 +97,8 @@ def exponents(
     transient: float = 300,
     starts: int = 4,
     rtol: float = 1e-6,
-    workers: int | None = None,
     seed: int = 0,
+    workers: int | None = None,
     show_progress: bool | None = False,
     **parameters: float,
 ) -> Exponents:

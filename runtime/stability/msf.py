@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -20,10 +21,20 @@ from ..prediction.synchronisability import Window, windows
 from ..support.arrays import row
 from .exponents import Exponents, exponents
 
-__all__ = ["MSF", "Plane", "classify", "msf", "plane"]
+__all__ = ["MSF", "Plane", "StabilityClass", "classify", "msf", "plane"]
 
 FINE = 1001
 """Strengths at which the function is known at least; ends of ranges are interpolated between them."""
+
+
+class StabilityClass(StrEnum):
+    """Class of a master stability function by its zeros on the grid of alpha."""
+
+    NEVER = "never stable"
+    EVERYWHERE = "stable everywhere"
+    HALF_LINE = "half-line"
+    BOUNDED = "bounded interval"
+    SEVERAL = "several intervals"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +74,7 @@ class MSF:
         return tuple((low, high) for (_, low), (_, high) in self.fine.ranges)
 
     @property
-    def kind(self) -> str:
+    def kind(self) -> StabilityClass:
         """The class of the function on its grid, in words (see `classify`)."""
         return classify(self.intervals, float(self.fine.alpha[-1]), float(self.fine.alpha[0]))
 
@@ -108,7 +119,7 @@ class MSF:
             "stderr": self.stderr.tolist(),
             "intervals": [list(interval) for interval in self.intervals],
             "uncertainties": [list(pair) for pair in self.uncertainties],
-            "class": self.kind,
+            "class": self.kind.value,
             "attractors": list(self.attractors),
             "time": self.fine.time,
             "starts": self.fine.starts,
@@ -148,7 +159,20 @@ class Plane:
         }
 
 
-def msf(scene: Scene, alpha: Sequence[float] | np.ndarray, **options: Any) -> MSF:
+def msf(
+    scene: Scene,
+    alpha: Sequence[float] | np.ndarray,
+    *,
+    precision: float = 1e-3,
+    periods: float = 5000,
+    transient: float = 300,
+    starts: int = 4,
+    rtol: float = 1e-6,
+    seed: int = 0,
+    workers: int | None = None,
+    show_progress: bool | None = False,
+    **parameters: float,
+) -> MSF:
     """Return the master stability function of a scene's oscillator and coupling on a line of real strengths.
 
     alpha = -sigma gamma; `alpha` must increase.  Options as for `exponents`.  Raises ValueError as `exponents` does, and
@@ -156,11 +180,36 @@ def msf(scene: Scene, alpha: Sequence[float] | np.ndarray, **options: Any) -> MS
     """
     line = row("alpha", alpha, 2, rising=True)
     fine = np.union1d(line, np.linspace(line[0], line[-1], FINE))
-    return MSF(scene, line, exponents(scene, fine, **options))
+    found = exponents(
+        scene,
+        fine,
+        precision=precision,
+        periods=periods,
+        transient=transient,
+        starts=starts,
+        rtol=rtol,
+        seed=seed,
+        workers=workers,
+        show_progress=show_progress,
+        **parameters,
+    )
+    return MSF(scene, line, found)
 
 
 def plane(
-    scene: Scene, alpha: Sequence[float] | np.ndarray, beta: Sequence[float] | np.ndarray, **options: Any
+    scene: Scene,
+    alpha: Sequence[float] | np.ndarray,
+    beta: Sequence[float] | np.ndarray,
+    *,
+    precision: float = 1e-3,
+    periods: float = 5000,
+    transient: float = 300,
+    starts: int = 4,
+    rtol: float = 1e-6,
+    seed: int = 0,
+    workers: int | None = None,
+    show_progress: bool | None = False,
+    **parameters: float,
 ) -> Plane:
     """Return the master stability function on the rectangle alpha + i beta = -sigma gamma; options as for `exponents`.
 
@@ -169,23 +218,35 @@ def plane(
     """
     across, up = row("alpha", alpha, 2, rising=True), row("beta", beta, 2, rising=True)
     heights, place = np.unique(np.abs(up), return_inverse=True)
-    found = exponents(scene, (across[:, None] + 1j * heights).reshape(-1), **options)
+    found = exponents(
+        scene,
+        (across[:, None] + 1j * heights).reshape(-1),
+        precision=precision,
+        periods=periods,
+        transient=transient,
+        starts=starts,
+        rtol=rtol,
+        seed=seed,
+        workers=workers,
+        show_progress=show_progress,
+        **parameters,
+    )
     table, error = (row.reshape(len(across), -1)[:, place] for row in (found.exponent, found.stderr))
     kinds = tuple(a.kind for a in found.attractors)
     return Plane(scene, across, up, table, error, kinds, found.time)
 
 
-def classify(intervals: Sequence[Interval], end: float, begin: float = 0.0) -> str:
+def classify(intervals: Sequence[Interval], end: float, begin: float = 0.0) -> StabilityClass:
     """The class of a function that is negative on `intervals` of the grid begin … end.
 
     "never stable" (no zero), "stable everywhere" on the grid, "half-line" (one zero, stable from there to the end of the
     grid), "bounded interval" (also one that begins with the grid), "several intervals".
     """
     if not intervals:
-        return "never stable"
+        return StabilityClass.NEVER
     if len(intervals) > 1:
-        return "several intervals"
+        return StabilityClass.SEVERAL
     low, high = intervals[0]
     if high < end:
-        return "bounded interval"
-    return "half-line" if low > begin else "stable everywhere"
+        return StabilityClass.BOUNDED
+    return StabilityClass.HALF_LINE if low > begin else StabilityClass.EVERYWHERE

@@ -65,7 +65,7 @@ def test_stable_pieces_are_lines_and_unstable_ones_dashed() -> None:
         axes = drawing.draw(drawing.layout(style.new_figure(drawing.size)), small())
     styles = {line.get_linestyle() for line in axes.lines}
     assert {"-", "--", "None"} <= styles
-    (mark,) = (line for line in axes.lines if line.get_marker() == skeleton.KINDS["period doubling"])
+    (mark,) = (line for line in axes.lines if line.get_marker() == skeleton.MARKERS["period doubling"])
     np.testing.assert_allclose(mark.get_xdata(), DOUBLING)
     (legend,) = axes.figure.legends
     assert [text.get_text() for text in legend.get_texts()] == [

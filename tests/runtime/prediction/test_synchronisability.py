@@ -286,7 +286,7 @@ def test_wrong_ranges_are_refused(ranges, errors, words: str) -> None:
 def test_complex_and_positive_eigenvalues_are_refused() -> None:
     one_way = Topology("one-way ring", 3, tuple((i, (i + 1) % 3, ONE) for i in range(3)))
     with pytest.raises(
-        ValueError, match=r"complex eigenvalue .* Use synchain\.runtime\.prediction\.one_way\.windows_complex"
+        ValueError, match=r"complex eigenvalue .* Use synchain\.runtime\.prediction\.synchronisability\.windows_complex"
     ):
         windows([(0.0, 1.0)], one_way)
     with pytest.raises(ValueError, match=r"positive eigenvalue 2, .* negate it"):
