@@ -1,7 +1,9 @@
-"""Whether a cluster state of a network is stable: exponents of the differences within its clusters, block by block.
+"""Stability of cluster states: transversal exponents of a network, block by block.
 
-One orbit of the quotient network carries a deviation for each block and one for the motion of the clusters themselves
-(Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014)).
+One orbit of the quotient network carries a deviation for each block and one for the motion of the
+clusters themselves.
+
+Source: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014).
 """
 
 from __future__ import annotations
@@ -39,12 +41,25 @@ class BlockVerdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ClusterExponents:
-    """Largest transversal exponent (blocks,) of each block of a cluster state, per unit of non-dimensional time, with its
-    standard error.
+    """Transversal exponents of a cluster state.
 
-    `motion` is the largest exponent of the clusters' own motion, with its error; `separation` (clusters, clusters) the
-    largest difference of two clusters' states seen at the ends of blocks: 0 where two have merged, so that the exponents
-    are those of a coarser state.  `time` is the length averaged over.
+    Parameters
+    ----------
+    state : Clusters
+        The cluster state with its blocks.
+    exponent : ndarray, shape (blocks,)
+        Largest exponent of each block per unit of non-dimensional time.
+    stderr : ndarray, shape (blocks,)
+        Standard errors of `exponent`.
+    motion : float
+        Largest exponent of the clusters' own motion.
+    motion_error : float
+        Standard error of `motion`.
+    separation : ndarray, shape (clusters, clusters)
+        Largest difference between the states of two clusters at the ends of blocks of time. It is 0
+        if the clusters have merged; then the exponents are those of a coarser state.
+    time : float
+        Time averaged over.
     """
 
     state: Clusters
@@ -57,24 +72,28 @@ class ClusterExponents:
 
     @property
     def verdicts(self) -> tuple[BlockVerdict, ...]:
-        """In words for each block: stable or unstable by more than two standard errors, else undecided."""
+        """Verdict on each block, decided if the exponent exceeds two standard errors."""
         signs = np.where(np.abs(self.exponent) > 2.0 * self.stderr, np.sign(self.exponent), 0.0)
         verdicts = {-1: BlockVerdict.STABLE, 0: BlockVerdict.UNDECIDED, 1: BlockVerdict.UNSTABLE}
         return tuple(verdicts[int(sign)] for sign in signs)
 
     @property
     def intertwined(self) -> tuple[tuple[int, ...], ...]:
-        """The clusters of each block: they lose their synchrony together."""
+        """The clusters of each block; they lose their synchrony together."""
         return tuple(block.clusters for block in self.state.blocks)
 
     @property
     def merged(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of clusters that were never seen more than 1e-9 apart: the motion is that of a coarser partition."""
+        """Pairs of clusters that never were more than 1e-9 apart, so that the motion is a coarser
+        partition's.
+        """
         first, second = np.nonzero(np.triu(self.separation < 1e-9, 1))
         return tuple((int(a), int(b)) for a, b in zip(first, second, strict=True))
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON-ready: classes, blocks (clusters, nodes, exponent, stderr, verdict), motion and its error, merged, time."""
+        """Return classes, blocks (clusters, nodes, exponent, stderr, verdict), motion, merged, time
+        for JSON.
+        """
         rows = zip(self.state.blocks, self.exponent, self.stderr, self.verdicts, strict=True)
         return {
             "classes": list(self.state.classes),
@@ -107,16 +126,42 @@ def cluster_exponents(
     show_progress: bool | None = False,
     **parameters: float,
 ) -> ClusterExponents:
-    """Return the transversal exponents of a cluster state of a scene's network at its coupling strength.
+    """Compute the transversal exponents of a cluster state of a scene's network.
 
-    `state` is a partition of the nodes, from `synchain.models.graphs.clusters` or as the cluster of each node; clusters start as
-    their first nodes do.  Times count periods of the drive, or 2 pi where there is none.  After `transient` the averages run
-    until every standard error is below `precision`, or for `periods`.  `rtol` is the tolerance of the integration, never
-    looser than what the friction law asks for; `seed` chooses the first deviations.
+    Parameters
+    ----------
+    scene : Scene
+        Network of at most eight clusters with its coupling strength.
+    state : Clusters or sequence of int
+        Partition of the nodes, from `synchain.models.graphs.clusters` or as the cluster of each
+        node. Each cluster starts from the state of its first node.
+    precision : float
+        Averaging stops if every standard error is below this value.
+    periods : float
+        Longest average, in periods of the drive, or in units of 2 pi if there is none.
+    transient : float
+        Transient before the average, in the same units.
+    rtol : float
+        Relative tolerance of the integration. The friction law may require a smaller one.
+    seed : int
+        Seed of the initial deviations.
+    show_progress : bool or None
+        Whether to show a progress bar; None shows it on terminals only.
+    **parameters : float
+        Parameters of the scene to set.
 
-    Raises ValueError for a partition that is not balanced or of another graph, for a coupling that is not linear in the
-    difference of states, more than eight clusters, and time dependence without a known period; FloatingPointError where
-    an integration fails.
+    Returns
+    -------
+    ClusterExponents
+
+    Raises
+    ------
+    ValueError
+        If the partition is not balanced or belongs to another graph, if the coupling is not linear
+        in the difference of states, if there are more than eight clusters, or if time enters
+        without a known period.
+    FloatingPointError
+        If the integration fails.
     """
     precision, periods, transient, seed = averaging(precision, periods, transient, seed)
     scene = single_cell(cluster_exponents, scene, rtol, parameters)
@@ -138,7 +183,7 @@ def cluster_exponents(
 
 
 def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
-    """The partition with its blocks, proved to belong to the scene's graph."""
+    """Compute the blocks of a partition and check that it belongs to the scene's graph."""
     classes = state.classes if isinstance(state, Clusters) else state
     found = clusters(scene.topology, classes)
     if isinstance(state, Clusters) and (found.quotient.links, found.blocks) != (state.quotient.links, state.blocks):
@@ -151,7 +196,9 @@ def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
 
 
 def _integrator(scene: Scene, found: Clusters, variation: Variation, seed: int) -> VariationalIntegrator:
-    """The quotient's orbit with one deviation along it and one in each block, which stay there."""
+    """Set up the quotient's orbit with one deviation along it and one in each block, which stay
+    there.
+    """
     firsts = [members[0] for members in found.members]
     state = np.array([[values[i] for values in scene.initial.values() for i in firsts]])
     numbers = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])
@@ -170,12 +217,12 @@ def _integrator(scene: Scene, found: Clusters, variation: Variation, seed: int) 
 
 
 def _deviating(variation: Variation) -> int:
-    """Components of an oscillator that deviate: all but the mode of a contact."""
+    """Number of components of an oscillator that deviate: all but the slip state of a contact."""
     return len(variation.orbit.node.state) if variation.events is None else 2
 
 
 def _parts(found: Clusters, components: int) -> Iterator[slice]:
-    """Where the clusters' motion and each block stand among the coordinates of the variational equation."""
+    """Yield the slices of the clusters' motion and of each block in the variational equation."""
     first, last = 0, found.quotient.n * components
     yield slice(first, last)
     for block in found.blocks:
@@ -184,6 +231,6 @@ def _parts(found: Clusters, components: int) -> Iterator[slice]:
 
 
 def _differences(state: np.ndarray, count: int, components: int) -> np.ndarray:
-    """Largest difference between the first components of every two of `count` clusters."""
+    """Largest difference between the components of every two of `count` clusters."""
     rows = state.reshape(-1, count)[:components]
     return np.asarray(np.abs(rows[:, :, None] - rows[:, None, :]).max(axis=0))

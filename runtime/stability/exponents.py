@@ -1,12 +1,13 @@
 """Transversal Lyapunov exponents of the synchronous state: the master stability function.
 
-One orbit carries the modes of all strengths alpha + i beta = -sigma gamma at once (`synchain.codegen.kernels.modes`), the
-propagators of most of them interpolated in the strength (`synchain.runtime.stability.interpolation`).  On a fixed point or a periodic
-orbit locked to the drive the exponents follow from eigenvalues, elsewhere from the mean growth of a deviation, with an
-error from batch means.
+One orbit carries the modes of all strengths alpha + i beta = -sigma gamma at once
+(`synchain.codegen.kernels.modes`). The propagators of most modes are interpolated in the strength
+(`synchain.runtime.stability.interpolation`). On a fixed point or a periodic orbit locked to the
+drive the exponents follow from eigenvalues. Elsewhere they are the mean growth of a deviation, with
+an error from batch means.
 
-Sources: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15, 9
-(1980); batch means: Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989).
+Sources: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); Benettin, Galgani, Giorgilli &
+Strelcyn, Meccanica 15, 9 (1980); batch means: Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989).
 """
 
 from __future__ import annotations
@@ -37,12 +38,27 @@ __all__ = ["Exponents", "coupled_cell", "exponents", "group_by_attractor", "init
 
 @dataclass(frozen=True, slots=True)
 class Exponents:
-    """Largest exponent (m,) per unit of non-dimensional time at each strength (m,), real or complex, with its standard
-    error.
+    """Largest transversal exponent at each strength.
 
-    The mean is over the starts that reached the attractor found most often; by_start (starts, m) and attractors (starts,)
-    hold all of them.  On fixed points and drive-locked periodic orbits the error is the difference of two cycles;
-    elsewhere it comes from the scatter of batch means.  `time` is the length averaged over for each start.
+    The mean is over the starts that reached the attractor found most often.
+
+    Parameters
+    ----------
+    alpha : ndarray, shape (m,)
+        Strengths, real or complex.
+    exponent : ndarray, shape (m,)
+        Exponents per unit of non-dimensional time.
+    stderr : ndarray, shape (m,)
+        Standard errors. On fixed points and drive-locked periodic orbits, the difference of two
+        cycles; elsewhere from the scatter of batch means.
+    time : float
+        Time averaged over for each start.
+    starts : int
+        Number of starts.
+    by_start : ndarray, shape (starts, m)
+        Exponents of each start.
+    attractors : tuple of Attractor
+        Motion of each start.
     """
 
     alpha: np.ndarray
@@ -60,18 +76,27 @@ class Exponents:
 
     @property
     def groups(self) -> list[list[int]]:
-        """The starts that reached the same attractor, by their numbers."""
+        """Indices of the starts, grouped by attractor."""
         return group_by_attractor(self.attractors, self.by_start)
 
     @property
     def intervals(self) -> tuple[Interval, ...]:
-        """Where the exponent is negative (real strengths); ends between grid points by linear interpolation."""
+        """Intervals of real strengths with a negative exponent, interpolated linearly between grid
+        points.
+        """
         return tuple((low, high) for (low, _), (high, _) in self.ranges)
 
     @property
     def ranges(self) -> tuple[tuple[Interval, Interval], ...]:
-        """The intervals as ((low, its uncertainty), (high, its uncertainty)): standard error over the slope, 0 at grid
-        ends."""
+        """The intervals as ((low, its uncertainty), (high, its uncertainty)).
+
+        The uncertainty is the standard error over the slope, and 0 at the ends of the grid.
+
+        Raises
+        ------
+        ValueError
+            If the strengths are complex.
+        """
         x, y, error = self.alpha, self.exponent, self.stderr
         if np.iscomplexobj(x):
             raise ValueError("strengths are complex; ranges need real ones")
@@ -102,15 +127,45 @@ def exponents(
     show_progress: bool | None = False,
     **parameters: float,
 ) -> Exponents:
-    """Return the largest transversal exponent of a scene's oscillator and coupling for each strength, real or complex.
+    """Compute the largest transversal exponent of an oscillator and coupling at each strength.
 
-    Times count periods of the drive, or 2 pi where there is none.  After `transient` the averages run until the standard
-    error of every exponent is below `precision`, or for `periods`.  The `starts` initial states are that of the scene's
-    first oscillator and copies moved at random by up to 0.4 in the first component.  `rtol` is the tolerance of the
-    integration, never looser than what the friction law asks for.
+    Parameters
+    ----------
+    scene : Scene
+        Source of the oscillator and the coupling; a lone oscillator gets a partner.
+    alpha : array_like, shape (m,)
+        Strengths alpha + i beta = -sigma gamma, real or complex.
+    precision : float
+        Averaging stops if the standard error of every exponent is below this value.
+    periods : float
+        Longest average, in periods of the drive, or in units of 2 pi if there is none.
+    transient : float
+        Transient before the average, in the same units.
+    starts : int
+        Number of initial states: that of the scene's first oscillator, and copies displaced at
+        random by up to 0.4 in the first component.
+    rtol : float
+        Relative tolerance of the integration. The friction law may require a smaller one.
+    seed : int
+        Seed of the displacements.
+    workers : int, optional
+        Number of threads; all cores by default.
+    show_progress : bool or None
+        Whether to show a progress bar; None shows it on terminals only.
+    **parameters : float
+        Parameters of the scene to set.
 
-    Raises ValueError for a network without coupling or a coupling without synchronous state, and for time dependence
-    without a known period; FloatingPointError where an integration fails.
+    Returns
+    -------
+    Exponents
+
+    Raises
+    ------
+    ValueError
+        If the network has no coupling, if the coupling has no synchronous state, or if time enters
+        without a known period.
+    FloatingPointError
+        If an integration fails.
     """
     scene, strengths = coupled_cell(exponents, scene, rtol, parameters), row_of("alpha", alpha, complex_too=True)
     precision, periods, transient, seed = averaging(precision, periods, transient, seed)
@@ -126,8 +181,7 @@ def exponents(
 def _by_start(
     orbits: Orbits, attractors: Sequence[Attractor], precision: float, periods: float, show_progress: bool | None
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Exponents and errors (starts, m): by eigenvalues where the motion has them, else by averages; the time they
-    took."""
+    """Exponents and errors (starts, m) from eigenvalues or averages, and the time averaged over."""
     found = np.empty((len(attractors), len(orbits.strengths)))
     error = np.empty_like(found)
     rest = [row for row, attractor in enumerate(attractors) if attractor.propagators is None]
@@ -141,23 +195,66 @@ def _by_start(
 
 
 def coupled_cell(function: Callable[..., Any], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
-    """The scene with fixed parameters and without records; a lone oscillator gets a partner, so that it has a
-    coupling."""
+    """Return a single cell whose network has a coupling: a lone oscillator gets a partner.
+
+    Parameters
+    ----------
+    function : callable
+        Public function that took the parameters; error messages name it.
+    scene : Scene
+        Scene to change.
+    rtol : float
+        Relative tolerance.
+    parameters : dict of str to float
+        Parameters to set.
+    """
     graph = scene.topology if a_scene(scene).topology.links else topology("chain", 2)
     coupled = scene.replace(topology=graph, axes=(), zipped=False, continuation="none")
     return single_cell(function, coupled, rtol, parameters)
 
 
 def single_cell(function: Callable[..., Any], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
-    """A single cell of the scene without records, with parameters that `function` was given; TypeError where it is no
-    Scene."""
+    """Return a scene without axes and records, with the parameters passed to a public function.
+
+    Parameters
+    ----------
+    function : callable
+        Public function that took the parameters; error messages name it.
+    scene : Scene
+        Scene to change.
+    rtol : float
+        Relative tolerance.
+    parameters : dict of str to float
+        Parameters to set.
+
+    Raises
+    ------
+    TypeError
+        If `scene` is no Scene.
+    ValueError
+        If a parameter is unknown.
+    """
     return with_parameters(
         function, scene, parameters, axes=(), zipped=False, continuation="none", record=(), rtol=rtol, atol=None
     )
 
 
 def initial_states(scene: Scene, starts: int, seed: int) -> np.ndarray:
-    """Initial states (starts, components): the first oscillator's, and copies moved in the first component."""
+    """Return initial states near that of the first oscillator.
+
+    Parameters
+    ----------
+    scene : Scene
+        Source of the first state.
+    starts : int
+        Number of states.
+    seed : int
+        Seed of the displacements of up to 0.4 in the first component.
+
+    Returns
+    -------
+    ndarray, shape (starts, components)
+    """
     starts = whole("starts", starts, 1)
     state = np.tile([values[0] for values in scene.initial.values()], (starts, 1))
     state[1:, 0] += np.random.default_rng(seed).uniform(-0.4, 0.4, starts - 1)
@@ -165,7 +262,23 @@ def initial_states(scene: Scene, starts: int, seed: int) -> np.ndarray:
 
 
 def group_by_attractor(attractors: Sequence[Attractor], by_start: np.ndarray) -> list[list[int]]:
-    """The starts by attractor: of one kind and, where eigenvalues give the exponents, with the same exponents."""
+    """Group the starts by attractor.
+
+    Two attractors are the same if they are of one kind and, for exponents from eigenvalues, if
+    their exponents agree.
+
+    Parameters
+    ----------
+    attractors : sequence of Attractor
+        Motion of each start.
+    by_start : ndarray, shape (starts, m)
+        Exponents of each start.
+
+    Returns
+    -------
+    list of list of int
+        Indices of the starts on each attractor.
+    """
     found: list[list[int]] = []
     for row, attractor in enumerate(attractors):
         for others in found:

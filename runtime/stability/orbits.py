@@ -1,4 +1,4 @@
-"""Synchronous orbits with all their modes: settled on an attractor, then advanced block by block."""
+"""Synchronous orbits with all their modes, settled on an attractor, then advanced block by block."""
 
 from __future__ import annotations
 
@@ -21,19 +21,43 @@ from .variational_integrator import VariationalIntegrator
 __all__ = ["Orbits", "unit_of_time"]
 
 NODES, PARTS = (14, 20, 28, 40, 60), (1, 2, 4, 8, 16)
-"""Nodes of a panel of strengths, and panels a side, that are tried."""
+"""Nodes of a panel of strengths, and panels on each side, that are tried."""
 
 LOOSENESS = 10.0
-"""Times the tolerance that modes are allowed where their growth is averaged: it moves exponents by less than rtol."""
+"""Ratio of the tolerance of the modes to that of the orbit if their growth is averaged.
+
+It moves exponents by less than rtol.
+"""
 
 
 @dataclass(slots=True)
 class Orbits:
-    """Orbits from several starts and the modes of `strengths` (m,) along them.
+    """Orbits from several starts with the modes of all strengths along them.
 
-    strengths: those of the variational equation, alpha + i beta unless links have inertia; state (starts, components);
-    unit: the period of the drive, or 2 pi; block: how many of them are advanced at once;
-    deviations (starts, m, components), at unit length.
+    Parameters
+    ----------
+    scene : Scene
+        Oscillator, coupling and numerical settings.
+    variation : Variation
+        Variational equation of a mode.
+    strengths : ndarray, shape (m,)
+        Strengths in the variational equation: alpha + i beta unless links have inertia.
+    state : ndarray, shape (starts, components)
+        Current states.
+    workers : int or None
+        Number of threads.
+    unit : float
+        Period of the drive, or 2 pi if there is none, in units of non-dimensional time.
+    block : float
+        Number of units of one call of `advance`.
+    interpolation : Interpolation, optional
+        Interpolation in the strength, set by `prepare`.
+    integrator : VariationalIntegrator, optional
+        Integrator of the nodes of the interpolation, set by `prepare`.
+    deviations : ndarray, shape (starts, m, components), optional
+        Deviations at unit length.
+    interpolation_error : float
+        Largest error of the interpolation so far.
     """
 
     scene: Scene
@@ -50,9 +74,24 @@ class Orbits:
 
     @classmethod
     def make(cls, scene: Scene, strengths: np.ndarray, state: np.ndarray, workers: int | None) -> Orbits:
-        """Orbits at the start of their transient, `strengths` alpha + i beta of their modes.
+        """Set up orbits at the start of their transient.
 
-        Raises ValueError where time enters without a known period, and for a strength at which a mode has no mass.
+        Parameters
+        ----------
+        scene : Scene
+            Scene with coupling.
+        strengths : ndarray, shape (m,)
+            Strengths alpha + i beta of the modes.
+        state : ndarray, shape (starts, components)
+            Initial states.
+        workers : int or None
+            Number of threads.
+
+        Raises
+        ------
+        ValueError
+            If time enters without a known period, or if a mode has no positive mass at its
+            strength.
         """
         variation = _variation(scene.equations, bool(np.iscomplexobj(strengths)))
         unit = unit_of_time(scene)
@@ -66,11 +105,19 @@ class Orbits:
         return self.variation.size // len(self.variation.parameters)
 
     def part(self, rows: list[int]) -> Orbits:
-        """The orbits of some starts."""
+        """Return the orbits of some starts."""
         return Orbits(self.scene, self.variation, self.strengths, self.state[rows], self.workers, self.unit)
 
     def integrator_of(self, strengths: np.ndarray, looseness: float = 1.0) -> VariationalIntegrator:
-        """A integrator of these strengths along the orbits from where they are, one deviation for each component."""
+        """Return an integrator along the orbits from their current states.
+
+        Parameters
+        ----------
+        strengths : ndarray, shape (k,)
+            Strengths; each has one deviation for each component.
+        looseness : float
+            Ratio of the tolerance of the deviations to that of the orbit.
+        """
         repeated = np.repeat(strengths, self.components)
         rows = np.stack([repeated.real, repeated.imag]) if np.iscomplexobj(self.strengths) else repeated[None]
         names = self.variation.orbit.parameters
@@ -80,14 +127,16 @@ class Orbits:
         )
 
     def settle(self, periods: float) -> None:
-        """Run through a transient."""
+        """Advance all orbits over a transient of a number of units."""
         integrator = self.integrator_of(self.strengths[:1])
         for length in _stretches(round(periods)):
             integrator.advance(length * self.unit)
         self.state = integrator.state
 
     def prepare(self) -> None:
-        """Choose the block and the panels of strengths, tried on the next block of the orbits, and start the deviations."""
+        """Choose the block and the interpolation by trial on the next blocks, and start the
+        deviations.
+        """
         limit = max(0.1 * self.scene.rtol, 1e-12)
         for block, nodes, parts in _choices(self.scene.forced):
             self.block, self.interpolation = block, strength_interpolation(self.strengths, nodes, parts)
@@ -101,7 +150,18 @@ class Orbits:
         self.deviations = start / math.sqrt(self.components)
 
     def propagators(self) -> np.ndarray:
-        """Advance by one block; returns the propagators (starts, nodes, components, components)."""
+        """Advance by one block.
+
+        Returns
+        -------
+        ndarray, shape (starts, nodes, components, components)
+            Propagators of the nodes over the block.
+
+        Raises
+        ------
+        RuntimeError
+            If the orbits are not prepared.
+        """
         integrator, p = self.integrator, self.components
         if integrator is None:
             raise RuntimeError("orbits are not prepared")
@@ -117,7 +177,18 @@ class Orbits:
         return np.asarray(found.reshape(len(self.state), p, -1, p).transpose(0, 2, 1, 3))
 
     def advance(self) -> np.ndarray:
-        """Advance orbits and deviations by one block; returns the logarithm of their growth (starts, m)."""
+        """Advance orbits and deviations by one block.
+
+        Returns
+        -------
+        ndarray, shape (starts, m)
+            Logarithm of the growth of each deviation.
+
+        Raises
+        ------
+        RuntimeError
+            If the orbits are not prepared.
+        """
         if self.interpolation is None or self.deviations is None:
             raise RuntimeError("orbits are not prepared")
         nodes = self.propagators()
@@ -131,7 +202,10 @@ class Orbits:
 
 
 def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:
-    """The strengths tau = alpha/(1 + b alpha) of modes whose links have inertia (`synchain.models.dynamics.mode_inertia`)."""
+    """Strengths tau = alpha/(1 + b alpha) of modes whose links have inertia.
+
+    See `synchain.models.dynamics.mode_inertia`.
+    """
     _, share = inertia_of_modes(scene.equations)
     if share == 0:
         return alpha
@@ -145,12 +219,20 @@ def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _variation(equations: Equations, plane: bool) -> Variation:
-    """The variational equation of a mode: Newton's method on an orbit asks for it at every step."""
+    """Variational equation of a mode, cached because Newton's method on an orbit needs it at every
+    step.
+    """
     return mode(equations, plane=plane)
 
 
 def unit_of_time(scene: Scene) -> float:
-    """The period of the drive, or 2 pi if there is none; ValueError if time enters without a known period."""
+    """Return the period of the drive, or 2 pi if there is none, in units of non-dimensional time.
+
+    Raises
+    ------
+    ValueError
+        If time enters the equations without a known period.
+    """
     drive = scene.drive
     if scene.forced and drive.frequency is None:
         raise ValueError(
@@ -161,13 +243,16 @@ def unit_of_time(scene: Scene) -> float:
 
 
 def _choices(forced: bool) -> list[tuple[float, int, int]]:
-    """Blocks, nodes of a panel and panels a side, the cheapest first; each block costs as much as some nodes by itself."""
+    """Blocks, nodes of a panel and panels on each side, the cheapest first.
+
+    Each block costs as much as twenty nodes by itself.
+    """
     blocks = (4.0, 2.0, 1.0) if forced else (1.0, 0.5, 0.25, 0.125)
     made = [(block, nodes, parts) for block in blocks for nodes in NODES for parts in PARTS]
     return sorted(made, key=lambda choice: (20.0 + choice[1] * choice[2]) / choice[0])
 
 
 def _stretches(periods: int) -> list[int]:
-    """A number of periods in pieces, so that Ctrl-C is heard."""
+    """Split a number of periods into pieces, so that Ctrl-C is noticed."""
     whole, rest = divmod(max(periods, 0), 100)
     return [100] * whole + ([rest] if rest else [])
