@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from .results.open import open_result
     from .results.result import Result
     from .stability.clusters import ClusterExponents, cluster_exponents
+    from .stability.exponents import Exponents, exponents
     from .stability.lyapunov import Lyapunov, lyapunov_spectrum
     from .stability.msf import MSF, Plane, msf, plane
-    from .stability.transversal import Exponents, exponents
     from .support.status import Status
     from .sweeps.progress import Progress
     from .sweeps.run import run
@@ -36,7 +36,7 @@ _HOME = {
     "Basin": "synchronisation.basin",
     "Branch": "bifurcation.branches",
     "ClusterExponents": "stability.clusters",
-    "Exponents": "stability.transversal",
+    "Exponents": "stability.exponents",
     "Lyapunov": "stability.lyapunov",
     "MSF": "stability.msf",
     "PeriodicOrbit": "bifurcation.periodic",
@@ -51,7 +51,7 @@ _HOME = {
     "Thresholds": "synchronisation.threshold",
     "basin": "synchronisation.basin",
     "cluster_exponents": "stability.clusters",
-    "exponents": "stability.transversal",
+    "exponents": "stability.exponents",
     "follow": "bifurcation.branches",
     "kernel": "sweeps.run",
     "lyapunov_spectrum": "stability.lyapunov",

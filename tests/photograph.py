@@ -44,9 +44,9 @@ from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
 from synchain.runtime.results.open import open_result
 from synchain.runtime.stability.clusters import cluster_exponents
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum
 from synchain.runtime.stability.msf import msf, plane
-from synchain.runtime.stability.transversal import exponents
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import stream
 from synchain.runtime.synchronisation.basin import basin
@@ -607,7 +607,7 @@ def orbit_of(found: Any) -> Quantities:
     """A periodic orbit."""
     return {
         **_seen(found, "periods", "state", "multipliers", "residual", "steps", "points", "least"),
-        "transversal": found.transversal(0.3),
+        "transversal": found.transversal_multipliers(0.3),
         "stable": str(found.stable),
         "phases": "none" if found.phases is None else found.phases.words,
     }
@@ -620,7 +620,7 @@ def _() -> Quantities:
     return orbit_of(found) | {
         "branch": np.array([orbit.state for orbit in branch.orbits]),
         "branch multipliers": np.array([orbit.multipliers for orbit in branch.orbits]),
-        "bifurcations": repr([words for _, words in branch.bifurcations]),
+        "bifurcations": repr([str(each.kind) for each in branch.bifurcations]),
     }
 
 

@@ -18,7 +18,7 @@ from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.mechanics.link import edge
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.certify import certify
 
 GRAPH = from_matrix([[-3, 1, 2], [1, -2, 1], [2, 1, -3]])

@@ -11,7 +11,7 @@ from synchain.models.dynamics.reduction import fold
 from synchain.models.graphs.families import topology
 from synchain.models.mechanics.stick_slip import SLIP, set_valued
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.run import run
 
 X, V, W = (sp.Symbol(name, real=True) for name in ("x", "v", "w"))

@@ -19,7 +19,7 @@ from synchain.models.scenes.energy import energy
 from synchain.models.scenes.scene import Scene
 from synchain.models.scenes.section import Section
 from synchain.models.scenes.start import default_start
-from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.run import run
 
 X, Y, Z, V = sp.symbols("x y z v", real=True)

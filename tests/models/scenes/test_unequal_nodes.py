@@ -21,7 +21,7 @@ from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.reduce import decide
 from synchain.runtime.results.open import open_result
-from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.certify import certify
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.synchronisation.probe import ring_of_three

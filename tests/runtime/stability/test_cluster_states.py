@@ -17,7 +17,7 @@ from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.mechanics.components import Edge
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.clusters import ClusterExponents, cluster_exponents
-from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.run import run
 
 pytestmark = pytest.mark.long

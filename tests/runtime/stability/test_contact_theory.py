@@ -15,8 +15,8 @@ from synchain.models.graphs.families import topology
 from synchain.models.inputs.plugins import allow_code
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.results.result import Result
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.stability.orbits import Orbits
-from synchain.runtime.stability.transversal import exponents
 from synchain.runtime.sweeps.run import run
 
 ONE = topology("chain", 1)
@@ -242,7 +242,7 @@ def test_propagator_against_differences_of_the_flow(
     scene = scene.replace(record=(), samples=0)
     pair = scene.replace(topology=topology("chain", 2), initial={"x": [x, x], "v": [v, v]})
     orbits = Orbits.make(pair, np.array([0.0]), np.array([[x, v, 0.0]]), 1)
-    orbits.block, orbits.carrier = 1.0, orbits.carry(orbits.strengths)
+    orbits.block, orbits.integrator = 1.0, orbits.integrator_of(orbits.strengths)
     found = orbits.propagators()[0, 0]
     d = 1e-6
     by_x, by_v = (flow(scene, x + p, v + q) - flow(scene, x - p, v - q) for p, q in ((d, 0.0), (0.0, d)))

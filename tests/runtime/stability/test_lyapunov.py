@@ -12,8 +12,8 @@ from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import Node
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.stability.lyapunov import Lyapunov, Walk, lyapunov_spectrum
-from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.stability.exponents import exponents
+from synchain.runtime.stability.lyapunov import Lyapunov, TangentFrame, lyapunov_spectrum
 from synchain.runtime.sweeps.run import run
 
 pytestmark = pytest.mark.long
@@ -79,10 +79,10 @@ def test_blocks_of_a_part_of_a_period_see_the_drive_at_its_phase() -> None:
     """The same orbit in one block a period and in eight: end and divergence agree, and the growth of all directions."""
     made = []
     for parts in (1, 8):
-        walk = Walk.make(lone("duffing", u=4.0), 2, seed=0)
-        walk.parts = parts
-        growth = [walk.advance() for _ in range(5 * parts)]
-        made.append((walk.carrier.state[0], sum(g[0].sum() for g in growth), sum(g[2] for g in growth)))
+        frame = TangentFrame.make(lone("duffing", u=4.0), 2, seed=0)
+        frame.parts = parts
+        growth = [frame.advance() for _ in range(5 * parts)]
+        made.append((frame.integrator.state[0], sum(g[0].sum() for g in growth), sum(g[2] for g in growth)))
     for whole_block, eighths in zip(*made, strict=True):
         np.testing.assert_allclose(eighths, whole_block, atol=1e-6)
 

@@ -1,0 +1,211 @@
+"""Integration of orbits together with deviations, one stretch of time after the other.
+
+The arrays here surround the kernels of `synchain.codegen.kernels.modes`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from synchain.codegen.kernels.compile import Kernel, load
+from synchain.codegen.kernels.modes import emit_modes
+from synchain.models.dynamics.variational import Variation
+from synchain.models.scenes.scene import Scene
+
+from ..cells.initial_modes import local_clock
+from ..cells.plan import CANCEL, control_array, half_swing, periods, tolerances
+from ..support.status import Status
+from ..support.threads import worker_count
+
+__all__ = ["VariationalIntegrator"]
+
+
+@dataclass(slots=True)
+class VariationalIntegrator:
+    """Orbits with several deviations each, which differ in their strengths.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        Compiled variational equation.
+    state : ndarray, shape (cells, dimension)
+        States of the orbits.
+    numbers : ndarray, shape (cells, parameters)
+        Values of the parameters.
+    period : ndarray, shape (cells,)
+        Time after which the clock restarts; 0 if it does not.
+    control : ndarray
+        Tolerances, limits and the cancel flag for the kernel.
+    strengths : ndarray, shape (number of strengths, padded modes)
+        Strengths sorted by size, padded to a multiple of the lanes.
+    order : ndarray, shape (modes,)
+        Position of each mode of the caller in `strengths`.
+    vectors : ndarray, shape (cells, size, padded modes)
+        Deviations.
+    workers : int
+        Number of threads.
+    steps : int
+        Steps taken so far.
+    """
+
+    kernel: Kernel
+    state: np.ndarray
+    numbers: np.ndarray
+    period: np.ndarray
+    control: np.ndarray
+    strengths: np.ndarray
+    order: np.ndarray
+    vectors: np.ndarray
+    workers: int
+    steps: int = 0
+
+    @classmethod
+    def make(
+        cls,
+        scene: Scene,
+        variation: Variation,
+        state: np.ndarray,
+        numbers: np.ndarray,
+        strengths: np.ndarray,
+        workers: int | None = None,
+        looseness: float = 1.0,
+    ) -> VariationalIntegrator:
+        """Prepare the kernel and the arrays; tolerances and the step budget are those of the scene.
+
+        Parameters
+        ----------
+        scene : Scene
+            Source of the tolerances and the largest number of steps.
+        variation : Variation
+            Orbit with its variational equation.
+        state : ndarray, shape (cells, dimension)
+            Initial states.
+        numbers : ndarray, shape (cells, parameters)
+            Values of the parameters of `variation`.
+        strengths : ndarray, shape (number of strengths, modes)
+            Strengths of the modes in any order. All deviations start along (1, 1, …).
+        workers : int, optional
+            Number of threads; all cores by default.
+        looseness : float
+            Ratio of the tolerance of the deviations to that of the orbit.
+        """
+        kernel = _kernel(variation)
+        width, count = kernel.origin.width, strengths.shape[1]
+        order = np.argsort(np.hypot.reduce(strengths, axis=0) if len(strengths) else np.zeros(count), kind="stable")
+        padded = -(-count // width) * width
+        chosen = np.concatenate([order, np.full(padded - count, order[-1])])
+        where = np.empty(count, dtype=np.int64)
+        where[order] = np.arange(count)
+        rtol, atol = tolerances(scene, numbers)
+        repeat = periods(kernel.equations, numbers)
+        longest = half_swing(kernel.equations, dict(zip(kernel.equations.parameters, numbers.T, strict=True)))
+        control = np.append(control_array(rtol, atol, longest, scene.max_steps, jumps=False), looseness)
+        vectors = np.full((len(state), variation.size, padded), 1.0 / math.sqrt(variation.size))
+        kept = np.ascontiguousarray(strengths[:, chosen], dtype=float)
+        kept = kept if len(kept) else np.zeros((1, padded))
+        return cls(
+            kernel=kernel,
+            state=np.ascontiguousarray(state, dtype=float).copy(),
+            numbers=np.ascontiguousarray(numbers, dtype=float),
+            period=local_clock(kernel.equations, repeat),
+            control=control,
+            strengths=kept,
+            order=where,
+            vectors=vectors,
+            workers=worker_count(workers),
+        )
+
+    @property
+    def deviations(self) -> np.ndarray:
+        """The deviations at unit length in the caller's order, shape (cells, size, modes)."""
+        return self.vectors[:, :, self.order]
+
+    def set_deviations(self, vectors: np.ndarray) -> None:
+        """Set the deviations.
+
+        Parameters
+        ----------
+        vectors : ndarray, shape (cells, size, modes)
+            Deviations in the caller's order; lengths other than 1 are kept.
+        """
+        self.vectors[:, :, self.order] = vectors
+        spare = self.vectors.shape[2] - len(self.order)
+        if spare:
+            self.vectors[:, :, -spare:] = self.vectors[:, :, -spare - 1 : -spare]
+
+    def advance(self, length: float | np.ndarray) -> np.ndarray:
+        """Integrate over a length of time.
+
+        Parameters
+        ----------
+        length : float or ndarray, shape (cells,)
+            Length in units of non-dimensional time, one for all cells or one each. If the equations
+            are periodic in time, it must be a whole number of periods: each stretch begins at phase
+            0.
+
+        Returns
+        -------
+        ndarray, shape (cells, modes)
+            Logarithm of the growth of each deviation; -inf for one that has become zero. The
+            deviations have unit length afterwards.
+
+        Raises
+        ------
+        FloatingPointError
+            If an orbit cannot be integrated.
+        KeyboardInterrupt
+            On Ctrl-C.
+        """
+        cells, dimension = self.state.shape
+        spans = np.zeros((cells, 4))
+        spans[:, 1], spans[:, 2] = length, self.period
+        growth = np.empty((cells, self.strengths.shape[1]))
+        end, sums, counts = np.empty((cells, dimension)), np.empty((cells, 4)), np.zeros((cells, 6), dtype=np.int64)
+        rest = (
+            self.state,
+            self.numbers,
+            spans,
+            self.control,
+            self.strengths,
+            self.vectors,
+            growth,
+            end,
+            sums,
+            counts,
+            np.empty((cells, 0, dimension)),
+        )
+        cuts = np.linspace(0, cells, min(cells, self.workers) + 1).astype(int)
+        if len(cuts) == 2:
+            self.kernel.entry(0, cells, *rest)
+        else:
+            self._share(cuts, rest)
+        bad = np.flatnonzero(counts[:, 0] != Status.FINISHED)
+        if len(bad):
+            status = Status(int(counts[bad[0], 0]))
+            raise FloatingPointError(f"the orbit with its deviations cannot be integrated: {status.message}")
+        self.state = end
+        self.steps += int(counts[:, 1:3].sum())
+        return growth[:, self.order]
+
+    def _share(self, cuts: np.ndarray, rest: tuple[np.ndarray, ...]) -> None:
+        """Run parts of the cells on threads; Ctrl-C stops them at once."""
+        with ThreadPoolExecutor(self.workers) as pool:
+            jobs = [pool.submit(self.kernel.entry, a, b, *rest) for a, b in itertools.pairwise(cuts)]
+            try:
+                for job in jobs:
+                    job.result()
+            except KeyboardInterrupt:
+                self.control[CANCEL] = 1.0
+                raise
+
+
+@lru_cache(maxsize=64)
+def _kernel(variation: Variation) -> Kernel:
+    """Compiled kernel of a variational equation."""
+    return load(emit_modes(variation))
