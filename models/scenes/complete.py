@@ -27,7 +27,7 @@ RECORDS = ("sync_error", "section", "trajectory")
 
 TIME_UNITS = ("period", "time")
 
-METHODS = Path(__file__).parents[1] / "codegen" / "integrators"
+METHODS = Path(__file__).parents[2] / "codegen" / "integrators"
 """The folder of the integrators, one file each; it is listed here, and read by the code generator alone."""
 
 TIME_LIMIT, STEP_LIMIT, SAMPLE_LIMIT = 1e9, 10**12, 10**8
