@@ -18,6 +18,7 @@ import sympy as sp
 from flint import acb, arb, fmpq, fmpz_poly
 
 from .balls import precision
+from .rationals import to_flint, to_fraction
 from .real_roots import Disc, discs, dyadic, sharpened, sign
 
 __all__ = ["ComplexRoot", "RealRoot", "coefficient_text", "complex_order", "roots"]
@@ -46,7 +47,7 @@ class RealRoot:
 
     def __post_init__(self) -> None:
         f = fmpz_poly(list(self.polynomial))
-        if not self.low < self.high or sign(f, _exact(self.low)) * sign(f, _exact(self.high)) >= 0:
+        if not self.low < self.high or sign(f, to_flint(self.low)) * sign(f, to_flint(self.high)) >= 0:
             raise ValueError(
                 f"{self.text}: no sign change from {_short(self.low)} to {_short(self.high)}; expected a bracket of one root"
             )
@@ -133,8 +134,8 @@ def _expression(polynomial: Polynomial, index: int) -> sp.Expr:
 
 @lru_cache(maxsize=4096)
 def _sharpened(root: ComplexRoot, bits: int) -> acb:
-    disc = Disc(_exact(root.near[0]), _exact(root.near[1]), fmpq(0))
-    return sharpened(fmpz_poly(list(root.polynomial)), disc, _exact(root.room), bits)
+    disc = Disc(to_flint(root.near[0]), to_flint(root.near[1]), fmpq(0))
+    return sharpened(fmpz_poly(list(root.polynomial)), disc, to_flint(root.room), bits)
 
 
 def _by_arb(f: fmpz_poly) -> list[Disc]:
@@ -159,12 +160,12 @@ def roots(polynomial: Polynomial) -> tuple[RealRoot | ComplexRoot, ...]:
     reals = [disc for disc in isolated if disc.y == 0]
     upper = [disc for disc in isolated if disc.y > 0]
     found: list[RealRoot | ComplexRoot] = [
-        RealRoot(polynomial, i, _fraction(d.x - d.radius), _fraction(d.x + d.radius)) for i, d in enumerate(reals)
+        RealRoot(polynomial, i, to_fraction(d.x - d.radius), to_fraction(d.x + d.radius)) for i, d in enumerate(reals)
     ]
     with precision(256):
         balls = [disc.ball for disc in upper]
     for place, k in enumerate(complex_order(polynomial, balls)):
-        x, y, room = (_fraction(part) for part in (upper[k].x, upper[k].y, _room(upper[k], isolated)))
+        x, y, room = (to_fraction(part) for part in (upper[k].x, upper[k].y, _room(upper[k], isolated)))
         found.append(ComplexRoot(polynomial, len(reals) + 2 * place, (x, -y), room))
         found.append(ComplexRoot(polynomial, len(reals) + 2 * place + 1, (x, y), room))
     return tuple(found)
@@ -179,7 +180,7 @@ def _room(disc: Disc, others: list[Disc]) -> fmpq:
 @lru_cache(maxsize=4096)
 def _refined(root: RealRoot, bits: int) -> tuple[fmpq, fmpq]:
     """Narrow the bracket to 2**-bits of its ends: guess by the secant, prove by signs, square the step."""
-    f, low, high = fmpz_poly(list(root.polynomial)), _exact(root.low), _exact(root.high)
+    f, low, high = fmpz_poly(list(root.polynomial)), to_flint(root.low), to_flint(root.high)
     if low * high > 0 and (high - low) * 2**bits <= min(abs(low), abs(high)):
         return low, high
     at_low, at_high = f(low), f(high)
@@ -205,14 +206,6 @@ def _refined(root: RealRoot, bits: int) -> tuple[fmpq, fmpq]:
     return low, high
 
 
-def _exact(x: Fraction) -> fmpq:
-    return fmpq(x.numerator, x.denominator)
-
-
-def _fraction(x: fmpq) -> Fraction:
-    return Fraction(int(x.p), int(x.q))
-
-
 def complex_order(polynomial: tuple[int, ...], upper: Sequence[acb]) -> list[int]:
     """The positions in `upper` (balls around the roots above the real axis) in SymPy's order."""
     if len(upper) < 2:
@@ -221,7 +214,7 @@ def complex_order(polynomial: tuple[int, ...], upper: Sequence[acb]) -> list[int
     scale, inner = sp.CRootOf(given, 0).as_coeff_Mul()  # SymPy may count the roots of a rescaled polynomial
     coefficients = [abs(int(c)) for c in inner.poly.all_coeffs()]
     bound = 2 * max(Fraction(c, coefficients[0]) for c in coefficients)
-    shrink = acb(fmpq(int(scale.q), int(scale.p)))
+    shrink = acb(to_flint(1 / scale))
     boxes = _leaves({k: ball * shrink for k, ball in enumerate(upper)}, (-bound, Fraction(0), bound, bound))
     if boxes is None:  # a root on the border of a box
         return _ask_sympy(given, upper)
@@ -240,7 +233,7 @@ def _leaves(
             continue
         upright = right - left > top - low
         middle = (left + right) / 2 if upright else (low + top) / 2
-        border = arb(fmpq(middle.numerator, middle.denominator))
+        border = arb(to_flint(middle))
         first: dict[int, acb] = {}
         second: dict[int, acb] = {}
         for k, ball in inside.items():

@@ -23,6 +23,7 @@ import sympy as sp
 from ..algebra.cosine_sums import AngleSum, expression
 from ..algebra.cosine_text import angle_number, angle_wave
 from ..algebra.number_text import exact_number, whole_number
+from ..algebra.rationals import to_fraction
 from ..graphs.families import topology
 from ..graphs.graph_text import is_composed, read_graph
 from ..graphs.topology import Topology, read_matrix
@@ -61,8 +62,15 @@ class Claimed:
     def sum(self) -> AngleSum | None:
         """The number as a sum of cosines; None where it is not read as one."""
         if self.exact is not None and self.exact.is_Rational:
-            return AngleSum.rational(Fraction(int(self.exact.p), int(self.exact.q)))
+            return AngleSum.rational(to_fraction(self.exact))
         return self.angle
+
+    @property
+    def ends(self) -> tuple[Fraction, Fraction]:
+        """The interval of an approximation; ValueError for an exact number."""
+        if self.interval is None:
+            raise ValueError(f"{self.text} is an exact number; expected an approximation")
+        return self.interval
 
     @property
     def words(self) -> str:

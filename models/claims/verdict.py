@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import sympy as sp
-from flint import acb, arb, fmpq
+from flint import acb, arb
 
 from ..algebra.balls import enclose, precision
 from ..algebra.cosine_sums import AngleSum, read
 from ..algebra.equality import equal
 from ..algebra.minimal_polynomials import multiplied
+from ..algebra.rationals import to_flint, to_sympy
 from ..algebra.roots import ComplexRoot, RealRoot
 from ..spectra.characteristic import characteristic
 from ..spectra.eigenvalue import Eigenvalue, entry, times, words
@@ -139,7 +140,7 @@ def _assign(claims: Sequence[Claimed], found: Sequence[Eigenvalue], tally: list[
     rising = sorted(
         (i for i, e in enumerate(found) if not isinstance(e.value, complex)), key=lambda i: found[i].value.real
     )
-    for claimed in sorted(claims, key=lambda c: (c.interval or (0, 0))[1]):
+    for claimed in sorted(claims, key=lambda c: c.ends[1]):
         inside = [i for i in rising if _rounds_to(found[i], claimed)]
         left = claimed.count
         for i in inside:
@@ -155,19 +156,19 @@ def _assign(claims: Sequence[Claimed], found: Sequence[Eigenvalue], tally: list[
 
 
 def _centre(claimed: Claimed) -> float:
-    low, high = claimed.interval or (0, 0)
+    low, high = claimed.ends
     return float((low + high) / 2)
 
 
 def _rounds_to(e: Eigenvalue, claimed: Claimed) -> bool:
     """Whether a real eigenvalue lies in the closed interval of an approximation."""
-    low, high = (sp.Rational(end.numerator, end.denominator) for end in claimed.interval or (0, 0))
+    low, high = map(to_sympy, claimed.ends)
     if not isinstance(e.number, (RealRoot, ComplexRoot)) and e.number.is_Rational:
         return bool(low <= e.number <= high)
     for bits in (64, 512, 4096):
         with precision(bits + 16):
             ball = arb(0) if e.number == 0 else e.enclosure(bits)
-            below, above = (arb(fmpq(int(end.p), int(end.q))) for end in (low, high))
+            below, above = (arb(to_flint(end)) for end in claimed.ends)
             if ball > below and ball < above:
                 return True
             if ball < below or ball > above:
