@@ -15,7 +15,7 @@ from flint import fmpq, fmpq_poly, fmpz, fmpz_poly
 from . import cosine_sums, cosines
 from .cosine_sums import AngleSum
 from .rationals import to_flint
-from .roots import ComplexRoot, RealRoot
+from .roots import Root
 
 __all__ = ["minimal_polynomial", "multiplied"]
 
@@ -60,9 +60,9 @@ def _monic(coefficients: Sequence[int]) -> fmpq_poly:
     return fmpq_poly(list(coefficients)) / coefficients[-1]
 
 
-def minimal_polynomial(number: sp.Expr | RealRoot | ComplexRoot) -> fmpq_poly:
+def minimal_polynomial(number: sp.Expr | Root) -> fmpq_poly:
     """The monic irreducible polynomial over the rationals of which a number is a root."""
-    if isinstance(number, (RealRoot, ComplexRoot)):
+    if isinstance(number, Root):
         return _monic(number.polynomial)
     if number.is_Rational:
         return fmpq_poly([-to_flint(number), 1])

@@ -18,7 +18,7 @@ from flint import arb
 from ..algebra.cosine_sums import AngleSum, expression, read
 from ..algebra.equality import Number, equal, sign
 from ..algebra.lazy import Descending
-from ..algebra.roots import ComplexRoot, RealRoot
+from ..algebra.roots import Root
 from ..graphs.families import family, topology
 from ..graphs.products import factors
 from ..graphs.topology import Topology
@@ -194,7 +194,7 @@ def _quotient(value: Value, unit: Value) -> str:
 
 def _value(number: Number) -> Value:
     """An eigenvalue as a sum of cosines where it is one."""
-    found = None if isinstance(number, (RealRoot, ComplexRoot)) else read(number)
+    found = None if isinstance(number, Root) else read(number)
     return number if found is None else found
 
 

@@ -13,7 +13,7 @@ from ..algebra.cosine_sums import AngleSum, read
 from ..algebra.equality import equal
 from ..algebra.minimal_polynomials import multiplied
 from ..algebra.rationals import to_flint, to_sympy
-from ..algebra.roots import ComplexRoot, RealRoot
+from ..algebra.roots import Root
 from ..spectra.characteristic import characteristic
 from ..spectra.eigenvalue import Eigenvalue, entry, times, words
 from ..spectra.solve import spectrum
@@ -98,9 +98,7 @@ def _compared(claim: Claim) -> tuple[str, ...]:
 
 def _angles(found: Sequence[Eigenvalue]) -> dict[AngleSum, int]:
     """The places of the eigenvalues that are sums of cosines; equal sums are equal numbers, not the other way round."""
-    forms = (
-        (None if isinstance(e.number, (RealRoot, ComplexRoot)) else read(e.number), i) for i, e in enumerate(found)
-    )
+    forms = ((None if isinstance(e.number, Root) else read(e.number), i) for i, e in enumerate(found))
     return {form.folded: i for form, i in forms if form is not None}
 
 
@@ -113,11 +111,11 @@ def _find(number: sp.Expr, found: Sequence[Eigenvalue], middles: Sequence[comple
     return None
 
 
-def _middle(number: sp.Expr | RealRoot | ComplexRoot) -> complex:
+def _middle(number: sp.Expr | Root) -> complex:
     """A number to more digits than are needed to tell which eigenvalues it may be."""
     bits = 128
     while True:
-        ball = acb(number.enclosure(bits) if isinstance(number, (RealRoot, ComplexRoot)) else enclose(number, bits))
+        ball = acb(number.enclosure(bits) if isinstance(number, Root) else enclose(number, bits))
         with precision(bits):
             radius = float(ball.real.rad() + ball.imag.rad())
         if radius < 1e-18 * max(1.0, abs(complex(ball))):
@@ -163,7 +161,7 @@ def _centre(claimed: Claimed) -> float:
 def _rounds_to(e: Eigenvalue, claimed: Claimed) -> bool:
     """Whether a real eigenvalue lies in the closed interval of an approximation."""
     low, high = map(to_sympy, claimed.ends)
-    if not isinstance(e.number, (RealRoot, ComplexRoot)) and e.number.is_Rational:
+    if not isinstance(e.number, Root) and e.number.is_Rational:
         return bool(low <= e.number <= high)
     for bits in (64, 512, 4096):
         with precision(bits + 16):
