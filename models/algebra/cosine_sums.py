@@ -117,7 +117,7 @@ class AngleSum:
             coefficients[k] += to_flint(b)
             coefficients[m - k] += to_flint(b)
         remainder = fmpq_poly(coefficients) % fmpq_poly(fmpz_poly.cyclotomic(m))
-        return remainder.degree() < 0
+        return bool(remainder.degree() < 0)
 
 
 def _collected(shift: Fraction, parts: Iterable[tuple[Fraction, Fraction]]) -> AngleSum:

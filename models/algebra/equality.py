@@ -49,7 +49,7 @@ def equal(a: Number, b: Number) -> bool:
     """
     if a is b or (isinstance(a, sp.Expr) and isinstance(b, sp.Expr) and a == b):
         return True
-    return _compared((a,), (b,)) == 0
+    return bool(_compared((a,), (b,)) == 0)
 
 
 def sign(a: tuple[Number, ...], b: tuple[Number, ...]) -> int:

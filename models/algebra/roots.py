@@ -1,7 +1,7 @@
 """Real and complex algebraic numbers: an irreducible integer polynomial and what isolates one of its roots.
 
 A real root is held between two rationals where the polynomial changes sign, a complex root in a disc that holds no
-other; both are refined to any accuracy.  `real_roots.py` isolates the roots or, should that fail, Arb
+other; both are refined to any accuracy.  `isolation.py` isolates the roots or, should that fail, Arb
 (F. Johansson, IEEE Trans. Comput. 66, 1281, 2017).  Real roots are refined exactly: secant guesses, proved by
 signs (J. Abbott, ACM Commun. Comput. Algebra 48, 3, 2014).
 """
@@ -18,8 +18,8 @@ import sympy as sp
 from flint import acb, arb, fmpq, fmpz_poly
 
 from .balls import Ball, precision
+from .isolation import Disc, discs, dyadic, sharpened, sign
 from .rationals import to_flint, to_fraction
-from .real_roots import Disc, discs, dyadic, sharpened, sign
 
 __all__ = ["ComplexRoot", "RealRoot", "Root", "coefficient_text", "complex_order", "roots"]
 

@@ -6,7 +6,7 @@ star n=3..12: 0, -1^(n-2), -n               # every n of a range
 torus 9 shape=3x3: 0, -3^4, -6^4            # options of the family: name=value, without blanks
 ring n=3..9: -4*sin(k*pi/n)**2 for k=0..n-1
 matrix G.txt: ~-3.414, -2, ~-0.586, 0       # ~: an approximation, right if it is the value rounded to its digits
-chain 1000000: largest = -4*cos(pi/(2*n))**2, distinct = n   # parts, of graphs of any size: see `part_claims`
+chain 1000000: largest = -4*cos(pi/(2*n))**2, distinct = n   # parts, of graphs of any size: see `parts`
 cartesian(chain(2), ring(5)): ratio < 10    # products and unions of families: see `graph_text`
 """
 
@@ -28,12 +28,9 @@ from ..graphs.families import topology
 from ..graphs.graph_text import is_composed, read_graph
 from ..graphs.topology import Topology, read_matrix
 from ..inputs.checks import shown
-from .parts import WORDS, Part, interval, is_part, read_part
+from .parts import LARGEST, WORDS, Part, interval, is_part, read_part
 
 __all__ = ["Claim", "Claimed", "read_claims"]
-
-LARGEST = 500
-"""Largest graph of a claim about all eigenvalues: above it, closed forms take long to prove."""
 
 BYTES, REPETITIONS = 1_000_000, 100_000
 _OPTIONS = r"((?:\s+[A-Za-z_]\w*=\S+)*)"

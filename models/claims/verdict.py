@@ -18,7 +18,7 @@ from ..spectra.characteristic import characteristic
 from ..spectra.eigenvalue import Eigenvalue, entry, times, words
 from ..spectra.solve import spectrum
 from .language import Claim, Claimed
-from .part_verdict import judged
+from .parts import verify_parts
 
 __all__ = ["Verdict", "verify"]
 
@@ -54,7 +54,7 @@ def verify(claim: Claim) -> Verdict:
     Raises ValueError where a number is too involved to be compared, ProofError where the proof of the spectrum fails.
     """
     if claim.parts:
-        return Verdict(claim, *judged(claim))
+        return Verdict(claim, *verify_parts(claim.graph, claim.parts))
     if _multiplies_out(claim):
         return Verdict(claim, ())
     return Verdict(claim, _compared(claim))
