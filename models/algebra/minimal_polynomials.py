@@ -14,7 +14,8 @@ from flint import fmpq, fmpq_poly, fmpz, fmpz_poly
 
 from . import cosine_sums, cosines
 from .cosine_sums import AngleSum
-from .roots import ComplexRoot, RealRoot
+from .rationals import to_flint
+from .roots import Root
 
 __all__ = ["minimal_polynomial", "multiplied"]
 
@@ -59,12 +60,12 @@ def _monic(coefficients: Sequence[int]) -> fmpq_poly:
     return fmpq_poly(list(coefficients)) / coefficients[-1]
 
 
-def minimal_polynomial(number: sp.Expr | RealRoot | ComplexRoot) -> fmpq_poly:
+def minimal_polynomial(number: sp.Expr | Root) -> fmpq_poly:
     """The monic irreducible polynomial over the rationals of which a number is a root."""
-    if isinstance(number, (RealRoot, ComplexRoot)):
+    if isinstance(number, Root):
         return _monic(number.polynomial)
     if number.is_Rational:
-        return fmpq_poly([fmpq(-int(number.p), int(number.q)), 1])
+        return fmpq_poly([-to_flint(number), 1])
     form = cosines.linear_cosine(number)
     if form is not None:
         a, b, _, m = form
@@ -87,4 +88,4 @@ def _cosine(a: Fraction, b: Fraction, m: int) -> tuple[fmpq, ...]:
 @lru_cache(maxsize=1024)
 def _radical(number: sp.Expr) -> tuple[fmpq, ...]:
     polynomial = sp.Poly(sp.minimal_polynomial(number, _X), _X).monic()
-    return tuple(fmpq(int(c.p), int(c.q)) for c in polynomial.all_coeffs()[::-1])
+    return tuple(to_flint(c) for c in polynomial.all_coeffs()[::-1])

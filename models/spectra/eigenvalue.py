@@ -14,7 +14,7 @@ import sympy as sp
 from flint import acb, fmpq
 
 from ..algebra.balls import Ball, accurate, decimals, enclose, nearest, precision
-from ..algebra.roots import ComplexRoot, RealRoot
+from ..algebra.roots import ComplexRoot, RealRoot, Root
 from .proof import ProofError, distinct
 
 __all__ = ["Blocks", "Eigenvalue", "decimal", "entry", "ordered", "rounded", "times", "words"]
@@ -28,7 +28,7 @@ class Eigenvalue:
     blocks, (size, count), the largest first, None where nobody looked; `value` is the nearest float, or complex.
     """
 
-    number: sp.Expr | RealRoot | ComplexRoot
+    number: sp.Expr | Root
     multiplicity: int
     blocks: Blocks | None = field(default=None, compare=False)
     value: float | complex = field(init=False, compare=False)
@@ -46,12 +46,12 @@ class Eigenvalue:
     @property
     def exact(self) -> sp.Expr:
         """The number as a SymPy expression (CRootOf where no shorter form is known)."""
-        return self.number.expression if isinstance(self.number, (RealRoot, ComplexRoot)) else self.number
+        return self.number.expression if isinstance(self.number, Root) else self.number
 
     @property
     def text(self) -> str:
         """The exact number as text that SymPy reads back."""
-        return self.number.text if isinstance(self.number, (RealRoot, ComplexRoot)) else sp.sstr(self.number)
+        return self.number.text if isinstance(self.number, Root) else sp.sstr(self.number)
 
     @property
     def geometric(self) -> int | None:
@@ -74,13 +74,13 @@ class Eigenvalue:
         return decimals(self._ball, digits)
 
     def _ball(self, bits: int) -> Ball:
-        if isinstance(self.number, (RealRoot, ComplexRoot)):
+        if isinstance(self.number, Root):
             return self.number.enclosure(bits)
         return enclose(self.number, bits)
 
     def __str__(self) -> str:
         text = self.text
-        if len(text) <= 60 or not isinstance(self.number, (RealRoot, ComplexRoot)):
+        if len(text) <= 60 or not isinstance(self.number, Root):
             return text
         return f"{decimal(self.value)} (degree {len(self.number.polynomial) - 1})"
 
@@ -152,7 +152,7 @@ def rounded(e: Eigenvalue, digits: int = 12) -> str:
 
 def words(e: Eigenvalue) -> str:
     """An eigenvalue as a sentence names it."""
-    if isinstance(e.number, (RealRoot, ComplexRoot)):
+    if isinstance(e.number, Root):
         value = rounded(e) if isinstance(e.number, RealRoot) else e.evaluate(12)
         return f"{value} (a root of degree {len(e.number.polynomial) - 1})"
     if e.number.is_Rational:

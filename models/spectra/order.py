@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from flint import arb, arb_poly, fmpq, fmpq_poly
+from flint import arb, arb_poly, fmpq_poly
 
 from ..algebra.balls import Ball, precision
 from ..algebra.minimal_polynomials import minimal_polynomial
+from ..algebra.rationals import to_flint
 from .eigenvalue import Eigenvalue
 
 __all__ = ["compare"]
@@ -33,7 +34,7 @@ def compare(alpha: Fraction, gamma: Eigenvalue, other_alpha: Fraction, other_gam
     while True:
         here, there = gamma.enclosure(bits), other_gamma.enclosure(bits)
         with precision(bits + 16):
-            scaled = there * arb(_exact(alpha / other_alpha))
+            scaled = there * arb(to_flint(alpha / other_alpha))
             if scaled < here or scaled > here:
                 return 1 if scaled < here else -1
         if bits == 256:
@@ -46,7 +47,7 @@ def compare(alpha: Fraction, gamma: Eigenvalue, other_alpha: Fraction, other_gam
 def _one_polynomial(gamma: Eigenvalue, other: Eigenvalue, factor: Fraction) -> fmpq_poly | None:
     """The minimal polynomial of gamma where it is also that of factor * other."""
     p, q = minimal_polynomial(gamma.number), minimal_polynomial(other.number)
-    ratio = _exact(factor)
+    ratio = to_flint(factor)
     return p if p == q(fmpq_poly([0, 1 / ratio])) * ratio ** q.degree() else None
 
 
@@ -55,7 +56,3 @@ def _one_root(polynomial: fmpq_poly, ball: Ball, bits: int) -> bool:
     with precision(2 * bits + 64):
         slope = arb_poly(polynomial.derivative())(ball)
         return bool(slope > 0 or slope < 0)
-
-
-def _exact(x: Fraction) -> fmpq:
-    return fmpq(x.numerator, x.denominator)

@@ -16,7 +16,7 @@ from flint import fmpq_poly
 
 from ..algebra.balls import Ball, disjoint, precision
 from ..algebra.minimal_polynomials import _monic, minimal_polynomial
-from ..algebra.roots import ComplexRoot, RealRoot
+from ..algebra.roots import RealRoot, Root
 
 __all__ = ["ProofError", "check", "distinct"]
 
@@ -29,7 +29,7 @@ class Claim(Protocol):
     """An eigenvalue that can be proved."""
 
     @property
-    def number(self) -> sp.Expr | RealRoot | ComplexRoot: ...
+    def number(self) -> sp.Expr | Root: ...
     @property
     def multiplicity(self) -> int: ...
     def enclosure(self, bits: int) -> Ball: ...
@@ -59,9 +59,9 @@ def check(claims: Iterable[Claim], characteristic: fmpq_poly, name: str) -> None
         )
 
 
-def _key(number: sp.Expr | RealRoot | ComplexRoot) -> tuple[int, ...]:
+def _key(number: sp.Expr | Root) -> tuple[int, ...]:
     """The minimal polynomial with coprime integer coefficients, the leading one positive."""
-    if isinstance(number, (RealRoot, ComplexRoot)):
+    if isinstance(number, Root):
         return number.polynomial
     return tuple(int(c) for c in minimal_polynomial(number).numer().coeffs())
 

@@ -11,7 +11,7 @@ import sympy as sp
 
 from ..algebra.balls import precision
 from ..algebra.lazy import Descending
-from ..algebra.roots import ComplexRoot, RealRoot, coefficient_text
+from ..algebra.roots import Root, coefficient_text
 from ..inputs.checks import instance
 from .eigenvalue import Eigenvalue, decimal
 
@@ -57,7 +57,7 @@ def _blocks(e: Eigenvalue) -> str:
 
 
 def _short(e: Eigenvalue) -> str:
-    if len(e.text) <= 60 or not isinstance(e.number, (RealRoot, ComplexRoot)):
+    if len(e.text) <= 60 or not isinstance(e.number, Root):
         return e.text
     return f"root {e.number.index} of a polynomial of degree {len(e.number.polynomial) - 1}"
 
@@ -164,7 +164,7 @@ class Spectrum:
         listed = []
         for e in self.eigenvalues:
             number, index, exact = None, None, None
-            if isinstance(e.number, (RealRoot, ComplexRoot)):
+            if isinstance(e.number, Root):
                 number, index = numbers.setdefault(e.number.polynomial, len(numbers)), e.number.index
                 exact = f"CRootOf(p{number}, {index})"
             listed.append(

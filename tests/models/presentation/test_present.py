@@ -258,16 +258,19 @@ def test_latex_of_every_oscillator_balances(oscillator: str, n: int) -> None:
 def test_vector_fields_and_links_between_components() -> None:
     """The right-hand sides as they stand in the papers; a link from two components in one pair of parentheses."""
     assert text(made(topology("chain", 2), "rossler", None, coupling="x->x, -1/2 z->y")).splitlines()[:2] == [
-        "x_1' = -y_1 - z_1 + σ (x_2 - x_1)", "y_1' = x_1 + a y_1 - (1/2) σ (z_2 - z_1)",
-    ]  # fmt: skip
+        "x_1' = -y_1 - z_1 + σ (x_2 - x_1)",
+        "y_1' = x_1 + a y_1 - (1/2) σ (z_2 - z_1)",
+    ]
     assert text(made(topology("chain", 1), "lorenz", None, coupling=None)).splitlines() == [
-        "x' = prandtl (y - x)", "y' = -y + x (rayleigh - z)", "z' = x y - b z",
-    ]  # fmt: skip
+        "x' = prandtl (y - x)",
+        "y' = -y + x (rayleigh - z)",
+        "z' = x y - b z",
+    ]
     many = text(made(topology("ring", 9), "rossler", None, coupling="x->x, 1/2 y->x, -1/2 z->y")).splitlines()
     assert many[:2] == [
         "x_i' = -y_i - z_i + σ Σ_j G_ij (x_j + (1/2) y_j - x_i - (1/2) y_i)",
         "y_i' = x_i + a y_i - (1/2) σ Σ_j G_ij (z_j - z_i)",
-    ]  # fmt: skip
+    ]
 
 
 # -- for programs --------------------------------------------------------------------------------------------
@@ -296,6 +299,10 @@ def test_the_dictionary_is_read_back_exactly(contact: str) -> None:
 def test_the_keys_of_the_jacobian() -> None:
     keys = as_dict(made(topology("chain", 2), "harmonic", None))["jacobian"]
     assert keys == {
-        "x_1,v_1": "1", "x_2,v_2": "1", "v_1,x_1": "-sigma - 1", "v_1,x_2": "sigma", "v_2,x_1": "sigma",
+        "x_1,v_1": "1",
+        "x_2,v_2": "1",
+        "v_1,x_1": "-sigma - 1",
+        "v_1,x_2": "sigma",
+        "v_2,x_1": "sigma",
         "v_2,x_2": "-sigma - 1",
-    }  # fmt: skip
+    }

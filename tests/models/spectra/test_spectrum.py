@@ -21,7 +21,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synchain.models.algebra.cosines import biquadratic, cosine, linear_cosine, minimal_polynomial
-from synchain.models.algebra.real_roots import discs, sign
+from synchain.models.algebra.isolation import discs, sign
 from synchain.models.algebra.roots import ComplexRoot, RealRoot, roots
 from synchain.models.graphs import topology as graphs
 from synchain.models.graphs.families import names, topology
