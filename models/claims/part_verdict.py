@@ -104,9 +104,9 @@ class _Known:
 def _axes(graph: Topology) -> Iterator[Topology]:
     """The factors of a Cartesian product with more than one node, where the spectrum of each is short and not above 0."""
     pair = factors(graph)
-    if graph.name in ("grid", "torus"):
+    if graph.name in ("grid", "torus") and (sides := family(graph.name).sides):
         shape = dict(graph.options).get("shape")
-        sizes = shape if isinstance(shape, tuple) else family(graph.name).sides(graph.n)
+        sizes = shape if isinstance(shape, tuple) else sides(graph.n)
         yield from (topology("ring" if graph.name == "torus" else "chain", size) for size in sizes if size > 1)
     elif pair is None or not all(_short(axis) for part in pair for axis in _axes(part)):
         yield graph

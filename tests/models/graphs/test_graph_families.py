@@ -20,8 +20,8 @@ from synchain.models.spectra.solve import spectrum
 
 fresh = spectrum.__wrapped__
 
-CLOSED = [name for name in names() if hasattr(family(name), "spectrum")]
-COUNTED = [name for name in names() if hasattr(family(name), "count")]
+CLOSED = [name for name in names() if family(name).spectrum]
+COUNTED = [name for name in names() if family(name).count]
 
 SAME = [
     (("complete_bipartite", 9), nx.complete_bipartite_graph(4, 5)),
@@ -92,7 +92,7 @@ def test_one_way_graphs_by_hand() -> None:
 
 @pytest.mark.parametrize("name", COUNTED)
 def test_counts_are_those_of_the_edges(name: str) -> None:
-    for n in range(family(name).MINIMUM, 31):
+    for n in range(family(name).minimum, 31):
         graph = topology(name, n)
         promised = graph.link_count
         assert len(graph.links) == promised, n
