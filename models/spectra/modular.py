@@ -12,13 +12,14 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from hashlib import sha256
 from math import lcm, log, log2
+from operator import mul
 
 import sympy as sp
 from flint import fmpz, nmod_mat, nmod_poly
 
 from ..algebra import cosines
 from ..algebra.cosine_sums import read
-from .characteristic import banded, cyclic
+from .characteristic import pairwise_product, sparse
 from .matrix import Matrix
 from .proof import ProofError
 
@@ -103,10 +104,7 @@ def _claimed(numbers: Sequence[tuple[Powers, int]], m: int, p: int) -> nmod_poly
     for (shift, terms), times in numbers:
         value = _residue(shift, p) + sum(_residue(b, p) * pow(unit, int(t * m), p) for t, b in terms)
         factors.append(nmod_poly([-value % p, 1], p) ** times)
-    while len(factors) > 1:
-        odd = factors[-1:] if len(factors) % 2 else []
-        factors = [a * b for a, b in zip(factors[::2], factors[1::2], strict=False)] + odd
-    return factors[0]
+    return pairwise_product(factors, mul)
 
 
 def _characteristic(graph: Matrix, p: int) -> nmod_poly:
@@ -120,8 +118,9 @@ def _characteristic(graph: Matrix, p: int) -> nmod_poly:
         entries[target, source] = value
         sums[target] -= value
     entries.update({(i, i): total % p for i, total in enumerate(sums)})
-    if banded(graph.n, entries):
-        return cyclic(graph.n, entries, lambda c: nmod_poly([x % p for x in c], p))
+    polynomial = sparse(graph.n, entries, lambda c: nmod_poly([x % p for x in c], p))
+    if polynomial is not None:
+        return polynomial
     flat = [0] * graph.n**2
     for (i, j), value in entries.items():
         flat[i * graph.n + j] = value
