@@ -17,13 +17,13 @@ from flint import arb
 
 from ..algebra.cosine_sums import AngleSum, expression, read
 from ..algebra.equality import Number, equal, sign
-from ..algebra.lazy import Descending
+from ..algebra.lazy import LazyEigenvalues
 from ..algebra.roots import ComplexRoot, RealRoot
 from ..graphs.families import family, topology
 from ..graphs.products import factors
 from ..graphs.topology import Topology
 from ..spectra.eigenvalue import Eigenvalue, words
-from ..spectra.solve import has_closed_form, spectrum
+from ..spectra.solve import Proof, has_closed_form, spectrum
 from ..spectra.spectrum import Spectrum
 from .language import LARGEST, Claim
 from .parts import Exact, Part
@@ -73,7 +73,7 @@ class _Known:
             raise ValueError(
                 f"{self.graph.name} {n}: expected at most {LISTED} nodes for this part of the spectrum of this graph"
             )
-        return spectrum(self.graph, prove=n <= LARGEST)
+        return spectrum(self.graph, Proof.EXACT if n <= LARGEST else Proof.NONE)
 
     @cached_property
     def axes(self) -> tuple[Topology, ...]:
@@ -97,7 +97,7 @@ class _Known:
     def multiplicity(self, number: Exact) -> int:
         """How often a number is an eigenvalue."""
         found = self.spectrum.eigenvalues
-        near = _neighbours(found, number) if isinstance(found, Descending) else found
+        near = _neighbours(found, number) if isinstance(found, LazyEigenvalues) else found
         return sum(e.multiplicity for e in near if _same(e, number))
 
 
@@ -119,7 +119,7 @@ def _short(graph: Topology) -> bool:
     return graph.name in ("chain", "ring", "complete", "complete_bipartite", "star", "hypercube", "feed_forward")
 
 
-def _neighbours(found: Descending[Eigenvalue], number: Exact) -> Sequence[Eigenvalue]:
+def _neighbours(found: LazyEigenvalues[Eigenvalue], number: Exact) -> Sequence[Eigenvalue]:
     """The eigenvalues of a chain or ring beside the place where a number would stand."""
     low, high = 0, len(found)
     while low < high:

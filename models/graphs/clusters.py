@@ -15,10 +15,11 @@ from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import dataclass
 from fractions import Fraction
 
-from flint import fmpq, fmpq_mat, fmpq_poly
+from flint import fmpq_mat, fmpq_poly
 
+from ..algebra.rationals import as_fmpq
 from ..inputs.checks import typed
-from ..spectra.proof import ProofError
+from ..spectra.eigenvalue import ProofError
 from .partitions import class_links, join
 from .symmetry import automorphisms
 from .topology import Topology, a_graph
@@ -154,4 +155,4 @@ def _fine_first(classes: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
 
 
 def _polynomial(rows: Rows) -> fmpq_poly:
-    return fmpq_mat([[fmpq(x.numerator, x.denominator) for x in row] for row in rows]).charpoly()
+    return fmpq_mat([[as_fmpq(x) for x in row] for row in rows]).charpoly()

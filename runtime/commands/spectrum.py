@@ -75,14 +75,14 @@ def execute(arguments: Namespace) -> int:
     """Print the spectrum as a table or as JSON."""
     if arguments.value and not (arguments.symbolic and arguments.matrix):
         raise WrongUse("found --value without --symbolic --matrix FILE; expected all of them")
-    from synchain.models.spectra.solve import spectrum
+    from synchain.models.spectra.solve import Proof, spectrum
     from synchain.models.spectra.spectrum import table
 
     if arguments.symbolic:
         return _symbolic(arguments)
     with wrong_use():
         chosen = graph(arguments)
-        found = spectrum(chosen, prove=chosen.n <= PROVED or ("primes" if chosen.n <= CHECKED else False))
+        found = spectrum(chosen, Proof.of_size(chosen.n, PROVED, CHECKED))
     if found.zeros > 1:
         warn([f"zero is an eigenvalue of multiplicity {found.zeros}: {_reason(chosen)}"])
     if arguments.json:

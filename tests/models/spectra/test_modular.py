@@ -15,9 +15,9 @@ from synchain.models.graphs.families import family, names, topology
 from synchain.models.graphs.products import cartesian, complement, kronecker, union, weighted
 from synchain.models.graphs.topology import Topology
 from synchain.models.spectra.characteristic import characteristic
+from synchain.models.spectra.eigenvalue import ProofError
 from synchain.models.spectra.modular import _characteristic, _claimed, _powers, _primes, _unit, check_modulo
-from synchain.models.spectra.proof import ProofError
-from synchain.models.spectra.solve import spectrum
+from synchain.models.spectra.solve import Proof, spectrum
 from synchain.models.spectra.spectrum import table
 from synchain.runtime.cli import main
 
@@ -105,14 +105,14 @@ def test_numbers_that_are_no_sums_of_roots_of_unity_are_not_checked() -> None:
 
 def test_large_spectra_say_how_they_were_checked(capsys: pytest.CaptureFixture[str]) -> None:
     fresh = spectrum.__wrapped__
-    assert (fresh(ring(200)).verified, fresh(ring(200)).chance) == (True, None)
+    assert (fresh(ring(200)).verified, fresh(ring(200)).error_probability) == (True, None)
     middle = fresh(topology("hypercube", 256))
     assert not middle.verified
-    assert middle.chance is not None
-    assert middle.chance < 1e-40
-    assert fresh(topology("hypercube", 512)).chance is None
-    assert fresh(topology("hypercube", 512), prove="primes").chance is not None
-    assert fresh(chain(600), prove=False).chance is None
+    assert middle.error_probability is not None
+    assert middle.error_probability < 1e-40
+    assert fresh(topology("hypercube", 512)).error_probability is None
+    assert fresh(topology("hypercube", 512), proof=Proof.MODULAR).error_probability is not None
+    assert fresh(chain(600), proof=Proof.NONE).error_probability is None
     assert "the same modulo three large primes" in table(middle)
     assert main(["spectrum", "ring", "600"]) == 0
     last = capsys.readouterr().out.splitlines()[-1]
