@@ -110,7 +110,9 @@ def __getattr__(name: str) -> Any:
     elif name.startswith("_") or name not in _families():
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     else:
-        value = _family(name)
+        from .graphs.families import family
+
+        value = family(name)
     globals()[name] = value
     return value
 
@@ -124,15 +126,3 @@ def _families() -> set[str]:
 
     found = iter_modules(import_module(".topologies", __name__).__path__)
     return {module.name for module in found if not module.name.startswith("_")}
-
-
-def _family(name: str) -> Any:
-    from .graphs.families import topology
-
-    def family(n: int, **options: Any) -> Topology:
-        return topology(name, n, **options)
-
-    family.__name__ = family.__qualname__ = name
-    family.__module__ = __name__
-    family.__doc__ = f"Return the {name} of `n` nodes, with the options of its file; ValueError where n is too small."
-    return family

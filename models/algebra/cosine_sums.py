@@ -20,7 +20,7 @@ from flint import arb, arb_poly, fmpq, fmpq_poly, fmpz_poly
 
 from . import cosines
 from .balls import Ball, precision
-from .lazy import Descending
+from .lazy import LazyEigenvalues
 from .rationals import to_flint, to_fraction, to_sympy
 
 __all__ = ["AngleSum", "box", "expression", "folded_sum", "merged", "minimal_polynomial", "read"]
@@ -165,7 +165,7 @@ def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]
     return found
 
 
-def box(sizes: Sequence[int], closed: Sequence[bool]) -> Descending[tuple[sp.Expr, int]]:
+def box(sizes: Sequence[int], closed: Sequence[bool]) -> LazyEigenvalues[tuple[sp.Expr, int]]:
     """The spectrum of the Cartesian product of chains, and of rings where `closed`: sums of -4 sin² of each.
 
     Directions of one kind and size are taken in one order only.  Only what cosines cannot be told apart by floats is
@@ -197,7 +197,7 @@ def box(sizes: Sequence[int], closed: Sequence[bool]) -> Descending[tuple[sp.Exp
         if end == len(places) or places[end - 1][0] - places[end][0] > 1e-12 * len(sizes):  # of cosines: within 2 each
             found += _told_apart([(number(key), key, counts[key]) for _, key in places[start:end]])
             start = end
-    return Descending(len(found), prod(sizes), lambda k: (expression(number(found[k][0])), found[k][1]))
+    return LazyEigenvalues(len(found), prod(sizes), lambda k: (expression(number(found[k][0])), found[k][1]))
 
 
 def _waves(size: int, ring: bool, unit: int) -> list[tuple[int, int]]:

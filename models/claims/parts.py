@@ -25,14 +25,14 @@ from flint import arb
 from ..algebra.cosine_sums import AngleSum, expression, read
 from ..algebra.cosine_text import angle_number
 from ..algebra.equality import Number, equal, sign
-from ..algebra.lazy import Descending
+from ..algebra.lazy import LazyEigenvalues
 from ..algebra.number_text import exact_number
 from ..algebra.roots import Root
 from ..graphs.families import family, topology
 from ..graphs.products import factors
 from ..graphs.topology import Topology
 from ..spectra.eigenvalue import Eigenvalue, words
-from ..spectra.solve import has_closed_form, spectrum
+from ..spectra.solve import Proof, has_closed_form, spectrum
 from ..spectra.spectrum import Spectrum
 
 __all__ = ["LARGEST", "WORDS", "Exact", "Part", "interval", "is_part", "read_part", "verify_parts"]
@@ -166,7 +166,7 @@ class _Known:
             raise ValueError(
                 f"{self.graph.name} {n}: expected at most {LISTED} nodes for this part of the spectrum of this graph"
             )
-        return spectrum(self.graph, prove=n <= LARGEST)
+        return spectrum(self.graph, Proof.EXACT if n <= LARGEST else Proof.NONE)
 
     @cached_property
     def axes(self) -> tuple[Topology, ...]:
@@ -190,16 +190,16 @@ class _Known:
     def multiplicity(self, number: Exact) -> int:
         """How often a number is an eigenvalue."""
         found = self.spectrum.eigenvalues
-        near = _neighbours(found, number) if isinstance(found, Descending) else found
+        near = _neighbours(found, number) if isinstance(found, LazyEigenvalues) else found
         return sum(e.multiplicity for e in near if _same(e, number))
 
 
 def _axes(graph: Topology) -> Iterator[Topology]:
     """The factors of a Cartesian product with more than one node, where the spectrum of each is short and not above 0."""
     pair = factors(graph)
-    if graph.name in ("grid", "torus"):
+    if graph.name in ("grid", "torus") and (sides := family(graph.name).sides):
         shape = dict(graph.options).get("shape")
-        sizes = shape if isinstance(shape, tuple) else family(graph.name).sides(graph.n)
+        sizes = shape if isinstance(shape, tuple) else sides(graph.n)
         yield from (topology("ring" if graph.name == "torus" else "chain", size) for size in sizes if size > 1)
     elif pair is None or not all(_short(axis) for part in pair for axis in _axes(part)):
         yield graph
@@ -212,7 +212,7 @@ def _short(graph: Topology) -> bool:
     return graph.name in ("chain", "ring", "complete", "complete_bipartite", "star", "hypercube", "feed_forward")
 
 
-def _neighbours(found: Descending[Eigenvalue], number: Exact) -> Sequence[Eigenvalue]:
+def _neighbours(found: LazyEigenvalues[Eigenvalue], number: Exact) -> Sequence[Eigenvalue]:
     """The eigenvalues of a chain or ring beside the place where a number would stand."""
     low, high = 0, len(found)
     while low < high:

@@ -16,7 +16,7 @@ from ..algebra.rationals import to_flint, to_sympy
 from ..algebra.roots import Root
 from ..spectra.characteristic import characteristic
 from ..spectra.eigenvalue import Eigenvalue, entry, times, words
-from ..spectra.solve import spectrum
+from ..spectra.solve import Proof, spectrum
 from .language import Claim, Claimed
 from .parts import verify_parts
 
@@ -40,7 +40,7 @@ class Verdict:
     @property
     def eigenvalues(self) -> Sequence[Eigenvalue]:
         """The eigenvalues of the graph."""
-        return spectrum(self.claim.graph, prove=bool(self.problems)).eigenvalues
+        return spectrum(self.claim.graph, Proof.EXACT if self.problems else Proof.NONE).eigenvalues
 
     @property
     def expected(self) -> str:
@@ -71,7 +71,7 @@ def _multiplies_out(claim: Claim) -> bool:
 
 def _compared(claim: Claim) -> tuple[str, ...]:
     """What is wrong with a claim, number by number."""
-    found = spectrum(claim.graph, prove=True).eigenvalues
+    found = spectrum(claim.graph, Proof.EXACT).eigenvalues
     tally, problems = [0] * len(found), []
     known = _angles(found) if any(c.angle is not None for c in claim.numbers) else {}
     middles: list[complex] = []

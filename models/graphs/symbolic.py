@@ -21,7 +21,7 @@ from sympy.polys.matrices import DomainMatrix
 
 from ..inputs.rationals import file_text, parse_rows, rational, square
 from ..inputs.reader import Algebra, NoMeaning, parse
-from ..spectra.proof import ProofError
+from ..spectra.eigenvalue import ProofError
 from .topology import Topology, from_matrix
 
 __all__ = ["SymbolicSpectrum", "SymbolicTopology", "from_symbols", "read_symbols", "weight"]

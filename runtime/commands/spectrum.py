@@ -77,14 +77,14 @@ def execute(arguments: Namespace) -> int:
     """Print the spectrum as a table or as JSON."""
     if arguments.value and not (arguments.symbolic and arguments.matrix):
         raise WrongUse("found --value without --symbolic --matrix FILE; expected all of them")
-    from synchain.models.spectra.solve import spectrum
+    from synchain.models.spectra.solve import Proof, spectrum
     from synchain.models.spectra.spectrum import table
 
     if arguments.symbolic:
         return _symbolic(arguments)
     with wrong_use():
         graph = named_graph(arguments)
-        eigenvalues = spectrum(graph, prove=graph.n <= PROVED or ("primes" if graph.n <= CHECKED else False))
+        eigenvalues = spectrum(graph, Proof.of_size(graph.n, PROVED, CHECKED))
     if eigenvalues.zeros > 1:
         warn([f"zero is an eigenvalue of multiplicity {eigenvalues.zeros}: {_reason(graph)}"])
     if arguments.json:

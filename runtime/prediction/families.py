@@ -74,7 +74,7 @@ def largest_network(
     """
     if limit < 2:
         raise ValueError(f"limit = {limit}; expected at least 2 nodes")
-    directed = getattr(plugin(family), "DIRECTED", False)
+    directed = plugin(family).directed
     given = exact_ranges(ranges, errors)
     sets = [given, widen(given, -1), widen(given, 1)]
     counts = SizeUnit.DIMENSION if family == "hypercube" else SizeUnit.NODES
@@ -170,9 +170,9 @@ def eigenratio(family: str, n: int) -> Ball:
 
 
 def _by_search(family: str, ranges: Sequence[StableRange], limit: int) -> int | None:
-    if _open(ranges) and not getattr(plugin(family), "DIRECTED", False):
+    if _open(ranges) and not plugin(family).directed:
         return None
     cube = family == "hypercube"
-    sizes = range(1, limit.bit_length()) if cube else range(max(2, plugin(family).MINIMUM), limit + 1)
+    sizes = range(1, limit.bit_length()) if cube else range(max(2, plugin(family).minimum), limit + 1)
     found = [size for size in sizes if possible(ranges, topology(family, 2**size if cube else size))]
     return max(found, default=0)
