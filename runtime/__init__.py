@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .support.status import Status
     from .sweeps.progress import Progress
     from .sweeps.run import run
-    from .sweeps.sitting import SweepFailed, SweepInterrupted
+    from .sweeps.scheduler import SweepFailed, SweepInterrupted
     from .sweeps.stream import Streamed, stream
     from .synchronisation.basin import Basin, basin
     from .synchronisation.probe import Probe, universal_probe
@@ -46,8 +46,8 @@ _HOME = {
     "Result": "results.result",
     "Status": "support.status",
     "Streamed": "sweeps.stream",
-    "SweepFailed": "sweeps.sitting",
-    "SweepInterrupted": "sweeps.sitting",
+    "SweepFailed": "sweeps.scheduler",
+    "SweepInterrupted": "sweeps.scheduler",
     "Thresholds": "synchronisation.threshold",
     "basin": "synchronisation.basin",
     "cluster_exponents": "stability.clusters",

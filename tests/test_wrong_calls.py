@@ -92,7 +92,7 @@ CALLS = [
     (lambda: runtime.run(PAIR, workers=-1), "workers = -1; expected at least 1"),
     (lambda: runtime.run(PAIR, width=3), "width = 3; expected one of 1, 2, 4, 8, 16"),
     (lambda: runtime.run(PAIR, width="a"), "width = 'a'"),
-    (lambda: runtime.run(PAIR, skip="no"), "skip: found 'no'"),
+    (lambda: runtime.run(PAIR, reduce="no"), "reduce: found 'no'"),
     (lambda: runtime.run(PAIR, certified="yes"), "certified: found 'yes'"),
     (lambda: runtime.run(PAIR, resume="file.nc"), "resume: found 'file.nc'"),
     (lambda: runtime.run(PAIR, executor=THREADS), "executor: found <class"),

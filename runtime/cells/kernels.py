@@ -15,24 +15,24 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.checks import flag, whole
 from synchain.models.scenes.scene import Scene, a_scene
 
-from .reduce import Skip, decide
+from .reduce import Reduction, reduce_scene
 
-__all__ = ["best_integrator", "chosen_skip", "kernel", "kernel_source"]
+__all__ = ["as_reduction", "best_integrator", "kernel", "kernel_source"]
 
 
-def kernel(scene: Scene, width: int | None = None, skip: bool | Skip = True) -> Kernel:
+def kernel(scene: Scene, width: int | None = None, reduce: bool | Reduction = True) -> Kernel:
     """Return the compiled kernel of a scene, the one that `run(scene)` runs; scenes that differ only in numbers share it.
 
-    `width` and `skip` mean what they mean for `run`: by default the kernel leaves out what the scene does not need (see
-    `synchain.runtime.cells.reduce`), and has a single lane where the scene has a single cell; with `skip` False it integrates
+    `width` and `reduce` mean what they mean for `run`: by default the kernel leaves out what the scene does not need (see
+    `synchain.runtime.cells.reduce`), and has a single lane where the scene has a single cell; with `reduce` False it integrates
     the scene as it stands.
     """
-    return load(kernel_source(scene, width, skip))
+    return load(kernel_source(scene, width, reduce))
 
 
-def kernel_source(scene: Scene, width: int | None = None, skip: bool | Skip = True) -> KernelSource:
+def kernel_source(scene: Scene, width: int | None = None, reduce: bool | Reduction = True) -> KernelSource:
     """Return the text of a scene's kernel without compiling it."""
-    chosen = chosen_skip(scene, skip)
+    chosen = as_reduction(scene, reduce)
     width = 1 if width is None and scene.cells == 1 else width
     if width is not None and whole("width", width, 1) not in WIDTHS:
         raise ValueError(f"width = {width}; expected one of {', '.join(map(str, WIDTHS))}")
@@ -62,10 +62,10 @@ def best_integrator(equations: Equations, rtol: float) -> str:
     return "dop853" if equations.node.contact is not None else "switching" if pair else AUTO
 
 
-def chosen_skip(scene: Scene, skip: bool | Skip) -> Skip:
+def as_reduction(scene: Scene, reduce: bool | Reduction) -> Reduction:
     """What is left out of a scene: as decided, or as given; ValueError where that is of another scene."""
     a_scene(scene)
-    chosen = skip if isinstance(skip, Skip) else decide(scene, flag("skip", skip))
+    chosen = reduce if isinstance(reduce, Reduction) else reduce_scene(scene, flag("reduce", reduce))
     if chosen.scene != scene:
-        raise ValueError("skip: found the reductions of another scene; make them with decide(scene)")
+        raise ValueError("reduce: found the reductions of another scene; make them with reduce_scene(scene)")
     return chosen

@@ -20,7 +20,7 @@ from synchain.models.scenes.scene import Scene
 from .buffers import Buffers
 from .plan import Plan
 
-__all__ = ["Merged", "Skip", "decide", "explain"]
+__all__ = ["NodeMerge", "Reduction", "explain", "reduce_scene"]
 
 DIVERGED = "diverged: the cell ends as soon as its state is out of bounds"
 PERIODIC = (
@@ -30,8 +30,8 @@ PERIODIC = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Merged:
-    """Which oscillators were stepped as one: `states` and `places` of a Skip; `together` where all of them were."""
+class NodeMerge:
+    """Which oscillators were stepped as one: `states` and `places` of a Reduction; `together` where all of them were."""
 
     states: np.ndarray
     places: np.ndarray
@@ -59,7 +59,7 @@ class Merged:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Skip:
+class Reduction:
     """What is left of a scene to integrate, and the way back.
 
     The kernel steps `equations` and writes `records`.  `states` are the columns of the whole network's state that start
@@ -95,10 +95,10 @@ class Skip:
         return replace(whole, start=start, numbers=numbers)
 
     @property
-    def merged(self) -> Merged:
+    def merged(self) -> NodeMerge:
         """How the reduced network's results become those of the whole one."""
         together = "sync_error" in self.scene.record and "sync_error" not in self.records
-        return Merged(self.states, self.places, together)
+        return NodeMerge(self.states, self.places, together)
 
     def expand(self, buffers: Buffers) -> Buffers:
         """What the kernel wrote, for the whole network; the same arrays where nothing was merged."""
@@ -109,17 +109,17 @@ class Skip:
         return self.merged.take(buffers, self.states)
 
 
-def decide(scene: Scene, skip: bool = True, fold_all: bool = False) -> Skip:
+def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> Reduction:
     """Find out what can be left out of a scene.
 
     Parameters that are 0 in every cell are folded, so that scenes that differ only in numbers share a kernel; `fold_all`
-    folds all that are fixed, to their shortest decimals.  With `skip` false everything is integrated as it stands.
+    folds all that are fixed, to their shortest decimals.  With `reduce` false everything is integrated as it stands.
     """
     whole = scene.equations
     skipped: list[str] = []
     kept: list[str] = []
     equations, classes = whole, tuple(range(scene.n))
-    if skip:
+    if reduce:
         equations = _fold(scene, fold_all, skipped, kept)
         equations, classes = _merge(scene, equations, skipped, kept)
         kept += _present(scene, equations)
@@ -132,7 +132,7 @@ def decide(scene: Scene, skip: bool = True, fold_all: bool = False) -> Skip:
     first = [seen[k] for k in range(equations.n)]
     components = range(whole.dimension // scene.n)
     alone = np.arange(whole.dimension)
-    return Skip(
+    return Reduction(
         scene,
         equations,
         tuple(r for r in scene.record if not (together and r == "sync_error")),
@@ -142,7 +142,7 @@ def decide(scene: Scene, skip: bool = True, fold_all: bool = False) -> Skip:
         _multiplicity(scene, classes),
         tuple(skipped),
         tuple(kept),
-        skip,
+        reduce,
     )
 
 
@@ -255,7 +255,7 @@ def _multiplicity(scene: Scene, classes: tuple[int, ...]) -> tuple[int, ...] | N
     return tuple(sizes[k] for k in range(len(sizes)))
 
 
-def explain(chosen: Skip) -> str:
+def explain(chosen: Reduction) -> str:
     """What is left out of a scene and why, what is not, and what may be left out of a cell at run time."""
     parts = (
         ("left out", (*chosen.skipped, *_unwritten(chosen))),
@@ -270,7 +270,7 @@ def explain(chosen: Skip) -> str:
     )
 
 
-def _unwritten(chosen: Skip) -> list[str]:
+def _unwritten(chosen: Reduction) -> list[str]:
     """What the text of the kernel does not have, because the scene never had it."""
     scene, found = chosen.scene, []
     if not scene.forced:

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from synchain.models.scenes.scene import Scene
 
-    from ..cells.reduce import Skip
-    from ..sweeps.sitting import SweepFailed, SweepInterrupted
+    from ..cells.reduce import Reduction
+    from ..sweeps.scheduler import SweepFailed, SweepInterrupted
     from ..sweeps.stream import Streamed
 
 SUMMARY = "run a scene; write its results (netCDF) and a figure"
@@ -84,15 +84,15 @@ def configure(parser: ArgumentParser) -> None:
 def execute(arguments: Namespace) -> int:
     """Explain the scene where asked to; run it to a file, draw, and say how the cells ended."""
     from ..cells.kernels import kernel
-    from ..cells.reduce import decide, explain
-    from ..sweeps.sitting import SweepFailed, SweepInterrupted
+    from ..cells.reduce import explain, reduce_scene
+    from ..sweeps.scheduler import SweepFailed, SweepInterrupted
     from ..sweeps.stream import claim, stream
 
     if arguments.out is None and (arguments.resume or arguments.overwrite or not arguments.explain):
         raise WrongUse("the following arguments are required: --out\nsee: synchain run --help")
     with wrong_use():
         scene = changed_scene(arguments)
-        skip = decide(scene, not arguments.no_skip)
+        skip = reduce_scene(scene, not arguments.no_skip)
         name = Path(arguments.scene).stem if arguments.scene.endswith(".toml") else arguments.scene
         if arguments.explain:
             print(f"{name}: {_count(scene.cells, 'cell')} of {_count(scene.n, 'oscillator')}\n{explain(skip)}")
@@ -106,10 +106,10 @@ def execute(arguments: Namespace) -> int:
         output_folder(target.parent)
     warn(scene.warnings)
     if arguments.dask:
-        kernel(scene, skip=skip)  # before the connection is there, which would not be answered while it compiles
+        kernel(scene, reduce=skip)  # before the connection is there, which would not be answered while it compiles
     with stopped_by_signals(), _executor(arguments.dask) as executor:
         try:
-            done = stream(scene, target, skip=skip, workers=arguments.workers, executor=executor, **given)
+            done = stream(scene, target, reduce=skip, workers=arguments.workers, executor=executor, **given)
         except (SweepInterrupted, SweepFailed) as stop:
             raise _stopped(stop, target, arguments) from None
     _summary(name, scene, done, target)
@@ -155,7 +155,7 @@ def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[st
     return int(value) if name in ("samples", "max_steps") and value.is_integer() else value
 
 
-def _check(skip: Skip, arguments: Namespace) -> None:
+def _check(skip: Reduction, arguments: Namespace) -> None:
     """Find out whatever can go wrong before the first cell runs."""
     from ..cells.kernels import kernel_source
     from ..cells.plan import Planner
@@ -164,7 +164,7 @@ def _check(skip: Skip, arguments: Namespace) -> None:
     if arguments.out is None:
         return
     Planner(skip.scene).extremes()
-    kernel_source(skip.scene, skip=skip)
+    kernel_source(skip.scene, reduce=skip)
     if arguments.certify:
         check_certifiable(skip.scene)
 
@@ -228,7 +228,7 @@ def _executor(address: str | None) -> Iterator[Executor | None]:
 
 def _stopped(stop: SweepInterrupted | SweepFailed, target: Path, arguments: Namespace) -> Failed:
     """What to say about a run that did not come to its end, and how to go on."""
-    from ..results.unfinished import partial_path
+    from ..results.partial import partial_path
 
     words = [word for word in arguments.command_line if word != "--overwrite"]
     again = shlex.join([*words, *(() if arguments.resume else ("--resume",))])

@@ -98,7 +98,9 @@ class Result:
                 "restore the code, or run without resume"
             )
         if not self.stepped(equations):
-            raise ValueError("the result to resume left out other parts of its scene; resume with the skip of that run")
+            raise ValueError(
+                "the result to resume left out other parts of its scene; resume with the reduction of that run"
+            )
         if (begun := str(self.data.attrs.get("processor"))) != processor():
             there, here = told_apart(begun, processor())
             raise ValueError(
@@ -128,10 +130,10 @@ class Result:
 
 def _opened(path: Path) -> Result:
     """The result of a file of either kind."""
-    from .store import is_store
+    from .block_log import is_store
 
     if is_store(path):
-        from .unfinished import open_unfinished
+        from .partial import open_unfinished
 
         return open_unfinished(path)
     with netcdf_data(path) as file:

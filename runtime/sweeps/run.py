@@ -17,14 +17,14 @@ from ..cells.kernels import kernel, kernel_source
 from ..cells.keywords import check_keywords
 from ..cells.layout import Layout
 from ..cells.plan import plan
-from ..cells.reduce import Skip
+from ..cells.reduce import Reduction
 from ..results.result import IN_MEMORY, Result, gather
 from ..support.status import CODES, Status, tally
 from ..support.threads import worker_count
-from .crew import Task, worker_lost
+from .job import Start
+from .pool import Task, worker_lost
 from .progress import Hook, Reporter
-from .sitting import Prepared, Sitting, SweepFailed, SweepInterrupted, prepare
-from .worker import Start
+from .scheduler import BlockScheduler, PreparedRun, SweepFailed, SweepInterrupted, prepare
 
 __all__ = ["Buffers", "SweepFailed", "SweepInterrupted", "kernel", "kernel_source", "run", "with_axes", "worker_count"]
 
@@ -36,7 +36,7 @@ def run(
     resume: Result | None = None,
     show_progress: bool | None = None,
     width: int | None = None,
-    skip: bool | Skip = True,
+    reduce: bool | Reduction = True,
     certified: bool = False,
     executor: Executor | None = None,
     progress: Hook | None = None,
@@ -49,27 +49,27 @@ def run(
     number of lanes (default: what the CPU has), `executor` any `concurrent.futures.Executor` to run on in place of
     threads (docs/scale.md); none of them changes a result.  `resume` is an earlier, unfinished result of the same scene,
     whose finished cells are kept.  `show_progress` None shows a bar on terminals, elsewhere a line a minute; `progress` is
-    called with a Progress after each block.  `skip` leaves out what the scene does not need, exactly (docs/skips.md);
-    False integrates it as it stands, a Skip of this scene is taken as is.  `certified` adds the transversal exponent of
+    called with a Progress after each block.  `reduce` leaves out what the scene does not need, exactly (docs/skips.md);
+    False integrates it as it stands, a Reduction of this scene is taken as is.  `certified` adds the transversal exponent of
     every cell and a verdict on its synchronisation to the result, and lets cells end that are certain to stay
     synchronous (see `synchain.runtime.sweeps.certify`).
 
-    Raises ValueError for an unknown axis, a result or a Skip of another scene, SweepInterrupted on Ctrl-C, and SweepFailed
+    Raises ValueError for an unknown axis, a result or a Reduction of another scene, SweepInterrupted on Ctrl-C, and SweepFailed
     where the workers are lost.
     """
     scene = with_axes(scene, axes)
     if resume is not None:
         instance("resume", resume, Result, "an earlier Result, e.g. from open_result")
     reporter = Reporter(scene.cells, show_progress, progress)
-    prepared = prepare(scene, skip, width, workers, executor, certified)
+    prepared = prepare(scene, reduce, width, workers, executor, certified)
     memory = _memory(prepared, resume)
     _work(memory, prepared, executor, reporter)
     return memory.result(prepared)
 
 
-def _work(memory: Memory, prepared: Prepared, executor: Executor | None, reporter: Reporter) -> None:
+def _work(memory: Memory, prepared: PreparedRun, executor: Executor | None, reporter: Reporter) -> None:
     """Run what is missing; whoever stops it gets the cells that have finished."""
-    sitting = Sitting(memory.layout, memory.done(), memory, reporter, prepared.certificate)
+    sitting = BlockScheduler(memory.layout, memory.done(), memory, reporter, prepared.certificate)
     try:
         reporter.start(tally(memory.buffers.counts[:, 0]) * (np.arange(CODES) == Status.FINISHED))
         sitting.run(prepared.shop, executor, prepared.workers)
@@ -128,14 +128,14 @@ class Memory:
             target[task.cells] = source
         whole.points[task.cells, :most] = made.points
 
-    def result(self, prepared: Prepared) -> Result:
+    def result(self, prepared: PreparedRun) -> Result:
         """The cells so far as a result."""
         chosen = prepared.shop.recipe.chosen
         spans = plan(chosen.scene).spans
         return gather(chosen.scene, prepared.attributes, spans, chosen.expand(self.buffers), prepared.certificate)
 
 
-def _memory(prepared: Prepared, earlier: Result | None) -> Memory:
+def _memory(prepared: PreparedRun, earlier: Result | None) -> Memory:
     """Arrays for all cells, with those of an earlier result that finished."""
     chosen = prepared.shop.recipe.chosen
     scene = chosen.scene

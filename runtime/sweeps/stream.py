@@ -17,20 +17,20 @@ from synchain.models.inputs.checks import a_path, flag, shown
 from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
-from ..cells.kernels import chosen_skip
+from ..cells.kernels import as_reduction
 from ..cells.layout import Layout
-from ..cells.reduce import Skip
+from ..cells.reduce import Reduction
+from ..results.block_log import Store
 from ..results.labels import alike, changed, scene_of
+from ..results.partial import about, certificate_of, finish_file, layout_of, partial_path
 from ..results.result import told_by
-from ..results.store import Store
-from ..results.unfinished import about, certificate_of, finish_file, layout_of, partial_path
 from ..support.files import check_replaceable, drop_leftovers, netcdf_data, understood
 from ..support.status import Status
-from .crew import Task, crew_size, worker_lost
+from .job import Start, whole
+from .pool import Task, pool_size, worker_lost
 from .progress import Hook, Progress, Reporter
 from .run import with_axes
-from .sitting import Prepared, Sitting, SweepFailed, SweepInterrupted, prepare
-from .worker import Start, whole
+from .scheduler import BlockScheduler, PreparedRun, SweepFailed, SweepInterrupted, prepare
 
 __all__ = ["Streamed", "claim", "stream"]
 
@@ -58,7 +58,7 @@ def stream(
     workers: int | None = None,
     show_progress: bool | None = None,
     width: int | None = None,
-    skip: bool | Skip = True,
+    reduce: bool | Reduction = True,
     certified: bool = False,
     executor: Executor | None = None,
     progress: Hook | None = None,
@@ -73,9 +73,9 @@ def stream(
     Raises the errors of `claim` where the files do not allow it, SweepInterrupted on Ctrl-C, SweepFailed where the workers
     are lost or the disk is full.
     """
-    chosen = chosen_skip(scene := with_axes(scene, axes, stream), skip)
+    chosen = as_reduction(scene := with_axes(scene, axes, stream), reduce)
     reporter = Reporter(scene.cells, show_progress, progress)
-    crew_size(executor, workers)  # refuses what is no executor before there is a file
+    pool_size(executor, workers)  # refuses what is no executor before there is a file
     if (state := claim(chosen, path, resume=resume, overwrite=overwrite, certified=certified)) == "complete":
         raise FileExistsError(
             f"{os.fspath(path)} holds the result of this scene already; give overwrite (--overwrite) to run it again"
@@ -91,7 +91,7 @@ def stream(
     return Streamed(Path(path), reporter.now, verdicts)
 
 
-def _prepared(chosen: Skip, partial: Path, state: str, certified: bool, **given: Any) -> Prepared:
+def _prepared(chosen: Reduction, partial: Path, state: str, certified: bool, **given: Any) -> PreparedRun:
     """The kernel, the certificate (made or kept) and, of a new run, the store."""
     if state == "continue":
         return prepare(chosen.scene, chosen, **given, certificate=certificate_of(Store.describe(partial)) or False)
@@ -102,7 +102,7 @@ def _prepared(chosen: Skip, partial: Path, state: str, certified: bool, **given:
 
 
 def claim(
-    chosen: Skip,
+    chosen: Reduction,
     path: str | os.PathLike[str],
     *,
     resume: bool = False,
@@ -152,7 +152,7 @@ def _described(target: Path) -> dict[str, Any]:
     return {"attributes": told_by(attributes, target), "certificate": certified or None}
 
 
-def _check_same(chosen: Skip, certified: bool, path: Path, told: Mapping[str, Any]) -> None:
+def _check_same(chosen: Reduction, certified: bool, path: Path, told: Mapping[str, Any]) -> None:
     """Raise ValueError where a file is not that of this run."""
     kept = told["attributes"]
     again = "repeat the options of that run, choose another path (--out), or replace it with overwrite (--overwrite)"
@@ -166,7 +166,7 @@ def _check_same(chosen: Skip, certified: bool, path: Path, told: Mapping[str, An
     if kept["equations"] != chosen.equations.digest:
         raise ValueError(
             f"{path} left out other parts of its scene: {kept.get('skipped', 'nothing')}; "
-            f"{again.replace('the options of that run', 'its skip (--no-skip, or the absence of it)')}"
+            f"{again.replace('the options of that run', 'its reduction (--no-skip, or the absence of it)')}"
         )
     if (told["certificate"] is not None) != certified:
         found = "with" if told["certificate"] is not None else "without"
@@ -193,13 +193,13 @@ class _Disk:
 
 
 def _fill(
-    prepared: Prepared, store: Store, executor: Executor | None, reporter: Reporter, path: str | os.PathLike[str]
+    prepared: PreparedRun, store: Store, executor: Executor | None, reporter: Reporter, path: str | os.PathLike[str]
 ) -> dict[str, int]:
     """Run what the store lacks, then write the result; returns the verdicts."""
     scene = prepared.shop.recipe.chosen.scene
     _check_kernel(prepared, store)
     layout = layout_of(store.about, scene)
-    sitting = Sitting(layout, store.done, _Disk(layout, store), reporter, prepared.certificate)
+    sitting = BlockScheduler(layout, store.done, _Disk(layout, store), reporter, prepared.certificate)
     try:
         drop_leftovers(path)
         reporter.start(store.counts)
@@ -217,7 +217,7 @@ def _fill(
         raise SweepFailed(reason, int(store.counts.sum()), scene.cells) from problem
 
 
-def _check_kernel(prepared: Prepared, store: Store) -> None:
+def _check_kernel(prepared: PreparedRun, store: Store) -> None:
     """Raise ValueError if a store's cells were run by another kernel, version or kind of processor."""
     recipe, kept = prepared.shop.recipe, store.about["attributes"]
     if (begun := str(kept.get("processor"))) != recipe.processor:

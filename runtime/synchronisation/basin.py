@@ -20,7 +20,7 @@ from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import with_parameters
 from ..cells.plan import Planner
-from ..cells.reduce import decide
+from ..cells.reduce import reduce_scene
 from ..support.arrays import row
 from ..support.status import Status
 from ..sweeps.progress import Hook
@@ -124,8 +124,10 @@ def basin(
     fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ("sync_error",)}
     scene = with_parameters(basin, scene, parameters, **fixed, transient=transient, window=window)
     cells = _started(scene, _box(scene, ranges), samples, seed)
-    chosen = replace(decide(cells, skip=False), jumps=True)
-    result = run(cells, skip=chosen, workers=workers, executor=executor, show_progress=show_progress, progress=progress)
+    chosen = replace(reduce_scene(cells, reduce=False), jumps=True)
+    result = run(
+        cells, reduce=chosen, workers=workers, executor=executor, show_progress=show_progress, progress=progress
+    )
     status = result.status.values
     error = np.where(status == Status.FINISHED, result.sync_error.values, np.inf)
     return Basin(scene, tolerance, confidence, Planner(cells).rows(np.arange(samples)).start, error, status)

@@ -28,9 +28,9 @@ from ..cells.buffers import Buffers
 from ..cells.plan import Plan, control_array, longest_step, plan, tolerances
 from ..support.arrays import numbers
 from ..support.status import CODES, Status, tally
-from ..sweeps.crew import Crew, Task, crew_size, feed
+from ..sweeps.job import JobSpec, RowsSpec
+from ..sweeps.pool import Task, WorkerPool, feed, pool_size
 from ..sweeps.progress import Hook, Reporter
-from ..sweeps.worker import Recipe, Rows
 from .threshold import Criterion, checked, offsets
 
 __all__ = ["MODE_ALPHA", "MODE_BETA", "Probe", "integrate", "ring_of_three", "universal_probe"]
@@ -93,7 +93,7 @@ def universal_probe(
     limits = tolerances(three, np.empty((0, 0)))
     control = control_array(*limits, longest_step(three), three.max_steps)
     error, status = integrate(
-        Rows(equations, three.integrator, cells, control), workers=workers, executor=executor, show_progress=show_progress,
+        RowsSpec(equations, three.integrator, cells, control), workers=workers, executor=executor, show_progress=show_progress,
         progress=progress,
     )  # fmt: skip
     shape = (*real.shape, criterion.starts)
@@ -177,14 +177,14 @@ def _cells(scene: Scene, names: tuple[str, ...], alpha: np.ndarray, beta: np.nda
 
 
 def integrate(
-    rows: Rows, width: int | None = None, *, workers: int | None = None, executor: Executor | None = None,
+    rows: RowsSpec, width: int | None = None, *, workers: int | None = None, executor: Executor | None = None,
     show_progress: bool | None = None, progress: Hook | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Run all rows; returns mean synchronisation error (cells,), infinite where unfinished, and status (cells,)."""
-    count, threads = len(rows.plan.start), crew_size(executor, workers)
+    count, threads = len(rows.plan.start), pool_size(executor, workers)
     reporter = Reporter(count, show_progress, progress)
     source = emit(rows.equations, rows.integrator, ("sync_error",), width=width)
-    crew = Crew(Recipe.of(rows, source.width, source.digest).opened(), executor, threads)
+    crew = WorkerPool(JobSpec.of(rows, source.width, source.digest).opened(), executor, threads)
     error, status = np.full(count, np.inf), np.full(count, int(Status.NOT_RUN))
     size = source.width * min(
         16, math.ceil(count / (8 * threads * source.width))

@@ -30,7 +30,7 @@ def nine(x: list[float], v: list[float], window: float, **more: float) -> Scene:
 
 def ran(scene: Scene, **more: Any) -> np.ndarray:
     """The states (component, oscillator) at the end of the only cell."""
-    result = run(scene, skip=False, show_progress=False, width=WIDTH, **more)
+    result = run(scene, reduce=False, show_progress=False, width=WIDTH, **more)
     assert np.all(result.status == Status.FINISHED)
     return np.asarray(result.end.values.reshape(3, -1))
 
@@ -44,11 +44,11 @@ def test_looped_events_are_those_of_the_kernel_that_is_written_out(
         topology=topology("ring", 3), contact="set-valued", transient=0.0, window=20.0, rtol=1e-12, record=(),
         coupling=coupling, initial={"x": [0.3, -0.2, 0.1], "v": [0.0, 0.2, -0.1]}, parameters={"sigma": 0.3},
     )  # fmt: skip
-    plain = run(scene, skip=False, show_progress=False)
+    plain = run(scene, reduce=False, show_progress=False)
     for module in (emit_module, load_module):
         monkeypatch.setattr(module, "LARGEST_UNROLLED", 0)
     load_module._load.cache_clear()
-    looped = run(scene, skip=False, show_progress=False)
+    looped = run(scene, reduce=False, show_progress=False)
     load_module._load.cache_clear()
     np.testing.assert_allclose(looped.end.values, plain.end.values, rtol=0, atol=1e-10)
     np.testing.assert_array_equal(looped.end.values[6:], plain.end.values[6:])
@@ -77,7 +77,7 @@ def test_a_sweep_finds_the_end_of_the_synchronous_range() -> None:
     """omega = 1.15: the largest mode of nine, sigma (2 + 2 cos(pi/9)) = 0.465, leaves the stable range at 0.1199."""
     x = [0.3 + 1e-6 * i for i in range(9)]
     scene = nine(x, [0.0] * 9, 20.0, omega=1.15).replace(transient=300.0, rtol=1e-8)
-    result = run(scene, skip=False, show_progress=False, width=WIDTH, sigma=[0.1, 0.11, 0.13, 0.14])
+    result = run(scene, reduce=False, show_progress=False, width=WIDTH, sigma=[0.1, 0.11, 0.13, 0.14])
     assert np.all(result.status == Status.FINISHED)
     assert list(result.sync_error.values < 1e-6) == [True, True, False, False]
 

@@ -23,14 +23,14 @@ from synchain.models import chain
 from synchain.models.graphs.products import cartesian
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.kernels import kernel_source
-from synchain.runtime.cells.reduce import decide
+from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.results.open import open_result
 from synchain.runtime.results.result import Result
-from synchain.runtime.sweeps import worker as works
+from synchain.runtime.sweeps import job as works
+from synchain.runtime.sweeps.job import JobSpec, run_block
 from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.sitting import SweepFailed
+from synchain.runtime.sweeps.scheduler import SweepFailed
 from synchain.runtime.sweeps.stream import stream
-from synchain.runtime.sweeps.worker import Recipe, run_block
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -44,9 +44,9 @@ def alone() -> dict[Scene, Result]:
     return {scene: run(scene, workers=1, show_progress=False) for scene in (MAP, UP)}
 
 
-def recipe(scene: Scene) -> Recipe:
-    source = kernel_source(scene, None, decide(scene))
-    return Recipe.of(decide(scene), source.width, source.digest)
+def recipe(scene: Scene) -> JobSpec:
+    source = kernel_source(scene, None, reduce_scene(scene))
+    return JobSpec.of(reduce_scene(scene), source.width, source.digest)
 
 
 # -- recipes -------------------------------------------------------------------------------------------------
@@ -55,7 +55,7 @@ def recipe(scene: Scene) -> Recipe:
 def test_a_recipe_is_small_and_comes_back():
     for scene in (MAP, Scene(topology=cartesian(chain(2), chain(3)), contact="atan")):
         packed = recipe(scene).packed()
-        again = Recipe.unpacked(packed)
+        again = JobSpec.unpacked(packed)
         assert len(packed) < 20_000
         assert again.chosen.scene == scene
         assert again.digest == recipe(scene).digest
@@ -64,10 +64,10 @@ def test_a_recipe_is_small_and_comes_back():
 def test_a_worker_with_other_versions_or_another_kernel_refuses(monkeypatch):
     packed = recipe(MAP).packed()
     with pytest.raises(RuntimeError, match="makes the kernel"):
-        works.Workshop(replace(recipe(MAP), digest="0" * 64))
+        works.SweepJob(replace(recipe(MAP), digest="0" * 64))
     monkeypatch.setattr(works, "versions", lambda: "synchain 0.0.1")
     with pytest.raises(RuntimeError, match=r"this worker has synchain 0\.0\.1; expected .*, synchain "):
-        Recipe.unpacked(packed)
+        JobSpec.unpacked(packed)
 
 
 class Elsewhere(Executor):
@@ -90,7 +90,7 @@ def test_a_worker_with_another_processor_says_so(monkeypatch):
     with pytest.raises(
         InstallationError, match="this worker has the processor abacus; expected that of the main program"
     ):
-        Recipe.unpacked(packed)
+        JobSpec.unpacked(packed)
 
 
 def test_a_worker_that_does_not_know_the_sweep_asks_for_it(monkeypatch):

@@ -22,14 +22,14 @@ from test_skip import MIRRORED
 from synchain.models.inputs.plugins import allow_code
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
-from synchain.runtime.cells.reduce import decide
+from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.figures.result_plot import draw_result
+from synchain.runtime.results.block_log import HEAD, Store
 from synchain.runtime.results.open import open_result
-from synchain.runtime.results.store import HEAD, Store
 from synchain.runtime.support.netcdf import Sheet
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.sitting import SweepFailed, SweepInterrupted
+from synchain.runtime.sweeps.scheduler import SweepFailed, SweepInterrupted
 from synchain.runtime.sweeps.stream import stream
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of Unix")
@@ -99,7 +99,7 @@ def test_every_shape_of_a_sweep_streams_as_it_saves(axes, tmp_path):
 def test_a_merged_network_streams_as_it_saves(tmp_path):
     """Oscillators that are stepped as one are kept as one and come back as all of them."""
     scene = MIRRORED.replace(axes={"sigma": [0.1, 0.2]})
-    assert len(decide(scene).states) < len(scene.y0)
+    assert len(reduce_scene(scene).states) < len(scene.y0)
     run(scene, width=1, show_progress=False).save(tmp_path / "a.nc")
     stream(scene, tmp_path / "b.nc", width=1, show_progress=False)
     assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
@@ -253,7 +253,7 @@ def test_a_page_of_zeros_costs_the_records_that_lie_on_it(tmp_path):
 
 
 def test_two_processes_do_not_write_to_one_store(store):
-    code = f"from synchain.runtime.results.store import Store\nStore.open({str(store)!r}, writing=True)"
+    code = f"from synchain.runtime.results.block_log import Store\nStore.open({str(store)!r}, writing=True)"
     held = Store.open(store, writing=True)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     held.close()
@@ -458,7 +458,7 @@ def test_other_versions_do_not_go_on_with_a_run(tmp_path, monkeypatch, interrupt
     path = tmp_path / "a.nc"
     with pytest.raises(SweepInterrupted):
         stream(MAP, path, show_progress=False, progress=interrupt_at(1))
-    monkeypatch.setattr("synchain.runtime.sweeps.worker.versions", lambda: "synchain 0.0.1")
+    monkeypatch.setattr("synchain.runtime.sweeps.job.versions", lambda: "synchain 0.0.1")
     with pytest.raises(ValueError, match=r"was begun with synchain .*; found synchain 0\.0\.1"):
         stream(MAP, path, resume=True, show_progress=False)
 

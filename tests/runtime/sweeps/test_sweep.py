@@ -16,9 +16,9 @@ from synchain.runtime.cells.kernels import kernel
 from synchain.runtime.cells.plan import plan, tolerances
 from synchain.runtime.results.open import open_result
 from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps import crew, worker
+from synchain.runtime.sweeps import job, pool
 from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.sitting import SweepInterrupted
+from synchain.runtime.sweeps.scheduler import SweepInterrupted
 
 PAIR = Scene(topology=chain(2), transient=5, window=10, parameters={"sigma": 0.1})
 SECTIONS = PAIR.replace(record=("sync_error", "section"))
@@ -87,7 +87,7 @@ def test_every_status_has_a_sentence():
 def test_section_room_grows_to_what_a_cell_needs(monkeypatch):
     whole = run(SECTIONS, sigma=[0.0, 0.1, 0.2])
     assert int(whole.section_count.min()) > 3
-    monkeypatch.setattr(worker, "_room", lambda *given: 2)
+    monkeypatch.setattr(job, "_room", lambda *given: 2)
     grown = run(SECTIONS, sigma=[0.0, 0.1, 0.2])
     assert grown.data.identical(whole.data)
 
@@ -108,7 +108,7 @@ def test_continuation_starts_from_the_neighbour(direction):
 def test_continuation_keeps_its_states_where_room_grows(monkeypatch):
     scene = SECTIONS.replace(axes={"sigma": [0.02, 0.05, 0.08]}, continuation="up")
     whole = run(scene)
-    monkeypatch.setattr(worker, "_room", lambda *given: 2)
+    monkeypatch.setattr(job, "_room", lambda *given: 2)
     assert run(scene).data.identical(whole.data)
 
 
@@ -166,7 +166,7 @@ def interruptible():
 
 def test_interrupt_keeps_finished_cells_and_resume_completes_them(monkeypatch, interruptible):
     scene = SECTIONS.replace(transient=50, window=50, axes={"sigma": list(np.linspace(0, 0.3, 200))})
-    following = crew._next
+    following = pool._next
 
     def next_then_interrupt(arrived):
         future = following(arrived)
@@ -174,7 +174,7 @@ def test_interrupt_keeps_finished_cells_and_resume_completes_them(monkeypatch, i
         return future
 
     with monkeypatch.context() as patch:
-        patch.setattr(crew, "_next", next_then_interrupt)
+        patch.setattr(pool, "_next", next_then_interrupt)
         with pytest.raises(SweepInterrupted) as caught:
             run(scene, workers=1)
     partial = caught.value.result
@@ -218,6 +218,6 @@ def test_a_window_of_whole_periods_has_its_last_sample(periods: int) -> None:
         time_unit="time", parameters={"delta": 0.5},
     )  # fmt: skip
     for window in (2 * np.pi * periods, np.nextafter(2 * np.pi * periods, 0), np.nextafter(2 * np.pi * periods, 1e9)):
-        result = run(scene.replace(window=float(window)), skip=False, width=1)
+        result = run(scene.replace(window=float(window)), reduce=False, width=1)
         assert np.isfinite(result.trajectory.values).all(), window
         np.testing.assert_allclose(result.trajectory.values[-1], result.end.values, rtol=1e-11)

@@ -14,7 +14,7 @@ from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import Edge, Node
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps import worker
+from synchain.runtime.sweeps import job
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.synchronisation.probe import MODE_ALPHA, MODE_BETA, ring_of_three, universal_probe
 from synchain.runtime.synchronisation.threshold import Criterion, probe
@@ -108,7 +108,7 @@ def test_a_one_way_ring_is_one_point_of_the_plane():
 
 def test_a_plane_needs_one_kernel_and_the_workers_do_not_matter(monkeypatch):
     loaded = []
-    monkeypatch.setattr(worker, "load", lambda source, load=worker.load: loaded.append(source.digest) or load(source))
+    monkeypatch.setattr(job, "load", lambda source, load=job.load: loaded.append(source.digest) or load(source))
     criterion = Criterion(transient=5, window=2, starts=3)
     alpha, beta = np.linspace(-0.5, 2.0, 30), np.linspace(-1.0, 1.0, 30)
     one, two = (universal_probe(SPRINGS, alpha, beta, criterion=criterion, workers=workers) for workers in (1, 2))

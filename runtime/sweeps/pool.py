@@ -16,9 +16,9 @@ from synchain.models.inputs.checks import instance
 
 from ..cells.buffers import Buffers
 from ..support.threads import worker_count
-from .worker import Given, Start, Workshop, forget, run_block
+from .job import RowsJob, Start, SweepJob, forget, run_block
 
-__all__ = ["Crew", "Task", "crew_size", "feed", "worker_lost"]
+__all__ = ["Task", "WorkerPool", "feed", "pool_size", "worker_lost"]
 
 LOOK = 0.2
 """Seconds after which somebody who waits for a block looks whether Ctrl-C was pressed."""
@@ -29,7 +29,7 @@ ELSEWHERE = ("distributed", "dask", "tornado", "mpi4py")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """Cells (numbers) of a block to run; `start` in place of the scene's, `near` as in `Workshop.run`."""
+    """Cells (numbers) of a block to run; `start` in place of the scene's, `near` as in `SweepJob.run`."""
 
     block: int
     cells: np.ndarray
@@ -37,10 +37,10 @@ class Task:
     near: np.ndarray | None = None
 
 
-class Crew:
+class WorkerPool:
     """Workers and the sweep that they work on; `limit` tasks are with them at a time, two for each."""
 
-    def __init__(self, shop: Workshop | Given, executor: Executor | None, workers: int) -> None:
+    def __init__(self, shop: SweepJob | RowsJob, executor: Executor | None, workers: int) -> None:
         self.shop = shop
         self.limit = 2 * workers
         self.executor = ThreadPoolExecutor(workers) if executor is None else executor
@@ -73,7 +73,7 @@ class Crew:
             self.executor.shutdown(wait=True, cancel_futures=True)
 
 
-def crew_size(executor: Executor | None, workers: int | None) -> int:
+def pool_size(executor: Executor | None, workers: int | None) -> int:
     """How many blocks can run at a time: as given, else as far as the executor tells, else all cores."""
     if executor is not None:
         instance("executor", executor, Executor, "a concurrent.futures.Executor, e.g. ProcessPoolExecutor(2)")
@@ -87,7 +87,7 @@ def crew_size(executor: Executor | None, workers: int | None) -> int:
     )
 
 
-def feed(crew: Crew, tasks: Iterator[Task], finish: Callable[[Task, Buffers], Task | None]) -> None:
+def feed(crew: WorkerPool, tasks: Iterator[Task], finish: Callable[[Task, Buffers], Task | None]) -> None:
     """Run the tasks and those that `finish` adds; on Ctrl-C the blocks in flight are finished first where that can be.
 
     A second Ctrl-C leaves them.  Raises what a worker raised.
@@ -120,7 +120,9 @@ def feed(crew: Crew, tasks: Iterator[Task], finish: Callable[[Task, Buffers], Ta
         raise
 
 
-def _fill(crew: Crew, flying: dict[Future[Any], Task], tasks: Iterable[Task], send: Callable[[Task], None]) -> None:
+def _fill(
+    crew: WorkerPool, flying: dict[Future[Any], Task], tasks: Iterable[Task], send: Callable[[Task], None]
+) -> None:
     while len(flying) < crew.limit:
         task = next(iter(tasks), None)
         if task is None:

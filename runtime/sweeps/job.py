@@ -31,7 +31,7 @@ from ..cells.kernels import kernel, kernel_source
 from ..cells.plan import CANCEL, Plan, Planner, control_array, longest_step, tolerances
 from ..support.status import Status
 
-__all__ = ["Given", "Recipe", "Rows", "Start", "Workshop", "forget", "run_block", "versions"]
+__all__ = ["JobSpec", "RowsJob", "RowsSpec", "Start", "SweepJob", "forget", "run_block", "versions"]
 
 DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
 KEPT = 8
@@ -43,17 +43,17 @@ LARGEST = 2**25
 Start = tuple[np.ndarray, np.ndarray]
 """States (cells, dimension) to start from in place of the scene's, and for which cells (cells,) they are good."""
 
-_shops: OrderedDict[str, Workshop | Given] = OrderedDict()
+_shops: OrderedDict[str, SweepJob | RowsJob] = OrderedDict()
 _lock = threading.Lock()
 
 
 @dataclass(frozen=True, slots=True)
-class Recipe:
+class JobSpec:
     """What all blocks of a sweep have in common; `digest` is that of the kernel's text, `code` are files allowed to run.
 
     `processor` is the kind that machine code is made for (see `synchain.codegen.kernels.processor`).
 
-    `chosen` is what is left of a scene to integrate (a Skip), or cells of a kernel that no scene has (Rows).
+    `chosen` is what is left of a scene to integrate (a Reduction), or cells of a kernel that no scene has (RowsSpec).
     """
 
     chosen: Any
@@ -64,7 +64,7 @@ class Recipe:
     code: tuple[str, ...]
 
     @classmethod
-    def of(cls, chosen: Any, source_width: int, digest: str) -> Recipe:
+    def of(cls, chosen: Any, source_width: int, digest: str) -> JobSpec:
         """The recipe of a sweep in this process."""
         return cls(chosen, source_width, digest, versions(), processor(), allowed_code())
 
@@ -77,7 +77,7 @@ class Recipe:
         return target.getvalue()
 
     @classmethod
-    def unpacked(cls, data: bytes) -> Recipe:
+    def unpacked(cls, data: bytes) -> JobSpec:
         """From bytes; InstallationError if this worker has other versions or another processor than the main program."""
         source = io.BytesIO(data)
         head = pickle.load(source)
@@ -103,13 +103,13 @@ class Recipe:
                 f"{self.digest[:12]}: a sweep needs the same installation everywhere"
             )
 
-    def opened(self) -> Workshop | Given:
+    def opened(self) -> SweepJob | RowsJob:
         """The kernel with all that it needs to run."""
-        return Given(self) if isinstance(self.chosen, Rows) else Workshop(self)
+        return RowsJob(self) if isinstance(self.chosen, RowsSpec) else SweepJob(self)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rows:
+class RowsSpec:
     """Cells of equations that no scene has: their rows, integrator and control array; only the error is recorded."""
 
     equations: Equations
@@ -119,15 +119,15 @@ class Rows:
 
 
 @dataclass(slots=True)
-class Given:
+class RowsJob:
     """A kernel, ready to run any of the given rows."""
 
-    recipe: Recipe
+    recipe: JobSpec
     kernel: Kernel = field(init=False)
     control: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        rows: Rows = self.recipe.chosen
+        rows: RowsSpec = self.recipe.chosen
         source = emit(rows.equations, rows.integrator, ("sync_error",), width=self.recipe.width)
         self.recipe.check(source)
         self.kernel, self.control = load(source), rows.control.copy()
@@ -146,10 +146,10 @@ class Given:
 
 
 @dataclass(slots=True)
-class Workshop:
+class SweepJob:
     """A kernel, ready to run any cells of its sweep."""
 
-    recipe: Recipe
+    recipe: JobSpec
     kernel: Kernel = field(init=False)
     planner: Planner = field(init=False)
     control: np.ndarray = field(init=False)
@@ -217,7 +217,7 @@ def run_block(key: str, recipe: bytes | None, *block: Any) -> Buffers | None:
     with _lock:
         shop = _shops.get(key)
         if shop is None and recipe is not None:
-            shop = _shops[key] = Recipe.unpacked(recipe).opened()
+            shop = _shops[key] = JobSpec.unpacked(recipe).opened()
             while len(_shops) > KEPT:
                 _shops.popitem(last=False)
     return None if shop is None else shop.run(*block)

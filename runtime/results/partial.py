@@ -17,19 +17,19 @@ from synchain.models.scenes.scene import Scene
 from ..cells.buffers import COUNTS, SUMS, Buffers
 from ..cells.layout import Layout
 from ..cells.plan import Planner
-from ..cells.reduce import Merged, Skip
+from ..cells.reduce import NodeMerge, Reduction
 from ..support.files import understood, whole_file
 from ..support.netcdf import Sheet, seal, unsealed
+from .block_log import Store
 from .certificate import VERDICTS, Certificate
 from .labels import MEANINGS, Variable, coordinates, dimensions, scene_of, variables
 from .result import IN_MEMORY, Result, gather
-from .store import Store
 
 __all__ = ["about", "certificate_of", "finish_file", "layout_of", "open_unfinished", "partial_path"]
 
 
 def about(
-    chosen: Skip, layout: Layout, samples: int, attributes: Mapping[str, Any], certificate: Certificate | None
+    chosen: Reduction, layout: Layout, samples: int, attributes: Mapping[str, Any], certificate: Certificate | None
 ) -> dict[str, Any]:
     """What a store has to say of its sweep, in JSON types, so that it can be read without the kernel."""
     merged = chosen.merged
@@ -72,7 +72,7 @@ class _Reader:
         self.planner = Planner(self.scene)
         same = np.arange(int(told["dimension"]))
         states, places = (same, same) if told["merged"] is None else map(np.array, told["merged"])
-        self.merged = Merged(states, places, bool(told["together"]))
+        self.merged = NodeMerge(states, places, bool(told["together"]))
 
     def buffers(self, block: int) -> Buffers:
         return self.merged.expand(self.store.read(block))

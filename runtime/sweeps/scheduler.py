@@ -15,19 +15,19 @@ from synchain.models.inputs.checks import flag
 from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
-from ..cells.kernels import chosen_skip, kernel_source
+from ..cells.kernels import as_reduction, kernel_source
 from ..cells.layout import Layout, block_size
-from ..cells.reduce import Skip
+from ..cells.reduce import Reduction
 from ..results.certificate import Certificate
 from ..results.labels import provenance
 from ..results.result import Result
 from ..support.status import Status, tally
 from .certify import certify
-from .crew import Crew, Task, crew_size, feed
+from .job import JobSpec, Start, SweepJob, whole
+from .pool import Task, WorkerPool, feed, pool_size
 from .progress import Reporter
-from .worker import Recipe, Start, Workshop, whole
 
-__all__ = ["Prepared", "Sink", "Sitting", "SweepFailed", "SweepInterrupted", "prepare"]
+__all__ = ["BlockScheduler", "PreparedRun", "Sink", "SweepFailed", "SweepInterrupted", "prepare"]
 
 
 class SweepInterrupted(KeyboardInterrupt):
@@ -67,7 +67,7 @@ class Sink(Protocol):
 
 
 @dataclass(slots=True)
-class Sitting:
+class BlockScheduler:
     """A sweep's layout, the blocks (blocks,) that are there, where the others go, and who is told."""
 
     layout: Layout
@@ -76,11 +76,11 @@ class Sitting:
     reporter: Reporter
     certificate: Certificate | None = None
 
-    def run(self, shop: Workshop, executor: Executor | None, workers: int) -> None:
+    def run(self, shop: SweepJob, executor: Executor | None, workers: int) -> None:
         """Run all blocks that are not there; raises what a worker raises, and KeyboardInterrupt on Ctrl-C."""
         if self.done.all():
             return
-        crew = Crew(shop, executor, workers)
+        crew = WorkerPool(shop, executor, workers)
         try:
             feed(crew, self.tasks(), self.finish)
         finally:
@@ -112,10 +112,10 @@ class Sitting:
 
 
 @dataclass(frozen=True, slots=True)
-class Prepared:
+class PreparedRun:
     """Kernel and certificate of a sweep, and how many workers it has."""
 
-    shop: Workshop
+    shop: SweepJob
     certificate: Certificate | None
     workers: int
 
@@ -140,24 +140,24 @@ class Prepared:
 
 def prepare(
     scene: Scene,
-    skip: bool | Skip,
+    reduce: bool | Reduction,
     width: int | None,
     workers: int | None,
     executor: Executor | None,
     certificate: Certificate | bool,
-) -> Prepared:
+) -> PreparedRun:
     """Compile the kernel of a scene and, with `certificate` True, find the exponents of its cells."""
-    chosen = chosen_skip(scene, skip)
+    chosen = as_reduction(scene, reduce)
     if not isinstance(certificate, Certificate):
         flag("certified", certificate)
     source = kernel_source(scene, width, chosen)
     _warn_of_chords(scene, source.integrator)
-    count = crew_size(executor, workers)
+    count = pool_size(executor, workers)
     if isinstance(certificate, bool):
         found = certify(scene, workers=None if executor is not None else count) if certificate else None
     else:
         found = certificate
-    return Prepared(Workshop(Recipe.of(chosen, source.width, source.digest)), found, count)
+    return PreparedRun(SweepJob(JobSpec.of(chosen, source.width, source.digest)), found, count)
 
 
 def _warn_of_chords(scene: Scene, name: str) -> None:
