@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from .stability.msf import MSF, Plane, msf, plane
     from .stability.transversal import Exponents, exponents
     from .support.status import Status
+    from .sweeps.errors import SweepFailed, SweepInterrupted
     from .sweeps.progress import Progress
     from .sweeps.run import run
-    from .sweeps.scheduler import SweepFailed, SweepInterrupted
     from .sweeps.stream import Streamed, stream
     from .synchronisation.basin import Basin, basin
     from .synchronisation.probe import Probe, universal_probe
@@ -46,14 +46,14 @@ _HOME = {
     "Result": "results.result",
     "Status": "support.status",
     "Streamed": "sweeps.stream",
-    "SweepFailed": "sweeps.scheduler",
-    "SweepInterrupted": "sweeps.scheduler",
+    "SweepFailed": "sweeps.errors",
+    "SweepInterrupted": "sweeps.errors",
     "Thresholds": "synchronisation.threshold",
     "basin": "synchronisation.basin",
     "cluster_exponents": "stability.clusters",
     "exponents": "stability.transversal",
     "follow": "bifurcation.branches",
-    "kernel": "sweeps.run",
+    "kernel": "cells.kernels",
     "lyapunov_spectrum": "stability.lyapunov",
     "msf": "stability.msf",
     "open_result": "results.open",

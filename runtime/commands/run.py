@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from synchain.models.scenes.scene import Scene
 
     from ..cells.reduce import Reduction
-    from ..sweeps.scheduler import SweepFailed, SweepInterrupted
+    from ..sweeps.errors import SweepFailed, SweepInterrupted
     from ..sweeps.stream import Streamed
 
 SUMMARY = "run a scene; write its results (netCDF) and a figure"
@@ -85,7 +85,7 @@ def execute(arguments: Namespace) -> int:
     """Explain the scene where asked to; run it to a file, draw, and say how the cells ended."""
     from ..cells.kernels import kernel
     from ..cells.reduce import explain, reduce_scene
-    from ..sweeps.scheduler import SweepFailed, SweepInterrupted
+    from ..sweeps.errors import SweepFailed, SweepInterrupted
     from ..sweeps.stream import claim, stream
 
     if arguments.out is None and (arguments.resume or arguments.overwrite or not arguments.explain):
@@ -121,7 +121,8 @@ def changed_scene(arguments: Namespace) -> Scene:
     """The scene with the changes of --set and --rtol; ValueError where they do not fit."""
     from synchain.models.scenes.file import load_scene
 
-    from ..sweeps.run import with_axes
+    from ..cells.keywords import with_axes
+    from ..sweeps.run import run
 
     scene = load_scene(arguments.scene)
     changes: dict[str, Any] = {}
@@ -129,7 +130,7 @@ def changed_scene(arguments: Namespace) -> Scene:
         if name in changes:
             raise WrongUse(f"--set gives {name} twice; expected it once")
         changes[name] = _fitting(scene, name, value)
-    scene = with_axes(scene, changes)
+    scene = with_axes(run, scene, changes)
     if changes:
         scene = scene.replace(title=f"{scene.title or arguments.scene}, changed: {', '.join(changes)}")
     return scene if arguments.rtol is None else scene.replace(rtol=arguments.rtol)

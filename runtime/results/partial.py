@@ -1,4 +1,4 @@
-"""From the blocks of a sweep on disk to a result: of all cells so far in memory, or of all cells in a netCDF file."""
+"""Results out of the blocks of a sweep on disk: of the cells so far in memory, or of all cells in a netCDF file."""
 
 from __future__ import annotations
 
@@ -11,112 +11,127 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from synchain.codegen.driver.columns import Count, Point, Sum
 from synchain.models.inputs.checks import whole
 from synchain.models.scenes.scene import Scene
 
-from ..cells.buffers import COUNTS, SUMS, Buffers
+from ..cells.buffers import Buffers
 from ..cells.layout import Layout
 from ..cells.plan import Planner
 from ..cells.reduce import NodeMerge, Reduction
 from ..support.files import understood, whole_file
 from ..support.netcdf import Sheet, seal, unsealed
-from .block_log import Store
+from .block_log import BlockLog
 from .certificate import VERDICTS, Certificate
 from .labels import MEANINGS, Variable, coordinates, dimensions, scene_of, variables
 from .result import IN_MEMORY, Result, gather
 
-__all__ = ["about", "certificate_of", "finish_file", "layout_of", "open_unfinished", "partial_path"]
+__all__ = ["certificate_of", "describe_sweep", "layout_of", "partial_path", "read_partial", "write_result"]
 
 
-def about(
-    chosen: Reduction, layout: Layout, samples: int, attributes: Mapping[str, Any], certificate: Certificate | None
+def describe_sweep(
+    reduction: Reduction, layout: Layout, attributes: Mapping[str, Any], certificate: Certificate | None
 ) -> dict[str, Any]:
-    """What a store has to say of its sweep, in JSON types, so that it can be read without the kernel."""
-    merged = chosen.merged
-    few = len(merged.states) < len(merged.places)
+    """Return what a block log says of its sweep, in JSON types, so that it can be read without the kernel."""
+    merge = reduction.merge
+    exponents = None if certificate is None else (certificate.exponent, certificate.stderr, certificate.diffusion)
     return {
         "attributes": dict(attributes),
         "blocks": layout.blocks,
         "size": layout.size,
-        "dimension": len(merged.states),
-        "samples": samples,
-        "merged": [merged.states.tolist(), merged.places.tolist()] if few else None,
-        "together": merged.together,
-        "certificate": None if certificate is None else [
-            part.tolist() for part in (certificate.exponent, certificate.stderr, certificate.diffusion)
-        ],
-    }  # fmt: skip
+        "dimension": reduction.dimension,
+        "samples": reduction.samples,
+        "merged": [merge.states.tolist(), merge.places.tolist()] if merge.merges else None,
+        "together": merge.together,
+        "certificate": None if exponents is None else [part.tolist() for part in exponents],
+    }
 
 
-def layout_of(told: Mapping[str, Any], scene: Scene) -> Layout:
-    """The blocks of a store; ValueError if it does not have as many as its scene needs."""
-    layout = Layout.of(scene, whole("size", told["size"], 1))
-    if layout.blocks != told["blocks"]:
-        raise ValueError(f"found {told['blocks']} blocks; expected {layout.blocks} for the cells of its scene")
+def layout_of(about: Mapping[str, Any], scene: Scene) -> Layout:
+    """Return the blocks of a log.
+
+    Raises
+    ------
+    ValueError
+        If it does not have as many as its scene needs.
+    """
+    layout = Layout.of(scene, whole("size", about["size"], 1))
+    if layout.blocks != about["blocks"]:
+        raise ValueError(f"found {about['blocks']} blocks; expected {layout.blocks} for the cells of its scene")
     return layout
 
 
-def certificate_of(told: Mapping[str, Any]) -> Certificate | None:
-    """The certificate of a store's cells, None where they are not certified."""
-    found = told["certificate"]
-    return None if found is None else Certificate(*(np.array(part, dtype=float) for part in found))
+def certificate_of(about: Mapping[str, Any]) -> Certificate | None:
+    """Return the certificate of a log's cells; None if they are not certified."""
+    exponents = about["certificate"]
+    return None if exponents is None else Certificate(*(np.array(part, dtype=float) for part in exponents))
 
 
 class _Reader:
-    """Reads blocks of a store as those of the whole network."""
+    """Reads the blocks of a log as those of the whole network."""
 
-    def __init__(self, store: Store, scene: Scene) -> None:
-        told = store.about
-        self.store, self.scene = store, scene
-        self.layout, self.certificate = layout_of(told, self.scene), certificate_of(told)
-        self.planner = Planner(self.scene)
-        same = np.arange(int(told["dimension"]))
-        states, places = (same, same) if told["merged"] is None else map(np.array, told["merged"])
-        self.merged = NodeMerge(states, places, bool(told["together"]))
+    def __init__(self, log: BlockLog, scene: Scene) -> None:
+        about = log.about
+        self.log, self.scene = log, scene
+        self.layout, self.certificate = layout_of(about, scene), certificate_of(about)
+        self.planner = Planner(scene)
+        same = np.arange(int(about["dimension"]))
+        states, places = (same, same) if about["merged"] is None else map(np.array, about["merged"])
+        self.merge = NodeMerge(states, places, bool(about["together"]))
 
     def buffers(self, block: int) -> Buffers:
-        return self.merged.expand(self.store.read(block))
+        """The results of a block."""
+        return self.merge.expand(self.log.read(block))
 
-    def variables(self, rows: np.ndarray, buffers: Buffers) -> Iterator[Variable]:
-        own = None if self.certificate is None else self.certificate.take(rows)
-        return variables(self.scene, self.planner.rows(rows).spans, buffers, own, self.store.most)
-
-
-def open_unfinished(path: str | os.PathLike[str]) -> Result:
-    """The cells so far of a sweep on disk; the others have the status NOT_RUN."""
-    with understood(Path(path)):
-        told = Store.describe(path)
-        scene = scene_of(told["attributes"])
-        layout_of(told, scene)
-        with closing(Store.open(path)) as store:
-            return _so_far(store, scene)
+    def variables(self, cells: np.ndarray, buffers: Buffers) -> Iterator[Variable]:
+        """The variables of these cells, whose results the buffers hold."""
+        certificate = None if self.certificate is None else self.certificate.take(cells)
+        return variables(self.scene, self.planner.spans(cells), buffers, certificate, self.log.most)
 
 
-def _so_far(store: Store, scene: Scene) -> Result:
-    reader = _Reader(store, scene)
-    dimension, samples = len(reader.merged.places), int(store.about["samples"])
-    numbers = scene.cells * (dimension * (1 + samples) + (dimension + 1) * store.most + SUMS + COUNTS)
-    if numbers > IN_MEMORY:
-        raise ValueError(
-            f"found a sweep of {numbers * 8 / 1e9:.0f} GB; expected at most {IN_MEMORY * 8 / 1e9:.0f} GB in memory; finish "
-            "it with resume (--resume), and open parts of the result with xarray"
-        )
-    made = Buffers.empty(scene.cells, dimension, store.most, samples)
-    for block in np.flatnonzero(store.done).tolist():
-        rows, found = reader.layout.rows(block), reader.buffers(block)
-        for target, source in zip(made.arrays(), found.arrays(), strict=True):
-            target[(rows, slice(source.shape[1]))] = source
-    spans = reader.planner.rows(np.arange(scene.cells)).spans
-    return gather(scene, store.about["attributes"], spans, made, reader.certificate)
+def read_partial(path: str | os.PathLike[str]) -> Result:
+    """Return the cells so far of a sweep on disk; the others have the status NOT_RUN.
 
-
-def finish_file(store: Store, path: str | os.PathLike[str], scene: Scene) -> dict[str, int]:
-    """Write the netCDF file of a scene's store whose blocks are all there, one block in memory at a time.
-
-    Returns how many cells have which verdict, and how many "ended early"; empty where the cells are not certified.
+    Raises
+    ------
+    ValueError
+        If the file is damaged, or if its cells do not fit into memory.
     """
-    reader = _Reader(store, scene)
-    told: dict[str, int] = {}
+    with understood(Path(path)):
+        about = BlockLog.describe(path)
+        scene = scene_of(about["attributes"])
+        layout_of(about, scene)
+        with closing(BlockLog.open(path)) as log:
+            return _so_far(_Reader(log, scene))
+
+
+def _so_far(reader: _Reader) -> Result:
+    """The blocks that a log holds, as a result."""
+    log, scene = reader.log, reader.scene
+    dimension, samples = len(reader.merge.places), int(log.about["samples"])
+    row = dimension * (1 + samples) + (Point.STATE + dimension) * log.most + len(Sum) + len(Count)
+    if scene.cells * row > IN_MEMORY:
+        raise ValueError(
+            f"found a sweep of {scene.cells * row * 8 / 1e9:.0f} GB; expected at most {IN_MEMORY * 8 / 1e9:.0f} GB in "
+            "memory; finish it with resume (--resume), and open parts of the result with xarray"
+        )
+    buffers = Buffers.empty(scene.cells, dimension, log.most, samples)
+    for block in np.flatnonzero(log.done).tolist():
+        buffers.put(reader.layout.rows(block), reader.buffers(block))
+    spans = reader.planner.spans(np.arange(scene.cells))
+    return gather(scene, log.about["attributes"], spans, buffers, reader.certificate)
+
+
+def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> dict[str, int]:
+    """Write the netCDF file of a scene's log that has all blocks, with one block in memory at a time.
+
+    Returns
+    -------
+    dict of str to int
+        How many cells have each verdict, and how many "ended early"; empty if the cells are not certified.
+    """
+    reader = _Reader(log, scene)
+    verdicts: dict[str, int] = {}
     axes = {axis.name: len(axis) for axis in scene.axes}
     lengths = {"cell": scene.cells} if scene.zipped else axes
     with whole_file(path) as temporary, open(temporary, "w+b") as file:
@@ -127,12 +142,12 @@ def finish_file(store: Store, path: str | os.PathLike[str], scene: Scene) -> dic
             rows = reader.layout.rows(block)
             for name, _, values in reader.variables(rows, reader.buffers(block)):
                 sheet.put(name, rows, values)
-                for word, count in _words(name, values):
-                    told[word] = told.get(word, 0) + count
+                for verdict, count in _verdicts(name, values):
+                    verdicts[verdict] = verdicts.get(verdict, 0) + count
         seal(file)
         file.flush()
         os.fsync(file.fileno())
-    return told
+    return verdicts
 
 
 def _template(reader: _Reader) -> xr.Dataset:
@@ -145,15 +160,15 @@ def _template(reader: _Reader) -> xr.Dataset:
         name: ((*dims, *more), values[:1].reshape((*ones, *values.shape[1:])), {"long_name": MEANINGS[name]})
         for name, more, values in reader.variables(one, first)
     }
-    made = coordinates(scene)
+    coords = coordinates(scene)
     for axis in scene.axes:
-        dim, values = made[axis.name]
-        made[axis.name] = (dim, values[:1])
-    return unsealed(xr.Dataset(data, made, reader.store.about["attributes"]))
+        dim, values = coords[axis.name]
+        coords[axis.name] = (dim, values[:1])
+    return unsealed(xr.Dataset(data, coords, reader.log.about["attributes"]))
 
 
-def _words(name: str, values: np.ndarray) -> list[tuple[str, int]]:
-    """What a block adds to the count of verdicts."""
+def _verdicts(name: str, values: np.ndarray) -> list[tuple[str, int]]:
+    """What a variable of a block adds to the count of verdicts."""
     if name == "ended_early":
         return [("ended early", int(np.count_nonzero(values)))]
     if name == "verdict":
@@ -163,5 +178,5 @@ def _words(name: str, values: np.ndarray) -> list[tuple[str, int]]:
 
 
 def partial_path(path: str | os.PathLike[str]) -> Path:
-    """Where the blocks of a run are kept until its result is written: beside the result."""
+    """Return where the blocks of a run are kept until its result is written: beside the result."""
     return Path(path).with_suffix(".partial")

@@ -1,8 +1,7 @@
-"""What a worker does: from a recipe it makes the kernel, then it runs the blocks that it is given.
+"""Jobs: a compiled kernel with all that it needs to run cells, and the specification that rebuilds it elsewhere.
 
-A worker is a thread, another process or another machine.  Where it does not share our memory it gets the recipe of a sweep
-once, packed, and makes the kernel itself, from its own installation and through its own cache; of a block it gets the
-numbers of the cells.
+A job runs in threads of this process.  A worker that does not share its memory, another process or another machine,
+gets the specification once, packed, and compiles the kernel from its own installation (`worker.py`).
 """
 
 from __future__ import annotations
@@ -11,13 +10,12 @@ import importlib.metadata
 import io
 import math
 import pickle
-import threading
-from collections import OrderedDict
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
+from synchain.codegen.driver.columns import Control
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.installation import InstallationError
 from synchain.codegen.kernels.processor import processor, told_apart
@@ -27,36 +25,57 @@ from synchain.models.inputs.plugins import allow_code, allowed_code
 from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
-from ..cells.kernels import kernel, kernel_source
-from ..cells.plan import CANCEL, Plan, Planner, control_array, longest_step, tolerances
-from ..support.status import Status
+from ..cells.kernels import write_kernel
+from ..cells.plan import Plan, Planner, control_of
+from ..cells.reduce import Reduction
 
-__all__ = ["JobSpec", "RowsJob", "RowsSpec", "Start", "SweepJob", "forget", "run_block", "versions"]
+__all__ = ["Job", "JobSpec", "Problem", "RowsJob", "RowsSpec", "Start", "SweepJob", "SweepSpec", "versions"]
 
-DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
-KEPT = 8
-"""Sweeps that a worker process remembers; an older one is sent to it again."""
-
-LARGEST = 2**25
+LARGEST_ROOM = 2**25
 """Numbers that the room for section points of a block has at first, 268 MB."""
 
 Start = tuple[np.ndarray, np.ndarray]
 """States (cells, dimension) to start from in place of the scene's, and for which cells (cells,) they are good."""
 
-_shops: OrderedDict[str, SweepJob | RowsJob] = OrderedDict()
-_lock = threading.Lock()
+
+class Job(Protocol):
+    """A compiled kernel, ready to run blocks of cells."""
+
+    spec: JobSpec
+
+    def run(self, *block: Any) -> Buffers:
+        """Run a block; its arguments are those of a `Task`."""
+
+    def cancel(self) -> None:
+        """End all cells that run in this process."""
+
+
+class Problem(Protocol):
+    """What a job integrates."""
+
+    def source(self, width: int) -> KernelSource:
+        """Return the text of its kernel."""
+
+    def job(self, spec: JobSpec, kernel: Kernel) -> Job:
+        """Return the job that runs its kernel."""
 
 
 @dataclass(frozen=True, slots=True)
 class JobSpec:
-    """What all blocks of a sweep have in common; `digest` is that of the kernel's text, `code` are files allowed to run.
+    """What all blocks of a job have in common: enough to rebuild it in another process.
 
-    `processor` is the kind that machine code is made for (see `synchain.codegen.kernels.processor`).
-
-    `chosen` is what is left of a scene to integrate (a Reduction), or cells of a kernel that no scene has (RowsSpec).
+    Attributes
+    ----------
+    problem : Problem
+    width, digest : int, str
+        Lanes of the kernel and SHA-256 of its text.
+    versions, processor : str
+        Versions and kind of processor of the main program; a worker must have the same.
+    code : tuple of str
+        Files of code that are allowed to run.
     """
 
-    chosen: Any
+    problem: Problem
     width: int
     digest: str
     versions: str
@@ -64,21 +83,27 @@ class JobSpec:
     code: tuple[str, ...]
 
     @classmethod
-    def of(cls, chosen: Any, source_width: int, digest: str) -> JobSpec:
-        """The recipe of a sweep in this process."""
-        return cls(chosen, source_width, digest, versions(), processor(), allowed_code())
+    def of(cls, problem: Problem, source: KernelSource) -> JobSpec:
+        """Return the specification of a job of this process."""
+        return cls(problem, source.width, source.digest, versions(), processor(), allowed_code())
 
     def packed(self) -> bytes:
-        """As bytes, for a worker elsewhere."""
+        """Return the specification as bytes, for a worker elsewhere."""
         target = io.BytesIO()
         head = {name: getattr(self, name) for name in ("versions", "processor", "code", "width", "digest")}
         pickle.dump(head, target)
-        pickle.dump(self.chosen, target)
+        pickle.dump(self.problem, target)
         return target.getvalue()
 
     @classmethod
     def unpacked(cls, data: bytes) -> JobSpec:
-        """From bytes; InstallationError if this worker has other versions or another processor than the main program."""
+        """Return the specification from bytes.
+
+        Raises
+        ------
+        InstallationError
+            If this worker has other versions or another processor than the main program.
+        """
         source = io.BytesIO(data)
         head = pickle.load(source)
         if head["versions"] != versions():
@@ -95,159 +120,156 @@ class JobSpec:
         allow_code(*head["code"])
         return cls(pickle.load(source), **head)
 
-    def check(self, source: KernelSource) -> None:
-        """Raise InstallationError where this worker has written another kernel than who made the recipe."""
+    def rebuilt(self) -> Job:
+        """Return the job, with a kernel from this installation.
+
+        Raises
+        ------
+        InstallationError
+            If the text of the kernel is not that of the main program.
+        """
+        source = self.problem.source(self.width)
         if source.digest != self.digest:
             raise InstallationError(
                 f"this worker makes the kernel {source.digest[:12]}; expected that of the main program, "
                 f"{self.digest[:12]}: a sweep needs the same installation everywhere"
             )
-
-    def opened(self) -> SweepJob | RowsJob:
-        """The kernel with all that it needs to run."""
-        return RowsJob(self) if isinstance(self.chosen, RowsSpec) else SweepJob(self)
+        return self.problem.job(self, load(source))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RowsSpec:
-    """Cells of equations that no scene has: their rows, integrator and control array; only the error is recorded."""
+class SweepSpec:
+    """The sweep of a scene, or what is left of it to integrate; `room` are section points to make room for at first."""
 
-    equations: Equations
-    integrator: str
-    plan: Plan
-    control: np.ndarray
+    reduction: Reduction
+    room: int | None = None
 
+    def source(self, width: int) -> KernelSource:
+        """Return the text of the kernel."""
+        return write_kernel(self.reduction, width)
 
-@dataclass(slots=True)
-class RowsJob:
-    """A kernel, ready to run any of the given rows."""
-
-    recipe: JobSpec
-    kernel: Kernel = field(init=False)
-    control: np.ndarray = field(init=False)
-
-    def __post_init__(self) -> None:
-        rows: RowsSpec = self.recipe.chosen
-        source = emit(rows.equations, rows.integrator, ("sync_error",), width=self.recipe.width)
-        self.recipe.check(source)
-        self.kernel, self.control = load(source), rows.control.copy()
-
-    def cancel(self) -> None:
-        """End all cells that run in this process."""
-        self.control[CANCEL] = 1.0
-
-    def run(self, cells: np.ndarray, start: Start | None = None, near: np.ndarray | None = None) -> Buffers:
-        """Run these cells; they start as their rows say."""
-        plan: Plan = self.recipe.chosen.plan
-        rows = plan.start[cells], plan.numbers[cells], plan.spans[cells]
-        made = Buffers.empty(len(cells), plan.start.shape[1], room=0, samples=0)
-        self.kernel.drive(0, len(cells), *rows, self.control, *made.arrays())
-        return made
+    def job(self, spec: JobSpec, kernel: Kernel) -> SweepJob:
+        """Return the job that runs the kernel."""
+        return SweepJob(spec, kernel, self.reduction, self.room)
 
 
 @dataclass(slots=True)
 class SweepJob:
-    """A kernel, ready to run any cells of its sweep."""
+    """A kernel, ready to run any cells of a scene's sweep.
 
-    recipe: JobSpec
-    kernel: Kernel = field(init=False)
+    `room` are section points of a cell to make room for at first; by default two a period, as far as memory allows.  Cells
+    with more are run again with what they need.
+    """
+
+    spec: JobSpec
+    kernel: Kernel
+    reduction: Reduction
+    room: int | None = None
     planner: Planner = field(init=False)
     control: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        chosen, scene = self.recipe.chosen, self.recipe.chosen.scene
-        source = kernel_source(scene, self.recipe.width, chosen)
-        self.recipe.check(source)
-        self.kernel = kernel(scene, self.recipe.width, chosen)
-        self.planner = Planner(scene)
-        limits = tolerances(scene, self.planner.extremes().numbers)
-        direction = DIRECTIONS[scene.section.direction]
-        self.control = control_array(*limits, longest_step(scene), scene.max_steps, direction, chosen.jumps)
-
-    @property
-    def samples(self) -> int:
-        """Points of a trajectory, 0 where none is recorded."""
-        scene = self.recipe.chosen.scene
-        return scene.samples if "trajectory" in scene.record else 0
+        self.planner = Planner(self.reduction.scene)
+        self.control = control_of(self.planner, self.reduction.jumps)
 
     def cancel(self) -> None:
         """End all cells that run in this process."""
-        self.control[CANCEL] = 1.0
-
-    def blank(self, cells: int, room: int | None = None) -> Buffers:
-        """Buffers for so many cells, with the room for section points that they have at first."""
-        chosen = self.recipe.chosen
-        dimension = len(chosen.states)
-        room = _room(chosen.scene, cells * (dimension + 1)) if room is None else room
-        return Buffers.empty(cells, dimension, room, self.samples)
+        self.control[Control.CANCEL] = 1.0
 
     def run(self, cells: np.ndarray, start: Start | None = None, near: np.ndarray | None = None) -> Buffers:
-        """Run these cells; `near` (cells,) is the last column of their spans."""
-        rows = self.recipe.chosen.cells(self.planner.rows(cells, near))
+        """Run cells of the sweep.
+
+        Parameters
+        ----------
+        cells : ndarray of int
+            Numbers of the cells.
+        start : tuple of ndarray, optional
+            States to start from in place of the scene's, and for which of the cells they are good.
+        near : ndarray, shape (cells,), optional
+            Synchronisation errors below which the cells end early.
+        """
+        reduction = self.reduction
+        rows = reduction.rows(self.planner.rows(cells, near))
         if start is not None:
             rows = replace(rows, start=np.where(start[1][:, None], start[0], rows.start))
-        made = self.blank(len(cells))
-        self._drive(rows, made)
-        room = made.points.shape[1]
-        short = np.flatnonzero(made.counts[:, 3] > room)
+        room = first_room(reduction.scene, len(cells) * (reduction.dimension + 1)) if self.room is None else self.room
+        buffers = self._drive(rows, room)
+        short = np.flatnonzero(buffers.point_counts > room)
         if len(short):
-            self._again(rows, made, short)
-        most = int(made.counts[:, 3].max(initial=0))
-        made.points = np.ascontiguousarray(made.points[:, :most])
-        return made
+            buffers.put(short, self._drive(rows.take(short), buffers.most_points))
+        buffers.points = np.ascontiguousarray(buffers.points[:, : buffers.most_points])
+        return buffers
 
-    def _drive(self, rows: Plan, made: Buffers) -> None:
-        cells = len(rows.start)
-        self.kernel.drive(0, cells, rows.start, rows.numbers, rows.spans, self.control, *made.arrays())
-
-    def _again(self, rows: Plan, made: Buffers, short: np.ndarray) -> None:
-        """Run cells with more section points than there was room for again, with the room they need."""
-        most = int(made.counts[:, 3].max())
-        wide = np.full((len(made.counts), most, made.points.shape[2]), np.nan)
-        wide[:, : made.points.shape[1]] = made.points
-        made.points = wide
-        part = self.blank(len(short), most)
-        self._drive(Plan(rows.start[short], rows.numbers[short], rows.spans[short]), part)
-        for whole, piece in zip(made.arrays(), part.arrays(), strict=True):
-            whole[short] = piece
+    def _drive(self, rows: Plan, room: int) -> Buffers:
+        """Run rows with room for so many section points of each."""
+        buffers = Buffers.empty(len(rows), self.reduction.dimension, room, self.reduction.samples)
+        _drive(self.kernel, rows, self.control, buffers)
+        return buffers
 
 
-def run_block(key: str, recipe: bytes | None, *block: Any) -> Buffers | None:
-    """Run a block in a worker that does not share our memory; None where it does not know the sweep and needs the recipe."""
-    with _lock:
-        shop = _shops.get(key)
-        if shop is None and recipe is not None:
-            shop = _shops[key] = JobSpec.unpacked(recipe).opened()
-            while len(_shops) > KEPT:
-                _shops.popitem(last=False)
-    return None if shop is None else shop.run(*block)
+@dataclass(frozen=True, slots=True, eq=False)
+class RowsSpec:
+    """Equations without a sweep, whose cells come as rows; the synchronisation error is the only record.
+
+    Attributes
+    ----------
+    equations : Equations
+    integrator : str
+    control : ndarray, shape (len(Control),)
+    multiplicity : tuple of int, optional
+        How many oscillators each node stands for in the synchronisation error.
+    records : tuple of str
+        ("sync_error",), or none if all oscillators are stepped as one.
+    """
+
+    equations: Equations
+    integrator: str
+    control: np.ndarray
+    multiplicity: tuple[int, ...] | None = None
+    records: tuple[str, ...] = ("sync_error",)
+
+    def source(self, width: int | None = None) -> KernelSource:
+        """Return the text of the kernel."""
+        return emit(self.equations, self.integrator, self.records, None, width, self.multiplicity)
+
+    def job(self, spec: JobSpec, kernel: Kernel) -> RowsJob:
+        """Return the job that runs the kernel."""
+        return RowsJob(spec, kernel, self.control.copy())
 
 
-def forget(key: str) -> None:
-    """Drop a sweep that ran in this process; its cells that still run end."""
-    with _lock:
-        shop = _shops.pop(key, None)
-    if shop is not None:
-        shop.cancel()
+@dataclass(slots=True)
+class RowsJob:
+    """A kernel, ready to run any rows."""
+
+    spec: JobSpec
+    kernel: Kernel
+    control: np.ndarray
+
+    def cancel(self) -> None:
+        """End all cells that run in this process."""
+        self.control[Control.CANCEL] = 1.0
+
+    def run(self, rows: Plan) -> Buffers:
+        """Run the cells of these rows."""
+        buffers = Buffers.empty(len(rows), rows.start.shape[1], room=0, samples=0)
+        _drive(self.kernel, rows, self.control, buffers)
+        return buffers
 
 
-def whole(made: Buffers) -> bool:
-    """True where every cell has come to its end, good or bad."""
-    return not bool(np.isin(made.counts[:, 0], (Status.NOT_RUN, Status.INTERRUPTED)).any())
+def _drive(kernel: Kernel, rows: Plan, control: np.ndarray, buffers: Buffers) -> None:
+    """Run all rows into the buffers."""
+    kernel.drive(0, len(rows), rows.start, rows.numbers, rows.spans, control, *buffers.arrays())
 
 
 def versions() -> str:
-    """The versions that a result depends on."""
+    """Return the versions that a result depends on."""
     names = ("synchain", "numba", "numpy", "sympy")
     return ", ".join(f"{name} {importlib.metadata.version(name)}" for name in names)
 
 
-def _room(scene: Scene, row: int) -> int:
-    """Section points to make room for at first: two a period, as far as LARGEST allows where one more needs `row` numbers.
-
-    Cells with more are run again with what they need.
-    """
+def first_room(scene: Scene, row: int) -> int:
+    """Return the section points to make room for at first: two a period, if one more needs `row` numbers."""
     if "section" not in scene.record:
         return 0
     periods = scene.window if scene.time_unit == "period" else scene.window / math.pi
-    return int(min(2.0 * periods, 1e6, LARGEST // row)) + 8
+    return int(min(2.0 * periods, 1e6, LARGEST_ROOM // row)) + 8

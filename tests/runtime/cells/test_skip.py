@@ -183,7 +183,7 @@ def test_a_wrong_partition_is_caught(monkeypatch):
 
 
 def test_a_wrong_way_back_is_caught(monkeypatch):
-    right = skip_module.Reduction.expand
+    right = skip_module.NodeMerge.expand
 
     def turned(self, found):
         made = right(self, found)

@@ -13,8 +13,8 @@ from synchain.runtime.results.certificate import NEAR, VERDICTS, Certificate
 from synchain.runtime.results.open import open_result
 from synchain.runtime.stability.transversal import exponents
 from synchain.runtime.sweeps.certify import certify
+from synchain.runtime.sweeps.errors import SweepInterrupted
 from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.scheduler import SweepInterrupted
 
 SIGMA = np.array([0.05, 0.12, 0.3])
 
