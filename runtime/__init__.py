@@ -35,9 +35,9 @@ if TYPE_CHECKING:
     from .stability.lyapunov import Lyapunov, lyapunov_spectrum
     from .stability.msf import MSF, Plane, msf, plane
     from .support.status import Status
+    from .sweeps.errors import SweepFailed, SweepInterrupted
     from .sweeps.progress import Progress
     from .sweeps.run import run
-    from .sweeps.sitting import SweepFailed, SweepInterrupted
     from .sweeps.stream import Streamed, stream
     from .synchronisation.basin import Basin, basin
     from .synchronisation.probe import Probe, universal_probe
@@ -91,14 +91,14 @@ _HOME = {
     "Result": "results.result",
     "Status": "support.status",
     "Streamed": "sweeps.stream",
-    "SweepFailed": "sweeps.sitting",
-    "SweepInterrupted": "sweeps.sitting",
+    "SweepFailed": "sweeps.errors",
+    "SweepInterrupted": "sweeps.errors",
     "Thresholds": "synchronisation.threshold",
     "basin": "synchronisation.basin",
     "cluster_exponents": "stability.clusters",
     "exponents": "stability.exponents",
     "follow": "bifurcation.branches",
-    "kernel": "sweeps.run",
+    "kernel": "cells.kernels",
     "lyapunov_spectrum": "stability.lyapunov",
     "msf": "stability.msf",
     "open_result": "results.open",

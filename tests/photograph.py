@@ -73,7 +73,7 @@ from synchain.models.presentation.equations import text
 
 from synchain.runtime.cli import main  # isort: skip
 from synchain.runtime.results.energy import energy_function  # isort: skip
-from synchain.runtime.cells.kernels import chosen_skip  # isort: skip
+from synchain.runtime.cells.kernels import as_reduction  # isort: skip
 from synchain.runtime.cells.reduce import explain  # isort: skip
 from synchain.runtime.synchronisation.threshold import Criterion  # isort: skip
 
@@ -245,7 +245,7 @@ def written(given: Scene, skip: Any = True) -> Quantities:
         "scene": json.dumps(given.as_dict(), sort_keys=True),
         "equations": text(equations),
         "latex": latex(equations),
-        "explain": explain(chosen_skip(given, skip)),
+        "explain": explain(as_reduction(given, skip)),
         "warnings": "\n".join(given.warnings),
     }
     for language, export in (("python", to_python), ("numba", to_numba), ("c", to_c)):
@@ -308,7 +308,7 @@ def _() -> Quantities:
 
 @scene("friction pair without drive, as it stands")
 def _() -> Quantities:
-    return simulated(pair(parameters={"u": 0, "sigma": 0.1}), skip=False)
+    return simulated(pair(parameters={"u": 0, "sigma": 0.1}), reduce=False)
 
 
 @scene("friction pair, too few steps")

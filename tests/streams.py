@@ -13,7 +13,7 @@ from synchain.models import chain
 from synchain.models.scenes.axis import Axis
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.kernels import kernel
-from synchain.runtime.cells.reduce import decide
+from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.results.open import open_result
 from synchain.runtime.sweeps.progress import Progress
 from synchain.runtime.sweeps.stream import stream
@@ -26,7 +26,7 @@ UP = PAIR.replace(axes={"omega": [1.1, 1.3, 1.5], "sigma": [0.01 * k for k in ra
 
 def warm() -> None:
     """Have the kernel ready before anybody's time is taken."""
-    kernel(MAP, skip=decide(MAP))
+    kernel(MAP, reduce=reduce_scene(MAP))
 
 
 def partial(path: Path) -> Path:

@@ -20,9 +20,9 @@ from synchain.models.scenes.energy import energy
 from synchain.models.scenes.scene import Scene
 from synchain.models.scenes.section import Section
 from synchain.models.spectra.spectrum import Spectrum
+from synchain.runtime.cells.keywords import with_axes
 from synchain.runtime.results.energy import energy_function
 from synchain.runtime.support.threads import worker_count
-from synchain.runtime.sweeps.run import with_axes
 from synchain.runtime.synchronisation.agreement import agreement
 from synchain.runtime.synchronisation.threshold import Criterion
 
@@ -92,7 +92,7 @@ CALLS = [
     (lambda: runtime.run(PAIR, workers=-1), "workers = -1; expected at least 1"),
     (lambda: runtime.run(PAIR, width=3), "width = 3; expected one of 1, 2, 4, 8, 16"),
     (lambda: runtime.run(PAIR, width="a"), "width = 'a'"),
-    (lambda: runtime.run(PAIR, skip="no"), "skip: found 'no'"),
+    (lambda: runtime.run(PAIR, reduce="no"), "reduce: found 'no'"),
     (lambda: runtime.run(PAIR, certified="yes"), "certified: found 'yes'"),
     (lambda: runtime.run(PAIR, resume="file.nc"), "resume: found 'file.nc'"),
     (lambda: runtime.run(PAIR, executor=THREADS), "executor: found <class"),
@@ -195,7 +195,7 @@ def test_a_wrong_argument_is_refused_in_one_line(call, words, monkeypatch, tmp_p
 
 def test_what_is_right_is_taken():
     """Numbers of other types, and what only looks wrong."""
-    assert with_axes(PAIR, {"sigma": range(2), "x_1": "sqrt(4)"}).axes[0].values == (0.0, 1.0)
+    assert with_axes(runtime.run, PAIR, {"sigma": range(2), "x_1": "sqrt(4)"}).axes[0].values == (0.0, 1.0)
     assert worker_count(np.int64(2)) == 2
     assert models.from_edges([[0, 1], (1, 2, "1/2"), np.array([2, 3])]).n == 4
     assert clusters(star(5), "hpppp").quotient.n == 2

@@ -25,7 +25,17 @@ from ..steps.program import FILL_LIMIT, Program, program, workspace
 from ..steps.rosenbrock import write_rosenbrock
 from ..steps.step import PAIR, SCALED, StepWriter, function_name, write_function
 
-__all__ = ["RECORDS", "KernelKind", "KernelSource", "Record", "describe", "emit", "imports", "node_functions"]
+__all__ = [
+    "RECORDS",
+    "KernelKind",
+    "KernelSource",
+    "Record",
+    "default_width",
+    "describe",
+    "emit",
+    "imports",
+    "node_functions",
+]
 
 
 class Record(StrEnum):
@@ -131,8 +141,7 @@ def emit(
         raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(RECORDS)}")
     if "section" in records and section is None:
         raise ValueError("the record 'section' needs a section function, for example v_1")
-    # a small system does not keep the pipelines of the processor busy with one register: it gets two
-    width = lanes.native_width(2 if equations.dimension <= 2 else 1) if width is None else width
+    width = default_width(equations) if width is None else width
     ordered = tuple(r for r in RECORDS if r in records)
     weights = tuple(multiplicity) if multiplicity is not None and "sync_error" in ordered else None
     if "sync_error" in ordered and not equations.common:
@@ -145,6 +154,11 @@ def emit(
     elimination = program(equations, fill) if looped else None
     text = _module(equations, method, ordered, section if "section" in ordered else None, width, weights, elimination)
     return KernelSource(text, equations, method.name, ordered, width, elimination=elimination)
+
+
+def default_width(equations: Equations) -> int:
+    """Lanes that suit the processor; a small system does not keep its pipelines busy with one register and gets two."""
+    return lanes.native_width(2 if equations.dimension <= 2 else 1)
 
 
 def _module(

@@ -84,7 +84,7 @@ def drift(case: Case, integrator: str, rtol: float, periods: int) -> tuple[float
     Raises RuntimeError where the run fails.
     """
     scene = case.scene.replace(integrator=integrator, rtol=rtol, window=periods * case.period, max_steps=10**10)
-    result = run(scene, workers=1, show_progress=False, skip=False)
+    result = run(scene, workers=1, show_progress=False, reduce=False)
     if not result.success:
         raise RuntimeError(f"{case.name}, {integrator}: {result.message}")
     between = result.trajectory.values[: -1 if integrator not in CHORDS else 1]

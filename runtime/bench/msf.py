@@ -171,7 +171,7 @@ def _alone(orbits: Orbits, periods: int) -> Callable[[], int]:
         topology=topology("chain", 1), record=(), integrator="rodas5p", rtol=RTOL, transient=0.0, window=periods,
         parameters={"omega": orbits.scene.parameters["omega"]},
     )  # fmt: skip
-    cells, compiled = plan(scene), kernel(scene, 1, skip=False)
+    cells, compiled = plan(scene), kernel(scene, 1, reduce=False)
     rtol, atol = tolerances(scene, cells.numbers)
     control = control_array(rtol, atol, 0.5 * orbits.unit, scene.max_steps, jumps=False)
 

@@ -59,7 +59,7 @@ def measure(quick: bool = False) -> list[tuple[object, ...]]:
 
 def _row(n: int, width: int, quick: bool) -> tuple[object, ...]:
     scene = Scene(topology=topology("chain", n), record=(), integrator="rodas5p")
-    compiled = kernel(scene, width, skip=False)
+    compiled = kernel(scene, width, reduce=False)
     flops = operations(compiled.source)
     module = inspect.getmodule(compiled.entry)
     if module is None:

@@ -69,7 +69,7 @@ def apart(function: Any, *arguments: object) -> Row:
 def network_row(name: str, n: int, lanes: int, work: int) -> Row:
     """Time a fixed number of steps of one network, the best of three runs; the kernel is compiled before."""
     scene = Scene(topology=topology(name, n), record=(), time_unit="time", transient=0.0, window=1e6)
-    compiled = kernel(scene, lanes, skip=False)
+    compiled = kernel(scene, lanes, reduce=False)
     one = plan(scene)
     cells = [np.repeat(part, lanes, axis=0) for part in (one.start, one.numbers, one.spans)]
     control = control_array(scene.rtol, scene.atol, math.inf, max(20, work // (n * lanes)))

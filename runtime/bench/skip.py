@@ -19,7 +19,7 @@ from synchain.models.scenes.axis import Axis
 from synchain.models.scenes.scene import Scene
 
 from ..cells.kernels import kernel_source
-from ..cells.reduce import Skip, decide
+from ..cells.reduce import Reduction, reduce_scene
 from ..results.result import Result
 from ..sweeps.run import run
 from .kit.operations import operations
@@ -70,7 +70,7 @@ def measure(quick: bool = False) -> list[tuple[object, ...]]:
     return [_row(case, quick) for case in (CASES[:QUICK] if quick else CASES)]
 
 
-def scenes(case: Case, quick: bool) -> tuple[Skip, Skip]:
+def scenes(case: Case, quick: bool) -> tuple[Reduction, Reduction]:
     """What is run with the skip and without it: cells of one core over the frequency of the drive."""
     axis = Axis.between("omega", 1.1, 1.2, 8 if quick else 64)
     given = {"parameters": PARAMETERS, "transient": 0.0, "window": 20.0 if quick else 100.0, **case.given}
@@ -78,30 +78,30 @@ def scenes(case: Case, quick: bool) -> tuple[Skip, Skip]:
         given["window"] /= 5.0
     scene = Scene(topology=topology(case.graph, case.n), axes=[axis], **given)
     if case.less:
-        return decide(scene.replace(**case.less), skip=False), decide(scene, skip=False)
-    return decide(scene, fold_all=case.fold_all), decide(scene, skip=False)
+        return reduce_scene(scene.replace(**case.less), reduce=False), reduce_scene(scene, reduce=False)
+    return reduce_scene(scene, fold_all=case.fold_all), reduce_scene(scene, reduce=False)
 
 
 def _row(case: Case, quick: bool) -> tuple[object, ...]:
     pair = scenes(case, quick)
-    counts = [operations(kernel_source(chosen.scene, skip=chosen).text) for chosen in pair]
+    counts = [operations(kernel_source(chosen.scene, reduce=chosen).text) for chosen in pair]
     seconds = [np.inf, np.inf]
     for _ in range(2 if quick else 6):  # the first may compile
         for k, chosen in enumerate(pair):
             began = time.process_time()
-            run(chosen.scene, workers=1, skip=chosen, show_progress=False)
+            run(chosen.scene, workers=1, reduce=chosen, show_progress=False)
             seconds[k] = min(seconds[k], time.process_time() - began)
     fewer, more = seconds
     return (case.name, case.n, *counts, 1e3 * fewer, 1e3 * more, more / fewer, _worst(case, pair))
 
 
-def _worst(case: Case, pair: tuple[Skip, Skip]) -> float:
+def _worst(case: Case, pair: tuple[Reduction, Reduction]) -> float:
     """The largest difference of the answers over a short time."""
     results = []
     for chosen, skip in zip(pair, (not case.less, False), strict=True):
         scene = chosen.scene.replace(window=chosen.scene.window / 20.0, rtol=1e-10)
-        short = decide(scene, skip, fold_all=case.fold_all)
-        results.append(run(scene, workers=1, skip=short, show_progress=False))
+        short = reduce_scene(scene, skip, fold_all=case.fold_all)
+        results.append(run(scene, workers=1, reduce=short, show_progress=False))
     return difference(*results)
 
 

@@ -45,7 +45,7 @@ def measure(quick: bool = False) -> list[Row]:
 
 def row(case: Case) -> Row:
     """Run one case and compare it with its reference."""
-    found = run(case.scene, skip=case.skip, show_progress=False)
+    found = run(case.scene, reduce=case.skip, show_progress=False)
     status = Status(int(found.status))
     end = found.end.values
     expected = (

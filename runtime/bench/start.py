@@ -32,7 +32,7 @@ marks.append(time.perf_counter())
 from synchain.runtime.sweep import kernel_source
 from synchain.codegen.load import load
 marks.append(time.perf_counter())
-source = kernel_source(scene, skip=False)
+source = kernel_source(scene, reduce=False)
 marks.append(time.perf_counter())
 compiled = load(source)
 marks.append(time.perf_counter())

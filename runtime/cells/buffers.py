@@ -6,15 +6,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Buffers"]
+from synchain.codegen.driver.columns import Count, Point, Sum
 
-SUMS, COUNTS = 4, 6
-"""Columns of the numbers and of the counts that a kernel writes for each cell."""
+from ..support.status import Status
+
+__all__ = ["Buffers"]
 
 
 @dataclass(slots=True)
 class Buffers:
-    """What the kernel fills, one row for each cell; see the docstring of `drive` in any kernel."""
+    """The arrays that a kernel fills, one row for each cell; the docstring of `drive` in a kernel describes them.
+
+    Attributes
+    ----------
+    end : ndarray, shape (cells, dimension)
+        States at which the cells stopped.
+    sums : ndarray, shape (cells, len(Sum))
+        Synchronisation errors and the time at which each cell stopped.
+    counts : ndarray of int64, shape (cells, len(Count))
+        Status, steps and numbers of section points.
+    points : ndarray, shape (cells, room, 1 + dimension)
+        Time and state of the section points, NaN if a cell has fewer.
+    samples : ndarray, shape (cells, samples, dimension)
+        States at equally spaced times of the window.
+    """
 
     end: np.ndarray
     sums: np.ndarray
@@ -24,15 +39,62 @@ class Buffers:
 
     @classmethod
     def empty(cls, cells: int, dimension: int, room: int, samples: int) -> Buffers:
-        """Buffers in which nothing has run: numbers NaN, counts zero."""
+        """Return buffers of cells that have not run: numbers NaN, counts zero."""
         return cls(
             end=np.full((cells, dimension), np.nan),
-            sums=np.full((cells, SUMS), np.nan),
-            counts=np.zeros((cells, COUNTS), np.int64),
-            points=np.full((cells, room, dimension + 1), np.nan),
+            sums=np.full((cells, len(Sum)), np.nan),
+            counts=np.zeros((cells, len(Count)), np.int64),
+            points=np.full((cells, room, Point.STATE + dimension), np.nan),
             samples=np.full((cells, samples, dimension), np.nan),
         )
 
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """In the order of the kernel's arguments."""
+        """The arrays in the order of the kernel's arguments."""
         return self.end, self.sums, self.counts, self.points, self.samples
+
+    @property
+    def status(self) -> np.ndarray:
+        """Status (cells,) of each cell; a view of `counts`."""
+        return self.counts[:, Count.STATUS]
+
+    @property
+    def finished(self) -> np.ndarray:
+        """True for each cell (cells,) that reached the end of its window."""
+        return self.status == Status.FINISHED
+
+    @property
+    def ended(self) -> bool:
+        """True if every cell came to its end, good or bad; False if one did not run or was interrupted."""
+        return not bool(np.isin(self.status, (Status.NOT_RUN, Status.INTERRUPTED)).any())
+
+    @property
+    def point_counts(self) -> np.ndarray:
+        """Number of section points of each cell (cells,)."""
+        return self.counts[:, Count.POINTS]
+
+    @property
+    def most_points(self) -> int:
+        """Number of section points of the cell that has most."""
+        return int(self.point_counts.max(initial=0))
+
+    def widen(self, room: int) -> None:
+        """Make room for so many section points of each cell, if there is less."""
+        old = self.points.shape[1]
+        if room > old:
+            points = np.full((len(self.points), room, self.points.shape[2]), np.nan)
+            points[:, :old] = self.points
+            self.points = points
+
+    def put(self, cells: np.ndarray, part: Buffers) -> None:
+        """Copy the rows of `part` into the rows `cells`, whose room for section points grows if it has to."""
+        self.widen(part.points.shape[1])
+        self.points[cells, : part.points.shape[1]] = part.points
+        self.end[cells], self.sums[cells], self.counts[cells], self.samples[cells] = (
+            part.end, part.sums, part.counts, part.samples,
+        )  # fmt: skip
+
+    def clear(self, cells: np.ndarray) -> None:
+        """Set cells (numbers or a mask) back to the state in which they have not run."""
+        for array in (self.end, self.sums, self.points, self.samples):
+            array[cells] = np.nan
+        self.counts[cells] = 0

@@ -7,18 +7,54 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from typing import Any
 
-from synchain.models.inputs.checks import suggestion
+from synchain.models.inputs.checks import number, suggestion
 from synchain.models.scenes.scene import Scene, a_scene
 
-__all__ = ["check_keywords", "with_parameters"]
+__all__ = ["check_keywords", "with_axes", "with_parameters"]
+
+
+def with_axes(function: Callable[..., Any], scene: Scene, axes: Mapping[str, Any]) -> Scene:
+    """Return a scene with parameters and initial states fixed or swept.
+
+    Parameters
+    ----------
+    function : callable
+        The function whose keywords they are; an error names it.
+    scene : Scene
+    axes : mapping of str to number or sequence
+        A number fixes a parameter, a setting or an initial state; a sequence makes an axis of it, after those of the scene.
+
+    Raises
+    ------
+    ValueError
+        If a name is no parameter, setting or initial state.
+    """
+    fixed: dict[str, Any] = {}
+    swept: dict[str, Any] = {axis.name: axis.values for axis in a_scene(scene).axes}
+    start = {name: list(values) for name, values in scene.initial.items()}
+    for name, value in axes.items():
+        if isinstance(value, Iterable) and not isinstance(value, str | bytes) and getattr(value, "ndim", 1) > 0:
+            swept[name] = value
+        elif _is_state(scene, name):
+            component, node = name.rsplit("_", 1)
+            start[component][scene.equations.holders(component).index(int(node) - 1)] = number(name, value)
+            swept.pop(name, None)
+        else:
+            fixed[name] = value
+            swept.pop(name, None)
+    check_keywords(function, scene, fixed, states=True)
+    return scene.replace(axes=swept, initial=start, **fixed) if axes else scene
 
 
 def with_parameters(
     function: Callable[..., Any], scene: Scene, parameters: Mapping[str, Any], **settings: Any
 ) -> Scene:
-    """The scene with the settings that a function needs and the parameters that it was given.
+    """Return the scene with the settings that a function needs and the parameters that its caller passed.
 
-    Raises ValueError as `check_keywords` does; what the function sets itself cannot be given.
+    Raises
+    ------
+    ValueError
+        If a name is no parameter or setting of the scene, or a setting that the function sets itself.
     """
     check_keywords(function, a_scene(scene), parameters, taken=settings)
     return scene.replace(**settings, **parameters)
@@ -27,24 +63,32 @@ def with_parameters(
 def check_keywords(
     function: Callable[..., Any],
     scene: Scene,
-    given: Iterable[str],
-    states: Iterable[str] = (),
+    names: Iterable[str],
+    *,
+    states: bool = False,
     taken: Iterable[str] = (),
 ) -> None:
-    """Raise ValueError for a name that is no parameter or setting of the scene, nor one of the `states`.
+    """Raise ValueError for a name that is no parameter or setting of the scene nor, with `states`, an initial state.
 
     The function's own keywords are among the known names, since one of them may be what was meant; settings that are
     `taken` are not.
     """
-    states = tuple(states)
     settings = [field.name for field in fields(Scene) if field.name not in taken]
-    strange = next((name for name in given if not (scene.takes(name) or name in states or name in settings)), None)
+    strange = next(
+        (n for n in names if not (scene.takes(n) or n in settings or (states and _is_state(scene, n)))), None
+    )
     if strange is not None:
-        known = dict.fromkeys((*scene.parameters, *states, *_own(function), *settings))
+        initial = scene.equations.state if states else ()
+        known = dict.fromkeys((*scene.parameters, *initial, *_own(function), *settings))
         raise ValueError(
             f"unknown parameter or keyword {strange!r} of {function.__name__}; known: {', '.join(known)}"
             f"{suggestion(strange, known)}"
         )
+
+
+def _is_state(scene: Scene, name: str) -> bool:
+    """True for the name of an initial state; equations are derived only for a name that looks like one."""
+    return name.rpartition("_")[0] in scene.components and name in scene.equations.state
 
 
 def _own(function: Callable[..., Any]) -> list[str]:

@@ -1,4 +1,4 @@
-"""How the cells of a sweep are cut into numbered blocks: what is run, stored and resumed as one piece."""
+"""The numbered blocks of a sweep: cells that are run, stored and resumed together."""
 
 from __future__ import annotations
 
@@ -65,9 +65,23 @@ class Layout:
         return block - 1 if self.columns and block % self.columns else None
 
 
-def block_size(scene: Scene, width: int, workers: int) -> int:
-    """Cells of a block, a multiple of the number of lanes: large enough for the lanes, small enough to lose."""
-    cells = scene.cells // (scene.shape[-1] if scene.continuation != "none" else 1)
+def block_size(scene: Scene, width: int, workers: int, cells: int | None = None) -> int:
+    """Return the cells of a block, a multiple of the number of lanes.
+
+    A block is large enough to keep the lanes busy and small enough to be lost.
+
+    Parameters
+    ----------
+    scene : Scene
+    width : int
+        Number of lanes.
+    workers : int
+        Blocks that run at a time.
+    cells : int, optional
+        Cells that can run at a time (default: those of the scene, of its first column if the sweep is continued).
+    """
+    if cells is None:
+        cells = scene.cells // (scene.shape[-1] if scene.continuation != "none" else 1)
     lengths = scene.transient + scene.window
     work = scene.n * max(lengths if scene.time_unit == "period" else lengths / (2.0 * math.pi), 1.0)
     most = min(REFILLS * width, int(LONGEST / work) // width * width)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import sympy as sp
 
+from synchain.codegen.driver.columns import Control, Span
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import as_function, drive_of, names_in
 from synchain.models.scenes.scene import Scene
@@ -17,13 +18,14 @@ from synchain.models.scenes.scene import Scene
 from .initial_modes import local_clock, with_modes
 
 __all__ = [
-    "CANCEL",
     "Plan",
     "Planner",
     "control_array",
+    "control_of",
     "half_swing",
     "longest_step",
     "parameter_names",
+    "periods",
     "plan",
     "tolerances",
 ]
@@ -31,17 +33,23 @@ __all__ = [
 FIRST_STEP = 1e-4
 """Step tried first in every cell; the step control enlarges it sixfold at a time."""
 
-CANCEL = 6
-"""Entry of the control array that stops a running kernel when it is not zero."""
+DIRECTIONS = {"falling": -1.0, "rising": 1.0, "both": 0.0}
+"""The numbers that a kernel knows the directions of a section by."""
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Rows of all cells, in C order over the axes (the last one fastest).
+    """Rows of cells as a kernel takes them.
 
-    start (cells, dimension), numbers (cells, parameters) in the order of Equations.parameters, spans (cells, 4): start and
-    end of the window, the period after which the equations repeat themselves (0: none), in non-dimensional time, and the
-    synchronisation error below which a cell is known to stay synchronous (0: not known).
+    Attributes
+    ----------
+    start : ndarray, shape (cells, dimension)
+        Initial states.
+    numbers : ndarray, shape (cells, parameters)
+        Parameters, in the order of `Equations.parameters`.
+    spans : ndarray, shape (cells, len(Span))
+        Start and end of the window and the period of the equations, in non-dimensional time, and the synchronisation
+        error below which a cell ends early (0: none does).
     """
 
     start: np.ndarray
@@ -52,52 +60,82 @@ class Plan:
         for array in (self.start, self.numbers, self.spans):
             array.flags.writeable = False
 
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def take(self, cells: np.ndarray) -> Plan:
+        """Return the rows of some of the cells."""
+        return Plan(self.start[cells], self.numbers[cells], self.spans[cells])
+
 
 def plan(scene: Scene, near: np.ndarray | None = None) -> Plan:
-    """Lay out all cells of a scene; `near` (cells,) is the last column of the spans (default: 0).
+    """Return the rows of all cells of a scene, in C order over the axes (the last one fastest).
 
-    Raises ValueError where a window in drive periods meets a drive of frequency 0, or is too long for double precision.
+    Parameters
+    ----------
+    scene : Scene
+    near : ndarray, shape (cells,), optional
+        Synchronisation errors below which the cells end early (default: 0, none does).
+
+    Raises
+    ------
+    ValueError
+        If a window in drive periods meets a drive of frequency 0, or if it is too long for double precision.
     """
     return Planner(scene).rows(np.arange(scene.cells), near)
 
 
 class Planner:
-    """Lays out any of a scene's cells, so that nobody need hold all of them; the axes are arrays once and for all."""
+    """Lays out any cells of a scene, so that the rows of all cells need not be in memory at once."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
+        self.equations = scene.equations
         self.values = {axis.name: np.array(axis.values) for axis in scene.axes}
 
     def columns(self, cells: np.ndarray) -> dict[str, np.ndarray]:
-        """The value of each axis in each of these cells."""
+        """Return the value of each axis in each of these cells."""
         if self.scene.zipped or not self.values:
             return {name: values[cells] for name, values in self.values.items()}
         places = np.unravel_index(cells, self.scene.shape)
         return {name: values[place] for (name, values), place in zip(self.values.items(), places, strict=True)}
 
     def rows(self, cells: np.ndarray, near: np.ndarray | None = None) -> Plan:
-        """The rows of these cells; `near`, one for each of them, is the last column of the spans (default: 0)."""
-        scene, equations = self.scene, self.scene.equations
-        names = equations.parameters
-        numbers = np.empty((len(cells), len(names)))
-        numbers[:] = [scene.parameters[name] for name in names]
-        start = np.empty((len(cells), len(scene.y0)))
-        start[:] = scene.y0
-        columns = self.columns(cells)
-        state = equations.state
+        """Return the rows of these cells; `near` (cells,) is the last column of their spans (default: 0)."""
+        columns, state = self.columns(cells), self.equations.state
+        numbers = self._numbers(columns, len(cells))
+        start = np.empty((len(cells), len(self.scene.y0)))
+        start[:] = self.scene.y0
+        for name, values in columns.items():
+            if name not in self.equations.parameters:
+                start[:, state.index(name)] = values
+        return Plan(with_modes(self.equations, start, numbers), numbers, self._spans(numbers, near))
+
+    def spans(self, cells: np.ndarray) -> np.ndarray:
+        """Return the spans (cells, len(Span)) of these cells, without their states."""
+        return self._spans(self._numbers(self.columns(cells), len(cells)), None)
+
+    def _numbers(self, columns: Mapping[str, np.ndarray], cells: int) -> np.ndarray:
+        """The parameters of cells in which the axes have these values."""
+        names = self.equations.parameters
+        numbers = np.empty((cells, len(names)))
+        numbers[:] = [self.scene.parameters[name] for name in names]
         for name, values in columns.items():
             if name in names:
                 numbers[:, names.index(name)] = values
-            else:
-                start[:, state.index(name)] = values
-        start = with_modes(equations, start, numbers)
-        last = np.zeros(len(cells)) if near is None else near
-        repeat = periods(equations, numbers)
-        spans = np.column_stack([_spans(scene, repeat), local_clock(equations, repeat), last])
-        return Plan(start, numbers, np.ascontiguousarray(spans))
+        return numbers
+
+    def _spans(self, numbers: np.ndarray, near: np.ndarray | None) -> np.ndarray:
+        """The spans of cells with these parameters."""
+        repeat = periods(self.equations, numbers)
+        spans = np.empty((len(numbers), len(Span)))
+        spans[:, : Span.PERIOD] = _windows(self.scene, repeat)
+        spans[:, Span.PERIOD] = local_clock(self.equations, repeat)
+        spans[:, Span.NEAR] = 0.0 if near is None else near
+        return spans
 
     def extremes(self) -> Plan:
-        """The rows of a few cells in which every axis takes its smallest, its largest and its value nearest to 0."""
+        """Return the rows of a few cells in which every axis takes its smallest, its largest and its value nearest to 0."""
         ends = [(v.argmin(), v.argmax(), np.abs(v).argmin()) for v in self.values.values()]
         if not ends:
             return self.rows(np.arange(1))
@@ -152,11 +190,6 @@ def longest_step(scene: Scene) -> float:
     return half_swing(scene.equations, dict(zip(known, corners.T, strict=True)))
 
 
-def axis_columns(scene: Scene) -> dict[str, np.ndarray]:
-    """The value of each axis in each cell."""
-    return Planner(scene).columns(np.arange(scene.cells))
-
-
 def parameter_names(scene: Scene, name: str) -> tuple[str, ...]:
     """The names under which a scene has a parameter: one, a_1 … a_n where nodes differ, none where it has no such."""
     if name not in scene.varied:
@@ -164,7 +197,8 @@ def parameter_names(scene: Scene, name: str) -> tuple[str, ...]:
     return tuple(found for found in scene.parameters if found.rpartition("_")[0] == name)
 
 
-def _spans(scene: Scene, period: np.ndarray) -> np.ndarray:
+def _windows(scene: Scene, period: np.ndarray) -> np.ndarray:
+    """Start and end (cells, 2) of the windows of cells whose drives have these periods."""
     unit = period if scene.time_unit == "period" else np.ones(len(period))
     if np.any(unit == 0.0):
         name = scene.drive.frequency
@@ -174,17 +208,40 @@ def _spans(scene: Scene, period: np.ndarray) -> np.ndarray:
         raise ValueError(
             f"the run ends at t = {spans.max():.3g}; expected less than 1e12, where time has lost 4 digits"
         )
-    return np.ascontiguousarray(spans)
+    return spans
 
 
 def control_array(
     rtol: float, atol: float, max_step: float, max_steps: float, direction: float = 0.0, jumps: bool = True
 ) -> np.ndarray:
-    """The numbers that steer a kernel, in the order of its column names (codegen/skeletons/recording.py).
+    """Return the array (len(Control),) that steers a kernel.
 
-    Without `jumps` a cell that repeats itself is integrated to its end all the same.
+    Parameters
+    ----------
+    rtol, atol : float
+        Relative and absolute tolerance of a step.
+    max_step : float
+        Longest step, in non-dimensional time.
+    max_steps : float
+        Steps after which a cell is given up.
+    direction : float
+        Direction in which the section function passes zero: -1 falling, 1 rising, 0 either.
+    jumps : bool
+        If False, a cell that repeats itself is integrated to its end all the same.
     """
-    return np.array([rtol, atol, FIRST_STEP, max_step, max_steps, direction, 0.0, float(not jumps)])
+    control = np.zeros(len(Control))
+    control[Control.RTOL], control[Control.ATOL] = rtol, atol
+    control[Control.FIRST_STEP], control[Control.MAX_STEP] = FIRST_STEP, max_step
+    control[Control.MAX_STEPS], control[Control.DIRECTION] = max_steps, direction
+    control[Control.NO_JUMPS] = float(not jumps)
+    return control
+
+
+def control_of(planner: Planner, jumps: bool) -> np.ndarray:
+    """Return the control array of a scene's sweep; `jumps` as for `control_array`."""
+    scene = planner.scene
+    rtol, atol = tolerances(scene, planner.extremes().numbers)
+    return control_array(rtol, atol, longest_step(scene), scene.max_steps, DIRECTIONS[scene.section.direction], jumps)
 
 
 def tolerances(scene: Scene, numbers: np.ndarray) -> tuple[float, float]:

@@ -1,7 +1,7 @@
-"""What a scene does not need is not integrated: terms that are zero in every cell, oscillators that move as another does.
+"""Exact reduction of a scene: terms that are zero in every cell, and oscillators that move as one, are left out.
 
-Every reduction is exact (see `synchain.models.dynamics.reduction`) and undone before anyone sees the result, which is that of the
-whole network.  docs/skips.md lists them all, also those of the emitted text and of the kernel's driver.
+`synchain.models.dynamics.reduction` proves each reduction; it is undone before the result, which is that of the whole
+network.  docs/skips.md lists all reductions, also those of the emitted text and of the kernel's driver.
 """
 
 from __future__ import annotations
@@ -13,14 +13,17 @@ from fractions import Fraction
 
 import numpy as np
 
+from synchain.codegen.driver.columns import Point, Sum
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.reduction import NoQuotient, fold, quotient
-from synchain.models.scenes.scene import Scene
+from synchain.models.inputs.checks import flag
+from synchain.models.scenes.scene import Scene, a_scene
 
+from ..support.status import Status
 from .buffers import Buffers
 from .plan import Plan
 
-__all__ = ["Merged", "Skip", "decide", "explain"]
+__all__ = ["NodeMerge", "Reduction", "as_reduction", "explain", "reduce_scene"]
 
 DIVERGED = "diverged: the cell ends as soon as its state is out of bounds"
 PERIODIC = (
@@ -30,26 +33,47 @@ PERIODIC = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Merged:
-    """Which oscillators were stepped as one: `states` and `places` of a Skip; `together` where all of them were."""
+class NodeMerge:
+    """Which oscillators are stepped as one, and the way back to the whole network.
+
+    Attributes
+    ----------
+    states : ndarray of int
+        Columns of the whole network's state that start the reduced one.
+    places : ndarray of int
+        Column of the reduced state in which each state of the whole network is found.
+    together : bool
+        True if all oscillators are stepped as one and their synchronisation error, which is 0, is a record.
+    """
 
     states: np.ndarray
     places: np.ndarray
     together: bool
 
-    def expand(self, buffers: Buffers) -> Buffers:
-        """What the kernel wrote, for the whole network; the same arrays where nothing was merged."""
-        made = self.take(buffers, self.places)
-        if self.together:
-            made = replace(made, sums=made.sums.copy())
-            made.sums[made.counts[:, 0] != 0, :3] = 0.0  # oscillators that are one have no distance
-        return made
+    @property
+    def merges(self) -> bool:
+        """True if any oscillators are stepped as one."""
+        return len(self.states) < len(self.places)
 
-    def take(self, buffers: Buffers, columns: np.ndarray) -> Buffers:
+    def expand(self, buffers: Buffers) -> Buffers:
+        """Return the results of the whole network; the same arrays if nothing was merged."""
+        whole = self._take(buffers, self.places)
+        if self.together:
+            whole = replace(whole, sums=whole.sums.copy())
+            whole.sums[whole.status != Status.NOT_RUN, : Sum.STOPPED_AT] = (
+                0.0  # one oscillator has no distance to itself
+            )
+        return whole
+
+    def contract(self, buffers: Buffers) -> Buffers:
+        """Return the part of the whole network's results that the reduced network has."""
+        return self._take(buffers, self.states)
+
+    def _take(self, buffers: Buffers, columns: np.ndarray) -> Buffers:
         """The buffers of a network whose states are these columns of another one's."""
-        if len(self.states) == len(self.places):
+        if not self.merges:
             return buffers
-        points = np.concatenate([[0], columns + 1])  # the time of the point comes first
+        points = np.concatenate([[Point.TIME], columns + Point.STATE])
         return replace(
             buffers,
             end=np.take(buffers.end, columns, axis=1),
@@ -59,90 +83,131 @@ class Merged:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Skip:
+class Reduction:
     """What is left of a scene to integrate, and the way back.
 
-    The kernel steps `equations` and writes `records`.  `states` are the columns of the whole network's state that start
-    the reduced one, `places` the column of the reduced state in which each state of the whole network is found, `numbers`
-    the columns of the whole network's parameters that are left.  `multiplicity` counts the oscillators behind each node
-    where the synchronisation error needs it, else None.  `skipped` and `kept` say in sentences what was left out, and what
-    not and why; `jumps` whether a cell that repeats itself may leave out whole cycles.
+    Attributes
+    ----------
+    scene : Scene
+    equations : Equations
+        The equations that the kernel steps.
+    records : tuple of str
+        What the kernel records.
+    merge : NodeMerge
+        Which oscillators are stepped as one.
+    numbers : ndarray of int
+        Columns of the whole network's parameters that are left.
+    multiplicity : tuple of int, optional
+        How many oscillators each node stands for, if the synchronisation error needs it.
+    skipped, kept : tuple of str
+        Sentences: what was left out, and what was not and why.
+    jumps : bool
+        Whether a cell that repeats itself leaves out whole cycles.
     """
 
     scene: Scene
     equations: Equations = field(repr=False)
     records: tuple[str, ...]
-    states: np.ndarray = field(repr=False)
-    places: np.ndarray = field(repr=False)
+    merge: NodeMerge = field(repr=False)
     numbers: np.ndarray = field(repr=False)
     multiplicity: tuple[int, ...] | None
     skipped: tuple[str, ...]
     kept: tuple[str, ...]
     jumps: bool
 
-    def section_variable(self) -> str:
-        """The state variable of the reduced network that stands for the scene's section variable."""
-        whole = self.scene.equations.state.index(self.scene.section.variable)
-        return self.equations.state[int(self.places[whole])]
+    @property
+    def dimension(self) -> int:
+        """Number of states of the reduced network."""
+        return len(self.merge.states)
 
-    def cells(self, whole: Plan) -> Plan:
-        """The rows of the reduced network out of those of the whole one."""
+    @property
+    def samples(self) -> int:
+        """Points of a trajectory; 0 if none is recorded."""
+        return self.scene.samples if "trajectory" in self.scene.record else 0
+
+    def section_variable(self) -> str:
+        """Return the state variable of the reduced network that stands for the scene's section variable."""
+        whole = self.scene.equations.state.index(self.scene.section.variable)
+        return self.equations.state[int(self.merge.places[whole])]
+
+    def rows(self, whole: Plan) -> Plan:
+        """Return the rows of the reduced network out of those of the whole one."""
         start, numbers = whole.start, whole.numbers
-        if len(self.states) < len(self.places):
-            start = np.take(start, self.states, axis=1)
+        if self.merge.merges:
+            start = np.take(start, self.merge.states, axis=1)
         if len(self.numbers) < numbers.shape[1]:
             numbers = np.take(numbers, self.numbers, axis=1)
         return replace(whole, start=start, numbers=numbers)
 
-    @property
-    def merged(self) -> Merged:
-        """How the reduced network's results become those of the whole one."""
-        together = "sync_error" in self.scene.record and "sync_error" not in self.records
-        return Merged(self.states, self.places, together)
-
     def expand(self, buffers: Buffers) -> Buffers:
-        """What the kernel wrote, for the whole network; the same arrays where nothing was merged."""
-        return self.merged.expand(buffers)
-
-    def contract(self, buffers: Buffers) -> Buffers:
-        """The way back: the part of the whole network's results that the reduced network has."""
-        return self.merged.take(buffers, self.states)
+        """Return the results of the whole network; the same arrays if nothing was merged."""
+        return self.merge.expand(buffers)
 
 
-def decide(scene: Scene, skip: bool = True, fold_all: bool = False) -> Skip:
-    """Find out what can be left out of a scene.
+def as_reduction(scene: Scene, reduce: bool | Reduction) -> Reduction:
+    """Return the reduction of a scene that the argument `reduce` of `run` asks for.
 
-    Parameters that are 0 in every cell are folded, so that scenes that differ only in numbers share a kernel; `fold_all`
-    folds all that are fixed, to their shortest decimals.  With `skip` false everything is integrated as it stands.
+    Raises
+    ------
+    ValueError
+        If it is the reduction of another scene.
+    """
+    a_scene(scene)
+    if not isinstance(reduce, Reduction):
+        return reduce_scene(scene, flag("reduce", reduce))
+    if reduce.scene != scene:
+        raise ValueError("reduce: found the reductions of another scene; make them with reduce_scene(scene)")
+    return reduce
+
+
+def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> Reduction:
+    """Return what is left of a scene to integrate.
+
+    Parameters
+    ----------
+    scene : Scene
+    reduce : bool
+        If False, everything is integrated as it stands.
+    fold_all : bool
+        Substitute all parameters that have one value in every cell, by their shortest decimals.  By default only zeros
+        are substituted, so that scenes that differ in numbers share a kernel.
     """
     whole = scene.equations
     skipped: list[str] = []
     kept: list[str] = []
     equations, classes = whole, tuple(range(scene.n))
-    if skip:
+    if reduce:
         equations = _fold(scene, fold_all, skipped, kept)
         equations, classes = _merge(scene, equations, skipped, kept)
         kept += _present(scene, equations)
     else:
         kept.append("everything is integrated as it stands, as asked for")
-    together = max(classes) == 0 and scene.n > 1
-    seen: dict[int, int] = {}
-    for node, k in enumerate(classes):
-        seen.setdefault(k, node)
-    first = [seen[k] for k in range(equations.n)]
-    components = range(whole.dimension // scene.n)
-    alone = np.arange(whole.dimension)
-    return Skip(
+    together = max(classes) == 0 and scene.n > 1 and "sync_error" in scene.record
+    first = [classes.index(k) for k in range(equations.n)]
+    return Reduction(
         scene,
         equations,
         tuple(r for r in scene.record if not (together and r == "sync_error")),
-        alone if whole.mixed else np.array([c * scene.n + i for c in components for i in first]),
-        alone if whole.mixed else np.array([c * equations.n + k for c in components for k in classes]),
+        _node_merge(whole, equations, classes, together),
         np.array([whole.parameters.index(_column(name, equations, first)) for name in equations.parameters], dtype=int),
         _multiplicity(scene, classes),
         tuple(skipped),
         tuple(kept),
-        skip,
+        reduce,
+    )
+
+
+def _node_merge(whole: Equations, reduced: Equations, classes: tuple[int, ...], together: bool) -> NodeMerge:
+    """The columns of both states, from the class of each oscillator of the whole network."""
+    if whole.mixed:
+        alone = np.arange(whole.dimension)
+        return NodeMerge(alone, alone, together)
+    first = [classes.index(k) for k in range(reduced.n)]
+    components = range(whole.dimension // whole.n)
+    return NodeMerge(
+        np.array([c * whole.n + i for c in components for i in first]),
+        np.array([c * reduced.n + k for c in components for k in classes]),
+        together,
     )
 
 
@@ -255,14 +320,14 @@ def _multiplicity(scene: Scene, classes: tuple[int, ...]) -> tuple[int, ...] | N
     return tuple(sizes[k] for k in range(len(sizes)))
 
 
-def explain(chosen: Skip) -> str:
-    """What is left out of a scene and why, what is not, and what may be left out of a cell at run time."""
+def explain(reduction: Reduction) -> str:
+    """Return in words what is left out of a scene and why, what is not, and what a cell may leave out at run time."""
     parts = (
-        ("left out", (*chosen.skipped, *_unwritten(chosen))),
-        ("not left out", chosen.kept),
+        ("left out", (*reduction.skipped, *_unwritten(reduction))),
+        ("not left out", reduction.kept),
         (
             "in a cell, while it runs",
-            (DIVERGED, PERIODIC) if chosen.jumps and chosen.scene.drive.frequency is not None else (DIVERGED,),
+            (DIVERGED, PERIODIC) if reduction.jumps and reduction.scene.drive.frequency is not None else (DIVERGED,),
         ),
     )
     return "\n".join(
@@ -270,21 +335,21 @@ def explain(chosen: Skip) -> str:
     )
 
 
-def _unwritten(chosen: Skip) -> list[str]:
+def _unwritten(reduction: Reduction) -> list[str]:
     """What the text of the kernel does not have, because the scene never had it."""
-    scene, found = chosen.scene, []
+    scene, found = reduction.scene, []
     if not scene.forced:
         found.append("forcing: time does not occur in the equations; no time terms")
     if not scene.equations.links:
         found.append("coupling: no links")
     if "sync_error" not in scene.record:
         found.append("synchronisation error: not recorded")
-    elif "sync_error" not in chosen.records:
+    elif "sync_error" not in reduction.records:
         found.append("synchronisation error: 0 between oscillators that are stepped as one")
     if "section" not in scene.record:
         found.append("section: not recorded; no search for crossings")
     if "trajectory" not in scene.record:
         found.append("trajectory: not recorded; no samples")
-    if not chosen.records:
+    if not reduction.records:
         found.append("dense output: no record needs states inside a step")
     return found

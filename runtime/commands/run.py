@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from synchain.models.scenes.scene import Scene
 
-    from ..cells.reduce import Skip
-    from ..sweeps.sitting import SweepFailed, SweepInterrupted
+    from ..cells.reduce import Reduction
+    from ..sweeps.errors import SweepFailed, SweepInterrupted
     from ..sweeps.stream import Streamed
 
 SUMMARY = "run a scene; write its results (netCDF) and a figure"
@@ -84,15 +84,15 @@ def configure(parser: ArgumentParser) -> None:
 def execute(arguments: Namespace) -> int:
     """Explain the scene where asked to; run it to a file, draw, and say how the cells ended."""
     from ..cells.kernels import kernel
-    from ..cells.reduce import decide, explain
-    from ..sweeps.sitting import SweepFailed, SweepInterrupted
+    from ..cells.reduce import explain, reduce_scene
+    from ..sweeps.errors import SweepFailed, SweepInterrupted
     from ..sweeps.stream import claim, stream
 
     if arguments.out is None and (arguments.resume or arguments.overwrite or not arguments.explain):
         raise WrongUse("the following arguments are required: --out\nsee: synchain run --help")
     with wrong_use():
         scene = changed_scene(arguments)
-        skip = decide(scene, not arguments.no_skip)
+        skip = reduce_scene(scene, not arguments.no_skip)
         name = Path(arguments.scene).stem if arguments.scene.endswith(".toml") else arguments.scene
         if arguments.explain:
             print(f"{name}: {_count(scene.cells, 'cell')} of {_count(scene.n, 'oscillator')}\n{explain(skip)}")
@@ -106,10 +106,10 @@ def execute(arguments: Namespace) -> int:
         output_folder(target.parent)
     warn(scene.warnings)
     if arguments.dask:
-        kernel(scene, skip=skip)  # before the connection is there, which would not be answered while it compiles
+        kernel(scene, reduce=skip)  # before the connection is there, which would not be answered while it compiles
     with stopped_by_signals(), _executor(arguments.dask) as executor:
         try:
-            done = stream(scene, target, skip=skip, workers=arguments.workers, executor=executor, **given)
+            done = stream(scene, target, reduce=skip, workers=arguments.workers, executor=executor, **given)
         except (SweepInterrupted, SweepFailed) as stop:
             raise _stopped(stop, target, arguments) from None
     _summary(name, scene, done, target)
@@ -121,7 +121,8 @@ def changed_scene(arguments: Namespace) -> Scene:
     """The scene with the changes of --set and --rtol; ValueError where they do not fit."""
     from synchain.models.scenes.file import load_scene
 
-    from ..sweeps.run import with_axes
+    from ..cells.keywords import with_axes
+    from ..sweeps.run import run
 
     scene = load_scene(arguments.scene)
     changes: dict[str, Any] = {}
@@ -129,7 +130,7 @@ def changed_scene(arguments: Namespace) -> Scene:
         if name in changes:
             raise WrongUse(f"--set gives {name} twice; expected it once")
         changes[name] = _fitting(scene, name, value)
-    scene = with_axes(scene, changes)
+    scene = with_axes(run, scene, changes)
     if changes:
         scene = scene.replace(title=f"{scene.title or arguments.scene}, changed: {', '.join(changes)}")
     return scene if arguments.rtol is None else scene.replace(rtol=arguments.rtol)
@@ -155,7 +156,7 @@ def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[st
     return int(value) if name in ("samples", "max_steps") and value.is_integer() else value
 
 
-def _check(skip: Skip, arguments: Namespace) -> None:
+def _check(skip: Reduction, arguments: Namespace) -> None:
     """Find out whatever can go wrong before the first cell runs."""
     from ..cells.kernels import kernel_source
     from ..cells.plan import Planner
@@ -164,7 +165,7 @@ def _check(skip: Skip, arguments: Namespace) -> None:
     if arguments.out is None:
         return
     Planner(skip.scene).extremes()
-    kernel_source(skip.scene, skip=skip)
+    kernel_source(skip.scene, reduce=skip)
     if arguments.certify:
         check_certifiable(skip.scene)
 
@@ -228,7 +229,7 @@ def _executor(address: str | None) -> Iterator[Executor | None]:
 
 def _stopped(stop: SweepInterrupted | SweepFailed, target: Path, arguments: Namespace) -> Failed:
     """What to say about a run that did not come to its end, and how to go on."""
-    from ..results.unfinished import partial_path
+    from ..results.partial import partial_path
 
     words = [word for word in arguments.command_line if word != "--overwrite"]
     again = shlex.join([*words, *(() if arguments.resume else ("--resume",))])

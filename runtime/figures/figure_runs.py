@@ -75,7 +75,7 @@ class FigureRuns:
         pair = scene.replace(topology=topology("chain", 2), initial=None, axes=(), title="", sigma=0.0)
         if pair not in self._sweeps:
             alpha = 2.0 * np.array(thin(_swept(pair, 0.6, 601), self.quality.grid).axes[0].values)
-            self._sweeps[pair] = probe(pair, alpha, **self._options(2.0))
+            self._sweeps[pair] = probe(pair, alpha, **self._options(1.0))
         return self._sweeps[pair]
 
     def network(self, scene: Scene) -> Sweep:

@@ -4,7 +4,7 @@ Eigenratios (largest over smallest non-zero |gamma|) that grow with the size of 
 chain cot²(π/2n); ring 1/sin²(π/n) for even n, 1/(4 sin²(π/2n)) for odd n; star n; hypercube its dimension; complete 1.
 They follow from the spectra in Brouwer & Haemers, Spectra of Graphs (Springer, 2012), section 1.4.  Those with an angle are
 rational only where cos(π/n), for the even ring cos(2π/n), is 0, ±1/2 or ±1 (I. Niven, Irrational Numbers, Carus Math.
-Monographs 11, 1956, corollary 3.12), so that balls decide every other comparison.
+Monographs 11, 1956, corollary 3.12), so that balls reduce_scene every other comparison.
 """
 
 from __future__ import annotations

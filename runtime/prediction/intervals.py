@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-__all__ = ["Interval", "find", "grid_intervals", "intersect", "scale"]
+__all__ = ["Interval", "find", "grid_intervals", "intersect", "refine", "scale"]
 
 Interval = tuple[float, float]
 Predicate = Callable[[np.ndarray], np.ndarray]
@@ -37,6 +37,13 @@ def find(judge: Predicate, x: np.ndarray, resolution: float, fan: int = 7) -> tu
     if not resolution > 0:
         raise ValueError(f"resolution = {resolution}; expected a positive number")
     verdict = np.asarray(judge(x), dtype=bool)
+    return refine(judge, x, verdict, resolution, fan), verdict
+
+
+def refine(
+    judge: Callable[[np.ndarray], np.ndarray], x: np.ndarray, verdict: np.ndarray, resolution: float, fan: int = 7
+) -> list[Interval]:
+    """Return the intervals of `find`, if the verdict (m,) on the grid `x` is known already."""
     changes = np.flatnonzero(verdict[1:] != verdict[:-1])
     good = np.where(verdict[changes], x[changes], x[changes + 1])
     bad = np.where(verdict[changes], x[changes + 1], x[changes])
@@ -47,7 +54,7 @@ def find(judge: Predicate, x: np.ndarray, resolution: float, fan: int = 7) -> tu
         ends.insert(0, x[0])
     if verdict[-1]:
         ends.append(x[-1])
-    return [(float(a), float(b)) for a, b in zip(ends[::2], ends[1::2], strict=True)], verdict
+    return [(float(a), float(b)) for a, b in zip(ends[::2], ends[1::2], strict=True)]
 
 
 def _narrow(judge: Predicate, good: np.ndarray, bad: np.ndarray, fan: int) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""What the numbers of a kernel are called in a result: variables of any of its cells, coordinates, provenance."""
+"""Names of a kernel's numbers in a result: variables of any of its cells, coordinates, provenance."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from synchain.codegen.driver.columns import Count, Point, Span, Sum
 from synchain.models.scenes.scene import Scene
 
 from ..support.status import Status
@@ -19,7 +20,9 @@ if TYPE_CHECKING:
     from ..cells.buffers import Buffers
 
 __all__ = [
+    "COUNTS",
     "MEANINGS",
+    "SUMS",
     "Variable",
     "alike",
     "changed",
@@ -58,61 +61,94 @@ MEANINGS = {
 }
 
 
+COUNTS = {
+    "status": Count.STATUS,
+    "steps": Count.ACCEPTED,
+    "rejected": Count.REJECTED,
+    "periods_skipped": Count.SKIPPED,
+    "section_count": Count.POINTS,
+}
+SUMS = {
+    "sync_error": Sum.MEAN,
+    "sync_error_max": Sum.PEAK,
+    "sync_error_end": Sum.LAST,
+    "end_time": Sum.STOPPED_AT,
+}
+"""The columns of `counts` and of `sums` by the names of their variables."""
+
+
 def variables(
     scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: Certificate | None, most: int
 ) -> Iterator[Variable]:
-    """The variables of some cells, with room for `most` section points each; spans, buffers, certificate: of these cells."""
-    for name, column in (("status", 0), ("steps", 1), ("rejected", 2), ("periods_skipped", 4)):
-        yield name, (), buffers.counts[:, column].astype(np.int32)
+    """Yield the variables of some cells.
+
+    Parameters
+    ----------
+    scene : Scene
+    spans : ndarray, shape (cells, len(Span))
+    buffers : Buffers
+        Results of these cells, of the whole network.
+    certificate : Certificate, optional
+        Exponents of these cells.
+    most : int
+        Section points of a cell that there is room for.
+    """
+    for name in ("status", "steps", "rejected", "periods_skipped"):
+        yield name, (), buffers.counts[:, COUNTS[name]].astype(np.int32)
     yield "end", ("state",), buffers.end
-    yield "end_time", (), buffers.sums[:, 3]
+    yield "end_time", (), buffers.sums[:, Sum.STOPPED_AT]
     if "sync_error" in scene.record:
-        for column, name in enumerate(("sync_error", "sync_error_max", "sync_error_end")):
-            yield name, (), buffers.sums[:, column]
+        for name in ("sync_error", "sync_error_max", "sync_error_end"):
+            yield name, (), buffers.sums[:, SUMS[name]]
     if certificate is not None:
         for name, values in _certified(scene, spans, buffers, certificate).items():
             yield name, (), values
     if "section" in scene.record:
         points = np.full((len(spans), max(most, 1), buffers.points.shape[2]), np.nan)
-        there = min(most, buffers.points.shape[1])
-        points[:, :there] = buffers.points[:, :there]
-        yield "section_count", (), buffers.counts[:, 3].astype(np.int32)
-        yield "section_time", ("point",), points[:, :, 0]
-        yield "section", ("point", "state"), points[:, :, 1:]
+        room = min(most, buffers.points.shape[1])
+        points[:, :room] = buffers.points[:, :room]
+        yield "section_count", (), buffers.point_counts.astype(np.int32)
+        yield "section_time", ("point",), points[:, :, Point.TIME]
+        yield "section", ("point", "state"), points[:, :, Point.STATE :]
     if "trajectory" in scene.record:
         parts = np.linspace(0.0, 1.0, scene.samples) if scene.samples > 1 else np.zeros(1)
-        times = spans[:, :1] + (spans[:, 1:2] - spans[:, :1]) * parts
-        yield "trajectory_time", ("sample",), times
+        start, end = spans[:, Span.START, None], spans[:, Span.END, None]
+        yield "trajectory_time", ("sample",), start + (end - start) * parts
         yield "trajectory", ("sample", "state"), buffers.samples
 
 
 def dimensions(scene: Scene) -> tuple[str, ...]:
-    """The dimensions of a sweep: the names of its axes, or "cell" where they are zipped."""
+    """Return the dimensions of a sweep: the names of its axes, or "cell" if they are zipped."""
     return ("cell",) if scene.zipped else tuple(axis.name for axis in scene.axes)
 
 
 def _certified(scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: Certificate) -> dict[str, np.ndarray]:
-    """What a certificate says of each cell."""
-    made = {"transversal_exponent": certificate.exponent, "transversal_stderr": certificate.stderr}
-    last = spans[:, 1]
-    made["ended_early"] = ((buffers.counts[:, 0] == Status.FINISHED) & (buffers.sums[:, 3] < last)).astype(np.int32)
+    """The variables of a certificate."""
+    sums, finished = buffers.sums, buffers.finished
+    values = {"transversal_exponent": certificate.exponent, "transversal_stderr": certificate.stderr}
+    values["ended_early"] = (finished & (sums[:, Sum.STOPPED_AT] < spans[:, Span.END])).astype(np.int32)
     if "sync_error" in scene.record:
-        finished = buffers.counts[:, 0] == Status.FINISHED
-        made["verdict"] = certificate.verdicts(finished, buffers.sums[:, 0], buffers.sums[:, 1]).astype(np.int32)
-    return made
+        verdicts = certificate.verdicts(finished, sums[:, Sum.MEAN], sums[:, Sum.PEAK])
+        values["verdict"] = verdicts.astype(np.int32)
+    return values
 
 
 def coordinates(scene: Scene) -> dict[str, Any]:
-    """The coordinates of a result: the axes and the names of the states."""
-    made: dict[str, Any] = {"state": list(scene.equations.state)}
+    """Return the coordinates of a result: the axes and the names of the states."""
+    coords: dict[str, Any] = {"state": list(scene.equations.state)}
     for axis in scene.axes:
-        made[axis.name] = ("cell" if scene.zipped else axis.name, np.array(axis.values))
-    return made
+        coords[axis.name] = ("cell" if scene.zipped else axis.name, np.array(axis.values))
+    return coords
 
 
 def scene_of(attributes: Mapping[Any, Any]) -> Scene:
-    """The scene that a result says it is of; ValueError or TypeError if it does not say it as `provenance` does, or if the
-    models that are here cannot make it."""
+    """Return the scene of a result from its attributes.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If the attributes are not those of `provenance`, or if the installed models cannot make the scene.
+    """
     missing = [name for name in TOLD if not isinstance(attributes.get(name), str)]
     if "scene" in missing:
         raise ValueError("it is no synchain result: it has no attribute 'scene'")
@@ -129,13 +165,13 @@ def scene_of(attributes: Mapping[Any, Any]) -> Scene:
 
 
 def alike(first: Scene, second: Scene) -> bool:
-    """True where two scenes differ in their titles at most, and in the text of the files of code that they name."""
+    """True if two scenes differ at most in their titles and in the text of the files of code that they name."""
     one, other = first.replace(title=""), second.replace(title="")
     return one == other or one.as_dict() == other.as_dict()
 
 
 def changed(attributes: Mapping[Any, Any], scene: Scene) -> bool:
-    """True where a result of a scene comes of another model: the code behind the names of its parts has changed since."""
+    """True if the code behind the names of a scene's parts has changed since the result was computed."""
     return "model" in attributes and attributes["model"] != scene.equations.digest
 
 
@@ -147,7 +183,7 @@ def provenance(
     versions: str,
     processor: str,
 ) -> dict[str, Any]:
-    """Where a result comes from; `skipped` says what was left out of the equations (see `synchain.runtime.cells.reduce`)."""
+    """Return how a result came about, as its attributes; `skipped` says what was left out of the equations."""
     return {
         "title": scene.title or repr(scene),
         "scene": json.dumps(scene.as_dict()),

@@ -1,4 +1,4 @@
-"""The labelled outcome of a run: numbers, what they mean, and how they came about."""
+"""The labelled result of a run: numbers, their meaning, and how they came about."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from ..support.files import netcdf_data, understood, whole_file
 from ..support.netcdf import DIGEST, seal, unsealed
 from ..support.status import Status
 from .certificate import Certificate
-from .labels import MEANINGS, alike, changed, coordinates, dimensions, scene_of, variables
+from .labels import COUNTS, MEANINGS, SUMS, alike, changed, coordinates, dimensions, scene_of, variables
 
 if TYPE_CHECKING:
     from synchain.models.dynamics.equations import Equations
 
-__all__ = ["Result", "gather", "told_by"]
+__all__ = ["Result", "attributes_of", "gather", "read_result"]
 
 IN_MEMORY = 10**9
 """Numbers of the largest result that is kept in memory, 8 GB."""
@@ -98,45 +98,46 @@ class Result:
                 "restore the code, or run without resume"
             )
         if not self.stepped(equations):
-            raise ValueError("the result to resume left out other parts of its scene; resume with the skip of that run")
+            raise ValueError(
+                "the result to resume left out other parts of its scene; resume with the reduction of that run"
+            )
         if (begun := str(self.data.attrs.get("processor"))) != processor():
             there, here = told_apart(begun, processor())
             raise ValueError(
                 f"the result to resume was begun on the processor {there}; found {here}, which may round otherwise; "
                 "resume on the first kind, or run without resume"
             )
-        cells, data = scene.cells, self.data
+        self._fill(buffers)
+        buffers.clear(~buffers.finished)
+
+    def _fill(self, buffers: Buffers) -> None:
+        """Copy all cells into the buffers; the way back of `gather`."""
+        cells, data = self.scene.cells, self.data
         for source, target in (("end", buffers.end), ("trajectory", buffers.samples)):
             if source in data:
                 target[:] = data[source].values.reshape(target.shape)
-        counts = ("status", "steps", "rejected", "section_count", "periods_skipped")
-        sums = ("sync_error", "sync_error_max", "sync_error_end", "end_time")
-        for table, names in ((buffers.counts, counts), (buffers.sums, sums)):
-            for column, name in enumerate(names):
+        for table, columns in ((buffers.counts, COUNTS), (buffers.sums, SUMS)):
+            for name, column in columns.items():
                 if name in data:
                     table[:, column] = data[name].values.reshape(cells)
         if "section" in data:
-            kept = np.concatenate([data.section_time.values[..., None], data.section.values], axis=-1)
-            kept = kept.reshape(cells, -1, kept.shape[-1])
-            buffers.points = np.full((cells, max(kept.shape[1], buffers.points.shape[1]), kept.shape[2]), np.nan)
-            buffers.points[:, : kept.shape[1]] = kept
-        again = buffers.counts[:, 0] != Status.FINISHED
-        buffers.counts[again] = 0
-        for array in (buffers.end, buffers.sums, buffers.points, buffers.samples):
-            array[again] = np.nan
+            points = np.concatenate([data.section_time.values[..., None], data.section.values], axis=-1)
+            points = points.reshape(cells, -1, points.shape[-1])
+            buffers.widen(points.shape[1])
+            buffers.points[:, : points.shape[1]] = points
 
 
-def _opened(path: Path) -> Result:
-    """The result of a file of either kind."""
-    from .store import is_store
+def read_result(path: Path) -> Result:
+    """Return the result that a netCDF file holds.
 
-    if is_store(path):
-        from .unfinished import open_unfinished
-
-        return open_unfinished(path)
+    Raises
+    ------
+    OSError, ValueError
+        If the file is damaged or holds no result.
+    """
     with netcdf_data(path) as file:
         data = file.load()
-    data.attrs = told_by(data.attrs, path)
+    data.attrs = attributes_of(data.attrs, path)
     with understood(path):
         scene = scene_of(data.attrs)
         status = data.get("status")
@@ -146,7 +147,7 @@ def _opened(path: Path) -> Result:
     return Result(data, scene)
 
 
-def told_by(attributes: Mapping[Any, Any], path: Path) -> dict[str, Any]:
+def attributes_of(attributes: Mapping[Any, Any], path: Path) -> dict[str, Any]:
     """The attributes of a result's file without its digest; a RuntimeWarning says if there is none."""
     if "scene" in attributes and DIGEST not in attributes:
         warnings.warn(
@@ -164,11 +165,21 @@ def gather(
     buffers: Buffers,
     certificate: Certificate | None = None,
 ) -> Result:
-    """Label what the kernel wrote for all cells; `attributes` say where it comes from (`synchain.runtime.results.labels`)."""
+    """Return the labelled result of all cells.
+
+    Parameters
+    ----------
+    scene : Scene
+    attributes : mapping
+        How the result came about (`synchain.runtime.results.labels.provenance`).
+    spans : ndarray, shape (cells, len(Span))
+    buffers : Buffers
+        Results of all cells, of the whole network.
+    certificate : Certificate, optional
+    """
     dims, shape = dimensions(scene), scene.shape
-    most = int(buffers.counts[:, 3].max(initial=0))
     data = {
         name: ((*dims, *more), values.reshape((*shape, *values.shape[1:])), {"long_name": MEANINGS[name]})
-        for name, more, values in variables(scene, spans, buffers, certificate, most)
+        for name, more, values in variables(scene, spans, buffers, certificate, buffers.most_points)
     }
     return Result(xr.Dataset(data, coordinates(scene), dict(attributes)), scene)

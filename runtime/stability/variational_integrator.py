@@ -13,13 +13,14 @@ from functools import lru_cache
 
 import numpy as np
 
+from synchain.codegen.driver.columns import Control
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.modes import emit_modes
 from synchain.models.dynamics.variational import Variation
 from synchain.models.scenes.scene import Scene
 
 from ..cells.initial_modes import local_clock
-from ..cells.plan import CANCEL, control_array, half_swing, periods, tolerances
+from ..cells.plan import control_array, half_swing, periods, tolerances
 from ..support.status import Status
 from ..support.threads import worker_count
 
@@ -201,7 +202,7 @@ class VariationalIntegrator:
                 for job in jobs:
                     job.result()
             except KeyboardInterrupt:
-                self.control[CANCEL] = 1.0
+                self.control[Control.CANCEL] = 1.0
                 raise
 
 

@@ -1,4 +1,4 @@
-"""What the transversal exponents say about each cell of a sweep: whether its synchronous state is stable.
+"""Certification: the transversal exponents of every cell of a sweep say whether its synchronous state is stable.
 
 Two oscillators can become equal bit for bit by rounding and then stay together although the state is unstable (Pikovsky,
 Phys. Rev. Lett. 73, 2931 (1994)), and a cell that starts outside the basin or waits too short a time is not synchronous
@@ -16,7 +16,7 @@ from synchain.models.dynamics.variational import mode
 from synchain.models.scenes.scene import Scene
 from synchain.models.scenes.sweep import rest_in_sweep
 
-from ..cells.plan import axis_columns
+from ..cells.plan import Planner
 from ..results.certificate import Certificate
 from ..stability.exponents import Exponents, exponents
 from ..stability.orbits import unit_of_time
@@ -28,18 +28,31 @@ MOST = 10**7
 
 
 def certify(scene: Scene, *, precision: float = 2e-3, periods: float = 2000, workers: int | None = None) -> Certificate:
-    """Return the exponents of every cell's synchronous state; cells that differ only in sigma and starts share one orbit.
+    """Return the exponents of every cell's synchronous state.
 
-    Of several kinds of attractor found by four starts the least stable counts.  Raises ValueError as `exponents` does.
+    Cells that differ only in sigma and starts share one orbit.  Of several kinds of attractor found by four starts the least
+    stable counts.
+
+    Parameters
+    ----------
+    scene : Scene
+        A sweep, with its axes.
+    precision, periods, workers
+        As for `exponents`.
+
+    Raises
+    ------
+    ValueError
+        If the synchronous state has no transversal exponents; as `exponents` does.
     """
     check_certifiable(scene)
-    columns = axis_columns(scene)
+    gamma = _transversal_eigenvalues(scene)
+    columns = Planner(scene).columns(np.arange(scene.cells))
     own = [name for name in columns if name in scene.parameters and name != "sigma"]
     sigma = np.broadcast_to(columns.get("sigma", np.array(scene.parameters["sigma"])), (scene.cells,))
     groups: dict[tuple[float, ...], list[int]] = defaultdict(list)
     for cell in range(scene.cells):
         groups[tuple(float(columns[name][cell]) for name in own)].append(cell)
-    gamma = _transversal(scene)
     exponent, stderr, diffusion = (np.empty(scene.cells) for _ in range(3))
     for values, cells in groups.items():
         asked = -sigma[cells][:, None] * gamma
@@ -56,7 +69,7 @@ def certify(scene: Scene, *, precision: float = 2e-3, periods: float = 2000, wor
 
 
 def check_certifiable(scene: Scene) -> None:
-    """Raise ValueError where the synchronous state of a scene has no transversal exponents."""
+    """Raise ValueError if the synchronous state of a scene has no transversal exponents."""
     if not scene.equations.links:
         raise ValueError("a certificate needs coupled oscillators; found a scene without links")
     if scene.cells > MOST:
@@ -69,7 +82,7 @@ def check_certifiable(scene: Scene) -> None:
         raise ValueError(f"a certificate needs a drive with a period; found {rest[0]} = {rest[1]:g} in the sweep")
 
 
-def _transversal(scene: Scene) -> np.ndarray:
+def _transversal_eigenvalues(scene: Scene) -> np.ndarray:
     """The transversal eigenvalues: all but one zero."""
     spectrum = scene.topology.spectrum
     values = [complex(v) for v, m in zip(spectrum.values, spectrum.multiplicities, strict=True) if v != 0.0 or m > 1]

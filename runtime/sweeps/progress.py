@@ -1,4 +1,4 @@
-"""How far a sweep has come: for a bar on a terminal, a line now and then elsewhere, and whoever wants to know."""
+"""Progress of a sweep: a bar on a terminal, a line a minute elsewhere, and a value for a hook of the caller."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from synchain.models.inputs.checks import a_callable, flag
 
 from ..support.status import CODES, Status
 
-__all__ = ["Hook", "Progress", "Reporter", "duration"]
+__all__ = ["Hook", "Progress", "Reporter", "check_reporting", "duration"]
 
 EVERY = 60.0
 """Seconds between two lines where stderr is no terminal."""
@@ -24,9 +24,20 @@ EVERY = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """State of a sweep: `done` of `cells` have ended, `kept` of them in an earlier sitting, and how; times in seconds.
+    """State of a sweep.
 
-    `compiling` is the time before the first cell ran, `running` that since then.
+    Attributes
+    ----------
+    cells, done, kept : int
+        Cells in all, those that have ended, and those of them that an earlier run had finished.
+    statuses : mapping of Status to int
+        How many cells ended how.
+    compiling : float
+        Seconds that the compilation of the kernel took, or its loading.
+    running : float
+        Seconds since the first cell began.
+    preparing : float
+        Seconds before that without the compilation: equations, text of the kernel, exponents of a certified run.
     """
 
     cells: int
@@ -35,20 +46,21 @@ class Progress:
     statuses: Mapping[Status, int]
     compiling: float
     running: float
+    preparing: float = 0.0
 
     @property
     def rate(self) -> float:
-        """Cells a second in this sitting."""
+        """Cells a second in this run."""
         return (self.done - self.kept) / self.running if self.running > 0.0 else 0.0
 
     @property
     def left(self) -> float:
-        """Seconds left at this rate, infinite while nothing is known."""
+        """Seconds left at this rate; infinite before the first cell has ended."""
         return (self.cells - self.done) / self.rate if self.rate > 0.0 else float("inf")
 
     @property
     def failures(self) -> str:
-        """How many cells ended otherwise than at the end of their window, in words; empty where none did."""
+        """How many cells ended otherwise than at the end of their window, in words; empty if none did."""
         bad = ((s, n) for s, n in self.statuses.items() if s != Status.FINISHED and n)
         return ", ".join(f"{n} {s.name.lower().replace('_', ' ')}" for s, n in bad)
 
@@ -70,30 +82,45 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
+def check_reporting(show: bool | None, hook: Hook | None) -> None:
+    """Raise TypeError if a hook cannot be called or if `show_progress` is neither True, False nor None."""
+    if hook is not None:
+        a_callable("progress", hook)
+    if show is not None:
+        flag("show_progress", show)
+
+
 @dataclass(slots=True)
 class Reporter:
-    """Counts cells as they end and shows it: a bar on a terminal, else a line every minute; `show` False shows nothing."""
+    """Counts cells as they end and shows a bar on a terminal, else a line every minute; `show` False shows nothing."""
 
     cells: int
     show: bool | None = None
     hook: Hook | None = None
     counts: np.ndarray = field(default_factory=lambda: np.zeros(CODES, dtype=np.int64))
     kept: int = 0
+    preparing: float = 0.0
     compiling: float = 0.0
     began: float = field(default_factory=time.perf_counter)
     _said: float = 0.0
     _bar: Any = None
 
     def __post_init__(self) -> None:
-        if self.hook is not None:
-            a_callable("progress", self.hook)
-        if self.show is not None:
-            flag("show_progress", self.show)
+        check_reporting(self.show, self.hook)
 
-    def start(self, counts: np.ndarray) -> None:
-        """The kernel is there and the first cell runs; `counts` (CODES,) are the cells kept from before."""
+    def start(self, counts: np.ndarray, compiling: float) -> None:
+        """Begin to count cells.
+
+        Parameters
+        ----------
+        counts : ndarray, shape (CODES,)
+            Cells that are kept from an earlier run.
+        compiling : float
+            Seconds of the time since this reporter was made that the compilation took.
+        """
         now = time.perf_counter()
-        self.compiling, self.began, self._said = now - self.began, now, now
+        self.preparing, self.compiling = now - self.began - compiling, compiling
+        self.began, self._said = now, now
         self.counts = self.counts + counts
         self.kept = int(self.counts.sum())
         terminal = bool(getattr(sys.stderr, "isatty", bool)())
@@ -102,7 +129,7 @@ class Reporter:
         self._tell()
 
     def add(self, counts: np.ndarray) -> None:
-        """Some more cells have ended; counts (CODES,)."""
+        """Count cells that have ended; counts (CODES,)."""
         self.counts = self.counts + counts
         if self._bar is not None:
             self._bar.set_postfix_str(self.now.failures, refresh=False)
@@ -118,7 +145,7 @@ class Reporter:
         found = {status: int(self.counts[status]) for status in Status if self.counts[status]}
         running = time.perf_counter() - self.began
         done = int(self.counts.sum())
-        return Progress(self.cells, done, self.kept, MappingProxyType(found), self.compiling, running)
+        return Progress(self.cells, done, self.kept, MappingProxyType(found), self.compiling, running, self.preparing)
 
     def close(self) -> None:
         """Leave the bar as it stands."""

@@ -1,4 +1,4 @@
-"""Runs a scene to a file: blocks go to disk as they end, so that nothing that happens costs more than those in flight."""
+"""Runs a scene to a file: blocks go to disk as they end, so a crash loses at most the blocks being computed."""
 
 from __future__ import annotations
 
@@ -17,27 +17,28 @@ from synchain.models.inputs.checks import a_path, flag, shown
 from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
-from ..cells.kernels import chosen_skip
+from ..cells.keywords import with_axes
 from ..cells.layout import Layout
-from ..cells.reduce import Skip
+from ..cells.reduce import Reduction, as_reduction
+from ..results.block_log import BlockLog
 from ..results.labels import alike, changed, scene_of
-from ..results.result import told_by
-from ..results.store import Store
-from ..results.unfinished import about, certificate_of, finish_file, layout_of, partial_path
+from ..results.partial import certificate_of, describe_sweep, layout_of, partial_path, write_result
+from ..results.result import attributes_of
 from ..support.files import check_replaceable, drop_leftovers, netcdf_data, understood
 from ..support.status import Status
-from .crew import Task, crew_size, worker_lost
+from .errors import SweepFailed, SweepInterrupted
+from .job import Start
+from .pool import Task, pool_size, worker_lost
+from .prepare import PreparedRun, prepare
 from .progress import Hook, Progress, Reporter
-from .run import with_axes
-from .sitting import Prepared, Sitting, SweepFailed, SweepInterrupted, prepare
-from .worker import Start, whole
+from .scheduler import BlockScheduler
 
 __all__ = ["Streamed", "claim", "stream"]
 
 
 @dataclass(frozen=True, slots=True)
 class Streamed:
-    """A finished run: its file, how its cells ended, and how many have which verdict (only certified runs have some)."""
+    """A finished run: its file, how its cells ended, and how many have each verdict (certified runs only)."""
 
     path: Path
     progress: Progress
@@ -45,7 +46,7 @@ class Streamed:
 
     @property
     def success(self) -> bool:
-        """True where every cell reached the end of its window."""
+        """True if every cell reached the end of its window."""
         return self.progress.statuses.get(Status.FINISHED, 0) == self.progress.cells
 
 
@@ -58,61 +59,98 @@ def stream(
     workers: int | None = None,
     show_progress: bool | None = None,
     width: int | None = None,
-    skip: bool | Skip = True,
+    reduce: bool | Reduction = True,
     certified: bool = False,
     executor: Executor | None = None,
     progress: Hook | None = None,
     **axes: Any,
 ) -> Streamed:
-    """Run every cell of a scene and write its result to a netCDF file, block by block; memory does not grow with the sweep.
+    """Run every cell of a scene and write its result to a netCDF file, block by block.
 
-    Until all cells have ended, their blocks are kept beside `path` in a file ".partial", which `open_result` opens too.
-    With `resume` such a run goes on; its result is, byte for byte, that of a run without interruption.  What is there
-    already is replaced only with `overwrite`.  The other keywords are those of `run`.
+    Memory does not grow with the sweep.  Until all cells have ended, their blocks are kept beside `path` in a file
+    ".partial", which `open_result` opens too.
 
-    Raises the errors of `claim` where the files do not allow it, SweepInterrupted on Ctrl-C, SweepFailed where the workers
-    are lost or the disk is full.
+    Parameters
+    ----------
+    scene : Scene
+    path : str or path
+        File of the result; it ends in .nc by custom.
+    resume : bool
+        Go on with a run that was not finished; its result is, byte for byte, that of a run without interruption.
+    overwrite : bool
+        Replace what is there already.
+    workers, show_progress, width, reduce, certified, executor, progress, **axes
+        As for `run`.
+
+    Returns
+    -------
+    Streamed
+        The file, how its cells ended, and their verdicts.
+
+    Raises
+    ------
+    ValueError
+        If a keyword is refused as by `run`, or if a file at `path` belongs to another run.
+    FileExistsError
+        If the result or an unfinished run is there and neither `resume` nor `overwrite` is given.
+    FileNotFoundError
+        If there is nothing to resume.
+    SweepInterrupted
+        On Ctrl-C.
+    SweepFailed
+        If the workers are lost or the disk is full.
     """
-    chosen = chosen_skip(scene := with_axes(scene, axes, stream), skip)
+    scene = with_axes(stream, scene, axes)
+    reduction = as_reduction(scene, reduce)
     reporter = Reporter(scene.cells, show_progress, progress)
-    crew_size(executor, workers)  # refuses what is no executor before there is a file
-    if (state := claim(chosen, path, resume=resume, overwrite=overwrite, certified=certified)) == "complete":
+    pool_size(executor, workers)  # refuses what is no executor before there is a file
+    if (state := claim(reduction, path, resume=resume, overwrite=overwrite, certified=certified)) == "complete":
         raise FileExistsError(
             f"{os.fspath(path)} holds the result of this scene already; give overwrite (--overwrite) to run it again"
         )
-    prepared = _prepared(chosen, partial_path(path), state, certified, width=width, workers=workers, executor=executor)
-    store = Store.open(partial_path(path), writing=True)
+    partial = partial_path(path)
+    options = {"width": width, "workers": workers, "executor": executor}
+    prepared = _prepared(reduction, partial, state == "continue", certified, options)
+    log = BlockLog.open(partial, writing=True)
     try:
-        verdicts = _fill(prepared, store, executor, reporter, path)
+        verdicts = _run_blocks(prepared, log, executor, reporter, path)
     finally:
-        store.close()
+        log.close()
         reporter.close()
-    partial_path(path).unlink()
+    partial.unlink()
     return Streamed(Path(path), reporter.now, verdicts)
 
 
-def _prepared(chosen: Skip, partial: Path, state: str, certified: bool, **given: Any) -> Prepared:
-    """The kernel, the certificate (made or kept) and, of a new run, the store."""
-    if state == "continue":
-        return prepare(chosen.scene, chosen, **given, certificate=certificate_of(Store.describe(partial)) or False)
-    prepared = prepare(chosen.scene, chosen, **given, certificate=certified)
-    layout = Layout.of(chosen.scene, prepared.size())
-    Store.create(partial, about(chosen, layout, prepared.shop.samples, prepared.attributes, prepared.certificate))
+def _prepared(
+    reduction: Reduction, partial: Path, resume: bool, certified: bool, options: Mapping[str, Any]
+) -> PreparedRun:
+    """The kernel, the certificate (computed or kept) and, for a new run, the block log."""
+    if resume:
+        return prepare(reduction, certificate_of(BlockLog.describe(partial)) or False, **options)
+    prepared = prepare(reduction, certified, **options)
+    about = describe_sweep(reduction, prepared.layout(), prepared.attributes, prepared.certificate)
+    BlockLog.create(partial, about)
     return prepared
 
 
 def claim(
-    chosen: Skip,
+    reduction: Reduction,
     path: str | os.PathLike[str],
     *,
     resume: bool = False,
     overwrite: bool = False,
     certified: bool = False,
 ) -> str:
-    """What can be done about a result at `path`: "begin", "continue", or nothing because it is "complete".
+    """Return what can be done about a result at `path`: "begin", "continue", or nothing because it is "complete".
 
-    Raises ValueError where a file there belongs to another run, FileExistsError where a run there was not finished and
-    `resume` is not given, FileNotFoundError where it is given and there is none.
+    Raises
+    ------
+    ValueError
+        If a file there belongs to another run.
+    FileExistsError
+        If a run there was not finished and `resume` is not given.
+    FileNotFoundError
+        If there is nothing to resume.
     """
     for name, value in (("resume", resume), ("overwrite", overwrite), ("certified", certified)):
         flag(name, value)
@@ -129,7 +167,7 @@ def claim(
         return "begin"
     if partial.exists() and (resume or not target.exists()):
         with understood(partial):
-            _check_same(chosen, certified, partial, Store.describe(partial))
+            _check_same(reduction, certified, partial, BlockLog.describe(partial))
         if not resume:
             raise FileExistsError(
                 f"{partial} keeps a run of this scene that was not finished; "
@@ -138,7 +176,7 @@ def claim(
         return "continue"
     if target.exists():
         with understood(target):
-            _check_same(chosen, certified, target, _described(target))
+            _check_same(reduction, certified, target, _described(target))
         return "complete"
     if resume:
         raise FileNotFoundError(f"nothing to resume: {target} does not exist; run without resume (--resume)")
@@ -146,90 +184,98 @@ def claim(
 
 
 def _described(target: Path) -> dict[str, Any]:
-    """Of a finished result what a store says of an unfinished one."""
+    """What a block log says of its sweep, from the file of a finished result."""
     with netcdf_data(target) as file:
         attributes, certified = dict(file.attrs), "transversal_exponent" in file
-    return {"attributes": told_by(attributes, target), "certificate": certified or None}
+    return {"attributes": attributes_of(attributes, target), "certificate": certified or None}
 
 
-def _check_same(chosen: Skip, certified: bool, path: Path, told: Mapping[str, Any]) -> None:
-    """Raise ValueError where a file is not that of this run."""
-    kept = told["attributes"]
+def _check_same(reduction: Reduction, certified: bool, path: Path, about: Mapping[str, Any]) -> None:
+    """Raise ValueError if a file is not that of this run."""
+    attributes = about["attributes"]
     again = "repeat the options of that run, choose another path (--out), or replace it with overwrite (--overwrite)"
-    if not alike(scene_of(kept), chosen.scene):
-        raise ValueError(f"{path} belongs to another scene ({shown(kept['title'])}); {again}")
-    if changed(kept, chosen.scene):
+    if not alike(scene_of(attributes), reduction.scene):
+        raise ValueError(f"{path} belongs to another scene ({shown(attributes['title'])}); {again}")
+    if changed(attributes, reduction.scene):
         raise ValueError(
             f"{path} comes of another model: the code of its scene has changed since; "
             f"{again.replace('repeat the options of that run', 'restore the code')}"
         )
-    if kept["equations"] != chosen.equations.digest:
+    if attributes["equations"] != reduction.equations.digest:
         raise ValueError(
-            f"{path} left out other parts of its scene: {kept.get('skipped', 'nothing')}; "
-            f"{again.replace('the options of that run', 'its skip (--no-skip, or the absence of it)')}"
+            f"{path} left out other parts of its scene: {attributes.get('skipped', 'nothing')}; "
+            f"{again.replace('the options of that run', 'its reduction (--no-skip, or the absence of it)')}"
         )
-    if (told["certificate"] is not None) != certified:
-        found = "with" if told["certificate"] is not None else "without"
-        raise ValueError(f"{path} was run {found} a certificate (certified, --certify); {again}")
+    if (about["certificate"] is not None) != certified:
+        certificate = "with" if about["certificate"] is not None else "without"
+        raise ValueError(f"{path} was run {certificate} a certificate (certified, --certify); {again}")
 
 
 @dataclass(slots=True)
 class _Disk:
-    """Keeps the blocks of a sweep in a store."""
+    """Keeps the blocks of a sweep in a block log."""
 
     layout: Layout
-    store: Store
+    log: BlockLog
 
     def missing(self, block: int) -> np.ndarray:
+        """Numbers of all cells of a block: a log has whole blocks only."""
         return self.layout.rows(block)
 
     def ends(self, block: int) -> Start:
-        made = self.store.read(block)
-        return made.end, made.counts[:, 0] == Status.FINISHED
+        """The final states of a block, and which of its cells finished."""
+        buffers = self.log.read(block)
+        return buffers.end, buffers.finished
 
-    def put(self, task: Task, made: Buffers) -> None:
-        if whole(made):
-            self.store.append(task.block, made)
+    def put(self, task: Task, buffers: Buffers) -> None:
+        """Append a block of which all cells have ended."""
+        if buffers.ended:
+            self.log.append(task.block, buffers)
 
 
-def _fill(
-    prepared: Prepared, store: Store, executor: Executor | None, reporter: Reporter, path: str | os.PathLike[str]
+def _run_blocks(
+    prepared: PreparedRun, log: BlockLog, executor: Executor | None, reporter: Reporter, path: str | os.PathLike[str]
 ) -> dict[str, int]:
-    """Run what the store lacks, then write the result; returns the verdicts."""
-    scene = prepared.shop.recipe.chosen.scene
-    _check_kernel(prepared, store)
-    layout = layout_of(store.about, scene)
-    sitting = Sitting(layout, store.done, _Disk(layout, store), reporter, prepared.certificate)
+    """Run what the log lacks, then write the result; returns the verdicts."""
+    scene = prepared.scene
+    _check_kernel(prepared, log)
+    layout = layout_of(log.about, scene)
+    scheduler = BlockScheduler(layout, log.done, _Disk(layout, log), prepared, reporter)
     try:
         drop_leftovers(path)
-        reporter.start(store.counts)
-        sitting.run(prepared.shop, executor, prepared.workers)
-        return finish_file(store, path, scene)
+        reporter.start(log.counts, prepared.compiling)
+        scheduler.run(executor)
+        return write_result(log, path, scene)
     except KeyboardInterrupt:
-        raise SweepInterrupted(int(store.counts.sum()), scene.cells) from None
+        raise SweepInterrupted(int(log.counts.sum()), scene.cells) from None
     except Exception as problem:
         if not (worker_lost(problem) or isinstance(problem, OSError | InstallationError)):
             raise
-        reason = str(problem) if isinstance(problem, InstallationError) else f"the workers are lost ({problem})"
-        if isinstance(problem, OSError) and not worker_lost(problem):
-            where = problem.filename or store.path
-            reason = f"cannot write {where}: {problem.strerror}" if problem.strerror else str(problem)
-        raise SweepFailed(reason, int(store.counts.sum()), scene.cells) from problem
+        raise SweepFailed(_reason(problem, log), int(log.counts.sum()), scene.cells) from problem
 
 
-def _check_kernel(prepared: Prepared, store: Store) -> None:
-    """Raise ValueError if a store's cells were run by another kernel, version or kind of processor."""
-    recipe, kept = prepared.shop.recipe, store.about["attributes"]
-    if (begun := str(kept.get("processor"))) != recipe.processor:
-        there, here = told_apart(begun, recipe.processor)
+def _reason(problem: Exception, log: BlockLog) -> str:
+    """Why a sweep failed, in words."""
+    if isinstance(problem, InstallationError):
+        return str(problem)
+    if worker_lost(problem) or not isinstance(problem, OSError):
+        return f"the workers are lost ({problem})"
+    return f"cannot write {problem.filename or log.path}: {problem.strerror}" if problem.strerror else str(problem)
+
+
+def _check_kernel(prepared: PreparedRun, log: BlockLog) -> None:
+    """Raise ValueError if a log's cells were run by another kernel, version or kind of processor."""
+    spec, attributes = prepared.job.spec, log.about["attributes"]
+    if (begun := str(attributes.get("processor"))) != spec.processor:
+        there, here = told_apart(begun, spec.processor)
         raise ValueError(
-            f"{store.path} was begun on the processor {there}; found {here}, which may round otherwise: the two parts of "
+            f"{log.path} was begun on the processor {there}; found {here}, which may round otherwise: the two parts of "
             "the sweep might differ; go on there, or replace it with overwrite (--overwrite)"
         )
-    if kept["lanes"] == recipe.width and kept["kernel"] != recipe.digest:
-        raise ValueError(f"{store.path} was begun with another kernel; replace it with overwrite (--overwrite)")
-    if kept["versions"] != recipe.versions:
+    if attributes["lanes"] == spec.width and attributes["kernel"] != spec.digest:
+        raise ValueError(f"{log.path} was begun with another kernel; replace it with overwrite (--overwrite)")
+    if attributes["versions"] != spec.versions:
         raise ValueError(
-            f"{store.path} was begun with {kept['versions']}; found {recipe.versions}: the two parts of the sweep might "
+            f"{log.path} was begun with {attributes['versions']}; found {spec.versions}: the two parts of the sweep might "
             "differ; install those versions, or replace it with overwrite (--overwrite)"
         )

@@ -20,13 +20,13 @@ from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import with_parameters
 from ..cells.plan import Planner
-from ..cells.reduce import decide
+from ..cells.reduce import reduce_scene
 from ..support.arrays import row
 from ..support.status import Status
 from ..sweeps.progress import Hook
-from ..sweeps.run import run
+from .trials import Trials
 
-__all__ = ["Basin", "basin"]
+__all__ = ["Basin", "basin", "random_starts"]
 
 Range = tuple[float, float]
 
@@ -109,30 +109,52 @@ def basin(
     progress: Hook | None = None,
     **parameters: float,
 ) -> Basin:
-    """Start a scene's network from random states and count those that synchronise; `parameters` override the scene's.
+    """Start a scene's network from random states and count those that synchronise.
 
-    Every oscillator has a state of its own, uniform in `ranges` (component -> lowest, highest; default -1 … 1 for all
-    components); a component that is not named starts as in the scene.  A start is synchronous where the mean error over
-    `window` after `transient`, both in the scene's unit of time, is below `tolerance`.  The result depends on the seed and
-    not on the workers, and the first starts of a larger sample are those of a smaller one.  `workers`, `executor`,
-    `show_progress` and `progress` are those of `run`.
+    Every oscillator has a state of its own, uniform in `ranges`.  The result depends on the seed and not on the workers, and
+    the first starts of a larger sample are those of a smaller one.
 
-    Raises ValueError for an unknown component, an empty range, fewer than one sample or two oscillators, and a tolerance,
-    confidence or time that makes no sense; TypeError for a number of samples that is not whole.
+    Parameters
+    ----------
+    scene : Scene
+        The network; its axes and records are not used.
+    samples : int
+        Number of starts.
+    ranges : mapping of str to (float, float), optional
+        Lowest and highest value of a component (default: -1 and 1 for all components); a component that is not named
+        starts as in the scene.
+    tolerance : float
+        A start is synchronous if its mean synchronisation error over the window is below this.
+    transient, window : float
+        In the scene's unit of time.
+    seed : int
+    confidence : float
+        Level of the confidence interval.
+    workers, executor, show_progress, progress
+        As for `run`.
+    **parameters : float
+        Override the parameters of the scene.
+
+    Raises
+    ------
+    ValueError
+        If a component is unknown, a range is empty, or a number makes no sense.
+    TypeError
+        If the number of samples is not whole.
     """
     _check(scene, samples, tolerance, confidence, seed)
     fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ("sync_error",)}
     scene = with_parameters(basin, scene, parameters, **fixed, transient=transient, window=window)
-    cells = _started(scene, _box(scene, ranges), samples, seed)
-    chosen = replace(decide(cells, skip=False), jumps=True)
-    result = run(cells, skip=chosen, workers=workers, executor=executor, show_progress=show_progress, progress=progress)
-    status = result.status.values
-    error = np.where(status == Status.FINISHED, result.sync_error.values, np.inf)
-    return Basin(scene, tolerance, confidence, Planner(cells).rows(np.arange(samples)).start, error, status)
+    planner = Planner(random_starts(scene, samples, ranges, seed))
+    whole = replace(reduce_scene(planner.scene, reduce=False), jumps=True)
+    with Trials.of(whole, workers=workers, executor=executor, show_progress=show_progress, progress=progress) as trials:
+        error, status = trials.run(samples, planner.rows)
+    return Basin(scene, tolerance, confidence, planner.rows(np.arange(samples)).start, error, status)
 
 
-def _started(scene: Scene, box: Mapping[str, Range], samples: int, seed: int) -> Scene:
-    """The scene with a cell for each random start."""
+def random_starts(scene: Scene, samples: int, ranges: Mapping[str, Range] | None = None, seed: int = 0) -> Scene:
+    """Return the scene with a cell for each of `samples` random starts; `ranges` as for `basin`."""
+    box = _box(scene, ranges)
     names = [f"{component}_{i + 1}" for component in box for i in scene.equations.holders(component)]
     counts = [len(scene.initial[component]) for component in box]
     low, high = (np.repeat([ends[k] for ends in box.values()], counts) for k in (0, 1))

@@ -9,7 +9,6 @@ the three synchronise should synchronise too, one-way links included (Fink, John
 
 from __future__ import annotations
 
-import math
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -18,22 +17,19 @@ import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
 
-from synchain.codegen.kernels.sweep import emit
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.families import topology
 from synchain.models.mechanics.components import Edge
 from synchain.models.scenes.scene import Scene, a_scene
 
-from ..cells.buffers import Buffers
-from ..cells.plan import Plan, control_array, longest_step, plan, tolerances
+from ..cells.plan import Plan, Planner, control_of
 from ..support.arrays import numbers
-from ..support.status import CODES, Status, tally
-from ..sweeps.crew import Crew, Task, crew_size, feed
-from ..sweeps.progress import Hook, Reporter
-from ..sweeps.worker import Recipe, Rows
+from ..sweeps.job import RowsSpec
+from ..sweeps.progress import Hook
 from .threshold import Criterion, checked, offsets
+from .trials import Trials
 
-__all__ = ["MODE_ALPHA", "MODE_BETA", "Probe", "integrate", "ring_of_three", "universal_probe"]
+__all__ = ["MODE_ALPHA", "MODE_BETA", "Probe", "ring_of_three", "universal_probe"]
 
 MODE_ALPHA = sp.Symbol("mode_alpha", real=True)
 MODE_BETA = sp.Symbol("mode_beta", real=True)
@@ -74,28 +70,56 @@ def universal_probe(
     show_progress: bool | None = None,
     progress: Hook | None = None,
 ) -> Probe:
-    """Simulate three oscillators at the mode strengths alpha + i beta: arrays that are broadcast, negative numbers allowed.
+    """Simulate three oscillators at the mode strengths alpha + i beta.
 
-    Oscillator, coupling and parameters are those of the scene; its network, axes, start and sigma are not used.  The starts
-    are those of `synchain.runtime.synchronisation.threshold`; `workers`, `executor`, `show_progress` and `progress` those of `run`.
+    Parameters
+    ----------
+    scene : Scene
+        Oscillator, coupling and parameters; its network, axes, start and sigma are not used.
+    alpha, beta : array_like
+        Real and imaginary part of the strengths, broadcast against each other; negative numbers are allowed.
+    criterion : Criterion, optional
+        Starts, tolerance and times, as for `thresholds`.
+    workers, executor, show_progress, progress
+        As for `run`.
 
-    Raises ValueError for strengths that are not finite or none at all, for a scene without coupling, and for a coupling that
-    is not proportional to sigma and to the weight of a link.
+    Returns
+    -------
+    Probe
+        Verdicts in the common shape of `alpha` and `beta`.
+
+    Raises
+    ------
+    ValueError
+        If strengths are missing or not finite, if the scene has no coupling, or if its coupling is not proportional to
+        sigma and to the weight of a link.
     """
     criterion = checked(criterion)
     real, imaginary = _broadcast(alpha, beta)
-    three = a_scene(scene).replace(
-        topology=topology("ring", 3), initial=None, axes=(), zipped=False, continuation="none", record=("sync_error",),
-        transient=criterion.transient, window=criterion.window, rtol=criterion.rtol,
-    )  # fmt: skip
-    equations = ring_of_three(three.equations)
-    cells = _cells(three, equations.parameters, real.reshape(-1), imaginary.reshape(-1), criterion)
-    limits = tolerances(three, np.empty((0, 0)))
-    control = control_array(*limits, longest_step(three), three.max_steps)
-    error, status = integrate(
-        Rows(equations, three.integrator, cells, control), workers=workers, executor=executor, show_progress=show_progress,
+    ring = a_scene(scene).replace(
+        topology=topology("ring", 3),
+        initial=None,
+        axes=(),
+        zipped=False,
+        continuation="none",
+        record=("sync_error",),
+        transient=criterion.transient,
+        window=criterion.window,
+        rtol=criterion.rtol,
+    )
+    equations, planner = ring_of_three(ring.equations), Planner(ring)
+    rows = _rows(planner, equations.parameters, real.reshape(-1), imaginary.reshape(-1), criterion)
+    problem = RowsSpec(equations, ring.integrator, control_of(planner, jumps=True))
+    with Trials(
+        ring,
+        problem,
+        problem.source(),
+        workers=workers,
+        executor=executor,
+        show_progress=show_progress,
         progress=progress,
-    )  # fmt: skip
+    ) as trials:
+        error, status = trials.run(len(rows), rows.take)
     shape = (*real.shape, criterion.starts)
     error, status = error.reshape(shape), status.reshape(shape)
     share = np.asarray((error < criterion.tolerance).mean(axis=-1))
@@ -163,9 +187,9 @@ def _broadcast(alpha: ArrayLike, beta: ArrayLike) -> tuple[np.ndarray, np.ndarra
     return np.array(real), np.array(imaginary)
 
 
-def _cells(scene: Scene, names: tuple[str, ...], alpha: np.ndarray, beta: np.ndarray, criterion: Criterion) -> Plan:
+def _rows(planner: Planner, names: tuple[str, ...], alpha: np.ndarray, beta: np.ndarray, criterion: Criterion) -> Plan:
     """Rows of every strength and start, the starts fastest; a start moves all oscillators alike in the position."""
-    one, starts = plan(scene), criterion.starts
+    one, scene, starts = planner.rows(np.arange(1)), planner.scene, criterion.starts
     count = len(alpha) * starts
     values = {**scene.parameters, MODE_ALPHA.name: 0.0, MODE_BETA.name: 0.0}
     numbers = np.tile([values[name] for name in names], (count, 1))
@@ -174,32 +198,3 @@ def _cells(scene: Scene, names: tuple[str, ...], alpha: np.ndarray, beta: np.nda
     start = np.tile(one.start, (count, 1))
     start[:, : scene.n] += np.tile(offsets(criterion), len(alpha))[:, None]
     return Plan(start, numbers, np.tile(one.spans, (count, 1)))
-
-
-def integrate(
-    rows: Rows, width: int | None = None, *, workers: int | None = None, executor: Executor | None = None,
-    show_progress: bool | None = None, progress: Hook | None = None,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Run all rows; returns mean synchronisation error (cells,), infinite where unfinished, and status (cells,)."""
-    count, threads = len(rows.plan.start), crew_size(executor, workers)
-    reporter = Reporter(count, show_progress, progress)
-    source = emit(rows.equations, rows.integrator, ("sync_error",), width=width)
-    crew = Crew(Recipe.of(rows, source.width, source.digest).opened(), executor, threads)
-    error, status = np.full(count, np.inf), np.full(count, int(Status.NOT_RUN))
-    size = source.width * min(
-        16, math.ceil(count / (8 * threads * source.width))
-    )  # whole lanes, enough blocks to share
-
-    def finish(task: Task, made: Buffers) -> None:
-        status[task.cells] = made.counts[:, 0]
-        error[task.cells] = np.where(made.counts[:, 0] == Status.FINISHED, made.sums[:, 0], np.inf)
-        reporter.add(tally(made.counts[:, 0]))
-
-    try:
-        reporter.start(np.zeros(CODES, dtype=np.int64))
-        cells = (np.arange(first, min(first + size, count)) for first in range(0, count, size))
-        feed(crew, (Task(block, own) for block, own in enumerate(cells)), finish)
-    finally:
-        crew.close()
-        reporter.close()
-    return error, status

@@ -8,7 +8,7 @@ non-zero eigenvalue is -2.  Any other network synchronises where every non-zero 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,16 +22,20 @@ from synchain.models.scenes.scene import Scene, a_scene
 from synchain.models.spectra.spectrum import Spectrum
 
 from ..cells.keywords import with_parameters
-from ..prediction.intervals import Interval, find, intersect, scale
+from ..cells.plan import Planner
+from ..cells.reduce import reduce_scene
+from ..prediction.intervals import Interval, intersect, refine, scale
 from ..support.arrays import row
-from ..support.status import Status
 from ..sweeps.progress import Hook
-from ..sweeps.run import run
+from .trials import Trials
 
 __all__ = [
     "Criterion",
+    "Sweep",
     "Thresholds",
+    "cells_of",
     "critical_ratio",
+    "judge",
     "offsets",
     "probe",
     "project",
@@ -39,6 +43,13 @@ __all__ = [
     "thresholds",
     "wu_chua",
 ]
+
+
+RESOLUTION = 5e-4
+"""Width in sigma to which the ends of ranges are refined."""
+
+Measure = Callable[[np.ndarray], np.ndarray]
+"""Mean synchronisation errors (m, starts) at points (m,)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +127,7 @@ def thresholds(
     scene: Scene,
     *,
     sigma: Sequence[float] | np.ndarray | None = None,
-    resolution: float = 5e-4,
+    resolution: float = RESOLUTION,
     criterion: Criterion | None = None,
     workers: int | None = None,
     executor: Executor | None = None,
@@ -124,28 +135,55 @@ def thresholds(
     progress: Hook | None = None,
     **parameters: float,
 ) -> Thresholds:
-    """Return probe, prediction and direct simulation of a scene's network; `parameters` override the scene's.
+    """Find where a scene's network synchronises: by the probe, by projection, and by direct simulation.
 
-    `sigma` is the grid on which ranges are looked for (default: `default_grid`); narrower ranges are not seen.  The probe's
-    grid in alpha covers every sigma |gamma|.  Ends are refined to `resolution` in sigma.  A network in several parts is
-    allowed; its warnings say so.  `workers`, `executor`, `show_progress` and `progress` are those of `run`.
+    Parameters
+    ----------
+    scene : Scene
+        The network; its axes and records are not used.
+    sigma : sequence of float, optional
+        An increasing grid on which ranges are looked for (default: `default_grid`); narrower ranges are not seen.  The
+        probe's grid in alpha covers every sigma |gamma|.
+    resolution : float
+        Ends of ranges are refined to this width in sigma, those of the probe to twice as much in alpha.
+    criterion : Criterion, optional
+        When a value of sigma counts as synchronous.
+    workers, executor, show_progress, progress
+        As for `run`; each round has a bar of its own.
+    **parameters : float
+        Override the parameters of the scene.
 
-    Raises ValueError for a network without links, or with one-way links whose eigenvalues are complex, for unequal nodes and
-    for links with inertia.
+    Returns
+    -------
+    Thresholds
+        A network in several parts is allowed; its warnings say so.
+
+    Raises
+    ------
+    ValueError
+        For a network without links, for one-way links whose eigenvalues are complex, for unequal nodes and for links with
+        inertia.
     """
     a_scene(scene).equations.expect_alike("thresholds")
-    scene = with_parameters(thresholds, scene, parameters, axes=(), zipped=False, continuation="none", record=())
+    fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ()}
+    scene = with_parameters(thresholds, scene, parameters, **fixed)
     criterion = checked(criterion)
     spectrum = scene.topology.spectrum
     check_probe(scene.topology, spectrum)
     scene = scene.replace(record=("sync_error",))
     grid = default_grid(spectrum) if sigma is None else row("sigma", sigma, 2, rising=True)
-    resolution = positive("resolution", resolution)
-    options = {"workers": workers, "executor": executor, "show_progress": show_progress, "progress": progress}
-    found = probe(scene, _probe_grid(grid, spectrum), resolution=2.0 * resolution, criterion=criterion, **options)
-    direct = simulate(scene, grid, resolution=resolution, criterion=criterion, **options)
-    predicted = project(found.intervals, spectrum, float(grid[-1]))
-    return Thresholds(scene, found, tuple(predicted), direct, criterion, scene.warnings)
+    options: dict[str, Any] = {
+        "resolution": positive("resolution", resolution),
+        "criterion": criterion,
+        "workers": workers,
+        "executor": executor,
+        "show_progress": show_progress,
+        "progress": progress,
+    }
+    pair = probe(scene, _probe_grid(grid, spectrum), **options)
+    direct = simulate(scene, grid, **options)
+    predicted = project(pair.intervals, spectrum, float(grid[-1]))
+    return Thresholds(scene, pair, tuple(predicted), direct, criterion, scene.warnings)
 
 
 def default_grid(spectrum: Spectrum, step: float = 0.0025) -> np.ndarray:
@@ -179,39 +217,111 @@ def check_probe(graph: Topology, spectrum: Spectrum) -> None:
         )
 
 
-def probe(scene: Scene, alpha: Sequence[float] | np.ndarray, **options: Any) -> Sweep:
-    """Sweep the two-oscillator probe over alpha = 2 sigma; options as for `simulate`."""
+def probe(
+    scene: Scene,
+    alpha: Sequence[float] | np.ndarray,
+    *,
+    resolution: float = RESOLUTION,
+    criterion: Criterion | None = None,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    show_progress: bool | None = None,
+    progress: Hook | None = None,
+) -> Sweep:
+    """Sweep the two-oscillator probe over alpha = 2 sigma.
+
+    Parameters
+    ----------
+    scene : Scene
+        Oscillator, coupling and parameters; its network, start and axes are not used.
+    alpha : sequence of float
+        An increasing grid.
+    resolution : float
+        Ends of ranges are refined to this width in sigma, twice as much in alpha.
+    criterion, workers, executor, show_progress, progress
+        As for `thresholds`.
+
+    Returns
+    -------
+    Sweep
+        Its `x` and intervals are values of alpha.
+    """
     pair = scene.replace(topology=topology("chain", 2), initial=None, axes=())
-    half = dict(options)
-    if "resolution" in half:
-        half["resolution"] *= 0.5
-    found = simulate(pair, 0.5 * np.asarray(alpha, dtype=float), **half)
-    return Sweep(2.0 * found.x, found.error, found.share, tuple(scale(found.intervals, 2.0)))
+    sweep = simulate(
+        pair,
+        0.5 * np.asarray(alpha, dtype=float),
+        resolution=resolution,
+        criterion=criterion,
+        workers=workers,
+        executor=executor,
+        show_progress=show_progress,
+        progress=progress,
+    )
+    return Sweep(2.0 * sweep.x, sweep.error, sweep.share, tuple(scale(sweep.intervals, 2.0)))
 
 
 def simulate(
     scene: Scene,
     sigma: Sequence[float] | np.ndarray,
     *,
-    resolution: float = 5e-4,
+    resolution: float = RESOLUTION,
     criterion: Criterion | None = None,
-    **options: Any,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    show_progress: bool | None = None,
+    progress: Hook | None = None,
 ) -> Sweep:
-    """Sweep sigma by direct simulation and return errors, shares and refined synchronous intervals; options as for `run`."""
+    """Sweep sigma by direct simulation of a scene's network.
+
+    One kernel and one pool of workers run the grid and all rounds that refine the ends of ranges.
+
+    Parameters
+    ----------
+    scene : Scene
+    sigma : sequence of float
+        An increasing grid; ranges between two of its points are not seen.
+    resolution : float
+        Ends of ranges are refined to this width in sigma.
+    criterion, workers, executor, show_progress, progress
+        As for `thresholds`.
+    """
     criterion = checked(criterion)
-    moves = offsets(criterion)
-    seen: dict[str, np.ndarray] = {}
-
-    def judge(points: np.ndarray) -> np.ndarray:
-        errors = _errors(scene, points, moves, criterion, options)
-        seen.setdefault("error", np.median(errors, axis=1))
-        share = (errors < criterion.tolerance).mean(axis=1)
-        seen.setdefault("share", share)
-        return share >= 0.5
-
     x = row("sigma", sigma, rising=True)
-    intervals, _ = find(judge, x, resolution)
-    return Sweep(x, seen["error"], seen["share"], tuple(intervals))
+    if not resolution > 0:
+        raise ValueError(f"resolution = {resolution}; expected a positive number")
+    reduction = reduce_scene(cells_of(scene, x, criterion))
+    with Trials.of(
+        reduction, workers=workers, executor=executor, show_progress=show_progress, progress=progress
+    ) as trials:
+
+        def measure(points: np.ndarray) -> np.ndarray:
+            planner = Planner(cells_of(scene, points, criterion))
+            error, _ = trials.run(planner.scene.cells, lambda cells: reduction.rows(planner.rows(cells)))
+            return error.reshape(len(points), criterion.starts)
+
+        return judge(measure, x, resolution, criterion)
+
+
+def judge(measure: Measure, x: np.ndarray, resolution: float, criterion: Criterion) -> Sweep:
+    """Return the verdicts on a grid and the synchronous ranges, with ends refined to `resolution`.
+
+    Parameters
+    ----------
+    measure : callable
+        Returns the mean synchronisation errors (m, starts) at points (m,).
+    x : ndarray
+        An increasing grid.
+    resolution : float
+    criterion : Criterion
+    """
+
+    def share(errors: np.ndarray) -> np.ndarray:
+        return np.asarray((errors < criterion.tolerance).mean(axis=1))
+
+    errors = measure(x)
+    on_grid = share(errors)
+    ranges = refine(lambda points: share(measure(points)) >= 0.5, x, on_grid >= 0.5, resolution)
+    return Sweep(x, np.asarray(np.median(errors, axis=1)), on_grid, tuple(ranges))
 
 
 def offsets(criterion: Criterion) -> np.ndarray:
@@ -220,25 +330,20 @@ def offsets(criterion: Criterion) -> np.ndarray:
     return np.concatenate([[0.0], random.uniform(-criterion.reach, criterion.reach, criterion.starts - 1)])
 
 
-def _errors(
-    scene: Scene,
-    sigma: np.ndarray,
-    offsets: np.ndarray,
-    criterion: Criterion,
-    options: Mapping[str, Any],
-) -> np.ndarray:
-    """Mean synchronisation error (points, starts); infinite where a cell did not finish."""
-    position = scene.components[0]
-    axes: dict[str, np.ndarray] = {"sigma": np.repeat(sigma, len(offsets))}
+def cells_of(scene: Scene, sigma: np.ndarray, criterion: Criterion) -> Scene:
+    """Return the scene with a cell for every sigma and start of a criterion, the starts fastest."""
+    position, moves = scene.components[0], offsets(criterion)
+    axes: dict[str, np.ndarray] = {"sigma": np.repeat(sigma, len(moves))}
     for i, x0 in enumerate(scene.initial[position]):
-        axes[f"{position}_{i + 1}"] = np.tile(x0 + offsets, len(sigma))
-    cells = scene.replace(
-        axes={name: tuple(values) for name, values in axes.items()}, zipped=True, record=("sync_error",),
-        transient=criterion.transient, window=criterion.window, rtol=criterion.rtol,
-    )  # fmt: skip
-    result = run(cells, **options)
-    errors = np.where(result.status == Status.FINISHED, result.sync_error, np.inf)
-    return errors.reshape(len(sigma), len(offsets))
+        axes[f"{position}_{i + 1}"] = np.tile(x0 + moves, len(sigma))
+    return scene.replace(
+        axes={name: tuple(values) for name, values in axes.items()},
+        zipped=True,
+        record=("sync_error",),
+        transient=criterion.transient,
+        window=criterion.window,
+        rtol=criterion.rtol,
+    )
 
 
 def project(ranges: Sequence[Interval], spectrum: Spectrum, highest: float = math.inf) -> list[Interval]:

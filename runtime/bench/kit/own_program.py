@@ -30,7 +30,7 @@ def prepare(case: Case, integrator: str, width: int) -> Integrate:
 
     `solve` integrates one cell to each of the end times and raises RuntimeError where a cell did not reach its end.
     """
-    compiled = kernel(case.scene.replace(integrator=integrator), width, skip=False)
+    compiled = kernel(case.scene.replace(integrator=integrator), width, reduce=False)
     one = np.array([case.scene.parameters[name] for name in case.scene.equations.parameters])
     (y0,) = with_modes(case.scene.equations, np.array([case.scene.y0]), one[None])
 

@@ -51,8 +51,8 @@ def test_large_ring_runs_in_loops_and_keeps_its_symmetry():
     common = {"transient": 0, "window": 2, "rtol": 1e-9, "integrator": "rodas5p"}
     scene = Scene(topology=ring(12), parameters={"sigma": 0.05}, initial=start, **common)
     pair = Scene(topology=chain(2), parameters={"sigma": 0.1}, **common)
-    assert "for i in range(NODES)" in kernel_source(scene, width=1, skip=False).text
-    large, small = run(scene, skip=False), run(pair, skip=False)
+    assert "for i in range(NODES)" in kernel_source(scene, width=1, reduce=False).text
+    large, small = run(scene, reduce=False), run(pair, reduce=False)
     assert large.status == Status.FINISHED
     np.testing.assert_allclose(large.end.values.reshape(2, 12)[:, :2], small.end.values.reshape(2, 2), atol=1e-8)
 

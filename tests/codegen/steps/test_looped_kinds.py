@@ -80,13 +80,13 @@ def test_forty_nodes_of_two_kinds_move_as_their_exported_equations_say() -> None
     random = np.random.default_rng(1)
     numbers = {"sigma": 0.3, "u": 0.3, "delta": 0.1, "omega": np.linspace(1.0, 1.2, 40)}
     scene = pairs(40, integrator="dop853", parameters=numbers, initial={"x": random.uniform(-1, 1, 40), "v": 0})
-    found = run(scene, skip=False)
+    found = run(scene, reduce=False)
     assert found.success
     np.testing.assert_allclose(found.end, by_scipy(scene, 20), atol=3e-8)
     first = [i for i in range(40) if i % 4 < 2]
     start = {"x": [0.7 if i in first else 0.2 for i in range(40)], "v": 0}
     frequencies = [1.0 if i in first else 1.3 for i in range(40)]
-    end = run(scene.replace(initial=start, omega=frequencies), skip=False).end.values.reshape(2, 40)
+    end = run(scene.replace(initial=start, omega=frequencies), reduce=False).end.values.reshape(2, 40)
     for kind in (first, [i for i in range(40) if i not in first]):
         assert len(np.unique(end[:, kind], axis=1).T) == 1
     assert abs(end[0, 0] - end[0, 2]) > 0.01
@@ -98,7 +98,7 @@ def kept(scene: Scene, drift: float) -> None:
     function = energy_function(scene)
     zero = {sp.Symbol(name, real=True): 0 for name, value in scene.parameters.items() if value == 0.0}
     assert all(share.power.xreplace(zero) == 0 for share in (*function.exact.nodes, *function.exact.links))
-    start, end = function(scene.y0), function(run(scene, skip=False).end.values)
+    start, end = function(scene.y0), function(run(scene, reduce=False).end.values)
     assert abs(end - start) < drift * abs(start)
 
 

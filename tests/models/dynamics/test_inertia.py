@@ -171,7 +171,7 @@ def one_way(name: str) -> Scene:
 @pytest.mark.parametrize("name", ["pair", "feed forward", "static friction", "clocks"])
 def test_nodes_may_feel_the_inertia_of_one_that_feels_nobody(name: str, integrator: str) -> None:
     scene = one_way(name).replace(integrator=integrator)
-    found = run(scene, skip=False)
+    found = run(scene, reduce=False)
     assert found.success
     space: dict = {}
     exec(to_python(scene.equations, {s: scene.parameters[s] for s in scene.equations.parameters}), space)

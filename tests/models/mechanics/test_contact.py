@@ -86,7 +86,7 @@ def test_results_converge_with_the_tolerance_and_stick_is_exact() -> None:
 
 def test_equal_oscillators_stay_equal_although_the_state_is_unstable() -> None:
     whole = run(scene(3, initial={"x": [0.3, 0.3, 0.3]}, parameters={"sigma": 0.9, "omega": 1.4}, window=300.0),
-                skip=False, show_progress=False)  # fmt: skip
+                reduce=False, show_progress=False)  # fmt: skip
     assert whole.sync_error.item() == 0.0
     assert np.ptp(whole.end.values.reshape(3, 3), axis=1).max() == 0.0
 

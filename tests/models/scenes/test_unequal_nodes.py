@@ -19,7 +19,7 @@ from synchain.models.mechanics.components import TIME, Node
 from synchain.models.presentation.equations import text
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.cells.reduce import decide
+from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.results.open import open_result
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.certify import certify
@@ -139,12 +139,12 @@ def test_nodes_merge_where_their_parameters_agree() -> None:
     """A ring of four with dampings a, b, a, b: opposite nodes start equal, and only with equal dampings they stay so."""
     given = {"topology": ring(4), "initial": {"x": [0.3, 0.1, 0.3, 0.1], "v": 0}, "time_unit": "time"}
     pairs = scene(parameters={"sigma": 0.1, "delta": [0.1, 0.2, 0.1, 0.2]}, **given)
-    chosen = decide(pairs)
+    chosen = reduce_scene(pairs)
     assert chosen.equations.n == 2
     assert [pairs.equations.parameters[k] for k in chosen.numbers][:2] == ["delta_1", "delta_2"]
-    assert decide(scene(parameters={"sigma": 0.1, "delta": [0.1, 0.2, 0.3, 0.2]}, **given)).equations.n == 3
+    assert reduce_scene(scene(parameters={"sigma": 0.1, "delta": [0.1, 0.2, 0.3, 0.2]}, **given)).equations.n == 3
     swept = scene(parameters={"sigma": 0.1}, axes={"delta_3": [0.1, 0.2]}, **given)
-    assert decide(swept).equations.n == 3
+    assert reduce_scene(swept).equations.n == 3
     np.testing.assert_allclose(run(pairs).end, by_scipy(pairs, 20), atol=2e-8)
 
 

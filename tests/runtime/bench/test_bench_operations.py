@@ -93,7 +93,9 @@ def test_kernels_with_loops_are_refused():
 def test_every_unrolled_kernel_can_be_counted(oscillator, integrator):
     """One more link of a ring than of a chain costs more, whatever the node."""
     counts = [
-        operations(kernel_source(Scene(oscillator=oscillator, topology=graph, integrator=integrator), skip=False).text)
+        operations(
+            kernel_source(Scene(oscillator=oscillator, topology=graph, integrator=integrator), reduce=False).text
+        )
         for graph in (chain(3), ring(3))
     ]
     assert 0 < counts[0] < counts[1]
@@ -107,7 +109,7 @@ def test_a_quick_run_of_the_skips_needs_three_kernels():
     for case in skip.CASES[: skip.QUICK]:
         for chosen in skip.scenes(case, quick=True):
             tight = chosen.scene.replace(rtol=1e-10)
-            texts.add(kernel_source(chosen.scene, skip=chosen).text)
+            texts.add(kernel_source(chosen.scene, reduce=chosen).text)
             assert kernel_source(tight).integrator == kernel_source(chosen.scene).integrator
     assert len(texts) == 3
     assert len({case.name for case in skip.CASES}) == 9

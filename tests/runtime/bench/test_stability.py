@@ -50,7 +50,7 @@ def test_stiff_springs_are_said() -> None:
 def test_a_wrong_law_is_seen() -> None:
     """The reference of another steepness, 1 % away, is further off than what is allowed."""
     case = next(c for c in QUICK if c.name == "kappa = 1e5" and c.scene.rtol == 1e-8)
-    found = run(case.scene, skip=False, show_progress=False).end.values
+    found = run(case.scene, reduce=False, show_progress=False).end.values
     right, wrong = (end_state(s, "radau") for s in (case.scene, case.scene.replace(kappa=1.01e5)))
     allowed = stability.row(case)[ALLOWED]
     assert np.abs(found - right).max() < 0.1 * allowed < allowed < np.abs(found - wrong).max()
@@ -67,10 +67,10 @@ def apart(sigma: float, length: float) -> Scene:
 def test_growth_is_right_until_it_has_left_double_precision_behind() -> None:
     """A difference of 1e-2 that grows as cosh(sqrt(39) t): 1e8 at t = 4, beyond 2^53 at t = 7."""
     scene = apart(-20.0, 4.0)
-    found, expected = run(scene, skip=False, show_progress=False), end_state(scene, "growth")
+    found, expected = run(scene, reduce=False, show_progress=False), end_state(scene, "growth")
     assert int(found.status) == Status.FINISHED
     np.testing.assert_allclose(found.end.values, expected, rtol=1e-6)
-    far = run(apart(-20.0, 7.0), skip=False, show_progress=False)
+    far = run(apart(-20.0, 7.0), reduce=False, show_progress=False)
     assert int(far.status) == Status.DIVERGED
     assert 4.0 < float(far.end_time) < 7.0
     assert "beyond 2^53" in far.message
@@ -117,7 +117,7 @@ def test_a_small_difference_follows_the_transversal_exponent(
         window=30.0, record=("trajectory",), samples=16, rtol=1e-11, atol=1e-15,
         integrator="rodas5p", initial={"x": [float(x), float(x) + gap], "v": [float(v), float(v)]},
     )  # fmt: skip
-    found = run(scene, skip=False, show_progress=False)
+    found = run(scene, reduce=False, show_progress=False)
     assert int(found.status) == Status.FINISHED
     states, times = found.trajectory.values, found.trajectory_time.values
     distance = np.hypot(states[:, 0] - states[:, 1], states[:, 2] - states[:, 3])
@@ -136,7 +136,7 @@ def test_many_equal_oscillators_move_as_one_alone() -> None:
                 "time_unit": "time", "record": ()}  # fmt: skip
     numbers = {"kappa": 1e2}
     many = Scene(topology=topology("chain", 100), parameters={**numbers, "sigma": 1.0}, **settings)
-    ends = [run(s, skip=False, show_progress=False).end.values for s in (many, Scene(parameters=numbers, **settings))]
+    ends = [run(s, reduce=False, show_progress=False).end.values for s in (many, Scene(parameters=numbers, **settings))]
     for place, alone in zip(ends[0].reshape(2, 100), ends[1], strict=True):
         assert (place == place[0]).all()
         assert place[0] == pytest.approx(alone, abs=1e-6)

@@ -10,7 +10,7 @@ import pytest
 
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.cells.reduce import decide, explain
+from synchain.runtime.cells.reduce import explain, reduce_scene
 from synchain.runtime.figures.result_plot import draw_result
 from synchain.runtime.results.open import open_result
 from synchain.runtime.support.status import Status
@@ -62,7 +62,7 @@ def is_saved(result, folder: Path) -> None:
 
 
 def is_explained(result, folder: Path) -> None:
-    words = explain(decide(SCENE))
+    words = explain(reduce_scene(SCENE))
     assert "coupling: 1 link" in words or "coupling: 2 links" in words
     assert "quotient" in words
 

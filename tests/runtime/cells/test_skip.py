@@ -17,7 +17,7 @@ from synchain.runtime.bench import skip as bench
 from synchain.runtime.cells import reduce as skip_module
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.kernels import kernel, kernel_source
-from synchain.runtime.cells.reduce import decide, explain
+from synchain.runtime.cells.reduce import explain, reduce_scene
 from synchain.runtime.cli import main
 from synchain.runtime.results.result import Result
 from synchain.runtime.support.status import Status
@@ -37,10 +37,10 @@ MIRRORED = DUFFING.replace(initial={"x": [0.5, 0.1, 0.5], "v": [0.0, 0.2, 0.0]})
 
 def compare(scene: Scene, tolerance: float = 1e-9, nodes: int | None = None, **options) -> Result:
     """Run with skips and without, and hold the results against each other; returns the one with skips."""
-    chosen = decide(scene, **options)
+    chosen = reduce_scene(scene, **options)
     assert chosen.skipped
     assert chosen.equations.n == (nodes or scene.n)
-    fewer, whole = (run(scene, skip=skip, width=1) for skip in (chosen, False))  # scalar kernels compile fast
+    fewer, whole = (run(scene, reduce=skip, width=1) for skip in (chosen, False))  # scalar kernels compile fast
     assert set(fewer.data) == set(whole.data)
     for name in whole.data:
         assert fewer.data[name].dims == whole.data[name].dims
@@ -60,10 +60,10 @@ def compare(scene: Scene, tolerance: float = 1e-9, nodes: int | None = None, **o
 def test_no_forcing():
     scene = FRICTION.replace(u=0.0)
     compare(scene.replace(axes={"sigma": [0.05, 0.1]}))
-    source = kernel_source(scene, skip=True)
+    source = kernel_source(scene, reduce=True)
     assert "omega" not in source.equations.parameters
     assert not source.equations.node.forced
-    assert decide(scene).skipped == ("forcing: u = 0 in every cell, left out together with omega; no time terms",)
+    assert reduce_scene(scene).skipped == ("forcing: u = 0 in every cell, left out together with omega; no time terms",)
 
 
 def test_no_forcing_where_the_frequency_is_swept():
@@ -75,26 +75,26 @@ def test_no_forcing_where_the_frequency_is_swept():
 def test_no_coupling():
     scene = FRICTION.replace(sigma=0.0, axes={"omega": [1.15, 1.4]})
     compare(scene)
-    assert decide(scene).equations.links == ()
-    assert decide(scene).skipped == ("coupling: sigma = 0 in every cell, left out; no links",)
+    assert reduce_scene(scene).equations.links == ()
+    assert reduce_scene(scene).skipped == ("coupling: sigma = 0 in every cell, left out; no links",)
 
 
 def test_coupling_that_is_zero_in_some_cells_stays():
     scene = FRICTION.replace(axes={"sigma": [0.0, 0.1]})
-    assert not decide(scene).skipped
-    assert decide(FRICTION.replace(axes={"sigma": [0.0, 0.0]})).equations.links == ()
+    assert not reduce_scene(scene).skipped
+    assert reduce_scene(FRICTION.replace(axes={"sigma": [0.0, 0.0]})).equations.links == ()
 
 
 def test_all_fixed_numbers_folded():
     scene = FRICTION.replace(axes={"omega": [1.15, 1.4]})
     compare(scene, fold_all=True)
-    assert decide(scene, fold_all=True).equations.parameters == ("omega",)
+    assert reduce_scene(scene, fold_all=True).equations.parameters == ("omega",)
 
 
 def test_equal_starts_are_one_oscillator_without_synchronisation_error():
     scene = DUFFING.replace(initial={"x": 0.5, "v": 0.1}, axes={"sigma": [0.1, 0.3]})
     result = compare(scene, nodes=1)
-    assert decide(scene).records == ("section", "trajectory")
+    assert reduce_scene(scene).records == ("section", "trajectory")
     assert (result.sync_error == 0).all()
     assert int(result.section_count.min()) > 2
 
@@ -110,10 +110,10 @@ def test_mirrored_start_of_a_chain_with_its_synchronisation_error():
 @pytest.mark.long
 def test_synchronisation_error_and_section_of_a_star():
     ends = DUFFING.replace(topology=ring(4), initial={"x": [0.5, 0.1, 0.5, 0.1]})
-    assert decide(ends).multiplicity == (2, 2)
+    assert reduce_scene(ends).multiplicity == (2, 2)
     start = {"x": [0.5, 0.1, 0.1, 0.1, 0.2]}
     scene = DUFFING.replace(topology=star(5), initial=start, section="v_3 rising 0.01")
-    assert decide(scene).multiplicity == (1, 3, 1)
+    assert reduce_scene(scene).multiplicity == (1, 3, 1)
     result = compare(scene, nodes=3)
     trajectory = result.trajectory.values.reshape(scene.samples, 2, scene.n)
     distances = np.sqrt(((trajectory - trajectory[:, :, :1]) ** 2).sum(axis=1)).sum(axis=1)
@@ -135,7 +135,7 @@ def test_random_graph_with_weights_and_one_way_links():
     """Two of the nodes feel the same whole from different sources."""
     matrix = [[-3, 1, "1/2", "3/2"], [1, -2, 0, 1], [1, 1, -2, 0], [0, "1/3", "1/3", "-2/3"]]
     scene = DUFFING.replace(topology=from_matrix(matrix), initial={"x": [0.5, 0.1, 0.1, 0.3]}, record=("trajectory",))
-    assert decide(scene).equations.n == 4
+    assert reduce_scene(scene).equations.n == 4
     matrix[2] = [1, 0, -2, 1]
     compare(scene.replace(topology=from_matrix(matrix)), nodes=3)
 
@@ -145,13 +145,13 @@ def test_random_graph_with_weights_and_one_way_links():
 
 def test_starts_are_equal_only_where_they_are_so_in_every_cell():
     pair = FRICTION.replace(initial={"x": 0.2})
-    assert decide(pair).equations.n == 1
-    assert decide(pair.replace(axes={"x_1": [0.2, 0.3]})).equations.n == 2
-    assert decide(pair.replace(axes={"x_1": [0.2, 0.2]})).equations.n == 1
+    assert reduce_scene(pair).equations.n == 1
+    assert reduce_scene(pair.replace(axes={"x_1": [0.2, 0.3]})).equations.n == 2
+    assert reduce_scene(pair.replace(axes={"x_1": [0.2, 0.2]})).equations.n == 1
     both = {"x_1": [0.1, 0.3], "x_2": [0.1, 0.3]}
-    assert decide(pair.replace(axes=both)).equations.n == 2
-    assert decide(pair.replace(axes=both, zipped=True)).equations.n == 1
-    assert decide(pair.replace(axes={**both, "x_2": [0.1, 0.4]}, zipped=True)).equations.n == 2
+    assert reduce_scene(pair.replace(axes=both)).equations.n == 2
+    assert reduce_scene(pair.replace(axes=both, zipped=True)).equations.n == 1
+    assert reduce_scene(pair.replace(axes={**both, "x_2": [0.1, 0.4]}, zipped=True)).equations.n == 2
 
 
 def test_zipped_starts_are_expanded():
@@ -172,31 +172,31 @@ def test_continued_sweeps_stay_symmetric():
 @pytest.mark.long
 def test_a_wrong_partition_is_caught(monkeypatch):
     scene = DUFFING.replace(initial={"x": [0.5, 0.5, 0.1]})
-    assert decide(scene).equations.n == 3
-    assert "the links do not treat equal starts alike" in explain(decide(scene))
+    assert reduce_scene(scene).equations.n == 3
+    assert "the links do not treat equal starts alike" in explain(reduce_scene(scene))
     monkeypatch.setattr(reduction_module, "coarsest_balanced", lambda n, links, colours: (0, 0, 1))
     with pytest.raises(ValueError, match="partition is not balanced: nodes 1 and 2"):
-        decide(scene)
+        reduce_scene(scene)
     monkeypatch.setattr(reduction_module, "class_links", lambda n, links, classes: links[:2])
     with pytest.raises(AssertionError, match="Not equal to tolerance"):
         compare(scene, nodes=2)
 
 
 def test_a_wrong_way_back_is_caught(monkeypatch):
-    right = skip_module.Skip.expand
+    right = skip_module.NodeMerge.expand
 
     def turned(self, found):
         made = right(self, found)
         return replace(made, end=made.end[:, ::-1].copy()) if self.skipped else made
 
-    monkeypatch.setattr(skip_module.Skip, "expand", turned)
+    monkeypatch.setattr(skip_module.Reduction, "expand", turned)
     with pytest.raises(AssertionError, match="end"):
         compare(MIRRORED, nodes=2)
 
 
 def test_reductions_of_another_scene_are_refused():
     with pytest.raises(ValueError, match="reductions of another scene"):
-        run(FRICTION, skip=decide(FRICTION.replace(sigma=0.2)))
+        run(FRICTION, reduce=reduce_scene(FRICTION.replace(sigma=0.2)))
 
 
 # -- resuming ------------------------------------------------------------------------------------------------
@@ -222,14 +222,14 @@ def test_finished_cells_of_the_whole_network_are_resumed():
 def test_resuming_with_another_skip_is_refused():
     scene = MIRRORED.replace(axes={"sigma": [0.1, 0.2]})
     with pytest.raises(ValueError, match="left out other parts"):
-        run(scene, resume=run(scene, width=1), skip=False, width=1)
+        run(scene, resume=run(scene, width=1), reduce=False, width=1)
 
 
 def test_cells_that_did_not_run_have_no_synchronisation_error():
     scene = DUFFING.replace(initial={"x": 0.5}, axes={"sigma": [0.1, 0.3]})
     buffers = Buffers.empty(2, 2, 3, 7)
     buffers.counts[0, 0] = Status.FINISHED
-    made = decide(scene).expand(buffers)
+    made = reduce_scene(scene).expand(buffers)
     assert made.end.shape == (2, 6)
     assert made.points.shape == (2, 3, 7)
     assert made.samples.shape == (2, 7, 6)
@@ -251,21 +251,21 @@ def test_cells_that_did_not_run_have_no_synchronisation_error():
     ids=["one cell", "folded", "merged", "swept"],
 )
 def test_the_kernel_of_a_scene_is_the_one_that_runs(scene):
-    """By default with all skips; `skip=False` shows and runs the whole network."""
+    """By default with all skips; `reduce=False` shows and runs the whole network."""
     found = run(scene)
     assert found.success
     shown = kernel(scene)
     assert (shown.digest, shown.equations.digest) == (found.data.attrs["kernel"], found.data.attrs["equations"])
     assert kernel_source(scene).text == shown.source
-    whole = kernel_source(scene, skip=False)
+    whole = kernel_source(scene, reduce=False)
     assert whole.equations == scene.equations
-    assert (whole.digest == shown.digest) is not bool(decide(scene).skipped)
+    assert (whole.digest == shown.digest) is not bool(reduce_scene(scene).skipped)
 
 
 def test_scenes_that_differ_in_numbers_share_a_kernel():
-    texts = {kernel_source(FRICTION.replace(sigma=s, u=u), skip=True).digest for s in (0.1, 0.3) for u in (0.1, 0.2)}
+    texts = {kernel_source(FRICTION.replace(sigma=s, u=u), reduce=True).digest for s in (0.1, 0.3) for u in (0.1, 0.2)}
     assert texts == {kernel_source(FRICTION).digest}
-    assert kernel_source(FRICTION.replace(sigma=0.0), skip=True).digest not in texts
+    assert kernel_source(FRICTION.replace(sigma=0.0), reduce=True).digest not in texts
 
 
 SCENE = """
@@ -322,7 +322,7 @@ def test_explain_runs_where_there_is_a_folder_and_no_skip_runs_everything(tmp_pa
 
 def test_a_scene_without_anything_has_everything_left_out():
     scene = Scene(oscillator="harmonic", topology=chain(1))
-    words = explain(decide(scene))
+    words = explain(reduce_scene(scene))
     for part in ("forcing", "coupling", "synchronisation error", "section", "trajectory", "dense output"):
         assert f"\n  {part}: " in words
 
@@ -343,7 +343,7 @@ def test_operations_are_counted_with_the_functions_they_call():
 def test_every_case_of_the_benchmark_skips_something(case):
     fewer, more = bench.scenes(case, quick=True)
     assert fewer.skipped or len(fewer.records) < len(more.records)
-    counts = [bench.operations(kernel_source(chosen.scene, skip=chosen).text) for chosen in (fewer, more)]
+    counts = [bench.operations(kernel_source(chosen.scene, reduce=chosen).text) for chosen in (fewer, more)]
     assert counts[0] > 0
     assert counts[0] < counts[1] or case.fold_all
 
@@ -371,14 +371,14 @@ def test_benchmark_sees_a_difference():
 
 def test_what_a_cell_may_skip_is_said_only_where_it_may():
     forced, free = FRICTION, Scene(oscillator="harmonic", topology=chain(2))
-    assert "periodic:" in explain(decide(forced))
-    assert "periodic:" not in explain(decide(forced, False))
-    assert "periodic:" not in explain(decide(free))
-    assert all("diverged:" in explain(decide(scene)) for scene in (forced, free))
+    assert "periodic:" in explain(reduce_scene(forced))
+    assert "periodic:" not in explain(reduce_scene(forced, False))
+    assert "periodic:" not in explain(reduce_scene(free))
+    assert all("diverged:" in explain(reduce_scene(scene)) for scene in (forced, free))
 
 
 def test_no_skip_integrates_every_period():
     scene = Scene(parameters={"omega": 1.15}, record=(), transient=600, window=1, rtol=1e-6)
     assert run(scene).data.periods_skipped.item() > 100
-    for skip in (False, decide(scene, False)):
-        assert run(scene, skip=skip).data.periods_skipped.item() == 0
+    for skip in (False, reduce_scene(scene, False)):
+        assert run(scene, reduce=skip).data.periods_skipped.item() == 0

@@ -22,8 +22,8 @@ from synchain.runtime.cells import kernels
 from synchain.runtime.cli import main
 from synchain.runtime.console.outcome import print_json
 from synchain.runtime.results.open import open_result
+from synchain.runtime.sweeps import job, stream
 from synchain.runtime.sweeps import run as sweep
-from synchain.runtime.sweeps import stream, worker
 from synchain.runtime.synchronisation import threshold
 
 SCENE = """
@@ -269,15 +269,15 @@ def test_cells_that_fail_are_said_and_the_file_is_still_written(
 
 def interrupt_after(monkeypatch: pytest.MonkeyPatch, chunks: int) -> list[int]:
     """Press Ctrl-C when so many chunks of cells have run; the list counts the cells that were driven."""
-    real, driven = worker.Workshop.run, []
+    real, driven = job.SweepJob.run, []
 
-    def run(shop: worker.Workshop, cells: np.ndarray, *more: Any) -> Any:
+    def run(self: job.SweepJob, cells: np.ndarray, *more: Any) -> Any:
         if len(driven) == chunks:
             raise KeyboardInterrupt
         driven.append(len(cells))
-        return real(shop, cells, *more)
+        return real(self, cells, *more)
 
-    monkeypatch.setattr(worker.Workshop, "run", run)
+    monkeypatch.setattr(job.SweepJob, "run", run)
     return driven
 
 

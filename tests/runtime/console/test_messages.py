@@ -15,15 +15,16 @@ from synchain.models import chain
 from synchain.models.presentation.writer import Latex
 from synchain.models.scenes.scene import Scene
 from synchain.runtime import cli
-from synchain.runtime.cells.reduce import decide
+from synchain.runtime.cells.kernels import write_kernel
+from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.cli import main
 from synchain.runtime.commands.run import _nothing_to_do
 from synchain.runtime.console.arguments import grid, spaced
-from synchain.runtime.sweeps import run as sweep
-from synchain.runtime.sweeps import worker
+from synchain.runtime.sweeps import job
 from synchain.runtime.sweeps.certify import check_certifiable
+from synchain.runtime.sweeps.memory import check_memory
+from synchain.runtime.sweeps.prepare import warn_of_chords
 from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.sitting import prepare
 from synchain.runtime.sweeps.stream import claim
 
 PAIR = Scene(oscillator="harmonic", topology=chain(2), transient=1, window=1)
@@ -89,15 +90,13 @@ def test_grids_of_the_command_line_have_the_limit_of_an_axis():
         grid("0:1:10000001")
 
 
-def test_a_sweep_that_does_not_fit_is_refused_before_memory_is_taken(monkeypatch):
+def test_a_sweep_that_does_not_fit_is_refused_before_memory_is_taken():
     scene = PAIR.replace(axes=LARGE)
     with pytest.raises(ValueError, match=r"1000000000 cells, 112 GB in memory; expected at most 8 GB; .* with stream"):
-        sweep._fits(scene, 4)
-    sweep._fits(PAIR.replace(axes={name: values[:400] for name, values in LARGE.items()}), 4)
-    monkeypatch.setattr(sweep, "prepare", lambda given, *rest: SimpleNamespace(
-        shop=SimpleNamespace(recipe=SimpleNamespace(chosen=decide(given, skip=False)), samples=0)))  # fmt: skip
+        check_memory(reduce_scene(scene, reduce=False))
+    check_memory(reduce_scene(PAIR.replace(axes={name: values[:400] for name, values in LARGE.items()}), reduce=False))
     with pytest.raises(ValueError, match="expected at most 8 GB"):
-        run(scene)
+        run(scene, reduce=False)
     with pytest.raises(ValueError, match="found 1000000000, expected at most 10000000"):
         check_certifiable(scene)
     with pytest.raises(ValueError, match="found 1001000000 cells; expected at most 1000000000; use fewer"):
@@ -105,29 +104,22 @@ def test_a_sweep_that_does_not_fit_is_refused_before_memory_is_taken(monkeypatch
 
 
 def test_the_room_for_section_points_is_bounded():
-    """Two a period, and never more than LARGEST numbers for the cells of a block together."""
+    """Two a period, and never more than LARGEST_ROOM numbers for the cells of a block together."""
     short = PAIR.replace(record=("section",), window=100 * np.pi)
-    assert worker._room(short, 64 * 5) == 200 + 8
-    assert worker._room(PAIR, 64 * 5) == 0
+    assert job.first_room(short, 64 * 5) == 200 + 8
+    assert job.first_room(PAIR, 64 * 5) == 0
     long = PAIR.replace(record=("section",), window=1e8)
-    assert 64 * 5 * (worker._room(long, 64 * 5) - 8) <= worker.LARGEST
-    assert worker._room(long, 5) == 1_000_000 + 8
+    assert 64 * 5 * (job.first_room(long, 64 * 5) - 8) <= job.LARGEST_ROOM
+    assert job.first_room(long, 5) == 1_000_000 + 8
 
 
 @pytest.mark.filterwarnings("error")
 def test_records_between_steps_of_straight_lines_are_warned_of():
     scene = PAIR.replace(integrator="rodas6p", record=("trajectory",), samples=5, parameters={"sigma": 1})
     with pytest.warns(RuntimeWarning, match="rodas6p draws straight lines .* errors of trajectory"):
-        _prepared(scene)
+        warn_of_chords(write_kernel(reduce_scene(scene, False)))
     for other in (scene.replace(integrator="rodas5p"), scene.replace(record=("sync_error",))):
-        _prepared(other)  # a warning would be an error
-
-
-def _prepared(scene):
-    """As far as before the kernel is compiled."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("synchain.runtime.sweeps.sitting.Workshop", lambda recipe: recipe)
-        return prepare(scene, False, None, 1, None, False)
+        warn_of_chords(write_kernel(reduce_scene(other, False)))  # a warning would be an error
 
 
 def test_a_result_without_its_figure_is_drawn(tmp_path, monkeypatch, capsys):
@@ -144,7 +136,7 @@ def test_a_result_without_its_figure_is_drawn(tmp_path, monkeypatch, capsys):
 
 def test_messages_about_files_name_the_keyword_and_the_option(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"run without resume \(--resume\)"):
-        claim(decide(PAIR), tmp_path / "a.nc", resume=True)
+        claim(reduce_scene(PAIR), tmp_path / "a.nc", resume=True)
     (tmp_path / "a.nc").write_bytes(b"no netCDF")
     with pytest.raises(OSError, match=r"a\.nc is no netCDF file; expected a netCDF 3 result"):
-        claim(decide(PAIR), tmp_path / "a.nc")
+        claim(reduce_scene(PAIR), tmp_path / "a.nc")

@@ -13,8 +13,8 @@ from synchain.runtime.results.certificate import NEAR, VERDICTS, Certificate
 from synchain.runtime.results.open import open_result
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.certify import certify
+from synchain.runtime.sweeps.errors import SweepInterrupted
 from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.sitting import SweepInterrupted
 
 SIGMA = np.array([0.05, 0.12, 0.3])
 
@@ -85,21 +85,21 @@ def test_when_an_early_end_is_safe() -> None:
 
 
 def test_an_interrupted_run_is_resumed_with_its_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from synchain.runtime.sweeps.worker import Workshop
+    from synchain.runtime.sweeps.job import SweepJob
 
-    work, calls = Workshop.run, []
+    work, calls = SweepJob.run, []
 
-    def stop(shop: Workshop, cells: np.ndarray, *more: np.ndarray) -> object:
+    def stop(shop: SweepJob, cells: np.ndarray, *more: np.ndarray) -> object:
         calls.append(cells)
         if len(calls) > 1:
             raise KeyboardInterrupt
         return work(shop, cells, *more)
 
     grid = np.linspace(0.02, 0.2, 40)
-    monkeypatch.setattr(Workshop, "run", stop)
+    monkeypatch.setattr(SweepJob, "run", stop)
     with pytest.raises(SweepInterrupted) as caught:
         run(scene(transient=60.0, window=5.0), sigma=grid, certified=True, workers=1, show_progress=False)
-    monkeypatch.setattr(Workshop, "run", work)
+    monkeypatch.setattr(SweepJob, "run", work)
     caught.value.result.save(tmp_path / "part.nc")
     part = open_result(tmp_path / "part.nc")
     assert 0 < (part.status.values == 1).sum() < 40

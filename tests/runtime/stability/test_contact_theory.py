@@ -35,7 +35,7 @@ def block(friction: str, x: float = 0.0, v: float = 0.0, **more: Any) -> Scene:
 
 
 def finished(scene: Scene, **axes: Any) -> Result:
-    result = run(scene, show_progress=False, workers=1, skip=False, **axes)
+    result = run(scene, show_progress=False, workers=1, reduce=False, **axes)
     assert np.all(result.status == 1)
     return result
 

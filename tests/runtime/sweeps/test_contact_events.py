@@ -191,7 +191,7 @@ def test_law_that_chatters_ends_with_its_status(tmp_path: Path) -> None:
     allow_code(law)
     made = scene(ONE, [0.4], [0.0], 10.0, time_unit="time", friction=str(law),
                  parameters={"theta_b": 0.0, "epsilon": 1.0, "u": 0.0})  # fmt: skip
-    result = run(made, show_progress=False, x_1=[0.4, 0.1], skip=False)
+    result = run(made, show_progress=False, x_1=[0.4, 0.1], reduce=False)
     assert list(result.status.values) == [Status.CHATTERING, Status.FINISHED]
     assert "between stick and slip" in Status.CHATTERING.message
 

@@ -29,7 +29,7 @@ def nine(x: list[float], v: list[float], window: float, **more: float) -> Scene:
 
 def ran(scene: Scene, **more: Any) -> np.ndarray:
     """The states (component, oscillator) at the end of the only cell."""
-    result = run(scene, skip=False, show_progress=False, width=WIDTH, **more)
+    result = run(scene, reduce=False, show_progress=False, width=WIDTH, **more)
     assert np.all(result.status == Status.FINISHED)
     return np.asarray(result.end.values.reshape(3, -1))
 
@@ -69,7 +69,7 @@ def test_a_sweep_finds_the_end_of_the_synchronous_range() -> None:
     """omega = 1.15: the largest mode of nine, sigma (2 + 2 cos(pi/9)) = 0.465, leaves the stable range at 0.1199."""
     x = [0.3 + 1e-6 * i for i in range(9)]
     scene = nine(x, [0.0] * 9, 20.0, omega=1.15).replace(transient=300.0, rtol=1e-8)
-    result = run(scene, skip=False, show_progress=False, width=WIDTH, sigma=[0.1, 0.11, 0.13, 0.14])
+    result = run(scene, reduce=False, show_progress=False, width=WIDTH, sigma=[0.1, 0.11, 0.13, 0.14])
     assert np.all(result.status == Status.FINISHED)
     assert list(result.sync_error.values < 1e-6) == [True, True, False, False]
 

@@ -22,15 +22,16 @@ from synchain.codegen.kernels.installation import InstallationError
 from synchain.models import chain
 from synchain.models.graphs.products import cartesian
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.cells.kernels import kernel_source
-from synchain.runtime.cells.reduce import decide
+from synchain.runtime.cells.kernels import write_kernel
+from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.results.open import open_result
 from synchain.runtime.results.result import Result
-from synchain.runtime.sweeps import worker as works
+from synchain.runtime.sweeps import worker
+from synchain.runtime.sweeps.errors import SweepFailed
+from synchain.runtime.sweeps.job import JobSpec, SweepSpec
 from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.sitting import SweepFailed
 from synchain.runtime.sweeps.stream import stream
-from synchain.runtime.sweeps.worker import Recipe, run_block
+from synchain.runtime.sweeps.worker import forget, run_block
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -44,30 +45,30 @@ def alone() -> dict[Scene, Result]:
     return {scene: run(scene, workers=1, show_progress=False) for scene in (MAP, UP)}
 
 
-def recipe(scene: Scene) -> Recipe:
-    source = kernel_source(scene, None, decide(scene))
-    return Recipe.of(decide(scene), source.width, source.digest)
+def spec(scene: Scene) -> JobSpec:
+    reduction = reduce_scene(scene)
+    return JobSpec.of(SweepSpec(reduction), write_kernel(reduction))
 
 
-# -- recipes -------------------------------------------------------------------------------------------------
+# -- specifications -------------------------------------------------------------------------------------------------
 
 
-def test_a_recipe_is_small_and_comes_back():
+def test_a_specification_is_small_and_comes_back():
     for scene in (MAP, Scene(topology=cartesian(chain(2), chain(3)), contact="atan")):
-        packed = recipe(scene).packed()
-        again = Recipe.unpacked(packed)
+        packed = spec(scene).packed()
+        again = JobSpec.unpacked(packed)
         assert len(packed) < 20_000
-        assert again.chosen.scene == scene
-        assert again.digest == recipe(scene).digest
+        assert again.problem.reduction.scene == scene
+        assert again.digest == spec(scene).digest
 
 
 def test_a_worker_with_other_versions_or_another_kernel_refuses(monkeypatch):
-    packed = recipe(MAP).packed()
+    packed = spec(MAP).packed()
     with pytest.raises(RuntimeError, match="makes the kernel"):
-        works.Workshop(replace(recipe(MAP), digest="0" * 64))
-    monkeypatch.setattr(works, "versions", lambda: "synchain 0.0.1")
-    with pytest.raises(RuntimeError, match=r"this worker has synchain 0\.0\.1; expected .*, synchain "):
-        Recipe.unpacked(packed)
+        replace(spec(MAP), digest="0" * 64).rebuilt()
+    monkeypatch.setattr("importlib.metadata.version", lambda name: "0.0.1")
+    with pytest.raises(RuntimeError, match=r"this worker has synchain 0\.0\.1, .*; expected .*, synchain "):
+        JobSpec.unpacked(packed)
 
 
 class Elsewhere(Executor):
@@ -85,29 +86,29 @@ def test_a_stream_on_a_worker_with_another_installation_fails_in_words(tmp_path)
 
 
 def test_a_worker_with_another_processor_says_so(monkeypatch):
-    packed = recipe(MAP).packed()
+    packed = spec(MAP).packed()
     monkeypatch.setattr("llvmlite.binding.get_host_cpu_name", lambda: "abacus")
     with pytest.raises(
         InstallationError, match="this worker has the processor abacus; expected that of the main program"
     ):
-        Recipe.unpacked(packed)
+        JobSpec.unpacked(packed)
 
 
 def test_a_worker_that_does_not_know_the_sweep_asks_for_it(monkeypatch):
     cells = np.arange(3)
     assert run_block("first", None, cells) is None
-    made = run_block("first", recipe(MAP).packed(), cells)
+    made = run_block("first", spec(MAP).packed(), cells)
     assert (made.counts[:, 0] == 1).all()
     again = run_block("first", None, cells)
     np.testing.assert_array_equal(made.end, again.end)
-    monkeypatch.setattr(works, "KEPT", 1)
-    assert run_block("second", recipe(MAP).packed(), cells) is not None
+    monkeypatch.setattr(worker, "KEPT", 1)
+    assert run_block("second", spec(MAP).packed(), cells) is not None
     assert run_block("first", None, cells) is None
-    works.forget("second")
+    forget("second")
 
 
 class Foreign(Executor):
-    """Runs at once, in this process, what it is given, and forgets the recipe again and again."""
+    """Runs at once, in this process, what it is given, and forgets the job again and again."""
 
     def __init__(self) -> None:
         self.asked: list[bool] = []
@@ -115,7 +116,7 @@ class Foreign(Executor):
     def submit(self, function, /, key, packed, *block):
         self.asked.append(packed is not None)
         if len(self.asked) % 5 == 0:
-            works.forget(key)
+            forget(key)
         future: Future = Future()
         future.set_result(function(key, packed, *block))
         return future

@@ -22,14 +22,14 @@ from test_skip import MIRRORED
 from synchain.models.inputs.plugins import allow_code
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
-from synchain.runtime.cells.reduce import decide
+from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.figures.result_plot import draw_result
+from synchain.runtime.results.block_log import HEAD, BlockLog
 from synchain.runtime.results.open import open_result
-from synchain.runtime.results.store import HEAD, Store
 from synchain.runtime.support.netcdf import Sheet
 from synchain.runtime.support.status import Status
+from synchain.runtime.sweeps.errors import SweepFailed, SweepInterrupted
 from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.sitting import SweepFailed, SweepInterrupted
 from synchain.runtime.sweeps.stream import stream
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of Unix")
@@ -99,7 +99,7 @@ def test_every_shape_of_a_sweep_streams_as_it_saves(axes, tmp_path):
 def test_a_merged_network_streams_as_it_saves(tmp_path):
     """Oscillators that are stepped as one are kept as one and come back as all of them."""
     scene = MIRRORED.replace(axes={"sigma": [0.1, 0.2]})
-    assert len(decide(scene).states) < len(scene.y0)
+    assert reduce_scene(scene).dimension < len(scene.y0)
     run(scene, width=1, show_progress=False).save(tmp_path / "a.nc")
     stream(scene, tmp_path / "b.nc", width=1, show_progress=False)
     assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
@@ -136,8 +136,8 @@ ABOUT = {"blocks": 4, "dimension": 2, "samples": 1}
 @pytest.fixture
 def store(tmp_path):
     path = tmp_path / "x.partial"
-    Store.create(path, ABOUT)
-    made = Store.open(path, writing=True)
+    BlockLog.create(path, ABOUT)
+    made = BlockLog.open(path, writing=True)
     for number in range(3):
         made.append(number, block(5, number + 0.5))
     made.close()
@@ -145,7 +145,7 @@ def store(tmp_path):
 
 
 def test_blocks_come_back_as_they_went(store):
-    found = Store.open(store)
+    found = BlockLog.open(store)
     assert found.done.tolist() == [True, True, True, False]
     assert (found.counts[1], found.most) == (15, 3)
     for number in range(3):
@@ -158,7 +158,7 @@ def test_a_torn_end_loses_the_last_block_wherever_it_is_torn(store):
     size = (len(whole) - store.read_bytes().index(b"blk\0")) // 3
     for missing in (1, 7, size - 20, size - 1):
         store.write_bytes(whole[:-missing])
-        found = Store.open(store, writing=True)
+        found = BlockLog.open(store, writing=True)
         assert found.done.tolist() == [True, True, False, False]
         found.append(2, block(5, 2.5))
         found.close()
@@ -169,12 +169,12 @@ def test_a_damaged_block_is_none(store):
     whole = bytearray(store.read_bytes())
     whole[whole.index(b"blk\0") + 400] ^= 1
     store.write_bytes(whole)
-    found = Store.open(store, writing=True)
+    found = BlockLog.open(store, writing=True)
     assert found.done.tolist() == [False, True, True, False]
     assert found.counts[1] == 10
     found.append(0, block(5, 0.5))
     found.close()
-    assert Store.open(store).done.tolist() == [True, True, True, False]
+    assert BlockLog.open(store).done.tolist() == [True, True, True, False]
 
 
 def test_each_copy_of_the_first_line_stands_in_for_the_other(store):
@@ -184,8 +184,8 @@ def test_each_copy_of_the_first_line_stands_in_for_the_other(store):
             for begin in (place, place + 17, place + 40):
                 store.write_bytes(whole[:begin] + damage(whole[begin : begin + 20]) + whole[begin + 20 :])
                 assert open_result_or_refusal(store) != "no store"
-                assert Store.open(store).done.tolist() == [True, True, True, False]
-                assert Store.describe(store) == ABOUT
+                assert BlockLog.open(store).done.tolist() == [True, True, True, False]
+                assert BlockLog.describe(store) == ABOUT
 
 
 def open_result_or_refusal(path: Path) -> str:
@@ -211,7 +211,7 @@ def test_a_damaged_first_line_is_an_error_that_says_so(store):
     ):
         store.write_bytes(content)
         with pytest.raises(ValueError, match=words) as caught:
-            Store.open(store)
+            BlockLog.open(store)
         assert "(--overwrite)" in str(caught.value)
 
 
@@ -222,7 +222,7 @@ def test_a_bit_in_the_head_of_a_record_costs_that_record_alone(store):
         damaged = bytearray(whole)
         damaged[first + bit // 8] ^= 1 << bit % 8
         store.write_bytes(damaged)
-        found = Store.open(store, writing=True)
+        found = BlockLog.open(store, writing=True)
         assert found.done.tolist() == [False, True, True, False], bit
         found.close()
         assert store.read_bytes() == damaged
@@ -230,8 +230,8 @@ def test_a_bit_in_the_head_of_a_record_costs_that_record_alone(store):
 
 def test_a_page_of_zeros_costs_the_records_that_lie_on_it(tmp_path):
     path = tmp_path / "x.partial"
-    Store.create(path, {**ABOUT, "blocks": 60})
-    made = Store.open(path, writing=True)
+    BlockLog.create(path, {**ABOUT, "blocks": 60})
+    made = BlockLog.open(path, writing=True)
     for number in range(60):
         made.append(number, block(5, number + 0.5))
     places = made.places.copy()
@@ -240,12 +240,12 @@ def test_a_page_of_zeros_costs_the_records_that_lie_on_it(tmp_path):
     ends = np.append(places[1:], len(whole))
     for page in range(0, len(whole), 4096):
         path.write_bytes(whole[:page] + bytes(len(whole[page : page + 4096])) + whole[page + 4096 :])
-        found = Store.open(path, writing=True)
+        found = BlockLog.open(path, writing=True)
         np.testing.assert_array_equal(found.done, (ends <= page) | (places >= page + 4096))
         for lost in np.flatnonzero(~found.done):
             found.append(int(lost), block(5, lost + 0.5))
         found.close()
-        again = Store.open(path)
+        again = BlockLog.open(path)
         assert again.done.all()
         assert again.counts[1] == 300
         for number in range(60):
@@ -253,8 +253,8 @@ def test_a_page_of_zeros_costs_the_records_that_lie_on_it(tmp_path):
 
 
 def test_two_processes_do_not_write_to_one_store(store):
-    code = f"from synchain.runtime.results.store import Store\nStore.open({str(store)!r}, writing=True)"
-    held = Store.open(store, writing=True)
+    code = f"from synchain.runtime.results.block_log import BlockLog\nBlockLog.open({str(store)!r}, writing=True)"
+    held = BlockLog.open(store, writing=True)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     held.close()
     assert "is being written by another run" in done.stderr
@@ -369,12 +369,12 @@ def test_the_real_program_is_stopped_and_goes_on(sign, tmp_path):
     process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, preexec_fn=restore_interrupt)
     store = tmp_path / "slow.partial"
     give_up = time.monotonic() + 120
-    while process.poll() is None and not (store.exists() and Store.open(store).done.sum() >= 2):
+    while process.poll() is None and not (store.exists() and BlockLog.open(store).done.sum() >= 2):
         assert time.monotonic() < give_up
         time.sleep(0.05)
     process.send_signal(sign)
     _, err = process.communicate(timeout=60)
-    stored = int(Store.open(store).counts.sum())
+    stored = int(BlockLog.open(store).counts.sum())
     if sign == signal.SIGKILL:
         assert process.returncode == -9
     else:
@@ -458,8 +458,8 @@ def test_other_versions_do_not_go_on_with_a_run(tmp_path, monkeypatch, interrupt
     path = tmp_path / "a.nc"
     with pytest.raises(SweepInterrupted):
         stream(MAP, path, show_progress=False, progress=interrupt_at(1))
-    monkeypatch.setattr("synchain.runtime.sweeps.worker.versions", lambda: "synchain 0.0.1")
-    with pytest.raises(ValueError, match=r"was begun with synchain .*; found synchain 0\.0\.1"):
+    monkeypatch.setattr("importlib.metadata.version", lambda name: "0.0.1")
+    with pytest.raises(ValueError, match=r"was begun with synchain .*; found synchain 0\.0\.1, numba"):
         stream(MAP, path, resume=True, show_progress=False)
 
 
@@ -540,7 +540,7 @@ def test_another_kind_of_processor_does_not_go_on_with_a_run(tmp_path, interrupt
     path = tmp_path / "a.nc"
     with pytest.raises(SweepInterrupted):
         stream(MAP, path, show_progress=False, progress=interrupt_at(1))
-    told = Store.describe(partial(path))
+    told = BlockLog.describe(partial(path))
     name, _, features = told["attributes"]["processor"].partition(": ")
     assert features
     kinds = {
@@ -549,7 +549,7 @@ def test_another_kind_of_processor_does_not_go_on_with_a_run(tmp_path, interrupt
     }
     for forged, words in kinds.items():
         told["attributes"]["processor"] = forged
-        Store.create(partial(path), told)
+        BlockLog.create(partial(path), told)
         with pytest.raises(ValueError, match=words) as caught:
             stream(MAP, path, resume=True, show_progress=False)
         assert "go on there, or replace it with overwrite (--overwrite)" in str(caught.value)
@@ -608,9 +608,9 @@ def test_a_forged_scene_is_one_sentence(forged, tmp_path, interruptible):
     path = tmp_path / "b.nc"
     with pytest.raises(SweepInterrupted):
         stream(MAP, path, show_progress=False, progress=interrupt_at(1))
-    told = Store.describe(partial(path))
+    told = BlockLog.describe(partial(path))
     told["attributes"] = {k: v for k, v in {**told["attributes"], **forged}.items() if v is not None}
-    Store.create(partial(path), told)
+    BlockLog.create(partial(path), told)
     looks = (
         lambda: open_result(tmp_path / "a.nc"),
         lambda: stream(PAIR, tmp_path / "a.nc", show_progress=False),
@@ -636,8 +636,8 @@ def test_a_forged_store_is_one_sentence(forged, tmp_path, interruptible):
     path = tmp_path / "b.nc"
     with pytest.raises(SweepInterrupted):
         stream(MAP, path, show_progress=False, progress=interrupt_at(20))
-    records = partial(path).read_bytes()[Store.open(partial(path)).places.max() :]
-    Store.create(partial(path), {**Store.describe(partial(path)), **forged})
+    records = partial(path).read_bytes()[BlockLog.open(partial(path)).places.max() :]
+    BlockLog.create(partial(path), {**BlockLog.describe(partial(path)), **forged})
     with open(partial(path), "ab") as file:
         file.write(records)
     with pytest.raises((OSError, ValueError)) as caught:

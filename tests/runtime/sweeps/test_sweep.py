@@ -14,11 +14,14 @@ from synchain.models import chain
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.kernels import kernel
 from synchain.runtime.cells.plan import plan, tolerances
+from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.results.open import open_result
 from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps import crew, worker
-from synchain.runtime.sweeps.run import run
-from synchain.runtime.sweeps.sitting import SweepInterrupted
+from synchain.runtime.sweeps.errors import SweepInterrupted
+from synchain.runtime.sweeps.memory import Memory
+from synchain.runtime.sweeps.prepare import prepare
+from synchain.runtime.sweeps.progress import Reporter
+from synchain.runtime.sweeps.run import run, run_blocks
 
 PAIR = Scene(topology=chain(2), transient=5, window=10, parameters={"sigma": 0.1})
 SECTIONS = PAIR.replace(record=("sync_error", "section"))
@@ -84,11 +87,18 @@ def test_every_status_has_a_sentence():
     assert all(len(status.message) > 10 for status in Status)
 
 
-def test_section_room_grows_to_what_a_cell_needs(monkeypatch):
-    whole = run(SECTIONS, sigma=[0.0, 0.1, 0.2])
+def run_with_room(scene, room):
+    """Run a scene with room for so many section points of a cell at first."""
+    memory = Memory.of(prepare(reduce_scene(scene), room=room), None)
+    run_blocks(memory, None, Reporter(scene.cells, show=False))
+    return memory.result()
+
+
+def test_section_room_grows_to_what_a_cell_needs():
+    scene = SECTIONS.replace(axes={"sigma": [0.0, 0.1, 0.2]})
+    whole = run(scene)
     assert int(whole.section_count.min()) > 3
-    monkeypatch.setattr(worker, "_room", lambda *given: 2)
-    grown = run(SECTIONS, sigma=[0.0, 0.1, 0.2])
+    grown = run_with_room(scene, 2)
     assert grown.data.identical(whole.data)
 
 
@@ -105,11 +115,10 @@ def test_continuation_starts_from_the_neighbour(direction):
         state = alone.end.values
 
 
-def test_continuation_keeps_its_states_where_room_grows(monkeypatch):
+def test_continuation_keeps_its_states_where_room_grows():
     scene = SECTIONS.replace(axes={"sigma": [0.02, 0.05, 0.08]}, continuation="up")
     whole = run(scene)
-    monkeypatch.setattr(worker, "_room", lambda *given: 2)
-    assert run(scene).data.identical(whole.data)
+    assert run_with_room(scene, 2).data.identical(whole.data)
 
 
 def test_result_survives_its_file(tmp_path):
@@ -164,19 +173,17 @@ def interruptible():
     signal.signal(signal.SIGINT, before)
 
 
-def test_interrupt_keeps_finished_cells_and_resume_completes_them(monkeypatch, interruptible):
+def test_interrupt_keeps_finished_cells_and_resume_completes_them(interruptible):
     scene = SECTIONS.replace(transient=50, window=50, axes={"sigma": list(np.linspace(0, 0.3, 200))})
-    following = crew._next
+    pressed = []
 
-    def next_then_interrupt(arrived):
-        future = following(arrived)
-        os.kill(os.getpid(), signal.SIGINT)
-        return future
+    def press_once(progress):
+        if progress.done and not pressed:
+            pressed.append(progress.done)
+            os.kill(os.getpid(), signal.SIGINT)
 
-    with monkeypatch.context() as patch:
-        patch.setattr(crew, "_next", next_then_interrupt)
-        with pytest.raises(SweepInterrupted) as caught:
-            run(scene, workers=1)
+    with pytest.raises(SweepInterrupted) as caught:
+        run(scene, workers=1, progress=press_once)
     partial = caught.value.result
     finished = partial.status.values == Status.FINISHED
     assert 0 < finished.sum() < 200
@@ -218,6 +225,6 @@ def test_a_window_of_whole_periods_has_its_last_sample(periods: int) -> None:
         time_unit="time", parameters={"delta": 0.5},
     )  # fmt: skip
     for window in (2 * np.pi * periods, np.nextafter(2 * np.pi * periods, 0), np.nextafter(2 * np.pi * periods, 1e9)):
-        result = run(scene.replace(window=float(window)), skip=False, width=1)
+        result = run(scene.replace(window=float(window)), reduce=False, width=1)
         assert np.isfinite(result.trajectory.values).all(), window
         np.testing.assert_allclose(result.trajectory.values[-1], result.end.values, rtol=1e-11)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,6 @@ from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import Edge, Node
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps import worker
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.synchronisation.probe import MODE_ALPHA, MODE_BETA, ring_of_three, universal_probe
 from synchain.runtime.synchronisation.threshold import Criterion, probe
@@ -106,15 +106,28 @@ def test_a_one_way_ring_is_one_point_of_the_plane():
             assert abs(float(found.error) - direct) > 1e-4 * direct
 
 
-def test_a_plane_needs_one_kernel_and_the_workers_do_not_matter(monkeypatch):
-    loaded = []
-    monkeypatch.setattr(worker, "load", lambda source, load=worker.load: loaded.append(source.digest) or load(source))
+class Spy(ThreadPoolExecutor):
+    """Notes the kernels of the blocks that it runs."""
+
+    def __init__(self, workers: int, digests: set[str]) -> None:
+        super().__init__(workers)
+        self.digests = digests
+
+    def submit(self, function, /, *arguments):
+        self.digests.add(function.__self__.kernel.digest)
+        return super().submit(function, *arguments)
+
+
+def test_a_plane_needs_one_kernel_and_the_workers_do_not_matter():
+    digests = set()
     criterion = Criterion(transient=5, window=2, starts=3)
     alpha, beta = np.linspace(-0.5, 2.0, 30), np.linspace(-1.0, 1.0, 30)
-    one, two = (universal_probe(SPRINGS, alpha, beta, criterion=criterion, workers=workers) for workers in (1, 2))
-    universal_probe(SPRINGS.replace(delta=0.7), 1.0, 0.3, criterion=criterion)
-    assert len(loaded) == 3
-    assert len(set(loaded)) == 1
+    one, two = (
+        universal_probe(SPRINGS, alpha, beta, criterion=criterion, workers=workers, executor=Spy(workers, digests))
+        for workers in (1, 2)
+    )
+    universal_probe(SPRINGS.replace(delta=0.7), 1.0, 0.3, criterion=criterion, executor=Spy(1, digests))
+    assert len(digests) == 1
     assert np.array_equal(one.error, two.error)
     assert one.status.shape == (30, 3)
 

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
+from synchain.codegen.driver.columns import Count, Sum
 from synchain.models import chain, complete, star
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.scenes.scene import Scene
+from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.support.status import Status
 from synchain.runtime.synchronisation import threshold
 from synchain.runtime.synchronisation.threshold import (
     Criterion,
     Sweep,
+    cells_of,
     check_probe,
     critical_ratio,
     default_grid,
+    judge,
     offsets,
     probe,
     project,
@@ -26,6 +30,7 @@ from synchain.runtime.synchronisation.threshold import (
     thresholds,
     wu_chua,
 )
+from synchain.runtime.synchronisation.trials import mean_errors
 
 PARTS = from_matrix([[-1, 1, 0, 0], [1, -1, 0, 0], [0, 0, -1, 1], [0, 0, 1, -1]])
 SHORT = Criterion(transient=100, window=20, starts=2, tolerance=1e-3)
@@ -131,14 +136,12 @@ def test_the_criterion_is_that_of_the_published_table():
     assert (found.transient, found.window, found.rtol, found.seed) == (1000.0, 100.0, 1e-8, 0)
 
 
-def test_at_least_half_of_the_starts_must_fall_below_the_tolerance(monkeypatch):
-    def errors(scene, points, moves, *rest):
-        assert len(moves) == SHORT.starts
+def test_at_least_half_of_the_starts_must_fall_below_the_tolerance():
+    def errors(points):
         other = np.where(points < 0.5, 0.0, SHORT.tolerance)  # an error of the tolerance itself is not below it
         return np.stack([np.where(points < 0.25, 0.0, 1.0), other], axis=1)
 
-    monkeypatch.setattr(threshold, "_errors", errors)
-    found = simulate(Scene(topology=chain(2)), [0.0, 0.3, 0.6], resolution=1e-3, criterion=SHORT)
+    found = judge(errors, np.array([0.0, 0.3, 0.6]), 1e-3, SHORT)
     assert found.share.tolist() == [1.0, 0.5, 0.0]
     assert found.error.tolist() == [0.0, 0.5, 0.5 * (1 + SHORT.tolerance)]
     assert found.x.tolist() == [0.0, 0.3, 0.6]
@@ -146,33 +149,53 @@ def test_at_least_half_of_the_starts_must_fall_below_the_tolerance(monkeypatch):
     assert (low, high) == (0.0, pytest.approx(0.5, abs=1e-3))
 
 
-def test_cells_are_every_coupling_with_every_start_and_failed_ones_count_as_infinite(monkeypatch):
-    seen = []
+def test_cells_are_every_coupling_with_every_start():
+    criterion = Criterion(starts=2, transient=7, window=3, rtol=1e-5)
+    move = offsets(criterion)[1]
+    cells = cells_of(Scene(topology=chain(2)), np.array([0.1, 0.2]), criterion)
+    assert {axis.name: axis.values for axis in cells.axes} == {
+        "sigma": (0.1, 0.1, 0.2, 0.2),
+        "x_1": (0.3, 0.3 + move, 0.3, 0.3 + move),
+        "x_2": (0.28, 0.28 + move, 0.28, 0.28 + move),
+    }
+    assert (cells.zipped, cells.record) == (True, ("sync_error",))
+    assert (cells.transient, cells.window, cells.rtol) == (7, 3, 1e-5)
 
-    def run(cells, **options):
-        seen.append((cells, options))
-        return SimpleNamespace(
-            status=np.array([Status.FINISHED, Status.FINISHED, Status.STEP_BUDGET, Status.FINISHED]),
-            sync_error=np.array([0.0, 1.0, 2.0, 3.0]),
+
+def test_errors_of_cells_that_failed_are_infinite():
+    buffers = Buffers.empty(4, 4, 0, 0)
+    buffers.counts[:, Count.STATUS] = [Status.FINISHED, Status.FINISHED, Status.STEP_BUDGET, Status.FINISHED]
+    buffers.sums[:, Sum.MEAN] = [0.0, 1.0, 2.0, 3.0]
+    assert mean_errors(buffers).tolist() == [0.0, 1.0, np.inf, 3.0]
+
+
+class Spy(ThreadPoolExecutor):
+    """Notes the jobs whose blocks it runs."""
+
+    def __init__(self) -> None:
+        super().__init__(1)
+        self.jobs = []
+
+    def submit(self, function, /, *arguments):
+        self.jobs.append(function.__self__)
+        return super().submit(function, *arguments)
+
+
+def test_the_grid_and_the_rounds_that_refine_its_ends_run_one_kernel():
+    dampers = Scene(oscillator="harmonic", topology=chain(2), coupling="damper")
+    with Spy() as executor:
+        found = simulate(
+            dampers,
+            [0.0, 0.5],
+            criterion=Criterion(transient=50, window=5, starts=1),
+            resolution=1e-2,
+            executor=executor,
+            show_progress=False,
         )
-
-    monkeypatch.setattr(threshold, "run", run)
-    moves = np.array([0.0, 0.125])
-    criterion, options = Criterion(transient=7, window=3, rtol=1e-5), {"workers": 2, "show_progress": False}
-    found = threshold._errors(Scene(topology=chain(2)), np.array([0.1, 0.2]), moves, criterion, options)
-    assert found.tolist() == [[0.0, 1.0], [np.inf, 3.0]]
-    ((cells, given),) = seen
-    assert {name: tuple(axis.values) for name, axis in zip(("sigma", "x_1", "x_2"), cells.axes, strict=True)} == {
-        "sigma": (0.1, 0.1, 0.2, 0.2), "x_1": (0.3, 0.425, 0.3, 0.425), "x_2": (0.28, 0.405, 0.28, 0.405)
-    }  # fmt: skip
-    assert (cells.zipped, cells.record, cells.transient, cells.window, cells.rtol) == (
-        True,
-        ("sync_error",),
-        7,
-        3,
-        1e-5,
-    )
-    assert given == {"workers": 2, "show_progress": False}
+    assert found.share.tolist() == [0.0, 1.0]
+    assert 0.1 < found.intervals[0][0] < 0.5
+    assert len(executor.jobs) > 2
+    assert all(job is executor.jobs[0] for job in executor.jobs)
 
 
 def test_starts_are_moved_by_at_most_the_reach_and_the_first_not_at_all():

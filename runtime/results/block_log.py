@@ -23,13 +23,14 @@ from typing import Any
 
 import numpy as np
 
+from synchain.codegen.driver.columns import Count, Point, Sum
 from synchain.models.inputs.regular_file import open_regular
 
 from ..cells.buffers import Buffers
 from ..support.files import whole_file
 from ..support.status import CODES, tally
 
-__all__ = ["Store", "is_store"]
+__all__ = ["BlockLog", "is_block_log"]
 
 KIND = b"synchain blocks "
 MAGIC = KIND + b"2\n"
@@ -48,7 +49,7 @@ FLUSH = 5.0
 """Seconds between two requests to the system that the file be safe from a loss of power as well."""
 
 
-def is_store(path: str | os.PathLike[str]) -> bool:
+def is_block_log(path: str | os.PathLike[str]) -> bool:
     """True if a file begins like a store, or is called one and does not begin like a result."""
     try:
         with open_regular(path) as file:
@@ -59,7 +60,7 @@ def is_store(path: str | os.PathLike[str]) -> bool:
 
 
 @dataclass(slots=True)
-class Store:
+class BlockLog:
     """An open store: `about` says what the sweep is, `places` (blocks,) where each block's record begins, -1 for none.
 
     counts (CODES,): how many cells of the stored blocks ended how; `most`: section points of the cell that has most.
@@ -94,7 +95,7 @@ class Store:
             os.fsync(file.fileno())
 
     @classmethod
-    def open(cls, path: str | os.PathLike[str], writing: bool = False) -> Store:
+    def open(cls, path: str | os.PathLike[str], writing: bool = False) -> BlockLog:
         """Open a store and find its whole blocks; a record that is torn or damaged counts as none.
 
         Raises ValueError if the file is no store or both copies of its first line are damaged, BlockingIOError if another
@@ -106,14 +107,14 @@ class Store:
                 _lock(file, path)
             about = _about(file, path)
             places = np.full(about["blocks"], -1, dtype=np.int64)
-            store = cls(Path(path), about, places, np.zeros(CODES, np.int64), file, file.tell())
-            store._scan()
+            log = cls(Path(path), about, places, np.zeros(CODES, np.int64), file, file.tell())
+            log._scan()
             if writing:
-                file.truncate(store._end)  # what is torn at the end
+                file.truncate(log._end)  # what is torn at the end
         except BaseException:
             file.close()
             raise
-        return store
+        return log
 
     def _scan(self) -> None:
         """Find the records; the file ends for us behind the last one that has a sound head."""
@@ -136,12 +137,11 @@ class Store:
         """True for each block (blocks,) that is stored."""
         return self.places >= 0
 
-    def append(self, block: int, made: Buffers) -> None:
+    def append(self, block: int, buffers: Buffers) -> None:
         """Add a finished block; OSError where it cannot be written, after which the store is as it was."""
-        counts = tally(made.counts[:, 0])
-        body = _packed(made)
-        most = int(made.counts[:, 3].max(initial=0))
-        head = HEAD.pack(MARK, block, len(body), zlib.crc32(body), len(made.counts), most, *counts.tolist(), 0)
+        counts, most = tally(buffers.status), buffers.most_points
+        body = _packed(buffers)
+        head = HEAD.pack(MARK, block, len(body), zlib.crc32(body), len(buffers.counts), most, *counts.tolist(), 0)
         head = head[:-4] + struct.pack("<I", zlib.crc32(head[:-4]))
         self._file.seek(self._end)
         left = memoryview(head + body)
@@ -250,29 +250,35 @@ def _next_mark(file: FileIO, place: int, size: int) -> int:
     return size
 
 
-def _packed(made: Buffers) -> bytes:
-    """The numbers of a block; of the section points those that there are."""
-    there = np.arange(made.points.shape[1]) < made.counts[:, 3:4]
-    floats = (made.end, made.sums, made.points[there], made.samples)
-    return made.counts.astype("<i8").tobytes() + b"".join(part.astype("<f8").tobytes() for part in floats)
+def _packed(buffers: Buffers) -> bytes:
+    """The numbers of a block; of the section points those that exist."""
+    floats = (buffers.end, buffers.sums, buffers.points[_exists(buffers)], buffers.samples)
+    return buffers.counts.astype("<i8").tobytes() + b"".join(part.astype("<f8").tobytes() for part in floats)
+
+
+def _exists(buffers: Buffers) -> np.ndarray:
+    """True for each section point (cells, room) that exists."""
+    return np.arange(buffers.points.shape[1]) < buffers.point_counts[:, None]
 
 
 def _unpacked(body: bytes, cells: int, most: int, dimension: int, samples: int) -> Buffers | None:
     """The numbers of a block; None if there are not as many as its cells need, the most section points among them."""
-    if len(body) < cells * 48:
+    if len(body) < cells * len(Count) * 8:
         return None
-    counts = np.frombuffer(body, "<i8", cells * 6).reshape(cells, 6).astype(np.int64)
-    there = [int(count) for count in counts[:, 3]]
-    points = sum(there)
-    sizes = (cells * dimension, cells * 4, points * (dimension + 1), cells * samples * dimension)
-    if min(there, default=0) < 0 or max(there, default=0) != most or counts.nbytes + 8 * sum(sizes) != len(body):
+    counts = np.frombuffer(body, "<i8", cells * len(Count)).reshape(cells, len(Count)).astype(np.int64)
+    lengths = [int(count) for count in counts[:, Count.POINTS]]
+    points = sum(lengths)
+    sizes = (cells * dimension, cells * len(Sum), points * (Point.STATE + dimension), cells * samples * dimension)
+    if min(lengths, default=0) < 0 or max(lengths, default=0) != most or counts.nbytes + 8 * sum(sizes) != len(body):
         return None
-    rest = np.frombuffer(body, "<f8", offset=counts.nbytes).astype(float)
-    end, sums, found, tracks = np.split(rest, np.cumsum(sizes)[:-1])
-    made = Buffers.empty(cells, dimension, most, samples)
-    made.points[np.arange(made.points.shape[1]) < counts[:, 3:4]] = found.reshape(points, dimension + 1)
-    return Buffers(end.reshape(cells, dimension), sums.reshape(cells, 4), counts, made.points,
-                   tracks.reshape(made.samples.shape))  # fmt: skip
+    floats = np.frombuffer(body, "<f8", offset=counts.nbytes).astype(float)
+    end, sums, sections, tracks = np.split(floats, np.cumsum(sizes)[:-1])
+    buffers = Buffers.empty(cells, dimension, most, samples)
+    buffers.counts = counts
+    buffers.points[_exists(buffers)] = sections.reshape(points, Point.STATE + dimension)
+    buffers.end, buffers.sums = end.reshape(cells, dimension), sums.reshape(cells, len(Sum))
+    buffers.samples = tracks.reshape(cells, samples, dimension)
+    return buffers
 
 
 def _lock(file: FileIO, path: str | os.PathLike[str]) -> None:

@@ -1,0 +1,66 @@
+"""Columns of the arrays that a kernel reads and writes, by name.
+
+The text of every kernel defines the same numbers for itself (`recording.py`); a test compares the two.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+__all__ = ["Control", "Count", "Point", "Span", "Sum"]
+
+
+class Control(IntEnum):
+    """Entries of the array `control` that steers a kernel."""
+
+    RTOL = 0
+    ATOL = 1
+    FIRST_STEP = 2
+    MAX_STEP = 3
+    MAX_STEPS = 4
+    DIRECTION = 5
+    """Section points are taken where the section function falls (-1), rises (1) or either (0)."""
+    CANCEL = 6
+    """A number other than 0 stops the kernel while it runs."""
+    NO_JUMPS = 7
+    """A number other than 0 integrates a cell that repeats itself to its end."""
+
+
+class Span(IntEnum):
+    """Columns of `spans` (cells, 4), in non-dimensional time."""
+
+    START = 0
+    END = 1
+    PERIOD = 2
+    """After so much time the equations repeat themselves; 0 if they do not."""
+    NEAR = 3
+    """Synchronisation error below which a cell is known to stay synchronous; 0 if that is not known."""
+
+
+class Sum(IntEnum):
+    """Columns of `sums` (cells, 4): synchronisation error over the window, and the time at which the cell stopped."""
+
+    MEAN = 0
+    PEAK = 1
+    LAST = 2
+    STOPPED_AT = 3
+
+
+class Count(IntEnum):
+    """Columns of `counts` (cells, 6)."""
+
+    STATUS = 0
+    ACCEPTED = 1
+    REJECTED = 2
+    POINTS = 3
+    SKIPPED = 4
+    """Periods of the drive that were jumped over."""
+    SMOOTH = 5
+    """Steps of the explicit method in a kernel that switches."""
+
+
+class Point(IntEnum):
+    """Columns of a section point: its time, then the state."""
+
+    TIME = 0
+    STATE = 1

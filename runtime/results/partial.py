@@ -1,0 +1,182 @@
+"""Results out of the blocks of a sweep on disk: of the cells so far in memory, or of all cells in a netCDF file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from synchain.codegen.driver.columns import Count, Point, Sum
+from synchain.models.inputs.checks import whole
+from synchain.models.scenes.scene import Scene
+
+from ..cells.buffers import Buffers
+from ..cells.layout import Layout
+from ..cells.plan import Planner
+from ..cells.reduce import NodeMerge, Reduction
+from ..support.files import understood, whole_file
+from ..support.netcdf import Sheet, seal, unsealed
+from .block_log import BlockLog
+from .certificate import VERDICTS, Certificate
+from .labels import MEANINGS, Variable, coordinates, dimensions, scene_of, variables
+from .result import IN_MEMORY, Result, gather
+
+__all__ = ["certificate_of", "describe_sweep", "layout_of", "partial_path", "read_partial", "write_result"]
+
+
+def describe_sweep(
+    reduction: Reduction, layout: Layout, attributes: Mapping[str, Any], certificate: Certificate | None
+) -> dict[str, Any]:
+    """Return what a block log says of its sweep, in JSON types, so that it can be read without the kernel."""
+    merge = reduction.merge
+    exponents = None if certificate is None else (certificate.exponent, certificate.stderr, certificate.diffusion)
+    return {
+        "attributes": dict(attributes),
+        "blocks": layout.blocks,
+        "size": layout.size,
+        "dimension": reduction.dimension,
+        "samples": reduction.samples,
+        "merged": [merge.states.tolist(), merge.places.tolist()] if merge.merges else None,
+        "together": merge.together,
+        "certificate": None if exponents is None else [part.tolist() for part in exponents],
+    }
+
+
+def layout_of(about: Mapping[str, Any], scene: Scene) -> Layout:
+    """Return the blocks of a log.
+
+    Raises
+    ------
+    ValueError
+        If it does not have as many as its scene needs.
+    """
+    layout = Layout.of(scene, whole("size", about["size"], 1))
+    if layout.blocks != about["blocks"]:
+        raise ValueError(f"found {about['blocks']} blocks; expected {layout.blocks} for the cells of its scene")
+    return layout
+
+
+def certificate_of(about: Mapping[str, Any]) -> Certificate | None:
+    """Return the certificate of a log's cells; None if they are not certified."""
+    exponents = about["certificate"]
+    return None if exponents is None else Certificate(*(np.array(part, dtype=float) for part in exponents))
+
+
+class _Reader:
+    """Reads the blocks of a log as those of the whole network."""
+
+    def __init__(self, log: BlockLog, scene: Scene) -> None:
+        about = log.about
+        self.log, self.scene = log, scene
+        self.layout, self.certificate = layout_of(about, scene), certificate_of(about)
+        self.planner = Planner(scene)
+        same = np.arange(int(about["dimension"]))
+        states, places = (same, same) if about["merged"] is None else map(np.array, about["merged"])
+        self.merge = NodeMerge(states, places, bool(about["together"]))
+
+    def buffers(self, block: int) -> Buffers:
+        """The results of a block."""
+        return self.merge.expand(self.log.read(block))
+
+    def variables(self, cells: np.ndarray, buffers: Buffers) -> Iterator[Variable]:
+        """The variables of these cells, whose results the buffers hold."""
+        certificate = None if self.certificate is None else self.certificate.take(cells)
+        return variables(self.scene, self.planner.spans(cells), buffers, certificate, self.log.most)
+
+
+def read_partial(path: str | os.PathLike[str]) -> Result:
+    """Return the cells so far of a sweep on disk; the others have the status NOT_RUN.
+
+    Raises
+    ------
+    ValueError
+        If the file is damaged, or if its cells do not fit into memory.
+    """
+    with understood(Path(path)):
+        about = BlockLog.describe(path)
+        scene = scene_of(about["attributes"])
+        layout_of(about, scene)
+        with closing(BlockLog.open(path)) as log:
+            return _so_far(_Reader(log, scene))
+
+
+def _so_far(reader: _Reader) -> Result:
+    """The blocks that a log holds, as a result."""
+    log, scene = reader.log, reader.scene
+    dimension, samples = len(reader.merge.places), int(log.about["samples"])
+    row = dimension * (1 + samples) + (Point.STATE + dimension) * log.most + len(Sum) + len(Count)
+    if scene.cells * row > IN_MEMORY:
+        raise ValueError(
+            f"found a sweep of {scene.cells * row * 8 / 1e9:.0f} GB; expected at most {IN_MEMORY * 8 / 1e9:.0f} GB in "
+            "memory; finish it with resume (--resume), and open parts of the result with xarray"
+        )
+    buffers = Buffers.empty(scene.cells, dimension, log.most, samples)
+    for block in np.flatnonzero(log.done).tolist():
+        buffers.put(reader.layout.rows(block), reader.buffers(block))
+    spans = reader.planner.spans(np.arange(scene.cells))
+    return gather(scene, log.about["attributes"], spans, buffers, reader.certificate)
+
+
+def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> dict[str, int]:
+    """Write the netCDF file of a scene's log that has all blocks, with one block in memory at a time.
+
+    Returns
+    -------
+    dict of str to int
+        How many cells have each verdict, and how many "ended early"; empty if the cells are not certified.
+    """
+    reader = _Reader(log, scene)
+    verdicts: dict[str, int] = {}
+    axes = {axis.name: len(axis) for axis in scene.axes}
+    lengths = {"cell": scene.cells} if scene.zipped else axes
+    with whole_file(path) as temporary, open(temporary, "w+b") as file:
+        sheet = Sheet(file, _template(reader), lengths)
+        for axis in scene.axes:
+            sheet.put(axis.name, np.arange(len(axis)), np.array(axis.values))
+        for block in range(reader.layout.blocks):
+            rows = reader.layout.rows(block)
+            for name, _, values in reader.variables(rows, reader.buffers(block)):
+                sheet.put(name, rows, values)
+                for verdict, count in _verdicts(name, values):
+                    verdicts[verdict] = verdicts.get(verdict, 0) + count
+        seal(file)
+        file.flush()
+        os.fsync(file.fileno())
+    return verdicts
+
+
+def _template(reader: _Reader) -> xr.Dataset:
+    """The result of the first cell alone."""
+    scene = reader.scene
+    one = np.arange(1)
+    first = Buffers(*(array[:1] for array in reader.buffers(0).arrays()))
+    dims, ones = dimensions(scene), (1,) * len(scene.shape)
+    data = {
+        name: ((*dims, *more), values[:1].reshape((*ones, *values.shape[1:])), {"long_name": MEANINGS[name]})
+        for name, more, values in reader.variables(one, first)
+    }
+    coords = coordinates(scene)
+    for axis in scene.axes:
+        dim, values = coords[axis.name]
+        coords[axis.name] = (dim, values[:1])
+    return unsealed(xr.Dataset(data, coords, reader.log.about["attributes"]))
+
+
+def _verdicts(name: str, values: np.ndarray) -> list[tuple[str, int]]:
+    """What a variable of a block adds to the count of verdicts."""
+    if name == "ended_early":
+        return [("ended early", int(np.count_nonzero(values)))]
+    if name == "verdict":
+        codes, counts = np.unique(values, return_counts=True)
+        return [(VERDICTS[code], int(count)) for code, count in zip(codes, counts, strict=True)]
+    return []
+
+
+def partial_path(path: str | os.PathLike[str]) -> Path:
+    """Return where the blocks of a run are kept until its result is written: beside the result."""
+    return Path(path).with_suffix(".partial")

@@ -1,0 +1,82 @@
+"""The results of a sweep in memory: arrays of all its cells, which blocks fill."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from synchain.codegen.driver.columns import Count, Sum
+
+from ..cells.buffers import Buffers
+from ..cells.layout import Layout
+from ..cells.reduce import Reduction
+from ..results.result import IN_MEMORY, Result, gather
+from .job import Start
+from .pool import Task
+from .prepare import PreparedRun
+
+__all__ = ["Memory", "check_memory"]
+
+
+@dataclass(slots=True)
+class Memory:
+    """Keeps the blocks of a sweep in arrays of all its cells."""
+
+    prepared: PreparedRun
+    layout: Layout
+    buffers: Buffers
+
+    @classmethod
+    def of(cls, prepared: PreparedRun, earlier: Result | None) -> Memory:
+        """Return arrays for all cells, with those of an earlier result that finished."""
+        reduction = prepared.reduction
+        cells, samples = reduction.scene.cells, reduction.samples
+        if earlier is None:
+            return cls(prepared, prepared.layout(), Buffers.empty(cells, reduction.dimension, 0, samples))
+        whole = Buffers.empty(cells, len(reduction.scene.y0), 0, samples)
+        earlier.restore(reduction.scene, whole, reduction.equations)
+        return cls(prepared, prepared.layout(), reduction.merge.contract(whole))
+
+    def done(self) -> np.ndarray:
+        """True for each block (blocks,) that has finished, with those that it needed; in a continued sweep clears others."""
+        finished = self.buffers.finished
+        done = np.zeros(self.layout.blocks, dtype=bool)
+        for block in range(self.layout.blocks):
+            rows, needed = self.layout.rows(block), self.layout.before(block)
+            done[block] = finished[rows].all() and (needed is None or done[needed])
+            if self.layout.columns and not done[block]:  # its cells started from others
+                self.buffers.clear(rows)
+        return done
+
+    def missing(self, block: int) -> np.ndarray:
+        """Numbers of the cells of a block that have not finished."""
+        rows = self.layout.rows(block)
+        return rows[~self.buffers.finished[rows]]
+
+    def ends(self, block: int) -> Start:
+        """The final states of a block, and which of its cells finished."""
+        rows = self.layout.rows(block)
+        return self.buffers.end[rows], self.buffers.finished[rows]
+
+    def put(self, task: Task, buffers: Buffers) -> None:
+        """Copy the cells of a block into the arrays of all cells."""
+        self.buffers.put(task.cells, buffers)
+
+    def result(self) -> Result:
+        """Return the cells so far."""
+        prepared, scene = self.prepared, self.prepared.scene
+        spans = prepared.job.planner.spans(np.arange(scene.cells))
+        return gather(scene, prepared.attributes, spans, prepared.reduction.expand(self.buffers), prepared.certificate)
+
+
+def check_memory(reduction: Reduction) -> None:
+    """Raise ValueError if the cells of a sweep do not fit into memory."""
+    scene = reduction.scene
+    row = len(scene.y0) * (1 + reduction.samples) + len(Sum) + len(Count)
+    if scene.cells * row > IN_MEMORY:
+        size = scene.cells * row * 8 / 1e9
+        raise ValueError(
+            f"sweep: found {scene.cells} cells, {size:.0f} GB in memory; expected at most {IN_MEMORY * 8 / 1e9:.0f} GB; "
+            "write it to a file with stream, whose memory does not grow with the sweep, or take fewer cells"
+        )

@@ -1,0 +1,119 @@
+"""From what is left of a scene to a job that can run: the text of its kernel, the exponents of its cells, machine code."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import Any
+
+from synchain.codegen.driver.columns import Control
+from synchain.codegen.integrators import integrator
+from synchain.codegen.kernels.compile import load
+from synchain.codegen.kernels.sweep import KernelSource
+from synchain.models.inputs.checks import flag
+from synchain.models.scenes.scene import Scene
+
+from ..cells.kernels import write_kernel
+from ..cells.layout import Layout, block_size
+from ..cells.reduce import Reduction
+from ..results.certificate import Certificate
+from ..results.labels import provenance
+from .certify import certify
+from .job import JobSpec, SweepJob, SweepSpec
+from .pool import pool_size
+
+__all__ = ["PreparedRun", "prepare", "warn_of_chords"]
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedRun:
+    """A sweep that is ready to run.
+
+    Attributes
+    ----------
+    job : SweepJob
+    certificate : Certificate, optional
+        The exponents of all cells, if the run is certified.
+    workers : int
+        Blocks that run at a time.
+    compiling : float
+        Seconds that the compilation of the kernel took, or its loading.
+    """
+
+    job: SweepJob
+    certificate: Certificate | None
+    workers: int
+    compiling: float
+
+    @property
+    def reduction(self) -> Reduction:
+        """What is left of the scene to integrate."""
+        return self.job.reduction
+
+    @property
+    def scene(self) -> Scene:
+        """The scene, with its axes."""
+        return self.job.reduction.scene
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """How the result came about."""
+        job, spec = self.job, self.job.spec
+        tolerances = float(job.control[Control.RTOL]), float(job.control[Control.ATOL])
+        return provenance(self.scene, job.kernel, tolerances, self.reduction.skipped, spec.versions, spec.processor)
+
+    def layout(self) -> Layout:
+        """Return the blocks of the sweep, of a size that suits the workers."""
+        return Layout.of(self.scene, block_size(self.scene, self.job.spec.width, self.workers))
+
+
+def prepare(
+    reduction: Reduction,
+    certified: bool | Certificate = False,
+    *,
+    width: int | None = None,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    room: int | None = None,
+) -> PreparedRun:
+    """Write and compile the kernel of a reduced scene.
+
+    Parameters
+    ----------
+    reduction : Reduction
+    certified : bool or Certificate
+        True computes the exponents of all cells; a Certificate has them already.
+    width : int, optional
+        Number of lanes.
+    workers : int, optional
+        Blocks that run at a time (default: as many as the executor or the processor can).
+    executor : Executor, optional
+    room : int, optional
+        Section points of a cell to make room for at first.
+    """
+    scene = reduction.scene
+    certify_now = not isinstance(certified, Certificate) and flag("certified", certified)
+    source = write_kernel(reduction, width)
+    warn_of_chords(source)
+    count = pool_size(executor, workers)
+    certificate = certified if isinstance(certified, Certificate) else None
+    if certify_now:
+        certificate = certify(scene, workers=None if executor is not None else count)
+    began = time.perf_counter()
+    problem = SweepSpec(reduction, room)
+    job = problem.job(JobSpec.of(problem, source), load(source))
+    return PreparedRun(job, certificate, count, time.perf_counter() - began)
+
+
+def warn_of_chords(source: KernelSource) -> None:
+    """Warn if states between steps are recorded by an integrator that has only straight lines there."""
+    between = [record for record in ("trajectory", "section") if record in source.records]
+    if between and integrator(source.integrator).dense_order < 2:
+        warnings.warn(
+            f"{source.integrator} draws straight lines between its steps, so errors of {' and '.join(between)} are not bounded "
+            "by rtol; take another integrator for these records, e.g. rodas5p",
+            RuntimeWarning,
+            stacklevel=4,
+        )

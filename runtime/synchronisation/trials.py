@@ -1,0 +1,153 @@
+"""Trials: cells whose mean synchronisation error alone is asked for, run in rounds by one kernel on one pool of workers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor
+
+import numpy as np
+
+from synchain.codegen.driver.columns import Sum
+from synchain.codegen.kernels.compile import load
+from synchain.codegen.kernels.sweep import KernelSource
+from synchain.models.scenes.scene import Scene
+
+from ..cells.buffers import Buffers
+from ..cells.kernels import write_kernel
+from ..cells.layout import block_size
+from ..cells.plan import Plan, Planner, control_of
+from ..cells.reduce import Reduction
+from ..support.status import CODES, Status, tally
+from ..sweeps.errors import SweepFailed, SweepInterrupted
+from ..sweeps.job import JobSpec, RowsSpec
+from ..sweeps.pool import Task, WorkerPool, pool_size, worker_lost
+from ..sweeps.progress import Hook, Reporter, check_reporting
+
+__all__ = ["Trials", "mean_errors"]
+
+Rows = Callable[[np.ndarray], Plan]
+"""Lays out cells by their numbers (count,)."""
+
+
+class Trials:
+    """One compiled kernel and one pool of workers for any number of rounds; a context manager that closes the pool.
+
+    Parameters
+    ----------
+    scene : Scene
+        Says how long a cell runs.
+    problem : RowsSpec
+    source : KernelSource
+        The kernel of the problem.
+    expand : callable, optional
+        Turns the results of a reduced network into those of the whole one.
+    workers, executor, show_progress, progress
+        As for `run`; each round has a bar of its own.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        problem: RowsSpec,
+        source: KernelSource,
+        *,
+        expand: Callable[[Buffers], Buffers] | None = None,
+        workers: int | None = None,
+        executor: Executor | None = None,
+        show_progress: bool | None = None,
+        progress: Hook | None = None,
+    ) -> None:
+        check_reporting(show_progress, progress)
+        self.scene, self.width, self.expand = scene, source.width, expand
+        self.show_progress, self.progress = show_progress, progress
+        self.workers = pool_size(executor, workers)
+        began = time.perf_counter()
+        job = problem.job(JobSpec.of(problem, source), load(source))
+        self._compiling = time.perf_counter() - began
+        self.pool = WorkerPool(job, executor, self.workers)
+
+    @classmethod
+    def of(
+        cls,
+        reduction: Reduction,
+        *,
+        workers: int | None = None,
+        executor: Executor | None = None,
+        show_progress: bool | None = None,
+        progress: Hook | None = None,
+    ) -> Trials:
+        """Return trials of what is left of a scene; its cells stand for those of all rounds."""
+        source = write_kernel(reduction)
+        control = control_of(Planner(reduction.scene), reduction.jumps)
+        problem = RowsSpec(reduction.equations, source.integrator, control, reduction.multiplicity, reduction.records)
+        return cls(
+            reduction.scene,
+            problem,
+            source,
+            expand=reduction.expand,
+            workers=workers,
+            executor=executor,
+            show_progress=show_progress,
+            progress=progress,
+        )
+
+    def __enter__(self) -> Trials:
+        return self
+
+    def __exit__(self, *problem: object) -> None:
+        self.pool.close()
+
+    def run(self, count: int, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
+        """Run a round.
+
+        Parameters
+        ----------
+        count : int
+            Number of cells.
+        rows : callable
+            Lays out cells by their numbers, block by block.
+
+        Returns
+        -------
+        error : ndarray, shape (count,)
+            Mean synchronisation errors, infinite if a cell did not finish.
+        status : ndarray of int, shape (count,)
+            How the cells ended.
+
+        Raises
+        ------
+        SweepInterrupted
+            On Ctrl-C.
+        SweepFailed
+            If the workers are lost.
+        """
+        error, status = np.full(count, np.inf), np.full(count, int(Status.NOT_RUN))
+        reporter = Reporter(count, self.show_progress, self.progress)
+        size = block_size(self.scene, self.width, self.workers, count)
+
+        def finish(task: Task, buffers: Buffers) -> None:
+            error[task.cells] = mean_errors(buffers if self.expand is None else self.expand(buffers))
+            status[task.cells] = buffers.status
+            reporter.add(tally(buffers.status))
+
+        blocks = (np.arange(first, min(first + size, count)) for first in range(0, count, size))
+        try:
+            reporter.start(np.zeros(CODES, dtype=np.int64), self._compiling)
+            self._compiling = 0.0
+            self.pool.run((Task(k, cells, (rows(cells),)) for k, cells in enumerate(blocks)), finish)
+        except (Exception, KeyboardInterrupt) as problem:
+            finished = int((status == Status.FINISHED).sum())
+            if isinstance(problem, KeyboardInterrupt):
+                raise SweepInterrupted(finished, count) from None
+            if not worker_lost(problem):
+                raise
+            raise SweepFailed(f"the workers are lost ({problem})", finished, count) from problem
+        finally:
+            reporter.close()
+        return error, status
+
+
+def mean_errors(buffers: Buffers) -> np.ndarray:
+    """Return the mean synchronisation errors (cells,), infinite if a cell did not finish."""
+    return np.where(buffers.finished, buffers.sums[:, Sum.MEAN], np.inf)
