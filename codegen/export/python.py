@@ -12,7 +12,7 @@ from synchain.models.dynamics.equations import Equations
 from .body import (
     Syntax,
     check_inertia,
-    constant_mass,
+    is_unrolled,
     link_body,
     link_places,
     mass_body,
@@ -22,7 +22,7 @@ from .body import (
     wrapped,
 )
 from .header import given_values, header
-from .loops import is_unrolled, jacobian_lines, mass_lines, rhs_lines
+from .loops import jacobian_lines, mass_lines, rhs_lines
 from .names import portable
 from .printer import NUMPY
 
@@ -97,7 +97,7 @@ def _imports(model: Equations, small: bool) -> list[str]:
 def _jac(model: Equations, small: bool, given: Mapping[str, str]) -> list[str]:
     """The statements of jac."""
     if small:
-        moving = model.inertial and not constant_mass(model)
+        moving = model.inertial and not model.constant_mass
         jac = [f"rates = rhs({', '.join(['t', 'state', *given])})"] if moving else []
         jac += ["matrix = np.zeros((DIMENSION, DIMENSION))", *jacobian_lines(model, SYNTAX)]
         return jac + ([*_masses(model, small), "return solve(mass_, matrix)"] if model.inertial else ["return matrix"])

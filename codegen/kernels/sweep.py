@@ -102,7 +102,7 @@ def _module(
     names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
     blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
     looped = equations.n > LARGEST_UNROLLED
-    sticking = ("contacts",) if plain.node.contact is not None else ()
+    sticking = ("contacts",) if plain.sticks else ()
     if looped:
         method = _for_many(method, equations)
     steps = _steps(plain, blocks, method, looped)
@@ -231,7 +231,7 @@ def _constants(
     rows = {
         "WIDTH": width,
         "NODES": equations.n,
-        "COMPONENTS": 2 if equations.node.contact is not None else len(equations.common),
+        "COMPONENTS": len(equations.compared),
         "DIMENSION": equations.dimension,
         "PARAMETERS": len(equations.parameters),
         "DENSE_ROWS": max(len(m.dense) for m in (method, method.smooth) if m is not None),
@@ -240,8 +240,8 @@ def _constants(
         **({"SMOOTH_ERROR_ORDER": method.smooth.error_order} if method.smooth is not None else {}),
         "WEIGHTED": multiplicity is not None,
         **flags,
-        "DENSE": any(flags.values()) or equations.node.contact is not None,
-        "CONTACTS": equations.node.contact is not None,
+        "DENSE": any(flags.values()) or equations.sticks,
+        "CONTACTS": equations.sticks,
     }
     text = "\n".join(f"{name} = {value!r}" for name, value in rows.items())
     return text if multiplicity is None else f"{text}\nMULTIPLICITY = np.array({[float(m) for m in multiplicity]!r})"

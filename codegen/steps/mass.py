@@ -68,9 +68,8 @@ class Mass:
 
     @property
     def constant(self) -> bool:
-        """True where M depends on parameters alone."""
-        ends = (({*edge.here, *edge.there}, edge.inertia) for edge in self.equations.edges)
-        return not any(e.free_symbols & states for states, blocks in ends for b in blocks for row in b for e in row)
+        """True if M depends on parameters alone."""
+        return self.equations.constant_mass
 
     def refuse(self, what: str) -> None:
         """Raise ValueError where M is not the identity."""

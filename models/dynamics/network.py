@@ -30,7 +30,7 @@ from ..mechanics.parameter import Parameter
 from ..mechanics.stick_slip import SLIP, set_valued
 from .equations import Equations
 
-__all__ = ["check_coupling", "connectivity", "drawn", "edge", "mixed_network", "network", "node", "parameters"]
+__all__ = ["check_coupling", "connectivity", "edge", "mixed_network", "network", "node", "oriented_links", "parameters"]
 
 
 def parameters(
@@ -128,9 +128,10 @@ def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str,
     Where a link tells its ends apart, its weight becomes the sign of its direction (`synchain.models.mechanics.orientation`).
     """
     if link is None:
-        return Equations(single, None, graph.n, (), varied)
+        return Equations.of_equal_nodes(single, None, graph.n, (), varied)
     oriented = graph.links and is_oriented(link)
-    return Equations(single, link, graph.n, drawn(graph) if oriented else graph.links, varied)
+    links = oriented_links(graph) if oriented else graph.links
+    return Equations.of_equal_nodes(single, link, graph.n, links, varied)
 
 
 def mixed_network(
@@ -145,15 +146,14 @@ def mixed_network(
 
     Every pair of kinds that a link joins gets its own edge.  Raises ValueError where a coupling does not fit a pair.
     """
-    apart = Equations(singles[0], None, graph.n, (), varied, tuple(singles[1:]), tuple(kinds))
-    links = graph.links if coupling is not None else ()
-    pairs = sorted({(kinds[target], kinds[source]) for target, source, _ in links})
-    joints = tuple(
-        ((a, b), edge(str(coupling), singles[a], oscillators[a], singles[b], oscillators[b])) for a, b in pairs
-    )
-    if any(a == b and is_oriented(link) for (a, b), link in joints):
+    apart = Equations(tuple(singles), tuple(kinds), (), (), varied)
+    if coupling is None:
+        return apart
+    pairs = sorted({apart.ends(link) for link in graph.links})
+    edges = tuple(((a, b), edge(coupling, singles[a], oscillators[a], singles[b], oscillators[b])) for a, b in pairs)
+    if any(a == b and is_oriented(link) for (a, b), link in edges):
         raise ValueError(f"coupling {coupling!r} tells the ends of a link apart; expected nodes of one kind")
-    return replace(apart, links=links, joints=joints)
+    return replace(apart, links=graph.links, edge_of=edges)
 
 
 def connectivity(coupling: str, graph: Topology) -> tuple[tuple[Fraction, ...], ...]:
@@ -200,7 +200,7 @@ def _hessian(coupling: str) -> tuple[Fraction, Fraction]:
     return Fraction(int(own.p), int(own.q)), Fraction(int(other.p), int(other.q))
 
 
-def drawn(graph: Topology) -> tuple[Link, ...]:
+def oriented_links(graph: Topology) -> tuple[Link, ...]:
     """Return the links of a graph with the sign of their direction as weight.
 
     A link runs from the smaller to the larger number; on a graph that looks alike from every node (a ring) it runs the

@@ -14,7 +14,7 @@ from fractions import Fraction
 import numpy as np
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.reduction import NoQuotient, fold, quotient
+from synchain.models.dynamics.reduction import NoQuotient, quotient, substitute_constants
 from synchain.models.scenes.scene import Scene
 
 from .buffers import Buffers
@@ -130,14 +130,17 @@ def decide(scene: Scene, skip: bool = True, fold_all: bool = False) -> Skip:
     for node, k in enumerate(classes):
         seen.setdefault(k, node)
     first = [seen[k] for k in range(equations.n)]
-    components = range(whole.dimension // scene.n)
-    alone = np.arange(whole.dimension)
+    states, places = np.empty(equations.dimension, dtype=int), np.empty(whole.dimension, dtype=int)
+    for k, node in enumerate(first):
+        states[list(equations.places[k])] = whole.places[node]
+    for node, k in enumerate(classes):
+        places[list(whole.places[node])] = equations.places[k]
     return Skip(
         scene,
         equations,
         tuple(r for r in scene.record if not (together and r == "sync_error")),
-        alone if whole.mixed else np.array([c * scene.n + i for c in components for i in first]),
-        alone if whole.mixed else np.array([c * equations.n + k for c in components for k in classes]),
+        states,
+        places,
         np.array([whole.parameters.index(_column(name, equations, first)) for name in equations.parameters], dtype=int),
         _multiplicity(scene, classes),
         tuple(skipped),
@@ -166,7 +169,7 @@ def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> 
         if name not in equations.parameters or (value != 0.0 and not fold_all):
             continue
         try:
-            made = fold(equations, {name: Fraction(repr(value))})
+            made = substitute_constants(equations, {name: Fraction(repr(value))})
         except ValueError as problem:
             kept.append(str(problem))
             continue
@@ -177,7 +180,7 @@ def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> 
 
 def _present(scene: Scene, equations: Equations) -> list[str]:
     """What has to be integrated, in words."""
-    found = ["forcing: time occurs in the equations"] if any(node.forced for node in equations.nodes) else []
+    found = ["forcing: time occurs in the equations"] if equations.forced else []
     if equations.links:
         fixed = _fixed(scene)
         names = [*dict.fromkeys(symbol.name for edge in equations.edges for symbol in edge.parameters)]
@@ -190,7 +193,7 @@ def _consequence(before: Equations, after: Equations, name: str, value: float) -
     """What a folded parameter has taken along, in words."""
     gone = [p for p in before.parameters if p not in after.parameters and p != name]
     too = f" together with {', '.join(gone)}" if gone else ""
-    if before.node.forced and not after.node.forced:
+    if before.forced and not after.forced:
         return f"forcing: {name} = {value:g} in every cell, left out{too}; no time terms"
     if before.links and not after.links:
         return f"coupling: {name} = {value:g} in every cell, left out{too}; no links"

@@ -156,7 +156,7 @@ def _carrier(scene: Scene, found: Clusters, variation: Variation, seed: int) -> 
 
 def _deviating(variation: Variation) -> int:
     """Components of an oscillator that deviate: all but the mode of a contact."""
-    return len(variation.orbit.node.state) if variation.events is None else 2
+    return len(variation.orbit.node.continuous)
 
 
 def _parts(found: Clusters, components: int) -> Iterator[slice]:
