@@ -85,9 +85,8 @@ def link_places(equations: Equations, link: Link | None = None) -> tuple[dict[Pl
     edge = _edge(equations, link)
     if edge is None:
         return {}, {}
-    here, there = (_places(_at_rates(edge, block, ends)) for block, ends in
-                   ((edge.jacobian_here(), edge.here), (edge.jacobian_there(), edge.there)))  # fmt: skip
-    return here, there
+    here = _places(_at_rates(edge, edge.jacobian_here(), edge.here))
+    return here, _places(_at_rates(edge, edge.jacobian_there(), edge.there))
 
 
 def rate_symbols(edge: Edge) -> tuple[sp.Symbol, ...]:

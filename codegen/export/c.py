@@ -154,7 +154,7 @@ def _jacobian(model: Equations, small: bool) -> list[str]:
     lines = jacobian_lines(model, SYNTAX)
     if small:
         lines.insert(0, "memset(matrix, 0, sizeof(double)*DIMENSION*DIMENSION);")
-        if model.inertial and not model.constant_mass:
+        if not model.constant_mass:
             lines[:0] = ["double rates[DIMENSION];", "rhs(t, state, numbers, rates);"]
         lines += _solved(model, "matrix", model.dimension)
         return _function(f"void jacobian({ARGUMENTS}matrix)", lines)
