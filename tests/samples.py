@@ -49,20 +49,20 @@ def friction_chain(n: int) -> Equations:
     w = theta_b - v
     law = (mu_k + (mu_s - mu_k) * sp.exp(-a * sp.Abs(w))) * 2 / sp.pi * sp.atan(kappa * w)
     node = Node((x, v), (v, -x + u * sp.cos(omega * TIME) + epsilon * law), tuple(parameters))
-    return Equations(node, spring() if n > 1 else None, n, path(n))
+    return Equations.of_equal_nodes(node, spring() if n > 1 else None, n, path(n))
 
 
 def harmonic_chain(n: int) -> Equations:
     """Oscillators without friction or drive, joined by springs."""
     x, v = real("x", "v")
-    return Equations(Node((x, v), (v, -x), ()), spring(), n, path(n))
+    return Equations.of_equal_nodes(Node((x, v), (v, -x), ()), spring(), n, path(n))
 
 
 def waving() -> Equations:
     """A damped pendulum driven such that x = cos t, v = -sin t solves it."""
     x, v, damping = real("x", "v", "damping")
     drive = -sp.cos(TIME) + sp.sin(sp.cos(TIME)) - damping * sp.sin(TIME)
-    return Equations(Node((x, v), (v, drive - sp.sin(x) - damping * v), (damping,)), None, 1)
+    return Equations.of_equal_nodes(Node((x, v), (v, drive - sp.sin(x) - damping * v), (damping,)), None, 1)
 
 
 def looped() -> Equations:
@@ -74,7 +74,7 @@ def looped() -> Equations:
     push = (delta * w * (v_2 - v), sigma * w * (x_2 - x) * sp.cos(x_2 - x) + mu * v_2)
     edge = Edge((x, v), (x_2, v_2), w, push, (sigma, delta, mu))
     links = ((0, 1, Fraction(2, 3)), (1, 2, Fraction(1)), (2, 0, Fraction(-3, 2)), (0, 2, Fraction(1)))
-    return Equations(node, edge, 3, links)
+    return Equations.of_equal_nodes(node, edge, 3, links)
 
 
 def parametric() -> Equations:
@@ -82,7 +82,7 @@ def parametric() -> Equations:
     x, v, omega, u = real("x", "v", "omega", "u")
     wave = u * omega * sp.sin(omega * TIME)
     rhs = (v + u * sp.cos(omega * TIME), wave * x * v - x * sp.sin(omega * TIME))
-    return Equations(Node((x, v), rhs, (omega, u)), spring(), 2, path(2))
+    return Equations.of_equal_nodes(Node((x, v), rhs, (omega, u)), spring(), 2, path(2))
 
 
 def third_order() -> Equations:
@@ -90,7 +90,7 @@ def third_order() -> Equations:
     x, y, z, a, b = real("x", "y", "z", "a", "b")
     kinks = sp.Abs(y) * sp.sign(x - b)
     last = -a * z - kinks - x**3 + sp.cos(a * TIME) ** 2 - sp.log(b) / (1 + y**2)
-    return Equations(Node((x, y, z), (y, z + sp.Rational(1, 3), last), (a, b)), None, 1)
+    return Equations.of_equal_nodes(Node((x, y, z), (y, z + sp.Rational(1, 3), last), (a, b)), None, 1)
 
 
 def tanh_pair() -> Equations:
@@ -99,7 +99,7 @@ def tanh_pair() -> Equations:
     rhs = (sp.tanh(a * x) * sp.sin(phase) - sp.sqrt(1 + x**2), sp.S.One)
     x_2, phase_2, w, sigma = real("x_2", "phase_2", "w", "sigma")
     edge = Edge((x, phase), (x_2, phase_2), w, (sp.S.Zero, sigma * w * sp.sin(phase_2 - phase)), (sigma,))
-    return Equations(Node((x, phase), rhs, (a,)), edge, 2, path(2))
+    return Equations.of_equal_nodes(Node((x, phase), rhs, (a,)), edge, 2, path(2))
 
 
 def choices() -> Equations:
@@ -112,7 +112,7 @@ def choices() -> Equations:
     x_2, v_2, w, sigma = real("x_there", "v_there", "weight", "sigma")
     rope = sp.Piecewise((sigma * w * (x_2 - x), (x_2 > x) & (sigma > b)), (0, True))
     node = Node((x, v), (v, stop - x + drag + drive + mixed), (a, b, omega))
-    return Equations(node, Edge((x, v), (x_2, v_2), w, (sp.S.Zero, rope), (sigma, b)), 2, path(2))
+    return Equations.of_equal_nodes(node, Edge((x, v), (x_2, v_2), w, (sp.S.Zero, rope), (sigma, b)), 2, path(2))
 
 
 CASES: dict[str, Equations] = {

@@ -258,7 +258,7 @@ def _module(
     carry: list[str],
     names: Names,
 ) -> str:
-    sticking = ("contacts",) if plain.node.contact is not None else ()
+    sticking = ("contacts",) if plain.sticks else ()
     orbit = [
         "@njit(error_model='numpy')",
         "def step(t, h, y, p, y_new, dense, rtol, atol, shared):",
@@ -286,9 +286,9 @@ def _module(
 
 
 def _constants(variation: Variation, plain: Equations, method: Integrator, width: int, shared: int) -> str:
-    sticking = plain.node.contact is not None
+    sticking = plain.sticks
     constants = {
-        "WIDTH": 1, "LANES": width, "NODES": plain.n, "COMPONENTS": 2 if sticking else len(plain.node.state),
+        "WIDTH": 1, "LANES": width, "NODES": plain.n, "COMPONENTS": len(plain.node.continuous),
         "DIMENSION": plain.dimension, "PARAMETERS": len(plain.parameters),
         "DENSE_ROWS": len(method.dense), "ERROR_ORDER": method.error_order, "SWITCHING": False, "WEIGHTED": False,
         "CONTACTS": sticking, "SYNC_ERROR": False, "SECTION": False, "TRAJECTORY": False,

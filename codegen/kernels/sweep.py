@@ -176,7 +176,7 @@ def _module(
     states = [s.name for node in plain.nodes for s in node.state]
     names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
     blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
-    sticking = ("contacts",) if plain.node.contact is not None else ()
+    sticking = ("contacts",) if plain.sticks else ()
     steps = _steps(plain, blocks, method, elimination)
     lines = [line for writer in steps.values() for line in writer.lines]
     functions = [f for k in range(len(blocks)) for f in node_functions(list(steps.values()), blocks[k], k)]
@@ -309,7 +309,7 @@ def _constants(
     rows = {
         "WIDTH": width,
         "NODES": equations.n,
-        "COMPONENTS": 2 if equations.node.contact is not None else len(equations.common),
+        "COMPONENTS": len(equations.compared),
         "DIMENSION": equations.dimension,
         "PARAMETERS": len(equations.parameters),
         "DENSE_ROWS": max(len(m.dense) for m in (method, method.smooth) if m is not None),
@@ -318,8 +318,8 @@ def _constants(
         **({"SMOOTH_ERROR_ORDER": method.smooth.error_order} if method.smooth is not None else {}),
         "WEIGHTED": multiplicity is not None,
         **flags,
-        "DENSE": any(flags.values()) or equations.node.contact is not None,
-        "CONTACTS": equations.node.contact is not None,
+        "DENSE": any(flags.values()) or equations.sticks,
+        "CONTACTS": equations.sticks,
     }
     text = "\n".join(f"{name} = {value!r}" for name, value in rows.items())
     return text if multiplicity is None else f"{text}\nMULTIPLICITY = np.array({[float(m) for m in multiplicity]!r})"

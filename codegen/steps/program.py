@@ -79,14 +79,12 @@ def program(equations: Equations, fill: float = FILL_LIMIT) -> Program:
     size = max(len(node.state) for node in equations.nodes)
     own = tuple(block_pattern(node.jacobian()) for node in equations.nodes)
     joined = tuple(tuple(tuple(sorted(pattern)) for pattern in _link_patterns(edge)) for edge in equations.edges)
-    if not equations.mixed:
-        return _program(equations.n, size, own, joined, equations.links, fill)
+    where = tuple(table(equations).tolist()) if equations.mixed else ()
     numbers = {i: k for k, i in enumerate(by_kind(equations))}
     links = tuple((numbers[target], numbers[source], weight) for target, source, weight in by_joint(equations))
-    counts = tuple(map(equations.kinds.count, range(len(own))))
-    joints = joint_numbers(equations) if links else []
-    shares = tuple(map(joints.count, range(len(joined))))
-    return _program(equations.n, size, own, joined, links, fill, tuple(table(equations).tolist()), counts, shares)
+    counts = tuple(map(equations.kind_of.count, range(len(own))))
+    shares = tuple(map(joint_numbers(equations).count, range(len(joined))))
+    return _program(equations.n, size, own, joined, links, fill, counts, shares, where)
 
 
 def _link_patterns(edge: Edge) -> tuple[set[Entry], set[Entry]]:
@@ -108,16 +106,16 @@ def _program(
     joined: tuple[tuple[Pattern, Pattern], ...],
     links: tuple[Link, ...],
     fill: float,
-    where: tuple[int, ...] = (),
-    counts: tuple[int, ...] = (),
-    shares: tuple[int, ...] = (),
+    counts: tuple[int, ...],
+    shares: tuple[int, ...],
+    where: tuple[int, ...],
 ) -> Program:
-    """The program of a network of `counts` nodes of each kind and `shares` links of each joint; none: all of one."""
+    """The program of a network of `counts` nodes of each kind and `shares` links of each joint."""
     stands = np.array(where, np.int64).reshape(-1, n)[:size] if where else np.arange(n * size).reshape(size, n)
     dimension = int((stands >= 0).sum())
     nodes, (target, source) = np.arange(n), (np.array([link[side] for link in links], np.int64) for side in (0, 1))
-    alike = _Blocks(stands, nodes, nodes, own, _spans(counts or (n,)))
-    spans = _spans(shares or (len(links),))
+    alike = _Blocks(stands, nodes, nodes, own, _spans(counts))
+    spans = _spans(shares)
     ends = [
         _Blocks(stands, target, end, tuple(pair[k] for pair in joined), spans) for k, end in enumerate((target, source))
     ]

@@ -218,7 +218,7 @@ def _integrator(scene: Scene, found: Clusters, variation: Variation, seed: int) 
 
 def _deviating(variation: Variation) -> int:
     """Number of components of an oscillator that deviate: all but the slip state of a contact."""
-    return len(variation.orbit.node.state) if variation.events is None else 2
+    return len(variation.orbit.node.continuous)
 
 
 def _parts(found: Clusters, components: int) -> Iterator[slice]:

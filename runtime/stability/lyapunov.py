@@ -21,8 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from tqdm import tqdm
 
-from synchain.models.dynamics.variational import PHASE, Variation, phased, with_volume
-from synchain.models.dynamics.variational import whole as whole_network
+from synchain.models.dynamics.variational import PHASE, Variation, network_variation, phase_shifted, with_volume
 from synchain.models.inputs.checks import whole
 from synchain.models.scenes.scene import Scene
 
@@ -195,7 +194,7 @@ def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray) -> Lyapunov
 
 def _counted(scene: Scene, count: int | None) -> int:
     """Number of exponents to compute, checked against the network's state."""
-    dimension = scene.n * (len(scene.components) if scene.equations.node.contact is None else 2)
+    dimension = scene.n * len(scene.equations.nodes[0].continuous)
     if count is None:
         return dimension
     if not 1 <= whole("count", count, -dimension) <= dimension:
@@ -252,10 +251,10 @@ class TangentFrame:
             If time enters without a known period.
         """
         unit = unit_of_time(scene)
-        own = whole_network(scene.equations)
+        own = network_variation(scene.equations)
         sticks = own.events is not None
         variation = own if sticks else Variation(with_volume(own.orbit), own.size, own.matrix)
-        variation = phased(variation) if scene.forced else variation
+        variation = phase_shifted(variation) if scene.forced else variation
         values = {**scene.parameters, PHASE.name: 0.0}
         numbers = np.array([[values[name] for name in variation.orbit.parameters]])
         state = np.array([[*scene.y0, *(0.0 for _ in range(0 if sticks else scene.n))]])

@@ -221,7 +221,7 @@ def stopped(n: int) -> Equations:
     node = Node((x, v), (v, -x + stop + braked + sp.cos(sp.S(6) / 5 * TIME)), (gap, stiff, drag))
     rope = sp.Piecewise((sigma * w * (x_2 - x), x_2 > x), (0, True))
     edge = Edge((x, v), (x_2, v_2), w, (sp.S.Zero, rope), (sigma,))
-    return Equations(node, edge, n, path(n))
+    return Equations.of_equal_nodes(node, edge, n, path(n))
 
 
 KERNELS = [

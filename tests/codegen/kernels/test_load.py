@@ -30,7 +30,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import Node
 
 x, v = real("x", "v")
-SWING = Equations(Node((x, v), (v, -x), ()), None, 1)
+SWING = Equations.of_equal_nodes(Node((x, v), (v, -x), ()), None, 1)
 REAL = emit(SWING, "cash_karp", (), width=1)
 MORE = ", ".join(f"more_{i}" for i in range(len(loading.SIGNATURE.args) - 7))
 TINY = """

@@ -7,12 +7,13 @@ import pytest
 import scipy.integrate
 import scipy.linalg
 import sympy as sp
+from variational_reference import transversal_equations
 
 from synchain.codegen.kernels.compile import load
 from synchain.codegen.kernels.modes import emit_modes
 from synchain.codegen.kernels.sweep import emit
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.variational import Variation, mode, transversal, whole
+from synchain.models.dynamics.variational import Variation, mode, network_variation
 from synchain.models.graphs.families import topology
 from synchain.models.mechanics.components import Node
 from synchain.models.scenes.scene import Scene
@@ -73,7 +74,7 @@ def test_complex_strengths_of_a_linear_node() -> None:
 def test_modes_are_those_of_the_extended_system(name: str, coupling: str, state: list[float]) -> None:
     """Orbit and deviation as one state in an ordinary kernel, whose Jacobian SymPy derives anew."""
     s = scene(name, coupling)
-    made = transversal(s.equations)
+    made = transversal_equations(s.equations)
     kernel = load(emit(made, "rodas5p", (), width=1))
     length = s.period or 6.0
     size = len(state)
@@ -94,7 +95,7 @@ def test_modes_are_those_of_the_extended_system(name: str, coupling: str, state:
 def test_the_whole_network_follows_differences_of_its_trajectories() -> None:
     s = scene("duffing", "spring", 2, parameters={"sigma": 0.3})
     y0 = np.array([1.0, 0.7, 0.1, -0.2])
-    variation = whole(s.equations)
+    variation = network_variation(s.equations)
     c = integrator(s, variation, list(y0), np.zeros((0, 4)))
     c.set_deviations(np.eye(4)[None])
     found = moved(c, s.period or 0.0)
@@ -116,7 +117,7 @@ def test_the_whole_network_follows_differences_of_its_trajectories() -> None:
 def test_growth_over_any_number_of_decades_is_counted() -> None:
     """A pair x' = x (alpha - 1 …): growth of e^4000 would overflow, decay of e^-4000 would vanish."""
     x = sp.Symbol("x", real=True)
-    orbit = Equations(Node((x,), (-x,), ()), None, 1)
+    orbit = Equations.of_equal_nodes(Node((x,), (-x,), ()), None, 1)
     strength = sp.Symbol("mode_alpha", real=True)
     variation = Variation(orbit, 1, (((0, 0), strength),), (strength,))
     s = scene("harmonic", "spring")
@@ -146,7 +147,7 @@ def test_modes_do_not_depend_on_their_order_or_their_neighbours() -> None:
 @pytest.mark.long
 def test_names_of_the_model_cannot_collide_with_those_of_the_kernel() -> None:
     x, lag, value = (sp.Symbol(n, real=True) for n in ("x", "lag", "value_1_0"))
-    orbit = Equations(Node((x,), (-lag * x + value * sp.sin(x),), (lag, value)), None, 1)
+    orbit = Equations.of_equal_nodes(Node((x,), (-lag * x + value * sp.sin(x),), (lag, value)), None, 1)
     strength = sp.Symbol("mode_alpha", real=True)
     slope = -lag + value * sp.cos(orbit.symbols(0)[0])
     variation = Variation(orbit, 1, (((0, 0), slope - strength),), (strength,))
@@ -159,18 +160,18 @@ def test_names_of_the_model_cannot_collide_with_those_of_the_kernel() -> None:
 def test_what_a_variation_refuses() -> None:
     x = sp.Symbol("x", real=True)
     strength = sp.Symbol("mode_alpha", real=True)
-    orbit = Equations(Node((x,), (-x,), ()), None, 1)
+    orbit = Equations.of_equal_nodes(Node((x,), (-x,), ()), None, 1)
     with pytest.raises(ValueError, match="outside the 1 x 1 matrix"):
         Variation(orbit, 1, (((0, 1), strength),), (strength,))
     with pytest.raises(ValueError, match="not linear in the strengths"):
         Variation(orbit, 1, (((0, 0), strength**2),), (strength,))
     with pytest.raises(ValueError, match="unknown symbol 'q'"):
         Variation(orbit, 1, (((0, 0), sp.Symbol("q", real=True)),), (strength,))
-    taken = Equations(Node((x,), (-strength * x,), (strength,)), None, 1)
+    taken = Equations.of_equal_nodes(Node((x,), (-strength * x,), (strength,)), None, 1)
     with pytest.raises(ValueError, match="'mode_alpha' is needed for the strength of a mode"):
         Variation(taken, 1, (((0, 0), strength),), (strength,))
 
 
 def test_large_networks_are_refused_in_words() -> None:
     with pytest.raises(ValueError, match="tangent dynamics of 9 oscillators; expected at most 8"):
-        emit_modes(whole(Scene(topology=topology("chain", 9)).equations))
+        emit_modes(network_variation(Scene(topology=topology("chain", 9)).equations))

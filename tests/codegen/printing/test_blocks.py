@@ -151,7 +151,7 @@ def network(names: tuple[str, ...] = PLAIN, states: tuple[str, str] = ("x", "v")
     x_there, v_there, w = real("x_at_source", "v_at_source", weight)
     here = real(*(edge_states or states))
     edge = Edge(tuple(here), (x_there, v_there), w, (sp.S.Zero, p[6] * w * (x_there - here[0])), (p[6],))
-    return Equations(Node((x, v), rhs, tuple(p[:6])), edge, 2, path(2))
+    return Equations.of_equal_nodes(Node((x, v), rhs, tuple(p[:6])), edge, 2, path(2))
 
 
 def numbers_of(eq: Equations, method: str, looped: bool) -> list[float]:

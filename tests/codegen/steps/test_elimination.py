@@ -182,7 +182,7 @@ def test_the_program_solves_the_system(links, weighted):
     dice = np.random.default_rng(8)
     weight = {p: Fraction(int(dice.integers(1, 5)), 3) if weighted else Fraction(1) for p in links(n)}
     ends = sorted((*p, w) for (i, j), w in weight.items() for p in ((i, j), (j, i)))
-    eq = Equations(harmonic_chain(2).node, spring(), n, tuple(ends))
+    eq = Equations.of_equal_nodes(harmonic_chain(2).node, spring(), n, tuple(ends))
     made = program(eq)
     arrays = dict(zip(skeleton_names(), made.arrays, strict=True))
     matrix = np.zeros((2 * n, 2 * n))

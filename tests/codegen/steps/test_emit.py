@@ -265,7 +265,7 @@ def test_dense_output_meets_both_ends():
 @pytest.mark.parametrize("broken", [mpf("nan"), mpf("inf")])
 def test_an_undefined_estimate_is_never_accepted(broken, method):
     # two nodes without links: what is wrong with one leaves the estimates of the other small
-    space = plain(emit(Equations(harmonic_chain(2).node, None, 2), method, (), width=1).text, DIGITS)
+    space = plain(emit(Equations.of_equal_nodes(harmonic_chain(2).node, None, 2), method, (), width=1).text, DIGITS)
     tiny = mpf(10) ** -6
     assert take_step(space, mpf(0), tiny, [mpf(1)] * 4, [], mpf(1), mpf(1)).error < 1
     for slot in range(4):

@@ -9,7 +9,7 @@ from event_reference import Reference
 from mpmath import mp, mpf
 
 from synchain.models.dynamics.saltation import of_network
-from synchain.models.dynamics.variational import MODE, clustered, mode, whole
+from synchain.models.dynamics.variational import MODE, clustered, mode, network_variation
 from synchain.models.graphs.clusters import clusters
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
@@ -69,7 +69,7 @@ def test_exits_of_clusters_are_those_of_the_network() -> None:
 
 def test_dampers_and_a_jump_have_no_tangent() -> None:
     scene = Scene(topology=PAIR, friction="coulomb_static", contact="set-valued", coupling="damper")
-    for refused in (mode, whole):
+    for refused in (mode, network_variation):
         with pytest.raises(ValueError, match="links act on velocities, so the order of simultaneous releases matters"):
             refused(scene.equations)
 

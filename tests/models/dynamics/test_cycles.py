@@ -104,7 +104,7 @@ a, b = sp.symbols("a b", real=True)
 )
 def test_the_frequency_of_the_drive_is_derived(force, expected):
     node = Node((x, v), (v, force - v), tuple(sorted((force.free_symbols - {x, v, TIME}), key=str)))
-    assert angular_frequency(Equations(node, None, 1)) == expected
+    assert angular_frequency(Equations.of_equal_nodes(node, None, 1)) == expected
 
 
 def test_the_frequency_of_the_friction_oscillator():

@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.variational import PHASE, phased, whole, with_volume
+from synchain.models.dynamics.variational import PHASE, network_variation, phase_shifted, with_volume
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import Node
@@ -130,13 +130,13 @@ def test_the_log_of_a_volume_grows_by_the_divergence_of_the_network() -> None:
 
 
 def test_a_clock_set_later_shifts_equations_and_matrix() -> None:
-    made = phased(whole(lone("duffing").equations))
+    made = phase_shifted(network_variation(lone("duffing").equations))
     t, omega, u = sp.Symbol("t", real=True), sp.Symbol("omega", real=True), sp.Symbol("u", real=True)
     assert made.orbit.node.rhs[1].coeff(u) == sp.cos(omega * (t + PHASE))
     assert made.orbit.parameters[-1] == "phase"
     x, d = sp.symbols("x d", real=True)
-    wave = Equations(Node((x,), (sp.cos(omega * t) * x - d * x,), (omega, d)), None, 1)
-    assert dict(phased(whole(wave)).matrix) == {(0, 0): sp.cos(omega * (t + PHASE)) - d}
+    wave = Equations.of_equal_nodes(Node((x,), (sp.cos(omega * t) * x - d * x,), (omega, d)), None, 1)
+    assert dict(phase_shifted(network_variation(wave)).matrix) == {(0, 0): sp.cos(omega * (t + PHASE)) - d}
 
 
 def test_dimension_by_hand() -> None:
