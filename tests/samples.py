@@ -15,7 +15,7 @@ import sympy as sp
 
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.sweep import emit
-from synchain.models import ring, star
+from synchain.models import chain, ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Edge, Node
@@ -50,6 +50,11 @@ def friction_chain(n: int) -> Equations:
     law = (mu_k + (mu_s - mu_k) * sp.exp(-a * sp.Abs(w))) * 2 / sp.pi * sp.atan(kappa * w)
     node = Node((x, v), (v, -x + u * sp.cos(omega * TIME) + epsilon * law), tuple(parameters))
     return Equations.of_equal_nodes(node, spring() if n > 1 else None, n, path(n))
+
+
+def friction_scene(n: int) -> Equations:
+    """The same as scenes have it: with these equations, all records and the section v_1 a test shares the kernel of many."""
+    return Scene(topology=chain(n)).equations if n > 1 else Scene().equations
 
 
 def harmonic_chain(n: int) -> Equations:

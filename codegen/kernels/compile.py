@@ -1,7 +1,7 @@
 """From the text of a kernel to machine code, through a cache on disk that is named by content.
 
-A module file is named by the hash of its text, of the lane library, of the versions of Python, Numba, llvmlite and
-this package, and of the CPU: whatever could change the machine code changes the name.
+A module file is named by the hash of everything that could change the machine code: its text, the
+sources of the lanes, the versions of Python, Numba and llvmlite, and the processor.
 """
 
 from __future__ import annotations
@@ -41,35 +41,37 @@ from .sweep import KernelKind, KernelSource
 __all__ = ["Kernel", "load"]
 
 _matrix, _counts = types.float64[:, ::1], types.int64[:, ::1]
-_given = types.Array(types.float64, 2, "C", readonly=True)
-"""What a kernel only reads may be read-only or not."""
+_input = types.Array(types.float64, 2, "C", readonly=True)
+"""An array that a kernel only reads; it may be read-only or not."""
 _cube = types.float64[:, :, ::1]
 
 
 def _signature(arrays: int) -> Any:
     """The types of a sweep kernel's arguments, with so many arrays in its graph."""
-    return types.void(
-        types.int64, types.int64, _given, _given, _given, types.float64[::1], _matrix, _matrix, _counts, _cube, _cube,
-        types.UniTuple(types.int64[::1], arrays), types.float64[::1],
-    )  # fmt: skip
+    inputs = (_input, _input, _input, types.float64[::1])
+    outputs = (_matrix, _matrix, _counts, _cube, _cube)
+    graph = (types.UniTuple(types.int64[::1], arrays), types.float64[::1])
+    return types.void(types.int64, types.int64, *inputs, *outputs, *graph)
 
 
 SIGNATURE = _signature(len(NAMES))
 """first, last, start, numbers, spans, control, end, sums, counts, points, samples, graph, weights."""
 MODES = types.void(
-    types.int64, types.int64, _given, _given, _given, types.float64[::1], _given, _cube, _matrix, _matrix, _matrix,
-    _counts, _cube,
-)  # fmt: skip
+    types.int64,
+    types.int64,
+    *(_input, _input, _input, types.float64[::1], _input),
+    *(_cube, _matrix, _matrix, _matrix, _counts, _cube),
+)
 """first, last, start, numbers, spans, control, strengths, vectors, growth, end, sums, counts, samples."""
 
 LOG = logging.getLogger(__name__)
-"""Says at the level INFO when something is compiled, which takes seconds."""
+"""Reports at the level INFO each compilation, which takes seconds."""
 
 _lock = threading.Lock()
 
 
 class EntryPoint(Protocol):
-    """The compiled entry point of a kernel module: `drive` of a sweep, `march` of a kernel that carries modes.
+    """The compiled entry point of a kernel module: `drive` of a sweep, `march` of a kernel of modes.
 
     It runs the cells first … last-1 on arrays that are described in the text of the module.
     """
@@ -81,7 +83,7 @@ class EntryPoint(Protocol):
 class Kernel:
     """A compiled kernel that keeps its text: `print(kernel.source)` shows what runs.
 
-    `graph` and `weights` are the links and the elimination program of a network that is stepped through in loops.
+    `graph` and `weights` are the links and the elimination program of a network whose steps are loops.
     """
 
     origin: KernelSource
@@ -92,7 +94,16 @@ class Kernel:
     from_cache: bool
 
     def drive(self, first: int, last: int, *arrays: np.ndarray) -> None:
-        """Run the cells first … last-1 on the arrays start, numbers, spans, control, end, sums, counts, points, samples."""
+        """Run the cells first … last-1 of a sweep.
+
+        Parameters
+        ----------
+        first, last
+            Rows of the arrays to run.
+        *arrays
+            start, numbers, spans, control, end, sums, counts, points, samples, as the docstring of
+            `drive` in the text of the module describes them.
+        """
         self.entry(first, last, *arrays, self.graph, self.weights)
 
     @property
@@ -114,8 +125,29 @@ class Kernel:
 def load(source: KernelSource) -> Kernel:
     """Compile a kernel, or load its machine code from the cache.
 
-    A kernel whose cache file is damaged is compiled anew.  If the cache folder cannot be used, the kernel is compiled for
-    this process alone and a RuntimeWarning says why.  Raises InstallationError if Numba does not compile.
+    Parameters
+    ----------
+    source
+        The text of the kernel, and what its arrays mean.
+
+    Returns
+    -------
+    Kernel
+        The same object for the same source within a process.
+
+    Raises
+    ------
+    InstallationError
+        If Numba is told not to compile.
+
+    Warns
+    -----
+    RuntimeWarning
+        If the cache folder cannot be used; the kernel is then compiled for this process alone.
+
+    Notes
+    -----
+    A kernel whose cache file is damaged is compiled anew.
     """
     if numba.config.DISABLE_JIT:
         raise InstallationError(
@@ -130,39 +162,39 @@ def _load(source: KernelSource) -> Kernel:
     name = f"kernel_{_fingerprint(source)[:32]}"
     try:
         with open_folder(cache_folder()) as folder:
-            return _kept(source, name, folder)
+            return _from_folder(source, name, folder)
     except (OSError, RuntimeError) as problem:  # RuntimeError: no home folder
         warnings.warn(f"kernels are not kept on disk: {problem}", RuntimeWarning, stacklevel=3)
-    _tell(source, "for this process alone")
+    _report(source, "for this process alone")
     path = Path(tempfile.mkdtemp(prefix="synchain-"), f"{name}.py")
     atexit.register(shutil.rmtree, path.parent, ignore_errors=True)
     path.write_text(source.text, encoding="utf-8")
     return _compile(source, path, _MachineCode())
 
 
-def _tell(source: KernelSource, how: str) -> None:
+def _report(source: KernelSource, how: str) -> None:
     n = source.equations.n
     LOG.info("compiling a kernel for %d oscillator%s (%s), %s", n, "s" * (n != 1), source.integrator, how)
 
 
-def _kept(source: KernelSource, name: str, folder: Folder) -> Kernel:
+def _from_folder(source: KernelSource, name: str, folder: Folder) -> Kernel:
     """The kernel from the folder, or compiled into it; what cannot be loaded is compiled anew."""
     path, text = folder.path / f"{name}.py", source.text.encode()
     if folder.read(path.name) != text:
         folder.write(path.name, text)
-    if (kernel := _found(source, name, folder, path)) is not None:
+    if (kernel := _stored(source, name, folder, path)) is not None:
         return kernel
     with folder.turn(name):
-        if (kernel := _found(source, name, folder, path)) is not None:
+        if (kernel := _stored(source, name, folder, path)) is not None:
             return kernel
-        _tell(source, "kept for later runs")
+        _report(source, "kept for later runs")
         code = _MachineCode()
         kernel = _compile(source, path, code)
         folder.keep(name, code.data)
     return kernel
 
 
-def _found(source: KernelSource, name: str, folder: Folder, path: Path) -> Kernel | None:
+def _stored(source: KernelSource, name: str, folder: Folder, path: Path) -> Kernel | None:
     """The kernel by the machine code in the folder, None if there is none that can be loaded."""
     code = folder.machine_code(name)
     if code is None:
@@ -175,13 +207,13 @@ def _found(source: KernelSource, name: str, folder: Folder, path: Path) -> Kerne
 
 
 class _MachineCode:
-    """Stands in for the files that Numba would read and write by their paths: machine code as bytes that were checked."""
+    """Machine code as checked bytes, in place of the files that Numba reads and writes by their paths."""
 
     def __init__(self, data: bytes = b"") -> None:
         self.data = data
 
     def load(self, key: Any) -> Any:
-        """What was compiled for these types and this processor, None if that is not here."""
+        """What was compiled for these types and this processor; None if there is no such code."""
         return pickle.loads(self.data).get(key) if self.data else None
 
     def save(self, key: Any, compiled: Any) -> None:
@@ -204,8 +236,8 @@ def _compile(source: KernelSource, path: Path, code: _MachineCode) -> Kernel:
 def _module(text: str, path: Path) -> ModuleType:
     """Run the text of a module.
 
-    The text comes from memory, not from the file at `path` and not from what Python would keep of it in `__pycache__`; the
-    file is there for readers, and for Numba, which caches nothing that has none.
+    The text comes from memory, not from the file at `path` and not from `__pycache__`.  The file is
+    there for readers, and for Numba, which caches no function without a file.
     """
     module = ModuleType(path.stem)
     module.__file__ = str(path)

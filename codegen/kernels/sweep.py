@@ -1,4 +1,4 @@
-"""From equations, an integrator and a list of records to the text of one self-contained kernel module."""
+"""The text of a sweep kernel: one self-contained module from equations, an integrator and records."""
 
 from __future__ import annotations
 
@@ -230,7 +230,7 @@ def _steps(
 
 
 def node_functions(steps: list[StepWriter], blocks: NodeBlocks, kind: int = 0) -> list[list[str]]:
-    """The right-hand side of one node of some kind, and its linearisations where a step wants one."""
+    """The right-hand side of one node of some kind, and the linearisations that the steps call."""
     made = []
     first = [writer.first_of(blocks) for writer in steps]
     for name, doc, body in (
@@ -339,15 +339,18 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
     """The section function at a fraction of the step; a kernel without sections has none."""
     if section is None:
         return ""
-    swap = dict(zip(map(_real, (*equations.state, *equations.parameters)), map(_real, (*plain.state, *plain.parameters)),
-                    strict=True))  # fmt: skip
+    renamed = zip((*equations.state, *equations.parameters), (*plain.state, *plain.parameters), strict=True)
+    swap = {_real(old): _real(new) for old, new in renamed}
     section = section.xreplace({s: _real(s.name) for s in section.free_symbols})
     used = {s.name for s in section.free_symbols}
     unknown = sorted(used - set(equations.state) - set(equations.parameters) - {"t"})
     if unknown:
         raise ValueError(f"section function {section}: unknown symbol {unknown[0]!r}; use the state, parameters and t")
-    lines = ["@njit(error_model='numpy', forceinline=True)", "def section(theta, t, h, bank, y_new, dense):",
-             '    """The section function at the fraction theta of the step."""']  # fmt: skip
+    lines = [
+        "@njit(error_model='numpy', forceinline=True)",
+        "def section(theta, t, h, bank, y_new, dense):",
+        '    """The section function at the fraction theta of the step."""',
+    ]
     for slot, (name, shown) in enumerate(zip(equations.state, plain.state, strict=True)):
         if name in used:
             lines.append(f"    {shown} = inside(theta, {slot}, bank, y_new, dense)")

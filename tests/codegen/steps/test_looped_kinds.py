@@ -102,6 +102,7 @@ def kept(scene: Scene, drift: float) -> None:
     assert abs(end - start) < drift * abs(start)
 
 
+@pytest.mark.long  # steps of six clocks, in loops and written out, are compared above
 def test_forty_clocks_on_a_beam_move_as_their_exported_equations_say() -> None:
     scene = hanging(40, integrator="rodas5p")
     found = run(scene)

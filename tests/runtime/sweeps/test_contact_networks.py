@@ -34,7 +34,8 @@ def ran(scene: Scene, **more: Any) -> np.ndarray:
     return np.asarray(result.end.values.reshape(3, -1))
 
 
-@pytest.mark.parametrize("coupling", ["spring", pytest.param("damper", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("coupling", ["spring", "damper"])
 def test_looped_events_are_those_of_the_kernel_that_is_written_out(coupling: str) -> None:
     """To the tolerance: sums of forces are fused differently, and a step that differs by a rounding differs for good."""
     scene = Scene(
