@@ -26,11 +26,38 @@ if TYPE_CHECKING:
     from .synchronisation.threshold import Thresholds, thresholds
 
 __all__ = [
-    "MSF", "Basin", "Branch", "ClusterExponents", "Exponents", "Lyapunov", "PeriodicOrbit", "Plane", "Probe",
-    "Progress", "Result", "Status", "Streamed", "SweepFailed", "SweepInterrupted", "Thresholds", "basin",
-    "cluster_exponents", "exponents", "follow", "kernel", "lyapunov_spectrum", "msf", "open_result", "periodic_orbit",
-    "plane", "run", "skeleton", "stream", "thresholds", "universal_probe",
-]  # fmt: skip
+    "MSF",
+    "Basin",
+    "Branch",
+    "ClusterExponents",
+    "Exponents",
+    "Lyapunov",
+    "PeriodicOrbit",
+    "Plane",
+    "Probe",
+    "Progress",
+    "Result",
+    "Status",
+    "Streamed",
+    "SweepFailed",
+    "SweepInterrupted",
+    "Thresholds",
+    "basin",
+    "cluster_exponents",
+    "exponents",
+    "follow",
+    "kernel",
+    "lyapunov_spectrum",
+    "msf",
+    "open_result",
+    "periodic_orbit",
+    "plane",
+    "run",
+    "skeleton",
+    "stream",
+    "thresholds",
+    "universal_probe",
+]
 
 _HOME = {
     "Basin": "synchronisation.basin",

@@ -60,7 +60,7 @@ class Buffers:
     @property
     def finished(self) -> np.ndarray:
         """True for each cell (cells,) that reached the end of its window."""
-        return self.status == Status.FINISHED
+        return np.asarray(self.status == Status.FINISHED)
 
     @property
     def ended(self) -> bool:
@@ -89,9 +89,8 @@ class Buffers:
         """Copy the rows of `part` into the rows `cells`, whose room for section points grows if it has to."""
         self.widen(part.points.shape[1])
         self.points[cells, : part.points.shape[1]] = part.points
-        self.end[cells], self.sums[cells], self.counts[cells], self.samples[cells] = (
-            part.end, part.sums, part.counts, part.samples,
-        )  # fmt: skip
+        self.end[cells], self.sums[cells] = part.end, part.sums
+        self.counts[cells], self.samples[cells] = part.counts, part.samples
 
     def clear(self, cells: np.ndarray) -> None:
         """Set cells (numbers or a mask) back to the state in which they have not run."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,9 +13,13 @@ from ..cells.buffers import Buffers
 from ..cells.layout import Layout
 from ..cells.reduce import Reduction
 from ..results.result import IN_MEMORY, Result, gather
+from ..support.status import tally
+from .errors import SweepFailed, SweepInterrupted
 from .job import Start
-from .pool import Task
+from .pool import Task, worker_lost
 from .prepare import PreparedRun
+from .progress import Reporter
+from .scheduler import BlockScheduler
 
 __all__ = ["Memory", "check_memory"]
 
@@ -52,7 +57,7 @@ class Memory:
     def missing(self, block: int) -> np.ndarray:
         """Numbers of the cells of a block that have not finished."""
         rows = self.layout.rows(block)
-        return rows[~self.buffers.finished[rows]]
+        return np.asarray(rows[~self.buffers.finished[rows]])
 
     def ends(self, block: int) -> Start:
         """The final states of a block, and which of its cells finished."""
@@ -62,6 +67,29 @@ class Memory:
     def put(self, task: Task, buffers: Buffers) -> None:
         """Copy the cells of a block into the arrays of all cells."""
         self.buffers.put(task.cells, buffers)
+
+    def run(self, executor: Executor | None, reporter: Reporter) -> None:
+        """Run the blocks that have not finished.
+
+        Raises
+        ------
+        SweepInterrupted, SweepFailed
+            On Ctrl-C, or if the workers are lost; the error has the cells that have finished.
+        """
+        scheduler = BlockScheduler(self.layout, self.done(), self, self.prepared, reporter)
+        try:
+            reporter.start(tally(self.buffers.status[self.buffers.finished]), self.prepared.compiling)
+            scheduler.run(executor)
+        except (Exception, KeyboardInterrupt) as problem:
+            if not (isinstance(problem, KeyboardInterrupt) or worker_lost(problem)):
+                raise
+            count, result = int(self.buffers.finished.sum()), self.result()
+            if isinstance(problem, KeyboardInterrupt):
+                raise SweepInterrupted(count, result.scene.cells, result) from None
+            reason = f"the workers are lost ({problem})"
+            raise SweepFailed(reason, count, result.scene.cells, result) from problem
+        finally:
+            reporter.close()
 
     def result(self) -> Result:
         """Return the cells so far."""
