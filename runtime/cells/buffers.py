@@ -10,7 +10,15 @@ from synchain.codegen.driver.columns import Count, Point, Sum
 
 from ..support.status import Status
 
-__all__ = ["Buffers"]
+__all__ = ["IN_MEMORY", "Buffers", "numbers_of_a_cell"]
+
+IN_MEMORY = 10**9
+"""Numbers of the largest result that is kept in memory, 8 GB."""
+
+
+def numbers_of_a_cell(dimension: int, room: int, samples: int) -> int:
+    """Return how many numbers the buffers hold for each cell."""
+    return dimension * (1 + samples) + (Point.STATE + dimension) * room + len(Sum) + len(Count)
 
 
 @dataclass(slots=True)

@@ -7,12 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from synchain.codegen.driver.columns import Count, Sum
-
 from ..cells.buffers import Buffers
 from ..cells.layout import Layout
-from ..cells.reduce import Reduction
-from ..results.result import IN_MEMORY, Result, gather
+from ..results.result import Result, gather
 from ..support.status import tally
 from .errors import SweepFailed, SweepInterrupted
 from .job import Start
@@ -21,7 +18,7 @@ from .prepare import PreparedRun
 from .progress import Reporter
 from .scheduler import BlockScheduler
 
-__all__ = ["Memory", "check_memory"]
+__all__ = ["Memory"]
 
 
 @dataclass(slots=True)
@@ -96,15 +93,3 @@ class Memory:
         prepared, scene = self.prepared, self.prepared.scene
         spans = prepared.job.planner.spans(np.arange(scene.cells))
         return gather(scene, prepared.attributes, spans, prepared.reduction.expand(self.buffers), prepared.certificate)
-
-
-def check_memory(reduction: Reduction) -> None:
-    """Raise ValueError if the cells of a sweep do not fit into memory."""
-    scene = reduction.scene
-    row = len(scene.y0) * (1 + reduction.samples) + len(Sum) + len(Count)
-    if scene.cells * row > IN_MEMORY:
-        size = scene.cells * row * 8 / 1e9
-        raise ValueError(
-            f"sweep: found {scene.cells} cells, {size:.0f} GB in memory; expected at most {IN_MEMORY * 8 / 1e9:.0f} GB; "
-            "write it to a file with stream, whose memory does not grow with the sweep, or take fewer cells"
-        )

@@ -11,7 +11,7 @@ from synchain.models.scenes.scene import Scene
 from ..cells.keywords import with_axes
 from ..cells.reduce import Reduction, as_reduction
 from ..results.result import Result
-from .memory import Memory, check_memory
+from .memory import Memory
 from .prepare import prepare
 from .progress import Hook, Reporter
 
@@ -77,7 +77,7 @@ def run(
         instance("resume", resume, Result, "an earlier Result, e.g. from open_result")
     reporter = Reporter(scene.cells, show_progress, progress)
     reduction = as_reduction(scene, reduce)
-    check_memory(reduction)
+    reduction.check_memory()
     prepared = prepare(reduction, certified, width=width, workers=workers, executor=executor)
     memory = Memory.of(prepared, resume)
     memory.run(executor, reporter)
