@@ -10,7 +10,15 @@ from synchain.codegen.driver.columns import Count, Point, Sum
 
 from ..support.status import Status
 
-__all__ = ["Buffers"]
+__all__ = ["IN_MEMORY", "Buffers", "numbers_of_a_cell"]
+
+IN_MEMORY = 10**9
+"""Numbers of the largest result that is kept in memory, 8 GB."""
+
+
+def numbers_of_a_cell(dimension: int, room: int, samples: int) -> int:
+    """Return how many numbers the buffers hold for each cell."""
+    return dimension * (1 + samples) + (Point.STATE + dimension) * room + len(Sum) + len(Count)
 
 
 @dataclass(slots=True)
@@ -60,7 +68,7 @@ class Buffers:
     @property
     def finished(self) -> np.ndarray:
         """True for each cell (cells,) that reached the end of its window."""
-        return self.status == Status.FINISHED
+        return np.asarray(self.status == Status.FINISHED)
 
     @property
     def ended(self) -> bool:
@@ -89,9 +97,8 @@ class Buffers:
         """Copy the rows of `part` into the rows `cells`, whose room for section points grows if it has to."""
         self.widen(part.points.shape[1])
         self.points[cells, : part.points.shape[1]] = part.points
-        self.end[cells], self.sums[cells], self.counts[cells], self.samples[cells] = (
-            part.end, part.sums, part.counts, part.samples,
-        )  # fmt: skip
+        self.end[cells], self.sums[cells] = part.end, part.sums
+        self.counts[cells], self.samples[cells] = part.counts, part.samples
 
     def clear(self, cells: np.ndarray) -> None:
         """Set cells (numbers or a mask) back to the state in which they have not run."""

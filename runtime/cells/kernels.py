@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from functools import lru_cache
 
 import sympy as sp
 
+from synchain.codegen.integrators import integrator
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.sweep import AUTO, KernelSource, default_width, emit
 from synchain.codegen.simd.lane_types import WIDTHS
@@ -15,7 +17,7 @@ from synchain.models.scenes.scene import Scene
 
 from .reduce import Reduction, as_reduction
 
-__all__ = ["best_integrator", "kernel", "kernel_source", "write_kernel"]
+__all__ = ["best_integrator", "kernel", "kernel_source", "warn_of_chords", "write_kernel"]
 
 
 def kernel(scene: Scene, width: int | None = None, reduce: bool | Reduction = True) -> Kernel:
@@ -78,3 +80,15 @@ def best_integrator(equations: Equations, rtol: float) -> str:
     """
     pair = equations.n == 2 and not (equations.mixed or equations.inertial) and rtol <= 1e-9
     return "dop853" if equations.sticks else "switching" if pair else AUTO
+
+
+def warn_of_chords(source: KernelSource) -> None:
+    """Warn if states between steps are recorded by an integrator that has only straight lines there."""
+    between = [record for record in ("trajectory", "section") if record in source.records]
+    if between and integrator(source.integrator).dense_order < 2:
+        warnings.warn(
+            f"{source.integrator} draws straight lines between its steps, so errors of {' and '.join(between)} are not bounded "
+            "by rtol; take another integrator for these records, e.g. rodas5p",
+            RuntimeWarning,
+            stacklevel=4,
+        )

@@ -164,7 +164,7 @@ def _sizes(frequency: sp.Expr, values: Mapping[str, np.ndarray], rows: int) -> n
     if not names:
         return np.full(rows, abs(as_function(frequency)()))
     found = np.frompyfunc(as_function(frequency), len(names), 1)(*(values[name] for name in names))
-    return np.abs(np.asarray(found, dtype=float))
+    return np.asarray(np.abs(np.asarray(found, dtype=float)))
 
 
 def half_swing(equations: Equations, values: Mapping[str, np.ndarray]) -> float:

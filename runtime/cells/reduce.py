@@ -20,7 +20,7 @@ from synchain.models.inputs.checks import flag
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..support.status import Status
-from .buffers import Buffers
+from .buffers import IN_MEMORY, Buffers, numbers_of_a_cell
 from .plan import Plan
 
 __all__ = ["NodeMerge", "Reduction", "as_reduction", "explain", "reduce_scene"]
@@ -124,6 +124,17 @@ class Reduction:
     def samples(self) -> int:
         """Points of a trajectory; 0 if none is recorded."""
         return self.scene.samples if "trajectory" in self.scene.record else 0
+
+    def check_memory(self) -> None:
+        """Raise ValueError if the results of all cells do not fit into memory."""
+        cells = self.scene.cells
+        numbers = cells * numbers_of_a_cell(len(self.merge.places), 0, self.samples)
+        if numbers > IN_MEMORY:
+            raise ValueError(
+                f"sweep: found {cells} cells, {numbers * 8 / 1e9:.0f} GB in memory; expected at most "
+                f"{IN_MEMORY * 8 / 1e9:.0f} GB; write it to a file with stream, whose memory does not grow with the sweep, "
+                "or take fewer cells"
+            )
 
     def section_variable(self) -> str:
         """Return the state variable of the reduced network that stands for the scene's section variable."""

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from synchain.codegen.driver.columns import Count, Point, Sum
 from synchain.models.inputs.checks import whole
 from synchain.models.scenes.scene import Scene
 
-from ..cells.buffers import Buffers
+from ..cells.buffers import IN_MEMORY, Buffers, numbers_of_a_cell
 from ..cells.layout import Layout
 from ..cells.plan import Planner
 from ..cells.reduce import NodeMerge, Reduction
@@ -24,7 +23,7 @@ from ..support.netcdf import Sheet, seal, unsealed
 from .block_log import BlockLog
 from .certificate import VERDICTS, Certificate
 from .labels import MEANINGS, Variable, coordinates, dimensions, scene_of, variables
-from .result import IN_MEMORY, Result, gather
+from .result import Result, gather
 
 __all__ = ["certificate_of", "describe_sweep", "layout_of", "partial_path", "read_partial", "write_result"]
 
@@ -109,10 +108,10 @@ def _so_far(reader: _Reader) -> Result:
     """The blocks that a log holds, as a result."""
     log, scene = reader.log, reader.scene
     dimension, samples = len(reader.merge.places), int(log.about["samples"])
-    row = dimension * (1 + samples) + (Point.STATE + dimension) * log.most + len(Sum) + len(Count)
-    if scene.cells * row > IN_MEMORY:
+    numbers = scene.cells * numbers_of_a_cell(dimension, log.most, samples)
+    if numbers > IN_MEMORY:
         raise ValueError(
-            f"found a sweep of {scene.cells * row * 8 / 1e9:.0f} GB; expected at most {IN_MEMORY * 8 / 1e9:.0f} GB in "
+            f"found a sweep of {numbers * 8 / 1e9:.0f} GB; expected at most {IN_MEMORY * 8 / 1e9:.0f} GB in "
             "memory; finish it with resume (--resume), and open parts of the result with xarray"
         )
     buffers = Buffers.empty(scene.cells, dimension, log.most, samples)

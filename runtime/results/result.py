@@ -28,9 +28,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Result", "attributes_of", "gather", "read_result"]
 
-IN_MEMORY = 10**9
-"""Numbers of the largest result that is kept in memory, 8 GB."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:

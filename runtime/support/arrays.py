@@ -1,4 +1,4 @@
-"""Rows of numbers that users give: finite, in one row and, where it matters, rising."""
+"""Checks of arrays from the user: finite numbers, in one row and, if asked for, rising."""
 
 from __future__ import annotations
 
@@ -12,7 +12,13 @@ __all__ = ["averaging", "numbers", "row"]
 
 
 def numbers(what: str, values: Any, *, complex_too: bool = False) -> np.ndarray:
-    """The values as an array of any shape, of floats or, where that is allowed, complex numbers; else ValueError."""
+    """Return the values as an array of any shape, of floats or, if `complex_too`, of complex numbers.
+
+    Raises
+    ------
+    ValueError
+        If a value is no such number.
+    """
     try:
         found = np.asarray(values)
         if found.dtype.kind in ("US" if complex_too else "USc") or (found.dtype.kind == "O" and None in found):
@@ -24,17 +30,35 @@ def numbers(what: str, values: Any, *, complex_too: bool = False) -> np.ndarray:
 
 
 def averaging(precision: Any, periods: Any, transient: Any, seed: Any) -> tuple[float, float, float, int]:
-    """The four settings of an average along an orbit, checked: how sure, how long, after what, and the random seed."""
+    """Return the settings of an average along an orbit, checked: standard error, length, transient and random seed."""
     return (
-        positive("precision", precision, zero=True), positive("periods", periods),
-        positive("transient", transient, zero=True), whole("seed", seed, 0),
-    )  # fmt: skip
+        positive("precision", precision, zero=True),
+        positive("periods", periods),
+        positive("transient", transient, zero=True),
+        whole("seed", seed, 0),
+    )
 
 
 def row(what: str, values: Any, least: int = 1, *, rising: bool = False, complex_too: bool = False) -> np.ndarray:
-    """The values (m,) as floats, or complex where one of them is and that is allowed; a single number is a row of one.
+    """Return the values as one row (m,) of floats or, if `complex_too`, of complex numbers.
 
-    Raises ValueError for anything but at least `least` finite numbers in one row, with `rising` from low to high.
+    Parameters
+    ----------
+    what : str
+        Name of the argument, for errors.
+    values : number or sequence of numbers
+        A single number is a row of one.
+    least : int
+        Fewest numbers.
+    rising : bool
+        Whether the numbers must increase.
+    complex_too : bool
+        Whether complex numbers are allowed.
+
+    Raises
+    ------
+    ValueError
+        If the values are anything else.
     """
     found = np.atleast_1d(numbers(what, values, complex_too=complex_too))
     if found.ndim != 1 or len(found) < least:

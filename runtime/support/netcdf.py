@@ -75,7 +75,8 @@ class Sheet:
         self.file.write(values.tobytes())
 
     def _bytes(self, name: str) -> int:
-        return prod(self.shapes[name]) * self.types[name].itemsize
+        """Bytes of a variable."""
+        return int(prod(self.shapes[name]) * self.types[name].itemsize)
 
     def _head(self, name: str, variable: Any, shape: tuple[int, ...]) -> bytes:
         """All that the header says of a variable but its place."""
@@ -91,10 +92,10 @@ class Sheet:
 
 
 def unsealed(data: xr.Dataset) -> xr.Dataset:
-    """The data with room for a digest before the other attributes."""
-    made = data.copy(deep=False)
-    made.attrs = {DIGEST: BLANK, **{name: value for name, value in data.attrs.items() if name != DIGEST}}
-    return made
+    """Return the data with room for a digest before the other attributes."""
+    copy = data.copy(deep=False)
+    copy.attrs = {DIGEST: BLANK, **{name: value for name, value in data.attrs.items() if name != DIGEST}}
+    return copy
 
 
 def seal(file: BinaryIO) -> None:

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
 
-from synchain.codegen.driver.columns import Count, Sum
-
 from ..cells.buffers import Buffers
 from ..cells.layout import Layout
-from ..cells.reduce import Reduction
-from ..results.result import IN_MEMORY, Result, gather
+from ..results.result import Result, gather
+from ..support.status import tally
+from .errors import SweepFailed, SweepInterrupted
 from .job import Start
-from .pool import Task
+from .pool import Task, worker_lost
 from .prepare import PreparedRun
+from .progress import Reporter
+from .scheduler import BlockScheduler
 
-__all__ = ["Memory", "check_memory"]
+__all__ = ["Memory"]
 
 
 @dataclass(slots=True)
@@ -52,7 +54,7 @@ class Memory:
     def missing(self, block: int) -> np.ndarray:
         """Numbers of the cells of a block that have not finished."""
         rows = self.layout.rows(block)
-        return rows[~self.buffers.finished[rows]]
+        return np.asarray(rows[~self.buffers.finished[rows]])
 
     def ends(self, block: int) -> Start:
         """The final states of a block, and which of its cells finished."""
@@ -63,20 +65,31 @@ class Memory:
         """Copy the cells of a block into the arrays of all cells."""
         self.buffers.put(task.cells, buffers)
 
+    def run(self, executor: Executor | None, reporter: Reporter) -> None:
+        """Run the blocks that have not finished.
+
+        Raises
+        ------
+        SweepInterrupted, SweepFailed
+            On Ctrl-C, or if the workers are lost; the error has the cells that have finished.
+        """
+        scheduler = BlockScheduler(self.layout, self.done(), self, self.prepared, reporter)
+        try:
+            reporter.start(tally(self.buffers.status[self.buffers.finished]), self.prepared.compiling)
+            scheduler.run(executor)
+        except (Exception, KeyboardInterrupt) as problem:
+            if not (isinstance(problem, KeyboardInterrupt) or worker_lost(problem)):
+                raise
+            count, result = int(self.buffers.finished.sum()), self.result()
+            if isinstance(problem, KeyboardInterrupt):
+                raise SweepInterrupted(count, result.scene.cells, result) from None
+            reason = f"the workers are lost ({problem})"
+            raise SweepFailed(reason, count, result.scene.cells, result) from problem
+        finally:
+            reporter.close()
+
     def result(self) -> Result:
         """Return the cells so far."""
         prepared, scene = self.prepared, self.prepared.scene
         spans = prepared.job.planner.spans(np.arange(scene.cells))
         return gather(scene, prepared.attributes, spans, prepared.reduction.expand(self.buffers), prepared.certificate)
-
-
-def check_memory(reduction: Reduction) -> None:
-    """Raise ValueError if the cells of a sweep do not fit into memory."""
-    scene = reduction.scene
-    row = len(scene.y0) * (1 + reduction.samples) + len(Sum) + len(Count)
-    if scene.cells * row > IN_MEMORY:
-        size = scene.cells * row * 8 / 1e9
-        raise ValueError(
-            f"sweep: found {scene.cells} cells, {size:.0f} GB in memory; expected at most {IN_MEMORY * 8 / 1e9:.0f} GB; "
-            "write it to a file with stream, whose memory does not grow with the sweep, or take fewer cells"
-        )

@@ -131,10 +131,9 @@ def pool_size(executor: Executor | None, workers: int | None) -> int:
         return worker_count(workers)
     client = getattr(executor, "_client", None)  # of dask.distributed
     if client is not None:
-        return max(1, sum(client.nthreads().values()))
-    return max(
-        1, int(getattr(executor, "_max_workers", 0) or getattr(executor, "num_workers", 0) or worker_count(None))
-    )
+        return max(1, int(sum(client.nthreads().values())))
+    count = getattr(executor, "_max_workers", 0) or getattr(executor, "num_workers", 0) or worker_count(None)
+    return max(1, int(count))
 
 
 def _next(arrived: SimpleQueue[Future[Any]]) -> Future[Any]:

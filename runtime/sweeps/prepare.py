@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import time
-import warnings
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
 
 from synchain.codegen.driver.columns import Control
-from synchain.codegen.integrators import integrator
 from synchain.codegen.kernels.compile import load
-from synchain.codegen.kernels.sweep import KernelSource
 from synchain.models.inputs.checks import flag
 from synchain.models.scenes.scene import Scene
 
-from ..cells.kernels import write_kernel
+from ..cells.kernels import warn_of_chords, write_kernel
 from ..cells.layout import Layout, block_size
 from ..cells.reduce import Reduction
 from ..results.certificate import Certificate
@@ -24,7 +21,7 @@ from .certify import certify
 from .job import JobSpec, SweepJob, SweepSpec
 from .pool import pool_size
 
-__all__ = ["PreparedRun", "prepare", "warn_of_chords"]
+__all__ = ["PreparedRun", "prepare"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,15 +102,3 @@ def prepare(
     problem = SweepSpec(reduction, room)
     job = problem.job(JobSpec.of(problem, source), load(source))
     return PreparedRun(job, certificate, count, time.perf_counter() - began)
-
-
-def warn_of_chords(source: KernelSource) -> None:
-    """Warn if states between steps are recorded by an integrator that has only straight lines there."""
-    between = [record for record in ("trajectory", "section") if record in source.records]
-    if between and integrator(source.integrator).dense_order < 2:
-        warnings.warn(
-            f"{source.integrator} draws straight lines between its steps, so errors of {' and '.join(between)} are not bounded "
-            "by rtol; take another integrator for these records, e.g. rodas5p",
-            RuntimeWarning,
-            stacklevel=4,
-        )

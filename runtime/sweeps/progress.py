@@ -108,7 +108,7 @@ class Reporter:
     def __post_init__(self) -> None:
         check_reporting(self.show, self.hook)
 
-    def start(self, counts: np.ndarray, compiling: float) -> None:
+    def start(self, counts: np.ndarray, compiling: float = 0.0) -> None:
         """Begin to count cells.
 
         Parameters

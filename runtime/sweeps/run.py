@@ -5,21 +5,15 @@ from __future__ import annotations
 from concurrent.futures import Executor
 from typing import Any
 
-import numpy as np
-
 from synchain.models.inputs.checks import instance
 from synchain.models.scenes.scene import Scene
 
 from ..cells.keywords import with_axes
 from ..cells.reduce import Reduction, as_reduction
 from ..results.result import Result
-from ..support.status import CODES, Status, tally
-from .errors import SweepFailed, SweepInterrupted
-from .memory import Memory, check_memory
-from .pool import worker_lost
+from .memory import Memory
 from .prepare import prepare
 from .progress import Hook, Reporter
-from .scheduler import BlockScheduler
 
 __all__ = ["run"]
 
@@ -83,28 +77,8 @@ def run(
         instance("resume", resume, Result, "an earlier Result, e.g. from open_result")
     reporter = Reporter(scene.cells, show_progress, progress)
     reduction = as_reduction(scene, reduce)
-    check_memory(reduction)
+    reduction.check_memory()
     prepared = prepare(reduction, certified, width=width, workers=workers, executor=executor)
     memory = Memory.of(prepared, resume)
-    run_blocks(memory, executor, reporter)
+    memory.run(executor, reporter)
     return memory.result()
-
-
-def run_blocks(memory: Memory, executor: Executor | None, reporter: Reporter) -> None:
-    """Run the blocks that the memory lacks; an error that stops the sweep carries the cells that have finished."""
-    prepared = memory.prepared
-    scheduler = BlockScheduler(memory.layout, memory.done(), memory, prepared, reporter)
-    try:
-        kept = tally(memory.buffers.status) * (np.arange(CODES) == Status.FINISHED)
-        reporter.start(kept, prepared.compiling)
-        scheduler.run(executor)
-    except (Exception, KeyboardInterrupt) as problem:
-        if not (isinstance(problem, KeyboardInterrupt) or worker_lost(problem)):
-            raise
-        result = memory.result()
-        finished, cells = int((result.status == Status.FINISHED).sum()), result.scene.cells
-        if isinstance(problem, KeyboardInterrupt):
-            raise SweepInterrupted(finished, cells, result) from None
-        raise SweepFailed(f"the workers are lost ({problem})", finished, cells, result) from problem
-    finally:
-        reporter.close()

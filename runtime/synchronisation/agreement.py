@@ -188,9 +188,15 @@ class Judge:
             first[scene.components[0]] = first[scene.components[0]] + NUDGE * np.arange(scene.n)
             scene = scene.replace(initial={name: values.tolist() for name, values in first.items()})
         criterion = replace(self.criterion, transient=longer * self.criterion.transient)
-        found = simulate(scene, sigma, resolution=math.inf, criterion=criterion, workers=self.workers,
-                         show_progress=self.show_progress)  # fmt: skip
-        return found.share, found.error
+        sweep = simulate(
+            scene,
+            sigma,
+            resolution=math.inf,
+            criterion=criterion,
+            workers=self.workers,
+            show_progress=self.show_progress,
+        )
+        return sweep.share, sweep.error
 
 
 def _explained(judge: Judge, cells: Sequence[Cell], split: Sequence[bool]) -> list[Cell]:

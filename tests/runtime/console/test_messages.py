@@ -15,15 +15,13 @@ from synchain.models import chain
 from synchain.models.presentation.writer import Latex
 from synchain.models.scenes.scene import Scene
 from synchain.runtime import cli
-from synchain.runtime.cells.kernels import write_kernel
+from synchain.runtime.cells.kernels import warn_of_chords, write_kernel
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.cli import main
 from synchain.runtime.commands.run import _nothing_to_do
 from synchain.runtime.console.arguments import grid, spaced
 from synchain.runtime.sweeps import job
 from synchain.runtime.sweeps.certify import check_certifiable
-from synchain.runtime.sweeps.memory import check_memory
-from synchain.runtime.sweeps.prepare import warn_of_chords
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import claim
 
@@ -93,8 +91,9 @@ def test_grids_of_the_command_line_have_the_limit_of_an_axis():
 def test_a_sweep_that_does_not_fit_is_refused_before_memory_is_taken():
     scene = PAIR.replace(axes=LARGE)
     with pytest.raises(ValueError, match=r"1000000000 cells, 112 GB in memory; expected at most 8 GB; .* with stream"):
-        check_memory(reduce_scene(scene, reduce=False))
-    check_memory(reduce_scene(PAIR.replace(axes={name: values[:400] for name, values in LARGE.items()}), reduce=False))
+        reduce_scene(scene, reduce=False).check_memory()
+    fewer = {name: values[:400] for name, values in LARGE.items()}
+    reduce_scene(PAIR.replace(axes=fewer), reduce=False).check_memory()
     with pytest.raises(ValueError, match="expected at most 8 GB"):
         run(scene, reduce=False)
     with pytest.raises(ValueError, match="found 1000000000, expected at most 10000000"):

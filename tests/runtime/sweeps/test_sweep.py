@@ -21,7 +21,7 @@ from synchain.runtime.sweeps.errors import SweepInterrupted
 from synchain.runtime.sweeps.memory import Memory
 from synchain.runtime.sweeps.prepare import prepare
 from synchain.runtime.sweeps.progress import Reporter
-from synchain.runtime.sweeps.run import run, run_blocks
+from synchain.runtime.sweeps.run import run
 
 PAIR = Scene(topology=chain(2), transient=5, window=10, parameters={"sigma": 0.1})
 SECTIONS = PAIR.replace(record=("sync_error", "section"))
@@ -90,7 +90,7 @@ def test_every_status_has_a_sentence():
 def run_with_room(scene, room):
     """Run a scene with room for so many section points of a cell at first."""
     memory = Memory.of(prepare(reduce_scene(scene), room=room), None)
-    run_blocks(memory, None, Reporter(scene.cells, show=False))
+    memory.run(None, Reporter(scene.cells, show=False))
     return memory.result()
 
 

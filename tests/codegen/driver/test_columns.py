@@ -1,0 +1,17 @@
+"""The columns by name are those that the text of the kernels uses."""
+
+from __future__ import annotations
+
+import pytest
+
+from synchain.codegen.driver import recording
+from synchain.codegen.driver.columns import Control, Count, Sum
+
+
+@pytest.mark.parametrize(("columns", "prefixes"), [(Control, ("",)), (Sum, ("",)), (Count, ("", "N_"))])
+def test_columns_are_those_of_the_kernel_text(columns: type, prefixes: tuple[str, ...]) -> None:
+    for column in columns:
+        names = [name for prefix in prefixes if hasattr(recording, name := prefix + column.name)]
+        assert names, column
+        assert getattr(recording, names[-1]) == column
+    assert sorted(columns) == list(range(len(columns)))
