@@ -14,6 +14,7 @@ from sympy.physics import mechanics
 from synchain.models.graphs.topology import Topology
 from synchain.models.inputs.plugins import call, load
 from synchain.models.mechanics.components import TIME
+from synchain.models.mechanics.definition import COUPLING, OSCILLATOR
 from synchain.models.mechanics.nondimensional import magnitude, nondimensional
 
 T = mechanics.dynamicsymbols._t
@@ -54,7 +55,7 @@ class Whole:
 
 def whole(oscillator: str, coupling: str | None, graph: Topology, chosen: tuple[str, ...] | None = None) -> Whole:
     """Sum up nodes and links; a link of a coupling with a direction runs from the smaller to the larger number."""
-    module = load("oscillator", oscillator)
+    module = load(OSCILLATOR, oscillator)
     system = nondimensional(module)
     names = [s.name for s in system.coordinates]
     q = [[mechanics.dynamicsymbols(f"{name}_{i + 1}") for name in names] for i in range(graph.n)]
@@ -70,7 +71,7 @@ def whole(oscillator: str, coupling: str | None, graph: Topology, chosen: tuple[
     for i, j, weight in graph.links:
         if i > j or coupling is None:
             continue
-        law = load("coupling", coupling)
+        law = load(COUPLING, coupling)
         given = {**{p: sp.Symbol(p, real=True) for p in law.PARAMETERS}, "weight": sp.Rational(str(weight))}
         for k in range(len(names)):
             if chosen is not None and names[k] not in chosen:

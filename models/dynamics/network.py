@@ -21,6 +21,7 @@ from ..mechanics import coupling_text
 from ..mechanics.calculus import cancelled
 from ..mechanics.components import SLIDING, TIME, Edge, Node
 from ..mechanics.coupling_text import split
+from ..mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from ..mechanics.friction import CONTACTS, KAPPA
 from ..mechanics.lagrangian import Mechanics
 from ..mechanics.link import check_coupling, edge
@@ -48,12 +49,12 @@ def parameters(
         if contact == "atan" and friction_coefficient(law, "sign")(sp.Symbol("w", real=True)).has(sp.sign):
             _join(table, {"kappa": KAPPA}, f"contact {contact!r}")
     if coupling is not None:
-        own = coupling_text if coupling_text.is_matrix(coupling) else load("coupling", split(coupling)[0])
+        own = coupling_text if coupling_text.is_matrix(coupling) else load(COUPLING, split(coupling)[0])
         _join(table, own.PARAMETERS, f"coupling {coupling!r}")
     return {name: replace(p, scale=str(scale(model, p.unit))) for name, p in table.items()}
 
 
-@remembered(oscillator=partial(named, "oscillator"), friction=partial(named, "friction"))
+@remembered(oscillator=partial(named, OSCILLATOR), friction=partial(named, FRICTION_LAW))
 def node(oscillator: str, friction: str | None = None, contact: str = "atan") -> Node:
     """Derive the equations of one oscillator: for a Lagrangian x' = v and v' from the Euler-Lagrange equations.
 
@@ -106,7 +107,7 @@ def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str)
 
 def _model(oscillator: str, friction: str | None, contact: str) -> tuple[ModuleType, ModuleType | None]:
     """The modules of an oscillator and its friction law, None where it takes none."""
-    model = load("oscillator", oscillator)
+    model = load(OSCILLATOR, oscillator)
     if contact not in CONTACTS:
         raise ValueError(f"unknown contact {contact!r}; known: {', '.join(CONTACTS)}")
     if friction is None:
@@ -115,7 +116,7 @@ def _model(oscillator: str, friction: str | None, contact: str) -> tuple[ModuleT
                 f"oscillator {oscillator!r} has no friction law; known: {', '.join(names('friction'))}; name one"
             )
         return model, None
-    law = load("friction", friction)
+    law = load(FRICTION_LAW, friction)
     if not model.FRICTION:
         raise ValueError(f"oscillator {oscillator!r} takes no friction law, found {friction!r}; leave it out")
     return model, law
@@ -182,7 +183,7 @@ def _hessian(coupling: str) -> tuple[Fraction, Fraction]:
 
     Of a non-linear coupling they are taken between equal states, where its links are those of its linear part.
     """
-    model = load("coupling", split(coupling)[0])
+    model = load(COUPLING, split(coupling)[0])
     q_i, q_j, weight = (sp.Symbol(name, real=True) for name in ("q_i", "q_j", "weight"))
     given = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
     if hasattr(model, "BETWEEN"):

@@ -5,7 +5,6 @@ A stored value is a whole number, a text or a tuple of whole numbers, so that it
 
 from __future__ import annotations
 
-import inspect
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from ..inputs import plugins
 from ..inputs.checks import instance, typed
 from ..inputs.options import Options, as_options
 from ..inputs.plugins import located
+from .family_file import TOPOLOGY, defaults
 from .links import LINK_LIMIT, _few
 from .topology import Topology
 
@@ -52,12 +52,6 @@ def settled(name: str, module: ModuleType, n: int, given: Mapping[str, Any]) -> 
     return as_options({key: value for key, value in found.items() if value is not None})
 
 
-def defaults(module: ModuleType) -> dict[str, Any]:
-    """The options of a family with their defaults: the keyword-only parameters of its `edges`."""
-    found = inspect.signature(module.edges).parameters.values()
-    return {p.name: p.default for p in found if p.kind is inspect.Parameter.KEYWORD_ONLY}
-
-
 def a_graph(what: str, value: object) -> Topology:
     """Return the value where it is a Topology, else raise TypeError."""
     if all(hasattr(value, need) for need in ("nodes", "edges", "is_directed")):
@@ -67,7 +61,7 @@ def a_graph(what: str, value: object) -> Topology:
 
 def names() -> tuple[str, ...]:
     """All topologies that `topology` knows: the files of the folder `topologies`, and entry points of other packages."""
-    return plugins.names("topology")
+    return plugins.names(TOPOLOGY)
 
 
 def family(name: str) -> ModuleType:
@@ -83,7 +77,7 @@ def family(name: str) -> ModuleType:
     """
     if not isinstance(name, str):
         raise TypeError(f"topology name {name!r} is no text; expected one of {', '.join(names())}")
-    return plugins.load("topology", name)
+    return plugins.load(TOPOLOGY, name)
 
 
 def topology(name: str, n: int, **options: Any) -> Topology:
@@ -93,7 +87,7 @@ def topology(name: str, n: int, **options: Any) -> Topology:
     integer.  More than LINK_LIMIT links raise ValueError before any is built: at once where the family does not count
     them, else where they are first asked for.
     """
-    module = family(name := plugins.named("topology", name))
+    module = family(name := plugins.named(TOPOLOGY, name))
     size = _size(name, n, module)
     chosen = settled(name, module, size, options)
     if hasattr(module, "expected"):

@@ -13,6 +13,7 @@ from fractions import Fraction
 
 from ..inputs import plugins
 from ..inputs.checks import shown, suggestion, text
+from .definition import COUPLING
 from .parameter import Parameter
 
 __all__ = [
@@ -114,7 +115,7 @@ def named(coupling: str) -> str:
     """Return the coupling as scenes keep it, see `plugins.named`; ValueError where its file cannot be loaded."""
     if is_matrix(coupling):
         return coupling
-    own = plugins.named("coupling", split(coupling)[0])
+    own = plugins.named(COUPLING, split(coupling)[0])
     return _spelt(own, coupling)
 
 

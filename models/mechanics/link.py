@@ -13,6 +13,7 @@ from . import coupling_text
 from .components import TIME, Edge, Node
 from .coupling_text import coordinates_of, split
 from .coupling_text import named as named_coupling
+from .definition import COUPLING, OSCILLATOR
 from .lagrangian import balance, mass_matrix, solve_masses
 from .nondimensional import nondimensional
 from .orientation import link_energy
@@ -30,7 +31,7 @@ def check_coupling(coupling: str, single: Node, other: Node | None = None) -> No
             if other is None:
                 coupling_text.entries(coupling, _names(single))
             continue
-        model, half = load("coupling", split(coupling)[0]), len(node.state) // 2
+        model, half = load(COUPLING, split(coupling)[0]), len(node.state) // 2
         if hasattr(model, "BETWEEN") and other is None:
             raise ValueError(f"coupling {coupling!r} joins {' and '.join(model.BETWEEN)}; found nodes of one kind")
         if node.contact is None and node.rhs[:half] != node.state[half:]:
@@ -43,7 +44,7 @@ def check_coupling(coupling: str, single: Node, other: Node | None = None) -> No
             coordinates_of(coupling, _names(node)[: max(half, 1)])
 
 
-@remembered(coupling=named_coupling, oscillator=partial(named, "oscillator"), partner=partial(named, "oscillator"))
+@remembered(coupling=named_coupling, oscillator=partial(named, OSCILLATOR), partner=partial(named, OSCILLATOR))
 def edge(
     coupling: str, single: Node, oscillator: str | None = None, other: Node | None = None, partner: str | None = None
 ) -> Edge:
@@ -74,7 +75,7 @@ def edge(
         sigma = sp.Symbol("sigma", real=True)
         rates = _entry_rates(coupling, (single, other or single), sigma * weight, here, there)
         return Edge(here, there, weight, rates, (sigma,))
-    model, half = load("coupling", split(coupling)[0]), len(single.state) // 2
+    model, half = load(COUPLING, split(coupling)[0]), len(single.state) // 2
     strengths = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
     ends = _Ends(single, other or single, oscillator, partner or oscillator, here, there)
     rates, inertia = _by_lagrange(ends, ends.energies(coupling, model, {"weight": weight, **strengths}), oscillator)
@@ -187,7 +188,7 @@ def link_energies(
 
     `nodes` and `oscillators` are those of its target and its source.
     """
-    model = load("coupling", split(coupling)[0])
+    model = load(COUPLING, split(coupling)[0])
     strengths = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
     ends = _Ends(*nodes, *oscillators, joint.here, joint.there)
     return ends.energies(coupling, model, {"weight": joint.weight, **strengths})
@@ -242,9 +243,9 @@ def _in_differences(e: sp.Expr, pairs: list[tuple[sp.Symbol, sp.Symbol]], here: 
 def _masses(oscillator: str | None, single: Node, here: Symbols) -> sp.Matrix:
     """The mass matrix of the target by itself, in the symbols of a link's target."""
     half = len(here) // 2
-    if oscillator is None or hasattr(load("oscillator", oscillator), "field"):
+    if oscillator is None or hasattr(load(OSCILLATOR, oscillator), "field"):
         return sp.eye(half)
-    system = nondimensional(load("oscillator", oscillator))
+    system = nondimensional(load(OSCILLATOR, oscillator))
     masses = mass_matrix(system.kinetic, system.velocities)
     if masses.has(TIME):
         raise ValueError(

@@ -8,6 +8,7 @@ from functools import lru_cache
 import sympy as sp
 
 from ..inputs.plugins import load
+from .definition import FRICTION_LAW, OSCILLATOR
 from .lagrangian import mass_matrix
 from .nondimensional import friction_coefficient, nondimensional
 
@@ -22,7 +23,7 @@ def check_power(law: str, values: Mapping[str, float]) -> None:
 
     A law that is meant to do so has SELF_EXCITING = True.
     """
-    if getattr(load("friction", law), "SELF_EXCITING", False):
+    if getattr(load(FRICTION_LAW, law), "SELF_EXCITING", False):
         return
     coefficient, names = _coefficient(law)
     given = [values[name] for name in names]
@@ -41,9 +42,9 @@ def check_power(law: str, values: Mapping[str, float]) -> None:
 @lru_cache(maxsize=64)
 def _coefficient(law: str) -> tuple[Callable[..., float], tuple[str, ...]]:
     """f(w, …) as a plain function, and the names of its parameters."""
-    names = tuple(load("friction", law).PARAMETERS)
+    names = tuple(load(FRICTION_LAW, law).PARAMETERS)
     w = sp.Symbol("w", real=True)
-    value = friction_coefficient(load("friction", law), "sign")(w)
+    value = friction_coefficient(load(FRICTION_LAW, law), "sign")(w)
     symbols = [w, *(sp.Symbol(name, real=True) for name in names)]
     sign = {"sign": lambda x: (x > 0) - (x < 0)}
     return sp.lambdify(symbols, value, [sign, "math"]), names
@@ -82,7 +83,7 @@ def _check_masses(oscillator: str, values: tuple[tuple[str, float], ...]) -> Non
 @lru_cache(maxsize=64)
 def _masses(oscillator: str) -> tuple[sp.Matrix, tuple[sp.Symbol, ...]] | None:
     """The mass matrix in the parameters, None for a vector field."""
-    model = load("oscillator", oscillator)
+    model = load(OSCILLATOR, oscillator)
     if hasattr(model, "field"):
         return None
     system = nondimensional(model)

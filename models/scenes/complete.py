@@ -15,6 +15,7 @@ from ..inputs.plugins import load, named, part
 from ..mechanics.coupling_text import canonical, is_matrix, split
 from ..mechanics.coupling_text import canonical_coordinates as chosen_coordinates
 from ..mechanics.coupling_text import named as named_coupling
+from ..mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from .model import bare, by_kind, check_links, check_state, components, coordinate_names, default_friction, groups
 from .parameters import at_nodes, drive, parameters
 from .section import Section
@@ -27,7 +28,7 @@ RECORDS = ("sync_error", "section", "trajectory")
 
 TIME_UNITS = ("period", "time")
 
-METHODS = Path(__file__).parents[1] / "codegen" / "integrators"
+METHODS = Path(__file__).parents[2] / "codegen" / "integrators"
 """The folder of the integrators, one file each; it is listed here, and read by the code generator alone."""
 
 TIME_LIMIT, STEP_LIMIT, SAMPLE_LIMIT = 1e9, 10**12, 10**8
@@ -70,7 +71,7 @@ def _physics(made: Mapping[str, Any]) -> None:
 
 
 def _model(made: dict[str, Any]) -> None:
-    made["oscillator"] = named("oscillator", part("oscillator", made["oscillator"]))
+    made["oscillator"] = named(OSCILLATOR, part("oscillator", made["oscillator"]))
     made["contact"] = text("contact", made["contact"])
     graph = made["topology"] = topology("chain", 1) if made["topology"] is None else made["topology"]
     if not isinstance(graph, Topology):
@@ -81,7 +82,7 @@ def _model(made: dict[str, Any]) -> None:
         coupling = part("coupling", made["coupling"])
         made["coupling"] = None if coupling == "none" else named_coupling(coupling)
     if made["coupling"] is not None and not is_matrix(made["coupling"]):
-        load("coupling", split(made["coupling"])[0])  # an unknown name is refused even where nothing uses it
+        load(COUPLING, split(made["coupling"])[0])  # an unknown name is refused even where nothing uses it
     if made["coupling"] is not None and is_matrix(made["coupling"]):
         made["coupling"] = canonical(made["coupling"], components(made))
     elif made["coupling"] is not None and split(made["coupling"])[1] is not None:
@@ -98,7 +99,7 @@ def _start(made: Mapping[str, Any]) -> Frozen[tuple[float, ...]]:
     """The initial states, component by component, those of each kind of node around its own centre."""
     graph, names = made["topology"], components(made)
     templates, kinds = by_kind(made["oscillator"], made["friction"], made["nodes"], graph.n)
-    centres = [getattr(load("oscillator", oscillator), "INITIAL", None) for oscillator, _ in templates]
+    centres = [getattr(load(OSCILLATOR, oscillator), "INITIAL", None) for oscillator, _ in templates]
     if not kinds:
         return start(made["initial"], names, graph.n, made["seed"], centres[0])
     nodes = bare(made)
@@ -128,7 +129,7 @@ def _records(made: dict[str, Any]) -> None:
         raise ValueError("record: found 'sync_error', but these oscillators have no states of one name to compare")
     templates, kinds = by_kind(made["oscillator"], made["friction"], made["nodes"], n)
     own = tuple(s.name for s in bare(made).node_at(0).state)
-    crossed = own[0] if hasattr(load("oscillator", templates[kinds[0] if kinds else 0][0]), "field") else own[-1]
+    crossed = own[0] if hasattr(load(OSCILLATOR, templates[kinds[0] if kinds else 0][0]), "field") else own[-1]
     default = f"{'v' if 'v' in own else crossed}_1 falling"
     made["section"] = Section.parse(default if made["section"] is None else made["section"])
     check_state(made, made["section"].variable, "section variable")
@@ -176,7 +177,7 @@ def check_friction(made: Mapping[str, Any]) -> None:
         return
     for _, friction, own in at_nodes(made, {name: name for name in made["parameters"]}):
         if friction is not None:
-            for low, high in getattr(load("friction", friction), "ORDER", ()):
+            for low, high in getattr(load(FRICTION_LAW, friction), "ORDER", ()):
                 _check_order(made, friction, own[low], own[high])
 
 

@@ -19,6 +19,7 @@ from ..inputs.plugins import load
 from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Edge
 from ..mechanics.coupling_text import is_matrix
+from ..mechanics.definition import FRICTION_LAW, OSCILLATOR
 from ..mechanics.link import link_energies
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
 from .scene import a_scene
@@ -85,7 +86,7 @@ def energy(scene: Scene) -> Energy:
     """
     templates = a_scene(scene).templates
     for oscillator, _ in templates:
-        if hasattr(load("oscillator", oscillator), "field"):
+        if hasattr(load(OSCILLATOR, oscillator), "field"):
             raise ValueError(f"energy: oscillator {oscillator!r} is a vector field; expected one with a Lagrangian")
     equations = scene.equations
     if equations.node.contact is not None:
@@ -96,12 +97,12 @@ def energy(scene: Scene) -> Energy:
 
 def _of_node(oscillator: str, friction: str | None, contact: str) -> Share:
     """Energy and power of one oscillator by itself."""
-    system = nondimensional(load("oscillator", oscillator))
+    system = nondimensional(load(OSCILLATOR, oscillator))
     lagrangian = system.kinetic - system.potential
     power = sp.Add(*(v * f for v, f in zip(system.velocities, system.forces, strict=True)))
     power -= derivative(lagrangian, TIME)
     if friction is not None:
-        power = power.replace(FRICTION, friction_coefficient(load("friction", friction), contact))
+        power = power.replace(FRICTION, friction_coefficient(load(FRICTION_LAW, friction), contact))
     return Share(_of_lagrangian(lagrangian, system.velocities), power)
 
 

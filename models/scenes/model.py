@@ -12,6 +12,7 @@ from ..graphs.topology import Topology
 from ..inputs.checks import integer, known_keys, number, shown, suggestion, table
 from ..inputs.frozen import Frozen
 from ..inputs.plugins import load, named, part
+from ..mechanics.definition import FRICTION_LAW, OSCILLATOR
 
 if TYPE_CHECKING:
     from ..dynamics.equations import Equations
@@ -106,7 +107,7 @@ def coordinate_names(made: Mapping[str, Any]) -> tuple[str, ...]:
     from ..mechanics.nondimensional import coordinates
 
     templates, _ = by_kind(made["oscillator"], made["friction"], made["nodes"], made["topology"].n)
-    models = [load("oscillator", oscillator) for oscillator, _ in templates]
+    models = [load(OSCILLATOR, oscillator) for oscillator, _ in templates]
     return tuple(dict.fromkeys(name for model in models if not hasattr(model, "field") for name in coordinates(model)))
 
 
@@ -189,11 +190,11 @@ class Group:
 def default_friction(oscillator: str, friction: object) -> str | None:
     """Return the name of a friction law: of "default" the one that an oscillator starts with, of "none" None."""
     if friction == "default":
-        return "exponential" if load("oscillator", oscillator).FRICTION else None
+        return "exponential" if load(OSCILLATOR, oscillator).FRICTION else None
     if friction is None or part("friction", friction) == "none":
         return None
-    law = named("friction", part("friction", friction))
-    load("friction", law)  # an unknown name is refused even where nothing uses it
+    law = named(FRICTION_LAW, part("friction", friction))
+    load(FRICTION_LAW, law)  # an unknown name is refused even where nothing uses it
     return law
 
 
@@ -223,7 +224,7 @@ def _group(what: str, given: object, n: int) -> Group:
     for key in ("oscillator", "at"):
         if key not in entry:
             raise ValueError(f"{what}: {key!r} is missing; expected an oscillator and the numbers of its nodes, at")
-    oscillator = named("oscillator", part(f"{what} oscillator", entry["oscillator"]))
+    oscillator = named(OSCILLATOR, part(f"{what} oscillator", entry["oscillator"]))
     at = entry["at"]
     if isinstance(at, str | bytes | Mapping | set | frozenset) or not isinstance(at, Iterable):
         raise TypeError(f"{what}: at is {shown(at)}; expected a list of nodes, e.g. [1, 3]")

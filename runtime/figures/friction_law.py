@@ -9,6 +9,7 @@ import numpy as np
 import sympy as sp
 
 from synchain.models.inputs.plugins import load as plugin
+from synchain.models.mechanics.definition import FRICTION_LAW
 from synchain.models.mechanics.friction import regularise
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
@@ -45,7 +46,7 @@ def compute(name: str, study: Study) -> Law:
 
 def forces(scene: Scene) -> tuple[Any, Any]:
     """The friction coefficient as functions of an array of relative velocities: the law itself, and smoothed."""
-    law = plugin("friction", str(scene.templates[0][1]))
+    law = plugin(FRICTION_LAW, str(scene.templates[0][1]))
     w, kappa = sp.Symbol("w", real=True), sp.Symbol("kappa", real=True)
     symbols = {key: sp.Symbol(key, real=True) for key in law.PARAMETERS}
     sharp = law.force(w, **symbols)

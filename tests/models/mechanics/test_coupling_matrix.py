@@ -21,6 +21,7 @@ from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.components import Node
 from synchain.models.mechanics.coupling_text import canonical, entries
+from synchain.models.mechanics.definition import OSCILLATOR
 from synchain.models.mechanics.link import edge
 from synchain.models.presentation.equations import text
 from synchain.models.scenes.file import load_scene
@@ -122,10 +123,10 @@ def test_the_difference_of_the_first_enters_the_rate_of_the_second() -> None:
 OTHER_MASSES = ("beam", "belt_double_pendulum", "clock", "double_pendulum")
 
 
-@pytest.mark.parametrize("oscillator", [name for name in names("oscillator") if name not in OTHER_MASSES])
+@pytest.mark.parametrize("oscillator", [name for name in names(OSCILLATOR) if name not in OTHER_MASSES])
 def test_springs_and_dampers_of_mass_one_are_entries(oscillator: str) -> None:
-    single = node(oscillator, "coulomb" if load("oscillator", oscillator).FRICTION else None)
-    if hasattr(load("oscillator", oscillator), "field"):
+    single = node(oscillator, "coulomb" if load(OSCILLATOR, oscillator).FRICTION else None)
+    if hasattr(load(OSCILLATOR, oscillator), "field"):
         with pytest.raises(ValueError, match=r"joins coordinates with velocities; .* coupling = 'x->x'"):
             edge("spring", single, oscillator)
         return
@@ -183,7 +184,7 @@ def test_the_parameter() -> None:
 def test_a_field_of_positions_and_velocities_takes_a_spring(monkeypatch: pytest.MonkeyPatch) -> None:
     """Mass 1: no kinetic energy is asked for."""
     x, v = sp.symbols("x v", real=True)
-    monkeypatch.setattr(load("oscillator", "rossler"), "STATE", ("x", "v"))
+    monkeypatch.setattr(load(OSCILLATOR, "rossler"), "STATE", ("x", "v"))
     assert edge.__wrapped__("spring", Node((x, v), (v, -x), ()), "rossler").rhs[1] == SIGMA * WEIGHT * GAP["x"]
 
 

@@ -16,28 +16,33 @@ from hypothesis import strategies as st
 
 from synchain.models import oscillators
 from synchain.models.dynamics.network import node, parameters
-from synchain.models.inputs.plugins import call, load, names
+from synchain.models.inputs.plugins import Kind, call, load, names
 from synchain.models.mechanics.calculus import cancelled, operations
 from synchain.models.mechanics.components import TIME
+from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.mechanics.link import edge
 from synchain.models.mechanics.nondimensional import FRICTION, nondimensional, physical, scale
 from synchain.models.mechanics.parameter import Parameter, dimension
 
 x, v = sp.symbols("x v", real=True)
 theta_b, epsilon, u, omega = sp.symbols("theta_b epsilon u omega", real=True)
-OWNERS = [(kind, name) for kind in ("oscillator", "friction", "coupling") for name in names(kind)]
+OWNERS = [
+    pytest.param(kind, name, id=f"{kind.name}-{name}")
+    for kind in (OSCILLATOR, FRICTION_LAW, COUPLING)
+    for name in names(kind)
+]
 
 
 def test_eq_2_from_the_physical_lagrangian() -> None:
     m, k = sp.symbols("m k", positive=True)
     drive, frequency, belt, load_on_belt = sp.symbols("U Omega v_b F_N", real=True)
-    found = physical(load("oscillator", "friction")).accelerations()
+    found = physical(load(OSCILLATOR, "friction")).accelerations()
     expected = (-k * (x - drive * sp.cos(frequency * TIME)) + load_on_belt * FRICTION(belt - v)) / m
     assert sp.expand(found[0] - expected) == 0
 
 
 def test_eq_3_comes_out_of_the_scaling() -> None:
-    (found,) = nondimensional(load("oscillator", "friction")).accelerations()
+    (found,) = nondimensional(load(OSCILLATOR, "friction")).accelerations()
     assert found == -x + u * sp.cos(omega * TIME) + epsilon * FRICTION(theta_b - v)
 
 
@@ -54,7 +59,7 @@ def test_eq_3_with_the_law_of_eqs_4_and_5() -> None:
 
 def test_the_groups_of_the_paper() -> None:
     """x0 = g/omega0^2, tau = omega0 t, epsilon = F_N/(m g), theta_b = v_b/(x0 omega0), u = U/x0, omega = Omega/omega0."""
-    model = load("oscillator", "friction")
+    model = load(OSCILLATOR, "friction")
     m, k, g = sp.symbols("m k g", positive=True)
     omega0 = sp.sqrt(k / m)
     x0 = g / omega0**2
@@ -96,7 +101,7 @@ def test_physical_and_scaled_motion_agree_in_numbers(
 
 def test_coupling_scales_with_the_oscillators_own_spring() -> None:
     """A spring of stiffness sigma k between two masses: its energy over k x0^2 is the non-dimensional potential."""
-    model, spring = load("oscillator", "friction"), load("coupling", "spring")
+    model, spring = load(OSCILLATOR, "friction"), load(COUPLING, "spring")
     q_i, q_j, weight, sigma = sp.symbols("q_i q_j weight sigma", real=True)
     x0 = scale(model, "m")
     given_in_si = {"q_i": q_i * x0, "q_j": q_j * x0, "weight": weight, "sigma": sigma * scale(model, "N/m")}
@@ -182,7 +187,7 @@ def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
     def add(name: str, body: str) -> ModuleType:
         (tmp_path / f"{name}.py").write_text(body, encoding="utf-8")
         added.append(name)
-        return load("oscillator", name)
+        return load(OSCILLATOR, name)
 
     yield add
     for name in added:
@@ -193,7 +198,7 @@ def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
 def test_a_lagrangian_in_one_file(plug_in: Callable[[str, str], ModuleType]) -> None:
     plug_in("van_der_pol_again", VAN_DER_POL)
     mu = sp.Symbol("mu", real=True)
-    assert "van_der_pol_again" in names("oscillator")
+    assert "van_der_pol_again" in names(OSCILLATOR)
     assert node("van_der_pol_again").rhs == (v, -x + mu * (1 - x**2) * v)
     assert edge("spring", node("van_der_pol_again"), "van_der_pol_again").rhs[0] == 0
 
@@ -223,12 +228,10 @@ def test_equations_keep_no_common_factors(plug_in: Callable[[str, str], ModuleTy
     assert node("heavy").rhs == (v, -c * v - g * sp.sin(x))
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in names("oscillator") if not hasattr(load("oscillator", name), "field")]
-)
+@pytest.mark.parametrize("name", [name for name in names(OSCILLATOR) if not hasattr(load(OSCILLATOR, name), "field")])
 def test_cancelling_changes_the_text_of_an_equation_alone(name: str) -> None:
     """The rates of a node against those that the Euler-Lagrange equations give, at random places."""
-    system = nondimensional(load("oscillator", name))
+    system = nondimensional(load(OSCILLATOR, name))
     derived = system.accelerations()
     found = cancelled(derived)
     assert operations(found) <= operations(derived)
@@ -306,7 +309,7 @@ def test_unreadable_units(unit: str) -> None:
 
 
 @pytest.mark.parametrize(("kind", "name"), OWNERS)
-def test_every_plug_in_declares_itself(kind: str, name: str) -> None:
+def test_every_plug_in_declares_itself(kind: Kind, name: str) -> None:
     module = load(kind, name)
     assert module.SUMMARY.strip()
     assert any(character.isdigit() for character in module.SOURCE), "a source has a year or a volume"

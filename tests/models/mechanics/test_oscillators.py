@@ -15,6 +15,7 @@ from synchain.models.dynamics.variational import coupling_slope
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.components import TIME
+from synchain.models.mechanics.definition import OSCILLATOR
 from synchain.models.scenes.energy import energy
 from synchain.models.scenes.scene import Scene
 from synchain.models.scenes.section import Section
@@ -25,7 +26,7 @@ from synchain.runtime.sweeps.run import run
 X, Y, Z, V = sp.symbols("x y z v", real=True)
 A, B, C, P, Q, MU, U = sp.symbols("a b c p q mu u", real=True)
 PRANDTL, RAYLEIGH, OMEGA = sp.symbols("prandtl rayleigh omega", real=True)
-FIELDS = [name for name in names("oscillator") if hasattr(load("oscillator", name), "field")]
+FIELDS = [name for name in names(OSCILLATOR) if hasattr(load(OSCILLATOR, name), "field")]
 RESERVED = {"alpha", "beta2", "sigma", "t", "weight"}
 
 
@@ -78,7 +79,7 @@ def test_chua_is_the_circuit_of_its_paper() -> None:
     unit = c_2 / g  # of time; current in units of g
     resistor = outer * X + (inner - outer) * (sp.Abs(X + 1) - sp.Abs(X - 1)) / 2
     circuit = ((g * (Y - X) - resistor) / c_1, (g * (X - Y) + g * Z) / c_2, -Y / coil / g)
-    values = {s: sp.nsimplify(load("oscillator", "chua").PARAMETERS[s.name].default, rational=True).limit_denominator(99)
+    values = {s: sp.nsimplify(load(OSCILLATOR, "chua").PARAMETERS[s.name].default, rational=True).limit_denominator(99)
               for s in (P, Q, A, B)}  # fmt: skip
     for ours, theirs in zip(node("chua").rhs, circuit, strict=True):
         assert sp.expand(ours.subs(values) - unit * theirs) == 0
@@ -140,17 +141,17 @@ def test_chua_visits_both_scrolls() -> None:
 # -- names and starts ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", names("oscillator"))
+@pytest.mark.parametrize("name", names(OSCILLATOR))
 def test_names_leave_room_for_modes_and_couplings(name: str) -> None:
-    states = node(name, "exponential" if load("oscillator", name).FRICTION else None).state
-    taken = {s.name for s in states} | set(load("oscillator", name).PARAMETERS)
+    states = node(name, "exponential" if load(OSCILLATOR, name).FRICTION else None).state
+    taken = {s.name for s in states} | set(load(OSCILLATOR, name).PARAMETERS)
     assert not taken & RESERVED
     assert not [word for word in taken if word.startswith("d_")]
 
 
-@pytest.mark.parametrize("name", names("oscillator"))
+@pytest.mark.parametrize("name", names(OSCILLATOR))
 def test_initial_names_states(name: str) -> None:
-    initial = getattr(load("oscillator", name), "INITIAL", {})
+    initial = getattr(load(OSCILLATOR, name), "INITIAL", {})
     scene = Scene(oscillator=name)
     assert set(initial) <= set(scene.components)
     if name in FIELDS:
@@ -169,10 +170,10 @@ def test_starts_lie_around_the_centre(n: int, x: tuple[float, ...] | None) -> No
 
 
 def test_an_unknown_state_in_initial_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(load("oscillator", "rossler"), "INITIAL", {"w": 1.0})
+    monkeypatch.setattr(load(OSCILLATOR, "rossler"), "INITIAL", {"w": 1.0})
     with pytest.raises(ValueError, match="INITIAL of the oscillator: unknown key 'w'; known: x, y, z"):
         Scene(oscillator="rossler")
-    monkeypatch.setattr(load("oscillator", "rossler"), "INITIAL", {"x": math.nan})
+    monkeypatch.setattr(load(OSCILLATOR, "rossler"), "INITIAL", {"x": math.nan})
     with pytest.raises(ValueError, match="INITIAL of the oscillator: x: found nan; expected a finite number"):
         Scene(oscillator="rossler")
 

@@ -17,6 +17,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.components import TIME, Edge, Node
+from synchain.models.mechanics.definition import FRICTION_LAW, OSCILLATOR
 from synchain.models.mechanics.friction import CONTACTS
 from synchain.models.mechanics.link import edge
 from synchain.models.presentation.equations import LARGEST, as_dict, latex, text
@@ -68,7 +69,7 @@ LAW_TEXT = {
 }
 
 
-@pytest.mark.parametrize("law", names("friction"))
+@pytest.mark.parametrize("law", names(FRICTION_LAW))
 @pytest.mark.parametrize("contact", CONTACTS)
 def test_every_law_is_named_once_and_defined_below(law: str, contact: str) -> None:
     lines = text(made(topology("ring", 3), "friction", law, contact)).splitlines()
@@ -238,12 +239,12 @@ def test_a_force_turned_round_keeps_its_sign() -> None:
 # -- everything shipped --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("oscillator", names("oscillator"))
+@pytest.mark.parametrize("oscillator", names(OSCILLATOR))
 @pytest.mark.parametrize("n", [1, 3, 8])
 def test_latex_of_every_oscillator_balances(oscillator: str, n: int) -> None:
-    law = "stribeck" if load("oscillator", oscillator).FRICTION else None
+    law = "stribeck" if load(OSCILLATOR, oscillator).FRICTION else None
     coupling = "spring"
-    if hasattr(load("oscillator", oscillator), "field"):
+    if hasattr(load(OSCILLATOR, oscillator), "field"):
         own = [s.name for s in node(oscillator).state]
         coupling = f"{own[0]}->{own[0]}, -1/2 {own[-1]}->{own[0]}"
     lines = body(made(topology("chain", n), oscillator, law, coupling=coupling if n > 1 else None))

@@ -12,20 +12,21 @@ from synchain.models import chain, ring
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.components import TIME
+from synchain.models.mechanics.definition import COUPLING, OSCILLATOR
 from synchain.models.mechanics.lagrangian import total_derivative
 from synchain.models.scenes.energy import energy
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.results.energy import energy_function
 
-FORCES = [c for c in names("coupling") if not hasattr(load("coupling", c), "kinetic")]
+FORCES = [c for c in names(COUPLING) if not hasattr(load(COUPLING, c), "kinetic")]
 """The couplings without inertia: their accelerations are the right-hand side itself."""
 
-LAGRANGIAN = [name for name in names("oscillator") if not hasattr(load("oscillator", name), "field")]
+LAGRANGIAN = [name for name in names(OSCILLATOR) if not hasattr(load(OSCILLATOR, name), "field")]
 
 
 def scene_of(oscillator: str, coupling: str, n: int = 2, **more: object) -> Scene:
-    friction = "viscous" if load("oscillator", oscillator).FRICTION else None
+    friction = "viscous" if load(OSCILLATOR, oscillator).FRICTION else None
     return Scene(oscillator=oscillator, friction=friction, coupling=coupling, topology=chain(n), **more)
 
 
