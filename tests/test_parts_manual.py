@@ -9,7 +9,7 @@ import pytest
 
 from synchain.models.inputs.arithmetic import constant
 from synchain.models.inputs.plugins import Kind, load, names
-from synchain.models.mechanics.coupling_text import PARAMETERS
+from synchain.models.mechanics.coupling import STRENGTH
 from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.mechanics.friction import KAPPA
 
@@ -37,7 +37,7 @@ def table(title: str) -> dict[str, list[Row]]:
 def test_the_tables_are_those_of_the_modules(kind: Kind) -> None:
     expected = {name: load(kind, name).PARAMETERS for name in names(kind)}
     if kind is COUPLING:
-        expected["components"] = PARAMETERS
+        expected["components"] = STRENGTH
     assert table(TABLES[kind]) == {
         name: [(p, value.default, value.meaning) for p, value in known.items()] for name, known in expected.items()
     }

@@ -19,7 +19,7 @@ from .parameter import Parameter
 if TYPE_CHECKING:
     import sympy as sp
 
-__all__ = ["COUPLING", "FRICTION_LAW", "KNOWN", "OSCILLATOR"]
+__all__ = ["COUPLING", "FRICTION_LAW", "KNOWN", "OSCILLATOR", "coordinates_of", "lagrangian_symbols"]
 
 _PHYSICAL = ("scales", "UNITS")
 _LAGRANGIAN = ("kinetic", "potential", "force", "dissipation", "particles", "COORDINATES", "PHYSICAL", *_PHYSICAL)
@@ -85,6 +85,23 @@ class _PartFile(PluginFile):
                 raise self.wrong("PARAMETERS", f"no function uses the parameter {own}; use it or leave it out")
 
 
+def lagrangian_symbols(module: ModuleType) -> dict[str, Any]:
+    """Return what the functions of a Lagrangian may ask for, by name, in physical symbols."""
+    from .components import TIME
+    from .oscillator import FRICTION
+
+    physical = getattr(module, "PHYSICAL", {})
+    states = [name for c, (velocity, _) in coordinates_of(module).items() for name in (c, velocity)]
+    names = [*(physical.get(name, name) for name in module.PARAMETERS), *states]
+    return {**_symbols(names, getattr(module, "UNITS", {})), TIME.name: TIME, "friction": FRICTION}
+
+
+def coordinates_of(module: ModuleType) -> Mapping[str, tuple[str, str]]:
+    """Return coordinate -> (velocity, unit) of the file of a Lagrangian."""
+    table: Mapping[str, tuple[str, str]] = getattr(module, "COORDINATES", {"x": ("v", "m")})
+    return table
+
+
 def _symbols(names: Iterable[str], positive: Iterable[str] = ()) -> dict[str, sp.Symbol]:
     import sympy as sp
 
@@ -131,16 +148,14 @@ def _field(file: _PartFile) -> tuple[list[sp.Expr], tuple[str, ...]]:
 
 def _lagrangian(file: _PartFile) -> tuple[list[sp.Expr], tuple[str, ...]]:
     """All that the functions of a Lagrangian return, and the names of its states."""
-    from .nondimensional import coordinates, physical_symbols
-
-    found = file.get("COORDINATES", {"x": ("v", "m")})
+    found = coordinates_of(file.module)
     for name, pair in found.items() if isinstance(found, Mapping) else [(found, None)]:
         if not (isinstance(pair, tuple) and len(pair) == 2 and all(isinstance(part, str) for part in (name, *pair))):
             raise file.wrong(
                 "COORDINATES",
                 f'COORDINATES has {name!r}: {pair!r}; expected a velocity and a unit each, such as {{"x": ("v", "m")}}',
             )
-    given = physical_symbols(file.module)
+    given = lagrangian_symbols(file.module)
     values = [file.expression(name, given) for name in ("kinetic", "potential")]
     if file.has("force"):
         force = file.value("force", given)
@@ -148,8 +163,7 @@ def _lagrangian(file: _PartFile) -> tuple[list[sp.Expr], tuple[str, ...]]:
         values += file.expressions("force", (force,) if one else force, tuple(found))
     if file.has("dissipation"):
         values.append(file.expression("dissipation", given))
-    own = coordinates(file.module)
-    return values, (*own, *(speed for speed, _ in own.values()))
+    return values, (*found, *(speed for speed, _ in found.values()))
 
 
 def _check_units(file: _PartFile) -> None:
@@ -175,7 +189,7 @@ def _check_units(file: _PartFile) -> None:
 
 def _check_friction(file: _PartFile, found: Iterable[sp.Expr]) -> None:
     """FRICTION says whether there is a friction law in the forces."""
-    from .nondimensional import FRICTION
+    from .oscillator import FRICTION
 
     rubs = any(e.has(FRICTION) for e in found)
     if rubs != file.get("FRICTION"):

@@ -9,7 +9,6 @@ from importlib import resources
 from pathlib import Path
 
 from ..inputs.checks import shown, suggestion
-from .dictionary import from_dict
 from .scene import Scene
 
 __all__ = ["load_scene", "scene_names"]
@@ -96,7 +95,7 @@ def _scene(name: str, content: bytes, folder: Path | None) -> Scene:
         reason = str(error) if isinstance(error, tomllib.TOMLDecodeError) else "too deep or too long a value"
         raise ValueError(f"{name}: not TOML: {' '.join(reason.split())[:300]}; correct the file there") from None
     try:
-        return from_dict(values, folder)
+        return Scene.from_dict(values, folder)
     except (ValueError, TypeError) as error:
         raise type(error)(f"{name}: {error}") from None
 

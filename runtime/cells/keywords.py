@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import fields
 from typing import Any
 
 from synchain.models.inputs.checks import suggestion
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import KEYWORDS, Scene, a_scene
 
 __all__ = ["check_keywords", "with_parameters"]
 
@@ -37,7 +36,7 @@ def check_keywords(
     `taken` are not.
     """
     states = tuple(states)
-    settings = [field.name for field in fields(Scene) if field.name not in taken]
+    settings = [name for name in KEYWORDS if name not in taken]
     strange = next((name for name in given if not (scene.takes(name) or name in states or name in settings)), None)
     if strange is not None:
         known = dict.fromkeys((*scene.parameters, *states, *_own(function), *settings))

@@ -15,6 +15,7 @@ import numpy as np
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.reduction import NoQuotient, fold, quotient
+from synchain.models.mechanics.node_name import NodeName
 from synchain.models.scenes.scene import Scene
 
 from .buffers import Buffers
@@ -148,8 +149,8 @@ def decide(scene: Scene, skip: bool = True, fold_all: bool = False) -> Skip:
 
 def _column(name: str, equations: Equations, first: list[int]) -> str:
     """The name in the whole network of a parameter of the reduced one, whose node k stands for node first[k]."""
-    base, _, number = name.rpartition("_")
-    return f"{base}_{first[int(number) - 1] + 1}" if base in equations.varied else name
+    parts = NodeName.parse(name)
+    return str(NodeName(parts.base, first[parts.index])) if parts and parts.base in equations.varied else name
 
 
 def _fixed(scene: Scene) -> dict[str, float]:

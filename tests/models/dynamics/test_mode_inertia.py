@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import sympy as sp
+from parts import edge
 
 from synchain.models import chain
 from synchain.models.dynamics.equations import Equations
@@ -16,7 +17,6 @@ from synchain.models.dynamics.variational import ALPHA, MODE, clustered, mode, t
 from synchain.models.graphs.clusters import orbital_partitions
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Edge, Node
-from synchain.models.mechanics.link import edge
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.transversal import exponents
 from synchain.runtime.sweeps.certify import certify

@@ -17,14 +17,14 @@ import test_frictions
 import test_lagrangian
 import test_network
 import test_topologies
+from parts import node
 
 from synchain.models import chain
-from synchain.models.dynamics.network import node
 from synchain.models.graphs.families import names, topology
 from synchain.models.graphs.family_file import TOPOLOGY
 from synchain.models.inputs import plugins
 from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
-from synchain.models.mechanics.friction import CONTACTS
+from synchain.models.mechanics.friction import ContactModel
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cli import main
@@ -51,7 +51,7 @@ def test_the_starting_files_conform(placed: str) -> None:
     test_frictions.test_odd(placed)
     test_frictions.test_drags_along_and_never_drives(placed)
     test_frictions.test_jump_is_finite_and_numbers_are_exact(placed)
-    for contact in CONTACTS[:2]:
+    for contact in list(ContactModel)[:2]:
         test_frictions.test_units_cancel(placed, contact)
     for form in (test_lagrangian.physical, test_lagrangian.nondimensional):
         test_lagrangian.test_energy_balance_of_every_oscillator(placed, form)
@@ -310,7 +310,7 @@ def test_an_edited_law_coupling_or_group_of_nodes_is_another_model(tmp_path: Pat
     def scene() -> Scene:
         nodes = [{"oscillator": "harmonic", "at": [1]}]
         coupling = f"{pull} on x"
-        assert Scene(friction=rub).coupling == "spring"
+        assert str(Scene(friction=rub).coupling) == "spring"
         return Scene(oscillator=well, nodes=nodes, coupling=coupling, topology=chain(2))
 
     before, law = scene(), Scene(friction=rub)
@@ -345,21 +345,18 @@ def test_one_relative_name_in_two_folders_is_two_models(tmp_path: Path, monkeypa
     assert pickle.loads(pickle.dumps(scenes[0])) == scenes[0]
 
 
-def test_another_process_refuses_a_scene_whose_file_has_changed(tmp_path: Path) -> None:
+def test_another_process_has_the_model_that_a_scene_was_made_with_whatever_its_file_says(tmp_path: Path) -> None:
     path = written(tmp_path / "well.py", WELL)
     packed = tmp_path / "scene"
     packed.write_bytes(pickle.dumps(Scene(oscillator=path)))
-    words = (
-        f"import pickle; from synchain.models.inputs.plugins import allow_code; allow_code({path!r})\n"
-        f"print(pickle.load(open({str(packed)!r}, 'rb')).equations.node.rhs)"
-    )
+    words = f"import pickle\nprint(pickle.load(open({str(packed)!r}, 'rb')).equations.node.rhs)"
 
     def elsewhere() -> subprocess.CompletedProcess[str]:
         return subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, timeout=240, check=False)
 
     assert elsewhere().stdout == "(v, -x)\n"
     written(tmp_path / "well.py", WELL.replace("x**2", "x**4"))
-    assert "found another text in" in elsewhere().stderr.splitlines()[-1]
+    assert elsewhere().stdout == "(v, -x)\n"
 
 
 # -- what a file says takes effect, or is refused --------------------------------------------------------------

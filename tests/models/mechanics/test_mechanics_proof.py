@@ -8,27 +8,27 @@ from __future__ import annotations
 import pytest
 import sympy as sp
 from mechanics_proof import T, by_kane, by_lagrange, residual, vanishes, whole
+from parts import edge, is_lagrangian, node, oscillator_of
 
-from synchain.models.dynamics.network import network, node
+from synchain.models.dynamics.network import network
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
-from synchain.models.mechanics.link import edge
+from synchain.models.mechanics.definition import COUPLING, OSCILLATOR
 from synchain.models.mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
 
 FORCES = [c for c in names(COUPLING) if not hasattr(load(COUPLING, c), "kinetic")]
 """The couplings without inertia; tests/test_inertia.py has the others."""
 
-LAGRANGIAN = [name for name in names(OSCILLATOR) if not hasattr(load(OSCILLATOR, name), "field")]
-PLAIN = [name for name in LAGRANGIAN if len(nondimensional(load(OSCILLATOR, name)).coordinates) == 1]
+LAGRANGIAN = [name for name in names(OSCILLATOR) if is_lagrangian(name)]
+PLAIN = [name for name in LAGRANGIAN if len(nondimensional(oscillator_of(name)).coordinates) == 1]
 WEIGHTED = from_matrix([["-5/2", 2, "1/2"], [2, -2, 0], ["1/2", 0, "-1/2"]], "weighted")
 METHODS = [by_lagrange, by_kane]
 
 
 def law_of(oscillator: str) -> str | None:
-    return "viscous" if load(OSCILLATOR, oscillator).FRICTION else None
+    return "viscous" if oscillator_of(oscillator).takes_friction else None
 
 
 def accelerations(oscillator: str, coupling: str | None, graph: Topology, oriented: str = "") -> dict[str, sp.Expr]:
@@ -50,7 +50,7 @@ def accelerations(oscillator: str, coupling: str | None, graph: Topology, orient
 def check(method: object, oscillator: str, coupling: str | None, graph: Topology, on: tuple[str, ...] = ()) -> None:
     system = whole(oscillator, coupling, graph, on or None)
     if law_of(oscillator):
-        law = friction_coefficient(load(FRICTION_LAW, "viscous"), "sign")
+        law = friction_coefficient(law_of("viscous"), "sign")
         forces = tuple(e.replace(FRICTION, law) for e in system.forces)
         system = type(system)(system.q, system.rates, system.kinetic, system.potential, forces, system.particles)
     ours = accelerations(oscillator, coupling, graph, f" on {', '.join(on)}" if on else "")
