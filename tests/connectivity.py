@@ -7,14 +7,12 @@ from fractions import Fraction
 import sympy as sp
 
 from synchain.models.graphs.topology import Topology
-from synchain.models.inputs.plugins import call, load
-from synchain.models.mechanics import coupling_text
-from synchain.models.mechanics.coupling_text import split
+from synchain.models.mechanics.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling
 
 __all__ = ["connectivity"]
 
 
-def connectivity(coupling: str, graph: Topology) -> tuple[tuple[Fraction, ...], ...]:
+def connectivity(coupling: Coupling, graph: Topology) -> tuple[tuple[Fraction, ...], ...]:
     """Read G off the coupling: minus the Hessian of its whole potential over sigma, n rows of n fractions.
 
     The Hessian of one edge is derived once and added up over the links, so that a thousand nodes take no algebra.  For a
@@ -23,8 +21,7 @@ def connectivity(coupling: str, graph: Topology) -> tuple[tuple[Fraction, ...], 
     Raises ValueError for a coupling whose Hessian between equal states is not sigma times weight times a number: it has no
     matrix G.
     """
-    if coupling_text.is_matrix(coupling):
-        coupling_text.entries(coupling)
+    if isinstance(coupling, MatrixCoupling):
         diagonal, aside = Fraction(-1), Fraction(1)
     else:
         diagonal, aside = _hessian(coupling)
@@ -35,24 +32,22 @@ def connectivity(coupling: str, graph: Topology) -> tuple[tuple[Fraction, ...], 
     return tuple(map(tuple, rows))
 
 
-def _hessian(coupling: str) -> tuple[Fraction, Fraction]:
+def _hessian(coupling: LagrangianCoupling) -> tuple[Fraction, Fraction]:
     """Minus the second derivatives of one edge's energy over sigma and weight: twice by one end, and by both.
 
     Of a non-linear coupling they are taken between equal states, where its links are those of its linear part.
     """
-    model = load("coupling", split(coupling)[0])
-    q_i, q_j, weight = (sp.Symbol(name, real=True) for name in ("q_i", "q_j", "weight"))
-    given = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
-    if hasattr(model, "BETWEEN"):
+    q_i, q_j, v_i, v_j, sigma = sp.symbols("q_i q_j v_i v_j sigma", real=True)
+    if coupling.between is not None:
         raise ValueError(
-            f"coupling {coupling!r} joins {' and '.join(model.BETWEEN)}; it has no matrix of one coordinate"
+            f"coupling {str(coupling)!r} joins {' and '.join(coupling.between)}; it has no matrix of one coordinate"
         )
-    function = next(getattr(model, name) for name in ("potential", "dissipation", "kinetic") if hasattr(model, name))
-    energy = call(function, {"q_i": q_i, "q_j": q_j, "v_i": q_i, "v_j": q_j, "weight": weight, **given})
+    functions = (coupling.potential, coupling.dissipation, coupling.kinetic)
+    energy = next((e for e in functions if e != 0), sp.S.Zero).xreplace({v_i: q_i, v_j: q_j})
     slopes = (-energy.diff(q_i, q).xreplace({q_j: q_i}) for q in (q_i, q_j))
-    own, other = (sp.simplify(slope / (given["sigma"] * weight)) for slope in slopes)
+    own, other = (sp.simplify(slope / (sigma * WEIGHT)) for slope in slopes)
     if not (own.is_Rational and other.is_Rational) or own == 0:
         raise ValueError(
-            f"coupling {coupling!r}: Hessian over sigma and weight is {own}, {other}; expected numbers other than 0"
+            f"coupling {str(coupling)!r}: Hessian over sigma and weight is {own}, {other}; expected numbers other than 0"
         )
     return Fraction(int(own.p), int(own.q)), Fraction(int(other.p), int(other.q))

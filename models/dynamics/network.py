@@ -9,23 +9,23 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from functools import partial
-from types import ModuleType
+from functools import lru_cache
 
 import sympy as sp
 
 from ..graphs.links import Link
 from ..graphs.topology import Topology
-from ..inputs.plugins import call, load, named, names, remembered
-from ..mechanics import coupling_text
+from ..inputs.plugins import names
 from ..mechanics.calculus import cancelled
-from ..mechanics.components import SLIDING, TIME, Edge, Node
-from ..mechanics.coupling_text import split
-from ..mechanics.friction import CONTACTS, KAPPA
+from ..mechanics.components import SLIDING, Edge, Node
+from ..mechanics.coupling import Coupling
+from ..mechanics.definition import FRICTION_LAW
+from ..mechanics.friction import KAPPA, ContactModel, FrictionLaw
 from ..mechanics.lagrangian import Mechanics
 from ..mechanics.link import check_coupling, edge
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
 from ..mechanics.orientation import is_oriented
+from ..mechanics.oscillator import Field, Oscillator
 from ..mechanics.parameter import Parameter
 from ..mechanics.stick_slip import SLIP, set_valued
 from .equations import Equations
@@ -34,62 +34,72 @@ __all__ = ["check_coupling", "edge", "mixed_network", "network", "node", "orient
 
 
 def parameters(
-    oscillator: str, friction: str | None = None, contact: str = "atan", coupling: str | None = None
+    oscillator: Oscillator,
+    friction: FrictionLaw | None = None,
+    contact: str = ContactModel.ATAN,
+    coupling: Coupling | None = None,
 ) -> dict[str, Parameter]:
     """Return every parameter with default, unit, meaning and range, in the order of Equations.parameters.
 
-    Raises ValueError for an unknown oscillator, law, contact or coupling, where the oscillator takes no friction law but
-    is given one, or takes one but is given none, and where two of them have a parameter of the same name.
+    Parameters
+    ----------
+    oscillator : Oscillator
+        The node.
+    friction : FrictionLaw, optional
+        Its friction law.
+    contact : str
+        How a jump of the law at rest is treated, a `ContactModel`.
+    coupling : Coupling, optional
+        What joins the nodes.
+
+    Raises
+    ------
+    ValueError
+        For an unknown contact, if the oscillator takes no friction law but is given one, or takes one but is given
+        none, and if two of them have a parameter of the same name.
     """
-    model, law = _model(oscillator, friction, contact)
-    table: dict[str, Parameter] = dict(model.PARAMETERS)
-    if law is not None:
-        _join(table, law.PARAMETERS, f"friction law {friction!r}")
-        if contact == "atan" and friction_coefficient(law, "sign")(sp.Symbol("w", real=True)).has(sp.sign):
-            _join(table, {"kappa": KAPPA}, f"contact {contact!r}")
+    _check_parts(oscillator, friction, contact)
+    table: dict[str, Parameter] = dict(oscillator.parameters)
+    if friction is not None:
+        _join(table, friction.parameters, f"friction law {friction.name!r}")
+        if contact == ContactModel.ATAN and friction.force.has(sp.sign):
+            _join(table, {"kappa": KAPPA}, f"contact {str(contact)!r}")
     if coupling is not None:
-        own = coupling_text if coupling_text.is_matrix(coupling) else load("coupling", split(coupling)[0])
-        _join(table, own.PARAMETERS, f"coupling {coupling!r}")
-    return {name: replace(p, scale=str(scale(model, p.unit))) for name, p in table.items()}
+        _join(table, coupling.parameters, f"coupling {str(coupling)!r}")
+    return {name: replace(p, scale=str(scale(oscillator, p.unit))) for name, p in table.items()}
 
 
-@remembered(oscillator=partial(named, "oscillator"), friction=partial(named, "friction"))
-def node(oscillator: str, friction: str | None = None, contact: str = "atan") -> Node:
+@lru_cache(maxsize=64)
+def node(oscillator: Oscillator, friction: FrictionLaw | None = None, contact: str = ContactModel.ATAN) -> Node:
     """Derive the equations of one oscillator: for a Lagrangian x' = v and v' from the Euler-Lagrange equations.
 
     Raises ValueError as `parameters` does.
     """
-    model, law = _model(oscillator, friction, contact)
-    symbols = {name: sp.Symbol(name, real=True) for name in parameters(oscillator, friction, contact)}
-    if hasattr(model, "field"):
-        own = {name: sp.Symbol(name, real=True) for name in model.STATE}
-        rates = call(model.field, {**symbols, **own, "t": TIME})
-        return Node(tuple(own.values()), tuple(map(sp.sympify, rates)), tuple(symbols.values()))
-    system = nondimensional(model)
+    symbols = tuple(sp.Symbol(name, real=True) for name in parameters(oscillator, friction, contact))
+    if isinstance(oscillator.model, Field):
+        return Node(
+            tuple(sp.Symbol(name, real=True) for name in oscillator.model.state), oscillator.model.rates, symbols
+        )
+    system = nondimensional(oscillator)
     found = cancelled(system.accelerations())
     state = (*system.coordinates, *system.velocities)
-    if law is None:
-        return Node(state, (*system.velocities, *found), tuple(symbols.values()))
-    if contact == "set-valued" and _jumps(law):
-        return _sticking(system, found, law, tuple(symbols.values()))
-    coefficient = friction_coefficient(law, contact)
+    if friction is None:
+        return Node(state, (*system.velocities, *found), symbols)
+    if contact == ContactModel.SET_VALUED and friction.jumps:
+        return _sticking(system, found, friction, symbols)
+    coefficient = friction_coefficient(friction, contact)
     rates = (e.replace(FRICTION, coefficient) for e in found)
-    return Node(state, (*system.velocities, *rates), tuple(symbols.values()), law=coefficient(SLIDING))
-
-
-def _jumps(law: ModuleType) -> bool:
-    """True where friction has a jump at rest; without one nothing sticks and the equations are smooth as they are."""
-    return hasattr(law, "static") or friction_coefficient(law, "sign")(sp.Symbol("w", real=True)).has(sp.sign)
+    return Node(state, (*system.velocities, *rates), symbols, law=coefficient(SLIDING))
 
 
 def _sticking(
-    system: Mechanics, found: tuple[sp.Expr, ...], law: ModuleType, parameters: tuple[sp.Symbol, ...]
+    system: Mechanics, found: tuple[sp.Expr, ...], law: FrictionLaw, parameters: tuple[sp.Symbol, ...]
 ) -> Node:
     """The node that sticks and slips: states x, v and the mode."""
     if len(found) != 1:
         raise ValueError(f"set-valued contact: the oscillator has {len(found)} coordinates; expected one")
     w = sp.Dummy("w", real=True)
-    coefficient = friction_coefficient(law, "set-valued")
+    coefficient = friction_coefficient(law, ContactModel.SET_VALUED)
     (velocity,) = system.velocities
     rate, contact = set_valued(found[0], FRICTION, coefficient(w), w, static_coefficient(law), velocity)
     rates = (velocity, SLIP**2 * rate, sp.S.Zero)
@@ -104,21 +114,15 @@ def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str)
         table[name] = parameter
 
 
-def _model(oscillator: str, friction: str | None, contact: str) -> tuple[ModuleType, ModuleType | None]:
-    """The modules of an oscillator and its friction law, None where it takes none."""
-    model = load("oscillator", oscillator)
-    if contact not in CONTACTS:
-        raise ValueError(f"unknown contact {contact!r}; known: {', '.join(CONTACTS)}")
-    if friction is None:
-        if model.FRICTION:
-            raise ValueError(
-                f"oscillator {oscillator!r} has no friction law; known: {', '.join(names('friction'))}; name one"
-            )
-        return model, None
-    law = load("friction", friction)
-    if not model.FRICTION:
-        raise ValueError(f"oscillator {oscillator!r} takes no friction law, found {friction!r}; leave it out")
-    return model, law
+def _check_parts(oscillator: Oscillator, friction: FrictionLaw | None, contact: str) -> None:
+    """Raise ValueError for an unknown contact, and if an oscillator lacks a friction law or takes none."""
+    ContactModel.parse("contact", contact)
+    if friction is None and oscillator.takes_friction:
+        raise ValueError(
+            f"oscillator {oscillator.name!r} has no friction law; known: {', '.join(names(FRICTION_LAW))}; name one"
+        )
+    if friction is not None and not oscillator.takes_friction:
+        raise ValueError(f"oscillator {oscillator.name!r} takes no friction law, found {friction.name!r}; leave it out")
 
 
 def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str, ...] = ()) -> Equations:
@@ -135,10 +139,10 @@ def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str,
 
 
 def mixed_network(
-    oscillators: Sequence[str],
+    oscillators: Sequence[Oscillator],
     singles: Sequence[Node],
     kinds: Sequence[int],
-    coupling: str | None,
+    coupling: Coupling | None,
     graph: Topology,
     varied: tuple[str, ...] = (),
 ) -> Equations:
@@ -152,7 +156,7 @@ def mixed_network(
     pairs = sorted({apart.ends(link) for link in graph.links})
     edges = tuple(((a, b), edge(coupling, singles[a], oscillators[a], singles[b], oscillators[b])) for a, b in pairs)
     if any(a == b and is_oriented(link) for (a, b), link in edges):
-        raise ValueError(f"coupling {coupling!r} tells the ends of a link apart; expected nodes of one kind")
+        raise ValueError(f"coupling {str(coupling)!r} tells the ends of a link apart; expected nodes of one kind")
     return replace(apart, links=graph.links, edge_of=edges)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from synchain.models.inputs.plugins import load as plugin
+from synchain.models.mechanics.components import SLIDING
 from synchain.models.mechanics.friction import regularise
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
@@ -45,14 +45,16 @@ def compute(name: str, runs: FigureRuns) -> Law:
 
 def forces(scene: Scene) -> tuple[Any, Any]:
     """The friction coefficient as functions of an array of relative velocities: the law itself, and smoothed."""
-    law = plugin("friction", str(scene.templates[0][1]))
-    w, kappa = sp.Symbol("w", real=True), sp.Symbol("kappa", real=True)
-    symbols = {key: sp.Symbol(key, real=True) for key in law.PARAMETERS}
-    sharp = law.force(w, **symbols)
+    law = scene.model.kinds[0].friction
+    if law is None:
+        raise ValueError(f"oscillator {scene.oscillator.name!r} takes no friction law; expected a scene with one")
+    kappa = sp.Symbol("kappa", real=True)
+    symbols = {key: sp.Symbol(key, real=True) for key in law.parameters}
+    sharp = law.force
     numbers = {symbol: scene.parameters[key] for key, symbol in symbols.items()}
     numbers[kappa] = scene.parameters["kappa"]
     smooth = regularise(sharp, kappa)
-    return sp.lambdify(w, sharp.subs(numbers), "numpy"), sp.lambdify(w, smooth.subs(numbers), "numpy")
+    return sp.lambdify(SLIDING, sharp.subs(numbers), "numpy"), sp.lambdify(SLIDING, smooth.subs(numbers), "numpy")
 
 
 def table(data: Law) -> Table:

@@ -236,7 +236,7 @@ def unit_of_time(scene: Scene) -> float:
     drive = scene.drive
     if scene.forced and drive.frequency is None:
         raise ValueError(
-            f"drive: the oscillator {scene.oscillator!r} {drive.problem}; expected one with a period; "
+            f"drive: the oscillator {scene.oscillator.name!r} {drive.problem}; expected one with a period; "
             "`run` integrates others with time_unit = 'time'"
         )
     return scene.period or 2.0 * math.pi
