@@ -1,12 +1,14 @@
-"""Cluster states of a small graph: which oscillators can move as one, and the exact equations of their differences.
+"""Cluster states of a small graph: what can move as one, and equations of differences.
 
-A symmetry of the graph maps solutions to solutions, so the nodes of an orbit of any group of symmetries may stay equal.
-The differences within the clusters obey a linear equation of their own: with x_i - x_first(cluster) as coordinates it is
-rational, and it falls into blocks, one for each set of clusters that are intertwined.  The row sums of G are zero, so the
-partitions that G leaves invariant are the external equitable ones.
+A symmetry of the graph maps solutions to solutions: the nodes of an orbit of a group of symmetries
+may stay equal.  The differences within the clusters obey a linear equation of their own.  With
+x_i - x_first(cluster) as coordinates it is rational, and it falls into blocks, one for each set of
+intertwined clusters.  The row sums of G are zero, so the partitions that G leaves invariant are the
+external equitable ones.
 
-Sources: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014): clusters from symmetries, blocks,
-isolated desynchronisation; Golubitsky & Stewart, Bull. Amer. Math. Soc. 43, 305 (2006): balanced partitions.
+Sources: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014): clusters from
+symmetries, blocks, isolated desynchronisation; Golubitsky & Stewart, Bull. Amer. Math. Soc. 43, 305
+(2006): balanced partitions.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from .topology import Topology, a_graph
 __all__ = ["Block", "Clusters", "clusters", "orbital_partitions"]
 
 NODE_LIMIT = 64
-"""Largest graph whose symmetries are looked for."""
+"""Largest graph with a search for symmetries."""
 
 PARTITION_LIMIT = 5000
 """Most partitions that are listed."""
@@ -39,8 +41,16 @@ Rows = tuple[tuple[Fraction, ...], ...]
 class Block:
     """Differences that influence each other and no others.
 
-    `clusters` are the intertwined ones; coordinate k is x_i - x_j for pairs[k] = (i, j) and lives on the orbit of cluster
-    nodes[k]; `matrix` (b x b) takes the place of G in its variational equation.
+    Parameters
+    ----------
+    clusters : tuple of int
+        The intertwined clusters.
+    nodes : tuple of int
+        The cluster on whose orbit each of the b coordinates lives.
+    pairs : tuple of (int, int)
+        Coordinate k is x_i - x_j for ``pairs[k] = (i, j)``.
+    matrix : tuple of tuple of Fraction
+        b x b; takes the place of G in the variational equation.
     """
 
     clusters: tuple[int, ...]
@@ -51,9 +61,16 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Clusters:
-    """A balanced partition: the cluster of each node, the network of the clusters, and the blocks of the differences.
+    """A balanced partition.  The eigenvalues of quotient and blocks are together those of G.
 
-    Clusters are numbered by their first nodes.  The eigenvalues of the quotient and of the blocks are together those of G.
+    Parameters
+    ----------
+    classes : tuple of int
+        The cluster of each node; clusters are numbered by their first nodes.
+    quotient : Topology
+        The network of the clusters.
+    blocks : tuple of Block
+        The differences within clusters.
     """
 
     classes: tuple[int, ...]
@@ -67,10 +84,22 @@ class Clusters:
 
 
 def orbital_partitions(graph: Topology, limit: int = 20_000) -> tuple[Clusters, ...]:
-    """All partitions into orbits of a group of symmetries, from single nodes to the coarsest.
+    """Return all partitions into orbits of groups of symmetries, from single nodes upwards.
 
-    The orbits of one symmetry are its cycles; the orbits of a group are the join of those of its elements.
-    Raises ValueError for more than NODE_LIMIT nodes, `limit` automorphisms or PARTITION_LIMIT partitions.
+    The orbits of one symmetry are its cycles; those of a group are the join of the orbits of its
+    elements.
+
+    Parameters
+    ----------
+    graph : Topology
+        The graph.
+    limit : int, optional
+        Greatest number of automorphisms.
+
+    Raises
+    ------
+    ValueError
+        On more than NODE_LIMIT nodes, `limit` automorphisms or PARTITION_LIMIT partitions.
     """
     if a_graph("orbital_partitions", graph).n > NODE_LIMIT:
         raise ValueError(
@@ -92,9 +121,19 @@ def orbital_partitions(graph: Topology, limit: int = 20_000) -> tuple[Clusters, 
 
 
 def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
-    """The cluster state of any balanced partition, with or without symmetry; `classes` has the cluster of each node.
+    """Return the cluster state of any balanced partition, with or without symmetry.
 
-    Raises ValueError where the partition is not balanced, or has not one class for each node.
+    Parameters
+    ----------
+    graph : Topology
+        The graph.
+    classes : sequence
+        The cluster of each node.
+
+    Raises
+    ------
+    ValueError
+        If the partition is not balanced, or has not one class for each node.
     """
     a_graph("clusters", graph)
     if not isinstance(classes, Collection) or isinstance(classes, Set | Mapping):
@@ -122,7 +161,7 @@ def _described(graph: Topology, classes: tuple[int, ...], characteristic: fmpq_p
 
 
 def _blocks(graph: Topology, classes: tuple[int, ...]) -> tuple[Block, ...]:
-    """T G L of the differences from the first node of each cluster, split where no entry joins two clusters."""
+    """T G L of differences from the first nodes of clusters, in blocks of joined clusters."""
     first = {k: i for i, k in reversed(list(enumerate(classes)))}
     pairs = [(i, first[k]) for i, k in enumerate(classes) if i != first[k]]
     rows = graph.rows

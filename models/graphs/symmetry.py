@@ -18,9 +18,24 @@ TRY_LIMIT = 2_000_000
 
 
 def automorphisms(graph: Topology, limit: int = 20_000) -> tuple[Permutation, ...]:
-    """All automorphisms of a graph with weights and directions, the identity first.
+    """Return all automorphisms of a graph with weights and directions, the identity first.
 
-    Raises ValueError where there are more than `limit`, or where the search takes more than TRY_LIMIT steps.
+    Parameters
+    ----------
+    graph : Topology
+        The graph.
+    limit : int, optional
+        Greatest number of automorphisms.
+
+    Returns
+    -------
+    tuple of tuple of int
+        The image of each node under each automorphism, sorted.
+
+    Raises
+    ------
+    ValueError
+        If there are more than `limit`, or the search takes more than TRY_LIMIT steps.
     """
     found: list[Permutation] = []
     for permutation in _search(graph):
@@ -34,7 +49,7 @@ def automorphisms(graph: Topology, limit: int = 20_000) -> tuple[Permutation, ..
 
 
 def _search(graph: Topology) -> Iterator[Permutation]:
-    """Assign images node by node along the links, so that each image is next to one that is already fixed."""
+    """Assign images along the links: each image is next to one that is already fixed."""
     weights = graph.rows
     colour = coarsest_balanced(graph.n, graph.links, [row[i] for i, row in enumerate(weights)])
     order, anchor = _order(graph, colour)
@@ -68,7 +83,7 @@ def _search(graph: Topology) -> Iterator[Permutation]:
 
 
 def _order(graph: Topology, colour: tuple[int, ...]) -> tuple[list[int], dict[int, int]]:
-    """All nodes, part by part, breadth first from a rare colour; and for each that has one an earlier neighbour."""
+    """All nodes, part by part, breadth first from a rare colour; and earlier neighbours."""
     near = _neighbours(graph)
     rare = sorted(range(graph.n), key=lambda i: (colour.count(colour[i]), i))
     order: list[int] = []
