@@ -26,7 +26,7 @@ from .partitions import class_links, join
 from .symmetry import automorphisms
 from .topology import Topology, a_graph
 
-__all__ = ["Block", "Clusters", "clusters", "orbital_partitions"]
+__all__ = ["Block", "Clusters", "check", "clusters", "orbital_partitions"]
 
 NODE_LIMIT = 64
 """Largest graph with a search for symmetries."""
@@ -83,7 +83,9 @@ class Clusters:
         return tuple(tuple(i for i, k in enumerate(self.classes) if k == c) for c in range(self.quotient.n))
 
 
-def orbital_partitions(graph: Topology, limit: int = 20_000) -> tuple[Clusters, ...]:
+def orbital_partitions(
+    graph: Topology, limit: int = 20_000, partition_limit: int = PARTITION_LIMIT
+) -> tuple[Clusters, ...]:
     """Return all partitions into orbits of groups of symmetries, from single nodes upwards.
 
     The orbits of one symmetry are its cycles; those of a group are the join of the orbits of its
@@ -95,11 +97,13 @@ def orbital_partitions(graph: Topology, limit: int = 20_000) -> tuple[Clusters, 
         The graph.
     limit : int, optional
         Greatest number of automorphisms.
+    partition_limit : int, optional
+        Greatest number of partitions.
 
     Raises
     ------
     ValueError
-        On more than NODE_LIMIT nodes, `limit` automorphisms or PARTITION_LIMIT partitions.
+        On more than NODE_LIMIT nodes, `limit` automorphisms or `partition_limit` partitions.
     """
     if a_graph("orbital_partitions", graph).n > NODE_LIMIT:
         raise ValueError(
@@ -111,9 +115,9 @@ def orbital_partitions(graph: Topology, limit: int = 20_000) -> tuple[Clusters, 
     for partition in sorted(cycles, key=_fine_first):
         if partition not in closed:  # else a join of finer ones
             closed |= {join(graph.n, [*_stars(partition), *_stars(other)]) for other in closed}
-        if len(closed) > PARTITION_LIMIT:
+        if len(closed) > partition_limit:
             raise ValueError(
-                f"{graph.name}({graph.n}) has more than {PARTITION_LIMIT} orbital partitions; describe single ones with "
+                f"{graph.name}({graph.n}) has more than {partition_limit} orbital partitions; describe single ones with "
                 "`clusters`"
             )
     characteristic = _polynomial(graph.rows)
@@ -146,18 +150,23 @@ def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
 
 
 def _described(graph: Topology, classes: tuple[int, ...], characteristic: fmpq_poly) -> Clusters:
-    """Quotient and blocks, proved by characteristic polynomials."""
+    """Quotient and blocks of a balanced partition, proved."""
     quotient = Topology(f"{graph.name} quotient", max(classes) + 1, class_links(graph.n, graph.links, classes))
-    made = Clusters(classes, quotient, _blocks(graph, classes))
-    product = _polynomial(quotient.rows)
-    for block in made.blocks:
+    state = Clusters(classes, quotient, _blocks(graph, classes))
+    check(state, graph, characteristic)
+    return state
+
+
+def check(state: Clusters, graph: Topology, characteristic: fmpq_poly) -> None:
+    """Raise ProofError if quotient and blocks do not multiply out to the polynomial of the graph."""
+    product = _polynomial(state.quotient.rows)
+    for block in state.blocks:
         product *= _polynomial(block.matrix)
     if product != characteristic:
         raise ProofError(
-            f"clusters {classes} of {graph.name}({graph.n}): quotient and blocks multiply out to {product}; expected the "
-            f"characteristic polynomial {characteristic}"
+            f"clusters {state.classes} of {graph.name}({graph.n}): quotient and blocks multiply out to {product}; "
+            f"expected the characteristic polynomial {characteristic}"
         )
-    return made
 
 
 def _blocks(graph: Topology, classes: tuple[int, ...]) -> tuple[Block, ...]:
@@ -169,18 +178,18 @@ def _blocks(graph: Topology, classes: tuple[int, ...]) -> tuple[Block, ...]:
     on = [classes[i] for i, _ in pairs]
     met = [(on[a], on[b]) for a, row in enumerate(matrix) for b, entry in enumerate(row) if entry]
     group = join(max(classes) + 1, met)
-    found = []
+    blocks = []
     for part in sorted({group[k] for k in on}):
-        chosen = [a for a, k in enumerate(on) if group[k] == part]
-        found.append(
+        places = [a for a, k in enumerate(on) if group[k] == part]
+        blocks.append(
             Block(
-                tuple(sorted({on[a] for a in chosen})),
-                tuple(on[a] for a in chosen),
-                tuple(pairs[a] for a in chosen),
-                tuple(tuple(matrix[a][b] for b in chosen) for a in chosen),
+                tuple(sorted({on[a] for a in places})),
+                tuple(on[a] for a in places),
+                tuple(pairs[a] for a in places),
+                tuple(tuple(matrix[a][b] for b in places) for a in places),
             )
         )
-    return tuple(found)
+    return tuple(blocks)
 
 
 def _stars(classes: tuple[int, ...]) -> list[tuple[int, int]]:

@@ -13,11 +13,11 @@ __all__ = ["Permutation", "automorphisms"]
 Permutation = tuple[int, ...]
 """The image of each node."""
 
-TRY_LIMIT = 2_000_000
-"""Images tried before the search is given up."""
+STEP_LIMIT = 2_000_000
+"""Images tried before the search ends."""
 
 
-def automorphisms(graph: Topology, limit: int = 20_000) -> tuple[Permutation, ...]:
+def automorphisms(graph: Topology, limit: int = 20_000, step_limit: int = STEP_LIMIT) -> tuple[Permutation, ...]:
     """Return all automorphisms of a graph with weights and directions, the identity first.
 
     Parameters
@@ -26,6 +26,8 @@ def automorphisms(graph: Topology, limit: int = 20_000) -> tuple[Permutation, ..
         The graph.
     limit : int, optional
         Greatest number of automorphisms.
+    step_limit : int, optional
+        Greatest number of steps of the search.
 
     Returns
     -------
@@ -35,20 +37,20 @@ def automorphisms(graph: Topology, limit: int = 20_000) -> tuple[Permutation, ..
     Raises
     ------
     ValueError
-        If there are more than `limit`, or the search takes more than TRY_LIMIT steps.
+        If there are more than `limit`, or the search takes more than `step_limit` steps.
     """
-    found: list[Permutation] = []
-    for permutation in _search(graph):
-        if len(found) == limit:
+    permutations: list[Permutation] = []
+    for permutation in _search(graph, step_limit):
+        if len(permutations) == limit:
             raise ValueError(
                 f"{graph.name}({graph.n}) has more than {limit} automorphisms; expected at most {limit}: raise "
                 "the limit, or describe single partitions with `clusters`"
             )
-        found.append(permutation)
-    return tuple(sorted(found))
+        permutations.append(permutation)
+    return tuple(sorted(permutations))
 
 
-def _search(graph: Topology) -> Iterator[Permutation]:
+def _search(graph: Topology, step_limit: int) -> Iterator[Permutation]:
     """Assign images along the links: each image is next to one that is already fixed."""
     weights = graph.rows
     colour = coarsest_balanced(graph.n, graph.links, [row[i] for i, row in enumerate(weights)])
@@ -56,19 +58,19 @@ def _search(graph: Topology) -> Iterator[Permutation]:
     near = _neighbours(graph)
     image: dict[int, int] = {}
     used: set[int] = set()
-    tries = 0
+    steps = 0
 
     def extend(place: int) -> Iterator[Permutation]:
-        nonlocal tries
+        nonlocal steps
         if place == graph.n:
             yield tuple(image[i] for i in range(graph.n))
             return
         i = order[place]
         for j in near[image[anchor[i]]] if i in anchor else range(graph.n):
-            tries += 1
-            if tries > TRY_LIMIT:
+            steps += 1
+            if steps > step_limit:
                 raise ValueError(
-                    f"{graph.name}({graph.n}): automorphisms not found in {TRY_LIMIT} steps; describe "
+                    f"{graph.name}({graph.n}): automorphisms not found in {step_limit} steps; describe "
                     "single partitions with `clusters`"
                 )
             if j in used or colour[i] != colour[j]:

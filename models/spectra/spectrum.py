@@ -80,7 +80,7 @@ class Spectrum:
 
     @property
     def multiplicities(self) -> tuple[int, ...]:
-        """How often each distinct eigenvalue occurs (algebraic multiplicity)."""
+        """The algebraic multiplicity of each distinct eigenvalue."""
         return tuple(e.multiplicity for e in self.eigenvalues)
 
     @property
@@ -91,15 +91,16 @@ class Spectrum:
     @property
     def defective(self) -> tuple[Eigenvalue, ...]:
         """The eigenvalues that are known to have fewer eigenvectors than their multiplicity."""
-        return (
-            () if isinstance(self.eigenvalues, LazyEigenvalues) else tuple(e for e in self.eigenvalues if e.defective)
-        )
+        if isinstance(self.eigenvalues, LazyEigenvalues):
+            return ()
+        return tuple(e for e in self.eigenvalues if e.defective)
 
     @property
     def zeros(self) -> int:
-        """How often 0 is an eigenvalue."""
-        if isinstance(self.eigenvalues, LazyEigenvalues):  # 0 is the first
-            return self.eigenvalues[0].multiplicity
+        """The multiplicity of 0."""
+        if isinstance(self.eigenvalues, LazyEigenvalues):
+            first: Eigenvalue = self.eigenvalues[0]  # 0 is the first
+            return first.multiplicity
         return sum(e.multiplicity for e in self.eigenvalues if e.number is sp.S.Zero)
 
     @property
@@ -154,11 +155,15 @@ class Spectrum:
             "chance": self.error_probability,
         }
 
-    def __repr__(self) -> str:
-        many = len(self) > SHOWN
-        shown = [f"{e}: {e.multiplicity}" for e in (self.eigenvalues[: SHOWN - 1] if many else self.eigenvalues)]
-        last = [f"… ({len(self) - SHOWN} more)", f"{self[-1]}: {self[-1].multiplicity}"] if many else []
+    def text(self, limit: int) -> str:
+        """Return text such as {0: 1, -2: 3}; of more than `limit` eigenvalues the middle is left out."""
+        many = len(self) > limit
+        shown = [f"{e}: {e.multiplicity}" for e in (self.eigenvalues[: limit - 1] if many else self.eigenvalues)]
+        last = [f"… ({len(self) - limit} more)", f"{self[-1]}: {self[-1].multiplicity}"] if many else []
         return "{" + ", ".join(shown + last) + "}"
+
+    def __repr__(self) -> str:
+        return self.text(SHOWN)
 
 
 def _farthest(eigenvalues: Sequence[Eigenvalue], way: int) -> sp.Expr:
