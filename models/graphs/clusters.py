@@ -158,7 +158,7 @@ def _described(graph: Topology, classes: tuple[int, ...], characteristic: fmpq_p
 
 
 def check(state: Clusters, graph: Topology, characteristic: fmpq_poly) -> None:
-    """Raise ProofError if quotient and blocks do not multiply out to the polynomial of the graph."""
+    """Raise ProofError if quotient and blocks do not multiply out to the polynomial of G."""
     product = _polynomial(state.quotient.rows)
     for block in state.blocks:
         product *= _polynomial(block.matrix)

@@ -156,7 +156,7 @@ class Spectrum:
         }
 
     def text(self, limit: int) -> str:
-        """Return text such as {0: 1, -2: 3}; of more than `limit` eigenvalues the middle is left out."""
+        """Return text such as {0: 1, -2: 3}, without the middle of more than `limit` eigenvalues."""
         many = len(self) > limit
         shown = [f"{e}: {e.multiplicity}" for e in (self.eigenvalues[: limit - 1] if many else self.eigenvalues)]
         last = [f"… ({len(self) - limit} more)", f"{self[-1]}: {self[-1].multiplicity}"] if many else []
