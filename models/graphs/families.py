@@ -124,7 +124,7 @@ class Family:
             )
 
     def _size(self, n: Any) -> int:
-        """Return the number of nodes; TypeError if it is no integer, ValueError if it is too small."""
+        """The number of nodes; TypeError if it is no integer, ValueError if it is too small."""
         if isinstance(n, bool) or not hasattr(n, "__index__"):
             raise TypeError(f"topology {self.name}: n = {n!r} is a {type(n).__name__}; expected an integer")
         size = operator.index(n)
@@ -133,7 +133,7 @@ class Family:
         return size
 
     def _settled(self, n: int, options: Mapping[str, Any]) -> Options:
-        """Return all options as they are stored, checked by the family's `settle`."""
+        """All options as they are stored, checked by the family's `settle`."""
         for key in options:
             if key not in self.options:
                 words = f"known: {', '.join(self.options)}" if self.options else "this family has none: remove it"
@@ -223,7 +223,7 @@ def topology(name: str, n: int, **options: Any) -> Topology:
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all families: shipped files and entry points of installed packages, sorted."""
+    """Return the names of all families, sorted: shipped files and entry points."""
     return plugins.names(TOPOLOGY)
 
 
@@ -258,7 +258,7 @@ _ATTRIBUTES = {
 
 
 def _of_module(name: str, module: ModuleType) -> Family:
-    """Return the family of a module; errors of functions from outside the package name their file and line."""
+    """The family of a module; errors of functions from outside the package name file and line."""
     parts = {attribute: getattr(module, key) for key, attribute in _ATTRIBUTES.items() if hasattr(module, key)}
     outside = not module.__name__.startswith(f"{plugins.PACKAGE}.")
     for key in ("count", "expected", "spectrum"):
