@@ -1,4 +1,4 @@
-"""Synchronous orbits with all their modes, settled on an attractor, then advanced block by block."""
+"""Synchronous orbits with all their modes: settling on an attractor, then advancing by blocks."""
 
 from __future__ import annotations
 
@@ -198,7 +198,7 @@ class Orbits:
         length = np.linalg.norm(moved, axis=2)
         with np.errstate(divide="ignore", invalid="ignore"):
             self.deviations = np.where(length[..., None] > 0.0, moved / length[..., None], 0.0)
-            return np.log(length)
+            return np.asarray(np.log(length))
 
 
 def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:
