@@ -138,9 +138,7 @@ def bifurcations_at_end(arc: Arc, beyond: float) -> list[Bifurcation]:
 
 
 def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
-    """Period doubling of the orbit between the two halves of an arc's last orbit, of half its
-    periods.
-    """
+    """Period doubling of an orbit of half the periods, between the halves of an arc's last orbit."""
     half, last = arc.periods // 2, arc.orbits[-1]
     if arc.periods % 2:
         return None
@@ -197,9 +195,7 @@ def _same_slips(before: Phases, after: Phases) -> bool:
 
 
 def _stick_loss(arc: Arc, value: float, orbit: PeriodicOrbit, before: Phases, after: Phases) -> Bifurcation | None:
-    """Stick loss between the last orbit of an arc and the next; None if the load stays below the
-    limit.
-    """
+    """Stick loss between the last orbit of an arc and the next, None if there is none."""
     if not before.landing * after.landing < 0.0:
         return None
     ends = {arc.values[-1]: before.landing, value: after.landing}
@@ -265,9 +261,7 @@ def _orbit(arc: Arc, value: float) -> PeriodicOrbit | None:
 
 
 def _where(arc: Arc, gap: float) -> float:
-    """Value at which a gap is expected by linear extrapolation of the last two; nan if there is
-    none.
-    """
+    """Value at which a gap is expected by linear extrapolation; nan if there is none."""
     if len(arc.values) < 2:
         return float("nan")
     (a, b), (one, two) = arc.values[-2:], arc.phases[-2:]

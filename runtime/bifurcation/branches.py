@@ -43,9 +43,7 @@ FAR = 0.3
 """
 
 KINK = 1e-2
-"""Distance from the expected state that is always allowed: a change of phases is a kink of the
-branch.
-"""
+"""Distance from the expected state that is always allowed: changes of phases are kinks."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -186,8 +186,17 @@ class ArclengthStep:
         return float(np.prod(self.orbit(point).multipliers - 1.0).real)
 
     def point(self, length: float) -> np.ndarray | None:
-        """Find the point of the arc at a length from the start, measured along the direction; None
-        if none.
+        """Find the point of the arc at a length from the start, measured along the direction.
+
+        Parameters
+        ----------
+        length : float
+            Length.
+
+        Returns
+        -------
+        ndarray, shape (components + 1,), or None
+            State and parameter; None if Newton's method does not converge.
         """
         unit = self.along / np.linalg.norm(self.along)
         guess = self.start + length * unit

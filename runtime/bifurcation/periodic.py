@@ -165,9 +165,7 @@ def periodic_orbit(
 
 
 def _nearly_sticks(image: np.ndarray, gap: np.ndarray) -> bool:
-    """True if the image of a state sticks and the state itself slips at a speed of rounding
-    errors.
-    """
+    """True if a state slips at a speed of rounding errors and its image sticks."""
     return len(image) > len(gap) and image[-1] == 0.0 and 0.0 < abs(gap[1]) < ROUNDING
 
 

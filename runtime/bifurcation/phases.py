@@ -119,9 +119,7 @@ Function = Callable[..., np.ndarray]
 
 
 def _margins(scene: Scene, contact: Contact) -> tuple[Function, Function]:
-    """Distance of the load from the limits of static friction, and the sliding velocity, as
-    functions.
-    """
+    """Functions for the distance of the load from the limits of friction and the sliding velocity."""
     up, down, sliding = _functions(contact, tuple(scene.equations.node.state), tuple(scene.parameters))
     numbers = list(scene.parameters.values())
     return (
@@ -132,9 +130,7 @@ def _margins(scene: Scene, contact: Contact) -> tuple[Function, Function]:
 
 @lru_cache(maxsize=16)
 def _functions(contact: Contact, state: tuple[sp.Symbol, ...], names: tuple[str, ...]) -> tuple[Function, ...]:
-    """Both limits and the sliding velocity as functions of position, velocity, time and
-    parameters.
-    """
+    """Both limits and the sliding velocity as functions of state, time and parameters."""
     symbols = [*state[:2], TIME, *(sp.Symbol(name, real=True) for name in names)]
     return tuple(sp.lambdify(symbols, e, "numpy") for e in (contact.up, contact.down, contact.sliding))
 

@@ -33,9 +33,7 @@ NEARER = 4
 """The other sheet at a fold is entered at 4^-NEARER of the distance between fold and last orbit."""
 
 CLOSE, APART, TRIES = 0.05, 0.02, 12
-"""Largest distance of a return, least distance between the starts, and most starts for each number
-of periods.
-"""
+"""Largest distance of a return, least distance between starts, most starts for one period."""
 
 
 def skeleton(

@@ -101,9 +101,7 @@ def table(data: Diagram) -> Table:
 
 
 def draw(axes: Axes, data: Diagram) -> Axes:
-    """Draw section points as dots, synchronous ranges in grey and the published range as a thin
-    bar.
-    """
+    """Draw section points as dots, synchronous ranges in grey, the published range as a bar."""
     found, _ = points(data)
     values = data.result.data[data.axis].values
     if "sync_error" in data.result.data:

@@ -1,5 +1,4 @@
-"""The master stability function of the friction oscillator, one panel for each frequency of the
-paper.
+"""The master stability function of the friction oscillator at the paper's frequencies.
 
 Stable ranges are grey; the published ranges of two oscillators are drawn beside them.
 """
@@ -96,9 +95,7 @@ def table(data: tuple[MSF, ...]) -> Table:
 
 
 def ranges(data: tuple[MSF, ...]) -> Table:
-    """Return ranges of alpha with a negative exponent, uncertainties of their ends, kind of
-    motion.
-    """
+    """Return ranges of alpha with a negative exponent, errors of their ends, kind of motion."""
     rows = [
         (found.scene.parameters["omega"], low, high, *errors, found.attractors[0])
         for found in data

@@ -87,9 +87,7 @@ class FigureRuns:
         return self._runs[scene]
 
     def pair(self, scene: Scene) -> Sweep:
-        """Run the two-oscillator probe of a scene's oscillator over alpha = 2 sigma, sigma from 0
-        to 0.6.
-        """
+        """Run the two-oscillator probe of a scene's oscillator over alpha from 0 to 1.2."""
         pair = scene.replace(topology=topology("chain", 2), initial=None, axes=(), title="", sigma=0.0)
         if pair not in self._sweeps:
             alpha = 2.0 * np.array(thin(_swept(pair, 0.6, 601), self.quality.grid).axes[0].values)
@@ -97,9 +95,7 @@ class FigureRuns:
         return self._sweeps[pair]
 
     def network(self, scene: Scene) -> Sweep:
-        """Find ranges and errors of a scene's network on its own grid of sigma, by direct
-        simulation.
-        """
+        """Simulate a scene's network on its own grid of sigma to find its synchronous ranges."""
         if scene.topology == topology("chain", 2):
             found = self.pair(scene)
             return Sweep(0.5 * found.x, found.error, found.share, tuple(scale(found.intervals, 0.5)))
@@ -130,9 +126,7 @@ class FigureRuns:
         return simulate(scene.replace(axes=(), record=("sync_error",)), sigma, **options)
 
     def predicted(self, scene: Scene) -> list[Interval]:
-        """Project the ranges of the probe onto a scene's values of sigma, through its exact
-        spectrum.
-        """
+        """Project the ranges of the probe onto a scene's values of sigma by its exact spectrum."""
         return project(self.pair(scene).intervals, scene.spectrum, max(scene.axes[0].values))
 
     def chain(self, n: int, omega: float) -> Scene:

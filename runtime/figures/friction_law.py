@@ -1,6 +1,4 @@
-"""Figure 1b: friction force over relative velocity, as set-valued law and as smoothed for
-integration.
-"""
+"""Figure 1b: friction force over relative velocity, set-valued and smoothed."""
 
 from __future__ import annotations
 
@@ -59,9 +57,7 @@ def compute(name: str, runs: FigureRuns) -> Law:
 
 
 def forces(scene: Scene) -> tuple[Any, Any]:
-    """Return the friction coefficient as functions of relative velocity: the law itself, and
-    smoothed.
-    """
+    """Return the friction coefficient as functions of relative velocity, set-valued and smoothed."""
     law = plugin("friction", str(scene.templates[0][1]))
     w, kappa = sp.Symbol("w", real=True), sp.Symbol("kappa", real=True)
     symbols = {key: sp.Symbol(key, real=True) for key in law.PARAMETERS}

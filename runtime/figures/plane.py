@@ -81,9 +81,7 @@ def uneven_ring(n: int, back: Fraction = Fraction(1, 2)) -> Topology:
 
 
 def compute(name: str, runs: FigureRuns) -> Rays:
-    """Compute the function at one frequency for the upper half of the plane, which the lower
-    mirrors.
-    """
+    """Compute the function at one frequency; the lower half of the plane mirrors the upper."""
     scene = Scene(topology=uneven_ring(NODES), parameters={"omega": OMEGA})
     count = min(runs.quality.grid or 161, 161)
     alpha, beta = np.linspace(0.0, HIGHEST, count), np.linspace(0.0, TOP, count // 2 + 1)

@@ -80,7 +80,7 @@ def compute(name: str, runs: FigureRuns) -> Projection:
 
 
 def table(data: Projection) -> Table:
-    """Return errors (median over the starts), shares, status; exponents and their standard errors."""
+    """Return errors (median over the starts), shares and status; exponents and their errors."""
     rows: list[tuple[Any, ...]] = []
     for what, sweep in (("probe", data.probe), ("network", data.network)):
         for x, error, share in zip(sweep.x, sweep.error, sweep.share, strict=True):
@@ -106,7 +106,7 @@ def ranges(data: Projection) -> Table:
 
 
 def layout(figure: Figure) -> tuple[Axes, Axes, Axes]:
-    """Add axes for the probe (top left), the lines (top right) and the network (below the lines)."""
+    """Add axes for the probe (top left), lines (top right) and the network (below the lines)."""
     figure.set_layout_engine("none")  # the panels stand so close that the bands run through
     left, middle, right = (0.12, 0.345), 0.375, 0.885
     rays = figure.add_axes((middle, 0.40, right - middle, 0.51))

@@ -89,9 +89,7 @@ def _possible(result: Result) -> tuple[str, ...]:
 
 
 def _cut(result: Result, keep: int) -> tuple[xr.Dataset, str]:
-    """Select the last `keep` axes of a result at the first value of the others; unfinished cells
-    are NaN.
-    """
+    """Select the last `keep` axes of a result; cells that did not finish become NaN."""
     data = result.data
     leading = data.status.dims[: max(data.status.ndim - keep, 0)]
     words = ", ".join(f"{symbol(str(name))} = {float(data[name][0]):.4g}" for name in leading)
@@ -147,17 +145,13 @@ def _section(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
 
 
 def _section_words(result: Result) -> str:
-    """The section for an axis label: its state as a formula, its direction and a level other than
-    0.
-    """
+    """The section for an axis label: state as a formula, direction and a level other than 0."""
     section = result.scene.section
     return f"{symbol(section.variable)}{str(section).removeprefix(section.variable)}"
 
 
 def _map(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
-    """Colours over the last two axes: error, else number of section points, else the first final
-    state.
-    """
+    """Colours over the last two axes: error, else number of section points, else final state."""
     if "sync_error" in data:
         values, label = data.sync_error, "average synchronisation error"
     elif "section_count" in data:
@@ -173,9 +167,7 @@ def _map(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
 
 
 def _phase(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
-    """Velocity over position in the first cell; many oscillators as colours of the first state over
-    time.
-    """
+    """Velocity over position in the first cell; for many oscillators colours over time."""
     data = data.isel({name: 0 for name in data.status.dims})
     own = [_own(data, i) for i in range(1, result.scene.n + 1)]
     if len(own) > len(CYCLE):
@@ -206,9 +198,7 @@ def _common(states: Iterable[str]) -> str:
 
 
 def _end(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
-    """Final states of every oscillator, over the axis if there is one, else the second over the
-    first.
-    """
+    """Final states of every oscillator, over the axis if there is one."""
     own = [_own(data, i) for i in range(1, result.scene.n + 1)]
     first, second = (_common(names[k] for names in own) for k in (0, 1))
     along = _along(data, result) if data.status.ndim else None
@@ -240,9 +230,7 @@ def _legend(axes: Axes, result: Result) -> Axes:
 
 
 def _widen(axes: Axes) -> Axes:
-    """Widen the limits to at least a hundredth of the numbers, so that rounding errors show no
-    pattern.
-    """
+    """Widen the limits to a hundredth of the numbers, so that rounding errors show no pattern."""
     for low, high, put in ((*axes.get_xlim(), axes.set_xlim), (*axes.get_ylim(), axes.set_ylim)):
         least = 0.01 * max(abs(low), abs(high), 1e-3)
         if high - low < least:

@@ -58,9 +58,7 @@ MARK: dict[str, Any] = {
 SAME = 1e-9
 """Largest distance of two bifurcations of one kind that are one, seen from both branches."""
 FULL = (901, 121, 16)
-"""Values of omega of the motion, values at which orbits are followed, values at which they are
-searched.
-"""
+"""Number of values of omega for the motion, for following orbits and for their search."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,9 +106,7 @@ class Skeleton:
 
 
 def compute(name: str, runs: FigureRuns) -> Skeleton:
-    """Run the scene of figure 3 with set-valued friction; find its orbits of one, two and four
-    periods.
-    """
+    """Run the scene of figure 3 with set-valued friction and find its skeleton."""
     scene = load_scene("figure_3").replace(contact="set-valued")
     cloud, values, looks = FULL
     grid = runs.quality.grid
@@ -182,7 +178,7 @@ def ranges(data: Skeleton) -> Table:
 
 
 def document(data: Skeleton) -> str:
-    """Return the bifurcations as a table in Markdown; one that two branches share is listed once."""
+    """Return the bifurcations as a table in Markdown; a shared one is listed once."""
     lines = ["| ω | drive periods | kind | residual |", "|---|---|---|---|"]
     last: tuple[Any, ...] = (None, math.nan)
     for _, periods, kind, value, residual, _ in sorted(ranges(data).rows, key=lambda row: row[3]):
@@ -193,9 +189,7 @@ def document(data: Skeleton) -> str:
 
 
 def draw(axes: Axes, data: Skeleton) -> Axes:
-    """Draw the motion as grey dots, stable orbits as lines, unstable ones dashed, bifurcations as
-    marks.
-    """
+    """Draw the motion as grey dots, stable orbits as lines, unstable ones dashed."""
     _diagram(axes, data, 0.9)
     axes.set(xlim=(LOW, HIGH), xlabel=r"drive frequency $\omega$", ylabel=r"$\chi_1$ at the section")
     if CROWDED[0][0] > LOW and CROWDED[0][1] < HIGH:

@@ -88,9 +88,7 @@ SETTINGS: dict[Any, Any] = {
 
 @contextmanager
 def context() -> Iterator[None]:
-    """Use matplotlib with this style, independent of the user's settings, which are restored
-    afterwards.
-    """
+    """Use matplotlib with this style, whatever the user's settings, which return afterwards."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(SETTINGS)
@@ -98,9 +96,7 @@ def context() -> Iterator[None]:
 
 
 def symbol(name: str) -> str:
-    """Return a parameter or a state as a formula: sigma as the Greek letter, x_1 with its
-    subscript.
-    """
+    """Return a parameter or a state as a formula."""
     return f"${Latex().letter(name)}$"
 
 

@@ -33,7 +33,7 @@ class Errors:
 
 
 def compute(name: str, runs: FigureRuns) -> Errors:
-    """Run the scene of a figure; the section is recorded too, so that figures 4d-f share the runs."""
+    """Run the scene of a figure, with its section so that figures 4d-f share the runs."""
     scene = load_scene(name)
     row = published(scene.n, scene.parameters["omega"])
     return Errors(runs.run(scene.replace(record=("sync_error", "section"))), row.intervals if row else ())
@@ -75,7 +75,7 @@ def table(data: Errors) -> Table:
 
 
 def draw(axes: Axes, data: Errors) -> Axes:
-    """Draw the error as a line, synchronous ranges in grey, and the published range as a thin bar."""
+    """Draw the error as a line, synchronous ranges in grey, the published range as a bar."""
     result = data.result
     sigma, good = result.data["sigma"].values, result.status.values == Status.FINISHED
     error = np.where(good, result.sync_error.values, np.nan)

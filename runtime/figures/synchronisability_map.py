@@ -101,9 +101,7 @@ def largest_exponent(data: Map, graph: Topology) -> np.ndarray:
 
 
 def table(data: Map) -> Table:
-    """Return the largest exponent, per unit of time, of each network at every frequency and
-    coupling.
-    """
+    """Return the largest exponent, per unit of time, of each network at every point."""
     columns = {f"{graph.name}_{graph.n}": largest_exponent(data, graph).reshape(-1) for graph in _graphs()}
     omega, sigma = (part.reshape(-1) for part in np.meshgrid(data.omega, data.sigma, indexing="ij"))
     motion = np.repeat(np.array(data.attractors, dtype=object), len(data.sigma))
@@ -116,9 +114,7 @@ def layout(figure: Figure) -> list[Axes]:
 
 
 def draw(axes: list[Axes], data: Map) -> list[Axes]:
-    """Draw stable points in colours, unstable ones white, and the published ranges of chains as
-    bars.
-    """
+    """Draw stable points in colours, others white, published ranges of chains as bars."""
     graphs = _graphs()
     values = [largest_exponent(data, graph) for graph in graphs]
     stable = np.concatenate([-v[(v < 0) & np.isfinite(v)] for v in values])

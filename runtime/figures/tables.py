@@ -56,9 +56,7 @@ class Table:
 
 
 def as_csv(table: Table) -> str:
-    """Return CSV text with a header and 12 digits; a missing or non-finite number is an empty
-    cell.
-    """
+    """Return CSV text with a header and 12 digits; missing and non-finite numbers are empty."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(table.columns)

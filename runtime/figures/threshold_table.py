@@ -23,9 +23,7 @@ NAMES = ("thresholds",)
 SIZE = (COLUMN, 4.1)
 KINDS = (("measured", BLUE, 0.26), ("predicted", GREEN, 0.0), ("published", ORANGE, -0.26))
 GAP = 0.001
-"""Largest gap in sigma that is bridged before ends are compared: ends of chaotic ranges are
-ragged.
-"""
+"""Largest gap in sigma that is bridged, since the ends of chaotic ranges are ragged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +100,7 @@ def _row(n: int, omega: float, runs: FigureRuns) -> Row:
 
 
 def scene_of(n: int, omega: float, runs: FigureRuns) -> Scene:
-    """Return the scene of the figure that shows this chain, so that both share runs, or a new one."""
+    """Return the scene of the figure that shows this chain to share its runs, or a new one."""
     for scene in map(load_scene, projection.NAMES):
         if (scene.n, scene.parameters["omega"]) == (n, omega):
             return scene
@@ -119,9 +117,7 @@ def joined(found: tuple[Interval, ...], gap: float = GAP) -> tuple[Interval, ...
 
 
 def nearest(found: tuple[Interval, ...], printed: tuple[Interval, ...]) -> Interval | None:
-    """Return the range with the largest overlap with published ones, else the widest; None if
-    none.
-    """
+    """Return the range with the largest overlap with published ones, else the widest."""
 
     def merit(interval: Interval) -> tuple[float, float]:
         shared = sum(b - a for a, b in intersect([interval], printed))

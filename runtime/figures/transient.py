@@ -83,9 +83,7 @@ def layout(figure: Figure) -> list[Axes]:
 
 
 def draw(axes: list[Axes], data: tuple[Trial, ...]) -> list[Axes]:
-    """Draw the share of synchronised starts in grey over sigma and transient, published ends as
-    lines.
-    """
+    """Draw the share of synchronised starts over sigma and transient, published ends as lines."""
     for panel, trial in zip(axes, data, strict=True):
         share = np.array([sweep.share for sweep in trial.sweeps])
         heights = np.arange(len(trial.transients))

@@ -87,9 +87,7 @@ def find(judge: Predicate, x: np.ndarray, resolution: float, fan: int = 7) -> tu
 
 
 def _narrow(judge: Predicate, good: np.ndarray, bad: np.ndarray, fan: int) -> tuple[np.ndarray, np.ndarray]:
-    """Evaluate points in every bracket and keep the part between the last good and the first bad
-    one.
-    """
+    """Evaluate points in every bracket and keep the part at the first change from good to bad."""
     parts = np.arange(1, fan + 1) / (fan + 1)
     points = good[:, None] + (bad - good)[:, None] * parts
     verdict = np.asarray(judge(points.reshape(-1)), dtype=bool).reshape(points.shape)

@@ -46,9 +46,7 @@ class NetworkMode:
 
     @property
     def defective(self) -> bool:
-        """True if there are fewer independent eigenvectors than the multiplicity, by an exact
-        rank.
-        """
+        """True if there are fewer independent eigenvectors than the multiplicity (exact rank)."""
         return geometric_multiplicity(self.graph, self.eigenvalue) < self.multiplicity
 
     @property

@@ -22,9 +22,7 @@ LONGEST = 32
 """Longest cycle that is looked for, in periods of the drive."""
 
 RETURN = 1e-9
-"""Largest distance of a closed cycle, relative to the size of the state; 0.1 rtol if that is
-larger.
-"""
+"""Largest distance of a closed cycle, relative to the size of the state; at least 0.1 rtol."""
 
 
 class Motion(StrEnum):
@@ -165,9 +163,7 @@ def _states(variation: Variation) -> list[sp.Symbol]:
 
 
 def _fixed_point(own: Orbits) -> Attractor:
-    """Return a fixed point with its variational matrices if the orbit rests, else aperiodic
-    motion.
-    """
+    """Return a fixed point if the orbit rests, else aperiodic motion."""
     rates = sp.lambdify(_symbols(own.variation), list(own.variation.orbit.rhs()), "numpy")(*_values(own))
     if not np.abs(rates).max() < RETURN * max(1.0, np.abs(own.state).max()):
         return Attractor(Motion.APERIODIC, 0.0)

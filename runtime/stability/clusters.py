@@ -84,15 +84,18 @@ class ClusterExponents:
 
     @property
     def merged(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of clusters that never were more than 1e-9 apart, so that the motion is a coarser
-        partition's.
-        """
+        """Pairs of clusters that never were more than 1e-9 apart: the motion is a coarser partition's."""
         first, second = np.nonzero(np.triu(self.separation < 1e-9, 1))
         return tuple((int(a), int(b)) for a, b in zip(first, second, strict=True))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return classes, blocks (clusters, nodes, exponent, stderr, verdict), motion, merged, time
-        for JSON.
+        """Return the exponents for JSON.
+
+        Returns
+        -------
+        dict
+            classes, blocks (clusters, nodes, exponent, stderr, verdict), motion, motion_stderr, merged and
+            time.
         """
         rows = zip(self.state.blocks, self.exponent, self.stderr, self.verdicts, strict=True)
         return {
@@ -196,9 +199,7 @@ def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
 
 
 def _integrator(scene: Scene, found: Clusters, variation: Variation, seed: int) -> VariationalIntegrator:
-    """Set up the quotient's orbit with one deviation along it and one in each block, which stay
-    there.
-    """
+    """Set up the quotient's orbit with one deviation along it and one in each block."""
     firsts = [members[0] for members in found.members]
     state = np.array([[values[i] for values in scene.initial.values() for i in firsts]])
     numbers = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])

@@ -81,9 +81,7 @@ class Exponents:
 
     @property
     def intervals(self) -> tuple[Interval, ...]:
-        """Intervals of real strengths with a negative exponent, interpolated linearly between grid
-        points.
-        """
+        """Intervals of real strengths with a negative exponent; ends by linear interpolation."""
         return tuple((low, high) for (low, _), (high, _) in self.ranges)
 
     @property

@@ -42,8 +42,9 @@ TRIAL = 4
 """Periods of each trial, and periods that are dropped after the choice."""
 
 CLEAR, LOST = 1e4, 10.0
-"""Length of a direction after a block, in tolerances, from which it is clear of the error, and
-below which it is lost.
+"""Lengths of a direction after a block, in tolerances.
+
+From the first on it is clear of the error, below the second it is lost.
 """
 
 

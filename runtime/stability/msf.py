@@ -102,10 +102,9 @@ class MSF:
 
     @property
     def windows(self) -> tuple[Window, ...]:
-        """Ranges of sigma in which every mode of the scene's network is stable; real eigenvalues
-        only.
+        """Ranges of sigma in which every mode of the scene's network is stable.
 
-        No mode is lost at an end that comes from an end of the grid.
+        Eigenvalues must be real. No mode is lost at an end that comes from an end of the grid.
         """
         return tuple(self._trimmed(window) for window in windows(self.open_ranges, self.scene.topology, self.errors))
 
@@ -124,8 +123,12 @@ class MSF:
         return self.intervals
 
     def as_dict(self) -> dict[str, Any]:
-        """Return alpha, exponent, stderr, intervals, uncertainties, class, attractors, time, starts
-        for JSON.
+        """Return the function for JSON.
+
+        Returns
+        -------
+        dict
+            alpha, exponent, stderr, intervals, uncertainties, class, attractors, time and starts.
         """
         return {
             "alpha": self.alpha.tolist(),
@@ -179,8 +182,12 @@ class Plane:
         return tuple(np.asarray(line) for line in lines)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return alpha, beta, exponent and stderr (rows of alpha), contours, attractors, time for
-        JSON.
+        """Return the function for JSON.
+
+        Returns
+        -------
+        dict
+            alpha, beta, exponent and stderr (rows of alpha), contours, attractors and time.
         """
         return {
             "alpha": self.alpha.tolist(),
@@ -207,15 +214,14 @@ def msf(
     show_progress: bool | None = False,
     **parameters: float,
 ) -> MSF:
-    """Compute the master stability function of an oscillator and coupling on a line of real
-    strengths.
+    """Compute the master stability function of an oscillator and coupling on a line.
 
     Parameters
     ----------
     scene : Scene
         Source of the oscillator and the coupling.
     alpha : array_like, shape (m,)
-        Increasing strengths alpha = -sigma gamma.
+        Increasing real strengths alpha = -sigma gamma.
     precision, periods, transient, starts, rtol, seed, workers, show_progress
         See `synchain.runtime.exponents`.
     **parameters : float

@@ -134,9 +134,7 @@ class Orbits:
         self.state = integrator.state
 
     def prepare(self) -> None:
-        """Choose the block and the interpolation by trial on the next blocks, and start the
-        deviations.
-        """
+        """Choose block and interpolation by trial on the next blocks, and start the deviations."""
         limit = max(0.1 * self.scene.rtol, 1e-12)
         for block, nodes, parts in _choices(self.scene.forced):
             self.block, self.interpolation = block, strength_interpolation(self.strengths, nodes, parts)
@@ -219,9 +217,7 @@ def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _variation(equations: Equations, plane: bool) -> Variation:
-    """Variational equation of a mode, cached because Newton's method on an orbit needs it at every
-    step.
-    """
+    """Variational equation of a mode; Newton's method on an orbit needs it at every step."""
     return mode(equations, plane=plane)
 
 
