@@ -104,7 +104,7 @@ def bifurcations_between(arc: Arc, value: float, orbit: PeriodicOrbit, phases: P
     change = change or _graze(known, far)
     start = (known.values[0], known.orbits[0]) if not ahead else (arc.values[-1], arc.orbits[-1])
     beside = _crossings(known, (start[0], change.value), (start[1], change.orbit))
-    return sorted([change, *beside], key=lambda found: found.value)
+    return sorted([change, *beside], key=lambda bifurcation: bifurcation.value)
 
 
 def bifurcations_at_end(arc: Arc, beyond: float) -> list[Bifurcation]:
@@ -138,7 +138,7 @@ def bifurcations_at_end(arc: Arc, beyond: float) -> list[Bifurcation]:
 
 
 def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
-    """Period doubling of an orbit of half the periods, between the halves of an arc's last orbit."""
+    """Period doubling of an orbit of half the periods, between the halves of the last orbit."""
     half, last = arc.periods // 2, arc.orbits[-1]
     if arc.periods % 2:
         return None
@@ -146,18 +146,18 @@ def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
         middle = 0.5 * (last.state + strobe(last.scene, last.state, half)[0])
         single = Arc(arc.scene, arc.name, half)
         for value in (arc.values[-1], beyond):
-            own = periodic_orbit(arc.scene, half, middle, **{arc.name: value})
-            middle = own.state
-            single.take(value, own, own.phases)
-        made = _crossings(single, (single.values[0], beyond), (single.orbits[0], single.orbits[1]))
+            orbit = periodic_orbit(arc.scene, half, middle, **{arc.name: value})
+            middle = orbit.state
+            single.take(value, orbit, orbit.phases)
+        crossings = _crossings(single, (single.values[0], beyond), (single.orbits[0], single.orbits[1]))
     except ArithmeticError:
         return None
-    return next((each for each in made if each.kind is BifurcationKind.PERIOD_DOUBLING), None)
+    return next((each for each in crossings if each.kind is BifurcationKind.PERIOD_DOUBLING), None)
 
 
 def _crossings(arc: Arc, ends: tuple[float, float], orbits: tuple[PeriodicOrbit, PeriodicOrbit]) -> list[Bifurcation]:
     """Crossings of a real multiplier through -1 or 1 between two orbits of the same phases."""
-    found = []
+    crossings = []
     for point, kind in ((-1.0, BifurcationKind.PERIOD_DOUBLING), (1.0, BifurcationKind.FOLD)):
         if not _beyond(orbits[0], point) * _beyond(orbits[1], point) < 0.0:
             continue
@@ -166,8 +166,8 @@ def _crossings(arc: Arc, ends: tuple[float, float], orbits: tuple[PeriodicOrbit,
             return _beyond(orbits[ends.index(value)] if value in ends else arc.at(value), point)
 
         value, orbit = _root(distance, arc, ends)
-        found.append(Bifurcation(value, kind, float(np.abs(orbit.multipliers - point).min()), orbit))
-    return found
+        crossings.append(Bifurcation(value, kind, float(np.abs(orbit.multipliers - point).min()), orbit))
+    return crossings
 
 
 def _root(test: Callable[[float], float], arc: Arc, ends: tuple[float, float]) -> tuple[float, PeriodicOrbit]:
@@ -204,11 +204,11 @@ def _stick_loss(arc: Arc, value: float, orbit: PeriodicOrbit, before: Phases, af
     def landing(at: float) -> float:
         if at in ends:
             return ends[at]
-        own = both.at(at)
-        phases = own.phases
+        crossed = both.at(at)
+        phases = crossed.phases
         if phases is None:
             raise ArithmeticError("an orbit without phases")
-        both.take(at, own, phases)
+        both.take(at, crossed, phases)
         return phases.landing
 
     at, last = _root(landing, both, (arc.values[-1], value))

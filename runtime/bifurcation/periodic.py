@@ -85,10 +85,10 @@ class PeriodicOrbit:
     @property
     def points(self) -> np.ndarray:
         """The states (periods, components) at the beginning of each period of the drive."""
-        found = [self.state]
+        points = [self.state]
         for _ in range(self.periods - 1):
-            found.append(_strobe(self.scene, found[-1], 1, 0.0)[0][: len(self.state)])
-        return np.array(found)
+            points.append(_strobe(self.scene, points[-1], 1, 0.0)[0][: len(self.state)])
+        return np.array(points)
 
     @property
     def least(self) -> int:
@@ -154,14 +154,14 @@ def periodic_orbit(
         residual = float(np.abs(gap).max())
         if not residual < best:
             break
-        best, kept, found = residual, state, matrix
+        best, kept, monodromy = residual, state, matrix
         if residual == 0.0:
             break
         state = state + _correction(matrix, gap)
         steps += 1
     if not best < 1e-9 * max(1.0, float(np.abs(kept).max())):
         raise ArithmeticError(f"no orbit of {periods} drive periods near the start: the best residual was {best:.1e}")
-    return PeriodicOrbit(scene, int(periods), kept, _sorted(found), best, steps)
+    return PeriodicOrbit(scene, int(periods), kept, _sorted(monodromy), best, steps)
 
 
 def _nearly_sticks(image: np.ndarray, gap: np.ndarray) -> bool:
@@ -314,5 +314,5 @@ def _strobe(scene: Scene, state: np.ndarray, periods: int, alpha: float) -> tupl
 
 def _sorted(matrix: np.ndarray) -> np.ndarray:
     """Eigenvalues of a matrix, the largest first."""
-    found = np.linalg.eigvals(matrix)
-    return np.asarray(found[np.argsort(-np.abs(found), kind="stable")])
+    multipliers = np.linalg.eigvals(matrix)
+    return np.asarray(multipliers[np.argsort(-np.abs(multipliers), kind="stable")])

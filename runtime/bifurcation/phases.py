@@ -119,7 +119,7 @@ Function = Callable[..., np.ndarray]
 
 
 def _margins(scene: Scene, contact: Contact) -> tuple[Function, Function]:
-    """Functions for the distance of the load from the limits of friction and the sliding velocity."""
+    """Functions for the distance of the load from the limits of friction, and the speed."""
     up, down, sliding = _functions(contact, tuple(scene.equations.node.state), tuple(scene.parameters))
     numbers = list(scene.parameters.values())
     return (
@@ -138,14 +138,14 @@ def _functions(contact: Contact, state: tuple[sp.Symbol, ...], names: tuple[str,
 def _least(values: np.ndarray) -> float:
     """Least of the minima inside a row of equally spaced values, each from a local polynomial."""
     inner = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] < values[2:])) + 1
-    found = math.inf
+    least = math.inf
     for k in map(int, inner):
         a = min(max(k - REACH, 0), max(len(values) - 2 * REACH - 1, 0))
         near = values[a : a + 2 * REACH + 1]
         bent = Polynomial.fit(np.arange(len(near)) - float(k - a), near, len(near) - 1)
         turns = [r.real for r in bent.deriv().roots() if abs(r.imag) < 1e-9 and abs(r.real) <= 1.0]
-        found = min([found, *(float(bent(turn)) for turn in turns)])
-    return found
+        least = min([least, *(float(bent(turn)) for turn in turns)])
+    return least
 
 
 def _landing(piece: slice, t: np.ndarray, path: np.ndarray, slides: Function, held: Function) -> float:

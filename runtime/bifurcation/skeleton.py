@@ -122,17 +122,17 @@ def near_returns(scene: Scene, periods: Sequence[int], **parameters: float) -> l
     """
     scene = coupled_cell(near_returns, scene, TOLERANCE, parameters)
     path = _path(scene)
-    found: list[PeriodicOrbit] = []
+    orbits: list[PeriodicOrbit] = []
     for count in periods:
         for start in _returning(path, count):
             try:
                 orbit = periodic_orbit(scene, count, start)
             except ArithmeticError:
                 continue
-            own = [other for other in found if other.periods == count]
-            if orbit.least == count and not any(_same(orbit, other) for other in own):
-                found.append(orbit)
-    return found
+            alike = [other for other in orbits if other.periods == count]
+            if orbit.least == count and not any(_same(orbit, other) for other in alike):
+                orbits.append(orbit)
+    return orbits
 
 
 def _path(scene: Scene) -> np.ndarray:
@@ -151,14 +151,14 @@ def _path(scene: Scene) -> np.ndarray:
 def _returning(path: np.ndarray, periods: int) -> list[np.ndarray]:
     """States of a path with the closest returns after some periods, apart from each other."""
     gap = np.abs(path[periods:] - path[:-periods]).max(axis=2)
-    chosen: list[np.ndarray] = []
+    starts: list[np.ndarray] = []
     for flat in np.argsort(gap, axis=None, kind="stable"):
         k, row = np.unravel_index(flat, gap.shape)
-        if gap[k, row] > CLOSE or len(chosen) == TRIES:
+        if gap[k, row] > CLOSE or len(starts) == TRIES:
             break
-        if all(np.abs(path[k, row] - other).max() > APART for other in chosen):
-            chosen.append(path[k, row])
-    return chosen
+        if all(np.abs(path[k, row] - other).max() > APART for other in starts):
+            starts.append(path[k, row])
+    return starts
 
 
 def _same(orbit: PeriodicOrbit, other: PeriodicOrbit) -> bool:
@@ -169,8 +169,8 @@ def _same(orbit: PeriodicOrbit, other: PeriodicOrbit) -> bool:
 def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
     """True if a branch passes through an orbit."""
     (places,) = np.nonzero(branch.values == value)
-    own = branch.orbits[0].periods == orbit.periods
-    return own and any(_same(orbit, branch.orbits[k]) for k in places)
+    alike = branch.orbits[0].periods == orbit.periods
+    return alike and any(_same(orbit, branch.orbits[k]) for k in places)
 
 
 def _both_ways(scene: Scene, name: str, grid: list[float], k: int, orbit: PeriodicOrbit) -> Branch:
@@ -191,7 +191,7 @@ def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrb
     Near a fold the sheets lie on both sides of it, at distances proportional to the square root of
     that of the parameter.
     """
-    found = []
+    sheets = []
     for turn in branch.bifurcations:
         if turn.kind is not BifurcationKind.FOLD:
             continue
@@ -207,5 +207,5 @@ def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrb
                 sheet = follow(scene, branch.name, way, first)
             except ArithmeticError:
                 continue
-            found += [(end, sheet.orbits[-1])] if len(sheet.orbits) == len(way) else []
-    return found
+            sheets += [(end, sheet.orbits[-1])] if len(sheet.orbits) == len(way) else []
+    return sheets

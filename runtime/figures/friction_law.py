@@ -57,7 +57,7 @@ def compute(name: str, runs: FigureRuns) -> Law:
 
 
 def forces(scene: Scene) -> tuple[Any, Any]:
-    """Return the friction coefficient as functions of relative velocity, set-valued and smoothed."""
+    """Return the friction coefficient by relative velocity, set-valued and smoothed."""
     law = plugin("friction", str(scene.templates[0][1]))
     w, kappa = sp.Symbol("w", real=True), sp.Symbol("kappa", real=True)
     symbols = {key: sp.Symbol(key, real=True) for key in law.PARAMETERS}

@@ -118,12 +118,12 @@ def largest_network(
     stated = exact_ranges(ranges, errors)
     sets = [stated, widen(stated, -1), widen(stated, 1)]
     counts = SizeUnit.DIMENSION if family == "hypercube" else SizeUnit.NODES
-    if not directed and all(_open(found) for found in sets):
+    if not directed and all(_open(stable) for stable in sets):
         return LargestNetwork(family, None, None, None, counts, Method.OPEN_RANGE)
-    if family in CLOSED and all(_open(found) or len(found) <= 1 for found in sets):
-        n, certain, most = (_by_ratio(family, found) for found in sets)
+    if family in CLOSED and all(_open(stable) or len(stable) <= 1 for stable in sets):
+        n, certain, most = (_by_ratio(family, stable) for stable in sets)
         return LargestNetwork(family, n, certain, most, counts, Method.CLOSED_FORM)
-    n, certain, most = (_by_search(family, found, limit) for found in sets)
+    n, certain, most = (_by_search(family, stable, limit) for stable in sets)
     return LargestNetwork(family, n, certain, most, counts, Method.SEARCH, limit)
 
 
@@ -233,5 +233,5 @@ def _by_search(family: str, ranges: Sequence[StableRange], limit: int) -> int | 
         return None
     cube = family == "hypercube"
     sizes = range(1, limit.bit_length()) if cube else range(max(2, family_plugin(family).MINIMUM), limit + 1)
-    found = [size for size in sizes if possible(ranges, topology(family, 2**size if cube else size))]
-    return max(found, default=0)
+    possible_sizes = [size for size in sizes if possible(ranges, topology(family, 2**size if cube else size))]
+    return max(possible_sizes, default=0)

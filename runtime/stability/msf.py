@@ -92,13 +92,13 @@ class MSF:
     @property
     def attractors(self) -> tuple[str, ...]:
         """Kind of motion of each start."""
-        return tuple(found.kind for found in self.fine.attractors)
+        return tuple(attractor.kind for attractor in self.fine.attractors)
 
     @property
     def errors(self) -> tuple[Interval, ...] | None:
         """The uncertainties of the ends; None if an average was too short to estimate them."""
-        found = self.uncertainties
-        return found if np.isfinite(found).all() else None
+        uncertainties = self.uncertainties
+        return uncertainties if np.isfinite(uncertainties).all() else None
 
     @property
     def windows(self) -> tuple[Window, ...]:
@@ -240,7 +240,7 @@ def msf(
     """
     line = row("alpha", alpha, 2, rising=True)
     fine = np.union1d(line, np.linspace(line[0], line[-1], FINE))
-    found = exponents(
+    fine_exponents = exponents(
         scene,
         fine,
         precision=precision,
@@ -253,7 +253,7 @@ def msf(
         show_progress=show_progress,
         **parameters,
     )
-    return MSF(scene, line, found)
+    return MSF(scene, line, fine_exponents)
 
 
 def plane(
@@ -300,7 +300,7 @@ def plane(
     """
     across, up = row("alpha", alpha, 2, rising=True), row("beta", beta, 2, rising=True)
     heights, place = np.unique(np.abs(up), return_inverse=True)
-    found = exponents(
+    half_plane = exponents(
         scene,
         (across[:, None] + 1j * heights).reshape(-1),
         precision=precision,
@@ -313,9 +313,9 @@ def plane(
         show_progress=show_progress,
         **parameters,
     )
-    table, error = (row.reshape(len(across), -1)[:, place] for row in (found.exponent, found.stderr))
-    kinds = tuple(a.kind for a in found.attractors)
-    return Plane(scene, across, up, table, error, kinds, found.time)
+    table, error = (row.reshape(len(across), -1)[:, place] for row in (half_plane.exponent, half_plane.stderr))
+    kinds = tuple(a.kind for a in half_plane.attractors)
+    return Plane(scene, across, up, table, error, kinds, half_plane.time)
 
 
 def classify(intervals: Sequence[Interval], end: float, begin: float = 0.0) -> StabilityClass:

@@ -169,10 +169,10 @@ class Orbits:
             basis[:, k, k::p] = 1.0
         integrator.set_deviations(basis)
         growth = integrator.advance(self.block * self.unit)
-        found = integrator.deviations * np.exp(growth)[:, None, :]
+        columns = integrator.deviations * np.exp(growth)[:, None, :]
         if size != p:
-            found = found[:, :p] + 1j * found[:, p:]
-        return np.asarray(found.reshape(len(self.state), p, -1, p).transpose(0, 2, 1, 3))
+            columns = columns[:, :p] + 1j * columns[:, p:]
+        return np.asarray(columns.reshape(len(self.state), p, -1, p).transpose(0, 2, 1, 3))
 
     def advance(self) -> np.ndarray:
         """Advance orbits and deviations by one block.
@@ -191,8 +191,8 @@ class Orbits:
             raise RuntimeError("orbits are not prepared")
         nodes = self.propagators()
         self.interpolation_error = max(self.interpolation_error, self.interpolation.error(nodes))
-        found = self.interpolation.apply(nodes)
-        moved = sum(found[..., k] * self.deviations[..., k, None] for k in range(self.components))
+        propagators = self.interpolation.apply(nodes)
+        moved = sum(propagators[..., k] * self.deviations[..., k, None] for k in range(self.components))
         length = np.linalg.norm(moved, axis=2)
         with np.errstate(divide="ignore", invalid="ignore"):
             self.deviations = np.where(length[..., None] > 0.0, moved / length[..., None], 0.0)
@@ -244,8 +244,8 @@ def _choices(forced: bool) -> list[tuple[float, int, int]]:
     Each block costs as much as twenty nodes by itself.
     """
     blocks = (4.0, 2.0, 1.0) if forced else (1.0, 0.5, 0.25, 0.125)
-    made = [(block, nodes, parts) for block in blocks for nodes in NODES for parts in PARTS]
-    return sorted(made, key=lambda choice: (20.0 + choice[1] * choice[2]) / choice[0])
+    choices = [(block, nodes, parts) for block in blocks for nodes in NODES for parts in PARTS]
+    return sorted(choices, key=lambda choice: (20.0 + choice[1] * choice[2]) / choice[0])
 
 
 def _stretches(periods: int) -> list[int]:
