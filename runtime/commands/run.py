@@ -266,7 +266,7 @@ def _draw(target: Path) -> Path:
     with xr.open_dataset(target, engine="scipy") as data:
         axes = draw_result(Result(data, scene_of(data.attrs)))
         with whole_file(path) as temporary:
-            axes.figure.savefig(temporary, dpi=150)
+            axes.figure.figure.savefig(temporary, dpi=150)
     return path
 
 
