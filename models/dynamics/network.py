@@ -1,7 +1,8 @@
-"""Networks from one node and one edge: the template derivation that holds for any number of oscillators.
+"""Equations of networks from the oscillator, friction law and coupling that plug-ins define.
 
-The Lagrangian of a network is a sum over nodes and edges, T = sum T_i and V = sum V_i + sum V_edge, so the Euler-Lagrange
-equations of a node are those of the single oscillator plus one force for each edge that meets it.
+The Lagrangian of a network is a sum over nodes and edges, T = sum T_i and V = sum V_i + sum V_edge,
+so the Euler-Lagrange equations of a node are those of the single oscillator plus one force for each
+edge that meets it.
 """
 
 from __future__ import annotations
@@ -36,10 +37,29 @@ __all__ = ["check_coupling", "edge", "mixed_network", "network", "node", "orient
 def parameters(
     oscillator: str, friction: str | None = None, contact: str = "atan", coupling: str | None = None
 ) -> dict[str, Parameter]:
-    """Return every parameter with default, unit, meaning and range, in the order of Equations.parameters.
+    """Return the parameters of an oscillator, its friction law and a coupling.
 
-    Raises ValueError for an unknown oscillator, law, contact or coupling, where the oscillator takes no friction law but
-    is given one, or takes one but is given none, and where two of them have a parameter of the same name.
+    Parameters
+    ----------
+    oscillator : str
+        Name of an oscillator.
+    friction : str or None
+        Name of a friction law.
+    contact : str
+        "atan" for smooth or "set-valued" for exact friction.
+    coupling : str or None
+        Name of a coupling, or its entries.
+
+    Returns
+    -------
+    dict of str to Parameter
+        Default, unit, meaning and range by name, in the order of `Equations.parameters`.
+
+    Raises
+    ------
+    ValueError
+        For an unknown oscillator, law, contact or coupling, a friction law that the oscillator does
+        not take or lacks, and two parameters of the same name.
     """
     model, law = _model(oscillator, friction, contact)
     table: dict[str, Parameter] = dict(model.PARAMETERS)
@@ -55,9 +75,19 @@ def parameters(
 
 @remembered(oscillator=partial(named, "oscillator"), friction=partial(named, "friction"))
 def node(oscillator: str, friction: str | None = None, contact: str = "atan") -> Node:
-    """Derive the equations of one oscillator: for a Lagrangian x' = v and v' from the Euler-Lagrange equations.
+    """Return the equations of one oscillator.
 
-    Raises ValueError as `parameters` does.
+    A Lagrangian gives x' = v and v' from the Euler-Lagrange equations.
+
+    Parameters
+    ----------
+    oscillator, friction, contact
+        As for `parameters`.
+
+    Raises
+    ------
+    ValueError
+        As `parameters`.
     """
     model, law = _model(oscillator, friction, contact)
     symbols = {name: sp.Symbol(name, real=True) for name in parameters(oscillator, friction, contact)}
@@ -78,7 +108,7 @@ def node(oscillator: str, friction: str | None = None, contact: str = "atan") ->
 
 
 def _jumps(law: ModuleType) -> bool:
-    """True where friction has a jump at rest; without one nothing sticks and the equations are smooth as they are."""
+    """True if friction has a jump at rest; without one nothing sticks."""
     return hasattr(law, "static") or friction_coefficient(law, "sign")(sp.Symbol("w", real=True)).has(sp.sign)
 
 
@@ -97,7 +127,7 @@ def _sticking(
 
 
 def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str) -> None:
-    """Add the parameters of another part; the same name in two parts would silently be one number."""
+    """Add the parameters of another part; the same name in two parts is an error."""
     for name, parameter in more.items():
         if name in table:
             raise ValueError(f"{what}: its parameter {name!r} has the name of one of another part; rename it")
@@ -105,7 +135,7 @@ def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str)
 
 
 def _model(oscillator: str, friction: str | None, contact: str) -> tuple[ModuleType, ModuleType | None]:
-    """The modules of an oscillator and its friction law, None where it takes none."""
+    """The modules of an oscillator and its friction law, None if it takes none."""
     model = load("oscillator", oscillator)
     if contact not in CONTACTS:
         raise ValueError(f"unknown contact {contact!r}; known: {', '.join(CONTACTS)}")
@@ -122,10 +152,23 @@ def _model(oscillator: str, friction: str | None, contact: str) -> tuple[ModuleT
 
 
 def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str, ...] = ()) -> Equations:
-    """Join copies of a node by the links of a graph; without an edge the nodes stay uncoupled.
+    """Return the equations of equal nodes that the links of a graph join.
 
-    The node's parameters named in `varied` get a value for each node.
-    Where a link tells its ends apart, its weight becomes the sign of its direction (`synchain.models.mechanics.orientation`).
+    Parameters
+    ----------
+    single : Node
+        The template of the nodes.
+    link : Edge or None
+        The template of the links; None leaves the nodes uncoupled.
+    graph : Topology
+        The graph.
+    varied : tuple of str
+        Parameters of nodes that have one value for each node.
+
+    Notes
+    -----
+    If a link tells its ends apart, its weight becomes the sign of its direction
+    (`synchain.models.mechanics.orientation`).
     """
     if link is None:
         return Equations.of_equal_nodes(single, None, graph.n, (), varied)
@@ -142,9 +185,28 @@ def mixed_network(
     graph: Topology,
     varied: tuple[str, ...] = (),
 ) -> Equations:
-    """Join nodes of several kinds by the links of a graph: `kinds` says of which oscillator each node is.
+    """Return the equations of nodes of several kinds that the links of a graph join.
 
-    Every pair of kinds that a link joins gets its own edge.  Raises ValueError where a coupling does not fit a pair.
+    Parameters
+    ----------
+    oscillators : sequence of str
+        Names of the oscillators, by kind.
+    singles : sequence of Node
+        Their templates.
+    kinds : sequence of int
+        The kind of each node.
+    coupling : str or None
+        The coupling, from which every pair of kinds that a link joins gets its own edge; None leaves
+        the nodes uncoupled.
+    graph : Topology
+        The graph.
+    varied : tuple of str
+        Parameters of nodes that have one value for each node.
+
+    Raises
+    ------
+    ValueError
+        If the coupling does not fit a pair of kinds.
     """
     apart = Equations(tuple(singles), tuple(kinds), (), (), varied)
     if coupling is None:
@@ -159,9 +221,14 @@ def mixed_network(
 def oriented_links(graph: Topology) -> tuple[Link, ...]:
     """Return the links of a graph with the sign of their direction as weight.
 
-    A link runs from the smaller to the larger number; on a graph that looks alike from every node (a ring) it runs the
-    shorter way round, so that the last link runs from the last node to the first.
-    Raises ValueError for one-way links and for weights other than 1: strength and direction share one number.
+    A link runs from the smaller to the larger number.  On a graph that looks alike from every node,
+    such as a ring, it runs the shorter way round, so the last link runs from the last node to the
+    first.
+
+    Raises
+    ------
+    ValueError
+        For one-way links and for weights other than 1: strength and direction share one number.
     """
     if not graph.symmetric or any(weight != 1 for _, _, weight in graph.links):
         raise ValueError(
