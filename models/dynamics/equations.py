@@ -14,10 +14,10 @@ from functools import cached_property
 import sympy as sp
 
 from ..graphs.links import Link
-from ..mechanics.components import SLIDING, TIME, Edge, Node
+from ..mechanics.components import Edge, Node
 from ..mechanics.stick_slip import Contact
 
-__all__ = ["SLIDING", "TIME", "Edge", "Ends", "Equations", "Link", "Node", "check"]
+__all__ = ["Ends", "Equations", "check"]
 
 Ends = tuple[int, int]
 """The kinds of a link's target and source."""

@@ -31,35 +31,16 @@ from ..mechanics.parameter import Parameter
 from ..mechanics.stick_slip import SLIP, set_valued
 from .equations import Equations
 
-__all__ = ["check_coupling", "edge", "mixed_network", "network", "node", "oriented_links", "parameters"]
+__all__ = ["check_coupling", "connectivity", "edge", "mixed_network", "network", "node", "oriented_links", "parameters"]
 
 
 def parameters(
     oscillator: str, friction: str | None = None, contact: str = "atan", coupling: str | None = None
 ) -> dict[str, Parameter]:
-    """Return the parameters of an oscillator, its friction law and a coupling.
+    """Return every parameter with default, unit, meaning and range, in the order of Equations.parameters.
 
-    Parameters
-    ----------
-    oscillator : str
-        Name of an oscillator.
-    friction : str or None
-        Name of a friction law.
-    contact : str
-        "atan" for smooth or "set-valued" for exact friction.
-    coupling : str or None
-        Name of a coupling, or its entries.
-
-    Returns
-    -------
-    dict of str to Parameter
-        Default, unit, meaning and range by name, in the order of `Equations.parameters`.
-
-    Raises
-    ------
-    ValueError
-        For an unknown oscillator, law, contact or coupling, a friction law that the oscillator does
-        not take or lacks, and two parameters of the same name.
+    Raises ValueError for an unknown oscillator, law, contact or coupling, where the oscillator takes no friction law but
+    is given one, or takes one but is given none, and where two of them have a parameter of the same name.
     """
     model, law = _model(oscillator, friction, contact)
     table: dict[str, Parameter] = dict(model.PARAMETERS)
@@ -75,19 +56,9 @@ def parameters(
 
 @remembered(oscillator=partial(named, "oscillator"), friction=partial(named, "friction"))
 def node(oscillator: str, friction: str | None = None, contact: str = "atan") -> Node:
-    """Return the equations of one oscillator.
+    """Derive the equations of one oscillator: for a Lagrangian x' = v and v' from the Euler-Lagrange equations.
 
-    A Lagrangian gives x' = v and v' from the Euler-Lagrange equations.
-
-    Parameters
-    ----------
-    oscillator, friction, contact
-        As for `parameters`.
-
-    Raises
-    ------
-    ValueError
-        As `parameters`.
+    Raises ValueError as `parameters` does.
     """
     model, law = _model(oscillator, friction, contact)
     symbols = {name: sp.Symbol(name, real=True) for name in parameters(oscillator, friction, contact)}
@@ -108,7 +79,7 @@ def node(oscillator: str, friction: str | None = None, contact: str = "atan") ->
 
 
 def _jumps(law: ModuleType) -> bool:
-    """True if friction has a jump at rest; without one nothing sticks."""
+    """True where friction has a jump at rest; without one nothing sticks and the equations are smooth as they are."""
     return hasattr(law, "static") or friction_coefficient(law, "sign")(sp.Symbol("w", real=True)).has(sp.sign)
 
 
@@ -127,7 +98,7 @@ def _sticking(
 
 
 def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str) -> None:
-    """Add the parameters of another part; the same name in two parts is an error."""
+    """Add the parameters of another part; the same name in two parts would silently be one number."""
     for name, parameter in more.items():
         if name in table:
             raise ValueError(f"{what}: its parameter {name!r} has the name of one of another part; rename it")
@@ -135,7 +106,7 @@ def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str)
 
 
 def _model(oscillator: str, friction: str | None, contact: str) -> tuple[ModuleType, ModuleType | None]:
-    """The modules of an oscillator and its friction law, None if it takes none."""
+    """The modules of an oscillator and its friction law, None where it takes none."""
     model = load("oscillator", oscillator)
     if contact not in CONTACTS:
         raise ValueError(f"unknown contact {contact!r}; known: {', '.join(CONTACTS)}")
@@ -216,6 +187,50 @@ def mixed_network(
     if any(a == b and is_oriented(link) for (a, b), link in edges):
         raise ValueError(f"coupling {coupling!r} tells the ends of a link apart; expected nodes of one kind")
     return replace(apart, links=graph.links, edge_of=edges)
+
+
+def connectivity(coupling: str, graph: Topology) -> tuple[tuple[Fraction, ...], ...]:
+    """Read G off the coupling: minus the Hessian of its whole potential over sigma, n rows of n fractions.
+
+    The Hessian of one edge is derived once and added up over the links, so that a thousand nodes take no algebra.  For a
+    damper the Rayleigh function takes the potential's place; for a one-way link the row is read off the force on its target.
+    Of entries such as "1/2 x->y" the factor belongs to H, so that G holds the weights alone.
+    Raises ValueError for a coupling whose Hessian between equal states is not sigma times weight times a number: it has no
+    matrix G.
+    """
+    if coupling_text.is_matrix(coupling):
+        coupling_text.entries(coupling)
+        diagonal, aside = Fraction(-1), Fraction(1)
+    else:
+        diagonal, aside = _hessian(coupling)
+    rows = [[Fraction(0)] * graph.n for _ in range(graph.n)]
+    for target, source, factor in graph.links:
+        rows[target][target] += factor * diagonal
+        rows[target][source] += factor * aside
+    return tuple(map(tuple, rows))
+
+
+def _hessian(coupling: str) -> tuple[Fraction, Fraction]:
+    """Minus the second derivatives of one edge's energy over sigma and weight: twice by one end, and by both.
+
+    Of a non-linear coupling they are taken between equal states, where its links are those of its linear part.
+    """
+    model = load("coupling", split(coupling)[0])
+    q_i, q_j, weight = (sp.Symbol(name, real=True) for name in ("q_i", "q_j", "weight"))
+    given = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
+    if hasattr(model, "BETWEEN"):
+        raise ValueError(
+            f"coupling {coupling!r} joins {' and '.join(model.BETWEEN)}; it has no matrix of one coordinate"
+        )
+    function = next(getattr(model, name) for name in ("potential", "dissipation", "kinetic") if hasattr(model, name))
+    energy = call(function, {"q_i": q_i, "q_j": q_j, "v_i": q_i, "v_j": q_j, "weight": weight, **given})
+    slopes = (-energy.diff(q_i, q).xreplace({q_j: q_i}) for q in (q_i, q_j))
+    own, other = (sp.simplify(slope / (given["sigma"] * weight)) for slope in slopes)
+    if not (own.is_Rational and other.is_Rational) or own == 0:
+        raise ValueError(
+            f"coupling {coupling!r}: Hessian over sigma and weight is {own}, {other}; expected numbers other than 0"
+        )
+    return Fraction(int(own.p), int(own.q)), Fraction(int(other.p), int(other.q))
 
 
 def oriented_links(graph: Topology) -> tuple[Link, ...]:

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
-from connectivity import connectivity
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -17,7 +16,7 @@ from variational_reference import ALPHA, deviation_names, transversal_equations
 
 from synchain.codegen.printing.printer import show
 from synchain.models import chain, ring
-from synchain.models.dynamics.network import network, node, parameters
+from synchain.models.dynamics.network import connectivity, network, node, parameters
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.components import Node
