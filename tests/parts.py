@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from connectivity import connectivity as read_off
-
 from synchain.models.dynamics import network
 from synchain.models.graphs.topology import Topology
 from synchain.models.mechanics import link
@@ -58,4 +56,4 @@ def edge(coupling: str | Coupling, single: Node, oscillator: str | Oscillator | 
 
 
 def connectivity(coupling: str | Coupling, graph: Topology) -> tuple[tuple[Fraction, ...], ...]:
-    return read_off(coupling_of(coupling), graph)
+    return network.connectivity(coupling_of(coupling), graph)

@@ -1,7 +1,8 @@
-"""Networks from one node and one edge: the template derivation that holds for any number of oscillators.
+"""Equations of networks from the oscillator, friction law and coupling that plug-ins define.
 
-The Lagrangian of a network is a sum over nodes and edges, T = sum T_i and V = sum V_i + sum V_edge, so the Euler-Lagrange
-equations of a node are those of the single oscillator plus one force for each edge that meets it.
+The Lagrangian of a network is a sum over nodes and edges, T = sum T_i and V = sum V_i + sum V_edge,
+so the Euler-Lagrange equations of a node are those of the single oscillator plus one force for each
+edge that meets it.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from ..graphs.topology import Topology
 from ..inputs.plugins import names
 from ..mechanics.calculus import cancelled
 from ..mechanics.components import SLIDING, Edge, Node
-from ..mechanics.coupling import Coupling
+from ..mechanics.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling
 from ..mechanics.definition import FRICTION_LAW
 from ..mechanics.friction import KAPPA, ContactModel, FrictionLaw
 from ..mechanics.lagrangian import Mechanics
@@ -30,7 +31,7 @@ from ..mechanics.parameter import Parameter
 from ..mechanics.stick_slip import SLIP, set_valued
 from .equations import Equations
 
-__all__ = ["check_coupling", "edge", "mixed_network", "network", "node", "oriented_links", "parameters"]
+__all__ = ["check_coupling", "connectivity", "edge", "mixed_network", "network", "node", "oriented_links", "parameters"]
 
 
 def parameters(
@@ -126,10 +127,23 @@ def _check_parts(oscillator: Oscillator, friction: FrictionLaw | None, contact: 
 
 
 def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str, ...] = ()) -> Equations:
-    """Join copies of a node by the links of a graph; without an edge the nodes stay uncoupled.
+    """Return the equations of equal nodes that the links of a graph join.
 
-    The node's parameters named in `varied` get a value for each node.
-    Where a link tells its ends apart, its weight becomes the sign of its direction (`synchain.models.mechanics.orientation`).
+    Parameters
+    ----------
+    single : Node
+        The template of the nodes.
+    link : Edge or None
+        The template of the links; None leaves the nodes uncoupled.
+    graph : Topology
+        The graph.
+    varied : tuple of str
+        Parameters of nodes that have one value for each node.
+
+    Notes
+    -----
+    If a link tells its ends apart, its weight becomes the sign of its direction
+    (`synchain.models.mechanics.orientation`).
     """
     if link is None:
         return Equations.of_equal_nodes(single, None, graph.n, (), varied)
@@ -146,9 +160,28 @@ def mixed_network(
     graph: Topology,
     varied: tuple[str, ...] = (),
 ) -> Equations:
-    """Join nodes of several kinds by the links of a graph: `kinds` says of which oscillator each node is.
+    """Return the equations of nodes of several kinds that the links of a graph join.
 
-    Every pair of kinds that a link joins gets its own edge.  Raises ValueError where a coupling does not fit a pair.
+    Parameters
+    ----------
+    oscillators : sequence of str
+        Names of the oscillators, by kind.
+    singles : sequence of Node
+        Their templates.
+    kinds : sequence of int
+        The kind of each node.
+    coupling : str or None
+        The coupling, from which every pair of kinds that a link joins gets its own edge; None leaves
+        the nodes uncoupled.
+    graph : Topology
+        The graph.
+    varied : tuple of str
+        Parameters of nodes that have one value for each node.
+
+    Raises
+    ------
+    ValueError
+        If the coupling does not fit a pair of kinds.
     """
     apart = Equations(tuple(singles), tuple(kinds), (), (), varied)
     if coupling is None:
@@ -160,12 +193,58 @@ def mixed_network(
     return replace(apart, links=graph.links, edge_of=edges)
 
 
+def connectivity(coupling: Coupling, graph: Topology) -> tuple[tuple[Fraction, ...], ...]:
+    """Read G off the coupling: minus the Hessian of its whole potential over sigma, n rows of n fractions.
+
+    The Hessian of one edge is derived once and added up over the links, so that a thousand nodes take no algebra.  For a
+    damper the Rayleigh function takes the potential's place; for a one-way link the row is read off the force on its target.
+    Of entries such as "1/2 x->y" the factor belongs to H, so that G holds the weights alone.
+    Raises ValueError for a coupling whose Hessian between equal states is not sigma times weight times a number: it has no
+    matrix G.
+    """
+    if isinstance(coupling, MatrixCoupling):
+        diagonal, aside = Fraction(-1), Fraction(1)
+    else:
+        diagonal, aside = _hessian(coupling)
+    rows = [[Fraction(0)] * graph.n for _ in range(graph.n)]
+    for target, source, factor in graph.links:
+        rows[target][target] += factor * diagonal
+        rows[target][source] += factor * aside
+    return tuple(map(tuple, rows))
+
+
+def _hessian(coupling: LagrangianCoupling) -> tuple[Fraction, Fraction]:
+    """Minus the second derivatives of one edge's energy over sigma and weight: twice by one end, and by both.
+
+    Of a non-linear coupling they are taken between equal states, where its links are those of its linear part.
+    """
+    q_i, q_j, v_i, v_j, sigma = sp.symbols("q_i q_j v_i v_j sigma", real=True)
+    if coupling.between is not None:
+        raise ValueError(
+            f"coupling {str(coupling)!r} joins {' and '.join(coupling.between)}; it has no matrix of one coordinate"
+        )
+    functions = (coupling.potential, coupling.dissipation, coupling.kinetic)
+    energy = next((e for e in functions if e != 0), sp.S.Zero).xreplace({v_i: q_i, v_j: q_j})
+    slopes = (-energy.diff(q_i, q).xreplace({q_j: q_i}) for q in (q_i, q_j))
+    own, other = (sp.simplify(slope / (sigma * WEIGHT)) for slope in slopes)
+    if not (own.is_Rational and other.is_Rational) or own == 0:
+        raise ValueError(
+            f"coupling {str(coupling)!r}: Hessian over sigma and weight is {own}, {other}; expected numbers other than 0"
+        )
+    return Fraction(int(own.p), int(own.q)), Fraction(int(other.p), int(other.q))
+
+
 def oriented_links(graph: Topology) -> tuple[Link, ...]:
     """Return the links of a graph with the sign of their direction as weight.
 
-    A link runs from the smaller to the larger number; on a graph that looks alike from every node (a ring) it runs the
-    shorter way round, so that the last link runs from the last node to the first.
-    Raises ValueError for one-way links and for weights other than 1: strength and direction share one number.
+    A link runs from the smaller to the larger number.  On a graph that looks alike from every node,
+    such as a ring, it runs the shorter way round, so the last link runs from the last node to the
+    first.
+
+    Raises
+    ------
+    ValueError
+        For one-way links and for weights other than 1: strength and direction share one number.
     """
     if not graph.symmetric or any(weight != 1 for _, _, weight in graph.links):
         raise ValueError(
