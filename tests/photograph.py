@@ -227,7 +227,7 @@ def simulated(given: Scene, **options: Any) -> Quantities:
     counts = ("steps", "rejected", "periods_skipped")
     for name, values in found.data.data_vars.items():
         seen[str(name)] = Counts(values.values) if name in counts else values.values
-    return seen | written(found.scene, options.get("skip", True))
+    return seen | written(found.scene, options.get("reduce", True))
 
 
 def _parts(given: Scene) -> str:
@@ -239,14 +239,14 @@ def _parts(given: Scene) -> str:
     return ", ".join(f"{kind} {name}" for kind, name in dict.fromkeys(named) if name)
 
 
-def written(given: Scene, skip: Any = True) -> Quantities:
+def written(given: Scene, reduce: Any = True) -> Quantities:
     """Texts of a scene: file, equations, exports, reductions, warnings."""
     equations = given.equations
     seen: Quantities = {
         "scene": json.dumps(given.as_dict(), sort_keys=True),
         "equations": text(equations),
         "latex": latex(equations),
-        "explain": explain(as_reduction(given, skip)),
+        "explain": explain(as_reduction(given, reduce)),
         "warnings": "\n".join(given.warnings),
     }
     for language, export in (("python", to_python), ("numba", to_numba), ("c", to_c)):
