@@ -74,8 +74,7 @@ from synchain.models.presentation.equations import text
 
 from synchain.runtime.cli import main  # isort: skip
 from synchain.runtime.results.energy import energy_function  # isort: skip
-from synchain.runtime.cells.kernels import as_reduction  # isort: skip
-from synchain.runtime.cells.reduce import explain  # isort: skip
+from synchain.runtime.cells.reduce import as_reduction, explain  # isort: skip
 from synchain.runtime.synchronisation.threshold import Criterion  # isort: skip
 
 __all__ = ["SCENES", "Picture", "camera", "compare", "take"]

@@ -25,7 +25,7 @@ LONGEST = 1e7
 class Layout:
     """Blocks of `size` cells, in C order over the axes.
 
-    In a continued sweep (`columns` values of the last axis, `falling` where it runs downwards) a block is one column of up
+    In a continued sweep (`columns` values of the last axis, `falling` if it runs downwards) a block is one column of up
     to `size` rows, and each block needs the one before it in its row.
     """
 
@@ -36,7 +36,7 @@ class Layout:
 
     @classmethod
     def of(cls, scene: Scene, size: int) -> Layout:
-        """The layout of a scene's sweep in blocks of this size."""
+        """Return the layout of a scene's sweep in blocks of this size."""
         if scene.continuation == "none":
             return cls(scene.cells, size)
         return cls(scene.cells, size, scene.shape[-1], scene.continuation == "down")
@@ -48,7 +48,7 @@ class Layout:
         return math.ceil(self.cells / steps / self.size) * steps
 
     def rows(self, block: int) -> np.ndarray:
-        """Numbers of the cells of a block."""
+        """Return the numbers of the cells of a block."""
         if not self.columns:
             return np.arange(block * self.size, min((block + 1) * self.size, self.cells))
         group, place = divmod(block, self.columns)

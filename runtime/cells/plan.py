@@ -147,7 +147,7 @@ class Planner:
 
 
 def periods(equations: Equations, numbers: np.ndarray) -> np.ndarray:
-    """The period of the equations for each row of parameters; 0 where time does not enter or no period is known."""
+    """Return the period of the equations for each row of parameters; 0 if time does not enter or no period is known."""
     if len(numbers) == 0:
         return np.zeros(0)
     frequency = drive_of(equations.nodes, equations.varied).frequency
@@ -168,7 +168,7 @@ def _sizes(frequency: sp.Expr, values: Mapping[str, np.ndarray], rows: int) -> n
 
 
 def half_swing(equations: Equations, values: Mapping[str, np.ndarray]) -> float:
-    """Half the period of the fastest sine or cosine of time at arrays of parameters of one length; inf without a drive.
+    """Return half the period of the fastest sine or cosine of time; inf without a drive.
 
     No step may be longer, so that none can miss a whole swing of the drive.
     """
@@ -179,7 +179,7 @@ def half_swing(equations: Equations, values: Mapping[str, np.ndarray]) -> float:
 
 
 def longest_step(scene: Scene) -> float:
-    """The half swing at the ends of all that a scene's nodes and axes give to the parameters of its drive."""
+    """Return the half swing at the extremes of the drive's parameters over all nodes and axes of a scene."""
     known = dict.fromkeys(name for wave in scene.drive.waves for name in names_in(wave))
     ends = []
     for names in (parameter_names(scene, name) for name in known):
@@ -191,7 +191,7 @@ def longest_step(scene: Scene) -> float:
 
 
 def parameter_names(scene: Scene, name: str) -> tuple[str, ...]:
-    """The names under which a scene has a parameter: one, a_1 … a_n where nodes differ, none where it has no such."""
+    """Return the names under which a scene has a parameter: one, a_1 … a_n if nodes differ, none if it has no such."""
     if name not in scene.varied:
         return (name,) if name in scene.parameters else ()
     return tuple(found for found in scene.parameters if found.rpartition("_")[0] == name)

@@ -303,7 +303,7 @@ def _merge(
 
 
 def _colours(scene: Scene) -> list[Hashable]:
-    """For each oscillator its start and its own parameters in all cells; equal where these are equal in every cell."""
+    """For each oscillator its start and its own parameters in all cells; equal if these are equal in every cell."""
     swept = {axis.name: axis.values for axis in scene.axes}
     colours: list[Hashable] = []
     for i in range(scene.n):
@@ -321,7 +321,7 @@ def _colours(scene: Scene) -> list[Hashable]:
 
 
 def _multiplicity(scene: Scene, classes: tuple[int, ...]) -> tuple[int, ...] | None:
-    """Oscillators in each class where the synchronisation error must count them, else None.
+    """Oscillators in each class if the synchronisation error must count them, else None.
 
     It is the sum of the distances from the first oscillator, whose own class does not contribute.
     """

@@ -1,4 +1,4 @@
-"""What is known of the synchronous state of each cell: exponents, classes and verdicts."""
+"""Certificates: exponents of the synchronous state of each cell, and the verdicts that follow."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ NEAR = 1e-11
 """Synchronisation error below which a certified cell ends."""
 
 ERRORS, CHANCE = 5.0, 1e-6
-"""A cell may end early where its exponent is below 0 by so many standard errors, and where the chance of a burst from
-NEAR to BURST is below CHANCE."""
+"""A cell may end early if its exponent is below 0 by so many standard errors, and if the chance of a burst from NEAR to
+BURST is below CHANCE."""
 
 BURST, SYNCHRONOUS = 1e-6, 1e-3
 """Synchronisation error that a certified cell must not reach again; mean error below which a cell counts as synchronous,
@@ -45,7 +45,7 @@ class Certificate:
 
     @property
     def near(self) -> np.ndarray:
-        """The synchronisation error (cells,) below which a cell is taken to stay synchronous; 0 where that is not safe.
+        """The synchronisation error (cells,) below which a cell is taken to stay synchronous; 0 if that is not safe.
 
         A deviation whose logarithm drifts down at the rate -exponent and diffuses ever climbs by g with the chance
         exp(-2 g |exponent| / diffusion) (Redner, A Guide to First-Passage Processes (Cambridge, 2001), section 3.2).

@@ -36,7 +36,7 @@ LARGEST = 2**32 - 4
 class Sheet:
     """A file for data shaped like `template` but for other lengths of some dimensions; written by `put`.
 
-    The template holds the variables, dimensions and attributes; where a length is given the template's own is not used.
+    The template holds the variables, dimensions and attributes; if a length is given, the template's own is not used.
     """
 
     def __init__(self, file: BinaryIO, template: xr.Dataset, lengths: Mapping[str, int]) -> None:

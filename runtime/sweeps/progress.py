@@ -19,7 +19,7 @@ from ..support.status import CODES, Status
 __all__ = ["Hook", "Progress", "Reporter", "check_reporting", "duration"]
 
 EVERY = 60.0
-"""Seconds between two lines where stderr is no terminal."""
+"""Seconds between two lines if stderr is no terminal."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,7 +55,7 @@ class Probe:
 
     @property
     def synchronous(self) -> np.ndarray:
-        """True where at least half of the starts synchronised, as in `synchain.runtime.synchronisation.threshold`."""
+        """True if at least half of the starts synchronised, as in `synchain.runtime.synchronisation.threshold`."""
         return self.share >= 0.5
 
 
@@ -130,8 +130,12 @@ def ring_of_three(equations: Equations) -> Equations:
     """Return three nodes in a ring, with links of the weight alpha/3 + beta/sqrt(3) one way and alpha/3 - beta/sqrt(3) back.
 
     The parameters `mode_alpha` and `mode_beta` take the place of sigma; the weight of a link, 1 or -1, is its direction.
-    Raises ValueError where there is no coupling, where a link is not proportional to sigma and to its weight or does not
-    vanish between equal states, and where the model uses one of the two names itself.
+
+    Raises
+    ------
+    ValueError
+        If there is no coupling, if a link is not proportional to sigma and to its weight or does not vanish between equal
+        states, or if the model uses one of the two names itself.
     """
     equations.expect_alike("the three-oscillator probe")
     edge = equations.edge
@@ -172,7 +176,7 @@ def _sigma(edge: Edge) -> sp.Symbol:
 
 
 def _broadcast(alpha: ArrayLike, beta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """Both parts of the strengths in one shape; ValueError where they have none, are empty or not finite."""
+    """Both parts of the strengths in one shape; ValueError if they have none, are empty or not finite."""
     parts = numbers("alpha", alpha), numbers("beta", beta)
     for part in parts:
         if part.size == 0:

@@ -79,7 +79,7 @@ class Criterion:
 
 
 def checked(criterion: Criterion | None) -> Criterion:
-    """The criterion that was given, or the usual one; TypeError where it is none."""
+    """Return the criterion, or the default one for None; TypeError for anything else."""
     if criterion is None:
         return Criterion()
     return instance("criterion", criterion, Criterion, "a Criterion, e.g. Criterion(starts=4)")
@@ -187,7 +187,7 @@ def thresholds(
 
 
 def default_grid(spectrum: Spectrum, step: float = 0.0025) -> np.ndarray:
-    """Sigma from 0 to where the largest |sigma gamma| is 1.2, in at least 60 steps of at most `step`."""
+    """Return values of sigma from 0 to the one with 1.2 as largest |sigma gamma|, in at least 60 steps of at most `step`."""
     highest = 1.2 / max(abs(value) for value in spectrum.values)
     return np.linspace(0.0, highest, max(math.ceil(highest / step), 60) + 1)
 
@@ -201,7 +201,7 @@ def _probe_grid(sigma: np.ndarray, spectrum: Spectrum) -> np.ndarray:
 
 
 def check_probe(graph: Topology, spectrum: Spectrum) -> None:
-    """Raise ValueError where the two-oscillator probe says nothing about a network."""
+    """Raise ValueError if the two-oscillator probe says nothing about a network."""
     if graph.n < 2 or not graph.links:
         raise ValueError(f"{graph.name}({graph.n}) has no links; thresholds need at least two coupled oscillators")
     if any(isinstance(value, complex) for value in spectrum.values):
@@ -325,7 +325,7 @@ def judge(measure: Measure, x: np.ndarray, resolution: float, criterion: Criteri
 
 
 def offsets(criterion: Criterion) -> np.ndarray:
-    """How far the starts are moved: not at all, then at random."""
+    """Return how far the starts are moved: not at all, then at random."""
     random = np.random.default_rng(criterion.seed)
     return np.concatenate([[0.0], random.uniform(-criterion.reach, criterion.reach, criterion.starts - 1)])
 
