@@ -1,1 +1,16 @@
-"""From equations to machine code: text of one step, whole kernel modules, their compilation, and exports."""
+"""From equations to machine code: text of one step, whole kernel modules, their compilation, and exports.
+
+Glossary
+--------
+lane          One of the numbers in a SIMD register; each lane integrates a cell of its own.
+width         The number of lanes of a kernel: 1, 2, 4, 8 or 16.
+step          Generated function: advances all states of one cell by one step of an integrator.
+stage         One evaluation of the right-hand side within a step.
+driver        The fixed text around the step: step size, events, records, the next cell of a lane.
+kernel        Step and driver as one Python module that Numba compiles.
+digest        Hash of the text of a kernel, by which the cache finds it.
+record        What a kernel writes: mean errors, section points, trajectories.
+dense output  The polynomial through a step, which gives states between its ends.
+unrolled      Written out node by node; larger networks are looped over their nodes and links.
+golden        A file of expected text in tests/golden, which `pytest --update` writes anew.
+"""

@@ -1,8 +1,23 @@
 """From a Lagrangian and a graph to exact equations and exact spectra.
 
-Names are loaded on first use, so that importing this package costs next to nothing.  Every file of the folder
-`topologies` is offered as a function of the number of nodes and of its options: ``circulant(10, offsets=(1, 3))`` is
-``topology("circulant", 10, offsets=(1, 3))``.
+Names are loaded on first use, so that importing this package costs next to nothing.  Every file of the
+folder `topologies` is offered as a function of the number of nodes and of its options:
+``circulant(10, offsets=(1, 3))`` is ``topology("circulant", 10, offsets=(1, 3))``.
+
+Glossary
+--------
+node, link    An oscillator of a network; what node j does to node i, with an exact weight.
+kind          Nodes of one kind have the same oscillator, friction law and contact, hence one set of equations.
+topology      Number of nodes and weighted links: adjacency minus degree is the connectivity matrix G.
+family        A rule that makes the topology of any number of nodes: chain, ring, star.
+spectrum      The exact eigenvalues γ of G with their multiplicities; largest first, the first is 0.
+coupling      Energy or dissipation of a link, or a matrix between states; its strength is σ.
+contact       How friction jumps at rest: smoothed ("atan", steepness κ), or "set-valued".
+slip state    Of a node with set-valued contact: +1 or -1 while it slips, 0 while it sticks.
+quotient      The network of classes of nodes that move alike, which has fewer equations.
+record        What a scene keeps: "sync_error", "section" or "trajectory".
+scene         Model, numbers, start, records and axes: everything that a run needs.
+cell          One point of the axes of a scene: one initial-value problem.
 """
 
 from __future__ import annotations
@@ -95,7 +110,9 @@ def __getattr__(name: str) -> Any:
     elif name.startswith("_") or name not in _families():
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     else:
-        value = _family(name)
+        from .graphs.families import family
+
+        value = family(name)
     globals()[name] = value
     return value
 
@@ -109,15 +126,3 @@ def _families() -> set[str]:
 
     found = iter_modules(import_module(".topologies", __name__).__path__)
     return {module.name for module in found if not module.name.startswith("_")}
-
-
-def _family(name: str) -> Any:
-    from .graphs.families import topology
-
-    def family(n: int, **options: Any) -> Topology:
-        return topology(name, n, **options)
-
-    family.__name__ = family.__qualname__ = name
-    family.__module__ = __name__
-    family.__doc__ = f"Return the {name} of `n` nodes, with the options of its file; ValueError where n is too small."
-    return family

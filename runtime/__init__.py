@@ -1,4 +1,22 @@
-"""Running scenes: sweeps, thresholds, exponents, figures, benchmarks and the command line."""
+"""Running scenes: sweeps, thresholds, exponents, figures, benchmarks and the command line.
+
+Names are loaded on first use, so that the command line starts fast.
+
+Glossary
+--------
+cell          One point of the axes of a scene: one initial-value problem with a status of its own.
+row           The numbers of one cell as a kernel takes them: parameters, initial states, span.
+span          Of one cell: the ends of its window, its period, and the error from which it is synchronous.
+block         Cells that are run, stored and resumed as one piece.
+lane          One of the numbers in a SIMD register; each lane of a kernel integrates a cell of its own.
+transient     Time that is integrated before anything is recorded; the window follows it.
+strength      α = -σγ, real or complex: what one eigenvalue γ of the network feels of the coupling σ.
+mode          A deviation from synchrony along an eigenvector of the network; it grows with its exponent.
+interval      A range of strengths with negative exponent; a window of σ has every mode in one of these.
+verdict       Whether and where a network synchronises, decided from the intervals and the spectrum.
+probe         Two or three oscillators whose simulation stands for a mode of any network.
+certificate   Exponents and verdict of the synchronous state of each cell of a sweep.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +31,9 @@ if TYPE_CHECKING:
     from .results.open import open_result
     from .results.result import Result
     from .stability.clusters import ClusterExponents, cluster_exponents
+    from .stability.exponents import Exponents, exponents
     from .stability.lyapunov import Lyapunov, lyapunov_spectrum
     from .stability.msf import MSF, Plane, msf, plane
-    from .stability.transversal import Exponents, exponents
     from .support.status import Status
     from .sweeps.errors import SweepFailed, SweepInterrupted
     from .sweeps.progress import Progress
@@ -63,7 +81,7 @@ _HOME = {
     "Basin": "synchronisation.basin",
     "Branch": "bifurcation.branches",
     "ClusterExponents": "stability.clusters",
-    "Exponents": "stability.transversal",
+    "Exponents": "stability.exponents",
     "Lyapunov": "stability.lyapunov",
     "MSF": "stability.msf",
     "PeriodicOrbit": "bifurcation.periodic",
@@ -78,7 +96,7 @@ _HOME = {
     "Thresholds": "synchronisation.threshold",
     "basin": "synchronisation.basin",
     "cluster_exponents": "stability.clusters",
-    "exponents": "stability.transversal",
+    "exponents": "stability.exponents",
     "follow": "bifurcation.branches",
     "kernel": "cells.kernels",
     "lyapunov_spectrum": "stability.lyapunov",

@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 from synchain.codegen.kernels.installation import InstallationError
 
 from .commands import command, names
-from .console.outcome import FAILED, FINE, WRONG_USE, Failed, WrongUse, sentence, wrong_use
+from .console.outcome import FAILED, FINE, WRONG_USE, Failed, WrongUse, discard_output, sentence, wrong_use
 
 __all__ = ["main"]
 
@@ -76,9 +76,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         if sys.stdout is not None:
             sys.stdout.flush()
         return code
-    except BrokenPipeError as closed:  # whoever reads the output has seen enough
-        _silence()
-        return int(getattr(closed, "exit_code", FINE))
+    except BrokenPipeError:  # the reader of the output has seen enough
+        discard_output()
+        return FINE
     except (Exception, KeyboardInterrupt) as problem:
         if argv is None:  # the program ends: a second Ctrl-C cannot cut its last words short, nor change its exit code
             with suppress(ValueError):  # only the main thread may ask for that
@@ -180,7 +180,7 @@ def _report(name: str, problem: BaseException) -> int:
         if sys.stdout is not None:
             sys.stdout.flush()
     except OSError:
-        _silence()
+        discard_output()
     return code
 
 
@@ -215,12 +215,3 @@ def _readable(stream: Any) -> None:
     """Write characters that the stream's encoding lacks as escapes instead of failing."""
     if getattr(stream, "errors", None) == "strict" and hasattr(stream, "reconfigure"):
         stream.reconfigure(errors="backslashreplace")
-
-
-def _silence() -> None:
-    """Let what is left in stdout's buffer go nowhere, so that the interpreter ends without a complaint."""
-    with suppress(OSError, ValueError):
-        descriptor = sys.stdout.fileno()
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, descriptor)
-        os.close(nowhere)

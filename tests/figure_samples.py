@@ -12,17 +12,17 @@ import pytest
 import xarray as xr
 
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.figures import exponent, load, make, plane, study, style, synchronisability_map
+from synchain.runtime.figures import exponent, figure_runs, load, make, plane, style, synchronisability_map
 from synchain.runtime.results.result import Result
-from synchain.runtime.stability.attractor import Attractor
+from synchain.runtime.stability.attractor import Attractor, Motion
+from synchain.runtime.stability.exponents import Exponents
 from synchain.runtime.stability.msf import MSF, Plane
-from synchain.runtime.stability.transversal import Exponents
 from synchain.runtime.support.status import Status
 from synchain.runtime.synchronisation.threshold import Criterion, Sweep, project
 
 RANGE = {1.15: (0.0, 0.466), 1.4: (0.09, 0.6), 1.55: (0.176, 0.594)}
 """Ranges of alpha that the stand-in for the simulation pretends to measure."""
-TINY = study.Quality(9, 13, Criterion(starts=1), 1e-3, (5,))
+TINY = figure_runs.Quality(9, 13, Criterion(starts=1), 1e-3, (5,))
 
 
 def pretend(scene: Scene, failed: tuple[int, ...] = (), **options: Any) -> Result:
@@ -64,9 +64,9 @@ class Simulation:
         self.failed: tuple[int, ...] = ()
 
     def install(self, monkeypatch: pytest.MonkeyPatch) -> Simulation:
-        """Stand in for a study's runs and sweeps, and make both qualities tiny."""
+        """Stand in for the runs and sweeps, and make both qualities tiny."""
         for name in ("run", "probe", "simulate"):
-            monkeypatch.setattr(study, name, getattr(self, name))
+            monkeypatch.setattr(figure_runs, name, getattr(self, name))
         monkeypatch.setattr(exponent, "msf", self.msf)
         monkeypatch.setattr(plane, "plane", self.plane)
         monkeypatch.setattr(synchronisability_map, "exponents", self.exponents)
@@ -116,11 +116,11 @@ def parabola(omega: float, alpha: np.ndarray) -> Exponents:
     low, high = RANGE.get(omega, RANGE[1.4])
     value = (alpha - low) * (alpha - high)
     return Exponents(
-        alpha, value, np.full(len(alpha), 1e-3), 500.0, 1, value[None], (Attractor("aperiodic", 0.0),)
+        alpha, value, np.full(len(alpha), 1e-3), 500.0, 1, value[None], (Attractor(Motion.APERIODIC, 0.0),)
     )  # fmt: skip
 
 
-def drawn(name: str, runs: study.Study) -> tuple[Any, Any]:
+def drawn(name: str, runs: figure_runs.FigureRuns) -> tuple[Any, Any]:
     """Axes and data of a figure."""
     drawing = load(name)
     data = drawing.compute(runs)

@@ -27,26 +27,26 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = Path(os.environ.get("SYNCHAIN_MUTANTS", ROOT / ".mutants"))
 TESTS = {
-    "models/angles": "spectrum closed_forms angle_text graph_families",
-    "models/closed_forms": "closed_forms spectrum",
-    "models/contact": "contact contact_theory",
-    "models/coupling_matrix": "coupling_matrix parts_manual",
-    "models/isolation": "isolation spectrum",
-    "models/lagrangian": "lagrangian nondimensional energy inertia",
-    "models/link": "network inertia coupling_matrix lagrangian nondimensional",
-    "models/network": "network nondimensional inertia coupling_matrix",
-    "models/nondimensional": "nondimensional frictions lagrangian",
-    "models/proof": "spectrum clusters",
-    "models/saltation": "contact_theory contact_tangents",
-    "models/separation": "separation symbolic_weights angle_text claims",
-    "models/spectrum": "spectrum jordan closed_forms angle_text",
-    "models/tangent": "tangent coupling_matrix",
-    "runtime/intervals": "intervals one_way",
-    "runtime/probe": "probe",
-    "runtime/stable_ranges": "synchronisability",
-    "runtime/synchronisability": "synchronisability one_way",
-    "runtime/threshold": "threshold one_way synchronisability",
-    "runtime/transversal": "tangent synchronisability",
+    "models/algebra/cosines": "spectrum closed_forms angle_text graph_families",
+    "models/graphs/closed_forms": "closed_forms spectrum",
+    "models/mechanics/stick_slip": "contact contact_theory",
+    "models/mechanics/coupling_text": "coupling_matrix parts_manual",
+    "models/algebra/real_roots": "isolation spectrum",
+    "models/mechanics/lagrangian": "lagrangian nondimensional energy inertia",
+    "models/mechanics/link": "network inertia coupling_matrix lagrangian nondimensional",
+    "models/dynamics/network": "network nondimensional inertia coupling_matrix",
+    "models/mechanics/nondimensional": "nondimensional frictions lagrangian",
+    "models/spectra/proof": "spectrum clusters",
+    "models/dynamics/saltation": "contact_theory contact_tangents",
+    "models/algebra/equality": "separation symbolic_weights angle_text claims",
+    "models/spectra/solve": "spectrum jordan closed_forms angle_text",
+    "models/dynamics/variational": "tangent coupling_matrix",
+    "runtime/prediction/intervals": "intervals one_way",
+    "runtime/synchronisation/probe": "probe",
+    "runtime/prediction/stable_ranges": "synchronisability",
+    "runtime/prediction/synchronisability": "synchronisability one_way",
+    "runtime/synchronisation/threshold": "threshold one_way synchronisability",
+    "runtime/prediction/modes": "tangent synchronisability",
 }
 """The test files that concern a module."""
 COMPARISONS = ["Lt_LtE", "LtE_Lt", "Gt_GtE", "GtE_Gt", "Eq_NotEq", "NotEq_Eq", "Is_IsNot", "IsNot_Is"]
@@ -97,9 +97,14 @@ def mutants(module: str) -> Iterator[dict[str, Any]]:
             statement = max((s for s in lines if s[0] <= start[0] <= s[1]), default=(start[0], start[0]))
             old = source.splitlines()[start[0] - 1].strip()
             yield {
-                "key": f"{module} {name} {occurrence} {old}", "module": module, "line": start[0], "operator": name,
-                "occurrence": occurrence, "old": old, "statement": statement,
-            }  # fmt: skip
+                "key": f"{module} {name} {occurrence} {old}",
+                "module": module,
+                "line": start[0],
+                "operator": name,
+                "occurrence": occurrence,
+                "old": old,
+                "statement": statement,
+            }
 
 
 def mutated(mutant: dict[str, Any]) -> str:
@@ -136,9 +141,10 @@ def baseline(name: str) -> tuple[Path, dict[str, float]]:
     data, times = FOLDER / f".coverage.{name}", FOLDER / f"{name}.json"
     if not times.exists():
         FOLDER.mkdir(exist_ok=True)
+        (path,) = (ROOT / "tests").rglob(f"test_{name}.py")
         code = (
             "import json, pytest, sys; from mutants import Durations; d = Durations(); "
-            f"r = pytest.main(['tests/test_{name}.py', '-q', '--cov', '--cov-context=test', '--cov-report='], [d]); "
+            f"r = pytest.main([{str(path)!r}, '-q', '--cov', '--cov-context=test', '--cov-report='], [d]); "
             f"r or open({str(times)!r}, 'w').write(json.dumps(d.found)); sys.exit(r)"
         )
         environment = {**os.environ, "COVERAGE_FILE": str(data), "PYTHONPATH": str(ROOT / "tests")}
@@ -256,7 +262,7 @@ def table(modules: list[str]) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("modules", nargs="*", default=sorted(TESTS), help="such as models/spectrum")
+    parser.add_argument("modules", nargs="*", default=sorted(TESTS), help="such as models/spectra/solve")
     parser.add_argument("--limit", type=float, default=30.0, help="seconds of tests that a mutant meets (default: 30)")
     parser.add_argument("--jobs", type=int, default=2, help="mutants at a time (default: 2)")
     parser.add_argument("--share", type=float, default=1.0, help="part of the mutants that is drawn (default: 1)")

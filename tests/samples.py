@@ -15,11 +15,12 @@ import sympy as sp
 
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.sweep import emit
-from synchain.models import ring, star
+from synchain.models import chain, ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.scenes.scene import Scene
+from synchain.runtime.cells.plan import control_array, longest_step, plan, tolerances
 
 TABLE = {"theta_b": 0.1, "mu_s": 0.3, "mu_k": 0.15, "a": 2.5, "kappa": 1e5, "epsilon": 2.0, "u": 0.1, "omega": 1.15,
          "sigma": 0.1}  # fmt: skip
@@ -48,20 +49,25 @@ def friction_chain(n: int) -> Equations:
     w = theta_b - v
     law = (mu_k + (mu_s - mu_k) * sp.exp(-a * sp.Abs(w))) * 2 / sp.pi * sp.atan(kappa * w)
     node = Node((x, v), (v, -x + u * sp.cos(omega * TIME) + epsilon * law), tuple(parameters))
-    return Equations(node, spring() if n > 1 else None, n, path(n))
+    return Equations.of_equal_nodes(node, spring() if n > 1 else None, n, path(n))
+
+
+def friction_scene(n: int) -> Equations:
+    """The same as scenes have it: with these equations, all records and the section v_1 a test shares the kernel of many."""
+    return Scene(topology=chain(n)).equations if n > 1 else Scene().equations
 
 
 def harmonic_chain(n: int) -> Equations:
     """Oscillators without friction or drive, joined by springs."""
     x, v = real("x", "v")
-    return Equations(Node((x, v), (v, -x), ()), spring(), n, path(n))
+    return Equations.of_equal_nodes(Node((x, v), (v, -x), ()), spring(), n, path(n))
 
 
 def waving() -> Equations:
     """A damped pendulum driven such that x = cos t, v = -sin t solves it."""
     x, v, damping = real("x", "v", "damping")
     drive = -sp.cos(TIME) + sp.sin(sp.cos(TIME)) - damping * sp.sin(TIME)
-    return Equations(Node((x, v), (v, drive - sp.sin(x) - damping * v), (damping,)), None, 1)
+    return Equations.of_equal_nodes(Node((x, v), (v, drive - sp.sin(x) - damping * v), (damping,)), None, 1)
 
 
 def looped() -> Equations:
@@ -73,7 +79,7 @@ def looped() -> Equations:
     push = (delta * w * (v_2 - v), sigma * w * (x_2 - x) * sp.cos(x_2 - x) + mu * v_2)
     edge = Edge((x, v), (x_2, v_2), w, push, (sigma, delta, mu))
     links = ((0, 1, Fraction(2, 3)), (1, 2, Fraction(1)), (2, 0, Fraction(-3, 2)), (0, 2, Fraction(1)))
-    return Equations(node, edge, 3, links)
+    return Equations.of_equal_nodes(node, edge, 3, links)
 
 
 def parametric() -> Equations:
@@ -81,7 +87,7 @@ def parametric() -> Equations:
     x, v, omega, u = real("x", "v", "omega", "u")
     wave = u * omega * sp.sin(omega * TIME)
     rhs = (v + u * sp.cos(omega * TIME), wave * x * v - x * sp.sin(omega * TIME))
-    return Equations(Node((x, v), rhs, (omega, u)), spring(), 2, path(2))
+    return Equations.of_equal_nodes(Node((x, v), rhs, (omega, u)), spring(), 2, path(2))
 
 
 def third_order() -> Equations:
@@ -89,7 +95,7 @@ def third_order() -> Equations:
     x, y, z, a, b = real("x", "y", "z", "a", "b")
     kinks = sp.Abs(y) * sp.sign(x - b)
     last = -a * z - kinks - x**3 + sp.cos(a * TIME) ** 2 - sp.log(b) / (1 + y**2)
-    return Equations(Node((x, y, z), (y, z + sp.Rational(1, 3), last), (a, b)), None, 1)
+    return Equations.of_equal_nodes(Node((x, y, z), (y, z + sp.Rational(1, 3), last), (a, b)), None, 1)
 
 
 def tanh_pair() -> Equations:
@@ -98,7 +104,7 @@ def tanh_pair() -> Equations:
     rhs = (sp.tanh(a * x) * sp.sin(phase) - sp.sqrt(1 + x**2), sp.S.One)
     x_2, phase_2, w, sigma = real("x_2", "phase_2", "w", "sigma")
     edge = Edge((x, phase), (x_2, phase_2), w, (sp.S.Zero, sigma * w * sp.sin(phase_2 - phase)), (sigma,))
-    return Equations(Node((x, phase), rhs, (a,)), edge, 2, path(2))
+    return Equations.of_equal_nodes(Node((x, phase), rhs, (a,)), edge, 2, path(2))
 
 
 def choices() -> Equations:
@@ -111,7 +117,7 @@ def choices() -> Equations:
     x_2, v_2, w, sigma = real("x_there", "v_there", "weight", "sigma")
     rope = sp.Piecewise((sigma * w * (x_2 - x), (x_2 > x) & (sigma > b)), (0, True))
     node = Node((x, v), (v, stop - x + drag + drive + mixed), (a, b, omega))
-    return Equations(node, Edge((x, v), (x_2, v_2), w, (sp.S.Zero, rope), (sigma, b)), 2, path(2))
+    return Equations.of_equal_nodes(node, Edge((x, v), (x_2, v_2), w, (sp.S.Zero, rope), (sigma, b)), 2, path(2))
 
 
 CASES: dict[str, Equations] = {
@@ -163,11 +169,15 @@ def numbers(equations: Equations, **changed: float) -> list[float]:
 
 @functools.cache
 def kernel(
-    equations: Equations, method: str = "rodas5p", records: tuple[str, ...] = (), section: sp.Expr | None = None,
+    equations: Equations,
+    method: str = "rodas5p",
+    records: tuple[str, ...] = (),
+    section: sp.Expr | None = None,
     width: int | None = None,
-) -> Kernel:  # fmt: skip
-    """The compiled kernel; tests that ask for the same one share it."""
-    return load(emit(equations, method, records, section, width))
+    **options: float,
+) -> Kernel:
+    """The compiled kernel; tests that ask for the same one share it.  `options` are `unroll` and `fill` of `emit`."""
+    return load(emit(equations, method, records, section, width, **options))
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,6 +193,11 @@ class Outcome:
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
         return self.end, self.sums, self.counts, self.points, self.samples
+
+    @property
+    def steps(self) -> np.ndarray:
+        """Accepted steps of each cell."""
+        return self.counts[:, 1]
 
     def section(self, cell: int) -> np.ndarray:
         """The section points of a cell: rows of time and state."""
@@ -206,9 +221,18 @@ def drive(
     spans = np.pad(spans, ((0, 0), (0, 4 - spans.shape[1])))
     cells = len(start)
     values = np.array(values, float).reshape(cells, -1)
-    control = np.array([rtol, rtol / 10 if atol is None else atol, 1e-4, max_step, max_steps, direction, 0.0])
+    control = np.array([rtol, rtol / 10 if atol is None else atol, 1e-4, max_step, max_steps, direction, 0.0, 0.0])
     outcome = blank(cells, start.shape[1], room, samples) if into is None else into
     compiled.drive(*(part or (0, cells)), start, values, spans, control, *outcome.arrays)
+    return outcome
+
+
+def run_cells(compiled: Kernel, scene: Scene) -> Outcome:
+    """All cells of a scene by a kernel of its equations, as `run` has them but without reductions and early ends."""
+    cells = plan(scene)
+    control = control_array(*tolerances(scene, cells.numbers), longest_step(scene), scene.max_steps, jumps=False)
+    outcome = blank(*cells.start.shape)
+    compiled.drive(0, scene.cells, cells.start, cells.numbers, cells.spans, control, *outcome.arrays)
     return outcome
 
 

@@ -21,7 +21,7 @@ PACKAGES = ("models", "codegen", "runtime")
 
 ARROWS = {
     "models.inputs": "",
-    "models.algebra": "",
+    "models.algebra": "inputs",
     "models.mechanics": "inputs",
     "models.spectra": "algebra inputs",
     "models.graphs": "spectra algebra inputs",

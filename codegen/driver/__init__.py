@@ -1,4 +1,7 @@
-"""Real Python around the generated step; its text becomes part of every kernel module."""
+"""The part of a kernel that is the same for all equations: control of the step size, recording, lanes.
+
+The files are Python that can be read and checked; their text becomes part of every kernel module.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,12 @@ MARK = "# --- kernel text below ---\n"
 
 
 def text(name: str) -> str:
-    """Return the part of a skeleton that a kernel module contains."""
-    whole = files(__name__).joinpath(f"{name}.py").read_text(encoding="utf-8")
-    return whole.split(MARK, 1)[1].strip("\n")
+    """Return the part of a file of this folder that a kernel module contains.
+
+    Parameters
+    ----------
+    name
+        Name of the file without its suffix.
+    """
+    file = files(__name__).joinpath(f"{name}.py").read_text(encoding="utf-8")
+    return file.split(MARK, 1)[1].strip("\n")

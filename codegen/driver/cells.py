@@ -1,7 +1,8 @@
 """The life of a cell: it enters a lane, turns over with every period of the drive, and leaves with a status.
 
-A computation that repeats itself bit for bit from one period of the drive to a later one will do so for ever: such a cell
-jumps over as many whole cycles as fit before its window (and, where only sums are recorded, inside it).
+A computation that repeats itself bit for bit from one period of the drive to a later one does so for
+ever.  Such a cell jumps over as many whole cycles as fit before its window and, if only sums are
+recorded, inside it.
 """
 
 # ruff: noqa: I001  (the long lists of names stay short)

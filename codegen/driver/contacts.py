@@ -1,9 +1,10 @@
-"""Events of set-valued friction: which step would pass one, where it lies, and what each contact does there.
+"""Events of set-valued friction: detection, location in time, and the changes of the contacts.
 
-The gap of a contact is positive while it keeps its mode: of one that slips the sliding velocity in the direction of its
-slip, of one that sticks the distance of its load from the limits of static friction.  A step that would make a gap negative
-is taken back and tried again with the length after which the gap has just passed zero, until the passage lies at its end
-to within rounding; all contacts that have passed change together.
+The gap of a contact is positive while it keeps its mode.  The gap of a slipping contact is its
+sliding velocity in the direction of slip; that of a sticking one is the distance of its load from
+the limits of static friction.  A step that would make a gap negative is taken back and tried again
+with the length after which the gap has just passed zero, until the passage lies at its end to within
+rounding.  All contacts that have passed change together.
 """
 
 from __future__ import annotations

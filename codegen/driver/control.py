@@ -1,4 +1,4 @@
-"""Step control: what is tried, whether it is accepted, and where it leads; all lanes at once."""
+"""Step control of all lanes at once: the size of a step, its acceptance, and the next size."""
 
 # ruff: noqa: I001  (the long lists of names stay short)
 from __future__ import annotations

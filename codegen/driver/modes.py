@@ -1,8 +1,9 @@
 """One orbit after the other, each with all its modes: the driver of the kernels that carry deviations along an orbit.
 
-A deviation grows or shrinks by any factor, so every few steps it is scaled by a power of two, which is exact; the powers
-are counted.  Step sizes follow the errors of the orbit and of the modes in the first and the last register: callers sort
-modes by the size of their strength, so that the fastest ones are watched.
+A deviation grows or shrinks by any factor, so it is scaled by a power of two every few steps, which is
+exact; the powers are counted.  Step sizes follow the errors of the orbit and of the modes in the
+first and the last register: callers sort modes by the size of their strength, so that the fastest
+modes are watched.
 """
 
 # ruff: noqa: I001  (the long lists of names stay short)

@@ -1,6 +1,6 @@
-"""What a skeleton finds in the kernel module it is pasted into; here only so that it can be read and checked.
+"""The names that the driver uses and that each kernel module defines for itself.
 
-The values belong to no model: each kernel module defines its own.
+They stand here so that the driver can be read and checked; the values belong to no model.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """Sparse elimination by a program that was planned once: the linear algebra of networks too large to write out.
 
-`work` holds lanes.  The matrix stands from group `first` on: the diagonal, then the other entries, row after row in the
-order of elimination; within a row those of earlier pivots come first.  codegen/sparse.py explains the integer arrays.
-`apart` is 0 where the elimination is exact; otherwise the factors stand so many groups behind the matrix, are those
-entries of the elimination that the rows have room for, and every solution is refined until rounding is all that is left.
+`work` holds lanes.  The matrix stands from group `first` on: the diagonal, then the other entries,
+row after row in the order of elimination; within a row those of earlier pivots come first.
+`Program` in codegen/steps/program.py describes the integer arrays.  `apart` is 0 if the elimination
+is exact.  Otherwise the factors stand so many groups behind the matrix and have only the entries for
+which the rows have room, and every solution is refined to rounding.
 """
 
 from __future__ import annotations

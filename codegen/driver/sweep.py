@@ -1,10 +1,12 @@
-"""Runs cells of a sweep: lanes in step with each other, each with its own time, step size and parameters.
+"""Runs the cells of a sweep: lanes in step with each other, each with its own time, step size and parameters.
 
-A cell starts at t = 0, lets transients pass until the start of its window, records until the end of it, and makes
-room for the next one.  What a cell computes does not depend on its neighbours in the register.
+A cell starts at t = 0, lets transients pass until the start of its window, records until the end of
+the window, and makes room for the next cell.  Its result does not depend on its neighbours in the
+register.
 
-Where a kernel has two ways to step (SWITCHING), every cell belongs to one of two groups of lanes, stiff or smooth, and
-moves over when its stiffness changes; 2 WIDTH - 1 cells are in flight, so that one of the groups is always full.
+In a kernel with two kinds of step (SWITCHING) every cell belongs to one of two groups of lanes, stiff
+or smooth, and changes groups when its stiffness changes.  2 WIDTH - 1 cells are in flight, so that
+one of the groups is always full.
 """
 
 # ruff: noqa: I001  (the long lists of names stay short)

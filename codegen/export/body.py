@@ -16,7 +16,7 @@ from synchain.models.mechanics.components import Edge
 from .printer import Dialect, decimal, write
 
 __all__ = [
-    "LARGEST_UNROLLED", "Body", "Place", "Store", "Syntax", "check_inertia", "constant_mass", "link_body", "link_places",
+    "LARGEST_UNROLLED", "Body", "Place", "Store", "Syntax", "check_inertia", "is_unrolled", "link_body", "link_places",
     "mass_body", "node_body", "node_places", "own_parameters", "parameters", "rate_symbols", "weights", "wrapped",
 ]  # fmt: skip
 
@@ -85,9 +85,8 @@ def link_places(equations: Equations, link: Link | None = None) -> tuple[dict[Pl
     edge = _edge(equations, link)
     if edge is None:
         return {}, {}
-    here, there = (_places(_at_rates(edge, block, ends)) for block, ends in
-                   ((edge.jacobian_here(), edge.here), (edge.jacobian_there(), edge.there)))  # fmt: skip
-    return here, there
+    here = _places(_at_rates(edge, edge.jacobian_here(), edge.here))
+    return here, _places(_at_rates(edge, edge.jacobian_there(), edge.there))
 
 
 def rate_symbols(edge: Edge) -> tuple[sp.Symbol, ...]:
@@ -119,16 +118,15 @@ def mass_body(equations: Equations, link: Link | None = None) -> Body:
     )
 
 
-def constant_mass(equations: Equations) -> bool:
-    """True where M depends on parameters alone."""
-    ends = ((edge, {*edge.here, *edge.there}) for edge in equations.edges)
-    return not any(e.free_symbols & states for edge, states in ends for b in edge.inertia for row in b for e in row)
+def is_unrolled(equations: Equations) -> bool:
+    """True if every node is written out."""
+    return equations.mixed or equations.n <= LARGEST_UNROLLED
 
 
 def check_inertia(equations: Equations, language: str) -> None:
     """Raise ValueError where a source text of many nodes cannot solve for the rates."""
-    if equations.inertial and not (equations.mixed or equations.n <= LARGEST_UNROLLED):
-        if language == "python" and constant_mass(equations):
+    if equations.inertial and not is_unrolled(equations):
+        if language == "python" and equations.constant_mass:
             return
         other = "" if language == "python" else "; export Python, which has sparse solvers"
         raise ValueError(

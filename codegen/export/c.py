@@ -7,9 +7,9 @@ from collections.abc import Mapping
 
 from synchain.models.dynamics.equations import Equations
 
-from .body import Syntax, check_inertia, constant_mass, link_places, node_places, weights, wrapped
+from .body import Syntax, check_inertia, is_unrolled, link_places, node_places, weights, wrapped
 from .header import given_values, header
-from .loops import is_unrolled, jacobian_lines, mass_lines, rhs_lines
+from .loops import jacobian_lines, mass_lines, rhs_lines
 from .names import portable
 from .printer import C
 
@@ -120,7 +120,7 @@ def _sizes(model: Equations, small: bool) -> list[str]:
     tables = {"TARGET": [str(i) for i, _, _ in model.links], "SOURCE": [str(j) for _, j, _ in model.links]}
     for name, table in tables.items():
         lines += [f"static const int {name}[LINKS] = {{", *wrapped(table), "};"]
-    if model.edge is not None and any(e.has(model.edge.weight) for e in model.edge.rhs):
+    if any(e.has(edge.weight) for edge in model.edges for e in edge.rhs):
         lines += ["static const double WEIGHT[LINKS] = {", *wrapped(weights(model)), "};"]
     return [*lines, ""]
 
@@ -154,7 +154,7 @@ def _jacobian(model: Equations, small: bool) -> list[str]:
     lines = jacobian_lines(model, SYNTAX)
     if small:
         lines.insert(0, "memset(matrix, 0, sizeof(double)*DIMENSION*DIMENSION);")
-        if model.inertial and not constant_mass(model):
+        if not model.constant_mass:
             lines[:0] = ["double rates[DIMENSION];", "rhs(t, state, numbers, rates);"]
         lines += _solved(model, "matrix", model.dimension)
         return _function(f"void jacobian({ARGUMENTS}matrix)", lines)

@@ -11,9 +11,9 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.links import Link
 
 from .body import (
-    LARGEST_UNROLLED,
     Store,
     Syntax,
+    is_unrolled,
     link_body,
     link_places,
     mass_body,
@@ -24,19 +24,14 @@ from .body import (
     rate_symbols,
 )
 
-__all__ = ["is_unrolled", "jacobian_lines", "mass_lines", "rhs_lines"]
-
-
-def is_unrolled(equations: Equations) -> bool:
-    """True where every node is written out."""
-    return equations.mixed or equations.n <= LARGEST_UNROLLED
+__all__ = ["jacobian_lines", "mass_lines", "rhs_lines"]
 
 
 def rhs_lines(equations: Equations, syntax: Syntax) -> list[str]:
     """The statements that write the right-hand side of the whole network to `rates`."""
     lines = _parameters(equations, syntax, False)
     if is_unrolled(equations):
-        places = equations.places()
+        places = equations.places
         for i, begin in enumerate(_nodes(equations, syntax)):
             lines += _block(syntax, begin, _node(equations, syntax, i, _literal(places[i])))
         for link, begin in zip(equations.links, _links(equations, syntax), strict=True):
@@ -81,7 +76,7 @@ def jacobian_lines(equations: Equations, syntax: Syntax) -> list[str]:
 
 
 def _dense(equations: Equations, syntax: Syntax) -> list[str]:
-    places, lines = equations.places(), list[str]()
+    places, lines = equations.places, list[str]()
     for i, begin in enumerate(_nodes(equations, syntax)):
         at, body = _literal(places[i]), node_body(equations, True, i)
         loads = _loads(equations, syntax, i, at)
@@ -100,7 +95,7 @@ def _dense(equations: Equations, syntax: Syntax) -> list[str]:
 
 def mass_lines(equations: Equations, syntax: Syntax) -> list[str]:
     """The statements that add what the links contribute to the mass matrix, for networks that are written out."""
-    places, lines = equations.places(), list[str]()
+    places, lines = equations.places, list[str]()
     for link, begin in zip(equations.links, _links(equations, syntax), strict=True):
         at, other = _literal(places[link[0]]), _literal(places[link[1]])
         body = mass_body(equations, link)
@@ -125,8 +120,8 @@ def _entry(syntax: Syntax, row: Callable[[int], str], column: Callable[[int], st
 
 def _parameters(equations: Equations, syntax: Syntax, jacobian: bool) -> list[str]:
     """Read the parameters that are used from `numbers`; nothing where the language has them as arguments."""
-    firsts = {equations.kind(i): i for i in range(equations.n)}.values()
-    ends = {(equations.kind(link[0]), equations.kind(link[1])): link for link in equations.links}.values()
+    firsts = {kind: i for i, kind in enumerate(equations.kind_of)}.values()
+    ends = {equations.ends(link): link for link in equations.links}.values()
     bodies = [node_body(equations, jacobian, i) for i in firsts]
     bodies += [link_body(equations, link, jacobian) for link in ends]
     bodies += [mass_body(equations, link) for link in ends]

@@ -6,12 +6,11 @@ import builtins
 import keyword
 import re
 import unicodedata
-from dataclasses import replace
 
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.mechanics.components import Edge, Node
+from synchain.models.mechanics.components import Edge
 
 __all__ = ["portable"]
 
@@ -42,27 +41,17 @@ def portable(equations: Equations) -> tuple[Equations, dict[str, str]]:
     taken = {s.name for s in shown if _fine(s.name)} | {"t"}
     for s in shown:
         swap[s] = _renamed(s, taken)
-    first, *others = (_node(node, swap) for node in equations.nodes)
+    of_nodes = dict(swap)
     changed = {s.name: new.name for s, new in swap.items() if s.name != new.name}
-    edges = {}
+    edges: dict[Edge, Edge] = {}
     for edge in equations.edges:
         edges[edge], more = _edge(edge, swap, taken)
         swap |= dict(zip(edge.parameters, edges[edge].parameters, strict=True))  # other links share them
         changed |= more
-    made = replace(
-        equations,
-        node=first,
-        others=tuple(others),
-        edge=edges.get(equations.edge) if equations.edge is not None else None,
-        joints=tuple((pair, edges[edge]) for pair, edge in equations.joints),
-        varied=tuple(swap[sp.Symbol(name, real=True)].name for name in equations.varied),
+    renamed = equations.map_templates(
+        lambda node: node.map(lambda e: e.xreplace(of_nodes)), lambda edge: edges.get(edge, edge), of_nodes
     )
-    return made, changed
-
-
-def _node(node: Node, swap: dict[sp.Symbol, sp.Symbol]) -> Node:
-    law = None if node.law is None else node.law.xreplace(swap)
-    return Node(_all(node.state, swap), _all(node.rhs, swap), _all(node.parameters, swap), law=law)
+    return renamed, changed
 
 
 def _edge(edge: Edge, outer: dict[sp.Symbol, sp.Symbol], taken: set[str]) -> tuple[Edge, dict[str, str]]:
@@ -82,18 +71,7 @@ def _edge(edge: Edge, outer: dict[sp.Symbol, sp.Symbol], taken: set[str]) -> tup
         swap[s] = _renamed(s, taken, s.name in taken)
         taken.add(swap[s].name)
     swap[edge.weight] = sp.Symbol("weight_", real=True)
-    return Edge(
-        _all(edge.here, swap),
-        _all(edge.there, swap),
-        swap[edge.weight],
-        _all(edge.rhs, swap),
-        _all(edge.parameters, swap),
-        tuple(tuple(_all(row, swap) for row in block) for block in edge.inertia),
-    ), changed
-
-
-def _all(expressions: tuple[sp.Expr, ...], swap: dict[sp.Symbol, sp.Symbol]) -> tuple[sp.Expr, ...]:
-    return tuple(sp.sympify(e).xreplace(swap) for e in expressions)
+    return edge.map(lambda e: e.xreplace(swap)), changed
 
 
 def _fine(name: str) -> bool:

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 from synchain.models.dynamics.equations import Equations
 
-from .body import Syntax, check_inertia, weights, wrapped
+from .body import Syntax, check_inertia, is_unrolled, weights, wrapped
 from .header import given_values, header
-from .loops import is_unrolled, mass_lines, rhs_lines
+from .loops import mass_lines, rhs_lines
 from .names import portable
 from .printer import NUMBA
 

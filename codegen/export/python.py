@@ -12,7 +12,7 @@ from synchain.models.dynamics.equations import Equations
 from .body import (
     Syntax,
     check_inertia,
-    constant_mass,
+    is_unrolled,
     link_body,
     link_places,
     mass_body,
@@ -22,7 +22,7 @@ from .body import (
     wrapped,
 )
 from .header import given_values, header
-from .loops import is_unrolled, jacobian_lines, mass_lines, rhs_lines
+from .loops import jacobian_lines, mass_lines, rhs_lines
 from .names import portable
 from .printer import NUMPY
 
@@ -79,7 +79,7 @@ def to_python(equations: Equations, values: Mapping[str, float] | None = None) -
     ]
     check_inertia(model, "python")
     rhs = ["rates = np.empty_like(state)", *(rhs_lines(model, SYNTAX) if small else _rhs(model))]
-    rhs += [*_masses(model, small), "return solve(mass_, rates)"] if model.inertial else ["return rates"]
+    rhs += _solved(model, small, "rates")
     lines += _function("rhs", arguments, "Return d(state)/dt, DIMENSION numbers.", rhs)
     jac = _jac(model, small, given)
     pattern = SPARSITY if small or not model.inertial else COUPLED
@@ -88,22 +88,27 @@ def to_python(equations: Equations, values: Mapping[str, float] | None = None) -
 
 
 def _imports(model: Equations, small: bool) -> list[str]:
-    lines = ["import numpy as np"]
-    lines += ["from numpy.linalg import solve"] if model.inertial and small else []
-    lines += ["from scipy.sparse import csc_matrix"]
-    return lines + (["from scipy.sparse.linalg import spsolve as solve"] if model.inertial and not small else [])
+    solver = "from numpy.linalg import solve" if small else "from scipy.sparse.linalg import spsolve as solve"
+    functions = ["from scipy.sparse import csc_matrix", *([solver] if model.inertial else [])]
+    return ["import numpy as np", *sorted(functions)]
 
 
 def _jac(model: Equations, small: bool, given: Mapping[str, str]) -> list[str]:
     """The statements of jac."""
     if small:
-        moving = model.inertial and not constant_mass(model)
-        jac = [f"rates = rhs({', '.join(['t', 'state', *given])})"] if moving else []
+        jac = [] if model.constant_mass else [f"rates = rhs({', '.join(['t', 'state', *given])})"]
         jac += ["matrix = np.zeros((DIMENSION, DIMENSION))", *jacobian_lines(model, SYNTAX)]
-        return jac + ([*_masses(model, small), "return solve(mass_, matrix)"] if model.inertial else ["return matrix"])
+        return jac + _solved(model, small, "matrix")
     sparse = "csc_matrix((values, (ROWS, COLUMNS)), shape=(DIMENSION, DIMENSION))"
-    solved = [f"matrix = {sparse}", *_masses(model, small), "return solve(mass_, matrix)"]
-    return ["values = np.empty(ROWS.size)", *_jacobian(model), *(solved if model.inertial else [f"return {sparse}"])]
+    return ["values = np.empty(ROWS.size)", *_jacobian(model), *_solved(model, small, "matrix", sparse)]
+
+
+def _solved(model: Equations, small: bool, name: str, value: str = "") -> list[str]:
+    """Statements that return M^-1 times an array, which has a name or is the value of an expression."""
+    if not model.inertial:
+        return [f"return {value or name}"]
+    assigned = [f"{name} = {value}"] if value else []
+    return [*assigned, *_masses(model, small), f"return solve(mass_, {name})"]
 
 
 def _arguments(model: Equations, known: Mapping[str, float]) -> dict[str, str]:
@@ -163,8 +168,8 @@ def _tables(model: Equations, small: bool) -> list[str]:
     rows = [_at(r, "NODE") for r, _ in node_places(model)] + [_at(r, "TARGET") for r, _ in (*here, *there)]
     columns = [_at(c, "NODE") for _, c in node_places(model)] + [_at(c, "TARGET") for _, c in here]
     columns += [_at(c, "SOURCE") for _, c in there]
-    if model.inertial:
-        heavy = sorted({r for _, (r, _) in dict(mass_body(model).results)})
+    heavy = sorted({r for _, (r, _) in dict(mass_body(model).results)})
+    if heavy:
         lines.append(f"HEAVY = np.concatenate([{', '.join(_at(r, 'NODE') for r in heavy)}])")
     empty = "np.zeros(0, dtype=int)"
     for name, parts in (("ROWS", rows), ("COLUMNS", columns)):
@@ -174,11 +179,8 @@ def _tables(model: Equations, small: bool) -> list[str]:
 
 def _small_places(model: Equations) -> list[tuple[int, int]]:
     """Where jac can differ from zero: in whole rows where rates are solved for, each depends on all that its row couples."""
-    places = set(model.jacobian())
-    if model.inertial:
-        heavy = sorted({row for row, column in model.mass() if row != column})
-        places |= {(row, column) for row in heavy for column in range(model.dimension)}
-    return sorted(places)
+    heavy = {row for row, column in model.mass() if row != column}
+    return sorted(set(model.jacobian()) | {(row, column) for row in heavy for column in range(model.dimension)})
 
 
 def _at(component: int, index: str) -> str:

@@ -1,8 +1,9 @@
 """Integrators as data, one file each: exact tableau, orders and the source of the coefficients.
 
-A file holds KIND ("rosenbrock" or "explicit"), ORDER, ERROR_ORDER, DENSE_ORDER, SOURCE and the coefficients; everything
-else (stage count, stiff accuracy, which sums can be reused) is computed from them.  A file of the kind "switching" names
-two others, STIFF and SMOOTH, between which every cell changes over as its stiffness asks for.
+A file holds KIND ("rosenbrock" or "explicit"), ORDER, ERROR_ORDER, DENSE_ORDER, SOURCE and the
+coefficients.  Everything else (number of stages, stiff accuracy, sums that can be reused) is
+computed from them.  A file of the kind "switching" names two others, STIFF and SMOOTH; every cell
+uses the one that suits its stiffness.
 """
 
 from __future__ import annotations
@@ -10,28 +11,70 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from types import ModuleType
 
-__all__ = ["Integrator", "integrator", "names"]
+__all__ = ["Integrator", "IntegratorKind", "integrator", "names"]
 
 Row = tuple[float, ...]
+
+
+class IntegratorKind(StrEnum):
+    """What KIND says in the file of an integrator."""
+
+    ROSENBROCK = "rosenbrock"
+    EXPLICIT = "explicit"
+    SWITCHING = "switching"
+    """Two methods, of which each cell uses the one that suits its stiffness."""
 
 
 @dataclass(frozen=True, slots=True)
 class Integrator:
     """One-step method with an embedded error estimate and dense output.
 
-    Rosenbrock methods stand in the form that needs no product with the Jacobian: with s = 1/(h gamma),
-    (s - J) k_i = f(t + c_i h, y + sum a_ij k_j) + h d_i f_t + sum (C_ij/h) k_j;  y_new = y + sum b_i k_i
-    (Hairer & Wanner, *Solving ODEs II*, 2nd ed. 1996, eq. IV.7.25).  Explicit methods have
-    k_i = f(t + c_i h, y + h sum a_ij k_j) and y_new = y + h sum b_i k_i.
-    The error is sum e_i k_i (times h); two rows of e are combined as |e1|^2 / sqrt(|e1|^2 + 0.01 |e2|^2).
-    Dense output: y(theta) = (1-theta) y + theta (y_new + (1-theta) (D_1 + theta (D_2 + …))), D_j = sum dense_ji k_i
-    (times h).  Stages after the number of `b` serve the dense output alone.
+    Attributes
+    ----------
+    name, kind
+        Name of the file, and whether the method is a Rosenbrock method or explicit.
+    order, error_order, dense_order
+        Orders of the result, of the error estimate and of the dense output.
+    source
+        Where the coefficients were published.
+    a, b, c
+        The tableau; row i of `a` has at most i entries.  Stages beyond the length of `b` serve the
+        dense output alone.
+    e
+        One or two rows of weights for the error estimate.
+    dense
+        One row of weights for each D_j below.
+    gamma, d, big_c
+        What a Rosenbrock method has besides: gamma, the weights of df/dt, and the matrix C.
+    inexact
+        True for a W-method, whose order does not need the exact Jacobian: its matrix has one block
+        for each oscillator.
+    smooth
+        The explicit method for cells that are not stiff at the moment; None for a single method.
+
+    Notes
+    -----
+    A Rosenbrock method has the form without products with the Jacobian [1]_.  With s = 1/(h gamma)::
+
+        (s - J) k_i = f(t + c_i h, y + sum a_ij k_j) + h d_i df/dt + sum (C_ij/h) k_j
+        y_new = y + sum b_i k_i
+
+    An explicit method has k_i = f(t + c_i h, y + h sum a_ij k_j) and y_new = y + h sum b_i k_i.  The
+    error is sum e_i k_i (times h); two rows of e are combined as |e1|^2 / sqrt(|e1|^2 + 0.01 |e2|^2).
+    The dense output is y(theta) = (1-theta) y + theta (y_new + (1-theta) (D_1 + theta (D_2 + …))) with
+    D_j = sum dense_ji k_i (times h).
+
+    References
+    ----------
+    .. [1] E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed., Springer, 1996,
+       eq. IV.7.25.
     """
 
     name: str
-    kind: str
+    kind: IntegratorKind
     order: int
     error_order: int
     dense_order: int
@@ -45,17 +88,20 @@ class Integrator:
     d: Row = ()
     big_c: tuple[Row, ...] = ()
     inexact: bool = False
-    """True for a W-method, whose order does not need the exact Jacobian: its matrix has one block for each oscillator."""
     smooth: Integrator | None = None
-    """The explicit method for cells that are not stiff at the moment; None where there is only one method."""
 
     def __post_init__(self) -> None:
-        if self.kind not in ("rosenbrock", "explicit"):
-            raise ValueError(f"integrator {self.name}: kind {self.kind!r}; expected 'rosenbrock' or 'explicit'")
+        if self.kind not in (IntegratorKind.ROSENBROCK, IntegratorKind.EXPLICIT):
+            raise ValueError(f"integrator {self.name}: kind {str(self.kind)!r}; expected 'rosenbrock' or 'explicit'")
         if len(self.a) != len(self.c) or any(len(row) > i for i, row in enumerate(self.a)):
             raise ValueError(f"integrator {self.name}: the tableau is not strictly lower triangular")
-        if self.kind == "rosenbrock" and not self.gamma > 0:
+        if self.implicit and not self.gamma > 0:
             raise ValueError(f"integrator {self.name}: a Rosenbrock method needs gamma > 0")
+
+    @property
+    def implicit(self) -> bool:
+        """True for a Rosenbrock method, whose stages solve linear systems with the Jacobian."""
+        return self.kind is IntegratorKind.ROSENBROCK
 
     @property
     def stages(self) -> int:
@@ -69,20 +115,43 @@ def names() -> tuple[str, ...]:
 
 
 def integrator(name: str) -> Integrator:
-    """Return the integrator of that name; ValueError for an unknown one."""
+    """Return the integrator of a name.
+
+    Parameters
+    ----------
+    name
+        One of `names()`.
+
+    Raises
+    ------
+    ValueError
+        If no file of this folder has the name.
+    """
     if name not in names():
         raise ValueError(f"unknown integrator {name!r}; known: {', '.join(names())}")
     data = importlib.import_module(f".{name}", __name__)
-    if data.KIND != "switching":
+    if data.KIND != IntegratorKind.SWITCHING:
         return _read(name, data)
     stiff, smooth = integrator(data.STIFF), integrator(data.SMOOTH)
     return replace(stiff, name=name, smooth=smooth, source=f"{stiff.source}; {smooth.name}: {smooth.source}")
 
 
 def _read(name: str, data: ModuleType) -> Integrator:
+    """The integrator that a file of this folder describes."""
     return Integrator(
-        name=name, kind=data.KIND, order=data.ORDER, error_order=data.ERROR_ORDER, dense_order=data.DENSE_ORDER,
-        source=data.SOURCE, a=data.A, b=data.B, c=data.C, e=data.E, dense=data.DENSE,
-        gamma=getattr(data, "GAMMA", 0.0), d=getattr(data, "TIME_WEIGHTS", ()), big_c=getattr(data, "BIG_C", ()),
+        name=name,
+        kind=IntegratorKind(data.KIND),
+        order=data.ORDER,
+        error_order=data.ERROR_ORDER,
+        dense_order=data.DENSE_ORDER,
+        source=data.SOURCE,
+        a=data.A,
+        b=data.B,
+        c=data.C,
+        e=data.E,
+        dense=data.DENSE,
+        gamma=getattr(data, "GAMMA", 0.0),
+        d=getattr(data, "TIME_WEIGHTS", ()),
+        big_c=getattr(data, "BIG_C", ()),
         inexact=getattr(data, "INEXACT", False),
-    )  # fmt: skip
+    )

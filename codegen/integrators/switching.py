@@ -1,7 +1,7 @@
-"""Rodas5P where a cell is stiff at the moment, DOP853 where it is not: of order 5 and 8, each with its own error control.
+"""Rodas5P (order 5) while a cell is stiff, DOP853 (order 8) while it is not, each with its own error control.
 
-The change-over hangs on the step times a bound of the eigenvalues, which the generated step knows from its exact Jacobian
-(codegen/skeletons/sweep.py, `turned`).
+The product of the step size and a bound of the eigenvalues decides; the generated step computes the
+bound from its exact Jacobian (`turned` in codegen/driver/control.py).
 """
 
 KIND = "switching"

@@ -1,8 +1,9 @@
 """The folder of compiled kernels.  Code is loaded from it, so a folder that others can change is refused.
 
-The folder is opened once and its files are reached through it, so that nobody can put another folder in its place between
-a check and what is read.  A wrong bit in machine code is a crash or a wrong number, so the machine code of a kernel is one
-file that begins with a checksum; it is read once, and the bytes that were checked are those that are loaded.
+The folder is opened once and its files are reached through it, so that nobody can replace the folder
+between a check and a reading.  A wrong bit in machine code is a crash or a wrong number, so the
+machine code of a kernel is one file that begins with a checksum.  The file is read once: the bytes
+that were checked are the bytes that are loaded.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ import secrets
 import shutil
 import stat
 import sys
-from contextlib import suppress
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
@@ -21,13 +24,24 @@ from types import TracebackType
 
 from synchain.models.inputs.regular_file import open_regular
 
+try:
+    import fcntl
+except ImportError:  # Windows has no such locks
+    fcntl = None  # type: ignore[assignment]
+
 __all__ = ["Folder", "cache_folder", "clear", "describe", "open_folder"]
 
 DIGEST = hashlib.sha256().digest_size
 
+PATIENCE = 120.0
+"""Seconds after which a process no longer waits for another one that compiles the same kernel."""
+
 
 def cache_folder() -> Path:
-    """Return where kernels are kept: SYNCHAIN_CACHE, or `synchain` in the user's cache folder (it may not exist yet)."""
+    """Return the folder of compiled kernels: SYNCHAIN_CACHE, or `synchain` in the user's cache folder.
+
+    The folder may not exist yet.
+    """
     wish = os.environ.get("SYNCHAIN_CACHE", "")
     if wish:
         return Path(wish).expanduser().absolute()
@@ -42,9 +56,15 @@ def cache_folder() -> Path:
 
 @dataclass(frozen=True, slots=True)
 class Folder:
-    """A cache folder that is open: `path` names it, and `descriptor` is what its files are reached through.
+    """An open cache folder.
 
-    Windows has no such descriptors; there it is None, and files are reached by their paths.
+    Attributes
+    ----------
+    path
+        Where the folder is.
+    descriptor
+        The open folder, through which its files are reached.  Windows has no such descriptors: there
+        it is None, and files are reached by their paths.
     """
 
     path: Path
@@ -60,9 +80,14 @@ class Folder:
             os.close(self.descriptor)
 
     def read(self, name: str) -> bytes | None:
-        """Return what a file holds, None if there is none.
+        """Return the content of a file, None if there is no such file.
 
-        Raises PermissionError if it belongs to another user or others may write to it, OSError if it is no file.
+        Raises
+        ------
+        PermissionError
+            If the file belongs to another user, or if others may write to it.
+        OSError
+            If it is no regular file.
         """
         try:
             file = open_regular(self._at(name), flags=getattr(os, "O_NOFOLLOW", 0), folder=self.descriptor)
@@ -89,7 +114,7 @@ class Folder:
             raise
 
     def machine_code(self, name: str) -> bytes | None:
-        """Return the machine code of the kernel `name` as it was kept; None if there is none or it has changed since."""
+        """Return the machine code of the kernel `name`; None if there is none or its checksum is wrong."""
         data = self.read(f"{name}.code")
         if data is None or data[:DIGEST] != _digest(name, data[DIGEST:]):
             return None
@@ -98,6 +123,30 @@ class Folder:
     def keep(self, name: str, code: bytes) -> None:
         """Write the machine code of the kernel `name` with its checksum."""
         self.write(f"{name}.code", _digest(name, code) + code)
+
+    @contextmanager
+    def turn(self, name: str) -> Iterator[None]:
+        """Let one process at a time compile the kernel `name`; the others wait, and then find it.
+
+        The operating system frees the lock of a process that ends.  A system without locks compiles
+        the kernel twice, with the same result.
+        """
+        lock = f"{name}.lock"
+        flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
+        descriptor = None
+        if fcntl is not None:
+            with suppress(OSError):
+                descriptor = os.open(self._at(lock), flags, 0o600, dir_fd=self.descriptor)
+        if descriptor is None:
+            yield
+            return
+        try:
+            _wait_for(descriptor)
+            yield
+        finally:
+            with suppress(OSError):
+                self.delete(lock)
+            os.close(descriptor)
 
     def delete(self, name: str) -> None:
         """Delete a file if it is there."""
@@ -108,6 +157,20 @@ class Folder:
         return name if self.descriptor is not None else str(self.path / name)
 
 
+def _wait_for(descriptor: int) -> None:
+    """Lock an open file, or give up when patience ends or the file system has no locks."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            time.sleep(0.05)
+        except OSError:
+            return
+        else:
+            return
+
+
 def _digest(name: str, code: bytes) -> bytes:
     return hashlib.sha256(f"{name}\n".encode() + code).digest()
 
@@ -115,8 +178,17 @@ def _digest(name: str, code: bytes) -> bytes:
 def open_folder(folder: Path) -> Folder:
     """Create the folder if it is missing and open it.
 
-    Raises PermissionError if it belongs to another user, or if others may write to it or put another one in its place;
-    OSError if it cannot be made or written to.
+    Parameters
+    ----------
+    folder
+        Absolute path, for example `cache_folder()`.
+
+    Raises
+    ------
+    PermissionError
+        If the folder belongs to another user, or if others may write to it or replace it.
+    OSError
+        If it cannot be made.
     """
     for place in reversed(folder.parents):
         if not place.exists():
@@ -149,9 +221,9 @@ def _check_owner(place: Path, status: os.stat_result) -> None:
 
 
 def _check_way(real: Path) -> None:
-    """Refuse a folder, given without symbolic links, if another user can put a folder in the place of it or its parents.
+    """Refuse a folder that another user can replace; the path has no symbolic links.
 
-    The owner of a parent can, and so can all who may write to it, unless it is sticky (/tmp).
+    The owner of a parent folder can, and so can all who may write to it, unless it is sticky (/tmp).
     """
     for place in real.parents:
         status = place.stat()
@@ -170,16 +242,16 @@ def _check_way(real: Path) -> None:
 def describe() -> dict[str, str | int]:
     """Return folder, number of kernels and bytes on disk."""
     folder = cache_folder()
-    found = [p for p in folder.rglob("*") if p.is_file()] if folder.is_dir() else []
+    files = [p for p in folder.rglob("*") if p.is_file()] if folder.is_dir() else []
     return {
         "folder": str(folder),
-        "kernels": sum(p.suffix == ".py" for p in found),
-        "bytes": sum(p.stat().st_size for p in found),
+        "kernels": sum(p.suffix == ".py" for p in files),
+        "bytes": sum(p.stat().st_size for p in files),
     }
 
 
 def clear() -> int:
-    """Delete all cached kernels and return how many there were; other files in the folder stay."""
+    """Delete all cached kernels and return their number; other files in the folder stay."""
     folder = cache_folder()
     if not folder.is_dir():
         return 0

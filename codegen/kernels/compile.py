@@ -1,7 +1,7 @@
 """From the text of a kernel to machine code, through a cache on disk that is named by content.
 
-A module file is named by the hash of its text, of the lane library, of the versions of Python, Numba, llvmlite and
-this package, and of the CPU: whatever could change the machine code changes the name.
+A module file is named by the hash of everything that could change the machine code: its text, the
+sources of the lanes, the versions of Python, Numba and llvmlite, and the processor.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, Protocol
 
 import numba
 import numpy as np
@@ -32,59 +32,78 @@ from synchain.models.dynamics.equations import Equations
 
 from ..printing.names import NAMES
 from ..simd import decorator, elementary, lane_types, lanes
-from ..steps.program import EMPTY, program
+from ..steps.program import EMPTY
 from .cache import Folder, cache_folder, open_folder
 from .installation import InstallationError
 from .processor import processor
-from .sweep import LARGEST_UNROLLED, KernelSource
+from .sweep import KernelKind, KernelSource
 
 __all__ = ["Kernel", "load"]
 
 _matrix, _counts = types.float64[:, ::1], types.int64[:, ::1]
-_given = types.Array(types.float64, 2, "C", readonly=True)
-"""What a kernel only reads may be read-only or not."""
+_input = types.Array(types.float64, 2, "C", readonly=True)
+"""An array that a kernel only reads; it may be read-only or not."""
 _cube = types.float64[:, :, ::1]
 
 
 def _signature(arrays: int) -> Any:
     """The types of a sweep kernel's arguments, with so many arrays in its graph."""
-    return types.void(
-        types.int64, types.int64, _given, _given, _given, types.float64[::1], _matrix, _matrix, _counts, _cube, _cube,
-        types.UniTuple(types.int64[::1], arrays), types.float64[::1],
-    )  # fmt: skip
+    inputs = (_input, _input, _input, types.float64[::1])
+    outputs = (_matrix, _matrix, _counts, _cube, _cube)
+    graph = (types.UniTuple(types.int64[::1], arrays), types.float64[::1])
+    return types.void(types.int64, types.int64, *inputs, *outputs, *graph)
 
 
 SIGNATURE = _signature(len(NAMES))
 """first, last, start, numbers, spans, control, end, sums, counts, points, samples, graph, weights."""
 MODES = types.void(
-    types.int64, types.int64, _given, _given, _given, types.float64[::1], _given, _cube, _matrix, _matrix, _matrix,
-    _counts, _cube,
-)  # fmt: skip
+    types.int64,
+    types.int64,
+    *(_input, _input, _input, types.float64[::1], _input),
+    *(_cube, _matrix, _matrix, _matrix, _counts, _cube),
+)
 """first, last, start, numbers, spans, control, strengths, vectors, growth, end, sums, counts, samples."""
 
 LOG = logging.getLogger(__name__)
-"""Says at the level INFO when something is compiled, which takes seconds."""
+"""Reports at the level INFO each compilation, which takes seconds."""
 
 _lock = threading.Lock()
+
+
+class EntryPoint(Protocol):
+    """The compiled entry point of a kernel module: `drive` of a sweep, `march` of a kernel of modes.
+
+    It runs the cells first … last-1 on arrays that are described in the text of the module.
+    """
+
+    def __call__(self, first: int, last: int, /, *arrays: np.ndarray | tuple[np.ndarray, ...]) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
 class Kernel:
     """A compiled kernel that keeps its text: `print(kernel.source)` shows what runs.
 
-    `entry` is the compiled entry point of the kernel module, `drive` of a sweep and `march` of a kernel that carries modes;
-    their arrays are described there.
+    `graph` and `weights` are the links and the elimination program of a network whose steps are loops.
     """
 
     origin: KernelSource
-    entry: Any = field(repr=False)
+    entry: EntryPoint = field(repr=False)
     graph: tuple[np.ndarray, ...] = field(repr=False)
     weights: np.ndarray = field(repr=False)
     path: str
     from_cache: bool
 
     def drive(self, first: int, last: int, *arrays: np.ndarray) -> None:
-        """Run the cells first … last-1 on the arrays start, numbers, spans, control, end, sums, counts, points, samples."""
+        """Run the cells first … last-1 of a sweep.
+
+        Parameters
+        ----------
+        first, last
+            Rows of the arrays to run.
+        *arrays
+            start, numbers, spans, control, end, sums, counts, points, samples, as the docstring of
+            `drive` in the text of the module describes them.
+        """
         self.entry(first, last, *arrays, self.graph, self.weights)
 
     @property
@@ -106,8 +125,29 @@ class Kernel:
 def load(source: KernelSource) -> Kernel:
     """Compile a kernel, or load its machine code from the cache.
 
-    A kernel whose cache file is damaged is compiled anew.  If the cache folder cannot be used, the kernel is compiled for
-    this process alone and a RuntimeWarning says why.  Raises InstallationError if Numba does not compile.
+    Parameters
+    ----------
+    source
+        The text of the kernel, and what its arrays mean.
+
+    Returns
+    -------
+    Kernel
+        The same object for the same source within a process.
+
+    Raises
+    ------
+    InstallationError
+        If Numba is told not to compile.
+
+    Warns
+    -----
+    RuntimeWarning
+        If the cache folder cannot be used; the kernel is then compiled for this process alone.
+
+    Notes
+    -----
+    A kernel whose cache file is damaged is compiled anew.
     """
     if numba.config.DISABLE_JIT:
         raise InstallationError(
@@ -122,46 +162,58 @@ def _load(source: KernelSource) -> Kernel:
     name = f"kernel_{_fingerprint(source)[:32]}"
     try:
         with open_folder(cache_folder()) as folder:
-            return _kept(source, name, folder)
+            return _from_folder(source, name, folder)
     except (OSError, RuntimeError) as problem:  # RuntimeError: no home folder
         warnings.warn(f"kernels are not kept on disk: {problem}", RuntimeWarning, stacklevel=3)
-    _tell(source, "for this process alone")
+    _report(source, "for this process alone")
     path = Path(tempfile.mkdtemp(prefix="synchain-"), f"{name}.py")
     atexit.register(shutil.rmtree, path.parent, ignore_errors=True)
     path.write_text(source.text, encoding="utf-8")
     return _compile(source, path, _MachineCode())
 
 
-def _tell(source: KernelSource, how: str) -> None:
+def _report(source: KernelSource, how: str) -> None:
     n = source.equations.n
     LOG.info("compiling a kernel for %d oscillator%s (%s), %s", n, "s" * (n != 1), source.integrator, how)
 
 
-def _kept(source: KernelSource, name: str, folder: Folder) -> Kernel:
+def _from_folder(source: KernelSource, name: str, folder: Folder) -> Kernel:
     """The kernel from the folder, or compiled into it; what cannot be loaded is compiled anew."""
     path, text = folder.path / f"{name}.py", source.text.encode()
     if folder.read(path.name) != text:
         folder.write(path.name, text)
-    if (found := folder.machine_code(name)) is not None:
-        try:
-            return _compile(source, path, _MachineCode(found))
-        except Exception:
-            sys.modules.pop(name, None)
-    _tell(source, "kept for later runs")
-    code = _MachineCode()
-    kernel = _compile(source, path, code)
-    folder.keep(name, code.data)
+    if (kernel := _stored(source, name, folder, path)) is not None:
+        return kernel
+    with folder.turn(name):
+        if (kernel := _stored(source, name, folder, path)) is not None:
+            return kernel
+        _report(source, "kept for later runs")
+        code = _MachineCode()
+        kernel = _compile(source, path, code)
+        folder.keep(name, code.data)
     return kernel
 
 
+def _stored(source: KernelSource, name: str, folder: Folder, path: Path) -> Kernel | None:
+    """The kernel by the machine code in the folder, None if there is none that can be loaded."""
+    code = folder.machine_code(name)
+    if code is None:
+        return None
+    try:
+        return _compile(source, path, _MachineCode(code))
+    except Exception:
+        sys.modules.pop(name, None)
+        return None
+
+
 class _MachineCode:
-    """Stands in for the files that Numba would read and write by their paths: machine code as bytes that were checked."""
+    """Machine code as checked bytes, in place of the files that Numba reads and writes by their paths."""
 
     def __init__(self, data: bytes = b"") -> None:
         self.data = data
 
     def load(self, key: Any) -> Any:
-        """What was compiled for these types and this processor, None if that is not here."""
+        """What was compiled for these types and this processor; None if there is no such code."""
         return pickle.loads(self.data).get(key) if self.data else None
 
     def save(self, key: Any, compiled: Any) -> None:
@@ -170,13 +222,12 @@ class _MachineCode:
 
 def _compile(source: KernelSource, path: Path, code: _MachineCode) -> Kernel:
     module = _module(source.text, path)
-    graph, weights = EMPTY, np.zeros(0)
-    if source.kind == "sweep" and source.equations.n > LARGEST_UNROLLED:
-        made = program(source.equations)
-        graph, weights = made.arrays, made.weights
-    entry = module.march if source.kind == "modes" else module.drive
+    loops = source.elimination
+    graph, weights = (EMPTY, np.zeros(0)) if loops is None else (loops.arrays, loops.weights)
+    modes = source.kind is KernelKind.MODES
+    entry = module.march if modes else module.drive
     entry._cache._cache_file = code
-    entry.compile(MODES if source.kind == "modes" else _signature(len(graph)))
+    entry.compile(MODES if modes else _signature(len(graph)))
     entry.disable_compile()  # arrays of another type are a mistake of ours, not a reason to compile anew
     hits = sum(entry.stats.cache_hits.values())
     return Kernel(source, entry, graph, weights, str(path), hits > 0)
@@ -185,8 +236,8 @@ def _compile(source: KernelSource, path: Path, code: _MachineCode) -> Kernel:
 def _module(text: str, path: Path) -> ModuleType:
     """Run the text of a module.
 
-    The text comes from memory, not from the file at `path` and not from what Python would keep of it in `__pycache__`; the
-    file is there for readers, and for Numba, which caches nothing that has none.
+    The text comes from memory, not from the file at `path` and not from `__pycache__`.  The file is
+    there for readers, and for Numba, which caches no function without a file.
     """
     module = ModuleType(path.stem)
     module.__file__ = str(path)

@@ -1,4 +1,4 @@
-"""The error for what is wrong with an installation and not with a scene."""
+"""The error for a fault of the installation, as opposed to one of a scene."""
 
 from __future__ import annotations
 
@@ -6,4 +6,4 @@ __all__ = ["InstallationError"]
 
 
 class InstallationError(RuntimeError):
-    """A kernel cannot be made here as it must be: other versions, another kernel, or a Numba that does not compile."""
+    """A kernel cannot be made here: versions differ, the kernel differs, or Numba does not compile."""

@@ -28,7 +28,7 @@ from ..steps.contacts import event_constants, write_events
 from ..steps.elimination import plan, write_factors, write_solve
 from ..steps.rosenbrock import stage_state, write_rosenbrock
 from ..steps.step import SCALED, StepWriter, combine, write_function
-from .sweep import LARGEST_UNROLLED, KernelSource, describe, imports, node_functions
+from .sweep import LARGEST_UNROLLED, KernelKind, KernelSource, describe, imports, node_functions
 
 __all__ = ["emit_modes"]
 
@@ -40,9 +40,26 @@ Place = tuple[int, int]
 
 
 def emit_modes(variation: Variation, width: int | None = None) -> KernelSource:
-    """Write the kernel that carries deviations along an orbit; `width` modes (default: a register) step together.
+    """Write the kernel that carries deviations along an orbit.
 
-    Raises ValueError for an orbit of more than eight oscillators, UnprintableError where the equations cannot be printed.
+    Parameters
+    ----------
+    variation
+        The orbit, and the equations of a mode along it.
+    width
+        Modes that step together; by default those of one register.
+
+    Returns
+    -------
+    KernelSource
+        The text, and what is needed to compile and to call it.
+
+    Raises
+    ------
+    ValueError
+        If the orbit has more than eight oscillators.
+    UnprintableError
+        If the equations cannot be printed.
     """
     equations = variation.orbit
     if equations.n > LARGEST_UNROLLED:
@@ -61,8 +78,8 @@ def emit_modes(variation: Variation, width: int | None = None) -> KernelSource:
     write_rosenbrock(writer, lambda i: _note(writer, parts, functions, method, i))
     carry = _mode_step(variation, parts, method)
     bodies = [*node_functions([writer], blocks), *(f.lines for f in functions if f.lines)]
-    text = _module(variation, plain, method, width, parts, writer.lines, bodies, carry, names)
-    return KernelSource(text, equations, method.name, (), width, "modes")
+    text = _module(writer, variation, width, parts, bodies, carry, names)
+    return KernelSource(text, equations, method.name, (), width, KernelKind.MODES)
 
 
 def _renamed(variation: Variation, plain: Equations) -> Variation:
@@ -248,17 +265,16 @@ def _largest(texts: list[str]) -> str:
 
 
 def _module(
+    writer: StepWriter,
     variation: Variation,
-    plain: Equations,
-    method: Integrator,
     width: int,
     parts: Parts,
-    lines: list[str],
     functions: list[list[str]],
     carry: list[str],
     names: Names,
 ) -> str:
-    sticking = ("contacts",) if plain.node.contact is not None else ()
+    plain, method, lines = writer.equations, writer.method, writer.lines
+    sticking = ("contacts",) if plain.sticks else ()
     orbit = [
         "@njit(error_model='numpy')",
         "def step(t, h, y, p, y_new, dense, rtol, atol, shared):",
@@ -286,13 +302,27 @@ def _module(
 
 
 def _constants(variation: Variation, plain: Equations, method: Integrator, width: int, shared: int) -> str:
-    sticking = plain.node.contact is not None
+    sticking = plain.sticks
     constants = {
-        "WIDTH": 1, "LANES": width, "NODES": plain.n, "COMPONENTS": 2 if sticking else len(plain.node.state),
-        "DIMENSION": plain.dimension, "PARAMETERS": len(plain.parameters),
-        "DENSE_ROWS": len(method.dense), "ERROR_ORDER": method.error_order, "SWITCHING": False, "WEIGHTED": False,
-        "CONTACTS": sticking, "SYNC_ERROR": False, "SECTION": False, "TRAJECTORY": False,
-        "DENSE": sticking, "LOOPED": False, "REPEATS": False,
-        "MODE_SIZE": variation.size, "STRENGTHS": len(variation.parameters), "SHARED": shared,
-    }  # fmt: skip
+        "WIDTH": 1,
+        "LANES": width,
+        "NODES": plain.n,
+        "COMPONENTS": len(plain.node.continuous),
+        "DIMENSION": plain.dimension,
+        "PARAMETERS": len(plain.parameters),
+        "DENSE_ROWS": len(method.dense),
+        "ERROR_ORDER": method.error_order,
+        "SWITCHING": False,
+        "WEIGHTED": False,
+        "CONTACTS": sticking,
+        "SYNC_ERROR": False,
+        "SECTION": False,
+        "TRAJECTORY": False,
+        "DENSE": sticking,
+        "LOOPED": False,
+        "REPEATS": False,
+        "MODE_SIZE": variation.size,
+        "STRENGTHS": len(variation.parameters),
+        "SHARED": shared,
+    }
     return "\n".join([*(f"{name} = {value!r}" for name, value in constants.items()), *event_constants(variation)])

@@ -1,4 +1,7 @@
-"""Which kind of processor machine code is made for; another kind may round the last digit of a result otherwise."""
+"""The kind of processor that machine code is made for.
+
+Another kind may round the last digit of a result differently.
+"""
 
 from __future__ import annotations
 
@@ -9,21 +12,37 @@ __all__ = ["processor", "told_apart"]
 
 
 def processor() -> str:
-    """Return name and features of the processor, as LLVM calls them, e.g. "znver3: aes avx avx2".
+    """Return name and features of the processor, as LLVM calls them, for example "znver3: aes avx avx2".
 
-    NUMBA_CPU_NAME, NUMBA_CPU_FEATURES and NUMBA_ENABLE_AVX choose another kind, for which Numba then compiles.
+    Notes
+    -----
+    NUMBA_CPU_NAME, NUMBA_CPU_FEATURES and NUMBA_ENABLE_AVX choose another kind, for which Numba
+    then compiles.
     """
     name = numba.config.CPU_NAME or llvm.get_host_cpu_name()
     if numba.config.CPU_FEATURES is not None:
         features = [word[1:] for word in numba.config.CPU_FEATURES.split(",") if word.startswith("+")]
     else:
-        found = llvm.get_host_cpu_features().items()
-        features = [word for word, there in found if there and (numba.config.ENABLE_AVX or not word.startswith("avx"))]
+        known = llvm.get_host_cpu_features().items()
+        features = [
+            word for word, present in known if present and (numba.config.ENABLE_AVX or not word.startswith("avx"))
+        ]
     return f"{name}: {' '.join(sorted(features))}"
 
 
 def told_apart(one: str, other: str) -> tuple[str, str]:
-    """Return two kinds of processor in few words: the names, and of equal ones the features that the other has not."""
+    """Describe two kinds of processor in few words, for a message that compares them.
+
+    Parameters
+    ----------
+    one, other
+        Texts of `processor()`.
+
+    Returns
+    -------
+    tuple of str
+        Their names; if these are equal, each with the features that the other one lacks.
+    """
     (name, _, features), (other_name, _, other_features) = one.partition(": "), other.partition(": ")
     if name != other_name:
         return name, other_name

@@ -1,10 +1,11 @@
-"""From equations, an integrator and a list of records to the text of one self-contained kernel module."""
+"""The text of a sweep kernel: one self-contained module from equations, an integrator and records."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 
 import sympy as sp
 
@@ -20,32 +21,67 @@ from ..simd import lanes
 from ..steps.contacts import write_pushes
 from ..steps.explicit import write_explicit
 from ..steps.looped import LoopWriter
-from ..steps.program import program, workspace
+from ..steps.program import FILL_LIMIT, Program, program, workspace
 from ..steps.rosenbrock import write_rosenbrock
 from ..steps.step import PAIR, SCALED, StepWriter, function_name, write_function
 
-__all__ = ["RECORDS", "KernelSource", "default_width", "describe", "emit", "imports", "node_functions"]
+__all__ = [
+    "RECORDS",
+    "KernelKind",
+    "KernelSource",
+    "Record",
+    "default_width",
+    "describe",
+    "emit",
+    "imports",
+    "node_functions",
+]
 
-RECORDS = ("sync_error", "section", "trajectory")
-"""What a kernel can record besides the final state."""
+
+class Record(StrEnum):
+    """What a kernel can record besides the final state."""
+
+    SYNC_ERROR = "sync_error"
+    SECTION = "section"
+    TRAJECTORY = "trajectory"
+
+
+RECORDS = tuple(Record)
+
+
+class KernelKind(StrEnum):
+    """What a kernel runs: the cells of a sweep, or orbits and the modes carried along each."""
+
+    SWEEP = "sweep"
+    MODES = "modes"
+
 
 AUTO = "rodas5p"
 """The integrator that "auto" stands for."""
 
 LARGEST_UNROLLED = 8
-"""Nodes up to which a step is written out; larger networks are stepped through in loops."""
+"""Nodes up to which a step is written out by default; larger networks are stepped through in loops."""
 
 
 @dataclass(frozen=True, slots=True)
 class KernelSource:
-    """The text of a kernel module and what its arrays mean."""
+    """The text of a kernel module and what its arrays mean.
+
+    `elimination` holds the integer arrays that a kernel of loops runs through; None if its steps are written out.
+    """
 
     text: str = field(repr=False)
     equations: Equations = field(repr=False)
     integrator: str
-    records: tuple[str, ...]
+    records: tuple[Record, ...]
     width: int
-    kind: str = "sweep"
+    kind: KernelKind = KernelKind.SWEEP
+    elimination: Program | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def looped(self) -> bool:
+        """True if the steps run in loops over nodes and links, False if they are written out."""
+        return self.elimination is not None
 
     @property
     def digest(self) -> str:
@@ -60,18 +96,47 @@ def emit(
     section: sp.Expr | None = None,
     width: int | None = None,
     multiplicity: Sequence[int] | None = None,
+    *,
+    unroll: int = LARGEST_UNROLLED,
+    fill: float = FILL_LIMIT,
 ) -> KernelSource:
     """Write the kernel of these equations for one integrator, one set of records and one lane width.
 
-    The integrator "auto" is "rodas5p", the fastest at equal error in full lanes (docs/performance.md).
-    `section` is an expression in the state symbols (x_1 …), the parameters and t whose zeros are recorded; it is needed
-    with the record "section".  `multiplicity` says for each node how many oscillators it stands for in the synchronisation
-    error (default: one).  Raises ValueError for an unknown record or integrator, a section function that uses other
-    symbols, and UnprintableError where the equations cannot be printed.
+    Parameters
+    ----------
+    equations
+        What the kernel integrates.
+    method
+        An integrator or its name; "auto" is "rodas5p", the fastest at equal error in full lanes (docs/performance.md).
+    records
+        What the kernel records besides the final state, out of RECORDS.
+    section
+        An expression in the state symbols (x_1 …), the parameters and t, whose zeros the record "section" needs.
+    width
+        Cells that one register holds; by default what suits the processor.
+    multiplicity
+        How many oscillators each node stands for in the synchronisation error; by default one.
+    unroll
+        Nodes up to which a step is written out; the steps of a larger network run in loops.
+    fill
+        Entries of the exact factors for each entry of the matrix, above which loops use incomplete factors.
+
+    Returns
+    -------
+    KernelSource
+        The text, and what is needed to compile and to call it.
+
+    Raises
+    ------
+    ValueError
+        If a record or the integrator is unknown, if the section function has other symbols, or if the integrator cannot
+        step so many nodes.
+    UnprintableError
+        If the equations cannot be printed.
     """
     method = AUTO if method == "auto" else method
     method = integrator(method) if isinstance(method, str) else method
-    unknown = [r for r in records if r not in RECORDS]
+    unknown = [r for r in records if r not in list(RECORDS)]
     if unknown:
         raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(RECORDS)}")
     if "section" in records and section is None:
@@ -83,8 +148,12 @@ def emit(
         raise ValueError("the record 'sync_error' compares states of one name, and these nodes have none in common")
     if weights is not None and len(weights) != equations.n:
         raise ValueError(f"multiplicity has {len(weights)} entries; expected one for each of {equations.n} nodes")
-    text = _module(equations, method, ordered, section if "section" in ordered else None, width, weights)
-    return KernelSource(text, equations, method.name, ordered, width)
+    looped = equations.n > unroll
+    if looped:
+        method = _for_many(method, equations, unroll)
+    elimination = program(equations, fill) if looped else None
+    text = _module(equations, method, ordered, section if "section" in ordered else None, width, weights, elimination)
+    return KernelSource(text, equations, method.name, ordered, width, elimination=elimination)
 
 
 def default_width(equations: Equations) -> int:
@@ -95,32 +164,28 @@ def default_width(equations: Equations) -> int:
 def _module(
     equations: Equations,
     method: Integrator,
-    records: tuple[str, ...],
+    records: tuple[Record, ...],
     section: sp.Expr | None,
     width: int,
     multiplicity: tuple[int, ...] | None,
+    elimination: Program | None,
 ) -> str:
+    looped = elimination is not None
     plain = tidy(equations)
     weight = [edge.weight.name for edge in plain.edges]
     states = [s.name for node in plain.nodes for s in node.state]
     names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
     blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
-    looped = equations.n > LARGEST_UNROLLED
-    sticking = ("contacts",) if plain.node.contact is not None else ()
-    if looped:
-        method = _for_many(method, equations)
-    steps = _steps(plain, blocks, method, looped)
+    sticking = ("contacts",) if plain.sticks else ()
+    steps = _steps(plain, blocks, method, elimination)
     lines = [line for writer in steps.values() for line in writer.lines]
     functions = [f for k in range(len(blocks)) for f in node_functions(list(steps.values()), blocks[k], k)]
-    solves = method.kind == "rosenbrock" or equations.inertial
-    entries = program(equations).entries if looped and solves else 0
-    scratch = workspace(steps["step"], entries) if looped else 0
     parts = [
         describe(equations, plain, method, records, lines),
         imports(functions, lines, section),
         _constants(plain, method, records, width, multiplicity)
-        + (f"\nENTRIES = {entries}" if looped else "")
-        + f"\nLOOPED = {looped}\nWORKSPACE = {scratch}\nREPEATS = {angular_frequency(plain) is not None}",
+        + _loop_constants(steps["step"], elimination)
+        + f"\nREPEATS = {angular_frequency(plain) is not None}",
         *("\n".join(f) for f in functions),
         SCALED,
         *([PAIR, driver.text("sparse")] if looped else []),
@@ -132,31 +197,40 @@ def _module(
     return "\n\n\n".join(part for part in parts if part) + "\n"
 
 
-def _for_many(method: Integrator, equations: Equations) -> Integrator:
+def _loop_constants(step: StepWriter, elimination: Program | None) -> str:
+    """Whether a kernel is looped, and how much memory its loops need."""
+    if elimination is None:
+        return "\nLOOPED = False\nWORKSPACE = 0"
+    solves = step.method.implicit or step.equations.inertial
+    entries = elimination.entries if solves else 0
+    return f"\nENTRIES = {entries}\nLOOPED = True\nWORKSPACE = {workspace(step, elimination)}"
+
+
+def _for_many(method: Integrator, equations: Equations, unroll: int) -> Integrator:
     """The method as looped kernels have it; ValueError for what only written-out kernels can."""
     if method.inexact:
-        raise ValueError(
-            f"integrator {method.name}: steps at most {LARGEST_UNROLLED} nodes, found {equations.n}; use rodas5p"
-        )
+        raise ValueError(f"integrator {method.name}: steps at most {unroll} nodes, found {equations.n}; use rodas5p")
     return replace(method, smooth=None)
 
 
-def _steps(plain: Equations, blocks: Sequence[NodeBlocks], method: Integrator, looped: bool) -> dict[str, StepWriter]:
+def _steps(
+    plain: Equations, blocks: Sequence[NodeBlocks], method: Integrator, elimination: Program | None
+) -> dict[str, StepWriter]:
     """The steps of a kernel by the name of their function, written."""
     methods = {"step": method} if method.smooth is None else {"step": method, "step_smooth": method.smooth}
     first, *more = blocks
     bounded = len(methods) > 1
     steps = {name: StepWriter(plain, first, m, bounded, more) for name, m in methods.items()}
     for writer in steps.values():
-        if looped:
-            LoopWriter(writer).lines()
+        if elimination is not None:
+            LoopWriter(writer, elimination).lines()
         else:
-            (write_rosenbrock if writer.method.kind == "rosenbrock" else write_explicit)(writer)
+            (write_rosenbrock if writer.method.implicit else write_explicit)(writer)
     return steps
 
 
 def node_functions(steps: list[StepWriter], blocks: NodeBlocks, kind: int = 0) -> list[list[str]]:
-    """The right-hand side of one node of some kind, and its linearisations where a step wants one."""
+    """The right-hand side of one node of some kind, and the linearisations that the steps call."""
     made = []
     first = [writer.first_of(blocks) for writer in steps]
     for name, doc, body in (
@@ -235,7 +309,7 @@ def _constants(
     rows = {
         "WIDTH": width,
         "NODES": equations.n,
-        "COMPONENTS": 2 if equations.node.contact is not None else len(equations.common),
+        "COMPONENTS": len(equations.compared),
         "DIMENSION": equations.dimension,
         "PARAMETERS": len(equations.parameters),
         "DENSE_ROWS": max(len(m.dense) for m in (method, method.smooth) if m is not None),
@@ -244,8 +318,8 @@ def _constants(
         **({"SMOOTH_ERROR_ORDER": method.smooth.error_order} if method.smooth is not None else {}),
         "WEIGHTED": multiplicity is not None,
         **flags,
-        "DENSE": any(flags.values()) or equations.node.contact is not None,
-        "CONTACTS": equations.node.contact is not None,
+        "DENSE": any(flags.values()) or equations.sticks,
+        "CONTACTS": equations.sticks,
     }
     text = "\n".join(f"{name} = {value!r}" for name, value in rows.items())
     return text if multiplicity is None else f"{text}\nMULTIPLICITY = np.array({[float(m) for m in multiplicity]!r})"
@@ -265,15 +339,18 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
     """The section function at a fraction of the step; a kernel without sections has none."""
     if section is None:
         return ""
-    swap = dict(zip(map(_real, (*equations.state, *equations.parameters)), map(_real, (*plain.state, *plain.parameters)),
-                    strict=True))  # fmt: skip
+    renamed = zip((*equations.state, *equations.parameters), (*plain.state, *plain.parameters), strict=True)
+    swap = {_real(old): _real(new) for old, new in renamed}
     section = section.xreplace({s: _real(s.name) for s in section.free_symbols})
     used = {s.name for s in section.free_symbols}
     unknown = sorted(used - set(equations.state) - set(equations.parameters) - {"t"})
     if unknown:
         raise ValueError(f"section function {section}: unknown symbol {unknown[0]!r}; use the state, parameters and t")
-    lines = ["@njit(error_model='numpy', forceinline=True)", "def section(theta, t, h, bank, y_new, dense):",
-             '    """The section function at the fraction theta of the step."""']  # fmt: skip
+    lines = [
+        "@njit(error_model='numpy', forceinline=True)",
+        "def section(theta, t, h, bank, y_new, dense):",
+        '    """The section function at the fraction theta of the step."""',
+    ]
     for slot, (name, shown) in enumerate(zip(equations.state, plain.state, strict=True)):
         if name in used:
             lines.append(f"    {shown} = inside(theta, {slot}, bank, y_new, dense)")

@@ -6,12 +6,10 @@ import builtins
 import keyword
 import re
 import unicodedata
-from dataclasses import replace
 
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.mechanics.components import Edge, Node
 
 from ..simd import elementary, lanes
 
@@ -64,36 +62,14 @@ def tidy(equations: Equations) -> Equations:
             name = _free(s.name, taken)
             taken.add(name)
             swap[s] = sp.Symbol(name, real=True)
-    node, *others = (_node(node, swap) for node in nodes)
-    for weight in sorted(weights & own, key=str):  # within the edge this name means the weight
-        swap[weight] = sp.Symbol(_free(f"{weight.name}_of_link", taken), real=True)
-    if not swap:
+    in_links = dict(swap)  # within an edge this name means the weight
+    for weight in sorted(weights & own, key=str):
+        in_links[weight] = sp.Symbol(_free(f"{weight.name}_of_link", taken), real=True)
+    if not in_links:
         return equations
-    return replace(
-        equations,
-        node=node,
-        others=tuple(others),
-        edge=None if equations.edge is None else _edge(equations.edge, swap),
-        joints=tuple((pair, _edge(edge, swap)) for pair, edge in equations.joints),
-        varied=tuple(swap.get(s, s).name for s in (sp.Symbol(name, real=True) for name in equations.varied)),
+    return equations.map_templates(
+        lambda node: node.map(lambda e: e.xreplace(swap)), lambda edge: edge.map(lambda e: e.xreplace(in_links)), swap
     )
-
-
-def _node(node: Node, swap: dict[sp.Symbol, sp.Symbol]) -> Node:
-    contact = None if node.contact is None else node.contact.map(lambda e: e.xreplace(swap))
-    return Node(_all(node.state, swap), _all(node.rhs, swap), _all(node.parameters, swap), contact)
-
-
-def _edge(edge: Edge, swap: dict[sp.Symbol, sp.Symbol]) -> Edge:
-    return Edge(
-        _all(edge.here, swap), _all(edge.there, swap), edge.weight.xreplace(swap),
-        _all(edge.rhs, swap), _all(edge.parameters, swap),
-        tuple(tuple(_all(row, swap) for row in block) for block in edge.inertia),
-    )  # fmt: skip
-
-
-def _all(expressions: tuple, swap: dict) -> tuple:
-    return tuple(e.xreplace(swap) for e in expressions)
 
 
 def _clashes(name: str) -> bool:

@@ -39,7 +39,7 @@ def write_pushes(equations: Equations, names: Names, looped: bool = False) -> st
 
     Written out, its text grows with the network; `looped` it runs over nodes and links, which it takes from `network`.
     """
-    if equations.node.contact is None:
+    if not equations.sticks:
         return ""
     lines = (_looped if looped else _written_out)(equations, names)
     return "\n".join([HEAD, *(f"    {line}" for line in lines)])
@@ -68,7 +68,7 @@ def _looped(equations: Equations, names: Names) -> list[str]:
     fixed = Hoist(frozenset(node.state), names.fresh("fixed"))
     moving = [fixed.apply(e) for e in _columns(node.contact)]
     statements, reduced = sp.cse(moving, symbols=names.fresh("z"), order="canonical")
-    force, link = _force(equations.edge if equations.links else None, node.contact)
+    force, link = _force(equations.edges, node.contact)
     used = _symbols((*moving, *fixed.table, *link))
     lines = _parameters(equations, used)
     lines += [f"{s} = {_lane(e)}" for e, s in fixed.table.items()]
@@ -82,10 +82,11 @@ def _looped(equations: Equations, names: Names) -> list[str]:
     return lines
 
 
-def _force(edge: Edge | None, contact: Contact) -> tuple[list[str], tuple[sp.Expr, ...]]:
+def _force(edges: tuple[Edge, ...], contact: Contact) -> tuple[list[str], tuple[sp.Expr, ...]]:
     """Statements that add the force of one link on a body that sticks, and the expressions they hold."""
-    if edge is None:
+    if not edges:
         return [], ()
+    (edge,) = edges
     velocity, mode = edge.here[1], edge.here[2]
     force = edge.rhs[1].xreplace({mode: sp.S.One, velocity: contact.speed})
     swap = {s: sp.Symbol(f"{s.name}_here", real=True) for s in edge.here}

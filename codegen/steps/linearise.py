@@ -16,7 +16,7 @@ def linearise(w: StepWriter) -> list[dict[str, sp.Expr]]:
     Returns what stands for each, by node.
     """
     eq = w.equations
-    implicit = w.method.kind == "rosenbrock"
+    implicit = w.method.implicit
     w.put(f"# right-hand side{', Jacobian and time derivative' if implicit else ' and Jacobian'} at the start")
     function = "node_linear" if implicit else "node_local"
     w.timed("t", w.wanted([w.first_of(blocks) for blocks in w.kinds]))
@@ -65,7 +65,7 @@ def write_bound(w: StepWriter, own: list[dict[str, sp.Expr]]) -> None:
     second_order = not eq.mixed and len(eq.node.state) % 2 == 0 and eq.node.rhs[:half] == eq.node.state[half:]
     slow: list[list[str]] = []
     fast: list[list[str]] = []
-    links, places, rows = list(eq.link_jacobian()), eq.places(), []
+    links, places, rows = list(eq.link_jacobian()), eq.places, []
     for i in range(eq.n):
         state = eq.node_at(i).state
         first = half if second_order else 0

@@ -15,7 +15,7 @@ from ..printing.printer import show
 from .linearise import entry
 from .looped_mass import LoopMass
 from .places import Joint, Kind, Places, named
-from .program import names
+from .program import Program, names
 from .rosenbrock import term
 from .step import StepWriter, combine, function_name
 
@@ -23,10 +23,10 @@ __all__ = ["LoopWriter"]
 
 
 class LoopWriter:
-    """Writes a step in loops; `w` supplies the naming and the node functions."""
+    """Writes a step in loops; `w` supplies the naming and the node functions, `elimination` the order of the pivots."""
 
-    def __init__(self, w: StepWriter) -> None:
-        self.w, self.method, self.places = w, w.method, Places(w.equations)
+    def __init__(self, w: StepWriter, elimination: Program) -> None:
+        self.w, self.method, self.places, self.elimination = w, w.method, Places(w.equations), elimination
         self.mass = LoopMass(self)
         stages = len(w.method.c)
         bases = [*(f"K{j + 1}" for j in range(stages)), "STATE", "SLOPE", "TIME_SLOPE", "MATRIX"]
@@ -39,7 +39,7 @@ class LoopWriter:
         w.put(*(f"{name} = {text}" for name, text in self.base.items()))
         w.put(f"{', '.join(names(w.equations))} = graph")
         w.parameters(but={f"{name}_{i + 1}" for name in w.equations.varied for i in range(w.equations.n)})
-        if self.method.kind == "rosenbrock":
+        if self.method.implicit:
             self.rosenbrock()
         else:
             self.explicit()

@@ -5,17 +5,17 @@ What is solved, and why no system in M is solved where M is constant, says codeg
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import Protocol
 
 import sympy as sp
 
+from ..integrators import Integrator
 from ..printing.printer import show
 from .mass import Mass, momentum_slopes
-from .places import Joint, named
-from .program import program
-
-if TYPE_CHECKING:
-    from .looped import LoopWriter
+from .places import Joint, Places, named
+from .program import Program
+from .step import StepWriter
 
 __all__ = ["LoopMass"]
 
@@ -23,10 +23,41 @@ Block = tuple[tuple[sp.Expr, ...], ...]
 SLOTS = ("here_slot", "there_slot")
 
 
+class Loops(Protocol):
+    """What a looped step offers to those that write about M."""
+
+    w: StepWriter
+    method: Integrator
+    places: Places
+    elimination: Program
+
+    def loop(self, head: str, lines: Sequence[str]) -> None:
+        """A for loop."""
+
+    def link(self, joint: Joint, base: str, used: tuple[sp.Expr, ...], states: bool = True) -> list[str]:
+        """The ends of a link, its weight, the parameters that `used` uses, and the states of both ends."""
+
+    def links(self, base: str, out: str, jacobian: bool = False) -> None:
+        """Add what each link contributes to the slopes and on demand to the matrix."""
+
+    def add(self, place: str, value: str) -> str:
+        """A statement that adds to a group of the workspace."""
+
+    def entries(
+        self,
+        block: Block,
+        slot: str,
+        swap: dict[sp.Symbol, sp.Symbol],
+        sign: str = "- ",
+        matrix: str = "MATRIX",
+    ) -> list[str]:
+        """Statements that subtract the entries of a block from the matrix, or add them by another `sign`."""
+
+
 class LoopMass:
     """What a looped step writes about M; where M is the identity, nothing but the solution of each stage."""
 
-    def __init__(self, writer: LoopWriter) -> None:
+    def __init__(self, writer: Loops) -> None:
         self.writer, self.equations = writer, writer.w.equations
         self.inertial, self.constant = self.equations.inertial, Mass(self.equations).constant
         self.joints = [joint for joint in writer.places.joints if joint.edge.inertia]
@@ -34,9 +65,9 @@ class LoopMass:
 
     def bases(self, before: int) -> dict[str, str]:
         """Where a Rosenbrock step keeps the rates at its start and M in a stage, behind so many vectors and the matrix."""
-        if self.constant or self.writer.method.kind != "rosenbrock":
+        if self.constant or not self.writer.method.implicit:
             return {}
-        matrix = "ENTRIES" if program(self.equations).exact else "2*ENTRIES"
+        matrix = "ENTRIES" if self.writer.elimination.exact else "2*ENTRIES"
         start = f"DENSE_ROWS*DIMENSION + {before}*DIMENSION + {matrix}"
         return {"RATES": start, "MASS": f"{start} + DIMENSION"}
 
@@ -44,7 +75,7 @@ class LoopMass:
 
     def factorise(self, matrix: str = "MATRIX") -> None:
         """Factorise a matrix; STATE is lost."""
-        self.apart = "0" if program(self.equations).exact else "ENTRIES"
+        self.apart = "0" if self.writer.elimination.exact else "ENTRIES"
         self.writer.w.put(
             f"factorise(dense, {matrix}, {self.apart}, STATE, order, place, row_start, after_start, column)"
         )

@@ -9,7 +9,8 @@ f(u) and no system in M is solved at all; otherwise F(u) takes one elimination o
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import Protocol
 
 import sympy as sp
 
@@ -20,12 +21,23 @@ from synchain.models.mechanics.components import Edge
 from ..printing.printer import show
 from .elimination import Entry, Factors, plan, write_elimination, write_solve
 
-if TYPE_CHECKING:
-    from .step import StepWriter
-
 __all__ = ["Mass", "momentum_slopes"]
 
 Block = tuple[tuple[sp.Expr, ...], ...]
+
+
+class Writer(Protocol):
+    """What a step offers to those that write about M: the names of its states, and statements."""
+
+    @property
+    def state(self) -> tuple[str, ...]:
+        """Names of the states."""
+
+    def put(self, *lines: str) -> None:
+        """Append statements."""
+
+    def staged(self, prefix: str) -> dict[sp.Symbol, sp.Symbol]:
+        """The names of all states in a stage."""
 
 
 def momentum_slopes(edge: Edge, here: Sequence[sp.Symbol], there: Sequence[sp.Symbol]) -> tuple[Block, Block]:
@@ -45,16 +57,12 @@ class Mass:
 
     def __init__(self, equations: Equations) -> None:
         self.equations = equations
-        self.inertial = equations.inertial
-        self._entries: dict[Entry, sp.Expr] | None = None if self.inertial else {}
         self.factors: Factors | None = None
 
-    @property
+    @cached_property
     def entries(self) -> dict[Entry, sp.Expr]:
-        """The non-zero entries of M by row and column; empty where it is the identity."""
-        if self._entries is None:
-            self._entries = self.equations.mass()
-        return self._entries
+        """The non-zero entries of M by row and column; empty if M is the identity."""
+        return self.equations.mass()
 
     @property
     def coupled(self) -> set[Entry]:
@@ -68,16 +76,15 @@ class Mass:
 
     @property
     def constant(self) -> bool:
-        """True where M depends on parameters alone."""
-        ends = (({*edge.here, *edge.there}, edge.inertia) for edge in self.equations.edges)
-        return not any(e.free_symbols & states for states, blocks in ends for b in blocks for row in b for e in row)
+        """True if M depends on parameters alone."""
+        return self.equations.constant_mass
 
     def refuse(self, what: str) -> None:
         """Raise ValueError where M is not the identity."""
-        if self.inertial:
+        if self.equations.inertial:
             raise ValueError(f"{what}: found links with inertia; expected none; use integrator 'rodas5p' or 'dop853'")
 
-    def factorise(self, w: StepWriter, prefix: str) -> None:
+    def factorise(self, w: Writer, prefix: str) -> None:
         """Write the elimination of M at the states of a stage."""
         rows, at = self.rows, w.staged(prefix)
         place = {row: k for k, row in enumerate(rows)}
@@ -88,7 +95,7 @@ class Mass:
         self.factors = write_elimination(self.steps, matrix, {}, tuple(f"mass_{w.state[row]}" for row in rows))
         w.put("# factors of M", *self.factors.lines)
 
-    def solve(self, w: StepWriter, source: str, out: str) -> None:
+    def solve(self, w: Writer, source: str, out: str) -> None:
         """Write out = M^-1 source for the rows that M couples, by the factors at hand."""
         if self.factors is None:
             raise RuntimeError("the mass matrix has not been factorised; this is a mistake in the program")
@@ -97,14 +104,14 @@ class Mass:
         rights = {k: f"r_{name}" for k, name in enumerate(names)}
         w.put(*write_solve(self.steps, self.factors, rights, {k: f"{out}{name}" for k, name in enumerate(names)}))
 
-    def explicit(self, w: StepWriter, prefix: str, out: str, first: bool) -> None:
+    def explicit(self, w: Writer, prefix: str, out: str, first: bool) -> None:
         """Turn the right-hand sides `out` of a stage into rates; a constant M is factorised in the first stage alone."""
         if self.entries:
             if first or not self.constant:
                 self.factorise(w, prefix)
             self.solve(w, out, out)
 
-    def at_start(self, w: StepWriter, jacobian: dict[Entry, sp.Expr]) -> dict[Entry, sp.Expr]:
+    def at_start(self, w: Writer, jacobian: dict[Entry, sp.Expr]) -> dict[Entry, sp.Expr]:
         """J = df/dy - d(M F)/dy at fixed F, from the entries of df/dy."""
         if not self.entries or self.constant:
             return jacobian
@@ -119,7 +126,7 @@ class Mass:
                     found[row, k] = found.get((row, k), sp.S.Zero) - derivative(e, s) * rate
         return {key: e for key, e in found.items() if e != 0}
 
-    def known(self, w: StepWriter, sums: Mapping[str, str], i: int) -> dict[str, str]:
+    def known(self, w: Writer, sums: Mapping[str, str], i: int) -> dict[str, str]:
         """By state, M (F + rate sum c k) for the rows that M couples, in stage i; `sums` are the texts of sum c k."""
         if not self.entries or i == 0:
             return {}

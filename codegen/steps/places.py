@@ -103,26 +103,19 @@ def named(joint: Joint) -> dict[sp.Symbol, sp.Symbol]:
 
 
 def _kinds(equations: Equations) -> tuple[Kind, ...]:
-    if not equations.mixed:
-        return (Kind(equations.node, 0, "for i in range(NODES):"),)
-    counts = [equations.kinds.count(k) for k in range(len(equations.nodes))]
-    return tuple(
-        Kind(node, k, head) for k, (node, head) in enumerate(zip(equations.nodes, _heads("i", counts), strict=True))
-    )
+    counts = [equations.kind_of.count(k) for k in range(len(equations.nodes))]
+    heads = _heads("i", counts) if equations.mixed else ["for i in range(NODES):"]
+    return tuple(Kind(node, k, head) for k, (node, head) in enumerate(zip(equations.nodes, heads, strict=True)))
 
 
 def _joints(equations: Equations) -> tuple[Joint, ...]:
     if not equations.links:
         return ()
-    if not equations.mixed:
-        found = equations.edges
-        return tuple(Joint(edge, equations.node, equations.node, "for e in range(target.size):") for edge in found)
-    numbers = joint_numbers(equations)
-    counts = [numbers.count(k) for k in range(len(equations.joints))]
-    nodes = equations.nodes
+    numbers, nodes = joint_numbers(equations), equations.nodes
+    counts = [numbers.count(k) for k in range(len(equations.edge_of))]
+    heads = _heads("e", counts) if equations.mixed else ["for e in range(target.size):"]
     return tuple(
-        Joint(edge, nodes[a], nodes[b], head)
-        for ((a, b), edge), head in zip(equations.joints, _heads("e", counts), strict=True)
+        Joint(edge, nodes[a], nodes[b], head) for ((a, b), edge), head in zip(equations.edge_of, heads, strict=True)
     )
 
 
@@ -133,22 +126,20 @@ def _heads(index: str, counts: Sequence[int]) -> list[str]:
 
 
 def joint_numbers(equations: Equations) -> list[int]:
-    """Return which joint each link of a network with nodes of several kinds is of, by its number."""
-    number = {pair: k for k, (pair, _) in enumerate(equations.joints)}
-    return [number[equations.kinds[target], equations.kinds[source]] for target, source, _ in equations.links]
+    """Return which joint each link is of, by its number."""
+    number = {ends: k for k, (ends, _) in enumerate(equations.edge_of)}
+    return [number[equations.ends(link)] for link in equations.links]
 
 
 def by_kind(equations: Equations) -> list[int]:
     """Return the nodes (0-based) in the order in which a kernel numbers them: kind after kind."""
-    return sorted(range(equations.n), key=equations.kind)
+    return sorted(range(equations.n), key=equations.kind_of.__getitem__)
 
 
 def by_joint(equations: Equations) -> tuple[Link, ...]:
     """Return the links in the order in which a kernel numbers them: joint after joint."""
-    if not equations.mixed:
-        return equations.links
-    found = zip(joint_numbers(equations), equations.links, strict=True)
-    return tuple(link for _, link in sorted(found, key=lambda pair: pair[0]))
+    pairs = zip(joint_numbers(equations), equations.links, strict=True)
+    return tuple(link for _, link in sorted(pairs, key=lambda pair: pair[0]))
 
 
 def table(equations: Equations) -> np.ndarray:
@@ -156,7 +147,7 @@ def table(equations: Equations) -> np.ndarray:
     size = max(len(node.state) for node in equations.nodes)
     slots = {name: k for k, name in enumerate(equations.parameters, start=equations.dimension)}
     found = np.full((size + len(equations.varied), equations.n), -1, np.int64)
-    places = equations.places()
+    places = equations.places
     for number, i in enumerate(by_kind(equations)):
         found[: len(places[i]), number] = places[i]
         for row, name in enumerate(equations.varied, start=size):

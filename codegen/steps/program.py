@@ -70,22 +70,21 @@ def names(equations: Equations) -> tuple[str, ...]:
     return (*NAMES, "where") if equations.mixed else NAMES
 
 
-def program(equations: Equations) -> Program:
+def program(equations: Equations, fill: float = FILL_LIMIT) -> Program:
     """Plan the elimination of (s - J) for a network; time and memory grow with its links.
 
-    Equations that differ only in what their symbols are called, or in numbers, share the program.
+    Equations that differ only in what their symbols are called, or in numbers, share the program.  The factors are exact
+    unless they would have more than `fill` entries for each entry of the matrix.
     """
     size = max(len(node.state) for node in equations.nodes)
     own = tuple(block_pattern(node.jacobian()) for node in equations.nodes)
     joined = tuple(tuple(tuple(sorted(pattern)) for pattern in _link_patterns(edge)) for edge in equations.edges)
-    if not equations.mixed:
-        return _program(equations.n, size, own, joined, equations.links)
+    where = tuple(table(equations).tolist()) if equations.mixed else ()
     numbers = {i: k for k, i in enumerate(by_kind(equations))}
     links = tuple((numbers[target], numbers[source], weight) for target, source, weight in by_joint(equations))
-    counts = tuple(map(equations.kinds.count, range(len(own))))
-    joints = joint_numbers(equations) if links else []
-    shares = tuple(map(joints.count, range(len(joined))))
-    return _program(equations.n, size, own, joined, links, tuple(table(equations).tolist()), counts, shares)
+    counts = tuple(map(equations.kind_of.count, range(len(own))))
+    shares = tuple(map(joint_numbers(equations).count, range(len(joined))))
+    return _program(equations.n, size, own, joined, links, fill, counts, shares, where)
 
 
 def _link_patterns(edge: Edge) -> tuple[set[Entry], set[Entry]]:
@@ -106,22 +105,23 @@ def _program(
     own: tuple[Pattern, ...],
     joined: tuple[tuple[Pattern, Pattern], ...],
     links: tuple[Link, ...],
-    where: tuple[int, ...] = (),
-    counts: tuple[int, ...] = (),
-    shares: tuple[int, ...] = (),
+    fill: float,
+    counts: tuple[int, ...],
+    shares: tuple[int, ...],
+    where: tuple[int, ...],
 ) -> Program:
-    """The program of a network of `counts` nodes of each kind and `shares` links of each joint; none: all of one."""
+    """The program of a network of `counts` nodes of each kind and `shares` links of each joint."""
     stands = np.array(where, np.int64).reshape(-1, n)[:size] if where else np.arange(n * size).reshape(size, n)
     dimension = int((stands >= 0).sum())
     nodes, (target, source) = np.arange(n), (np.array([link[side] for link in links], np.int64) for side in (0, 1))
-    alike = _Blocks(stands, nodes, nodes, own, _spans(counts or (n,)))
-    spans = _spans(shares or (len(links),))
+    alike = _Blocks(stands, nodes, nodes, own, _spans(counts))
+    spans = _spans(shares)
     ends = [
         _Blocks(stands, target, end, tuple(pair[k] for pair in joined), spans) for k, end in enumerate((target, source))
     ]
     parts = [part for blocks in (alike, *ends) for part in blocks.entries()]
     pattern = np.unique(np.concatenate(parts, axis=1), axis=1) if parts else np.zeros((2, 0), np.int64)
-    pivots, entries, exact = _factors(dimension, pattern)
+    pivots, entries, exact = _factors(dimension, pattern, fill)
     place = np.empty(dimension, np.int64)
     place[pivots] = np.arange(dimension)
     keys = np.unique(place[entries[0]] * dimension + place[entries[1]])
@@ -171,12 +171,12 @@ def _spans(counts: Sequence[int]) -> tuple[slice, ...]:
     return tuple(slice(a, b) for a, b in pairwise(ends))
 
 
-def _factors(dimension: int, pattern: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+def _factors(dimension: int, pattern: np.ndarray, fill: float) -> tuple[np.ndarray, np.ndarray, bool]:
     """Pivots, off-diagonal entries (2, count) of the factors, and whether they are exact."""
     off = pattern[:, pattern[0] != pattern[1]]
     rows, columns = off.tolist()
     listed = set(pattern[0, pattern[0] == pattern[1]].tolist())
-    found = _eliminate_all(dimension, rows, columns, listed, FILL_LIMIT * (dimension + len(rows)) - dimension)
+    found = _eliminate_all(dimension, rows, columns, listed, fill * (dimension + len(rows)) - dimension)
     if found is not None:
         steps = found
         lower = [(r, k) for k, below in zip(steps.order, steps.below, strict=True) for r in below]
@@ -266,16 +266,16 @@ def _eliminate(k: int, rows: list[set[int]], columns: list[set[int]], near: list
     return fill
 
 
-def workspace(w: StepWriter, entries: int) -> int:
+def workspace(w: StepWriter, elimination: Program) -> int:
     """Groups of scratch memory: stages, stage state, slopes, time slopes and, for implicit methods, the matrix.
 
     Factors of an incomplete elimination stand beside the matrix, exact ones replace it.  Where M depends on the state, an
     implicit method keeps the rates at the start and a second matrix.
     """
     vectors = (len(w.method.c) + 3) * w.equations.dimension
-    if w.method.kind != "rosenbrock" and not w.equations.inertial:
+    if not w.method.implicit and not w.equations.inertial:
         return vectors
-    matrix = entries if program(w.equations).exact else 2 * entries
-    if w.method.kind != "rosenbrock" or Mass(w.equations).constant:
+    matrix = elimination.entries if elimination.exact else 2 * elimination.entries
+    if not w.method.implicit or Mass(w.equations).constant:
         return vectors + matrix
     return vectors + 2 * matrix + w.equations.dimension

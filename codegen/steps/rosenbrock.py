@@ -29,7 +29,7 @@ def write_rosenbrock(w: StepWriter, note: Callable[[int], None] | None = None) -
     steps = plan(len(w.state), set(entries) | w.mass.coupled)
     factors = write_factors(steps, entries, tuple(w.state), w.mass.entries)
     w.put(f"# factors of {'shift*M - J' if w.mass.entries else 'shift - J'}", *factors.lines)
-    places = [(k, i, s) for i, own_places in enumerate(w.equations.places())
+    places = [(k, i, s) for i, own_places in enumerate(w.equations.places)
               for k, s in zip(own_places, w.equations.node_at(i).state, strict=True)]  # fmt: skip
     slopes = [show(own[i][f"ft_{s.name}"]) for _, i, s in sorted(places, key=lambda place: place[0])]
     for i in range(w.method.stages):
@@ -46,12 +46,12 @@ def gather(w: StepWriter, own: list[dict[str, sp.Expr]]) -> Entries:
     if w.method.inexact:
         w.mass.refuse(f"integrator {w.method.name}")
     entries: Entries = {}
-    for i, places in enumerate(eq.places()):
+    for i, places in enumerate(eq.places):
         state = eq.node_at(i).state
         for row, r in zip(places, state, strict=True):
             for column, c in zip(places, state, strict=True):
                 entries[row, column] = own[i][entry(r, c)]
-    node = {k: i for i, places in enumerate(eq.places()) for k in places}
+    node = {k: i for i, places in enumerate(eq.places) for k in places}
     for key, e in eq.link_jacobian():
         if w.method.inexact and node[key[0]] != node[key[1]]:
             continue

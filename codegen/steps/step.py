@@ -95,13 +95,13 @@ class StepWriter:
 
     def first_of(self, blocks: NodeBlocks) -> Body:
         """What is evaluated of a node of some kind at the start of a step."""
-        if self.method.kind == "rosenbrock":
+        if self.method.implicit:
             return blocks.linear
         return blocks.local if self.bounded else blocks.rhs
 
     def of(self, i: int) -> NodeBlocks:
         """The blocks of node i."""
-        return self.kinds[self.equations.kind(i)]
+        return self.kinds[self.equations.kind_of[i]]
 
     # -- pieces of the right-hand side ------------------------------------------------------------------------
 
@@ -137,7 +137,7 @@ class StepWriter:
 
     def call(self, function: str, body: Body, results: Sequence[sp.Expr], i: int, prefix: str) -> str:
         """The call of a node function for node i with the state names of a stage."""
-        at, kind = self.at(i, prefix), self.equations.kind(i)
+        at, kind = self.at(i, prefix), self.equations.kind_of[i]
         names = (at.get(s, s).name for s in self.arguments(body, results))
         return f"{function_name(function, kind)}({', '.join(names)})"
 

@@ -12,6 +12,8 @@ from typing import Any, TypeAlias
 import sympy as sp
 from flint import acb, arb, ctx, fmpq, fmpz
 
+from .rationals import to_flint
+
 __all__ = ["Ball", "accurate", "decimals", "disjoint", "enclose", "nearest", "precision"]
 
 Ball: TypeAlias = Any
@@ -105,7 +107,7 @@ def _radius(ball: Ball) -> arb:
 
 def _ball(e: sp.Expr) -> Ball:
     if e.is_Rational:
-        return arb(_rational(e))
+        return arb(to_flint(e))
     if e is sp.pi:
         return arb.pi()
     if e is sp.I:
@@ -118,7 +120,7 @@ def _ball(e: sp.Expr) -> Ball:
     if isinstance(e, sp.exp):
         return _exponential(e.args[0])
     if isinstance(e, sp.Pow) and e.exp.is_Rational:
-        return _power(_ball(e.base), _rational(e.exp))
+        return _power(_ball(e.base), to_flint(e.exp))
     if isinstance(e, (sp.sin, sp.cos)):
         return _circular(e)
     raise TypeError(f"{e} has no certified value; expected rationals, roots, pi, I, sin, cos and exp only")
@@ -135,7 +137,7 @@ def _power(base: Ball, exponent: fmpq) -> Ball:
 def _circular(e: sp.Expr) -> Ball:
     turn = e.args[0] / sp.pi
     if turn.is_Rational:
-        ratio = _rational(turn)
+        ratio = to_flint(turn)
         return arb.sin_pi_fmpq(ratio) if isinstance(e, sp.sin) else arb.cos_pi_fmpq(ratio)
     inner = _ball(e.args[0])
     return inner.sin() if isinstance(e, sp.sin) else inner.cos()
@@ -144,10 +146,6 @@ def _circular(e: sp.Expr) -> Ball:
 def _exponential(exponent: sp.Expr) -> Ball:
     turn = exponent / (sp.pi * sp.I)
     if turn.is_Rational:
-        ratio = _rational(turn)
+        ratio = to_flint(turn)
         return acb(arb.cos_pi_fmpq(ratio), arb.sin_pi_fmpq(ratio))
     return _ball(exponent).exp()
-
-
-def _rational(e: sp.Rational) -> fmpq:
-    return fmpq(int(e.p), int(e.q))

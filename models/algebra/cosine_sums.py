@@ -20,7 +20,8 @@ from flint import arb, arb_poly, fmpq, fmpq_poly, fmpz_poly
 
 from . import cosines
 from .balls import Ball, precision
-from .lazy import Descending
+from .lazy import LazyEigenvalues
+from .rationals import to_flint, to_fraction, to_sympy
 
 __all__ = ["AngleSum", "box", "expression", "folded_sum", "merged", "minimal_polynomial", "read"]
 
@@ -110,13 +111,13 @@ class AngleSum:
             return self.shift == 0
         m = self.modulus
         coefficients = [fmpq(0)] * m
-        coefficients[0] = _exact(self.shift)
+        coefficients[0] = to_flint(self.shift)
         for t, b in self.terms:
             k = int(t * m)
-            coefficients[k] += _exact(b)
-            coefficients[m - k] += _exact(b)
+            coefficients[k] += to_flint(b)
+            coefficients[m - k] += to_flint(b)
         remainder = fmpq_poly(coefficients) % fmpq_poly(fmpz_poly.cyclotomic(m))
-        return remainder.degree() < 0
+        return bool(remainder.degree() < 0)
 
 
 def _collected(shift: Fraction, parts: Iterable[tuple[Fraction, Fraction]]) -> AngleSum:
@@ -164,7 +165,7 @@ def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]
     return found
 
 
-def box(sizes: Sequence[int], closed: Sequence[bool]) -> Descending[tuple[sp.Expr, int]]:
+def box(sizes: Sequence[int], closed: Sequence[bool]) -> LazyEigenvalues[tuple[sp.Expr, int]]:
     """The spectrum of the Cartesian product of chains, and of rings where `closed`: sums of -4 sin² of each.
 
     Directions of one kind and size are taken in one order only.  Only what cosines cannot be told apart by floats is
@@ -196,7 +197,7 @@ def box(sizes: Sequence[int], closed: Sequence[bool]) -> Descending[tuple[sp.Exp
         if end == len(places) or places[end - 1][0] - places[end][0] > 1e-12 * len(sizes):  # of cosines: within 2 each
             found += _told_apart([(number(key), key, counts[key]) for _, key in places[start:end]])
             start = end
-    return Descending(len(found), prod(sizes), lambda k: (expression(number(found[k][0])), found[k][1]))
+    return LazyEigenvalues(len(found), prod(sizes), lambda k: (expression(number(found[k][0])), found[k][1]))
 
 
 def _waves(size: int, ring: bool, unit: int) -> list[tuple[int, int]]:
@@ -248,8 +249,8 @@ def expression(number: AngleSum) -> sp.Expr:
             short.append(cosines.cosine(Fraction(0), b, k, m))
         else:
             shift += 2 * b
-            long.append(cosines.minus_four_sine_squared(k, m) * sp.Rational(b.numerator, b.denominator))
-    return sp.Add(sp.Rational(shift.numerator, shift.denominator), *short, *long)
+            long.append(cosines.minus_four_sine_squared(k, m) * to_sympy(b))
+    return sp.Add(to_sympy(shift), *short, *long)
 
 
 def read(number: sp.Expr) -> AngleSum | None:
@@ -259,7 +260,7 @@ def read(number: sp.Expr) -> AngleSum | None:
         factor, core = part.as_coeff_Mul()
         if not factor.is_Rational:
             return None
-        b = Fraction(int(factor.p), int(factor.q))
+        b = to_fraction(factor)
         known = _atoms().get(core)
         if known is not None:
             found += AngleSum(known.shift * b, tuple((t, x * b) for t, x in known.terms))
@@ -299,7 +300,7 @@ def minimal_polynomial(number: AngleSum) -> fmpq_poly:
     the number is an algebraic integer, so that balls around the coefficients of that product give them exactly.
     """
     if not number.terms:
-        return fmpq_poly([-_exact(number.shift), 1])
+        return fmpq_poly([-to_flint(number.shift), 1])
     scale = lcm(number.shift.denominator, *(b.denominator for _, b in number.terms))
     m = number.modulus
     units = [u for u in range(1, m // 2 + 1) if gcd(u, m) == 1]
@@ -317,11 +318,7 @@ def minimal_polynomial(number: AngleSum) -> fmpq_poly:
 
 
 def _conjugate(number: AngleSum, unit: int, scale: int) -> Ball:
-    total = arb(_exact(number.shift * scale))
+    total = arb(to_flint(number.shift * scale))
     for t, b in number.terms:
-        total += 2 * arb(_exact(b * scale)) * arb.cos_pi_fmpq(_exact(2 * unit * t))
+        total += 2 * arb(to_flint(b * scale)) * arb.cos_pi_fmpq(to_flint(2 * unit * t))
     return total
-
-
-def _exact(x: Fraction) -> fmpq:
-    return fmpq(x.numerator, x.denominator)

@@ -1,21 +1,20 @@
 """Numbers such as -4*sin(k*pi/n)**2 read straight into sums of cosines: a hundred times faster than by SymPy.
 
-A letter such as k may stay open: the text is then read once for all its values.  Only what is surely such a sum is read;
-everything else, wrong texts too, is left to `exact_text.exact_number`.
+A letter such as k may stay open: the text is then read once for all its values.  Everything that is not
+such a sum for certain, wrong texts too, is left to `number_text.exact_number`.
 """
 
 from __future__ import annotations
 
-import ast
 import re
-import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
 from itertools import product
 from math import lcm
 
+from ..inputs.reader import Algebra, Expression, NoMeaning, parse
 from .cosine_sums import AngleSum, folded_sum
 
 __all__ = ["Wave", "angle_number", "angle_wave"]
@@ -25,10 +24,6 @@ LENGTH, DEPTH, TERMS, POWER, WHOLE, DENOMINATOR = 300, 24, 16, 4, 10**10, 10**10
 
 Linear = tuple[Fraction, Fraction]
 """a + b k, k the open letter."""
-
-
-class _Other(Exception):
-    """The text is something else."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,134 +68,174 @@ def _even(a: Fraction, b: Fraction) -> Linear:
 
 
 def angle_number(text: str, values: Mapping[str, int]) -> AngleSum | None:
-    """The number, or None where it is not a short sum of products of rationals, sines and cosines."""
-    found = angle_wave(text, values)
-    return None if found is None else found.at(0, 0)[0]
+    """Return a number as a sum of cosines.
+
+    Parameters
+    ----------
+    text : str
+        An expression such as ``"-2+2*cos(2*pi*k/n)"``.
+    values : mapping of str to int
+        Whole numbers for the letters.
+
+    Returns
+    -------
+    AngleSum or None
+        None if the text is not a short sum of products of rationals, sines and cosines.
+    """
+    wave = angle_wave(text, values)
+    return None if wave is None else wave.at(0, 0)[0]
 
 
 def angle_wave(text: str, values: Mapping[str, int], letter: str = "") -> Wave | None:
-    """The numbers for all values of a letter; None as `angle_number`, and where it stands outside sines and cosines."""
-    tree = _tree(text.strip())
+    """Return a number for all values of an open letter.
+
+    Parameters
+    ----------
+    text : str
+        An expression such as ``"-2+2*cos(2*pi*k/n)"``.
+    values : mapping of str to int
+        Whole numbers for the other letters.
+    letter : str, optional
+        The open letter.
+
+    Returns
+    -------
+    Wave or None
+        None as `angle_number`, and if the letter stands outside sines and cosines.
+    """
+    expression = _parsed(text.strip())
     try:
-        return None if tree is None else _value(tree, values, letter, 0)
-    except (_Other, ZeroDivisionError):
+        return None if expression is None else expression.evaluate(_Waves(values, letter))
+    except (NoMeaning, ZeroDivisionError):
         return None
 
 
 @lru_cache(maxsize=64)
-def _tree(text: str) -> ast.expr | None:
-    if len(text) > LENGTH or not _CIRCULAR.fullmatch(text):
-        return None
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return ast.parse(text, mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return None
+def _parsed(text: str) -> Expression | None:
+    return parse(text) if len(text) <= LENGTH and _CIRCULAR.fullmatch(text) else None
 
 
-def _value(node: ast.expr, values: Mapping[str, int], letter: str, depth: int) -> Wave:
-    if depth > DEPTH:
-        raise _Other
-    match node:
-        case ast.Constant(value=int() as value) if not isinstance(value, bool) and value < WHOLE:
-            return Wave(Fraction(value))
-        case ast.Name(id=name) if name in values:
-            return Wave(Fraction(values[name]))
-        case ast.UnaryOp(op=ast.USub(), operand=inner):
-            return -_value(inner, values, letter, depth + 1)
-        case ast.BinOp(left=left, op=ast.Pow(), right=ast.Constant(value=int() as power)) if 0 < power <= POWER:
-            base = found = _value(left, values, letter, depth + 1)
-            for _ in range(power - 1):
-                found = _small(found * base)
-            return found
-        case ast.BinOp(left=left, op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div() as op, right=right):
-            return _combined(op, *(_value(side, values, letter, depth + 1) for side in (left, right)))
-        case ast.Call(func=ast.Name(id="sin" | "cos" as name), args=[argument], keywords=[]):
-            a, b = (x / 2 for x in _turn(argument, values, letter, depth + 1))
-            a, b = (Fraction(1, 4) - a, -b) if name == "sin" else (a, b)
-            if max(a.denominator, b.denominator) > DENOMINATOR:
-                raise _Other
-            return Wave(Fraction(0), {_even(a, b): Fraction(1, 2)})
-    raise _Other
+@dataclass(frozen=True, slots=True)
+class _Waves(Algebra[Wave]):
+    """Sums of cosines of at most TERMS terms."""
+
+    values: Mapping[str, int]
+    letter: str
+    deepest = DEPTH
+
+    def number(self, value: int | float) -> Wave:
+        return Wave(_fraction_of(value))
+
+    def name(self, name: str) -> Wave:
+        if name not in self.values:
+            raise NoMeaning
+        return Wave(Fraction(self.values[name]))
+
+    def negative(self, value: Wave) -> Wave:
+        return -value
+
+    def add(self, a: Wave, b: Wave) -> Wave:
+        return _short(a + b)
+
+    def multiply(self, a: Wave, b: Wave) -> Wave:
+        return _short(a * b)
+
+    def divide(self, a: Wave, b: Wave) -> Wave:
+        if b.terms:
+            raise NoMeaning
+        return a * Wave(1 / b.shift)
+
+    def power(self, base: Wave, exponent: Wave) -> Wave:
+        raise NoMeaning
+
+    def whole_power(self, base: Wave, exponent: int) -> Wave:
+        if not 0 < exponent <= POWER:
+            raise NoMeaning
+        result = base
+        for _ in range(exponent - 1):
+            result = _short(result * base)
+        return result
+
+    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[_Angle]]:
+        if function not in ("sin", "cos") or count != 1 or options:
+            raise NoMeaning
+        return (_Angles(self.values, self.letter),)
+
+    def call(self, function: str, arguments: Sequence[_Angle], options: Mapping[str, str]) -> Wave:
+        (angle,) = arguments
+        if not angle.of_pi:
+            raise NoMeaning
+        a, b = angle.a / 2, angle.b / 2
+        if function == "sin":  # sin x = cos(π/2 - x)
+            a, b = Fraction(1, 4) - a, -b
+        if max(a.denominator, b.denominator) > DENOMINATOR:
+            raise NoMeaning
+        return Wave(Fraction(0), {_even(a, b): Fraction(1, 2)})
 
 
-def _combined(op: ast.operator, a: Wave, b: Wave) -> Wave:
-    if isinstance(op, ast.Add):
-        return _small(a + b)
-    if isinstance(op, ast.Sub):
-        return _small(a + -b)
-    if isinstance(op, ast.Mult):
-        return _small(a * b)
-    if b.terms:
-        raise _Other
-    return a * Wave(1 / b.shift)
+def _short(wave: Wave) -> Wave:
+    if len(wave.terms) > TERMS:
+        raise NoMeaning
+    return wave
 
 
-def _small(found: Wave) -> Wave:
-    if len(found.terms) > TERMS:
-        raise _Other
-    return found
+def _fraction_of(value: int | float) -> Fraction:
+    if isinstance(value, float) or value >= WHOLE:
+        raise NoMeaning
+    return Fraction(value)
 
 
-def _turn(node: ast.expr, values: Mapping[str, int], letter: str, depth: int) -> Linear:
-    """The factor of pi in an angle."""
-    match node:
-        case ast.Name(id="pi"):
-            return Fraction(1), Fraction(0)
-        case ast.UnaryOp(op=ast.USub(), operand=inner):
-            a, b = _turn(inner, values, letter, depth + 1)
-            return -a, -b
-        case ast.BinOp(left=left, op=ast.Mult(), right=right):
-            first = _has_pi(left)
-            if first == _has_pi(right):
-                raise _Other
-            angle, factor = (left, right) if first else (right, left)
-            return _scaled(_turn(angle, values, letter, depth + 1), _linear(factor, values, letter, depth + 1))
-        case ast.BinOp(left=left, op=ast.Div(), right=right):
-            a, b = _turn(left, values, letter, depth + 1)
-            by = _rational(right, values, depth + 1)
-            return a / by, b / by
-    raise _Other
+@dataclass(frozen=True, slots=True)
+class _Angle:
+    """a + b k, times pi where `of_pi`; k is the open letter."""
+
+    a: Fraction
+    b: Fraction = Fraction(0)
+    of_pi: bool = False
 
 
-def _has_pi(node: ast.expr) -> bool:
-    return any(isinstance(part, ast.Name) and part.id == "pi" for part in ast.walk(node))
+@dataclass(frozen=True, slots=True)
+class _Angles(Algebra[_Angle]):
+    """Angles that are linear in the open letter, and rational or a multiple of pi."""
 
+    values: Mapping[str, int]
+    letter: str
+    deepest = DEPTH
 
-def _scaled(x: Linear, y: Linear) -> Linear:
-    """A product of which one factor has no open letter."""
-    if x[1] and y[1]:
-        raise _Other
-    return x[0] * y[0], x[0] * y[1] + x[1] * y[0]
+    def number(self, value: int | float) -> _Angle:
+        return _Angle(_fraction_of(value))
 
+    def name(self, name: str) -> _Angle:
+        if name == "pi":
+            return _Angle(Fraction(1), of_pi=True)
+        if name == self.letter:
+            return _Angle(Fraction(0), Fraction(1))
+        if name not in self.values:
+            raise NoMeaning
+        return _Angle(Fraction(self.values[name]))
 
-def _linear(node: ast.expr, values: Mapping[str, int], letter: str, depth: int) -> Linear:
-    """A rational number, or one that hangs linearly on the open letter."""
-    if depth > DEPTH:
-        raise _Other
-    if not any(isinstance(part, ast.Name) and part.id == letter for part in ast.walk(node)):
-        return _rational(node, values, depth), Fraction(0)
-    match node:
-        case ast.Name():
-            return Fraction(0), Fraction(1)
-        case ast.UnaryOp(op=ast.USub(), operand=inner):
-            a, b = _linear(inner, values, letter, depth + 1)
-            return -a, -b
-        case ast.BinOp(left=left, op=ast.Div(), right=right):
-            a, b = _linear(left, values, letter, depth + 1)
-            by = _rational(right, values, depth + 1)
-            return a / by, b / by
-        case ast.BinOp(left=left, op=ast.Add() | ast.Sub() | ast.Mult() as op, right=right):
-            x, y = (_linear(side, values, letter, depth + 1) for side in (left, right))
-            if isinstance(op, ast.Mult):
-                return _scaled(x, y)
-            return (x[0] + y[0], x[1] + y[1]) if isinstance(op, ast.Add) else (x[0] - y[0], x[1] - y[1])
-    raise _Other
+    def negative(self, value: _Angle) -> _Angle:
+        return _Angle(-value.a, -value.b, value.of_pi)
 
+    def add(self, a: _Angle, b: _Angle) -> _Angle:
+        if a.of_pi or b.of_pi:
+            raise NoMeaning
+        return _Angle(a.a + b.a, a.b + b.b)
 
-def _rational(node: ast.expr, values: Mapping[str, int], depth: int) -> Fraction:
-    found = _value(node, values, "", depth)
-    if found.terms:
-        raise _Other
-    return found.shift
+    def multiply(self, a: _Angle, b: _Angle) -> _Angle:
+        if (a.b and b.b) or (a.of_pi and b.of_pi):
+            raise NoMeaning
+        return _Angle(a.a * b.a, a.a * b.b + a.b * b.a, a.of_pi or b.of_pi)
+
+    def divide(self, a: _Angle, b: _Angle) -> _Angle:
+        if b.b or b.of_pi:
+            raise NoMeaning
+        return _Angle(a.a / b.a, a.b / b.a, a.of_pi)
+
+    def power(self, base: _Angle, exponent: _Angle) -> _Angle:
+        raise NoMeaning
+
+    def whole_power(self, base: _Angle, exponent: int) -> _Angle:
+        if base.b or base.of_pi or not 0 < exponent <= POWER:
+            raise NoMeaning
+        return _Angle(base.a**exponent)

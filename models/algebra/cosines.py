@@ -13,7 +13,7 @@ from math import gcd, isqrt
 import sympy as sp
 from flint import fmpq, fmpq_poly, fmpz_poly
 
-from . import cosines
+from .rationals import to_flint, to_fraction, to_sympy
 
 __all__ = [
     "biquadratic",
@@ -67,7 +67,7 @@ def cosine(a: Fraction, b: Fraction, k: int, m: int) -> sp.Expr:
     """a + 2 b cos(2πk/m), as radicals where they are short, as a multiple of sin² where a = -2 b."""
     k = min(k % m, -k % m)
     k, m = k // gcd(k, m), m // gcd(k, m)
-    shift, factor = sp.Rational(a.numerator, a.denominator), sp.Rational(b.numerator, b.denominator)
+    shift, factor = to_sympy(a), to_sympy(b)
     if (k, m) in _SHORT:
         return sp.expand(shift + factor * sp.sympify(_SHORT[k, m]))
     if a == -2 * b:
@@ -86,7 +86,7 @@ def linear_cosine(expression: sp.Expr) -> tuple[Fraction, Fraction, int, int] | 
     turn = function.args[0] / (2 * sp.pi)
     if not turn.is_Rational or (isinstance(function, sp.sin) and not squared):
         return None
-    a, b, angle = Fraction(int(shift.p), int(shift.q)), Fraction(int(factor.p), int(factor.q)) / 2, turn
+    a, b, angle = to_fraction(shift), to_fraction(factor) / 2, turn
     if squared:  # 2 cos² = 1 + cos 2x, 2 sin² = 1 - cos 2x
         a, b, angle = a + b, (-b if isinstance(function, sp.sin) else b) / 2, 2 * turn
     return a, b, int(angle.p) % int(angle.q), int(angle.q)
@@ -101,7 +101,7 @@ def linear_exponential(expression: sp.Expr) -> tuple[Fraction, Fraction, int, in
     turn = core.args[0] / (2 * sp.pi * sp.I)
     if not turn.is_Rational:
         return None
-    a, b = Fraction(int(shift.p), int(shift.q)), Fraction(int(factor.p), int(factor.q))
+    a, b = to_fraction(shift), to_fraction(factor)
     return a, b, int(turn.p) % int(turn.q), int(turn.q)
 
 
@@ -111,8 +111,8 @@ def minimal_polynomial(a: Fraction, b: Fraction, m: int, conjugates: fmpz_poly |
     With `conjugates`, the roots are a + b r for its roots r instead.
     """
     psi = fmpq_poly(fmpz_poly.cos_minpoly(m) if conjugates is None else conjugates)
-    scale = fmpq(b.numerator, b.denominator)
-    inner = fmpq_poly([-fmpq(a.numerator, a.denominator) / scale, 1 / scale])
+    scale = to_flint(b)
+    inner = fmpq_poly([-to_flint(a) / scale, 1 / scale])
     return psi(inner) * scale ** psi.degree()
 
 
@@ -122,8 +122,8 @@ def exponential_roots(polynomial: fmpq_poly) -> list[sp.Expr] | None:
     for m in _moduli(degree):
         cyclotomic = fmpz_poly.cyclotomic(m)
         shift = (fmpq(cyclotomic[degree - 1]) - polynomial[degree - 1]) / degree
-        if minimal_polynomial(Fraction(int(shift.p), int(shift.q)), Fraction(1), m, cyclotomic) == polynomial:
-            a = sp.Rational(int(shift.p), int(shift.q))
+        if minimal_polynomial(to_fraction(shift), Fraction(1), m, cyclotomic) == polynomial:
+            a = to_sympy(shift)
             turns = [sp.Rational(2 * k, m) for k in range(m) if gcd(k, m) == 1]
             return [a + sp.exp(sp.I * sp.pi * turn) for turn in turns]
     return None
@@ -163,7 +163,7 @@ def _fit(polynomial: fmpq_poly, psi: fmpq_poly) -> tuple[Fraction, Fraction] | N
     top, bottom = isqrt(max(int(square.p), 0)), isqrt(int(square.q))
     if top and top * top == int(square.p) and bottom * bottom == int(square.q):
         b = Fraction(top, bottom)
-        return Fraction(int(mean.p), int(mean.q)) - b * Fraction(int(psi_mean.p), int(psi_mean.q)), b
+        return to_fraction(mean) - b * to_fraction(psi_mean), b
     return None
 
 
@@ -178,14 +178,14 @@ def _moments(polynomial: fmpq_poly) -> tuple[fmpq, fmpq]:
 def written(factor: fmpq_poly) -> list[sp.Expr] | None:
     """The roots of an irreducible polynomial in closed form, where a short one is known."""
     monic = factor / factor[factor.degree()]
-    c = [sp.Rational(int(x.p), int(x.q)) for x in monic.coeffs()]
+    c = [to_sympy(x) for x in monic.coeffs()]
     if len(c) == 2:
         return [-c[0]]
     if len(c) == 3:
         root = sp.sqrt(c[1] ** 2 / 4 - c[0])
         return [sp.expand(-c[1] / 2 + root), sp.expand(-c[1] / 2 - root)]
     quartic = biquadratic(monic) if len(c) == 5 else None
-    return cosines.cosine_roots(monic) or quartic or cosines.exponential_roots(monic)
+    return cosine_roots(monic) or quartic or exponential_roots(monic)
 
 
 def biquadratic(monic: fmpq_poly) -> list[sp.Expr] | None:
@@ -195,8 +195,8 @@ def biquadratic(monic: fmpq_poly) -> list[sp.Expr] | None:
     p, q, discriminant = even[2], even[0], even[2] ** 2 - 4 * even[0]
     if even[1] != 0 or discriminant < 0 or p > 0 or q < 0:
         return None
-    a, b, c = (sp.Rational(int(x.p), int(x.q)) for x in (-shift, -p / 2, discriminant / 4))
-    product = sp.sqrt(sp.Rational(int(q.p), int(q.q)))
+    a, b, c = (to_sympy(x) for x in (-shift, -p / 2, discriminant / 4))
+    product = sp.sqrt(to_sympy(q))
     if product.is_Rational:
         parts = [sp.sqrt((b + product) / 2), sp.sqrt((b - product) / 2)]
         roots = [a + s * parts[0] + t * parts[1] for s in (1, -1) for t in (1, -1)]

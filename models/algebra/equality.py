@@ -17,11 +17,11 @@ import sympy as sp
 from flint import acb, arb
 
 from .balls import Ball, enclose, precision
-from .roots import ComplexRoot, RealRoot
+from .roots import Root
 
 __all__ = ["Number", "check_size", "equal", "sign"]
 
-Number: TypeAlias = sp.Expr | RealRoot | ComplexRoot
+Number: TypeAlias = sp.Expr | Root
 """Rationals, roots, I, sin and cos of rational multiples of pi, exp of those of I*pi and what is made of them."""
 
 MOST_BITS = 2**19
@@ -49,7 +49,7 @@ def equal(a: Number, b: Number) -> bool:
     """
     if a is b or (isinstance(a, sp.Expr) and isinstance(b, sp.Expr) and a == b):
         return True
-    return _compared((a,), (b,)) == 0
+    return bool(_compared((a,), (b,)) == 0)
 
 
 def sign(a: tuple[Number, ...], b: tuple[Number, ...]) -> int:
@@ -114,7 +114,7 @@ def _measured(factors: tuple[Number, ...], generated: _Field) -> tuple[float, fl
 
 def _measure(x: Number, generated: _Field) -> tuple[float, float]:
     """(log2 u, log2 l) of a number, both at least 0; what it is made of goes into the field."""
-    if isinstance(x, (RealRoot, ComplexRoot)):
+    if isinstance(x, Root):
         generated.roots[(x.polynomial, x.index)] = len(x.polynomial) - 1
         leading = x.polynomial[-1]
         return math.log2(leading + max(map(abs, x.polynomial))), math.log2(leading)
@@ -164,9 +164,9 @@ def _power(x: sp.Pow, generated: _Field) -> tuple[float, float]:
 
 
 def _ball(x: Number, bits: int) -> Ball:
-    return x.enclosure(bits) if isinstance(x, (RealRoot, ComplexRoot)) else enclose(x, bits)
+    return x.enclosure(bits) if isinstance(x, Root) else enclose(x, bits)
 
 
 def _shown(x: Number) -> str:
-    text = x.text if isinstance(x, (RealRoot, ComplexRoot)) else sp.sstr(x)
+    text = x.text if isinstance(x, Root) else sp.sstr(x)
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar, overload
 
-__all__ = ["Descending"]
+__all__ = ["LazyEigenvalues"]
 
 T = TypeVar("T", covariant=True)
 
 
 @dataclass(frozen=True, slots=True)
-class Descending(Sequence[T]):
+class LazyEigenvalues(Sequence[T]):
     """`length` items, `make(0)`, `make(1)` …: the distinct real eigenvalues of `n` nodes, the largest (0) first.
 
     A slice is a list of its items.
@@ -34,4 +34,4 @@ class Descending(Sequence[T]):
         return self.make(places) if isinstance(places, int) else [self.make(k) for k in places]
 
     def __repr__(self) -> str:
-        return f"Descending({self.length} items)"
+        return f"LazyEigenvalues({self.length} items)"

@@ -14,9 +14,10 @@ from flint import fmpq, fmpq_poly, fmpz, fmpz_poly
 
 from . import cosine_sums, cosines
 from .cosine_sums import AngleSum
-from .roots import ComplexRoot, RealRoot
+from .rationals import to_flint
+from .roots import Root
 
-__all__ = ["minimal_polynomial", "multiplied"]
+__all__ = ["minimal_polynomial", "monic", "multiplied"]
 
 _X = sp.Symbol("x")
 
@@ -55,16 +56,17 @@ def _factor(a: Fraction, b: Fraction, m: int) -> fmpq_poly:
     return cosines.minimal_polynomial(a, b, m)
 
 
-def _monic(coefficients: Sequence[int]) -> fmpq_poly:
+def monic(coefficients: Sequence[int]) -> fmpq_poly:
+    """Return the monic polynomial that is proportional to one with whole coefficients, the constant first."""
     return fmpq_poly(list(coefficients)) / coefficients[-1]
 
 
-def minimal_polynomial(number: sp.Expr | RealRoot | ComplexRoot) -> fmpq_poly:
+def minimal_polynomial(number: sp.Expr | Root) -> fmpq_poly:
     """The monic irreducible polynomial over the rationals of which a number is a root."""
-    if isinstance(number, (RealRoot, ComplexRoot)):
-        return _monic(number.polynomial)
+    if isinstance(number, Root):
+        return monic(number.polynomial)
     if number.is_Rational:
-        return fmpq_poly([fmpq(-int(number.p), int(number.q)), 1])
+        return fmpq_poly([to_flint(-number), 1])
     form = cosines.linear_cosine(number)
     if form is not None:
         a, b, _, m = form
@@ -73,10 +75,22 @@ def minimal_polynomial(number: sp.Expr | RealRoot | ComplexRoot) -> fmpq_poly:
     if form is not None:
         a, b, _, m = form
         return cosines.minimal_polynomial(a, b, m, fmpz_poly.cyclotomic(m))
+    surd = _surd(number)
+    if surd is not None:
+        return surd
     terms = cosine_sums.read(number)
     if terms is not None:
         return cosine_sums.minimal_polynomial(terms)
     return fmpq_poly(list(_radical(number)))
+
+
+def _surd(number: sp.Expr) -> fmpq_poly | None:
+    """The minimal polynomial of a + b sqrt(c) with rational a, b and c > 0; None for any other number."""
+    a, rest = number.as_coeff_Add()
+    b, root = rest.as_coeff_Mul()
+    if not (a.is_Rational and b.is_Rational and root.is_Pow and root.exp == sp.S.Half and root.base.is_Rational):
+        return None
+    return fmpq_poly([to_flint(a**2 - b**2 * root.base), to_flint(-2 * a), 1])
 
 
 @lru_cache(maxsize=256)
@@ -87,4 +101,4 @@ def _cosine(a: Fraction, b: Fraction, m: int) -> tuple[fmpq, ...]:
 @lru_cache(maxsize=1024)
 def _radical(number: sp.Expr) -> tuple[fmpq, ...]:
     polynomial = sp.Poly(sp.minimal_polynomial(number, _X), _X).monic()
-    return tuple(fmpq(int(c.p), int(c.q)) for c in polynomial.all_coeffs()[::-1])
+    return tuple(to_flint(c) for c in polynomial.all_coeffs()[::-1])

@@ -1,7 +1,8 @@
-"""Exact numbers written as text, read by a whitelist over `ast`: nothing in the text is run.
+"""Exact numbers written as text, as SymPy expressions.
 
-Accepted: whole numbers, the letters that are given values, ``pi`` and ``I``, ``+ - * / **``, parentheses, ``sqrt`` and
-``sin cos exp`` of rational multiples of pi (of I*pi for exp).  Decimals are refused: they are no exact numbers.
+Accepted: whole numbers, the letters that have values, ``pi`` and ``I``, ``+ - * / **``, parentheses,
+``sqrt``, and ``sin cos exp`` of rational multiples of pi (of I*pi for exp).  Decimals are refused: they
+are no exact numbers.
 """
 
 from __future__ import annotations
@@ -9,157 +10,174 @@ from __future__ import annotations
 import ast
 import math
 import re
-import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NoReturn
 
 import sympy as sp
 
+from ..inputs.reader import Algebra, NoMeaning, parse, stray_character
 from .equality import check_size, equal
 
 __all__ = ["GRAMMAR", "exact_number", "whole_number"]
 
 LENGTH, DEPTH, DIGITS, BITS = 300, 24, 30, 20_000
 GRAMMAR = "whole numbers, + - * / **, parentheses, sqrt, I, and sin cos exp of rational multiples of pi"
-_ALLOWED = re.compile(r"[0-9A-Za-z_.+\-*/() \t]*")
+_PI = sp.Dummy("pi", real=True)
+"""The letter that stands for pi in the argument of sin, cos or exp while its factor is not known."""
 _DECIMAL = re.compile(r"(?<![A-Za-z_])(?:[0-9]+\.[0-9]*|\.[0-9]+|[0-9]+(?=[eE][+-]?[0-9]))(?:[eE][+-]?[0-9]+)?")
 
 
 def exact_number(text: str, values: Mapping[str, int] | None = None) -> sp.Expr:
-    """Return the number as a SymPy expression without floats; `values` are whole numbers for letters such as n.
+    """Return the value of an exact expression.
 
-    Raises ValueError on anything outside GRAMMAR, decimals, a division by zero, more than LENGTH characters, DEPTH nested
-    operations or DIGITS digits, and on rationals beyond BITS bits.
+    Parameters
+    ----------
+    text : str
+        The expression, such as ``"-2-sqrt(2)"`` or ``"-4*sin(k*pi/n)**2"``.
+    values : mapping of str to int, optional
+        Whole numbers for letters such as n.
+
+    Returns
+    -------
+    sympy.Expr
+        The number, without floats.
+
+    Raises
+    ------
+    ValueError
+        On anything outside GRAMMAR, decimals, a division by zero, more than LENGTH characters, DEPTH nested
+        operations or DIGITS digits, and on rationals beyond BITS bits.
     """
     stripped = text.strip()
     if len(stripped) > LENGTH:
         raise ValueError(f"number written as {len(stripped)} characters; expected at most {LENGTH}; shorten it")
-    stray = stripped[_match_length(stripped) :]
+    stray = stray_character(stripped)
     if stray:
-        raise ValueError(f"character {stray[0]!r} in the number {stripped!r}; expected {GRAMMAR}; correct it")
+        raise ValueError(f"character {stray!r} in the number {stripped!r}; expected {GRAMMAR}; correct it")
     decimal = _DECIMAL.search(stripped)
     if decimal:
         raise ValueError(
             f"decimal {decimal[0]!r} in the number {stripped!r}; expected an exact number such as 1/2 or -2-sqrt(2); "
             "write ~ before a decimal to have it compared to its own digits, e.g. ~-3.414"
         )
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            tree = ast.parse(stripped, mode="eval")
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ValueError(f"unreadable number {stripped!r}; expected {GRAMMAR}, e.g. -2-sqrt(2)") from None
-    number = _value(tree.body, stripped, values or {}, 0)
+    expression = parse(stripped)
+    if expression is None:
+        raise ValueError(f"unreadable number {stripped!r}; expected {GRAMMAR}, e.g. -2-sqrt(2)")
+    number = expression.evaluate(_ExactNumbers(stripped, values or {}))
     check_size(number)
     return number
 
 
 def whole_number(text: str, values: Mapping[str, int] | None = None) -> int:
-    """Return a whole number such as "n-2"; ValueError as `exact_number`, and where the value is not whole."""
+    """Return a whole number such as "n-2"; raises ValueError as `exact_number`, and if the value is not whole."""
     number = exact_number(text, values)
     if not number.is_Integer:
         raise ValueError(f"{text.strip()!r} is {number}; expected a whole number")
     return int(number)
 
 
-def _match_length(text: str) -> int:
-    found = _ALLOWED.match(text)
-    return found.end() if found else 0
+@dataclass(frozen=True, slots=True)
+class _ExactNumbers(Algebra[sp.Expr]):
+    """SymPy numbers without floats; as the argument of sin, cos or exp (`angle`) also multiples of pi."""
 
+    text: str
+    values: Mapping[str, int]
+    angle: bool = field(default=False, kw_only=True)
+    deepest = DEPTH
 
-def _value(node: ast.AST, text: str, values: Mapping[str, int], depth: int) -> sp.Expr:
-    if depth > DEPTH:
-        raise ValueError(f"number {text!r} nests more than {DEPTH} operations; write it shorter")
-    match node:
-        case ast.Constant(value=bool()):
-            pass
-        case ast.Constant(value=int() as value):
-            if value >= 10**DIGITS:
-                raise ValueError(f"number {text!r} has a part of more than {DIGITS} digits; expected fewer")
-            return sp.Integer(value)
-        case ast.Name(id=name) if name in values:
-            return sp.Integer(values[name])
-        case ast.Name(id="I"):
+    def refuse(self, node: ast.expr, reason: str) -> NoReturn:
+        if reason:
+            raise ValueError(f"{ast.unparse(node)} in the number {self.text!r}; {reason}")
+        if isinstance(node, ast.BinOp):
+            raise ValueError(f"unknown operation in the number {self.text!r}; expected {GRAMMAR}")
+        self._refuse(ast.unparse(node))
+
+    def _refuse(self, piece: str) -> NoReturn:
+        letters = f" and the letters {', '.join(self.values)}" if self.values else ""
+        hint = "; pi is read inside sin, cos and exp only" if piece == "pi" else ""
+        raise ValueError(f"{piece!r} in the number {self.text!r}; expected {GRAMMAR}{letters}{hint}")
+
+    def refuse_depth(self) -> NoReturn:
+        raise ValueError(f"number {self.text!r} nests more than {DEPTH} operations; write it shorter")
+
+    def number(self, value: int | float) -> sp.Expr:
+        if isinstance(value, float):
+            raise NoMeaning
+        if value >= 10**DIGITS:
+            raise ValueError(f"number {self.text!r} has a part of more than {DIGITS} digits; expected fewer")
+        return sp.Integer(value)
+
+    def name(self, name: str) -> sp.Expr:
+        if name == "pi" and self.angle:
+            return _PI
+        if name in self.values:
+            return sp.Integer(self.values[name])
+        if name == "I":
             return sp.I
-        case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign, operand=operand):
-            inner = _value(operand, text, values, depth + 1)
-            return -inner if isinstance(sign, ast.USub) else inner
-        case ast.BinOp(left=left, op=op, right=right):
-            pair = (_value(left, text, values, depth + 1), _value(right, text, values, depth + 1))
-            return _combined(op, *pair, text)
-        case ast.Call(func=ast.Name(id="sqrt"), args=[argument], keywords=[]):
-            return sp.sqrt(_value(argument, text, values, depth + 1))
-        case ast.Call(func=ast.Name(id="sin" | "cos" | "exp" as name), args=[argument], keywords=[]):
-            return _circular(name, argument, text, values, depth)
-    known = ", ".join(values)
-    letters = f" and the letters {known}" if values else ""
-    hint = "; pi is read inside sin, cos and exp only" if isinstance(node, ast.Name) and node.id == "pi" else ""
-    raise ValueError(f"{ast.unparse(node)!r} in the number {text!r}; expected {GRAMMAR}{letters}{hint}")
+        raise NoMeaning
 
+    def positive(self, value: sp.Expr) -> sp.Expr:
+        return value
 
-def _combined(op: ast.operator, a: sp.Expr, b: sp.Expr, text: str) -> sp.Expr:
-    if isinstance(op, ast.Add):
-        result = a + b
-    elif isinstance(op, ast.Sub):
-        result = a - b
-    elif isinstance(op, ast.Mult):
-        result = a * b
-    elif isinstance(op, ast.Div):
-        result = a / _divisor(b, text)
-    elif isinstance(op, ast.Pow):
-        result = _power(a, b, text)
-    else:
-        raise ValueError(f"unknown operation in the number {text!r}; expected {GRAMMAR}")
-    if result.is_Rational and max(int(result.p).bit_length(), int(result.q).bit_length()) > BITS:
-        raise ValueError(f"number {text!r} grows beyond {BITS} bits; expected a smaller one")
-    return result
+    def negative(self, value: sp.Expr) -> sp.Expr:
+        return -value
 
+    def add(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
+        return self._checked(a + b)
 
-def _divisor(b: sp.Expr, text: str) -> sp.Expr:
-    check_size(b)
-    if equal(b, sp.S.Zero):
-        raise ValueError(f"number {text!r} divides by zero; correct it")
-    return b
+    def multiply(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
+        return self._checked(a * b)
 
+    def divide(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
+        if b.has(_PI):
+            raise ValueError(f"number {self.text!r} divides by pi; expected a rational times pi")
+        return self._checked(a / self._divisor(b))
 
-def _power(base: sp.Expr, exponent: sp.Expr, text: str) -> sp.Expr:
-    if not exponent.is_Rational or abs(exponent.p) > 64 or exponent.q > 12:
-        raise ValueError(f"exponent {exponent} in the number {text!r}; expected p/q with |p| <= 64 and q <= 12")
-    if exponent < 0:
-        _divisor(base, text)
-    if base.is_Rational and abs(exponent.p) * math.log2(max(abs(base.p), base.q, 2)) > BITS:
-        raise ValueError(f"number {text!r} grows beyond {BITS} bits; expected a smaller one")
-    return base**exponent
+    def power(self, base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
+        if base.has(_PI) or exponent.has(_PI):
+            self._refuse("pi")
+        if not exponent.is_Rational or abs(exponent.p) > 64 or exponent.q > 12:
+            raise ValueError(
+                f"exponent {exponent} in the number {self.text!r}; expected p/q with |p| <= 64 and q <= 12"
+            )
+        if exponent < 0:
+            self._divisor(base)
+        if base.is_Rational and abs(exponent.p) * math.log2(max(abs(base.p), base.q, 2)) > BITS:
+            self._refuse_size()
+        return self._checked(base**exponent)
 
+    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Expr]]:
+        if function not in ("sqrt", "sin", "cos", "exp") or count != 1 or options:
+            raise NoMeaning
+        return (replace(self, angle=function != "sqrt"),)
 
-def _circular(name: str, argument: ast.AST, text: str, values: Mapping[str, int], depth: int) -> sp.Expr:
-    """sin, cos or exp: the argument is read with pi as a letter, and its factor must be rational."""
-    angle = sp.Dummy("pi", real=True)
-    inner = _angle(argument, text, values, depth + 1, angle)
-    turn = inner.coeff(angle, 1) / (sp.I if name == "exp" else 1)
-    if sp.expand(inner - turn * angle * (sp.I if name == "exp" else 1)) != 0 or not turn.is_Rational:
-        unit = "I*pi" if name == "exp" else "pi"
-        raise ValueError(f"{name}({ast.unparse(argument)}) in the number {text!r}; expected a rational times {unit}")
-    if turn.q > 10_000:
-        raise ValueError(f"{name}({ast.unparse(argument)}) in the number {text!r}; expected a denominator up to 10000")
-    turn -= 2 * sp.floor(turn / 2)
-    if name == "exp":
-        return sp.exp(turn * sp.pi * sp.I)
-    short = turn.q in (1, 2, 3, 4, 6)  # SymPy writes others as nested radicals, which generate far larger fields
-    return (sp.sin if name == "sin" else sp.cos)(turn * sp.pi, evaluate=short)
+    def call(self, function: str, arguments: Sequence[sp.Expr], options: Mapping[str, str]) -> sp.Expr:
+        (argument,) = arguments
+        if function == "sqrt":
+            return sp.sqrt(argument)
+        unit, words = (sp.I, "I*pi") if function == "exp" else (sp.S.One, "pi")
+        turn = argument.coeff(_PI, 1) / unit
+        if sp.expand(argument - turn * _PI * unit) != 0 or not turn.is_Rational:
+            raise NoMeaning(f"expected a rational times {words}")
+        if turn.q > 10_000:
+            raise NoMeaning("expected a denominator up to 10000")
+        turn -= 2 * sp.floor(turn / 2)
+        if function == "exp":
+            return sp.exp(turn * sp.pi * sp.I)
+        short = turn.q in (1, 2, 3, 4, 6)  # SymPy writes others as nested radicals, which generate far larger fields
+        return (sp.sin if function == "sin" else sp.cos)(turn * sp.pi, evaluate=short)
 
+    def _divisor(self, b: sp.Expr) -> sp.Expr:
+        check_size(b)
+        if equal(b, sp.S.Zero):
+            raise ValueError(f"number {self.text!r} divides by zero; correct it")
+        return b
 
-def _angle(node: ast.AST, text: str, values: Mapping[str, int], depth: int, angle: sp.Symbol) -> sp.Expr:
-    """An argument as a multiple of the letter that stands for pi."""
-    if depth > DEPTH:
-        raise ValueError(f"number {text!r} nests more than {DEPTH} operations; write it shorter")
-    match node:
-        case ast.Name(id="pi"):
-            return angle
-        case ast.UnaryOp(op=ast.USub(), operand=operand):
-            return -_angle(operand, text, values, depth + 1, angle)
-        case ast.BinOp(left=left, op=ast.Mult() | ast.Div() | ast.Add() | ast.Sub() as op, right=right):
-            a, b = (_angle(side, text, values, depth + 1, angle) for side in (left, right))
-            if isinstance(op, ast.Div) and b.has(angle):
-                raise ValueError(f"number {text!r} divides by pi; expected a rational times pi")
-            return sp.expand(_combined(op, a, b, text))
-    return _value(node, text, values, depth)
+    def _checked(self, result: sp.Expr) -> sp.Expr:
+        if result.is_Rational and max(int(result.p).bit_length(), int(result.q).bit_length()) > BITS:
+            self._refuse_size()
+        return sp.expand(result) if self.angle else result
+
+    def _refuse_size(self) -> NoReturn:
+        raise ValueError(f"number {self.text!r} grows beyond {BITS} bits; expected a smaller one")

@@ -1,9 +1,9 @@
 """Real and complex algebraic numbers: an irreducible integer polynomial and what isolates one of its roots.
 
 A real root is held between two rationals where the polynomial changes sign, a complex root in a disc that holds no
-other; both are refined to any accuracy.  `isolation.py` isolates the roots or, should that fail, Arb (F. Johansson, IEEE
-Trans. Comput. 66, 1281, 2017).  Real roots are refined exactly: secant guesses, proved by signs (J. Abbott, ACM Commun.
-Comput. Algebra 48, 3, 2014).
+other; both are refined to any accuracy.  `isolation.py` isolates the roots or, should that fail, Arb
+(F. Johansson, IEEE Trans. Comput. 66, 1281, 2017).  Real roots are refined exactly: secant guesses, proved by
+signs (J. Abbott, ACM Commun. Comput. Algebra 48, 3, 2014).
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from math import isqrt
 import sympy as sp
 from flint import acb, arb, fmpq, fmpz_poly
 
-from .balls import precision
-from .real_roots import Disc, discs, dyadic, sharpened, sign
+from .balls import Ball, precision
+from .isolation import Disc, discs, dyadic, sharpened, sign
+from .rationals import to_flint, to_fraction
 
-__all__ = ["ComplexRoot", "RealRoot", "coefficient_text", "complex_order", "roots"]
+__all__ = ["ComplexRoot", "RealRoot", "Root", "coefficient_text", "complex_order", "roots"]
 
 Polynomial = tuple[int, ...]
 """Integer coefficients, constant first; irreducible and primitive, the leading one positive."""
@@ -32,24 +33,21 @@ _WRITTEN = 14_000
 
 
 @dataclass(frozen=True, slots=True)
-class RealRoot:
-    """The only root of `polynomial` (irreducible, degree >= 2) between `low` and `high`.
+class Root:
+    """One root of an irreducible polynomial of degree >= 2.
 
-    `index` counts its real roots from the smallest, 0, as SymPy's CRootOf does.  Raises ValueError where the
-    polynomial does not change its sign between the ends.
+    Attributes
+    ----------
+    polynomial : tuple of int
+        Integer coefficients, constant first; primitive, the leading one positive.
+    index : int
+        Place of the root among SymPy's CRootOf: real roots ascending, then complex ones.  It stands in the
+        text of the number, and so in tables and JSON: `complex_order` finds it without SymPy's isolation,
+        which takes minutes where Aberth's method takes a second.
     """
 
     polynomial: Polynomial
     index: int
-    low: Fraction
-    high: Fraction
-
-    def __post_init__(self) -> None:
-        f = fmpz_poly(list(self.polynomial))
-        if not self.low < self.high or sign(f, _exact(self.low)) * sign(f, _exact(self.high)) >= 0:
-            raise ValueError(
-                f"{self.text}: no sign change from {_short(self.low)} to {_short(self.high)}; expected a bracket of one root"
-            )
 
     @property
     def text(self) -> str:
@@ -61,37 +59,48 @@ class RealRoot:
         """This number as SymPy's CRootOf."""
         return _expression(self.polynomial, self.index)
 
+    def enclosure(self, bits: int) -> Ball:
+        """Return a ball that holds this number, of radius below 2**-bits times its modulus."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, slots=True)
+class RealRoot(Root):
+    """The only root of `polynomial` between `low` and `high`.
+
+    Raises
+    ------
+    ValueError
+        If the polynomial does not change its sign between the ends.
+    """
+
+    low: Fraction
+    high: Fraction
+
+    def __post_init__(self) -> None:
+        f = fmpz_poly(list(self.polynomial))
+        if not self.low < self.high or sign(f, to_flint(self.low)) * sign(f, to_flint(self.high)) >= 0:
+            raise ValueError(
+                f"{self.text}: no sign change from {_short(self.low)} to {_short(self.high)}; expected a bracket of "
+                "one root"
+            )
+
     def enclosure(self, bits: int) -> arb:
-        """A ball that holds this number, of relative radius below 2**-bits."""
+        """Return a ball that holds this number, of relative radius below 2**-bits."""
         low, high = _refined(self, bits)
         with precision(bits + 16):
             return arb(low).union(arb(high))
 
 
 @dataclass(frozen=True, slots=True)
-class ComplexRoot:
-    """The only root of `polynomial` (irreducible, degree >= 2) within `room` of `near` = (real, imaginary); not real.
+class ComplexRoot(Root):
+    """The only root of `polynomial` within `room` of `near` = (real, imaginary); not real."""
 
-    `index` is its place among SymPy's CRootOf, which lists real roots first.
-    """
-
-    polynomial: Polynomial
-    index: int
     near: tuple[Fraction, Fraction]
     room: Fraction
 
-    @property
-    def text(self) -> str:
-        """SymPy's text of this number."""
-        return f"CRootOf({polynomial_text(self.polynomial)}, {self.index})"
-
-    @property
-    def expression(self) -> sp.Expr:
-        """This number as SymPy's CRootOf."""
-        return _expression(self.polynomial, self.index)
-
     def enclosure(self, bits: int) -> acb:
-        """A ball that holds this number, of radius below 2**-bits times its modulus."""
+        """Return a ball that holds this number, of radius below 2**-bits times its modulus."""
         return _sharpened(self, bits)
 
 
@@ -101,7 +110,7 @@ def polynomial_text(polynomial: Polynomial) -> str:
     longest = max(abs(c).bit_length() for c in polynomial)
     if longest > _WRITTEN:
         return f"polynomial of degree {len(polynomial) - 1} with coefficients of up to {longest} bits"
-    return sp.sstr(sp.Poly(list(polynomial[::-1]), _X).as_expr())
+    return str(sp.sstr(sp.Poly(list(polynomial[::-1]), _X).as_expr()))
 
 
 def coefficient_text(c: int) -> str:
@@ -114,7 +123,7 @@ def _short(x: Fraction) -> str:
     return str(x) if longest < 100 else f"a fraction of {longest} bits"
 
 
-class _Root(sp.CRootOf):
+class _LongRoot(sp.CRootOf):
     """SymPy's CRootOf of a polynomial whose coefficients Python refuses to write."""
 
     __slots__ = ()
@@ -127,14 +136,14 @@ class _Root(sp.CRootOf):
 
 @lru_cache(maxsize=512)
 def _expression(polynomial: Polynomial, index: int) -> sp.Expr:
-    kind = _Root if max(abs(c).bit_length() for c in polynomial) > _WRITTEN else sp.CRootOf
+    kind = _LongRoot if max(abs(c).bit_length() for c in polynomial) > _WRITTEN else sp.CRootOf
     return kind(sp.Poly(list(polynomial[::-1]), _X), index)
 
 
 @lru_cache(maxsize=4096)
 def _sharpened(root: ComplexRoot, bits: int) -> acb:
-    disc = Disc(_exact(root.near[0]), _exact(root.near[1]), fmpq(0))
-    return sharpened(fmpz_poly(list(root.polynomial)), disc, _exact(root.room), bits)
+    disc = Disc(to_flint(root.near[0]), to_flint(root.near[1]), fmpq(0))
+    return sharpened(fmpz_poly(list(root.polynomial)), disc, to_flint(root.room), bits)
 
 
 def _by_arb(f: fmpz_poly) -> list[Disc]:
@@ -149,7 +158,7 @@ def _by_arb(f: fmpz_poly) -> list[Disc]:
     ]
 
 
-def roots(polynomial: Polynomial) -> tuple[RealRoot | ComplexRoot, ...]:
+def roots(polynomial: Polynomial) -> tuple[Root, ...]:
     """All roots of an irreducible polynomial of degree >= 2, each isolated by a disc that is proved to hold it alone.
 
     Real ones come first, ascending; conjugates are neighbours.
@@ -158,13 +167,13 @@ def roots(polynomial: Polynomial) -> tuple[RealRoot | ComplexRoot, ...]:
     isolated = discs(f) or _by_arb(f)
     reals = [disc for disc in isolated if disc.y == 0]
     upper = [disc for disc in isolated if disc.y > 0]
-    found: list[RealRoot | ComplexRoot] = [
-        RealRoot(polynomial, i, _fraction(d.x - d.radius), _fraction(d.x + d.radius)) for i, d in enumerate(reals)
+    found: list[Root] = [
+        RealRoot(polynomial, i, to_fraction(d.x - d.radius), to_fraction(d.x + d.radius)) for i, d in enumerate(reals)
     ]
     with precision(256):
         balls = [disc.ball for disc in upper]
     for place, k in enumerate(complex_order(polynomial, balls)):
-        x, y, room = (_fraction(part) for part in (upper[k].x, upper[k].y, _room(upper[k], isolated)))
+        x, y, room = (to_fraction(part) for part in (upper[k].x, upper[k].y, _room(upper[k], isolated)))
         found.append(ComplexRoot(polynomial, len(reals) + 2 * place, (x, -y), room))
         found.append(ComplexRoot(polynomial, len(reals) + 2 * place + 1, (x, y), room))
     return tuple(found)
@@ -179,7 +188,7 @@ def _room(disc: Disc, others: list[Disc]) -> fmpq:
 @lru_cache(maxsize=4096)
 def _refined(root: RealRoot, bits: int) -> tuple[fmpq, fmpq]:
     """Narrow the bracket to 2**-bits of its ends: guess by the secant, prove by signs, square the step."""
-    f, low, high = fmpz_poly(list(root.polynomial)), _exact(root.low), _exact(root.high)
+    f, low, high = fmpz_poly(list(root.polynomial)), to_flint(root.low), to_flint(root.high)
     if low * high > 0 and (high - low) * 2**bits <= min(abs(low), abs(high)):
         return low, high
     at_low, at_high = f(low), f(high)
@@ -205,14 +214,6 @@ def _refined(root: RealRoot, bits: int) -> tuple[fmpq, fmpq]:
     return low, high
 
 
-def _exact(x: Fraction) -> fmpq:
-    return fmpq(x.numerator, x.denominator)
-
-
-def _fraction(x: fmpq) -> Fraction:
-    return Fraction(int(x.p), int(x.q))
-
-
 def complex_order(polynomial: tuple[int, ...], upper: Sequence[acb]) -> list[int]:
     """The positions in `upper` (balls around the roots above the real axis) in SymPy's order."""
     if len(upper) < 2:
@@ -221,7 +222,7 @@ def complex_order(polynomial: tuple[int, ...], upper: Sequence[acb]) -> list[int
     scale, inner = sp.CRootOf(given, 0).as_coeff_Mul()  # SymPy may count the roots of a rescaled polynomial
     coefficients = [abs(int(c)) for c in inner.poly.all_coeffs()]
     bound = 2 * max(Fraction(c, coefficients[0]) for c in coefficients)
-    shrink = acb(fmpq(int(scale.q), int(scale.p)))
+    shrink = acb(to_flint(1 / scale))
     boxes = _leaves({k: ball * shrink for k, ball in enumerate(upper)}, (-bound, Fraction(0), bound, bound))
     if boxes is None:  # a root on the border of a box
         return _ask_sympy(given, upper)
@@ -240,7 +241,7 @@ def _leaves(
             continue
         upright = right - left > top - low
         middle = (left + right) / 2 if upright else (low + top) / 2
-        border = arb(fmpq(middle.numerator, middle.denominator))
+        border = arb(to_flint(middle))
         first: dict[int, acb] = {}
         second: dict[int, acb] = {}
         for k, ball in inside.items():

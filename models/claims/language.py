@@ -6,7 +6,7 @@ star n=3..12: 0, -1^(n-2), -n               # every n of a range
 torus 9 shape=3x3: 0, -3^4, -6^4            # options of the family: name=value, without blanks
 ring n=3..9: -4*sin(k*pi/n)**2 for k=0..n-1
 matrix G.txt: ~-3.414, -2, ~-0.586, 0       # ~: an approximation, right if it is the value rounded to its digits
-chain 1000000: largest = -4*cos(pi/(2*n))**2, distinct = n   # parts, of graphs of any size: see `part_claims`
+chain 1000000: largest = -4*cos(pi/(2*n))**2, distinct = n   # parts, of graphs of any size: see `parts`
 cartesian(chain(2), ring(5)): ratio < 10    # products and unions of families: see `graph_text`
 """
 
@@ -23,16 +23,14 @@ import sympy as sp
 from ..algebra.cosine_sums import AngleSum, expression
 from ..algebra.cosine_text import angle_number, angle_wave
 from ..algebra.number_text import exact_number, whole_number
+from ..algebra.rationals import to_fraction
 from ..graphs.families import topology
 from ..graphs.graph_text import is_composed, read_graph
 from ..graphs.topology import Topology, read_matrix
 from ..inputs.checks import shown
-from .parts import WORDS, Part, interval, is_part, read_part
+from .parts import LARGEST, WORDS, Part, interval, is_part, read_part
 
 __all__ = ["Claim", "Claimed", "read_claims"]
-
-LARGEST = 500
-"""Largest graph of a claim about all eigenvalues: above it, closed forms take long to prove."""
 
 BYTES, REPETITIONS = 1_000_000, 100_000
 _OPTIONS = r"((?:\s+[A-Za-z_]\w*=\S+)*)"
@@ -61,8 +59,15 @@ class Claimed:
     def sum(self) -> AngleSum | None:
         """The number as a sum of cosines; None where it is not read as one."""
         if self.exact is not None and self.exact.is_Rational:
-            return AngleSum.rational(Fraction(int(self.exact.p), int(self.exact.q)))
+            return AngleSum.rational(to_fraction(self.exact))
         return self.angle
+
+    @property
+    def ends(self) -> tuple[Fraction, Fraction]:
+        """The interval of an approximation; ValueError for an exact number."""
+        if self.interval is None:
+            raise ValueError(f"{self.text} is an exact number; expected an approximation")
+        return self.interval
 
     @property
     def words(self) -> str:

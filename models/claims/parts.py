@@ -5,28 +5,47 @@ ratio                   their quotient, of real eigenvalues
 distinct                how many different eigenvalues there are
 multiplicity(number)    how often a number is an eigenvalue, 0 where it is none
 
-Each stands before =, <, >, <= or >= and an exact number; behind = an approximation such as ~-3.414 may stand, elsewhere a
-decimal, which is then exact.
+Each stands before =, <, >, <= or >= and an exact number.  An approximation such as ~-3.414 may stand behind =,
+a decimal, which is then exact, behind the others.  Each comparison is decided exactly.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property, reduce
+from operator import eq, ge, gt, le, lt
 from typing import TypeAlias
 
 import sympy as sp
+from flint import arb
 
-from ..algebra.cosine_sums import AngleSum, read
+from ..algebra.cosine_sums import AngleSum, expression, read
 from ..algebra.cosine_text import angle_number
+from ..algebra.equality import Number, equal, sign
+from ..algebra.lazy import LazyEigenvalues
 from ..algebra.number_text import exact_number
+from ..algebra.roots import Root
+from ..graphs.families import family, topology
+from ..graphs.products import factors
+from ..graphs.topology import Topology
+from ..spectra.eigenvalue import Eigenvalue, words
+from ..spectra.solve import Proof, has_closed_form, spectrum
+from ..spectra.spectrum import Spectrum
 
-__all__ = ["WORDS", "Exact", "Part", "interval", "is_part", "read_part"]
+__all__ = ["LARGEST", "WORDS", "Exact", "Part", "interval", "is_part", "read_part", "verify_parts"]
+
+LARGEST = 500
+"""Largest graph whose spectrum is proved here: above it, closed forms take long to prove."""
+
+LISTED = 5000
+"""Closed forms with as many different eigenvalues as nodes are listed up to so many nodes."""
 
 WORDS = ("largest", "slowest", "ratio", "distinct", "multiplicity")
 Exact: TypeAlias = AngleSum | sp.Expr
+Value: TypeAlias = AngleSum | Number
 
 _PART = re.compile(rf"({'|'.join(WORDS)})\b\s*(.*?)\s*(<=|>=|==?|<|>)\s*(.+)")
 _ROUNDED = re.compile(r"~\s*([+-]?[0-9]{1,40}(?:\.[0-9]{1,60})?(?:[eE][+-]?[0-9]{1,3})?)")
@@ -92,3 +111,200 @@ def interval(text: str) -> tuple[Fraction, Fraction]:
     power = int(exponent or 0) - len(mantissa.partition(".")[2])
     value, half = Fraction(rounded[1]), Fraction(10) ** power / 2
     return value - half, value + half
+
+
+_RELATIONS: dict[str, Callable[[int, int], bool]] = {"=": eq, "<": lt, ">": gt, "<=": le, ">=": ge}
+
+
+def verify_parts(graph: Topology, parts: Sequence[Part]) -> tuple[tuple[str, ...], bool, str]:
+    """Compare claimed parts with the spectrum of a graph.
+
+    A chain, a ring, and grids, tori and Cartesian products of families need no list of their eigenvalues:
+    the extreme ones are sums of those of the factors.  Other closed forms are listed up to LISTED nodes.
+
+    Returns
+    -------
+    problems : tuple of str
+        A sentence for each part that is wrong.
+    proved : bool
+        Whether the spectrum was proved.
+    right : str
+        The parts as they are, in words.
+
+    Raises
+    ------
+    ValueError
+        If a part is not known for the graph.
+    """
+    known = _Known(graph)
+    problems, right = [], []
+    for part in parts:
+        holds, value = _decided(part, known)
+        right.append(f"{_subject(part)} = {value}")
+        if not holds:
+            problems.append(f"claimed {part.text}: {_subject(part)} is {value}")
+    return tuple(problems), graph.n <= LARGEST, ", ".join(dict.fromkeys(right))
+
+
+def _subject(part: Part) -> str:
+    return part.word if part.of is None else f"{part.word}({sp.sstr(_expression(part.of))})"
+
+
+@dataclass
+class _Known:
+    """The parts of a graph's spectrum, each computed when it is asked for."""
+
+    graph: Topology
+
+    @cached_property
+    def spectrum(self) -> Spectrum:
+        """All eigenvalues, proved up to LARGEST nodes."""
+        n = self.graph.n
+        if n > LARGEST and not has_closed_form(self.graph):
+            raise ValueError(f"{self.graph.name} {n}: a graph without a closed form; expected at most {LARGEST} nodes")
+        if n > LISTED and not _short(self.graph):
+            raise ValueError(
+                f"{self.graph.name} {n}: expected at most {LISTED} nodes for this part of the spectrum of this graph"
+            )
+        return spectrum(self.graph, Proof.EXACT if n <= LARGEST else Proof.NONE)
+
+    @cached_property
+    def axes(self) -> tuple[Topology, ...]:
+        """The chains, rings and others of which a large graph is the Cartesian product; else the graph itself."""
+        return tuple(_axes(self.graph)) if self.graph.n > LARGEST else (self.graph,)
+
+    @cached_property
+    def largest(self) -> Value:
+        """The eigenvalue of largest modulus: of a product the sum of those of its factors."""
+        if len(self.axes) == 1:
+            return _value(self.spectrum.largest)
+        return sum((_sum(axis.spectrum.largest) for axis in self.axes), AngleSum.rational(0))
+
+    @cached_property
+    def slowest(self) -> Value:
+        """The eigenvalue other than 0 of smallest modulus: of a product the one of a factor that is nearest to 0."""
+        if len(self.axes) == 1:
+            return _value(self.spectrum.slowest)
+        return reduce(lambda a, b: b if _order(b, a) > 0 else a, [_sum(axis.spectrum.slowest) for axis in self.axes])
+
+    def multiplicity(self, number: Exact) -> int:
+        """How often a number is an eigenvalue."""
+        found = self.spectrum.eigenvalues
+        near = _neighbours(found, number) if isinstance(found, LazyEigenvalues) else found
+        return sum(e.multiplicity for e in near if _same(e, number))
+
+
+def _axes(graph: Topology) -> Iterator[Topology]:
+    """The factors of a Cartesian product with more than one node, where the spectrum of each is short and not above 0."""
+    pair = factors(graph)
+    if graph.name in ("grid", "torus") and (sides := family(graph.name).sides):
+        shape = dict(graph.options).get("shape")
+        sizes = shape if isinstance(shape, tuple) else sides(graph.n)
+        yield from (topology("ring" if graph.name == "torus" else "chain", size) for size in sizes if size > 1)
+    elif pair is None or not all(_short(axis) for part in pair for axis in _axes(part)):
+        yield graph
+    else:
+        yield from (axis for part in pair for axis in _axes(part) if axis.n > 1)
+
+
+def _short(graph: Topology) -> bool:
+    """True where a closed form has few different eigenvalues whatever the size, or makes them one by one."""
+    return graph.name in ("chain", "ring", "complete", "complete_bipartite", "star", "hypercube", "feed_forward")
+
+
+def _neighbours(found: LazyEigenvalues[Eigenvalue], number: Exact) -> Sequence[Eigenvalue]:
+    """The eigenvalues of a chain or ring beside the place where a number would stand."""
+    low, high = 0, len(found)
+    while low < high:
+        middle = (low + high) // 2
+        if _order(_value(found[middle].exact), number) > 0:
+            low = middle + 1
+        else:
+            high = middle
+    return found[max(low - 1, 0) : low + 2]
+
+
+def _decided(part: Part, known: _Known) -> tuple[bool, str]:
+    """Whether a part is as claimed, and its value in words."""
+    if part.word in ("distinct", "multiplicity"):
+        of = part.of if part.of is not None else AngleSum.rational(0)
+        count = len(known.spectrum) if part.word == "distinct" else known.multiplicity(of)
+        return _holds(part, AngleSum.rational(count), AngleSum.rational(1)), str(count)
+    if part.word == "ratio":
+        return _holds(part, known.largest, known.slowest), _quotient(known.largest, known.slowest)
+    value = known.largest if part.word == "largest" else known.slowest
+    shown = words(Eigenvalue(_number(value), 1))
+    if _complex(value) and part.relation == "=" and part.number is not None:
+        return equal(_number(value), _expression(part.number)), shown
+    return _holds(part, value, AngleSum.rational(1)), shown
+
+
+def _holds(part: Part, value: Value, unit: Value) -> bool:
+    """Whether value / unit is as claimed; the unit is 1, or the slowest eigenvalue."""
+    if _complex(value) or _complex(unit):
+        raise ValueError(f"{part.text}: complex eigenvalues have no order; expected = and an exact number")
+    if part.interval is not None:
+        low, high = (AngleSum.rational(end) for end in part.interval)
+        return _quotient_order(value, unit, low) >= 0 >= _quotient_order(value, unit, high)
+    if part.number is None:
+        raise ValueError(f"{part.text}: expected a number")
+    return _RELATIONS[part.relation](_quotient_order(value, unit, part.number), 0)
+
+
+def _quotient_order(value: Value, unit: Value, number: Exact) -> int:
+    """The sign of value / unit - number."""
+    if unit == AngleSum.rational(1):
+        return _order(value, number)
+    if isinstance(value, AngleSum) and isinstance(unit, AngleSum) and isinstance(number, AngleSum):
+        return (value + -(number * unit)).sign() * unit.sign()
+    return sign((_number(value),), (_expression(number), _number(unit))) * _order(unit, AngleSum.rational(0))
+
+
+def _order(value: Value, number: Exact) -> int:
+    """The sign of value - number."""
+    if isinstance(value, AngleSum) and isinstance(number, AngleSum):
+        return (value + -number).sign()
+    return sign((_number(value),), (_expression(number),))
+
+
+def _same(e: Eigenvalue, number: Exact) -> bool:
+    middle = complex(sp.N(_expression(number), 20))
+    if abs(complex(e.value) - middle) > 1e-9 * max(1.0, abs(middle)):
+        return False
+    value = _value(e.number)
+    if isinstance(value, AngleSum) and isinstance(number, AngleSum):
+        return (value + -number).sign() == 0
+    return equal(e.number, _expression(number))
+
+
+def _quotient(value: Value, unit: Value) -> str:
+    """value / unit by twelve digits, or as a whole number where it is one."""
+    if isinstance(value, AngleSum) and isinstance(unit, AngleSum) and not (value.terms or unit.terms):
+        return str(value.shift / unit.shift)
+    top, bottom = (Eigenvalue(_number(x), 1).enclosure(128) for x in (value, unit))
+    return f"{float(arb(top) / arb(bottom)):.12g}" if not (_complex(value) or _complex(unit)) else "complex"
+
+
+def _value(number: Number) -> Value:
+    """An eigenvalue as a sum of cosines where it is one."""
+    found = None if isinstance(number, Root) else read(number)
+    return number if found is None else found
+
+
+def _sum(number: sp.Expr) -> AngleSum:
+    found = read(number)
+    if found is None:
+        raise ValueError(f"{number} is no sum of cosines; expected one of a chain or ring")
+    return found
+
+
+def _number(value: Value) -> Number:
+    return expression(value.risen) if isinstance(value, AngleSum) else value
+
+
+def _expression(number: Exact) -> sp.Expr:
+    return expression(number.risen) if isinstance(number, AngleSum) else number
+
+
+def _complex(value: Value) -> bool:
+    return not isinstance(value, AngleSum) and isinstance(Eigenvalue(value, 1).value, complex)

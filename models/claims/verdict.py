@@ -6,18 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import sympy as sp
-from flint import acb, arb, fmpq
+from flint import acb, arb
 
 from ..algebra.balls import enclose, precision
 from ..algebra.cosine_sums import AngleSum, read
 from ..algebra.equality import equal
 from ..algebra.minimal_polynomials import multiplied
-from ..algebra.roots import ComplexRoot, RealRoot
+from ..algebra.rationals import to_flint, to_sympy
+from ..algebra.roots import Root
 from ..spectra.characteristic import characteristic
 from ..spectra.eigenvalue import Eigenvalue, entry, times, words
-from ..spectra.solve import spectrum
+from ..spectra.solve import Proof, spectrum
 from .language import Claim, Claimed
-from .part_verdict import judged
+from .parts import verify_parts
 
 __all__ = ["Verdict", "verify"]
 
@@ -39,7 +40,7 @@ class Verdict:
     @property
     def eigenvalues(self) -> Sequence[Eigenvalue]:
         """The eigenvalues of the graph."""
-        return spectrum(self.claim.graph, prove=bool(self.problems)).eigenvalues
+        return spectrum(self.claim.graph, Proof.EXACT if self.problems else Proof.NONE).eigenvalues
 
     @property
     def expected(self) -> str:
@@ -53,7 +54,7 @@ def verify(claim: Claim) -> Verdict:
     Raises ValueError where a number is too involved to be compared, ProofError where the proof of the spectrum fails.
     """
     if claim.parts:
-        return Verdict(claim, *judged(claim))
+        return Verdict(claim, *verify_parts(claim.graph, claim.parts))
     if _multiplies_out(claim):
         return Verdict(claim, ())
     return Verdict(claim, _compared(claim))
@@ -70,7 +71,7 @@ def _multiplies_out(claim: Claim) -> bool:
 
 def _compared(claim: Claim) -> tuple[str, ...]:
     """What is wrong with a claim, number by number."""
-    found = spectrum(claim.graph, prove=True).eigenvalues
+    found = spectrum(claim.graph, Proof.EXACT).eigenvalues
     tally, problems = [0] * len(found), []
     known = _angles(found) if any(c.angle is not None for c in claim.numbers) else {}
     middles: list[complex] = []
@@ -97,9 +98,7 @@ def _compared(claim: Claim) -> tuple[str, ...]:
 
 def _angles(found: Sequence[Eigenvalue]) -> dict[AngleSum, int]:
     """The places of the eigenvalues that are sums of cosines; equal sums are equal numbers, not the other way round."""
-    forms = (
-        (None if isinstance(e.number, (RealRoot, ComplexRoot)) else read(e.number), i) for i, e in enumerate(found)
-    )
+    forms = ((None if isinstance(e.number, Root) else read(e.number), i) for i, e in enumerate(found))
     return {form.folded: i for form, i in forms if form is not None}
 
 
@@ -112,11 +111,11 @@ def _find(number: sp.Expr, found: Sequence[Eigenvalue], middles: Sequence[comple
     return None
 
 
-def _middle(number: sp.Expr | RealRoot | ComplexRoot) -> complex:
+def _middle(number: sp.Expr | Root) -> complex:
     """A number to more digits than are needed to tell which eigenvalues it may be."""
     bits = 128
     while True:
-        ball = acb(number.enclosure(bits) if isinstance(number, (RealRoot, ComplexRoot)) else enclose(number, bits))
+        ball = acb(number.enclosure(bits) if isinstance(number, Root) else enclose(number, bits))
         with precision(bits):
             radius = float(ball.real.rad() + ball.imag.rad())
         if radius < 1e-18 * max(1.0, abs(complex(ball))):
@@ -139,7 +138,7 @@ def _assign(claims: Sequence[Claimed], found: Sequence[Eigenvalue], tally: list[
     rising = sorted(
         (i for i, e in enumerate(found) if not isinstance(e.value, complex)), key=lambda i: found[i].value.real
     )
-    for claimed in sorted(claims, key=lambda c: (c.interval or (0, 0))[1]):
+    for claimed in sorted(claims, key=lambda c: c.ends[1]):
         inside = [i for i in rising if _rounds_to(found[i], claimed)]
         left = claimed.count
         for i in inside:
@@ -155,19 +154,19 @@ def _assign(claims: Sequence[Claimed], found: Sequence[Eigenvalue], tally: list[
 
 
 def _centre(claimed: Claimed) -> float:
-    low, high = claimed.interval or (0, 0)
+    low, high = claimed.ends
     return float((low + high) / 2)
 
 
 def _rounds_to(e: Eigenvalue, claimed: Claimed) -> bool:
     """Whether a real eigenvalue lies in the closed interval of an approximation."""
-    low, high = (sp.Rational(end.numerator, end.denominator) for end in claimed.interval or (0, 0))
-    if not isinstance(e.number, (RealRoot, ComplexRoot)) and e.number.is_Rational:
+    low, high = map(to_sympy, claimed.ends)
+    if not isinstance(e.number, Root) and e.number.is_Rational:
         return bool(low <= e.number <= high)
     for bits in (64, 512, 4096):
         with precision(bits + 16):
             ball = arb(0) if e.number == 0 else e.enclosure(bits)
-            below, above = (arb(fmpq(int(end.p), int(end.q))) for end in (low, high))
+            below, above = (arb(to_flint(end)) for end in claimed.ends)
             if ball > below and ball < above:
                 return True
             if ball < below or ball > above:

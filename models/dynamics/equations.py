@@ -1,15 +1,15 @@
-"""The checked product of a derivation: node and edge equations, and the network they make on a graph.
+"""Equations of motion of a network: templates of its nodes and links, and the list of its links.
 
-Everything downstream (printing, code generation, spectra, tangent dynamics) reads these values and nothing else.
-A network is stored as templates (one node, one edge; several where its nodes are of several kinds) and a list of links,
-so its size costs no algebra.
+Printing, code generation, spectra and variational equations read these values and nothing else.  The templates do not
+depend on the size of the network, so a large network costs no algebra.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import sympy as sp
 
@@ -17,95 +17,202 @@ from ..graphs.links import Link
 from ..mechanics.components import SLIDING, TIME, Edge, Node
 from ..mechanics.stick_slip import Contact
 
-__all__ = ["SLIDING", "TIME", "Edge", "Equations", "Link", "Node", "check"]
+__all__ = ["SLIDING", "TIME", "Edge", "Ends", "Equations", "Link", "Node", "check"]
+
+Ends = tuple[int, int]
+"""The kinds of a link's target and source."""
 
 Entry = tuple[tuple[int, int], sp.Expr]
 
 Block = tuple[tuple[sp.Expr, ...], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Equations:
-    """The equations of motion of `n` nodes joined by `links`: M d(state)/dt = rhs, M the identity unless links have inertia.
+class _Cached:
+    """Gives a value with slots a dictionary for its cached properties, which pickles do not hold."""
 
-    State order is component by component: x_1 … x_n, v_1 … v_n.  The parameters named in `varied` have one value for each
-    node: a_1 … a_n.  Nodes of several kinds: `kinds` says for each node which of (node, *others) it is, and `joints` holds
-    ((kind of the target, kind of the source), edge) in place of `edge`; first come the components that all kinds have.
-    Raises ValueError on a link outside the nodes, a link from a node to itself, a repeated link, links without an edge,
-    or one name for two things.
+
+@dataclass(frozen=True, slots=True)
+class Equations(_Cached):
+    """The equations of motion of a network, M d(state)/dt = rhs; M is the identity unless links have inertia.
+
+    The state is ordered by components: x_1 … x_n, v_1 … v_n; components that all kinds of nodes have come first.
+
+    Parameters
+    ----------
+    nodes : tuple of Node
+        The templates of the nodes, by kind.  A network of equal nodes has one.
+    kind_of : tuple of int
+        The kind of each node; its length is the number of nodes n.
+    edge_of : tuple of ((int, int), Edge)
+        The templates of the links, by the kinds of their targets and sources.
+    links : tuple of (int, int, Fraction)
+        Target and source (0-based) and weight of each link.
+    varied : tuple of str
+        Parameters of nodes that have one value for each node: a_1 … a_n.
+
+    Raises
+    ------
+    ValueError
+        If a link is repeated, has no template, joins a node to itself or leaves the network, if templates and kinds do
+        not fit together, or if one name stands for two things.
     """
 
-    node: Node
-    edge: Edge | None
-    n: int
+    nodes: tuple[Node, ...]
+    kind_of: tuple[int, ...]
+    edge_of: tuple[tuple[Ends, Edge], ...] = ()
     links: tuple[Link, ...] = ()
     varied: tuple[str, ...] = ()
-    others: tuple[Node, ...] = ()
-    kinds: tuple[int, ...] = ()
-    joints: tuple[tuple[tuple[int, int], Edge], ...] = ()
 
     def __post_init__(self) -> None:
         check(self)
 
+    @classmethod
+    def of_equal_nodes(
+        cls, node: Node, edge: Edge | None, n: int, links: tuple[Link, ...] = (), varied: tuple[str, ...] = ()
+    ) -> Equations:
+        """Return the equations of a network of equal nodes.
+
+        Parameters
+        ----------
+        node : Node
+            The template of all nodes.
+        edge : Edge or None
+            The template of all links; None for nodes without links.
+        n : int
+            The number of nodes.
+        links, varied
+            As in `Equations`.
+        """
+        return cls((node,), (0,) * n, () if edge is None else (((0, 0), edge),), links, varied)
+
+    @property
+    def n(self) -> int:
+        """Number of nodes."""
+        return len(self.kind_of)
+
     @property
     def mixed(self) -> bool:
-        """True where the nodes are of several kinds."""
-        return bool(self.kinds)
+        """True if nodes are of several kinds."""
+        return len(self.nodes) > 1
+
+    @property
+    def node(self) -> Node:
+        """The template of a network of equal nodes; ValueError for several kinds."""
+        if self.mixed:
+            raise ValueError("the template of all nodes: found nodes of several kinds; expected equal nodes")
+        return self.nodes[0]
+
+    @property
+    def edge(self) -> Edge | None:
+        """The template of the links between equal nodes, None without any; ValueError for nodes of several kinds."""
+        if self.mixed:
+            raise ValueError("the template of all links: found nodes of several kinds; expected equal nodes")
+        return self.edge_of[0][1] if self.edge_of else None
 
     @property
     def edges(self) -> tuple[Edge, ...]:
-        """The edge templates that links use."""
-        if not self.links:
-            return ()
-        return tuple(edge for _, edge in self.joints) if self.mixed else () if self.edge is None else (self.edge,)
+        """The templates that links use."""
+        return tuple(edge for _, edge in self.edge_of) if self.links else ()
 
-    @property
-    def nodes(self) -> tuple[Node, ...]:
-        """The node templates, by kind."""
-        return (self.node, *self.others)
-
-    def kind(self, i: int) -> int:
-        """The kind of node `i` (0-based)."""
-        return self.kinds[i] if self.kinds else 0
+    @cached_property
+    def _edges_by_ends(self) -> dict[Ends, Edge]:
+        return dict(self.edge_of)
 
     def node_at(self, i: int) -> Node:
         """The template of node `i` (0-based)."""
-        return self.nodes[self.kind(i)]
+        return self.nodes[self.kind_of[i]]
+
+    def ends(self, link: Link) -> Ends:
+        """The kinds of the target and the source of a link."""
+        return self.kind_of[link[0]], self.kind_of[link[1]]
 
     def edge_at(self, link: Link) -> Edge:
-        """The template of a link."""
-        found = dict(self.joints).get((self.kind(link[0]), self.kind(link[1]))) if self.mixed else self.edge
-        if found is None:
+        """The template of a link; ValueError if there is none."""
+        edge = self._edges_by_ends.get(self.ends(link))
+        if edge is None:
             raise ValueError("these equations have no edge")
-        return found
+        return edge
 
-    def expect_alike(self, what: str) -> None:
-        """Raise ValueError where nodes differ in parameters or kind, or links have inertia: `what` is for others."""
-        found = f"nodes that differ in {', '.join(self.varied)}" if self.varied else ""
-        found = "nodes of several kinds" if self.mixed else found or ("links with inertia" if self.inertial else "")
-        if found:
+    def map_templates(
+        self,
+        of_node: Callable[[Node], Node],
+        of_edge: Callable[[Edge], Edge],
+        renamed: Mapping[sp.Symbol, sp.Symbol] | None = None,
+    ) -> Equations:
+        """Return the same network of changed templates.
+
+        Parameters
+        ----------
+        of_node, of_edge : callable
+            What becomes of each node and edge template.
+        renamed : mapping of Symbol to Symbol, optional
+            The new symbols of parameters in `varied`.
+
+        Returns
+        -------
+        Equations
+            Parameters in `varied` that no node has any more leave it.
+        """
+        nodes = tuple(map(of_node, self.nodes))
+        names = {s.name for node in nodes for s in node.parameters}
+        symbols = (sp.Symbol(name, real=True) for name in self.varied)
+        varied = (s.name for s in (symbols if renamed is None else (renamed.get(s, s) for s in symbols)))
+        return replace(
+            self,
+            nodes=nodes,
+            edge_of=tuple((ends, of_edge(edge)) for ends, edge in self.edge_of),
+            varied=tuple(name for name in varied if name in names),
+        )
+
+    def expect_alike(self, what: str, *, varied_too: bool = False, inertia_too: bool = False) -> None:
+        """Raise ValueError unless the nodes are equal and the links have no inertia.
+
+        Parameters
+        ----------
+        what : str
+            What is for such networks alone; the message begins with it.
+        varied_too : bool
+            Allow parameters that differ from node to node.
+        inertia_too : bool
+            Allow links with inertia.
+        """
+        problems = {
+            "nodes of several kinds": self.mixed,
+            f"nodes that differ in {', '.join(self.varied)}": bool(self.varied) and not varied_too,
+            "links with inertia": self.inertial and not inertia_too,
+        }
+        found = next((words for words, holds in problems.items() if holds), None)
+        if found is not None:
             raise ValueError(f"{what}: found {found}; expected equal nodes with links that have no inertia")
 
-    @property
+    @cached_property
     def inertial(self) -> bool:
-        """True where links have inertia, so that M is not the identity."""
+        """True if links have inertia, so that M is not the identity."""
         return any(edge.inertia for edge in self.edges)
 
-    @property
-    def plain(self) -> bool:
-        """True where all nodes are of one kind and M is the identity."""
-        return not (self.mixed or self.inertial)
+    @cached_property
+    def constant_mass(self) -> bool:
+        """True if M depends on parameters alone."""
+        return all(edge.constant_inertia for edge in self.edges)
 
     @property
+    def forced(self) -> bool:
+        """True if time occurs explicitly."""
+        return any(node.forced for node in self.nodes)
+
+    @property
+    def sticks(self) -> bool:
+        """True if friction is set-valued, so that nodes stick and slip."""
+        return any(node.contact is not None for node in self.nodes)
+
+    @cached_property
     def dimension(self) -> int:
         """Number of state variables of the whole network."""
-        if not self.mixed:
-            return self.n * len(self.node.state)
-        return sum(len(node.state) * self.kinds.count(k) for k, node in enumerate(self.nodes))
+        return sum(len(self.nodes[k].state) for k in self.kind_of)
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[str, ...]:
-        """Names of all parameters, node first, in a fixed order; a parameter in `varied` is a_1 … a_n."""
+        """Names of all parameters, those of nodes first, in a fixed order; a parameter in `varied` is a_1 … a_n."""
         names: list[str] = []
         for name in dict.fromkeys(s.name for node in self.nodes for s in node.parameters):
             names += [f"{name}_{i + 1}" for i in self.holders(name)] if name in self.varied else [name]
@@ -116,31 +223,38 @@ class Equations:
     def holders(self, name: str) -> tuple[int, ...]:
         """The nodes (0-based) that have a parameter or a state of that name."""
         has = [any(s.name == name for s in (*node.state, *node.parameters)) for node in self.nodes]
-        return tuple(i for i in range(self.n) if has[self.kind(i)])
+        return tuple(i for i, kind in enumerate(self.kind_of) if has[kind])
 
-    @property
+    @cached_property
     def components(self) -> tuple[str, ...]:
         """Names of the states of the nodes, such as ("x", "v"): first those that all kinds have."""
         names = dict.fromkeys(s.name for node in self.nodes for s in node.state)
-        return tuple(sorted(names, key=lambda name: name not in self.common)) if self.mixed else tuple(names)
+        return tuple(sorted(names, key=lambda name: name not in self.common))
 
-    @property
+    @cached_property
     def common(self) -> frozenset[str]:
         """The components that nodes of all kinds have."""
         first, *rest = ({s.name for s in node.state} for node in self.nodes)
         return frozenset(first.intersection(*rest))
 
     @property
+    def compared(self) -> tuple[str, ...]:
+        """The components whose distances between nodes make the synchronisation error."""
+        return tuple(s.name for s in self.nodes[0].continuous if s.name in self.common)
+
+    @cached_property
     def state(self) -> tuple[str, ...]:
         """Names of the state variables: x_1 … x_n, v_1 … v_n."""
         return tuple(f"{name}_{i + 1}" for name in self.components for i in self.holders(name))
 
+    @cached_property
     def places(self) -> tuple[tuple[int, ...], ...]:
-        """For each node where its states stand in the whole state, in the order of its template."""
-        if not self.mixed:
-            return tuple(tuple(c * self.n + i for c in range(len(self.node.state))) for i in range(self.n))
-        index = {name: k for k, name in enumerate(self.state)}
-        return tuple(tuple(index[f"{s.name}_{i + 1}"] for s in self.node_at(i).state) for i in range(self.n))
+        """For each node the places of its states in the state of the network, in the order of its template."""
+        places: list[dict[str, int]] = [{} for _ in self.kind_of]
+        slots = ((i, name) for name in self.components for i in self.holders(name))
+        for place, (i, name) in enumerate(slots):
+            places[i][name] = place
+        return tuple(tuple(own[s.name] for s in self.node_at(i).state) for i, own in enumerate(places))
 
     def symbols(self, i: int) -> tuple[sp.Symbol, ...]:
         """The state symbols of node `i` (0-based)."""
@@ -149,8 +263,8 @@ class Equations:
     def at_node(self, i: int) -> dict[sp.Symbol, sp.Symbol]:
         """The substitution that turns the node template into node `i`."""
         node = self.node_at(i)
-        found = dict(zip(node.state, self.symbols(i), strict=True))
-        return found | {s: _numbered(s, i) for s in node.parameters if s.name in self.varied}
+        states = dict(zip(node.state, self.symbols(i), strict=True))
+        return states | {s: _numbered(s, i) for s in node.parameters if s.name in self.varied}
 
     def at_link(self, link: Link) -> dict[sp.Symbol, sp.Expr]:
         """The substitution that turns the edge template into one link."""
@@ -162,55 +276,54 @@ class Equations:
         return {**here, **there, **own, edge.weight: sp.Rational(weight.numerator, weight.denominator)}
 
     def contact_at(self, i: int) -> Contact | None:
-        """What decides between stick and slip for node `i`, with the forces of its links; None without a contact."""
+        """The conditions of stick and slip of node `i`, with the forces of its links; None without a contact."""
         contact = self.node_at(i).contact
         if contact is None:
             return None
         velocity, mode = self.symbols(i)[1:3]
         own = contact.map(lambda e: e.xreplace(self.at_node(i)))
-        felt = [link for link in self.links if link[0] == i]
-        links = sp.Add(*(self.edge_at(link).rhs[1].xreplace(self.at_link(link)) for link in felt))
-        links = links.xreplace({mode: sp.S.One, velocity: own.speed})
-        return own.under(links)
+        links = [link for link in self.links if link[0] == i]
+        force = sp.Add(*(self.edge_at(link).rhs[1].xreplace(self.at_link(link)) for link in links))
+        return own.under(force.xreplace({mode: sp.S.One, velocity: own.speed}))
 
     def rhs(self) -> tuple[sp.Expr, ...]:
         """The right-hand side of M d(state)/dt = rhs, in state order (algebra grows with n: meant for small n)."""
-        places, found = self.places(), [sp.S.Zero] * self.dimension
-        for i in range(self.n):
-            for k, e in zip(places[i], self.node_at(i).rhs, strict=True):
-                found[k] = e.xreplace(self.at_node(i))
+        rates = [sp.S.Zero] * self.dimension
+        for i, places in enumerate(self.places):
+            for k, e in zip(places, self.node_at(i).rhs, strict=True):
+                rates[k] = e.xreplace(self.at_node(i))
         for link in self.links:
             values = self.at_link(link)
-            for k, e in zip(places[link[0]], self.edge_at(link).rhs, strict=True):
-                found[k] += e.xreplace(values)
-        return tuple(found)
+            for k, e in zip(self.places[link[0]], self.edge_at(link).rhs, strict=True):
+                rates[k] += e.xreplace(values)
+        return tuple(rates)
 
     def mass(self) -> dict[tuple[int, int], sp.Expr]:
-        """The non-zero entries (row, column) of M in M d(state)/dt = rhs; empty where M is the identity."""
+        """The non-zero entries (row, column) of M in M d(state)/dt = rhs; empty if M is the identity."""
         if not self.inertial:
             return {}
-        places = self.places()
-        found: dict[tuple[int, int], sp.Expr] = {(k, k): sp.S.One for k in range(self.dimension)}
+        places = self.places
+        entries: dict[tuple[int, int], sp.Expr] = {(k, k): sp.S.One for k in range(self.dimension)}
         for link in self.links:
             inertia, values = self.edge_at(link).inertia, self.at_link(link)
             for block, end in zip(inertia, link[:2], strict=False):
                 for key, e in _block(block, places[link[0]], places[end], values):
-                    found[key] = found.get(key, sp.S.Zero) + e
-        return {key: found[key] for key in sorted(found) if found[key] != 0}
+                    entries[key] = entries.get(key, sp.S.Zero) + e
+        return {key: entries[key] for key in sorted(entries) if entries[key] != 0}
 
     def jacobian(self) -> dict[tuple[int, int], sp.Expr]:
         """The non-zero entries (row, column) of d(rhs)/d(state), rows and columns in state order."""
         entries: dict[tuple[int, int], sp.Expr] = {}
-        own, places = [node.jacobian() for node in self.nodes], self.places()
-        for i in range(self.n):
-            entries.update(_block(own[self.kind(i)], places[i], places[i], self.at_node(i)))
+        blocks = [node.jacobian() for node in self.nodes]
+        for i, places in enumerate(self.places):
+            entries.update(_block(blocks[self.kind_of[i]], places, places, self.at_node(i)))
         for key, value in self.link_jacobian():
             entries[key] = entries.get(key, sp.S.Zero) + value
         return {key: entries[key] for key in sorted(entries) if entries[key] != 0}
 
     def link_jacobian(self) -> Iterator[Entry]:
-        """Yield ((row, column), entry) for each link's share of the Jacobian; keys repeat where links meet."""
-        places = self.places()
+        """Yield ((row, column), entry) for each link's share of the Jacobian; keys repeat if links share an end."""
+        places = self.places
         blocks = {edge: (edge.jacobian_here(), edge.jacobian_there()) for edge in self.edges}
         for link in self.links:
             here, there = blocks[self.edge_at(link)]
@@ -220,23 +333,24 @@ class Equations:
 
     def time_derivative(self) -> tuple[sp.Expr, ...]:
         """The partial derivative of the right-hand side with respect to time, in state order."""
-        own = [node.time_derivative() for node in self.nodes]
-        found: dict[int, sp.Expr] = {}
-        for i, places in enumerate(self.places()):
-            rows = zip(places, own[self.kind(i)], strict=True)
-            found |= {k: e.xreplace(self.at_node(i)) for k, e in rows}
-        return tuple(found[k] for k in range(self.dimension))
+        slopes = [node.time_derivative() for node in self.nodes]
+        rates = [sp.S.Zero] * self.dimension
+        for i, places in enumerate(self.places):
+            for k, e in zip(places, slopes[self.kind_of[i]], strict=True):
+                rates[k] = e.xreplace(self.at_node(i))
+        return tuple(rates)
 
-    @property
+    @cached_property
     def digest(self) -> str:
-        """Hexadecimal SHA-256 of the equations: equal equations have equal digests, whatever made them."""
-        parts = [_text(self.node.state, self.node.rhs, self.node.parameters), str(self.n), repr(self.links)]
-        if self.node.contact is not None:
-            parts.append("; ".join(map(sp.srepr, self.node.contact.expressions)))
+        """Hexadecimal SHA-256 of the equations; equal equations have equal digests."""
+        first, *others = self.nodes
+        parts = [_text(first.state, first.rhs, first.parameters), str(self.n), repr(self.links)]
+        if first.contact is not None:
+            parts.append("; ".join(map(sp.srepr, first.contact.expressions)))
         parts += [f"varied {' '.join(self.varied)}"] if self.varied else []
-        if self.mixed:
-            parts += [repr(self.kinds), *(_text(node.state, node.rhs, node.parameters) for node in self.others)]
-            parts += [repr(pair) for pair, _ in self.joints]
+        if others:  # a single kind adds nothing
+            parts += [repr(self.kind_of), *(_text(node.state, node.rhs, node.parameters) for node in others)]
+            parts += [repr(ends) for ends, _ in self.edge_of]
         for edge in self.edges:
             parts.append(_text((*edge.here, *edge.there, edge.weight), edge.rhs, edge.parameters))
             parts += [sp.srepr(sp.Matrix(block)) for block in edge.inertia]
@@ -262,7 +376,7 @@ def _text(state: tuple[sp.Symbol, ...], rhs: tuple[sp.Expr, ...], parameters: tu
 
 
 def check(eq: Equations) -> None:
-    """Raise ValueError where nodes, links and names do not fit together (see `Equations`)."""
+    """Raise ValueError if nodes, links and names do not fit together (see `Equations`)."""
     if eq.n < 1:
         raise ValueError(f"a network needs at least one node, found n = {eq.n}")
     _check_kinds(eq)
@@ -271,21 +385,18 @@ def check(eq: Equations) -> None:
 
 
 def _check_kinds(eq: Equations) -> None:
-    if bool(eq.others or eq.joints) != eq.mixed or (eq.mixed and set(eq.kinds) != set(range(len(eq.nodes)))):
-        raise ValueError(f"kinds of nodes: found {len(eq.nodes)} templates and the kinds {sorted(set(eq.kinds))}")
-    if eq.mixed and len(eq.kinds) != eq.n:
-        raise ValueError(f"kinds of nodes: found {len(eq.kinds)} for {eq.n} nodes; expected one for each")
-    if eq.mixed and any(node.contact is not None for node in eq.nodes):
+    if set(eq.kind_of) != set(range(len(eq.nodes))):
+        raise ValueError(f"kinds of nodes: found {len(eq.nodes)} templates and the kinds {sorted(set(eq.kind_of))}")
+    if eq.sticks and eq.mixed:
         raise ValueError(
             "nodes of several kinds: found set-valued friction; expected smooth contacts; use contact 'atan'"
         )
-    if eq.inertial and eq.node.contact is not None:
+    if eq.sticks and eq.inertial:
         raise ValueError("links with inertia: found set-valued friction; expected a smooth contact; use contact 'atan'")
-    sizes = eq.joints or (() if eq.edge is None else (((0, 0), eq.edge),))
-    for (target, source), edge in sizes:
+    for (target, source), edge in eq.edge_of:
         for end, symbols in ((target, edge.here), (source, edge.there)):
-            if len(symbols) != len(eq.nodes[end].state):
-                states = len(eq.nodes[end].state)
+            states = len(eq.nodes[end].state)
+            if len(symbols) != states:
                 raise ValueError(f"the edge joins nodes of {len(symbols)} states, the node has {states}")
 
 
@@ -298,9 +409,7 @@ def _check_links(eq: Equations) -> None:
         if (target, source) in seen:
             raise ValueError(f"link {target} <- {source} occurs twice; add the weights up")
         seen.add((target, source))
-    pairs = {(eq.kind(target), eq.kind(source)) for target, source, _ in eq.links}
-    lacking = sorted(pairs - {pair for pair, _ in eq.joints}) if eq.mixed else [(0, 0)] if pairs and not eq.edge else []
-    if lacking:
+    if {eq.ends(link) for link in eq.links} - {ends for ends, _ in eq.edge_of}:
         raise ValueError(f"{len(eq.links)} links but no edge equations; give a coupling")
 
 

@@ -30,7 +30,7 @@ from ..mechanics.parameter import Parameter
 from ..mechanics.stick_slip import SLIP, set_valued
 from .equations import Equations
 
-__all__ = ["check_coupling", "connectivity", "drawn", "edge", "mixed_network", "network", "node", "parameters"]
+__all__ = ["check_coupling", "edge", "mixed_network", "network", "node", "oriented_links", "parameters"]
 
 
 def parameters(
@@ -128,9 +128,10 @@ def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str,
     Where a link tells its ends apart, its weight becomes the sign of its direction (`synchain.models.mechanics.orientation`).
     """
     if link is None:
-        return Equations(single, None, graph.n, (), varied)
+        return Equations.of_equal_nodes(single, None, graph.n, (), varied)
     oriented = graph.links and is_oriented(link)
-    return Equations(single, link, graph.n, drawn(graph) if oriented else graph.links, varied)
+    links = oriented_links(graph) if oriented else graph.links
+    return Equations.of_equal_nodes(single, link, graph.n, links, varied)
 
 
 def mixed_network(
@@ -145,62 +146,17 @@ def mixed_network(
 
     Every pair of kinds that a link joins gets its own edge.  Raises ValueError where a coupling does not fit a pair.
     """
-    apart = Equations(singles[0], None, graph.n, (), varied, tuple(singles[1:]), tuple(kinds))
-    links = graph.links if coupling is not None else ()
-    pairs = sorted({(kinds[target], kinds[source]) for target, source, _ in links})
-    joints = tuple(
-        ((a, b), edge(str(coupling), singles[a], oscillators[a], singles[b], oscillators[b])) for a, b in pairs
-    )
-    if any(a == b and is_oriented(link) for (a, b), link in joints):
+    apart = Equations(tuple(singles), tuple(kinds), (), (), varied)
+    if coupling is None:
+        return apart
+    pairs = sorted({apart.ends(link) for link in graph.links})
+    edges = tuple(((a, b), edge(coupling, singles[a], oscillators[a], singles[b], oscillators[b])) for a, b in pairs)
+    if any(a == b and is_oriented(link) for (a, b), link in edges):
         raise ValueError(f"coupling {coupling!r} tells the ends of a link apart; expected nodes of one kind")
-    return replace(apart, links=links, joints=joints)
+    return replace(apart, links=graph.links, edge_of=edges)
 
 
-def connectivity(coupling: str, graph: Topology) -> tuple[tuple[Fraction, ...], ...]:
-    """Read G off the coupling: minus the Hessian of its whole potential over sigma, n rows of n fractions.
-
-    The Hessian of one edge is derived once and added up over the links, so that a thousand nodes take no algebra.  For a
-    damper the Rayleigh function takes the potential's place; for a one-way link the row is read off the force on its target.
-    Of entries such as "1/2 x->y" the factor belongs to H, so that G holds the weights alone.
-    Raises ValueError for a coupling whose Hessian between equal states is not sigma times weight times a number: it has no
-    matrix G.
-    """
-    if coupling_text.is_matrix(coupling):
-        coupling_text.entries(coupling)
-        diagonal, aside = Fraction(-1), Fraction(1)
-    else:
-        diagonal, aside = _hessian(coupling)
-    rows = [[Fraction(0)] * graph.n for _ in range(graph.n)]
-    for target, source, factor in graph.links:
-        rows[target][target] += factor * diagonal
-        rows[target][source] += factor * aside
-    return tuple(map(tuple, rows))
-
-
-def _hessian(coupling: str) -> tuple[Fraction, Fraction]:
-    """Minus the second derivatives of one edge's energy over sigma and weight: twice by one end, and by both.
-
-    Of a non-linear coupling they are taken between equal states, where its links are those of its linear part.
-    """
-    model = load("coupling", split(coupling)[0])
-    q_i, q_j, weight = (sp.Symbol(name, real=True) for name in ("q_i", "q_j", "weight"))
-    given = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
-    if hasattr(model, "BETWEEN"):
-        raise ValueError(
-            f"coupling {coupling!r} joins {' and '.join(model.BETWEEN)}; it has no matrix of one coordinate"
-        )
-    function = next(getattr(model, name) for name in ("potential", "dissipation", "kinetic") if hasattr(model, name))
-    energy = call(function, {"q_i": q_i, "q_j": q_j, "v_i": q_i, "v_j": q_j, "weight": weight, **given})
-    slopes = (-energy.diff(q_i, q).xreplace({q_j: q_i}) for q in (q_i, q_j))
-    own, other = (sp.simplify(slope / (given["sigma"] * weight)) for slope in slopes)
-    if not (own.is_Rational and other.is_Rational) or own == 0:
-        raise ValueError(
-            f"coupling {coupling!r}: Hessian over sigma and weight is {own}, {other}; expected numbers other than 0"
-        )
-    return Fraction(int(own.p), int(own.q)), Fraction(int(other.p), int(other.q))
-
-
-def drawn(graph: Topology) -> tuple[Link, ...]:
+def oriented_links(graph: Topology) -> tuple[Link, ...]:
     """Return the links of a graph with the sign of their direction as weight.
 
     A link runs from the smaller to the larger number; on a graph that looks alike from every node (a ring) it runs the

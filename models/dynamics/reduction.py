@@ -11,31 +11,68 @@ Billeh, Delvenne, Lambiotte & Barahona, Chaos 26, 094821 (2016): those of differ
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import sympy as sp
 
 from ..graphs.partitions import class_links, coarsest_balanced
-from ..mechanics.components import Edge, Node
-from ..mechanics.stick_slip import Contact
+from ..mechanics.components import Edge
 from .equations import Equations
 
-__all__ = ["NoQuotient", "collapse", "fold", "quotient"]
+__all__ = ["NoQuotient", "collapse", "quotient", "substitute_constants"]
 
 
 class NoQuotient(ValueError):
     """The coupling has no exact quotient network, whatever the partition."""
 
 
-def fold(equations: Equations, values: Mapping[str, int | Fraction]) -> Equations:
-    """Return the equations with some parameters replaced by exact numbers; parameters that occur no more leave as well.
+def substitute_constants(equations: Equations, values: Mapping[str, int | Fraction]) -> Equations:
+    """Return the equations with some parameters replaced by exact numbers.
 
-    Links whose right-hand side has become zero leave too.  Raises TypeError for a number that is not exact, ValueError for
-    an unknown parameter and where a right-hand side is undefined at the numbers.
+    Parameters
+    ----------
+    equations : Equations
+        Equations of a network of equal nodes.
+    values : mapping of str to int or Fraction
+        Numbers by the names of parameters that are the same for all nodes.
+
+    Returns
+    -------
+    Equations
+        Parameters that occur no more are left out as well, and so are links that have no effect any more.
+
+    Raises
+    ------
+    TypeError
+        If a number is not exact.
+    ValueError
+        If a parameter is unknown or differs from node to node, nodes are of several kinds, or an expression is undefined
+        at the numbers.
     """
+    _check_constants(equations, values)
+    if not values:
+        return equations
+    numbers = {sp.Symbol(name, real=True): sp.Rational(v.numerator, v.denominator) for name, v in values.items()}
+
+    def change(what: str, e: sp.Expr) -> sp.Expr:
+        value = e.xreplace(numbers)
+        if value.has(sp.nan, sp.zoo, sp.oo, -sp.oo):
+            at = ", ".join(f"{symbol} = {number}" for symbol, number in numbers.items())
+            raise ValueError(f"fold: a right-hand side of the {what} is undefined at {at}; leave it a parameter")
+        return value
+
+    reduced = equations.map_templates(
+        lambda node: node.map(partial(change, "node")).without_unused_parameters(),
+        lambda edge: edge.map(partial(change, "edge")).without_unused_parameters(),
+    )
+    return reduced if any(edge.acts for edge in reduced.edges) else replace(reduced, edge_of=(), links=())
+
+
+def _check_constants(equations: Equations, values: Mapping[str, int | Fraction]) -> None:
+    """Raise TypeError or ValueError for numbers that cannot take the places of parameters."""
     for name, value in values.items():
         if isinstance(value, bool) or not isinstance(value, (int, Fraction)):
             raise TypeError(f"fold {name}: found {value!r} ({type(value).__name__}); expected an int or a Fraction")
@@ -43,42 +80,8 @@ def fold(equations: Equations, values: Mapping[str, int | Fraction]) -> Equation
             raise ValueError(f"fold: unknown parameter {name!r}; known: {', '.join(equations.parameters) or 'none'}")
         if any(name in (f"{own}_{i + 1}" for i in range(equations.n)) for own in equations.varied):
             raise ValueError(f"fold {name}: the nodes have different values of it; it stays a parameter")
-    if not values:
-        return equations
-    if equations.mixed:
+    if values and equations.mixed:
         raise ValueError(f"fold {', '.join(values)}: found nodes of several kinds; they stay parameters")
-    numbers = {sp.Symbol(name, real=True): sp.Rational(v.numerator, v.denominator) for name, v in values.items()}
-    node = equations.node
-    rates = _folded("node", node.rhs, numbers)
-    conditions = () if node.contact is None else _folded("contact", node.contact.expressions, numbers)
-    contact = Contact(*conditions) if conditions else None
-    single = Node(node.state, rates, _occurring(node.parameters, (*rates, *conditions)), contact)
-    left = {s.name for s in single.parameters}
-    made = replace(equations, node=single, varied=tuple(name for name in equations.varied if name in left))
-    edge = equations.edge
-    if edge is not None:
-        pushes = _folded("edge", edge.rhs, numbers)
-        inertia = tuple(tuple(_folded("edge", row, numbers) for row in block) for block in edge.inertia)
-        inertia = inertia if any(e != 0 for block in inertia for row in block for e in row) else ()
-        used = _occurring(edge.parameters, (*pushes, *(e for block in inertia for row in block for e in row)))
-        edge = Edge(edge.here, edge.there, edge.weight, pushes, used, inertia)
-    if edge is None or not equations.links or not (any(edge.rhs) or edge.inertia):
-        return replace(made, edge=None, links=())
-    return replace(made, edge=edge)
-
-
-def _folded(what: str, rhs: Iterable[sp.Expr], numbers: Mapping[sp.Symbol, sp.Rational]) -> tuple[sp.Expr, ...]:
-    made = tuple(e.xreplace(dict(numbers)) for e in rhs)
-    for e in made:
-        if e.has(sp.nan, sp.zoo, sp.oo, -sp.oo):
-            found = ", ".join(f"{symbol} = {number}" for symbol, number in numbers.items())
-            raise ValueError(f"fold: a right-hand side of the {what} is undefined at {found}; leave it a parameter")
-    return made
-
-
-def _occurring(parameters: tuple[sp.Symbol, ...], rhs: tuple[sp.Expr, ...]) -> tuple[sp.Symbol, ...]:
-    used = set().union(*(e.free_symbols for e in rhs))
-    return tuple(p for p in parameters if p in used)
 
 
 def quotient(equations: Equations, colours: Sequence[Hashable]) -> tuple[Equations, tuple[int, ...]]:
@@ -107,10 +110,10 @@ def collapse(equations: Equations, classes: Sequence[int]) -> Equations:
         return equations
     if equations.mixed or equations.inertial:
         raise NoQuotient("quotient: nodes of several kinds or links with inertia are stepped one by one")
-    if equations.edge is not None and equations.links:
-        _check_coupling(equations.edge)
+    for edge in equations.edges:
+        _check_coupling(edge)
     links = class_links(equations.n, equations.links, classes)
-    return replace(equations, edge=equations.edge if links else None, n=count, links=links)
+    return replace(equations, kind_of=(0,) * count, edge_of=equations.edge_of if links else (), links=links)
 
 
 @lru_cache(maxsize=64)

@@ -11,7 +11,7 @@ Source: Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Sy
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -71,19 +71,17 @@ def _releases(orbit: Equations) -> tuple[tuple[Release, Release], ...]:
 
     Raises ValueError for links that act on velocities.
     """
-    contact = orbit.node.contact
-    if contact is None or not contact.jumps:
+    alone = orbit.node.contact
+    if alone is None or not alone.jumps:
         return ()
-    _check_release(orbit.edge if orbit.links else None)
-    made = []
+    _check_release(orbit.edges)
+    releases = []
     for i in range(orbit.n):
-        found = orbit.contact_at(i)
-        if found is None:
-            raise ValueError(f"node {i + 1} has no contact")
-        sides = ((found.up, found.pushed, contact.up), (found.down, found.pulled, contact.down))
-        up, down = (_release(orbit, i, found.speed, *side) for side in sides)
-        made.append((up, down))
-    return tuple(made)
+        contact = orbit.contact_at(i) or alone
+        sides = ((contact.up, contact.pushed, alone.up), (contact.down, contact.pulled, alone.down))
+        up, down = (_release(orbit, i, contact.speed, *side) for side in sides)
+        releases.append((up, down))
+    return tuple(releases)
 
 
 def _release(orbit: Equations, i: int, speed: sp.Expr, event: sp.Expr, jump: sp.Expr, alone: sp.Expr) -> Release:
@@ -95,14 +93,12 @@ def _release(orbit: Equations, i: int, speed: sp.Expr, event: sp.Expr, jump: sp.
     return Release(gradient, own, jump / moved)
 
 
-def _check_release(edge: Edge | None) -> None:
+def _check_release(edges: Iterable[Edge]) -> None:
     """Raise ValueError for links that act on velocities.
 
     Bodies that let go at the same instant then hasten each other, and what becomes of a deviation depends on which is first.
     """
-    if edge is None:
-        return
-    if any(edge.rhs[1].has(ends[1]) for ends in (edge.here, edge.there)):
+    if any(edge.rhs[1].has(ends[1]) for edge in edges for ends in (edge.here, edge.there)):
         raise ValueError(
             "tangent dynamics: slip begins with a jump of acceleration and links act on velocities, so the order of "
             "simultaneous releases matters; expected springs, or f(0+) = mu_s"
@@ -118,11 +114,11 @@ def of_mode(
     equations: Equations, orbit: Equations, slope: sp.Matrix, strength: tuple[sp.Symbol, sp.Symbol], plane: bool
 ) -> Events | None:
     """Events of a mode: link forces vanish on the synchronous orbit and deviate like those of one oscillator."""
-    if orbit.node.contact is None:
+    if not orbit.sticks:
         return None
     found = _releases(orbit)
     if found:
-        _check_release(equations.edge)
+        _check_release(edge for _, edge in equations.edge_of)
     alpha, beta = strength
     turned = _force_slope(slope).xreplace(orbit.at_node(0))
 
@@ -137,7 +133,7 @@ def of_mode(
 def of_network(equations: Equations) -> Events | None:
     """Events of all contacts of a network: row n + i is the velocity of oscillator i."""
     n = equations.n
-    if equations.node.contact is None:
+    if not equations.sticks:
         return None
 
     def entries(i: int, side: Release) -> tuple[Entry, ...]:
@@ -156,7 +152,7 @@ def of_blocks(
         return None
     sides = _releases(orbit)
     if sides:
-        _check_release(equations.edge)
+        _check_release(edge for _, edge in equations.edge_of)
     owners, exits = list(own.owners), [[list(up), list(down)] for up, down in own.exits]
     for block in blocks:
         first, size = len(owners), len(block.nodes)

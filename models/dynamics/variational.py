@@ -1,7 +1,7 @@
 """Tangent dynamics: what a small deviation does, along the orbit it deviates from.
 
-`mode`, `whole` and `clustered` part the orbit from the linear equation of the deviations, so that one orbit carries any
-number of them; `tangent` and `transversal` return equations like any others, orbit and deviation in one state.
+`mode`, `network_variation` and `clustered` part the orbit from the linear equation of the deviations, so that one orbit carries any
+number of them.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import sympy as sp
 from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Edge, Node
 from .equations import Equations
-from .mode_inertia import effective_slope, inertia_of_modes
+from .mode_inertia import effective_slope
 from .reduction import collapse
 from .saltation import Entry, Events, of_blocks, of_mode, of_network
 
@@ -23,12 +23,18 @@ if TYPE_CHECKING:
     from ..graphs.clusters import Block, Clusters
 
 __all__ = [
-    "ALPHA", "LOG_VOLUME", "MODE", "PHASE", "STRENGTH", "Variation", "clustered", "deviation_names", "mode", "phased",
-    "tangent", "transversal", "whole", "with_volume",
-]  # fmt: skip
-
-ALPHA = sp.Symbol("alpha", real=True)
-"""Coupling strength of a mode with its sign turned, alpha = -sigma gamma >= 0 for undirected networks."""
+    "LOG_VOLUME",
+    "MODE",
+    "PHASE",
+    "STRENGTH",
+    "Variation",
+    "clustered",
+    "coupling_slope",
+    "mode",
+    "network_variation",
+    "phase_shifted",
+    "with_volume",
+]
 
 MODE = (sp.Symbol("mode_alpha", real=True), sp.Symbol("mode_beta", real=True))
 """Real and imaginary part of the strength of a mode, alpha + i beta = -sigma gamma."""
@@ -64,7 +70,7 @@ class Variation:
         taken = names & {s.name for s in self.parameters}
         if taken:
             raise ValueError(f"the symbol {min(taken)!r} is needed for the strength of a mode; rename it in the model")
-        if (self.events is None) != (self.orbit.node.contact is None):
+        if (self.events is not None) != self.orbit.sticks:
             raise ValueError("variation: events belong to set-valued friction, and to nothing else")
         for (row, column), e in self.matrix:
             if not (0 <= row < self.size and 0 <= column < self.size):
@@ -86,9 +92,9 @@ def mode(equations: Equations, plane: bool = False) -> Variation:
     """
     slope = coupling_slope(equations)
     node = equations.node
-    orbit = Equations(node, None, 1)
+    orbit = Equations.of_equal_nodes(node, None, 1)
     here = orbit.at_node(0)
-    size = _deviating(node)
+    size = len(node.continuous)
     own = sp.Matrix(node.jacobian())[:size, :size].xreplace(here)
     push = slope[:size, :size].xreplace(here)
     alpha, beta = MODE
@@ -99,19 +105,13 @@ def mode(equations: Equations, plane: bool = False) -> Variation:
     return Variation(orbit, 2 * size, _entries(both), (alpha, beta), of_mode(equations, orbit, slope, MODE, plane))
 
 
-def _deviating(node: Node) -> int:
-    """The components of a node that deviate: all but the mode of a contact."""
-    return 2 if node.contact is not None else len(node.state)
-
-
-def whole(equations: Equations) -> Variation:
+def network_variation(equations: Equations) -> Variation:
     """Return the variational equation of the whole network, d' = J d, in state order (without the modes of contacts).
 
     Raises ValueError for nodes of several kinds and for links with inertia.
     """
-    if equations.mixed or equations.inertial:
-        equations.expect_alike("variational equation of the whole network")
-    size = equations.n * _deviating(equations.node)
+    equations.expect_alike("variational equation of the whole network", varied_too=True)
+    size = equations.n * len(equations.node.continuous)
     matrix = tuple((key, e) for key, e in equations.jacobian().items() if max(key) < size)
     return Variation(equations, size, matrix, (), of_network(equations))
 
@@ -126,11 +126,10 @@ def clustered(equations: Equations, found: Clusters) -> Variation:
     Raises ValueError as `transversal` does, for a link whose derivative depends on the state, and for a partition that is
     not balanced.
     """
-    if equations.inertial:
-        equations.expect_alike("cluster states")
+    equations.expect_alike("cluster states")
     slope = _constant_slope(equations)
     orbit = collapse(equations, found.classes)
-    components = _deviating(orbit.node)
+    components = len(orbit.node.continuous)
     first = orbit.n * components
     entries = {key: e for key, e in orbit.jacobian().items() if max(key) < first}
     for block in found.blocks:
@@ -144,7 +143,7 @@ def clustered(equations: Equations, found: Clusters) -> Variation:
 
 def _of_block(block: Block, orbit: Equations, slope: sp.Matrix) -> Iterator[tuple[tuple[int, int], sp.Expr]]:
     """Yield ((row, column), entry) of one block, component by component; keys repeat."""
-    size, own, components = len(block.nodes), orbit.node.jacobian(), _deviating(orbit.node)
+    size, own, components = len(block.nodes), orbit.node.jacobian(), len(orbit.node.continuous)
     for r, line in enumerate(own[:components]):
         for c, entry in enumerate(line[:components]):
             for k, cluster in enumerate(block.nodes):
@@ -161,7 +160,7 @@ def _constant_slope(equations: Equations) -> sp.Matrix:
     edge = equations.edge
     if edge is None:
         raise ValueError("these equations have no coupling; differences within clusters need links")
-    size = len(edge.here) if equations.node.contact is None else 2
+    size = len(equations.node.continuous)
     slips = dict.fromkeys(edge.here[size:], sp.S.One)
     here, there = (
         sp.Matrix(block)[:size, :size].xreplace(slips) for block in (edge.jacobian_here(), edge.jacobian_there())
@@ -174,17 +173,20 @@ def _constant_slope(equations: Equations) -> sp.Matrix:
     return slope
 
 
-def phased(variation: Variation) -> Variation:
+def phase_shifted(variation: Variation) -> Variation:
     """Return the same equations with a clock that is set to 0 at the time `PHASE`, a new parameter."""
-    later = {TIME: TIME + PHASE}
-    orbit = variation.orbit
-    rates = tuple(e.xreplace(later) for e in orbit.node.rhs)
-    contact = None if orbit.node.contact is None else orbit.node.contact.map(lambda e: e.xreplace(later))
-    node = Node(orbit.node.state, rates, (*orbit.node.parameters, PHASE), contact)
-    matrix = tuple((key, e.xreplace(later)) for key, e in variation.matrix)
-    events = None if variation.events is None else variation.events.map(lambda e: e.xreplace(later))
-    moved = replace(orbit, node=node)
-    return Variation(moved, variation.size, matrix, variation.parameters, events)
+
+    def later(e: sp.Expr) -> sp.Expr:
+        return e.xreplace({TIME: TIME + PHASE})
+
+    def shifted(node: Node) -> Node:
+        known = replace(node, parameters=(*node.parameters, PHASE))
+        return known.map(later)
+
+    orbit = variation.orbit.map_templates(shifted, lambda edge: edge)
+    matrix = tuple((key, later(e)) for key, e in variation.matrix)
+    events = None if variation.events is None else variation.events.map(later)
+    return replace(variation, orbit=orbit, matrix=matrix, events=events)
 
 
 def with_volume(equations: Equations) -> Equations:
@@ -193,20 +195,23 @@ def with_volume(equations: Equations) -> Equations:
     The sum over the oscillators is the logarithm of a volume of states carried along (Liouville's formula).
     Raises ValueError for set-valued friction, under which volumes vanish in stick.
     """
-    if equations.node.contact is not None:
+    if equations.sticks:
         raise ValueError("volumes of states: found set-valued friction, whose stick makes them zero")
-    if equations.mixed or equations.inertial:
-        equations.expect_alike("volumes of states")
-    node = equations.node
+    equations.expect_alike("volumes of states", varied_too=True)
+    return equations.map_templates(_node_with_volume, _edge_with_volume)
+
+
+def _node_with_volume(node: Node) -> Node:
+    """The node with its share of the divergence as the rate of one more state."""
     rate = sp.Add(*(derivative(e, s) for e, s in zip(node.rhs, node.state, strict=True)))
-    single = Node((*node.state, LOG_VOLUME), (*node.rhs, rate), node.parameters)
-    edge = equations.edge
-    if edge is not None:
-        share = sp.Add(*(derivative(e, s) for e, s in zip(edge.rhs, edge.here, strict=True)))
-        ends = (sp.Symbol(f"{LOG_VOLUME}_here", real=True), sp.Symbol(f"{LOG_VOLUME}_there", real=True))
-        here, there = (*edge.here, ends[0]), (*edge.there, ends[1])
-        edge = Edge(here, there, edge.weight, (*edge.rhs, share), edge.parameters)
-    return replace(equations, node=single, edge=edge)
+    return Node((*node.state, LOG_VOLUME), (*node.rhs, rate), node.parameters)
+
+
+def _edge_with_volume(edge: Edge) -> Edge:
+    """The edge between such nodes."""
+    share = sp.Add(*(derivative(e, s) for e, s in zip(edge.rhs, edge.here, strict=True)))
+    here, there = (sp.Symbol(f"{LOG_VOLUME}_{end}", real=True) for end in ("here", "there"))
+    return Edge((*edge.here, here), (*edge.there, there), edge.weight, (*edge.rhs, share), edge.parameters)
 
 
 def _entries(matrix: sp.Matrix) -> tuple[Entry, ...]:
@@ -214,39 +219,12 @@ def _entries(matrix: sp.Matrix) -> tuple[Entry, ...]:
     return tuple(((r, c), matrix[r, c]) for r in range(rows) for c in range(columns) if matrix[r, c] != 0)
 
 
-def deviation_names(node: Node) -> tuple[sp.Symbol, ...]:
-    """The symbols of the deviation: d_x, d_v for the state x, v."""
-    return tuple(sp.Symbol(f"d_{s.name}", real=True) for s in node.state)
-
-
-def tangent(node: Node) -> Equations:
-    """Return one uncoupled oscillator together with its linearisation: state x, v, d_x, d_v."""
-    return Equations(_extend(node, sp.zeros(len(node.state)), ()), None, 1)
-
-
-def transversal(equations: Equations) -> Equations:
-    """Return the synchronous orbit together with one transversal mode of the network, its strength `alpha` a parameter.
-
-    With links that vanish between equal states, a deviation along an eigenvector of G with eigenvalue gamma obeys
-    d' = (J + sigma gamma H) d, J the Jacobian of one oscillator and sigma H the derivative of a link with respect to the
-    state at its source (Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998)); alpha = -sigma gamma.  Links with inertia:
-    `synchain.models.dynamics.mode_inertia`.
-
-    Raises ValueError where there is no coupling, where a link does not vanish between equal states (the synchronous state
-    is no solution), or where links are not proportional to sigma.
-    """
-    slope = coupling_slope(equations)
-    strength = ALPHA / (1 + inertia_of_modes(equations)[1] * ALPHA)
-    return Equations(_extend(equations.node, -strength * slope, (ALPHA,)), None, 1)
-
-
 def coupling_slope(equations: Equations) -> sp.Matrix:
     """Return H: the derivative of a link of weight 1 with respect to the state at its source, over sigma, at equal states.
 
     Of links with inertia it is H + B J.  Raises ValueError as `transversal` does.
     """
-    if equations.mixed or equations.varied:
-        equations.expect_alike("transversal modes of complete synchronisation")
+    equations.expect_alike("transversal modes of complete synchronisation", inertia_too=True)
     edge = equations.edge
     if edge is None:
         raise ValueError("these equations have no coupling; a transversal mode needs links")
@@ -266,16 +244,3 @@ def coupling_slope(equations: Equations) -> sp.Matrix:
             f"between equal states links depend on {', '.join(sorted(more))} as well; expected sigma alone"
         )
     return effective_slope(equations, slope)
-
-
-def _extend(node: Node, coupling: sp.Matrix, parameters: tuple[sp.Symbol, ...]) -> Node:
-    """The node with its deviation d' = (J + coupling) d appended to the state."""
-    names = deviation_names(node)
-    taken = {s.name for s in (*node.state, *node.parameters)} & {s.name for s in (*names, *parameters)}
-    if taken:
-        raise ValueError(f"the symbol {sorted(taken)[0]!r} is needed for the deviation; rename it in the model")
-    rows = []
-    for i, rhs in enumerate(node.rhs):
-        slopes = (derivative(rhs, s) + coupling[i, j] for j, s in enumerate(node.state))
-        rows.append(sp.Add(*(slope * d for slope, d in zip(slopes, names, strict=True))))
-    return Node((*node.state, *names), (*node.rhs, *rows), (*node.parameters, *parameters), law=node.law)

@@ -223,7 +223,7 @@ def entries(what: str, given: Any) -> tuple[sp.Expr, ...]:
 
 def formulas() -> tuple[str, ...]:
     """The families that have a closed form with symbols."""
-    return tuple(name for name in names() if hasattr(family(name), "formula"))
+    return tuple(name for name in names() if family(name).formula is not None)
 
 
 def closed_form(name: str, **options: Any) -> ClosedForm:
@@ -231,15 +231,15 @@ def closed_form(name: str, **options: Any) -> ClosedForm:
 
     Raises ValueError where the family has none, or not with these options.
     """
-    module = family(name)
-    if not hasattr(module, "formula"):
+    formula = family(name).formula
+    if formula is None:
         raise ValueError(f"topology {name}: no closed form with symbols; known for {', '.join(formulas())}")
-    known = tuple(inspect.signature(module.formula).parameters)
+    known = tuple(inspect.signature(formula).parameters)
     unknown = sorted(set(options) - set(known))
     if unknown:
         raise ValueError(f"topology {name}: option {unknown[0]!r} with symbols; known: {', '.join(known) or 'none'}")
     try:
-        found: ClosedForm = module.formula(**options)
+        found = formula(**options)
     except ValueError as error:
         raise ValueError(f"topology {name}: {error}") from None
     more = ", ".join(f"{key}={_shown(value)}" for key, value in found.options.items() if key in options)

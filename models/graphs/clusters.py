@@ -11,18 +11,18 @@ isolated desynchronisation; Golubitsky & Stewart, Bull. Amer. Math. Soc. 43, 305
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence, Set
+from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import dataclass
 from fractions import Fraction
 
-from flint import fmpq, fmpq_mat, fmpq_poly
+from flint import fmpq_mat, fmpq_poly
 
+from ..algebra.rationals import to_flint
 from ..inputs.checks import typed
-from ..spectra.proof import ProofError
-from .families import a_graph
-from .partitions import class_links
+from ..spectra.eigenvalue import ProofError
+from .partitions import class_links, join
 from .symmetry import automorphisms
-from .topology import Topology
+from .topology import Topology, a_graph
 
 __all__ = ["Block", "Clusters", "clusters", "orbital_partitions"]
 
@@ -77,11 +77,11 @@ def orbital_partitions(graph: Topology, limit: int = 20_000) -> tuple[Clusters, 
             f"{graph.name}({graph.n}): expected at most {NODE_LIMIT} nodes to look for symmetries; describe single "
             "partitions with `clusters`"
         )
-    cycles = {_joined(graph.n, enumerate(g)) for g in automorphisms(graph, limit)}
+    cycles = {join(graph.n, enumerate(g)) for g in automorphisms(graph, limit)}
     closed = {tuple(range(graph.n))}
     for partition in sorted(cycles, key=_fine_first):
         if partition not in closed:  # else a join of finer ones
-            closed |= {_joined(graph.n, [*_stars(partition), *_stars(other)]) for other in closed}
+            closed |= {join(graph.n, [*_stars(partition), *_stars(other)]) for other in closed}
         if len(closed) > PARTITION_LIMIT:
             raise ValueError(
                 f"{graph.name}({graph.n}) has more than {PARTITION_LIMIT} orbital partitions; describe single ones with "
@@ -129,7 +129,7 @@ def _blocks(graph: Topology, classes: tuple[int, ...]) -> tuple[Block, ...]:
     matrix = [[rows[i][column] - rows[j][column] for column, _ in pairs] for i, j in pairs]
     on = [classes[i] for i, _ in pairs]
     met = [(on[a], on[b]) for a, row in enumerate(matrix) for b, entry in enumerate(row) if entry]
-    group = _joined(max(classes) + 1, met)
+    group = join(max(classes) + 1, met)
     found = []
     for part in sorted({group[k] for k in on}):
         chosen = [a for a, k in enumerate(on) if group[k] == part]
@@ -144,23 +144,6 @@ def _blocks(graph: Topology, classes: tuple[int, ...]) -> tuple[Block, ...]:
     return tuple(found)
 
 
-def _joined(n: int, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
-    """The finest partition of 0 … n - 1 in which the two of every pair are together, numbered by first members."""
-    parent = list(range(n))
-
-    def root(i: int) -> int:
-        while parent[i] != i:
-            parent[i] = parent[parent[i]]
-            i = parent[i]
-        return i
-
-    for i, j in pairs:
-        a, b = root(i), root(j)
-        parent[max(a, b)] = min(a, b)
-    order: dict[int, int] = {}
-    return tuple(order.setdefault(root(i), len(order)) for i in range(n))
-
-
 def _stars(classes: tuple[int, ...]) -> list[tuple[int, int]]:
     """Each node with the first of its class."""
     first: dict[int, int] = {}
@@ -172,4 +155,4 @@ def _fine_first(classes: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
 
 
 def _polynomial(rows: Rows) -> fmpq_poly:
-    return fmpq_mat([[fmpq(x.numerator, x.denominator) for x in row] for row in rows]).charpoly()
+    return fmpq_mat([[to_flint(x) for x in row] for row in rows]).charpoly()

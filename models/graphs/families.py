@@ -1,177 +1,304 @@
-"""Keywords of graph families: which there are, and the one form in which a value is stored.
-
-A stored value is a whole number, a text or a tuple of whole numbers, so that it can stand in a scene file.
-"""
+"""Families of graphs: a plug-in file as a value, and the graphs that it makes."""
 
 from __future__ import annotations
 
 import inspect
 import operator
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import wraps
 from itertools import islice
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ..inputs import plugins
-from ..inputs.checks import instance, typed
 from ..inputs.options import Options, as_options
-from ..inputs.plugins import located
-from .links import LINK_LIMIT, _few
+from .links import LINK_LIMIT
 from .topology import Topology
 
 if TYPE_CHECKING:
     import sympy as sp
 
+    from .closed_forms import ClosedForm
     from .links import Link
 
-__all__ = ["FamilyRule", "a_graph", "defaults", "family", "names", "settled", "topology"]
+__all__ = ["Family", "FamilyRule", "family", "names", "topology"]
+
+Edges: TypeAlias = "Callable[..., Iterable[tuple[int, int, int | str | Fraction]]]"
+Eigenvalues: TypeAlias = "Sequence[tuple[sp.Expr, int]] | None"
 
 
-def settled(name: str, module: ModuleType, n: int, given: Mapping[str, Any]) -> Options:
-    """The options of a graph of a family: those given, the others as its file has them, checked by its `settle`.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Family:
+    """A family of graphs: a function of the number of nodes and of the options of the family.
 
-    Raises ValueError on an option that the family lacks and on whatever `settle` refuses.
+    Families are equal if their names are; that of a file outside the package stands for one text
+    of that file.  A family pickles as its name.
+
+    Parameters
+    ----------
+    name : str
+        The name of the plug-in.
+    summary : str
+        One line for lists.
+    minimum : int
+        Smallest number of nodes.
+    edges : callable
+        ``edges(n, **options)`` yields (i, j, weight) once for each edge, i < j; of a directed
+        family (target, source, weight) once for each link.
+    source : str, optional
+        Where the graph comes from.
+    too_small : str, optional
+        What to do if n is below the minimum.
+    directed : bool, optional
+        True if links are one-way.
+    connected : bool, optional
+        False if a graph may fall into parts.
+    options : mapping, optional
+        The options with their defaults; None if an option is not stored unless it is set.
+    settle : callable, optional
+        ``settle(n, **options)`` checks the options and returns them as they are stored.
+    count, expected : callable, optional
+        ``count(n, **options)`` is the number of edges; ``expected(n, **options)`` is their mean
+        number if chance decides.
+    spectrum : callable, optional
+        ``spectrum(n, **options)`` is a sequence of (eigenvalue of G, multiplicity) without
+        repetition, or None for an n without a closed form.
+    formula : callable, optional
+        The closed form with symbols for the sizes.
+    sides : callable, optional
+        ``sides(n)`` is the number of nodes in each direction of a grid.
+    link_limit : int, optional
+        Greatest number of links of a graph.
     """
-    known = defaults(module)
-    for key in given:
-        if key not in known:
-            words = f"known: {', '.join(known)}" if known else "this family has none: remove it"
-            raise ValueError(f"topology {name}: unknown option {key!r}; {words}")
-    if not known:
-        return ()
-    try:
-        found = module.settle(n, **{**known, **given})
-    except (ValueError, TypeError) as error:
-        raise type(error)(f"topology {name}: {error}") from None
-    except Exception as error:
-        raise located(error, module.settle) from error
-    if not isinstance(found, Mapping):
-        raise ValueError(f"topology {name}: settle returns {found!r}; expected a dict of the options; correct its file")
-    return as_options({key: value for key, value in found.items() if value is not None})
 
+    name: str
+    summary: str
+    minimum: int
+    edges: Edges
+    source: str = ""
+    too_small: str = "choose a larger n"
+    directed: bool = False
+    connected: bool = True
+    options: Mapping[str, Any] = field(default_factory=dict)
+    settle: Callable[..., Any] | None = None
+    count: Callable[..., int] | None = None
+    expected: Callable[..., int] | None = None
+    spectrum: Callable[..., Eigenvalues] | None = None
+    formula: Callable[..., ClosedForm] | None = None
+    sides: Callable[[int], tuple[int, ...]] | None = None
+    link_limit: int = LINK_LIMIT
 
-def defaults(module: ModuleType) -> dict[str, Any]:
-    """The options of a family with their defaults: the keyword-only parameters of its `edges`."""
-    found = inspect.signature(module.edges).parameters.values()
-    return {p.name: p.default for p in found if p.kind is inspect.Parameter.KEYWORD_ONLY}
+    def __call__(self, n: int, **options: Any) -> Topology:
+        """Return the graph of `n` nodes; see `topology`."""
+        size = self._size(n)
+        settled = self._settled(size, options)
+        if self.expected is not None:
+            self.limit_links(size, self.links_of_edge * self.expected(size, **dict(settled)))
+        return Topology(self.name, size, None, settled, FamilyRule(self, size, settled))
 
+    def __eq__(self, other: object) -> bool:
+        return self.name == other.name if isinstance(other, Family) else NotImplemented
 
-def a_graph(what: str, value: object) -> Topology:
-    """Return the value where it is a Topology, else raise TypeError."""
-    if all(hasattr(value, need) for need in ("nodes", "edges", "is_directed")):
-        raise TypeError(f"{what}: found {typed(value)}; expected a graph such as chain(4); make it with from_graph")
-    return instance(what, value, Topology, "a graph, e.g. chain(4)")
+    def __hash__(self) -> int:
+        return hash(self.name)
 
+    def __repr__(self) -> str:
+        return f"Family({self.name!r})"
 
-def names() -> tuple[str, ...]:
-    """All topologies that `topology` knows: the files of the folder `topologies`, and entry points of other packages."""
-    return plugins.names("topology")
+    def __reduce__(self) -> tuple[Callable[[str], Family], tuple[str]]:
+        return family, (self.name,)
 
+    @property
+    def links_of_edge(self) -> int:
+        """The number of links of one edge."""
+        return 1 if self.directed else 2
 
-def family(name: str) -> ModuleType:
-    """The plug-in module of a topology, by name or by a path that `plugins.allow_code` allowed; else ValueError.
+    def limit_links(self, n: int, links: int) -> None:
+        """Raise ValueError if a graph of `n` nodes has too many links."""
+        if links > self.link_limit:
+            raise ValueError(
+                f"topology {self.name}: n = {n} has too many links, {links} or more; "
+                f"expected at most {self.link_limit}: reduce n"
+            )
 
-    A plug-in has SUMMARY, MINIMUM, SOURCE and `edges(n)`, which yields (i, j, weight) once for each edge,
-    i < j; with DIRECTED = True it yields (target, source, weight) once for each link.  It may have
-    `spectrum(n)`, a sequence of (eigenvalue of G as a SymPy expression, multiplicity) without repetition (or None for
-    an n without a closed form), `count(n)`, the number of edges, or `expected(n)`, their mean number if chance decides,
-    TOO_SMALL, what to do below MINIMUM, and CONNECTED = False where it may fall into parts.  Keyword-only parameters of
-    `edges` with defaults are options of the family: `spectrum`, `count` and `expected` take the same ones, and
-    `settle(n, **options)` checks them and returns them as they are stored (see `family_options`; None is not stored).
-    """
-    if not isinstance(name, str):
-        raise TypeError(f"topology name {name!r} is no text; expected one of {', '.join(names())}")
-    return plugins.load("topology", name)
+    def _size(self, n: Any) -> int:
+        """Return the number of nodes; TypeError if it is no integer, ValueError if it is too small."""
+        if isinstance(n, bool) or not hasattr(n, "__index__"):
+            raise TypeError(f"topology {self.name}: n = {n!r} is a {type(n).__name__}; expected an integer")
+        size = operator.index(n)
+        if size < self.minimum:
+            raise ValueError(f"topology {self.name}: n = {size}; expected at least {self.minimum}: {self.too_small}")
+        return size
 
-
-def topology(name: str, n: int, **options: Any) -> Topology:
-    """The named graph of `n` nodes, all weights as its family gives them, with the family's own options.
-
-    Raises ValueError on an unknown name or option and on n below the family's minimum, and TypeError where n is no
-    integer.  More than LINK_LIMIT links raise ValueError before any is built: at once where the family does not count
-    them, else where they are first asked for.
-    """
-    module = family(name := plugins.named("topology", name))
-    size = _size(name, n, module)
-    chosen = settled(name, module, size, options)
-    if hasattr(module, "expected"):
-        _few(name, size, _each(module) * module.expected(size, **dict(chosen)))
-    return Topology(name, size, None, chosen, FamilyRule(name, size, chosen))
+    def _settled(self, n: int, options: Mapping[str, Any]) -> Options:
+        """Return all options as they are stored, checked by the family's `settle`."""
+        for key in options:
+            if key not in self.options:
+                words = f"known: {', '.join(self.options)}" if self.options else "this family has none: remove it"
+                raise ValueError(f"topology {self.name}: unknown option {key!r}; {words}")
+        if self.settle is None:
+            return ()
+        try:
+            settled = self.settle(n, **{**self.options, **options})
+        except (ValueError, TypeError) as error:
+            raise type(error)(f"topology {self.name}: {error}") from None
+        except Exception as error:
+            raise plugins.located(error, self.settle) from error
+        if not isinstance(settled, Mapping):
+            raise ValueError(
+                f"topology {self.name}: settle returns {settled!r}; expected a dict of the options; correct its file"
+            )
+        return as_options({key: value for key, value in settled.items() if value is not None})
 
 
 @dataclass(frozen=True, slots=True)
 class FamilyRule:
-    """The rule of a graph that a family made: the name of the family, the number of nodes and the options."""
+    """The rule of a graph that a family made: the family, the number of nodes and the options."""
 
-    name: str
+    family: Family
     n: int
     options: Options
 
     @property
     def link_count(self) -> int | None:
         """The number of links; None if the family does not count its edges."""
-        module = family(self.name)
-        if not hasattr(module, "count"):
-            return None
-        with plugins.blamed(module.count):
-            return _each(module) * int(module.count(self.n, **dict(self.options)))
+        count = self.family.count
+        return None if count is None else self.family.links_of_edge * int(count(self.n, **dict(self.options)))
 
     @property
     def undirected(self) -> bool:
         """True if the family joins nodes both ways."""
-        return not getattr(family(self.name), "DIRECTED", False)
+        return not self.family.directed
 
     def links(self) -> tuple[Link, ...]:
-        """Build the sorted links; ValueError if they are more than LINK_LIMIT."""
-        _few(self.name, self.n, self.link_count or 0)
-        return _links(self.name, family(self.name), self.n, dict(self.options))
+        """Build the sorted links; ValueError if they are too many."""
+        family, one = self.family, Fraction(1)
+        family.limit_links(self.n, self.link_count or 0)
+        edges = islice(family.edges(self.n, **dict(self.options)), family.link_limit // family.links_of_edge + 1)
+        links = [(i, j, one if weight == 1 else Fraction(weight)) for i, j, weight in edges]
+        family.limit_links(self.n, family.links_of_edge * len(links))
+        if not family.directed:
+            links += [(j, i, weight) for i, j, weight in links]
+        links.sort(key=operator.itemgetter(0, 1))
+        return tuple(links)
 
-    def eigenvalues(self) -> Sequence[tuple[sp.Expr, int]] | None:
+    def eigenvalues(self) -> Eigenvalues:
         """List the eigenvalues of G with multiplicities; None if the family has no closed form.
 
         Raises ValueError if a file outside the package gives no such list.
         """
-        module = family(self.name)
-        if not hasattr(module, "spectrum"):
-            return None
-        with plugins.blamed(module.spectrum):
-            pairs: Sequence[tuple[sp.Expr, int]] | None = module.spectrum(self.n, **dict(self.options))
-        if isinstance(self.name, plugins.OwnFile) and pairs is not None:
-            for pair in pairs if isinstance(pairs, list | tuple) else (pairs,):
-                if not (isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[1], int) and pair[1] > 0):
-                    raise ValueError(
-                        f"{self.name.place}: spectrum({self.n}) has {pair!r}; "
-                        "expected a list of (eigenvalue, multiplicity) or None"
-                    )
+        spectrum = self.family.spectrum
+        return None if spectrum is None else spectrum(self.n, **dict(self.options))
+
+
+def topology(name: str, n: int, **options: Any) -> Topology:
+    """Return the graph of a family by its name.
+
+    Parameters
+    ----------
+    name : str
+        Name of a family (see `names`), or path of a file that `allow_code` has allowed.
+    n : int
+        Number of nodes.
+    **options
+        Options of the family; weights are those of the family.
+
+    Returns
+    -------
+    Topology
+        The graph.  Its links are built when they are first asked for.
+
+    Raises
+    ------
+    TypeError
+        If n is no integer.
+    ValueError
+        On an unknown name or option, on n below the family's minimum, and on more than LINK_LIMIT
+        links before any is built: at once if chance decides on their number, else when they are
+        first asked for.
+    """
+    return family(name)(n, **options)
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of all families: shipped files and entry points of installed packages, sorted."""
+    return plugins.names("topology")
+
+
+def family(name: str) -> Family:
+    """Return a family of graphs by its name, or by a path that `allow_code` has allowed.
+
+    Raises
+    ------
+    TypeError
+        If the name is no text.
+    ValueError
+        If there is no such family or its file is wrong.
+    """
+    if not isinstance(name, str):
+        raise TypeError(f"topology name {name!r} is no text; expected one of {', '.join(names())}")
+    known = plugins.named("topology", name)
+    return _of_module(known, plugins.load("topology", known))
+
+
+_ATTRIBUTES = {
+    "SUMMARY": "summary",
+    "MINIMUM": "minimum",
+    "SOURCE": "source",
+    "TOO_SMALL": "too_small",
+    "DIRECTED": "directed",
+    "CONNECTED": "connected",
+    "settle": "settle",
+    "formula": "formula",
+    "sides": "sides",
+}
+"""Names of a file that a family takes as they are."""
+
+
+def _of_module(name: str, module: ModuleType) -> Family:
+    """Return the family of a module; errors of functions from outside the package name their file and line."""
+    parts = {attribute: getattr(module, key) for key, attribute in _ATTRIBUTES.items() if hasattr(module, key)}
+    outside = not module.__name__.startswith(f"{plugins.PACKAGE}.")
+    for key in ("count", "expected", "spectrum"):
+        if hasattr(module, key):
+            function = getattr(module, key)
+            parts[key] = plugins.blamed(function)(function) if outside else function
+    if isinstance(name, plugins.OwnFile) and "spectrum" in parts:
+        parts["spectrum"] = _checked(parts["spectrum"], name.place)
+    edges = _blamed_edges(module.edges) if outside else module.edges
+    return Family(name=name, edges=edges, options=defaults(module), **parts)
+
+
+def defaults(module: ModuleType) -> dict[str, Any]:
+    """Return the options of a file with their defaults: the keyword-only parameters of its `edges`."""
+    parameters = inspect.signature(module.edges).parameters.values()
+    return {p.name: p.default for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY}
+
+
+def _blamed_edges(edges: Edges) -> Edges:
+    """Edges whose errors name file and line, wrong weights too."""
+
+    @wraps(edges)
+    def blamed_edges(n: int, **options: Any) -> Iterator[tuple[int, int, Fraction]]:
+        with plugins.blamed(edges):
+            yield from ((i, j, Fraction(weight)) for i, j, weight in edges(n, **options))
+
+    return blamed_edges
+
+
+def _checked(spectrum: Callable[..., Any], place: str) -> Callable[..., Eigenvalues]:
+    """A closed form that raises ValueError if it is no list of (eigenvalue, multiplicity)."""
+
+    @wraps(spectrum)
+    def checked(n: int, **options: Any) -> Eigenvalues:
+        pairs: Eigenvalues = spectrum(n, **options)
+        for pair in () if pairs is None else pairs if isinstance(pairs, list | tuple) else (pairs,):
+            if not (isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[1], int) and pair[1] > 0):
+                raise ValueError(
+                    f"{place}: spectrum({n}) has {pair!r}; expected a list of (eigenvalue, multiplicity) or None"
+                )
         return pairs
 
-
-def _each(module: ModuleType) -> int:
-    """The number of links of one edge."""
-    return 1 if getattr(module, "DIRECTED", False) else 2
-
-
-def _links(name: str, module: ModuleType, n: int, keywords: dict[str, Any]) -> tuple[Link, ...]:
-    """The sorted links of a family's edges; ValueError where they are too many."""
-    directed, one = getattr(module, "DIRECTED", False), Fraction(1)
-    limit = LINK_LIMIT if directed else LINK_LIMIT // 2
-    with plugins.blamed(module.edges):
-        edges = module.edges(n, **keywords)
-        found = [(i, j, one if weight == 1 else Fraction(weight)) for i, j, weight in islice(edges, limit + 1)]
-    _few(name, n, len(found) if directed else 2 * len(found))
-    if not directed:
-        found += [(j, i, weight) for i, j, weight in found]
-    found.sort(key=operator.itemgetter(0, 1))
-    return tuple(found)
-
-
-def _size(name: str, n: Any, module: ModuleType) -> int:
-    if isinstance(n, bool) or not hasattr(n, "__index__"):
-        raise TypeError(f"topology {name}: n = {n!r} is a {type(n).__name__}; expected an integer")
-    size = operator.index(n)
-    if size < module.MINIMUM:
-        advice = getattr(module, "TOO_SMALL", "choose a larger n")
-        raise ValueError(f"topology {name}: n = {size}; expected at least {module.MINIMUM}: {advice}")
-    return size
+    return checked

@@ -13,9 +13,8 @@ from itertools import product
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ..inputs.rationals import rational
-from .families import a_graph
 from .links import LINK_LIMIT
-from .topology import Rule, Topology
+from .topology import Rule, Topology, a_graph
 
 if TYPE_CHECKING:
     import sympy as sp

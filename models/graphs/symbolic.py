@@ -1,7 +1,7 @@
 """Graphs whose weights are rational functions of symbols: characteristic polynomial, factors, and roots where it factors.
 
 What is said holds for symbols as such: for particular numbers eigenvalues may coincide, and `SymbolicTopology.at` gives the
-graph for them, with its own proved spectrum.  Texts are read by a whitelist over `ast`: nothing in them is run.
+graph for them, with its own proved spectrum.
 """
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ from functools import reduce
 from math import comb
 from operator import add, mul
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
 
 from ..inputs.rationals import file_text, parse_rows, rational, square
-from ..spectra.proof import ProofError
+from ..inputs.reader import Algebra, NoMeaning, parse
+from ..spectra.eigenvalue import ProofError
 from .topology import Topology, from_matrix
 
 __all__ = ["SymbolicSpectrum", "SymbolicTopology", "from_symbols", "read_symbols", "weight"]
@@ -222,33 +223,56 @@ def _check_size(found: sp.Expr, where: str) -> None:
 def _read(text: str, where: str) -> sp.Expr:
     if len(text) > LENGTH or not _LETTERS.fullmatch(text):
         raise ValueError(f"{where} is {text[:40]!r}; {_EXPECTED}")
-    try:
-        tree = ast.parse(text, mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ValueError(f"{where} is {text!r}; {_EXPECTED}") from None
-    return _value(tree, text, where, 0)
+    expression = parse(text)
+    if expression is None:
+        raise ValueError(f"{where} is {text!r}; {_EXPECTED}")
+    return expression.evaluate(_Weights(text, where))
 
 
-def _value(node: ast.AST, text: str, where: str, depth: int) -> sp.Expr:
-    if depth > DEPTH:
-        raise ValueError(f"{where} is {text!r}, nested more than {DEPTH} times; write it shorter")
-    match node:
-        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
-            number = rational(value, where)
-            return sp.Rational(number.numerator, number.denominator)
-        case ast.Name(id=name):
-            return sp.Symbol(name)
-        case ast.UnaryOp(op=ast.USub(), operand=inner):
-            return -_value(inner, text, where, depth + 1)
-        case ast.BinOp(left=left, op=ast.Pow(), right=ast.Constant(value=int() as power)) if 0 < power <= EXPONENT:
-            base = _value(left, text, where, depth + 1)
-            if base.is_Rational and power * max(int(base.p).bit_length(), int(base.q).bit_length()) > BITS:
-                raise ValueError(f"{where} is {text!r}, a number of more than {BITS} bits; expected a smaller one")
-            return base**power
-        case ast.BinOp(left=left, op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div() as op, right=right):
-            a, b = (_value(side, text, where, depth + 1) for side in (left, right))
-            return {ast.Add: a + b, ast.Sub: a - b, ast.Mult: a * b}[type(op)] if not isinstance(op, ast.Div) else a / b
-    raise ValueError(f"{where} is {text!r}; {_EXPECTED}")
+@dataclass(frozen=True, slots=True)
+class _Weights(Algebra[sp.Expr]):
+    """Rational functions of symbols, as they are written: nothing is multiplied out."""
+
+    text: str
+    where: str
+    deepest = DEPTH
+
+    def refuse(self, node: ast.expr, reason: str) -> NoReturn:
+        raise ValueError(f"{self.where} is {self.text!r}; {_EXPECTED}")
+
+    def refuse_depth(self) -> NoReturn:
+        raise ValueError(f"{self.where} is {self.text!r}, nested more than {DEPTH} times; write it shorter")
+
+    def number(self, value: int | float) -> sp.Expr:
+        number = rational(value, self.where)
+        return sp.Rational(number.numerator, number.denominator)
+
+    def name(self, name: str) -> sp.Expr:
+        return sp.Symbol(name)
+
+    def negative(self, value: sp.Expr) -> sp.Expr:
+        return -value
+
+    def add(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
+        return a + b
+
+    def multiply(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
+        return a * b
+
+    def divide(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
+        return a / b
+
+    def power(self, base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
+        raise NoMeaning
+
+    def whole_power(self, base: sp.Expr, exponent: int) -> sp.Expr:
+        if not 0 < exponent <= EXPONENT:
+            raise NoMeaning
+        if base.is_Rational and exponent * max(int(base.p).bit_length(), int(base.q).bit_length()) > BITS:
+            raise ValueError(
+                f"{self.where} is {self.text!r}, a number of more than {BITS} bits; expected a smaller one"
+            )
+        return base**exponent
 
 
 def _monic(f: sp.Poly) -> sp.Poly:

@@ -13,9 +13,10 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from ..inputs.checks import instance, printable, shown, typed, whole
 from ..inputs.options import Options
 from ..inputs.rationals import file_text, parse_rows, rational_rows, total
-from .links import check_links
+from .partitions import join
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from ..spectra.spectrum import Spectrum
     from .links import Link
 
-__all__ = ["Rule", "Topology", "from_matrix", "read_matrix"]
+__all__ = ["Rule", "Topology", "a_graph", "from_matrix", "read_matrix"]
 
 
 class Rule(Protocol):
@@ -85,7 +86,8 @@ class Topology:
         rule: Rule | None = None,
     ) -> None:
         if links is not None or rule is None:
-            check_links(name, n, links)
+            _check_size(name, n)
+            _check_links(name, n, links)
         for key, value in (("name", name), ("n", n), ("options", options), ("rule", rule), ("_links", links)):
             object.__setattr__(self, key, value)
 
@@ -104,7 +106,7 @@ class Topology:
         """The links (target, source, weight), sorted; those of a rule are built when they are first asked for."""
         if self._links is None and self.rule is not None:
             links = self.rule.links()
-            check_links(self.name, self.n, links)
+            _check_links(self.name, self.n, links)
             object.__setattr__(self, "_links", links)
         return self._links or ()
 
@@ -132,21 +134,7 @@ class Topology:
     @property
     def components(self) -> int:
         """Number of weakly connected parts; where it is not 1 complete synchronisation is impossible."""
-        parent = list(range(self.n))
-
-        def root(i: int) -> int:
-            while parent[i] != i:
-                parent[i] = parent[parent[i]]
-                i = parent[i]
-            return i
-
-        count = self.n
-        for target, source, _ in self.links:
-            a, b = root(target), root(source)
-            if a != b:
-                parent[max(a, b)] = min(a, b)
-                count -= 1
-        return count
+        return 1 + max(join(self.n, ((target, source) for target, source, _ in self.links)))
 
     @property
     def leading_groups(self) -> int:
@@ -243,3 +231,52 @@ def read_matrix(path: str | Path) -> Topology:
     """
     text, name = file_text(path, "matrix file", "a text file of rows")
     return from_matrix(parse_rows(text, name), name)
+
+
+def a_graph(what: str, value: object) -> Topology:
+    """Return the value if it is a Topology, else raise TypeError."""
+    if all(hasattr(value, need) for need in ("nodes", "edges", "is_directed")):
+        raise TypeError(f"{what}: found {typed(value)}; expected a graph such as chain(4); make it with from_graph")
+    return instance(what, value, Topology, "a graph, e.g. chain(4)")
+
+
+def _check_size(name: object, n: object) -> None:
+    """Raise TypeError or ValueError if a name or a number of nodes is wrong."""
+    what = f"topology {printable('topology name', instance('topology name', name, str, 'text'))}"
+    size = whole(f"{what}: n", n, -(10**18))
+    if size < 1:
+        raise ValueError(f"{what}: n = {size}; expected at least one node")
+
+
+def _check_links(name: str, n: int, links: object) -> None:
+    """Raise TypeError or ValueError if links (target, source, weight) of n nodes are not sorted and sound."""
+    if not isinstance(links, tuple):
+        raise TypeError(f"topology {name}: links: found {typed(links)}; expected a tuple of (target, source, weight)")
+    before = (-1, -1)
+    for link in links:
+        if not isinstance(link, tuple) or len(link) != 3:
+            raise TypeError(f"topology {name}: found the link {shown(link)}; expected (target, source, weight)")
+        target, source, weight = link
+        sound = type(target) is int and type(source) is int and type(weight) is Fraction and weight
+        if not (sound and 0 <= target < n and 0 <= source < n and target != source and before < (target, source)):
+            _refuse(f"topology {name}", n, before, link)
+        before = (target, source)
+
+
+def _refuse(what: str, n: int, before: tuple[int, int], link: tuple[Any, Any, Any]) -> None:
+    """Raise TypeError or ValueError that says what is wrong with a link."""
+    target, source, weight = link
+    if not isinstance(target, int) or not isinstance(source, int):
+        raise TypeError(f"{what}: found the link {shown(link)}; expected (target, source, weight)")
+    if not (0 <= target < n and 0 <= source < n) or target == source:
+        raise ValueError(f"{what}: link {target} <- {source}; expected two different nodes of 0 … {n - 1}")
+    if (target, source) <= before:
+        raise ValueError(
+            f"{what}: link {target} <- {source} is repeated or out of order; "
+            "expected each pair once, sorted: add the weights up and sort"
+        )
+    if not isinstance(weight, Fraction) or not weight:
+        raise ValueError(
+            f"{what}: link {target} <- {source} has weight {weight!r}; "
+            "expected a Fraction other than 0: leave the link out or give it a weight"
+        )

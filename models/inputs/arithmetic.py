@@ -1,4 +1,4 @@
-"""Numbers written as text in a scene file, read by a whitelist over `ast`: a scene file cannot run code.
+"""Numbers written as text in a scene file: constant expressions in floating point.
 
 Accepted: decimal numbers, ``pi``, ``+ - * / **``, parentheses and ``sqrt exp log sin cos`` of one argument.
 """
@@ -8,9 +8,11 @@ from __future__ import annotations
 import ast
 import math
 import operator
-import re
-import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NoReturn
+
+from .reader import Algebra, NoMeaning, parse, stray_character
 
 __all__ = ["constant"]
 
@@ -22,80 +24,99 @@ FUNCTIONS: dict[str, Callable[[float], float]] = {
     "sin": math.sin,
     "sqrt": math.sqrt,
 }
-OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-}
 GRAMMAR = "numbers, pi, + - * / **, parentheses and " + " ".join(FUNCTIONS)
-_ALLOWED = re.compile(r"[0-9A-Za-z_.+\-*/() \t]*")
 
 
 def constant(text: str) -> float:
-    """Return the value of a constant expression such as ``"2*pi/1.15"``, in floating point.
+    """Return the value of a constant expression in floating point.
 
-    Raises ValueError on anything but a finite constant built from GRAMMAR, on more than LENGTH characters or
-    DEPTH nested operations, an exponent beyond EXPONENT or an intermediate value beyond MAGNITUDE.
+    Parameters
+    ----------
+    text : str
+        The expression, such as ``"2*pi/1.15"``.
+
+    Returns
+    -------
+    float
+        A finite number.
+
+    Raises
+    ------
+    ValueError
+        On anything but a finite constant of GRAMMAR, on more than LENGTH characters or DEPTH nested operations,
+        and on an exponent beyond EXPONENT or an intermediate value beyond MAGNITUDE.
     """
     if len(text) > LENGTH:
         raise ValueError(f"number written as {len(text)} characters; expected at most {LENGTH}; give its value")
-    stray = text[_match_length(text) :]
+    stray = stray_character(text)
     if stray:
-        power = "; write ** for a power" if stray[0] == "^" else ""
-        raise ValueError(f"character {stray[0]!r} in the number {text!r}; expected {GRAMMAR}{power}")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            tree = ast.parse(text.strip(), mode="eval")
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ValueError(f"unreadable number {text!r}; expected {GRAMMAR}, e.g. '2*pi/1.15'") from None
-    return _value(tree.body, text, 0)
+        power = "; write ** for a power" if stray == "^" else ""
+        raise ValueError(f"character {stray!r} in the number {text!r}; expected {GRAMMAR}{power}")
+    expression = parse(text)
+    if expression is None:
+        raise ValueError(f"unreadable number {text!r}; expected {GRAMMAR}, e.g. '2*pi/1.15'")
+    return expression.evaluate(_Floats(text))
 
 
-def _match_length(text: str) -> int:
-    found = _ALLOWED.match(text)
-    return found.end() if found else 0
+@dataclass(frozen=True, slots=True)
+class _Floats(Algebra[float]):
+    """Floating-point numbers up to MAGNITUDE, checked after every operation."""
 
+    text: str
+    deepest = DEPTH
 
-def _value(node: ast.AST, text: str, depth: int) -> float:
-    if depth > DEPTH:
-        raise ValueError(f"number {text!r} nests more than {DEPTH} operations; write it shorter")
-    try:
-        value = _evaluate(node, text, depth + 1)
-    except (OverflowError, ZeroDivisionError) as error:
-        raise ValueError(f"number {text!r}: {error}; expected a finite value") from None
-    if isinstance(value, complex) or not abs(value) <= MAGNITUDE:
-        found = "a complex value" if isinstance(value, complex) else f"an intermediate value of {value:g}"
-        raise ValueError(f"number {text!r} has {found}; expected real values up to {MAGNITUDE:g}")
-    return value
+    def refuse(self, node: ast.expr, reason: str) -> NoReturn:
+        raise ValueError(f"{ast.unparse(node)!r} in the number {self.text!r} is not a constant; expected {GRAMMAR}")
 
+    def refuse_depth(self) -> NoReturn:
+        raise ValueError(f"number {self.text!r} nests more than {DEPTH} operations; write it shorter")
 
-def _evaluate(node: ast.AST, text: str, depth: int) -> float:
-    match node:
-        case ast.Constant(value=bool()):
-            pass
-        case ast.Constant(value=int() | float() as value):
-            return float(value)
-        case ast.Name(id="pi"):
-            return math.pi
-        case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign, operand=operand):
-            inner = _value(operand, text, depth)
-            return -inner if isinstance(sign, ast.USub) else inner
-        case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
-            a, b = _value(left, text, depth), _value(right, text, depth)
-            if isinstance(op, ast.Pow) and abs(b) > EXPONENT:
-                raise ValueError(f"exponent {b:g} in the number {text!r}; expected at most {EXPONENT:g}")
-            return OPERATORS[type(op)](a, b)
-        case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
-            return _call(name, _value(argument, text, depth), text)
-    found = ast.unparse(node)
-    raise ValueError(f"{found!r} in the number {text!r} is not a constant; expected {GRAMMAR}")
+    def number(self, value: int | float) -> float:
+        return self._checked(float, value)
 
+    def name(self, name: str) -> float:
+        if name != "pi":
+            raise NoMeaning
+        return math.pi
 
-def _call(name: str, argument: float, text: str) -> float:
-    try:
-        return FUNCTIONS[name](argument)
-    except ValueError:
-        raise ValueError(f"{name}({argument:g}) in the number {text!r} is not real; give another number") from None
+    def positive(self, value: float) -> float:
+        return value
+
+    def negative(self, value: float) -> float:
+        return -value
+
+    def add(self, a: float, b: float) -> float:
+        return self._checked(operator.add, a, b)
+
+    def multiply(self, a: float, b: float) -> float:
+        return self._checked(operator.mul, a, b)
+
+    def divide(self, a: float, b: float) -> float:
+        return self._checked(operator.truediv, a, b)
+
+    def power(self, base: float, exponent: float) -> float:
+        if abs(exponent) > EXPONENT:
+            raise ValueError(f"exponent {exponent:g} in the number {self.text!r}; expected at most {EXPONENT:g}")
+        return self._checked(operator.pow, base, exponent)
+
+    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[float]]:
+        if function not in FUNCTIONS or count != 1 or options:
+            raise NoMeaning
+        return (self,)
+
+    def call(self, function: str, arguments: Sequence[float], options: Mapping[str, str]) -> float:
+        (argument,) = arguments
+        if (function == "sqrt" and argument < 0) or (function == "log" and argument <= 0):
+            raise ValueError(f"{function}({argument:g}) in the number {self.text!r} is not real; give another number")
+        return self._checked(FUNCTIONS[function], argument)
+
+    def _checked(self, operation: Callable[..., float | complex], *operands: float) -> float:
+        """The result of an operation, if it is real and not too large."""
+        try:
+            value = operation(*operands)
+        except (OverflowError, ZeroDivisionError) as error:
+            raise ValueError(f"number {self.text!r}: {error}; expected a finite value") from None
+        if isinstance(value, complex) or not abs(value) <= MAGNITUDE:
+            found = "a complex value" if isinstance(value, complex) else f"an intermediate value of {value:g}"
+            raise ValueError(f"number {self.text!r} has {found}; expected real values up to {MAGNITUDE:g}")
+        return value

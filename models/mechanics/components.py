@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 import sympy as sp
 
@@ -45,8 +46,40 @@ class Node:
 
     @property
     def forced(self) -> bool:
-        """True where time occurs explicitly."""
+        """True if time occurs explicitly."""
         return any(e.has(TIME) for e in self.rhs)
+
+    @property
+    def continuous(self) -> tuple[sp.Symbol, ...]:
+        """The states that change continuously: those before the mode of a contact, or all."""
+        return self.state if self.contact is None else self.state[:2]
+
+    @property
+    def expressions(self) -> tuple[sp.Expr, ...]:
+        """The right-hand side and the conditions of the contact."""
+        return self.rhs if self.contact is None else (*self.rhs, *self.contact.expressions)
+
+    def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Node:
+        """Return the node with every symbol and expression changed.
+
+        Parameters
+        ----------
+        change : callable
+            Maps an expression, or the symbol of a state or parameter, to another one.
+
+        Returns
+        -------
+        Node
+            The changed node.  A parameter that becomes a number is no parameter any more.  The `law`, which serves
+            printing alone, is left out.
+        """
+        state, rhs, parameters = (tuple(map(change, part)) for part in (self.state, self.rhs, self.parameters))
+        contact = None if self.contact is None else self.contact.map(change)
+        return Node(state, rhs, tuple(p for p in parameters if p.is_Symbol), contact)
+
+    def without_unused_parameters(self) -> Node:
+        """The same without the parameters that do not occur."""
+        return replace(self, parameters=_occurring(self.parameters, self.expressions))
 
     def jacobian(self) -> tuple[tuple[sp.Expr, ...], ...]:
         """d(rhs)/d(state), one-sided at kinks (see `synchain.models.mechanics.calculus`)."""
@@ -90,10 +123,58 @@ class Edge:
         return tuple(tuple(derivative(e, s) for s in self.there) for e in self.rhs)
 
     @property
+    def expressions(self) -> tuple[sp.Expr, ...]:
+        """The right-hand side and the entries of the inertia."""
+        return (*self.rhs, *(e for block in self.inertia for row in block for e in row))
+
+    @property
+    def acts(self) -> bool:
+        """True if the link does anything: if a force or an inertia is not zero."""
+        return any(e != 0 for e in self.expressions)
+
+    @property
+    def constant_inertia(self) -> bool:
+        """True if the inertia depends on parameters alone."""
+        states = {*self.here, *self.there}
+        return not any(e.free_symbols & states for block in self.inertia for row in block for e in row)
+
+    def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Edge:
+        """Return the edge with every symbol and expression changed.
+
+        Parameters
+        ----------
+        change : callable
+            Maps an expression, or the symbol of a state, the weight or a parameter, to another one.
+
+        Returns
+        -------
+        Edge
+            The changed edge.  A parameter that becomes a number is no parameter any more, and an inertia that becomes
+            zero is left out.
+        """
+        here, there, rhs, parameters = (
+            tuple(map(change, part)) for part in (self.here, self.there, self.rhs, self.parameters)
+        )
+        inertia = tuple(tuple(tuple(map(change, row)) for row in block) for block in self.inertia)
+        if not any(e != 0 for block in inertia for row in block for e in row):
+            inertia = ()
+        return Edge(here, there, change(self.weight), rhs, tuple(p for p in parameters if p.is_Symbol), inertia)
+
+    def without_unused_parameters(self) -> Edge:
+        """The same without the parameters that do not occur."""
+        return replace(self, parameters=_occurring(self.parameters, self.expressions))
+
+    @property
     def diffusive(self) -> bool:
         """True where the link vanishes between equal states, so that synchronous motion solves the network."""
         equal = dict(zip(self.there, self.here, strict=True))
         return all(sp.simplify(e.xreplace(equal)) == 0 for e in self.rhs)
+
+
+def _occurring(parameters: tuple[sp.Symbol, ...], expressions: tuple[sp.Expr, ...]) -> tuple[sp.Symbol, ...]:
+    """Those of the parameters that occur in some expressions."""
+    used = {s for e in expressions for s in e.free_symbols}
+    return tuple(p for p in parameters if p in used)
 
 
 def _differ(what: str, symbols: tuple[sp.Symbol, ...]) -> None:

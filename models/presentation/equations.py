@@ -7,7 +7,7 @@ Marszal et al., Eur. Phys. J. Special Topics (2016), eqs. 3-6: chi for the displ
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import sympy as sp
 
@@ -86,9 +86,10 @@ def _with_law(e: sp.Expr, law: sp.Expr, state: tuple[sp.Symbol, ...]) -> sp.Expr
 
 def _lines(equations: Equations, style: Style) -> Iterator[str]:
     """Equation by equation, then the laws, then what the indices of a large network mean."""
-    sticks, equations = equations.node.contact is not None, _in_slip(equations)
+    sticks, equations = equations.sticks, _in_slip(equations)
     named = tuple(_name_law(node) for node in equations.nodes)
-    if equations.n > LARGEST and not equations.mixed:
+    generic = equations.n > LARGEST and not equations.mixed
+    if generic:
         yield from _generic(equations, named[0], style)
     else:
         for i in range(equations.n):
@@ -98,10 +99,10 @@ def _lines(equations: Equations, style: Style) -> Iterator[str]:
             yield _law(equations, one.law, style, kind)
     if sticks:
         yield style.words("at zero sliding velocity f is what holds the body, up to the static coefficient")
-    if equations.n > LARGEST and not equations.mixed:
+    if generic:
         count, weights = len(equations.links), style.letter("G", "ij")
         meaning = f", {weights}" + style.words(f" the weights of the {count} links") if count else ""
-        if equations.edge is not None and count and is_oriented(equations.edge):
+        if any(map(is_oriented, equations.edges)):
             meaning += style.words(", -1 where a link runs from j to i")
         yield ("i, j" if count else "i") + f" = 1, {style.dots}, {equations.n}{meaning}"
 
@@ -111,7 +112,7 @@ def _law(equations: Equations, law: sp.Expr, style: Style, kind: int) -> str:
     own = {s: style.letter(s.name, "i") for s in _varied(equations) if law.has(s)}
     writer = Writer(style, own, frozenset((SLIDING,)))
     text = f"{writer.write(FRICTION(SLIDING))} = {writer.write(law)}"
-    nodes = [str(i + 1) for i, k in enumerate(equations.kinds) if k == kind]
+    nodes = [str(i + 1) for i, k in enumerate(equations.kind_of) if k == kind]
     about = [f"of node{'s' * (len(nodes) > 1)} {', '.join(nodes)}"] if equations.mixed else []
     about += ["of node i"] if own and not equations.mixed else []
     return text + "".join(style.words(f", {words}") for words in about)
@@ -124,25 +125,28 @@ def _varied(equations: Equations) -> list[sp.Symbol]:
 
 def _in_slip(equations: Equations) -> Equations:
     """Equations with set-valued friction as they are in slip, without the modes."""
-    node, edge = equations.node, equations.edge
-    if node.contact is None or equations.mixed:
+    if not equations.sticks:
         return equations
-    plain = Node(node.state[:2], (node.rhs[0], node.contact.shown), node.parameters, law=node.law)
-    if edge is not None:
-        one = {edge.here[2]: sp.S.One}
-        edge = Edge(
-            edge.here[:2], edge.there[:2], edge.weight, tuple(e.xreplace(one) for e in edge.rhs[:2]), edge.parameters
-        )
-    return replace(equations, node=plain, edge=edge)
+    return equations.map_templates(_node_in_slip, _edge_in_slip)
+
+
+def _node_in_slip(node: Node) -> Node:
+    rate = node.rhs[1] if node.contact is None else node.contact.shown
+    return Node(node.state[:2], (node.rhs[0], rate), node.parameters, law=node.law)
+
+
+def _edge_in_slip(edge: Edge) -> Edge:
+    rates = tuple(e.xreplace({edge.here[2]: sp.S.One}) for e in edge.rhs[:2])
+    return Edge(edge.here[:2], edge.there[:2], edge.weight, rates, edge.parameters)
 
 
 def _at_node(equations: Equations, named: tuple[_Named, ...], style: Style, i: int) -> Iterator[str]:
     """The equations of node i with all its links."""
-    here, node, own = equations.at_node(i), equations.node_at(i), named[equations.kind(i)]
+    here, node, own = equations.at_node(i), equations.node_at(i), named[equations.kind_of[i]]
     letters: dict[sp.Symbol, str] = {}
     for j in range(equations.n):
         index = str(j + 1) if equations.n > 1 else ""
-        letters |= _letters(equations, named[equations.kind(j)], style, equations.symbols(j), index, j)
+        letters |= _letters(equations, named[equations.kind_of[j]], style, equations.symbols(j), index, j)
     writer = Writer(style, letters, frozenset((*letters, TIME)))
     links = [link for link in equations.links if link[0] == i]
     for c in _shown(equations, i):
@@ -226,8 +230,8 @@ def _summed(term: sp.Expr, inside: tuple[sp.Symbol, ...], writer: Writer) -> str
 
 def _pairs(equations: Equations, i: int = 0) -> dict[int, int]:
     """Component -> component that is its velocity, of node i: its rate is that state alone, links add nothing."""
-    node, kind = equations.node_at(i), equations.kind(i)
-    edges = [edge for pair, edge in equations.joints if pair[0] == kind] if equations.mixed else equations.edges
+    node, kind = equations.node_at(i), equations.kind_of[i]
+    edges = [edge for (target, _), edge in equations.edge_of if target == kind] if equations.links else []
     found: dict[int, int] = {}
     for c, rate in enumerate(node.rhs):
         free = all(edge.rhs[c] == 0 for edge in edges)

@@ -23,8 +23,20 @@ NAMES = {"atan": "arctan", "asin": "arcsin", "acos": "arccos", "sign": "sgn"}
 """Functions that LaTeX calls otherwise than SymPy."""
 
 LATEX_FUNCTIONS = {
-    "arccos", "arcsin", "arctan", "cos", "cosh", "exp", "log", "max", "min", "sin", "sinh", "tan", "tanh",
-}  # fmt: skip
+    "arccos",
+    "arcsin",
+    "arctan",
+    "cos",
+    "cosh",
+    "exp",
+    "log",
+    "max",
+    "min",
+    "sin",
+    "sinh",
+    "tan",
+    "tanh",
+}
 
 
 class Style(Protocol):

@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from ..graphs.families import defaults, family, names, topology
+from ..graphs.families import family, names, topology
 from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import integer, known_keys, shown, table, text
 from ..inputs.plugins import part
@@ -63,7 +63,7 @@ def _placed_group(group: object, folder: Path | None) -> object:
 def _topology(given: Mapping[object, Any], folder: Path | None) -> Topology:
     name = _placed(given.get("name"), folder)
     known = isinstance(name, str) and "matrix" not in given and (name in names() or name.endswith(".py"))
-    options = defaults(family(str(name))) if known else {}
+    options = family(str(name)).options if known else {}
     known_keys("topology", given, ("name", "n", *options, "matrix", "file"))
     if "file" in given:
         if len(given) > 1:

@@ -62,13 +62,12 @@ class Energy:
     def of_link(self, link: Link) -> int:
         """Return which edge a link is of, its number in equations.edges."""
         eq = self.equations
-        pair = (eq.kind(link[0]), eq.kind(link[1]))
-        return [kinds for kinds, _ in eq.joints].index(pair) if eq.mixed else 0
+        return [ends for ends, _ in eq.edge_of].index(eq.ends(link))
 
     def whole(self) -> tuple[sp.Expr, sp.Expr]:
         """Return energy and power of the whole network in its state symbols (algebra grows with n: meant for small n)."""
         eq = self.equations
-        placed = [(self.nodes[eq.kind(i)], eq.at_node(i)) for i in range(eq.n)]
+        placed = [(self.nodes[eq.kind_of[i]], eq.at_node(i)) for i in range(eq.n)]
         shares: list[tuple[Share, dict]] = [
             *placed,
             *((self.links[self.of_link(p)], eq.at_link(p)) for p in self.pairs),
@@ -88,7 +87,7 @@ def energy(scene: Scene) -> Energy:
         if hasattr(load("oscillator", oscillator), "field"):
             raise ValueError(f"energy: oscillator {oscillator!r} is a vector field; expected one with a Lagrangian")
     equations = scene.equations
-    if equations.node.contact is not None:
+    if equations.sticks:
         raise ValueError("energy: set-valued friction does work that is no function of the state; use contact 'atan'")
     nodes = tuple(_of_node(oscillator, friction, scene.contact) for oscillator, friction in templates)
     return Energy(equations, nodes, _of_links(scene, [oscillator for oscillator, _ in templates]))
@@ -114,9 +113,8 @@ def _of_links(scene: Scene, oscillators: Sequence[str]) -> tuple[Share, ...]:
         raise ValueError(f"energy: the coupling {scene.coupling!r} has none; expected a spring or damper by its name")
     if not scene.topology.symmetric:
         raise ValueError(f"energy: {scene.topology.name}({scene.n}) has one-way links; expected links both ways")
-    kinds = [pair for pair, _ in equations.joints] if equations.mixed else [(0, 0)]
     found = []
-    for (a, b), edge in zip(kinds, equations.edges, strict=True):
+    for (a, b), edge in equations.edge_of:
         nodes = (equations.nodes[a], equations.nodes[b])
         found.append(_of_link(edge, *link_energies(scene.coupling, edge, nodes, (oscillators[a], oscillators[b]))))
     return tuple(found)

@@ -7,10 +7,12 @@ import re
 import tomllib
 from importlib import resources
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..inputs.checks import shown, suggestion
-from .dictionary import from_dict
-from .scene import Scene
+
+if TYPE_CHECKING:
+    from .scene import Scene
 
 __all__ = ["load_scene", "scene_names"]
 
@@ -83,6 +85,8 @@ def _read(path: Path) -> bytes:
 
 
 def _scene(name: str, content: bytes, folder: Path | None) -> Scene:
+    from .dictionary import from_dict  # the names of the scenes are wanted without the weight of `Scene`
+
     try:
         words = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -6,29 +6,65 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal, localcontext
-from fractions import Fraction
 from functools import cmp_to_key
+from itertools import pairwise
 from typing import TypeAlias
 
 import sympy as sp
 from flint import acb, fmpq
 
-from ..algebra.balls import Ball, accurate, decimals, enclose, nearest, precision
-from ..algebra.roots import ComplexRoot, RealRoot
-from .proof import ProofError, distinct
+from ..algebra.balls import Ball, accurate, decimals, disjoint, enclose, nearest, precision
+from ..algebra.rationals import to_fraction
+from ..algebra.roots import ComplexRoot, RealRoot, Root
 
-__all__ = ["Blocks", "Eigenvalue", "decimal", "entry", "ordered", "rounded", "times", "words"]
+__all__ = [
+    "Blocks",
+    "Eigenvalue",
+    "ProofError",
+    "decimal",
+    "distinct",
+    "entry",
+    "ordered",
+    "rounded",
+    "times",
+    "words",
+]
+
+Number: TypeAlias = sp.Expr | Root
+
+Blocks: TypeAlias = tuple[tuple[int, int], ...]
+"""(size, number of Jordan blocks of that size), the largest size first."""
+
+
+class ProofError(RuntimeError):
+    """A claimed spectrum is wrong: a mistake in the program or in a topology file, not the user's."""
 
 
 @dataclass(frozen=True, slots=True)
 class Eigenvalue:
     """An exact number with its algebraic multiplicity.
 
-    `number` is a SymPy expression or an algebraic number that is not written as radicals; `blocks` are its Jordan
-    blocks, (size, count), the largest first, None where nobody looked; `value` is the nearest float, or complex.
+    Parameters
+    ----------
+    number : SymPy expression, RealRoot or ComplexRoot
+        The exact number; a root if it is not written as radicals.
+    multiplicity : int
+        Algebraic multiplicity, at least 1.
+    blocks : tuple of (int, int), optional
+        Sizes of Jordan blocks with their numbers, the largest size first; None if they are not known.
+
+    Attributes
+    ----------
+    value : float or complex
+        The nearest float.
+
+    Raises
+    ------
+    ValueError
+        If the multiplicity is no integer >= 1, or the blocks do not add up to it.
     """
 
-    number: sp.Expr | RealRoot | ComplexRoot
+    number: Number
     multiplicity: int
     blocks: Blocks | None = field(default=None, compare=False)
     value: float | complex = field(init=False, compare=False)
@@ -45,48 +81,70 @@ class Eigenvalue:
 
     @property
     def exact(self) -> sp.Expr:
-        """The number as a SymPy expression (CRootOf where no shorter form is known)."""
-        return self.number.expression if isinstance(self.number, (RealRoot, ComplexRoot)) else self.number
+        """The number as a SymPy expression (CRootOf if no shorter form is known)."""
+        return self.number.expression if isinstance(self.number, Root) else self.number
 
     @property
     def text(self) -> str:
         """The exact number as text that SymPy reads back."""
-        return self.number.text if isinstance(self.number, (RealRoot, ComplexRoot)) else sp.sstr(self.number)
+        return self.number.text if isinstance(self.number, Root) else sp.sstr(self.number)
 
     @property
     def geometric(self) -> int | None:
-        """How many independent eigenvectors there are: one for each Jordan block; None where nobody looked."""
+        """Number of independent eigenvectors, one for each Jordan block; None if the blocks are not known."""
         return None if self.blocks is None else sum(times for _, times in self.blocks)
 
     @property
     def defective(self) -> bool:
-        """True where eigenvectors are known to be missing: a Jordan block is larger than 1."""
+        """True if eigenvectors are known to be missing: a Jordan block is larger than 1."""
         return self.blocks is not None and self.blocks[0][0] > 1
 
     def enclosure(self, bits: int) -> Ball:
-        """A certified ball (flint.arb or flint.acb) of radius below 2**-bits times the modulus."""
+        """Return a certified ball (flint.arb or flint.acb) of radius below 2**-bits times the modulus."""
         return accurate(self._ball, bits)
 
     def evaluate(self, digits: int) -> sp.Expr:
-        """The value as a SymPy Float, within one unit of the last of `digits` significant digits."""
+        """Return the value as a SymPy Float, within one unit of the last of `digits` significant digits."""
         if isinstance(digits, bool) or not isinstance(digits, int) or digits < 1:
             raise ValueError(f"digits = {digits!r}; expected a positive integer")
         return decimals(self._ball, digits)
 
     def _ball(self, bits: int) -> Ball:
-        if isinstance(self.number, (RealRoot, ComplexRoot)):
+        if isinstance(self.number, Root):
             return self.number.enclosure(bits)
         return enclose(self.number, bits)
 
     def __str__(self) -> str:
         text = self.text
-        if len(text) <= 60 or not isinstance(self.number, (RealRoot, ComplexRoot)):
+        if len(text) <= 60 or not isinstance(self.number, Root):
             return text
         return f"{decimal(self.value)} (degree {len(self.number.polynomial) - 1})"
 
 
+def distinct(claims: Sequence[Eigenvalue]) -> bool:
+    """Return True once brackets or balls around all eigenvalues are disjoint, False if two agree to 4000 bits."""
+    numbers = [claim.number for claim in claims]
+    brackets = sorted((number.low, number.high) for number in numbers if isinstance(number, RealRoot))
+    if len(brackets) == len(numbers) and all(first[1] <= second[0] for first, second in pairwise(brackets)):
+        return True  # no end is a root
+    for bits in (64, 256, 1024, 4096):
+        balls = [claim.enclosure(bits) for claim in claims]
+        with precision(bits):
+            if disjoint(balls):
+                return True
+    return False
+
+
 def ordered(claims: Sequence[Eigenvalue]) -> tuple[Eigenvalue, ...]:
-    """From 0 downwards by real part, conjugates side by side; what floats cannot tell apart, certified balls do."""
+    """Sort eigenvalues from 0 downwards by real part, conjugates side by side.
+
+    Certified balls decide if floats cannot.
+
+    Raises
+    ------
+    ProofError
+        If two real eigenvalues agree to 4000 bits.
+    """
     if any(isinstance(e.value, complex) for e in claims):
         return tuple(sorted(claims, key=cmp_to_key(_complex_order)))
     if len({e.value for e in claims}) == len(claims):
@@ -105,10 +163,11 @@ def _complex_order(a: Eigenvalue, b: Eigenvalue) -> int:
     if room < abs(gap) < math.inf:
         return 1 if gap > 0 else -1
     if a.value != b.value.conjugate() or not _conjugate(a, b):
-        for part in (lambda ball: -ball.real, lambda ball: abs(ball.imag)):
+        for imaginary in (False, True):
             for bits in (72, 256, 1024):
                 with precision(2 * bits):
-                    first, second = (part(acb(e.enclosure(bits))) for e in (a, b))
+                    balls = [acb(e.enclosure(bits)) for e in (a, b)]
+                    first, second = (abs(ball.imag) if imaginary else -ball.real for ball in balls)
                     if not first.overlaps(second):
                         return -1 if first < second else 1
     return -1 if a.value.imag < b.value.imag else 1
@@ -120,19 +179,21 @@ def _conjugate(a: Eigenvalue, b: Eigenvalue) -> bool:
         return bool(acb(a.enclosure(256)).conjugate().overlaps(acb(b.enclosure(256))))
 
 
-def _midpoint(e: Eigenvalue) -> fmpq:
-    mantissa, exponent = e.enclosure(4200).mid().man_exp()
+def _midpoint(e: Eigenvalue, bits: int = 4200) -> fmpq:
+    """The exact middle of a ball around a real eigenvalue."""
+    mantissa, exponent = e.enclosure(bits).mid().man_exp()
     return fmpq(mantissa) * fmpq(2) ** int(exponent)
 
 
 def decimal(value: float | complex) -> str:
+    """Return a float, or a complex number, as text."""
     if isinstance(value, complex):
         return f"{value.real:.15g} {'-' if value.imag < 0 else '+'} {abs(value.imag):.15g}i"
     return f"{value:.16g}"
 
 
 def entry(e: Eigenvalue) -> str:
-    """An eigenvalue in the words of a claims file; decimals where no short exact form is known."""
+    """Return an eigenvalue in the words of a claims file; decimals if no short exact form is known."""
     text = e.text
     if isinstance(e.number, RealRoot):
         text = f"~{rounded(e)}"
@@ -142,17 +203,16 @@ def entry(e: Eigenvalue) -> str:
 
 
 def rounded(e: Eigenvalue, digits: int = 12) -> str:
-    """A real eigenvalue rounded to so many digits, each of them right."""
-    mantissa, exponent = e.enclosure(256).mid().man_exp()
-    value = Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+    """Return a real eigenvalue rounded to so many digits, each of them right."""
+    value = to_fraction(_midpoint(e, 256))
     with localcontext() as context:
         context.prec = digits
         return str(Decimal(value.numerator) / Decimal(value.denominator))
 
 
 def words(e: Eigenvalue) -> str:
-    """An eigenvalue as a sentence names it."""
-    if isinstance(e.number, (RealRoot, ComplexRoot)):
+    """Return an eigenvalue as a sentence names it."""
+    if isinstance(e.number, Root):
         value = rounded(e) if isinstance(e.number, RealRoot) else e.evaluate(12)
         return f"{value} (a root of degree {len(e.number.polynomial) - 1})"
     if e.number.is_Rational:
@@ -161,9 +221,5 @@ def words(e: Eigenvalue) -> str:
 
 
 def times(count: int) -> str:
-    """A multiplicity as a sentence names it."""
+    """Return a multiplicity as a sentence names it."""
     return "once" if count == 1 else f"{count} times"
-
-
-Blocks: TypeAlias = tuple[tuple[int, int], ...]
-"""(size, how many blocks of it), the largest first."""

@@ -1,8 +1,9 @@
 """Jordan blocks of a connectivity matrix by exact ranks, with nothing rounded.
 
-Of an eigenvalue with minimal polynomial p the nullity of p(G)**k, over the degree of p, is the sum of min(size, k) over its
-blocks (F. R. Gantmacher, The Theory of Matrices 1, Chelsea, New York, 1959, chapter VI).  A mode in a block of size s grows
-or dies as t**(s - 1) exp(λt), λ its exponent (T. Nishikawa, A. E. Motter, Phys. Rev. E 73, 065106, 2006).
+The nullity of p(G)**k, over the degree of p, is the sum of min(size, k) over the blocks of an
+eigenvalue with the minimal polynomial p (F. R. Gantmacher, The Theory of Matrices 1, Chelsea,
+New York, 1959, chapter VI).  A mode in a block of size s grows or decays as t**(s - 1) exp(λt), λ its
+exponent (T. Nishikawa, A. E. Motter, Phys. Rev. E 73, 065106, 2006).
 """
 
 from __future__ import annotations
@@ -20,11 +21,26 @@ __all__ = ["blocks", "geometric_multiplicity", "nullity"]
 
 
 def blocks(graph: Matrix, polynomial: fmpq_poly, multiplicity: int) -> Blocks:
-    """The Jordan blocks of each root of an irreducible factor of G's characteristic polynomial, of that multiplicity."""
+    """Return the Jordan blocks that every root of a factor of the characteristic polynomial has.
+
+    Parameters
+    ----------
+    graph : Matrix
+        The matrix G.
+    polynomial : flint.fmpq_poly
+        An irreducible factor of its characteristic polynomial.
+    multiplicity : int
+        How often the factor divides it.
+
+    Returns
+    -------
+    tuple of (int, int)
+        Sizes and numbers of blocks, the largest size first.
+    """
     if multiplicity == 1 or graph.undirected:
         return ((1, multiplicity),)
     first = power = _value(graph, polynomial)
-    sums, longer = [0], [multiplicity]  # of min(size, k); how many blocks are longer than k
+    sums, longer = [0], [multiplicity]  # of min(size, k); number of blocks longer than k
     while sums[-1] < multiplicity:
         sums.append((graph.n - int(power.rank())) // polynomial.degree())
         longer.append(sums[-1] - sums[-2])
@@ -43,7 +59,7 @@ def blocks(graph: Matrix, polynomial: fmpq_poly, multiplicity: int) -> Blocks:
 
 
 def nullity(graph: Matrix, polynomial: fmpq_poly) -> int:
-    """How many independent vectors p(G) makes zero, p a polynomial with rational coefficients."""
+    """Return the dimension of the null space of p(G), p a polynomial with rational coefficients."""
     return graph.n - int(_value(graph, polynomial).rank())
 
 
@@ -69,9 +85,10 @@ def _value(graph: Matrix, polynomial: fmpq_poly) -> fmpz_mat:
 
 
 def geometric_multiplicity(graph: Matrix, eigenvalue: Eigenvalue) -> int:
-    """How many independent eigenvectors an eigenvalue of a graph has, by an exact rank.
+    """Return the number of independent eigenvectors of an eigenvalue of a graph, by an exact rank.
 
-    All roots of the minimal polynomial p share that number, so it is the nullity of p(G) over the degree of p.
+    All roots of the minimal polynomial p share that number: it is the nullity of p(G) over the degree
+    of p.
     """
     if eigenvalue.multiplicity == 1 or graph.undirected:
         return eigenvalue.multiplicity

@@ -1,9 +1,10 @@
-"""Whether a closed form multiplies out to the characteristic polynomial modulo large primes: the check of large graphs.
+"""The check of large graphs: a closed form against the characteristic polynomial modulo large primes.
 
-Modulo a prime p = 1 mod m there is a root of unity ζ of order m among the whole numbers, so that 2 cos(2πk/m) is ζ^k + ζ^-k
-and a wrong closed form is found without any cyclotomic algebra.  A polynomial over the cyclotomic field that is not zero is
-zero modulo few primes only (L. C. Washington, Introduction to Cyclotomic Fields, Springer, 1997, chapter 2): the norm of one
-of its coefficients, which is bounded by the eigenvalues, has few large divisors.
+Modulo a prime p = 1 mod m there is a root of unity ζ of order m among the whole numbers.  There
+2 cos(2πk/m) is ζ^k + ζ^-k, so that the check needs no cyclotomic algebra.  A polynomial over the
+cyclotomic field that is not zero is zero modulo few primes only (L. C. Washington, Introduction to
+Cyclotomic Fields, Springer, 1997, chapter 2): the norm of one of its coefficients, which is bounded
+by the eigenvalues, has few large divisors.
 """
 
 from __future__ import annotations
@@ -12,19 +13,22 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from hashlib import sha256
 from math import lcm, log, log2
+from operator import mul
 
 import sympy as sp
 from flint import fmpz, nmod_mat, nmod_poly
 
 from ..algebra import cosines
 from ..algebra.cosine_sums import read
-from .characteristic import banded, cyclic
+from .characteristic import pairwise_product, sparse
+from .eigenvalue import ProofError
 from .matrix import Matrix
-from .proof import ProofError
 
 __all__ = ["check_modulo"]
 
 PRIMES = 3
+"""Number of primes."""
+
 BITS = 61
 """Primes lie between 2**BITS and twice that."""
 
@@ -33,10 +37,25 @@ Powers = tuple[Fraction, tuple[tuple[Fraction, Fraction], ...]]
 
 
 def check_modulo(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]]) -> float | None:
-    """Compare modulo PRIMES primes that a hash of the claim picks; None where a number is no sum of roots of unity.
+    """Compare a closed form with the characteristic polynomial modulo primes that a hash of the claim picks.
 
-    Returns about the largest chance that as many random primes would show no difference where there is one.  Raises
-    ProofError where the polynomials differ.
+    Parameters
+    ----------
+    graph : Matrix
+        The matrix.
+    pairs : sequence of (SymPy expression, int)
+        Its eigenvalues and their multiplicities.
+
+    Returns
+    -------
+    float or None
+        About the largest probability that as many random primes miss a difference; None if a number
+        is no sum of roots of unity.
+
+    Raises
+    ------
+    ProofError
+        If the polynomials differ.
     """
     numbers = [(_powers(sp.sympify(number)), times) for number, times in pairs]
     known = [(powers, times) for powers, times in numbers if powers is not None]
@@ -51,7 +70,7 @@ def check_modulo(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]]) -> float |
                 f"spectrum of {graph.name} {graph.n}: the eigenvalues do not multiply out to the characteristic "
                 f"polynomial modulo {p}: correct the closed form"
             )
-    return _chance(graph, known, m) ** PRIMES
+    return _error_probability(graph, known, m) ** PRIMES
 
 
 def _powers(number: sp.Expr) -> Powers | None:
@@ -103,10 +122,7 @@ def _claimed(numbers: Sequence[tuple[Powers, int]], m: int, p: int) -> nmod_poly
     for (shift, terms), times in numbers:
         value = _residue(shift, p) + sum(_residue(b, p) * pow(unit, int(t * m), p) for t, b in terms)
         factors.append(nmod_poly([-value % p, 1], p) ** times)
-    while len(factors) > 1:
-        odd = factors[-1:] if len(factors) % 2 else []
-        factors = [a * b for a, b in zip(factors[::2], factors[1::2], strict=False)] + odd
-    return factors[0]
+    return pairwise_product(factors, mul)
 
 
 def _characteristic(graph: Matrix, p: int) -> nmod_poly:
@@ -120,15 +136,16 @@ def _characteristic(graph: Matrix, p: int) -> nmod_poly:
         entries[target, source] = value
         sums[target] -= value
     entries.update({(i, i): total % p for i, total in enumerate(sums)})
-    if banded(graph.n, entries):
-        return cyclic(graph.n, entries, lambda c: nmod_poly([x % p for x in c], p))
+    polynomial = sparse(graph.n, entries, lambda c: nmod_poly([x % p for x in c], p))
+    if polynomial is not None:
+        return polynomial
     flat = [0] * graph.n**2
     for (i, j), value in entries.items():
         flat[i * graph.n + j] = value
     return nmod_mat(graph.n, graph.n, flat, p).charpoly()
 
 
-def _chance(graph: Matrix, numbers: Sequence[tuple[Powers, int]], m: int) -> float:
+def _error_probability(graph: Matrix, numbers: Sequence[tuple[Powers, int]], m: int) -> float:
     """About the largest share of the primes that can divide the norm of a coefficient of the difference."""
     parts = [x for (a, terms), _ in numbers for x in (a, *(b for _, b in terms))]
     scale = lcm(*{x.denominator for x in (*parts, *(w for _, _, w in graph.links))})

@@ -1,26 +1,42 @@
-"""Exact comparison of coupling strengths at which modes of a network are lost, and modes that lack eigenvectors.
+"""Exact comparison of the coupling strengths at which modes of a network are lost.
 
-A mode with the real eigenvalue gamma reaches the strength alpha at sigma = alpha / |gamma|.  Two such values are told apart
-by certified balls; that they are equal is proved by minimal polynomials, never believed.
+A mode with the real eigenvalue gamma reaches the strength alpha at sigma = alpha / |gamma|.  Certified
+balls tell two such values apart; minimal polynomials prove that two are equal.
 """
 
 from __future__ import annotations
 
 from fractions import Fraction
 
-from flint import arb, arb_poly, fmpq, fmpq_poly
+from flint import arb, arb_poly, fmpq_poly
 
 from ..algebra.balls import Ball, precision
 from ..algebra.minimal_polynomials import minimal_polynomial
+from ..algebra.rationals import to_flint
 from .eigenvalue import Eigenvalue
 
 __all__ = ["compare"]
 
 
 def compare(alpha: Fraction, gamma: Eigenvalue, other_alpha: Fraction, other_gamma: Eigenvalue) -> int:
-    """The sign (-1, 0, 1) of alpha / |gamma| - other_alpha / |other_gamma|, for alpha >= 0 and real gamma < 0.
+    """Compare the coupling strengths sigma = alpha / |gamma| of two modes exactly.
 
-    Raises ValueError for a negative alpha, and for an eigenvalue that is not a negative real number.
+    Parameters
+    ----------
+    alpha, other_alpha : Fraction
+        Strengths of the modes, at least 0.
+    gamma, other_gamma : Eigenvalue
+        Negative real eigenvalues.
+
+    Returns
+    -------
+    int
+        The sign (-1, 0, 1) of alpha / |gamma| - other_alpha / |other_gamma|.
+
+    Raises
+    ------
+    ValueError
+        If a strength is negative, or an eigenvalue is no negative real number.
     """
     for strength, mode in ((alpha, gamma), (other_alpha, other_gamma)):
         if strength < 0 or isinstance(mode.value, complex) or not mode.value < 0:
@@ -33,7 +49,7 @@ def compare(alpha: Fraction, gamma: Eigenvalue, other_alpha: Fraction, other_gam
     while True:
         here, there = gamma.enclosure(bits), other_gamma.enclosure(bits)
         with precision(bits + 16):
-            scaled = there * arb(_exact(alpha / other_alpha))
+            scaled = there * arb(to_flint(alpha / other_alpha))
             if scaled < here or scaled > here:
                 return 1 if scaled < here else -1
         if bits == 256:
@@ -44,18 +60,14 @@ def compare(alpha: Fraction, gamma: Eigenvalue, other_alpha: Fraction, other_gam
 
 
 def _one_polynomial(gamma: Eigenvalue, other: Eigenvalue, factor: Fraction) -> fmpq_poly | None:
-    """The minimal polynomial of gamma where it is also that of factor * other."""
+    """The minimal polynomial of gamma if it is also that of factor * other, else None."""
     p, q = minimal_polynomial(gamma.number), minimal_polynomial(other.number)
-    ratio = _exact(factor)
+    ratio = to_flint(factor)
     return p if p == q(fmpq_poly([0, 1 / ratio])) * ratio ** q.degree() else None
 
 
 def _one_root(polynomial: fmpq_poly, ball: Ball, bits: int) -> bool:
-    """True where the polynomial is proved monotone on the ball, so that it has at most one root there."""
+    """True if the polynomial is proved monotone on the ball, so that it has at most one root there."""
     with precision(2 * bits + 64):
         slope = arb_poly(polynomial.derivative())(ball)
         return bool(slope > 0 or slope < 0)
-
-
-def _exact(x: Fraction) -> fmpq:
-    return fmpq(x.numerator, x.denominator)

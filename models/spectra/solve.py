@@ -1,113 +1,174 @@
 """Exact eigenvalues of a connectivity matrix with multiplicities, proved by its characteristic polynomial.
 
-A closed form is used where the family or operation that made the graph has one; any other rational matrix goes
-through its exact characteristic polynomial and the factors of that over the rationals (python-flint), whose roots are
-written as rationals, short real radicals, cosines of rational angles, or real and complex algebraic numbers.
+The closed form is used if the family or operation that made the graph has one.  The eigenvalues of any
+other rational matrix are the roots of the irreducible factors of its exact characteristic polynomial
+(python-flint), written as rationals, short real radicals, cosines of rational angles, or real and
+complex algebraic numbers.
+
+The proof multiplies the product of (z - eigenvalue) out.  Each claimed number has an exact minimal
+polynomial.  If the claims that share one are as many distinct numbers as its degree, with one
+multiplicity, their factors multiply to that polynomial: no two floats are ever compared.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from enum import StrEnum
 from functools import lru_cache
-from typing import Literal
 
 import sympy as sp
 from flint import fmpq_poly
 
 from ..algebra.cosines import written
-from ..algebra.lazy import Descending
-from ..algebra.minimal_polynomials import minimal_polynomial
-from ..algebra.roots import roots
+from ..algebra.lazy import LazyEigenvalues
+from ..algebra.minimal_polynomials import minimal_polynomial, monic
+from ..algebra.roots import Root, roots
 from ..inputs.plugins import OwnFile
 from .characteristic import characteristic
-from .eigenvalue import Eigenvalue, ordered
+from .eigenvalue import Eigenvalue, Number, ProofError, distinct, ordered
 from .jordan import blocks
 from .matrix import Matrix
 from .modular import check_modulo
-from .proof import ProofError, check
-from .spectrum import Spectrum, table
+from .spectrum import Spectrum
 
-__all__ = ["Eigenvalue", "ProofError", "has_closed_form", "spectrum", "table"]
-
-PROOF_LIMIT = 200
-"""Up to so many nodes a closed form is proved when it is made; above only on request."""
-
-CHECK_LIMIT = 400
-"""Up to so many nodes it is multiplied out modulo primes, which takes about a second at most."""
+__all__ = ["Proof", "has_closed_form", "spectrum"]
 
 DENSE_LIMIT = 1000
 """Largest matrix without a closed form."""
 
 
-@lru_cache(maxsize=32)
-def spectrum(graph: Matrix, prove: bool | Literal["primes"] | None = None) -> Spectrum:
-    """The exact spectrum of a graph's connectivity matrix.
+class Proof(StrEnum):
+    """How a closed form is compared with the characteristic polynomial of its graph."""
 
-    It proves itself; a closed form with more than PROOF_LIMIT nodes does so only where `prove` is True.  Up to CHECK_LIMIT
-    nodes, and where `prove` is "primes", it is multiplied out modulo three large primes instead (1000 nodes: seconds).
-    Raises ValueError on more than DENSE_LIMIT nodes without a closed form and where the closed form of a file outside
-    the package is wrong, ProofError where another proof fails.
+    EXACT = "exact"
+    """Multiplied out over the rationals."""
+    MODULAR = "modular"
+    """Multiplied out modulo three large primes (1000 nodes: seconds)."""
+    NONE = "none"
+
+    @classmethod
+    def of_size(cls, n: int, exact: int = 200, modular: int = 400) -> Proof:
+        """Return the proof of a graph of n nodes: EXACT and MODULAR up to these sizes, which take about a second."""
+        return cls.EXACT if n <= exact else cls.MODULAR if n <= modular else cls.NONE
+
+
+@lru_cache(maxsize=32)
+def spectrum(graph: Matrix, proof: Proof | None = None) -> Spectrum:
+    """Return the exact spectrum of a graph's connectivity matrix.
+
+    Parameters
+    ----------
+    graph : Matrix
+        A `Topology`, or any other rational matrix with zero row sums.
+    proof : Proof, optional
+        How a closed form is proved; ``Proof.of_size(n)`` without.  Eigenvalues without a closed form
+        are always proved over the rationals.
+
+    Returns
+    -------
+    Spectrum
+        The distinct eigenvalues with multiplicities and Jordan blocks.
+
+    Raises
+    ------
+    ValueError
+        On more than DENSE_LIMIT nodes without a closed form, and if the closed form of a file outside
+        the package is wrong.
+    ProofError
+        If another proof fails.
     """
     try:
-        return _found(graph, prove)
+        pairs = graph.closed_form()
+        return _by_factors(graph) if pairs is None else _by_pairs(graph, pairs, proof or Proof.of_size(graph.n))
     except ProofError as error:
         if isinstance(graph.name, OwnFile):
             raise ValueError(f"{graph.name.place}: {error}") from None
         raise
 
 
-def _found(graph: Matrix, prove: bool | Literal["primes"] | None) -> Spectrum:
-    """The spectrum of a graph, by its closed form or by factors."""
-    listed = graph.closed_form()
-    if prove is None:
-        prove = graph.n <= PROOF_LIMIT or ("primes" if graph.n <= CHECK_LIMIT else False)
-    if listed is not None and prove is not True:
-        return _believed(graph, listed, check_modulo(graph, listed) if prove == "primes" else None)
-    if listed is None and graph.n > DENSE_LIMIT:
+def has_closed_form(graph: Matrix) -> bool:
+    """True if the eigenvalues of a graph are known without its characteristic polynomial."""
+    return graph.closed_form() is not None
+
+
+def _by_factors(graph: Matrix) -> Spectrum:
+    """The roots of the irreducible factors of the characteristic polynomial."""
+    if graph.n > DENSE_LIMIT:
         raise ValueError(
             f"topology {graph.name}: n = {graph.n} without a closed form; expected at most {DENSE_LIMIT} "
             "nodes: exact factors of larger matrices take too long"
         )
     polynomial = characteristic(graph)
-    claims = _by_factors(graph, polynomial) if listed is None else _listed(graph, listed)
+    claims = []
+    for factor, count in polynomial.factor()[1]:
+        whole = tuple(int(c) for c in factor.numer().coeffs())
+        jordan = blocks(graph, factor, count)
+        claims += [Eigenvalue(number, count, jordan) for number in written(factor) or roots(whole)]
+    return _proved(graph, claims, polynomial)
+
+
+def _by_pairs(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]], proof: Proof) -> Spectrum:
+    """The spectrum of a closed form."""
+    if proof is Proof.EXACT:
+        return _proved(graph, [_with_blocks(graph, pair) for pair in pairs], characteristic(graph))
+    return _unverified(graph, pairs, check_modulo(graph, pairs) if proof is Proof.MODULAR else None)
+
+
+def _unverified(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]], error_probability: float | None) -> Spectrum:
+    """The spectrum of a closed form that is not multiplied out over the rationals."""
+    if isinstance(pairs, LazyEigenvalues):
+        lazy = LazyEigenvalues(len(pairs), pairs.n, lambda k: _candidate(pairs[k], True))
+        return Spectrum(lazy, error_probability=error_probability)
+    simple = graph.undirected
+    candidates = [_candidate(pair, simple) for pair in pairs]
+    return Spectrum(ordered(candidates), error_probability=error_probability)
+
+
+def _candidate(pair: tuple[sp.Expr, int], simple: bool) -> Eigenvalue:
+    """An eigenvalue of a closed form; its Jordan blocks are known if all are `simple`."""
+    return Eigenvalue(sp.sympify(pair[0]), pair[1], ((1, pair[1]),) if simple else None)
+
+
+def _with_blocks(graph: Matrix, pair: tuple[sp.Expr, int]) -> Eigenvalue:
+    """An eigenvalue of a closed form with its Jordan blocks."""
+    number, count = sp.sympify(pair[0]), pair[1]
+    if count == 1 or graph.undirected:
+        return _candidate(pair, graph.undirected)
+    return Eigenvalue(number, count, blocks(graph, minimal_polynomial(number), count))
+
+
+def _proved(graph: Matrix, claims: Sequence[Eigenvalue], polynomial: fmpq_poly) -> Spectrum:
+    """The spectrum of eigenvalues that multiply out to the characteristic polynomial; else ProofError."""
     check(claims, polynomial, f"{graph.name} {graph.n}")
     return Spectrum(ordered(claims), verified=True)
 
 
-def has_closed_form(graph: Matrix) -> bool:
-    """True where the eigenvalues of a graph are known without its characteristic polynomial."""
-    return graph.closed_form() is not None
+def check(claims: Iterable[Eigenvalue], characteristic: fmpq_poly, name: str) -> None:
+    """Multiply eigenvalues out; ProofError if that is not the exact characteristic polynomial."""
+    groups: dict[tuple[int, ...], list[Eigenvalue]] = {}
+    for claim in claims:
+        groups.setdefault(_key(claim.number), []).append(claim)
+    product = fmpq_poly([1])
+    for coefficients, members in groups.items():
+        factor = monic(coefficients)
+        counts = {claim.multiplicity for claim in members}
+        if len(members) != factor.degree() or len(counts) != 1 or not distinct(members):
+            shown = ", ".join(str(claim) for claim in members[:4])
+            raise ProofError(
+                f"spectrum of {name}: {len(members)} eigenvalues ({shown}, …) of multiplicities "
+                f"{sorted(counts)} have the minimal polynomial {factor}; expected {factor.degree()} distinct "
+                "ones of one multiplicity: correct the closed form"
+            )
+        product *= factor ** counts.pop()
+    if product != characteristic:
+        raise ProofError(
+            f"spectrum of {name}: the eigenvalues multiply out to a polynomial of degree {product.degree()}; "
+            f"expected the characteristic one, of degree {characteristic.degree()}: correct the closed form"
+        )
 
 
-def _believed(graph: Matrix, listed: Sequence[tuple[sp.Expr, int]], chance: float | None) -> Spectrum:
-    """The spectrum of a closed form that is not multiplied out over the rationals."""
-    if isinstance(listed, Descending):
-        return Spectrum(Descending(len(listed), listed.n, lambda k: _claim(listed[k], True)), chance=chance)
-    simple = graph.undirected
-    return Spectrum(ordered([_claim(pair, simple) for pair in listed]), chance=chance)
-
-
-def _claim(pair: tuple[sp.Expr, int], simple: bool) -> Eigenvalue:
-    return Eigenvalue(sp.sympify(pair[0]), pair[1], ((1, pair[1]),) if simple else None)
-
-
-def _listed(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]]) -> list[Eigenvalue]:
-    """The eigenvalues of a closed form with their Jordan blocks."""
-    if graph.undirected:
-        return [_claim(pair, True) for pair in pairs]
-    numbers = [(sp.sympify(number), count) for number, count in pairs]
-    return [
-        Eigenvalue(number, count, None if count == 1 else blocks(graph, minimal_polynomial(number), count))
-        for number, count in numbers
-    ]
-
-
-def _by_factors(graph: Matrix, polynomial: fmpq_poly) -> list[Eigenvalue]:
-    """The roots of each irreducible factor of the characteristic polynomial."""
-    claims = []
-    for factor, count in polynomial.factor()[1]:
-        whole = tuple(int(c) for c in factor.numer().coeffs())
-        numbers = written(factor) or roots(whole)
-        found = blocks(graph, factor, count)
-        claims += [Eigenvalue(number, count, found) for number in numbers]
-    return claims
+def _key(number: Number) -> tuple[int, ...]:
+    """The minimal polynomial with coprime integer coefficients, the leading one positive."""
+    if isinstance(number, Root):
+        return number.polynomial
+    return tuple(int(c) for c in minimal_polynomial(number).numer().coeffs())

@@ -1,4 +1,4 @@
-"""A spectrum as a table of text."""
+"""The spectrum of a matrix, and its table of text."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any, overload
 import sympy as sp
 
 from ..algebra.balls import precision
-from ..algebra.lazy import Descending
-from ..algebra.roots import ComplexRoot, RealRoot, coefficient_text
+from ..algebra.lazy import LazyEigenvalues
+from ..algebra.roots import Root, coefficient_text
 from ..inputs.checks import instance
 from .eigenvalue import Eigenvalue, decimal
 
@@ -21,63 +21,28 @@ SHOWN = 1000
 """The text of a spectrum leaves out the middle of more eigenvalues than this."""
 
 
-def table(found: Spectrum, limit: int | None = None) -> str:
-    """The spectrum as text: exact, decimal, multiplicity; long polynomials are cut short.
-
-    Of more than `limit` distinct eigenvalues the first and the last are shown, `limit` in all.
-    """
-    head = ("exact", "decimal", "multiplicity")
-    many = limit is not None and len(found) > limit
-    half = (limit or 0) // 2
-    shown = [*found[:half], *found[len(found) - half :]] if many else list(found.eigenvalues)
-    lines = [(_short(e), decimal(e.value), str(e.multiplicity)) for e in shown]
-    wide = [max(len(line[k]) for line in (head, *lines)) for k in range(3)]
-    rows = [f"{a:<{wide[0]}}  {b:>{wide[1]}}  {c:>{wide[2]}}" for a, b, c in (head, *lines)]
-    if found.defective:
-        words = ("Jordan blocks", *(_blocks(e) for e in shown))
-        rows = [f"{row}  {word}" for row, word in zip(rows, words, strict=True)]
-    if many:
-        rows.insert(half + 1, f"… ({len(found) - 2 * half} more)")
-    state = "proved" if found.verified else "not proved (closed form of a large graph)"
-    if found.chance is not None:
-        state = f"the same modulo three large primes (a difference would show but for a chance of {found.chance:.0e})"
-    rows.append(f"{found.n} eigenvalues, {len(found)} distinct; characteristic polynomial: {state}")
-    if found.defective:
-        rows.append(
-            "defective: of a block of size s, errors go as t^(s-1) exp(lambda t), lambda the exponent of its mode"
-        )
-    return "\n".join(rows)
-
-
-def _blocks(e: Eigenvalue) -> str:
-    """Sizes of blocks, as 3, 1 (2 times)."""
-    if e.blocks is None:
-        return "not computed"
-    return ", ".join(f"{size}" if times == 1 else f"{size} ({times} times)" for size, times in e.blocks)
-
-
-def _short(e: Eigenvalue) -> str:
-    if len(e.text) <= 60 or not isinstance(e.number, (RealRoot, ComplexRoot)):
-        return e.text
-    return f"root {e.number.index} of a polynomial of degree {len(e.number.polynomial) - 1}"
-
-
 @dataclass(frozen=True, slots=True)
 class Spectrum:
     """The distinct eigenvalues from 0 downwards by real part, conjugates side by side.
 
-    `verified` is True where the product of (z - γ)^multiplicity was multiplied out and found equal to the
-    exact characteristic polynomial; False says that nobody did (a closed form of a large graph).  There
-    `eigenvalues` of a chain or ring are made one by one as they are asked for; elsewhere they are a tuple.  `chance` is
-    not None where the two were found equal modulo large primes: about the chance that this misses a difference.
+    Parameters
+    ----------
+    eigenvalues : sequence of Eigenvalue
+        A tuple; of large chains and rings a lazy sequence that makes its items one by one.
+    verified : bool, optional
+        True if the product of (z - γ)^multiplicity was multiplied out and is the exact characteristic
+        polynomial; False for the closed form of a large graph.
+    error_probability : float, optional
+        Set if the two polynomials are equal modulo large primes: about the probability that this
+        misses a difference.
     """
 
     eigenvalues: Sequence[Eigenvalue]
     verified: bool = False
-    chance: float | None = None
+    error_probability: float | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.eigenvalues, Descending):
+        if not isinstance(self.eigenvalues, LazyEigenvalues):
             for e in instance("spectrum", self.eigenvalues, (tuple, list), "Eigenvalues; take the spectrum of a graph"):
                 instance("spectrum", e, Eigenvalue, "an Eigenvalue; take the spectrum of a graph")
         if not self.eigenvalues:
@@ -86,7 +51,7 @@ class Spectrum:
     @property
     def n(self) -> int:
         """Number of eigenvalues, each counted as often as it occurs."""
-        if isinstance(self.eigenvalues, Descending):
+        if isinstance(self.eigenvalues, LazyEigenvalues):
             return self.eigenvalues.n
         return sum(self.multiplicities)
 
@@ -110,7 +75,7 @@ class Spectrum:
 
     @property
     def values(self) -> tuple[float | complex, ...]:
-        """The distinct eigenvalues as nearest floats, complex where they are complex."""
+        """The distinct eigenvalues as nearest floats; complex ones as complex numbers."""
         return tuple(e.value for e in self.eigenvalues)
 
     @property
@@ -125,46 +90,48 @@ class Spectrum:
 
     @property
     def defective(self) -> tuple[Eigenvalue, ...]:
-        """The eigenvalues that are known to have fewer eigenvectors than their multiplicity says."""
-        return () if isinstance(self.eigenvalues, Descending) else tuple(e for e in self.eigenvalues if e.defective)
+        """The eigenvalues that are known to have fewer eigenvectors than their multiplicity."""
+        return (
+            () if isinstance(self.eigenvalues, LazyEigenvalues) else tuple(e for e in self.eigenvalues if e.defective)
+        )
 
     @property
     def zeros(self) -> int:
         """How often 0 is an eigenvalue."""
-        if isinstance(self.eigenvalues, Descending):  # 0 is the first
+        if isinstance(self.eigenvalues, LazyEigenvalues):  # 0 is the first
             return self.eigenvalues[0].multiplicity
         return sum(e.multiplicity for e in self.eigenvalues if e.number is sp.S.Zero)
 
     @property
     def largest(self) -> sp.Expr:
         """The eigenvalue of largest modulus; of several, the first in the order of the spectrum."""
-        if isinstance(self.eigenvalues, Descending):  # all real, none positive
+        if isinstance(self.eigenvalues, LazyEigenvalues):  # all real, none positive
             return self.eigenvalues[-1].exact
         return _farthest(self.eigenvalues, 1)
 
     @property
     def slowest(self) -> sp.Expr:
-        """The eigenvalue other than 0 of smallest modulus, the first of several; ValueError where all are 0."""
-        lazy = isinstance(self.eigenvalues, Descending)
+        """The eigenvalue other than 0 of smallest modulus, the first of several; ValueError if all are 0."""
+        lazy = isinstance(self.eigenvalues, LazyEigenvalues)
         others = self.eigenvalues[1:2] if lazy else self.nonzero
         if not others:
             raise ValueError("all eigenvalues are 0; expected a graph with links")
         return others[0].exact if lazy else _farthest(others, -1)
 
     def evaluate(self, digits: int) -> tuple[sp.Expr, ...]:
-        """The distinct eigenvalues as SymPy Floats, each within one unit of the last of `digits` digits."""
+        """Return the distinct eigenvalues as SymPy Floats, each within one unit of the last of `digits` digits."""
         return tuple(e.evaluate(digits) for e in self.eigenvalues)
 
     def as_dict(self) -> dict[str, Any]:
-        """What `synchain spectrum --json` prints; a complex value is [real, imaginary].
+        """Return what `synchain spectrum --json` prints; a complex value is [real, imaginary].
 
-        Each polynomial is written once; an eigenvalue that is given by one has its number and its own index as CRootOf.
+        Each polynomial is written once; its roots have its number and their index as CRootOf.
         """
         numbers: dict[tuple[int, ...], int] = {}
         listed = []
         for e in self.eigenvalues:
             number, index, exact = None, None, None
-            if isinstance(e.number, (RealRoot, ComplexRoot)):
+            if isinstance(e.number, Root):
                 number, index = numbers.setdefault(e.number.polynomial, len(numbers)), e.number.index
                 exact = f"CRootOf(p{number}, {index})"
             listed.append(
@@ -184,7 +151,7 @@ class Spectrum:
             "polynomials": polynomials,
             "eigenvalues": listed,
             "verified": self.verified,
-            "chance": self.chance,
+            "chance": self.error_probability,
         }
 
     def __repr__(self) -> str:
@@ -195,7 +162,7 @@ class Spectrum:
 
 
 def _farthest(eigenvalues: Sequence[Eigenvalue], way: int) -> sp.Expr:
-    """The eigenvalue of largest modulus, of smallest where `way` is -1; the first of those that 1024 bits hold equal."""
+    """The eigenvalue of largest modulus, or of smallest if `way` is -1; the first of those that agree to 1024 bits."""
     top = max(way * abs(e.value) for e in eigenvalues)
     bound = top - 1e-12 * abs(top)
     best, bits = [e for e in eigenvalues if not way * abs(e.value) < bound], 64  # of infinite floats, all
@@ -206,3 +173,50 @@ def _farthest(eigenvalues: Sequence[Eigenvalue], way: int) -> sp.Expr:
             best = [e for e, size in zip(best, sizes, strict=True) if not size < first]
         bits *= 4
     return best[0].exact
+
+
+def table(spectrum: Spectrum, limit: int | None = None) -> str:
+    """Return a spectrum as a table of text: exact, decimal, multiplicity; long polynomials are cut short.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        What is shown.
+    limit : int, optional
+        Greatest number of rows: of more distinct eigenvalues the first and the last are shown.
+    """
+    head = ("exact", "decimal", "multiplicity")
+    many = limit is not None and len(spectrum) > limit
+    half = (limit or 0) // 2
+    shown = [*spectrum[:half], *spectrum[len(spectrum) - half :]] if many else list(spectrum.eigenvalues)
+    lines = [(_short(e), decimal(e.value), str(e.multiplicity)) for e in shown]
+    wide = [max(len(line[k]) for line in (head, *lines)) for k in range(3)]
+    rows = [f"{a:<{wide[0]}}  {b:>{wide[1]}}  {c:>{wide[2]}}" for a, b, c in (head, *lines)]
+    if spectrum.defective:
+        words = ("Jordan blocks", *(_blocks(e) for e in shown))
+        rows = [f"{row}  {word}" for row, word in zip(rows, words, strict=True)]
+    if many:
+        rows.insert(half + 1, f"… ({len(spectrum) - 2 * half} more)")
+    state = "proved" if spectrum.verified else "not proved (closed form of a large graph)"
+    if spectrum.error_probability is not None:
+        chance = f"{spectrum.error_probability:.0e}"
+        state = f"the same modulo three large primes (a difference would show but for a chance of {chance})"
+    rows.append(f"{spectrum.n} eigenvalues, {len(spectrum)} distinct; characteristic polynomial: {state}")
+    if spectrum.defective:
+        rows.append(
+            "defective: of a block of size s, errors go as t^(s-1) exp(lambda t), lambda the exponent of its mode"
+        )
+    return "\n".join(rows)
+
+
+def _blocks(e: Eigenvalue) -> str:
+    """Sizes of blocks, as 3, 1 (2 times)."""
+    if e.blocks is None:
+        return "not computed"
+    return ", ".join(f"{size}" if times == 1 else f"{size} ({times} times)" for size, times in e.blocks)
+
+
+def _short(e: Eigenvalue) -> str:
+    if len(e.text) <= 60 or not isinstance(e.number, Root):
+        return e.text
+    return f"root {e.number.index} of a polynomial of degree {len(e.number.polynomial) - 1}"

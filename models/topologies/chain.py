@@ -28,9 +28,9 @@ def count(n: int) -> int:
 def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
     """-4 sin²(kπ/2n), k = 0 … n - 1, each once."""
     from ..algebra.cosines import minus_four_sine_squared
-    from ..algebra.lazy import Descending
+    from ..algebra.lazy import LazyEigenvalues
 
-    return Descending(n, n, lambda k: (minus_four_sine_squared(k, 2 * n), 1))
+    return LazyEigenvalues(n, n, lambda k: (minus_four_sine_squared(k, 2 * n), 1))
 
 
 def formula() -> ClosedForm:

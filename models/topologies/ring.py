@@ -30,9 +30,9 @@ def count(n: int) -> int:
 def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
     """-4 sin²(kπ/n), k = 0 … n/2: twice each, but once for k = 0 and k = n/2."""
     from ..algebra.cosines import minus_four_sine_squared
-    from ..algebra.lazy import Descending
+    from ..algebra.lazy import LazyEigenvalues
 
-    return Descending(n // 2 + 1, n, lambda k: (minus_four_sine_squared(k, n), 1 if k in (0, n - k) else 2))
+    return LazyEigenvalues(n // 2 + 1, n, lambda k: (minus_four_sine_squared(k, n), 1 if k in (0, n - k) else 2))
 
 
 def formula() -> ClosedForm:

@@ -34,7 +34,7 @@ def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
     from sympy import Integer
 
     from ..algebra.cosine_sums import AngleSum, expression
-    from ..algebra.lazy import Descending
+    from ..algebra.lazy import LazyEigenvalues
 
     rim = (n - 1) // 2
     own = n > 5
@@ -45,7 +45,7 @@ def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
         times = (1 if 2 * k == n - 1 else 2) + (k == rim and not own)
         return expression(AngleSum.cosine(-3, 1, k, n - 1)), times
 
-    return Descending(rim + 1 + own, n, make)
+    return LazyEigenvalues(rim + 1 + own, n, make)
 
 
 def formula() -> ClosedForm:

@@ -15,7 +15,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 
-from ..stability.transversal import Exponents, exponents
+from ..stability.exponents import Exponents, exponents
 from ..synchronisation.agreement import OUTCOMES, Agreement, agreement, strengths
 from ..synchronisation.threshold import Criterion
 

@@ -15,7 +15,7 @@ import numpy as np
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 
-from ..stability.transversal import Exponents, exponents
+from ..stability.exponents import Exponents, exponents
 from ..synchronisation.threshold import critical_ratio
 
 if TYPE_CHECKING:

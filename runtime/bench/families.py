@@ -21,7 +21,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 
-from ..prediction.families import CLOSED, Largest, largest
+from ..prediction.families import CLOSED, LargestNetwork, largest_network
 from ..prediction.synchronisability import Verdict, verdict
 from ..stability.msf import MSF, msf
 from ..synchronisation.threshold import Criterion, simulate
@@ -107,13 +107,13 @@ def summary(rows: Sequence[Sequence[object]]) -> str:
     made = []
     for omega, contact in dict.fromkeys((float(str(row[0])), str(row[1])) for row in rows):
         found = function_of(omega, contact)
-        sizes = [_size(largest(name, found.open_ranges, found.uncertainties)) for name in sorted(CLOSED)]
+        sizes = [_size(largest_network(name, found.open_ranges, found.uncertainties)) for name in sorted(CLOSED)]
         made.append((f"{omega:g}", contact, _ranges(found), *sizes))
     names = [f"{name} (dimension)" if name == "hypercube" else name for name in sorted(CLOSED)]
     return markdown(("omega", "contact", "ranges of alpha", *names), made)
 
 
-def _size(found: Largest) -> str:
+def _size(found: LargestNetwork) -> str:
     """The size for the ranges as they are and, where that differs, for all and for some within the errors."""
     sizes = ["any" if n is None else str(n) for n in (found.n, found.certain, found.possible)]
     return sizes[0] if len(set(sizes)) == 1 else f"{sizes[0]} ({sizes[1]} … {sizes[2]})"

@@ -32,9 +32,9 @@ from ..cells.buffers import Buffers
 from ..cells.kernels import kernel
 from ..cells.plan import control_array, plan, tolerances
 from ..stability.averages import Batches
-from ..stability.interpolation import exact
+from ..stability.exponents import coupled_cell, exponents
+from ..stability.interpolation import exact_interpolation
 from ..stability.orbits import Orbits, unit_of_time
-from ..stability.transversal import exponents, single
 from . import peers
 from .kit.tables import markdown
 from .peers import _jitcode_transversal as jitcode
@@ -133,7 +133,7 @@ def orbit_rows(quick: bool) -> list[Row]:
     for k, (orbits, values) in enumerate(zip(ready, chosen, strict=True), 1):
         plane = np.iscomplexobj(values)
         given = ("0 … 1.2, beta 0 … 0.6", f"{SIDE} x {SIDE}") if plane else (_span(values), len(values))
-        integrated, off = len(orbits.chosen.nodes) if orbits.chosen else 0, difference(values, periods)
+        integrated, off = len(orbits.interpolation.nodes) if orbits.interpolation else 0, difference(values, periods)
         cost = (steps[k], 1e6 * best[k], best[k] / best[0], *off, periods, nan, nan, nan)
         rows.append((ORBIT, CASES[0].name, "synchain", *given, integrated, *cost))
     return rows
@@ -146,7 +146,7 @@ def _span(values: Sequence[float] | np.ndarray) -> str:
 
 def _settled(omega: float, values: np.ndarray) -> Orbits:
     """One orbit with its modes, behind the transient."""
-    scene = single(exponents, Scene(topology=topology("chain", 2), record=()), RTOL, {"omega": omega})
+    scene = coupled_cell(exponents, Scene(topology=topology("chain", 2), record=()), RTOL, {"omega": omega})
     start = np.array([[numbers[0] for numbers in scene.initial.values()]])
     orbits = Orbits.make(scene, values, start, workers=1)
     orbits.settle(SETTLED)
@@ -156,7 +156,7 @@ def _settled(omega: float, values: np.ndarray) -> Orbits:
 
 def _along(orbits: Orbits, periods: int) -> int:
     """Advance from the settled state with all strengths; returns the steps of the orbit."""
-    carrier = orbits.carrier
+    carrier = orbits.integrator
     if carrier is None:
         raise RuntimeError("orbits are not prepared")
     carrier.state, before = orbits.state.copy(), carrier.steps
@@ -190,8 +190,8 @@ def difference(values: np.ndarray, periods: int) -> tuple[float, float]:
     Along the periodic orbit at omega = 1.15, over so many periods.
     """
     few, all_of_them = _settled(1.15, values), _settled(1.15, values)
-    all_of_them.block, all_of_them.chosen = few.block, exact(values)
-    all_of_them.carrier = all_of_them.carry(values)
+    all_of_them.block, all_of_them.interpolation = few.block, exact_interpolation(values)
+    all_of_them.integrator = all_of_them.integrator_of(values)
     sums = np.zeros((2, len(values)))
     for _ in range(round(periods / few.block)):
         for k, orbits in enumerate((few, all_of_them)):

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from synchain.codegen.kernels.sweep import LARGEST_UNROLLED
 from synchain.codegen.simd import lanes
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
@@ -54,7 +53,7 @@ def work(bank, clock, count):
 
 def measure(quick: bool = False) -> list[tuple[object, ...]]:
     """Return the rows of the table, in the order of COLUMNS."""
-    sizes = (1,) if quick else tuple(n for n in (1, 2, 4, 8) if n <= LARGEST_UNROLLED)
+    sizes = (1,) if quick else (1, 2, 4, 8)
     return [_row(n, lanes.native_width(), quick) for n in sizes]
 
 

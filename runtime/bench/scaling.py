@@ -51,7 +51,7 @@ def measure(quick: bool = False) -> list[Row]:
     rows = []
     for name in ("chain",) if quick else FAMILIES:
         for n in nodes:
-            if n >= family(name).MINIMUM:
+            if n >= family(name).minimum:
                 rows.append(apart(network_row, name, n, 1, work))
     lanes = native_width()
     rows += [apart(network_row, "chain", n, lanes, work) for n in nodes if lanes > 1]

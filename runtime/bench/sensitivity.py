@@ -15,7 +15,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 
 from ..prediction.intervals import Interval
-from ..stability.transversal import exponents
+from ..stability.exponents import exponents
 from ..synchronisation.threshold import Criterion, project, simulate
 
 __all__ = ["CASES", "CHANGES", "COLUMNS", "PROJECTED", "measure"]

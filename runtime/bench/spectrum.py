@@ -65,7 +65,13 @@ def _compared(name: str, graph: Topology, quick: bool) -> Iterator[Row]:
     """A row for each method that can take the graph."""
     fresh: Callable[[Topology], Spectrum] = spectrum.__wrapped__
     found = fresh(graph)
-    state = "proved" if found.verified else "closed form, not proved" if found.chance is None else "modulo primes"
+    state = (
+        "proved"
+        if found.verified
+        else "closed form, not proved"
+        if found.error_probability is None
+        else "modulo primes"
+    )
     own = best_time(lambda: fresh(graph).values, quick)  # all of them: a lazy spectrum costs nothing by itself
     yield (name, graph.n, "synchain", own, digits(found, found.values), len(found), state)
     rows = np.array([[float(x) for x in row] for row in graph.rows])

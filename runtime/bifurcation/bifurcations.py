@@ -13,17 +13,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 from scipy.optimize import brentq
 
-from .arcs import Arc
-from .folds import fold
+from .continuation import Arc, find_fold
 from .periodic import PeriodicOrbit, periodic_orbit, strobe
 from .phases import Phases
 
-__all__ = ["Found", "at_end", "between"]
+__all__ = ["Bifurcation", "BifurcationKind", "bifurcations_at_end", "bifurcations_between"]
 
 CLOSED = 1e-6
 """A gap this small has closed: the branch ends by grazing."""
@@ -42,24 +42,33 @@ LEAST_REACH = 1e-4
 """Where Newton's method finds nothing this close to the last orbit, relative to the other end, it is given up."""
 
 
+class BifurcationKind(StrEnum):
+    """Kind of a bifurcation of periodic orbits."""
+
+    PERIOD_DOUBLING = "period doubling"
+    FOLD = "fold"
+    GRAZING = "grazing"
+    STICK_LOSS = "stick loss"
+
+
 @dataclass(frozen=True, slots=True)
-class Found:
+class Bifurcation:
     """A bifurcation: the value of the parameter, its kind in words, how far its test function is from zero, and the nearest
     orbit that was found."""
 
     value: float
-    words: str
+    kind: BifurcationKind
     residual: float
-    orbit: PeriodicOrbit
+    orbit: PeriodicOrbit = field(repr=False)
 
 
-def between(arc: Arc, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> list[Found]:
+def bifurcations_between(arc: Arc, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> list[Bifurcation]:
     """The bifurcations between the last orbit of an arc and the next one on the branch, in the order of the parameter."""
     before = arc.phases[-1]
-    if before is None or phases is None or before.modes == phases.modes:
+    if before is None or phases is None or before.slip_states == phases.slip_states:
         last, there = arc.orbits[-1], (arc.values[-1], value)
         return _crossings(_copy(arc).take(value, orbit, phases), there, (last, orbit))
-    ahead = len(before.modes) <= len(phases.modes)
+    ahead = len(before.slip_states) <= len(phases.slip_states)
     known = _copy(arc) if ahead else arc.empty().take(value, orbit, phases)
     far = value if ahead else arc.values[-1]
     change = _stick_loss(arc, value, orbit, before, phases) if _same_slips(before, phases) else None
@@ -69,23 +78,23 @@ def between(arc: Arc, value: float, orbit: PeriodicOrbit, phases: Phases | None)
     return sorted([change, *beside], key=lambda found: found.value)
 
 
-def at_end(arc: Arc, beyond: float) -> list[Found]:
+def bifurcations_at_end(arc: Arc, beyond: float) -> list[Bifurcation]:
     """How a branch ends before `beyond`, where Newton's method finds no orbit of its own: where it was born of one
     of half as many periods, at a fold, or at a graze; nothing where it is none of them."""
     birth = _birth(arc, beyond)
     if birth is not None:
         return [birth]
-    turn = fold(arc, beyond)
+    turn = find_fold(arc, beyond)
     if turn is not None:
         at, orbit = turn
-        return [Found(at, "fold", float(np.abs(orbit.multipliers - 1.0).min()), orbit)]
+        return [Bifurcation(at, BifurcationKind.FOLD, float(np.abs(orbit.multipliers - 1.0).min()), orbit)]
     if arc.phases[-1] is None:
         return []
     last = _graze(_copy(arc), beyond)
     return [last] if last.residual < CLOSED else []
 
 
-def _birth(arc: Arc, beyond: float) -> Found | None:
+def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
     """The period doubling of the orbit of half as many periods that runs between the halves of an arc's last orbit."""
     half, last = arc.periods // 2, arc.orbits[-1]
     if arc.periods % 2:
@@ -100,17 +109,17 @@ def _birth(arc: Arc, beyond: float) -> Found | None:
         made = _crossings(single, (single.values[0], beyond), (single.orbits[0], single.orbits[1]))
     except ArithmeticError:
         return None
-    return next((each for each in made if each.words == "period doubling"), None)
+    return next((each for each in made if each.kind is BifurcationKind.PERIOD_DOUBLING), None)
 
 
 def _copy(arc: Arc) -> Arc:
     return Arc(arc.scene, arc.name, arc.periods, [*arc.values], [*arc.orbits], [*arc.phases])
 
 
-def _crossings(arc: Arc, ends: tuple[float, float], orbits: tuple[PeriodicOrbit, PeriodicOrbit]) -> list[Found]:
+def _crossings(arc: Arc, ends: tuple[float, float], orbits: tuple[PeriodicOrbit, PeriodicOrbit]) -> list[Bifurcation]:
     """The crossings of a real multiplier through -1 or 1 between two orbits of the same phases."""
     found = []
-    for point, words in ((-1.0, "period doubling"), (1.0, "fold")):
+    for point, kind in ((-1.0, BifurcationKind.PERIOD_DOUBLING), (1.0, BifurcationKind.FOLD)):
         if not _beyond(orbits[0], point) * _beyond(orbits[1], point) < 0.0:
             continue
 
@@ -118,7 +127,7 @@ def _crossings(arc: Arc, ends: tuple[float, float], orbits: tuple[PeriodicOrbit,
             return _beyond(orbits[ends.index(value)] if value in ends else arc.at(value), point)
 
         value, orbit = _root(distance, arc, ends)
-        found.append(Found(value, words, float(np.abs(orbit.multipliers - point).min()), orbit))
+        found.append(Bifurcation(value, kind, float(np.abs(orbit.multipliers - point).min()), orbit))
     return found
 
 
@@ -140,11 +149,11 @@ def _beyond(orbit: PeriodicOrbit, point: float) -> float:
 
 def _same_slips(before: Phases, after: Phases) -> bool:
     """True where stick alone comes or goes."""
-    slips = [sorted(mode for mode in phases.modes if mode != 0) for phases in (before, after)]
-    return slips[0] == slips[1] and before.modes.count(0) != after.modes.count(0)
+    slips = [sorted(mode for mode in phases.slip_states if mode != 0) for phases in (before, after)]
+    return slips[0] == slips[1] and before.slip_states.count(0) != after.slip_states.count(0)
 
 
-def _stick_loss(arc: Arc, value: float, orbit: PeriodicOrbit, before: Phases, after: Phases) -> Found | None:
+def _stick_loss(arc: Arc, value: float, orbit: PeriodicOrbit, before: Phases, after: Phases) -> Bifurcation | None:
     """Where the load at the landing is the limit of static friction, between the last orbit of an arc and the next; None
     where it does not pass the limit."""
     if not before.landing * after.landing < 0.0:
@@ -163,12 +172,12 @@ def _stick_loss(arc: Arc, value: float, orbit: PeriodicOrbit, before: Phases, af
         return phases.landing
 
     at, last = _root(landing, both, (arc.values[-1], value))
-    return Found(at, "stick loss", abs(landing(at)), last)
+    return Bifurcation(at, BifurcationKind.STICK_LOSS, abs(landing(at)), last)
 
 
-def _graze(arc: Arc, beyond: float) -> Found:
+def _graze(arc: Arc, beyond: float) -> Bifurcation:
     """Where the gap of an arc's last orbit closes on the way to `beyond`, which lies past it."""
-    modes = _known(arc).modes
+    modes = _known(arc).slip_states
     share, reach = SHARE, 0.5
     for _ in range(MOST_STEPS):
         low, gap = arc.values[-1], _known(arc).gap
@@ -179,7 +188,9 @@ def _graze(arc: Arc, beyond: float) -> Found:
         value = value if guided else low + reach * (beyond - low)
         own = _orbit(arc, value)
         phases = None if own is None else own.phases
-        if own is not None and phases is not None and phases.modes == modes and phases.gap > -SHUT:  # no phase unseen
+        if (
+            own is not None and phases is not None and phases.slip_states == modes and phases.gap > -SHUT
+        ):  # no phase unseen
             arc.take(value, own, phases)
             share, reach = SHARE, 0.5
         elif own is not None:
@@ -191,7 +202,7 @@ def _graze(arc: Arc, beyond: float) -> Found:
     at = _where(arc, 0.0)
     low = arc.values[-1]
     at = at if min(low, beyond) <= at <= max(low, beyond) else 0.5 * (low + beyond)
-    return Found(at, "grazing", abs(_known(arc).gap), arc.orbits[-1])
+    return Bifurcation(at, BifurcationKind.GRAZING, abs(_known(arc).gap), arc.orbits[-1])
 
 
 def _known(arc: Arc) -> Phases:

@@ -18,8 +18,8 @@ import numpy as np
 from synchain.models.inputs.checks import instance, shown
 from synchain.models.scenes.scene import Scene
 
-from .arcs import Arc
-from .bifurcations import Found, at_end, between
+from .bifurcations import Bifurcation, bifurcations_at_end, bifurcations_between
+from .continuation import Arc
 from .periodic import PeriodicOrbit, periodic_orbit
 from .phases import Phases
 
@@ -52,10 +52,8 @@ class Branch:
     name: str
     values: np.ndarray
     orbits: tuple[PeriodicOrbit, ...]
-    bifurcations: tuple[tuple[float, str], ...]
-    residuals: tuple[float, ...] = ()
+    bifurcations: tuple[Bifurcation, ...]
     phases: tuple[Phases, ...] = ()
-    at: tuple[PeriodicOrbit, ...] = ()
 
 
 def follow(scene: Scene, name: str, values: Sequence[float] | np.ndarray, first: PeriodicOrbit) -> Branch:
@@ -66,21 +64,22 @@ def follow(scene: Scene, name: str, values: Sequence[float] | np.ndarray, first:
     """
     instance("first", first, PeriodicOrbit, "a PeriodicOrbit, such as periodic_orbit(scene) returns")
     wanted = checked_values(first.scene, name, values)
-    trail = Trail(Arc(scene, name, first.periods))
+    tracer = BranchTracer(Arc(scene, name, first.periods))
     start = periodic_orbit(scene, first.periods, first.state, **{name: wanted[0]})
-    orbits = [trail.take(wanted[0], start, start.phases)]
+    orbits = [tracer.take(wanted[0], start, start.phases)]
     for value in wanted[1:]:
-        orbit = trail.on(value)
+        orbit = tracer.on(value)
         if orbit is None:
             break
         orbits.append(orbit)
-    phases = [trail.phases[value] for value in wanted[: len(orbits)]]
-    found = trail.found
+    phases = [tracer.phases[value] for value in wanted[: len(orbits)]]
     return Branch(
-        name, np.array(wanted[: len(orbits)]), tuple(orbits), tuple((each.value, each.words) for each in found),
-        tuple(each.residual for each in found), tuple(own for own in phases if own is not None),
-        tuple(each.orbit for each in found),
-    )  # fmt: skip
+        name,
+        np.array(wanted[: len(orbits)]),
+        tuple(orbits),
+        tuple(tracer.bifurcations),
+        tuple(each for each in phases if each is not None),
+    )
 
 
 def checked_values(scene: Scene, name: str, values: Sequence[float] | np.ndarray) -> list[float]:
@@ -96,12 +95,12 @@ def checked_values(scene: Scene, name: str, values: Sequence[float] | np.ndarray
     return wanted
 
 
-class Trail:
+class BranchTracer:
     """A branch on which orbits are found one after the other, with the piece of it that is smooth up to the last one."""
 
     def __init__(self, arc: Arc) -> None:
         self.arc = arc
-        self.found: list[Found] = []
+        self.bifurcations: list[Bifurcation] = []
         self.phases: dict[float, Phases | None] = {}
         self.least: int | None = None
 
@@ -111,11 +110,12 @@ class Trail:
         self.least = self.least or orbit.least
         if self.arc.values:
             way = sorted(
-                between(self.arc, value, orbit, phases), key=lambda each: abs(each.value - self.arc.values[-1])
+                bifurcations_between(self.arc, value, orbit, phases),
+                key=lambda each: abs(each.value - self.arc.values[-1]),
             )
-            self.found += way
+            self.bifurcations += way
             last = self.arc.phases[-1]
-            if last is not None and phases is not None and last.modes != phases.modes:
+            if last is not None and phases is not None and last.slip_states != phases.slip_states:
                 self.arc = self.arc.empty()
         self.arc.take(value, orbit, phases)
         return orbit
@@ -133,14 +133,14 @@ class Trail:
             elif orbit is not None or abs(ahead[-1] - last) > SHORTEST * step:
                 ahead.append(0.5 * (last + ahead[-1]))
             else:
-                self.found += at_end(self.arc, ahead[-1])
+                self.bifurcations += bifurcations_at_end(self.arc, ahead[-1])
                 return None
         return self.arc.orbits[-1]
 
     def _changes(self, phases: Phases | None) -> bool:
         """True where phases are others than those of the last orbit."""
         last = self.arc.phases[-1]
-        return phases is not None and last is not None and phases.modes != last.modes
+        return phases is not None and last is not None and phases.slip_states != last.slip_states
 
     def _orbit(self, value: float) -> PeriodicOrbit | None:
         """The orbit at a value, if Newton's method finds one close to where it is expected."""

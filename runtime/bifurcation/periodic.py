@@ -22,9 +22,9 @@ from synchain.models.inputs.checks import shown
 from synchain.models.mechanics.stick_slip import SLIP
 from synchain.models.scenes.scene import Scene
 
-from ..stability.attractor import over_one_cycle
+from ..stability.attractor import cycle_propagators
+from ..stability.exponents import coupled_cell, single_cell
 from ..stability.orbits import Orbits, unit_of_time
-from ..stability.transversal import one_cell, single
 from .phases import Phases, phases_of
 
 __all__ = ["SAME", "PeriodicOrbit", "check_periods", "orbit_through", "periodic_orbit", "stability_end", "strobe"]
@@ -83,7 +83,7 @@ class PeriodicOrbit:
         divisors = (k for k in range(1, self.periods) if self.periods % k == 0)
         return next((k for k in divisors if np.abs(points[k] - points[0]).max() < SAME), self.periods)
 
-    def transversal(self, alpha: float) -> np.ndarray:
+    def transversal_multipliers(self, alpha: float) -> np.ndarray:
         """The multipliers of a transversal mode of strength alpha along the orbit, the largest first."""
         return _sorted(_strobe(self.scene, self.state, self.periods, alpha)[1])
 
@@ -145,13 +145,13 @@ def strobe(scene: Scene, state: np.ndarray, periods: int, **parameters: float) -
 
 def _driven(function: Callable[..., Any], scene: Scene, parameters: dict[str, float]) -> Scene:
     """The scene with its parameters, to the tolerance of orbits; ValueError where it is not driven."""
-    scene = one_cell(function, scene, TOLERANCE, parameters)
+    scene = single_cell(function, scene, TOLERANCE, parameters)
     unit_of_time(scene)
     if not scene.period:
         raise ValueError(
             "periodic orbits are looked for on the stroboscopic map of a drive; found an oscillator without one"
         )
-    return single(function, scene, TOLERANCE, {})
+    return coupled_cell(function, scene, TOLERANCE, {})
 
 
 def _settled(scene: Scene) -> np.ndarray:
@@ -194,7 +194,7 @@ def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
             raise ValueError(f"{name} = {shown(value)}; expected a finite strength alpha")
 
     def growth(alpha: float) -> float:
-        return float(np.log(abs(orbit.transversal(alpha)[0])))
+        return float(np.log(abs(orbit.transversal_multipliers(alpha)[0])))
 
     if growth(low) * growth(high) > 0.0:
         raise ValueError(f"alpha: the mode grows, or decays, at {low} and at {high}; expected a change between them")
@@ -206,7 +206,7 @@ def _strobe(scene: Scene, state: np.ndarray, periods: int, alpha: float) -> tupl
     start = np.zeros(len(scene.initial))
     start[: len(state)] = state
     orbits = Orbits.make(scene, np.array([alpha]), start[None], 1)
-    matrix = over_one_cycle(orbits, periods)[0, 0]
+    matrix = cycle_propagators(orbits, periods)[0, 0]
     return orbits.state[0], matrix
 
 

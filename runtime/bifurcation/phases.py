@@ -37,21 +37,21 @@ REACH = 3
 
 @dataclass(frozen=True, slots=True)
 class Phases:
-    """The modes of one cycle in their order, 0 for stick, +1 and -1 for slip, from the one that makes the list smallest.
+    """The slip_states of one cycle in their order, 0 for stick, +1 and -1 for slip, from the one that makes the list smallest.
 
     gap: the least minimum, inside a phase, of the sliding speed in slip and of the distance of the load from the limits of
     static friction in stick; inf where there is none.  landing: how far the load is from those limits where slip ends, at
     the landing that is nearest to them, positive where it sticks; inf where slip never ends.
     """
 
-    modes: tuple[int, ...]
+    slip_states: tuple[int, ...]
     gap: float
     landing: float
 
     @property
     def words(self) -> str:
         """In words, for example "stick, slip +"."""
-        return ", ".join({0: "stick", 1: "slip +", -1: "slip -"}[mode] for mode in self.modes)
+        return ", ".join({0: "stick", 1: "slip +", -1: "slip -"}[mode] for mode in self.slip_states)
 
 
 def phases_of(scene: Scene, state: np.ndarray, periods: int) -> Phases | None:
@@ -72,17 +72,17 @@ def phases_of(scene: Scene, state: np.ndarray, periods: int) -> Phases | None:
     changes = np.flatnonzero(slip[1:] != slip[:-1]) + 1
     if len(changes) == 0:
         return Phases((int(slip[0]),), _least(np.concatenate([values[-1:], values])), math.inf)
-    modes, gaps, landings = [], [math.inf], [math.inf]
+    slip_states, gaps, landings = [], [math.inf], [math.inf]
     for a, b in pairwise(changes.tolist()):
         if a > len(once):
             break
-        modes.append(int(slip[a]))
+        slip_states.append(int(slip[a]))
         gaps.append(_least(values[a:b]))
         if slip[a] != 0:
             landings.append(_landing(slice(a, b), t, path, slides, held))
             if landings[-1] > 0.0 and slip[b] != 0:
-                modes.append(0)  # it sticks for less than the distance of two samples
-    return Phases(_canonical(modes), min(gaps), min(landings, key=abs))
+                slip_states.append(0)  # it sticks for less than the distance of two samples
+    return Phases(_canonical(slip_states), min(gaps), min(landings, key=abs))
 
 
 Function = Callable[..., np.ndarray]
@@ -130,6 +130,6 @@ def _landing(piece: slice, t: np.ndarray, path: np.ndarray, slides: Function, he
     return float(held(place(at), t[piece.stop - 1] + at * (t[1] - t[0])))
 
 
-def _canonical(modes: list[int]) -> tuple[int, ...]:
+def _canonical(slip_states: list[int]) -> tuple[int, ...]:
     """The rotation of a cycle that comes first in order."""
-    return min(tuple(modes[k:] + modes[:k]) for k in range(len(modes)))
+    return min(tuple(slip_states[k:] + slip_states[:k]) for k in range(len(slip_states)))

@@ -16,8 +16,9 @@ import numpy as np
 from synchain.models.inputs.checks import shown
 from synchain.models.scenes.scene import Scene, a_scene
 
+from ..stability.exponents import coupled_cell, initial_states
 from ..stability.orbits import Orbits
-from ..stability.transversal import several_starts, single
+from .bifurcations import BifurcationKind
 from .branches import Branch, checked_values, follow
 from .periodic import SAME, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit
 
@@ -46,7 +47,7 @@ def skeleton(
     grid = sorted(checked_values(a_scene(scene), name, values))
     if isinstance(periods, Integral | str) or len(periods) == 0:
         raise ValueError(f"periods = {shown(periods)}; expected numbers of drive periods, e.g. (1, 2)")
-    scene = single(skeleton, scene, TOLERANCE, {})
+    scene = coupled_cell(skeleton, scene, TOLERANCE, {})
     if not isinstance(looks, Integral) or looks < 1:
         raise ValueError(f"looks = {shown(looks)}; expected a whole number, at least 1")
     for each in periods:
@@ -70,7 +71,7 @@ def skeleton(
 
 def near_returns(scene: Scene, periods: Sequence[int], **parameters: float) -> list[PeriodicOrbit]:
     """The periodic orbits of these numbers of drive periods that motions from several starts nearly return to, each once."""
-    scene = single(near_returns, scene, TOLERANCE, parameters)
+    scene = coupled_cell(near_returns, scene, TOLERANCE, parameters)
     path = _path(scene)
     found: list[PeriodicOrbit] = []
     for count in periods:
@@ -88,13 +89,13 @@ def near_returns(scene: Scene, periods: Sequence[int], **parameters: float) -> l
 def _path(scene: Scene) -> np.ndarray:
     """States (LENGTH + 1, starts, components) at the beginning of each period of the drive."""
     loose = scene.replace(rtol=1e-8)
-    orbits = Orbits.make(loose, np.zeros(1), several_starts(loose, STARTS, 0), 1)
+    orbits = Orbits.make(loose, np.zeros(1), initial_states(loose, STARTS, 0), 1)
     orbits.settle(DROPPED)
-    carrier = orbits.carry(orbits.strengths)
-    states = [carrier.state]
+    integrator = orbits.integrator_of(orbits.strengths)
+    states = [integrator.state]
     for _ in range(LENGTH):
-        carrier.advance(orbits.unit)
-        states.append(carrier.state)
+        integrator.advance(orbits.unit)
+        states.append(integrator.state)
     return np.array(states)[:, :, : orbits.components]
 
 
@@ -127,10 +128,12 @@ def _both_ways(scene: Scene, name: str, grid: list[float], k: int, orbit: Period
     """The branch through an orbit at grid[k], in one piece."""
     up, down = (follow(scene, name, part, orbit) for part in (grid[k:], grid[k::-1]))
     return Branch(
-        name, np.concatenate([down.values[:0:-1], up.values]), (*down.orbits[:0:-1], *up.orbits),
-        (*down.bifurcations[::-1], *up.bifurcations), (*down.residuals[::-1], *up.residuals),
-        (*down.phases[:0:-1], *up.phases), (*down.at[::-1], *up.at),
-    )  # fmt: skip
+        name,
+        np.concatenate([down.values[:0:-1], up.values]),
+        (*down.orbits[:0:-1], *up.orbits),
+        (*down.bifurcations[::-1], *up.bifurcations),
+        (*down.phases[:0:-1], *up.phases),
+    )
 
 
 def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrbit]]:
@@ -139,14 +142,17 @@ def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrb
     Near a fold the sheets lie on both sides of it, at distances like the square root of that of the parameter.
     """
     found = []
-    for (fold, words), turn in zip(branch.bifurcations, branch.at, strict=True):
+    for turn in branch.bifurcations:
+        if turn.kind is not BifurcationKind.FOLD:
+            continue
+        fold = turn.value
         for k, inner in ((0, fold < branch.values[0]), (-1, fold > branch.values[-1])):
-            if words != "fold" or not inner:
+            if not inner:
                 continue
             end, last = float(branch.values[k]), branch.orbits[k]
             way = [fold + 4.0**-j * (end - fold) for j in range(NEARER, -1, -1)]
             try:
-                start = turn.state - 2.0**-NEARER * (last.state - turn.state)
+                start = turn.orbit.state - 2.0**-NEARER * (last.state - turn.orbit.state)
                 first = periodic_orbit(scene, last.periods, start, **{branch.name: way[0]})
                 sheet = follow(scene, branch.name, way, first)
             except ArithmeticError:

@@ -29,7 +29,8 @@ def with_modes(equations: Equations, start: np.ndarray, numbers: np.ndarray) -> 
         Positions, velocities and slip states; without contacts they are returned as they are.
     numbers : ndarray, shape (cells, parameters)
     """
-    contact, n = equations.node.contact, equations.n
+    n = equations.n
+    contact = equations.node.contact if equations.sticks else None
     if contact is None:
         return start
     made = np.array(start, dtype=float)
@@ -47,10 +48,11 @@ def _link_forces(
     equations: Equations, speed: sp.Expr, state: np.ndarray, given: dict[sp.Symbol, np.ndarray]
 ) -> np.ndarray:
     """Forces (cells, n) of the links on each oscillator if it moves with the ground."""
-    edge, n = equations.edge, equations.n
+    n = equations.n
     total = np.zeros((len(state), n))
-    if edge is None or not equations.links:
+    if not equations.edges:
         return total
+    (edge,) = equations.edges
     target, source = (np.array([link[side] for link in equations.links]) for side in (0, 1))
     given = {**given, edge.weight: np.array([float(link[2]) for link in equations.links])}
     for symbols, nodes in ((edge.here, target), (edge.there, source)):
@@ -66,14 +68,9 @@ def local_clock(equations: Equations, period: np.ndarray) -> np.ndarray:
     Events are located on the clock, to rounding.  If time does not enter the equations any length is a period, and a
     short one keeps the digits of events in long runs.
     """
-    if equations.node.contact is None or any(e.has(TIME) for e in (*equations.node.rhs, *_conditions(equations))):
+    if not equations.sticks or any(e.has(TIME) for e in equations.node.expressions):
         return period
     return np.full(len(period), CLOCK)
-
-
-def _conditions(equations: Equations) -> tuple[sp.Expr, ...]:
-    contact = equations.node.contact
-    return () if contact is None else contact.expressions
 
 
 def _at(e: sp.Expr, given: dict[sp.Symbol, np.ndarray], shape: tuple[int, int]) -> np.ndarray:

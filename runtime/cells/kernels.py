@@ -78,8 +78,8 @@ def best_integrator(equations: Equations, rtol: float) -> str:
 
     Two oscillators at a tight tolerance gain from DOP853 while none of them sticks; of more, some nearly always stick.
     """
-    pair = equations.n == 2 and equations.plain and rtol <= 1e-9
-    return "dop853" if equations.node.contact is not None else "switching" if pair else AUTO
+    pair = equations.n == 2 and not (equations.mixed or equations.inertial) and rtol <= 1e-9
+    return "dop853" if equations.sticks else "switching" if pair else AUTO
 
 
 def warn_of_chords(source: KernelSource) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from synchain.codegen.driver.columns import Point, Sum
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.reduction import NoQuotient, fold, quotient
+from synchain.models.dynamics.reduction import NoQuotient, quotient, substitute_constants
 from synchain.models.inputs.checks import flag
 from synchain.models.scenes.scene import Scene, a_scene
 
@@ -194,7 +194,10 @@ def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> R
     else:
         kept.append("everything is integrated as it stands, as asked for")
     together = max(classes) == 0 and scene.n > 1 and "sync_error" in scene.record
-    first = [classes.index(k) for k in range(equations.n)]
+    seen: dict[int, int] = {}
+    for node, k in enumerate(classes):
+        seen.setdefault(k, node)
+    first = [seen[k] for k in range(equations.n)]
     return Reduction(
         scene,
         equations,
@@ -210,16 +213,13 @@ def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> R
 
 def _node_merge(whole: Equations, reduced: Equations, classes: tuple[int, ...], together: bool) -> NodeMerge:
     """The columns of both states, from the class of each oscillator of the whole network."""
-    if whole.mixed:
-        alone = np.arange(whole.dimension)
-        return NodeMerge(alone, alone, together)
-    first = [classes.index(k) for k in range(reduced.n)]
-    components = range(whole.dimension // whole.n)
-    return NodeMerge(
-        np.array([c * whole.n + i for c in components for i in first]),
-        np.array([c * reduced.n + k for c in components for k in classes]),
-        together,
-    )
+    first: dict[int, int] = {}
+    states, places = np.empty(reduced.dimension, dtype=int), np.empty(whole.dimension, dtype=int)
+    for node, k in enumerate(classes):
+        if first.setdefault(k, node) == node:
+            states[list(reduced.places[k])] = whole.places[node]
+        places[list(whole.places[node])] = reduced.places[k]
+    return NodeMerge(states, places, together)
 
 
 def _column(name: str, equations: Equations, first: list[int]) -> str:
@@ -242,7 +242,7 @@ def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> 
         if name not in equations.parameters or (value != 0.0 and not fold_all):
             continue
         try:
-            made = fold(equations, {name: Fraction(repr(value))})
+            made = substitute_constants(equations, {name: Fraction(repr(value))})
         except ValueError as problem:
             kept.append(str(problem))
             continue
@@ -253,7 +253,7 @@ def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> 
 
 def _present(scene: Scene, equations: Equations) -> list[str]:
     """What has to be integrated, in words."""
-    found = ["forcing: time occurs in the equations"] if any(node.forced for node in equations.nodes) else []
+    found = ["forcing: time occurs in the equations"] if equations.forced else []
     if equations.links:
         fixed = _fixed(scene)
         names = [*dict.fromkeys(symbol.name for edge in equations.edges for symbol in edge.parameters)]
@@ -266,7 +266,7 @@ def _consequence(before: Equations, after: Equations, name: str, value: float) -
     """What a folded parameter has taken along, in words."""
     gone = [p for p in before.parameters if p not in after.parameters and p != name]
     too = f" together with {', '.join(gone)}" if gone else ""
-    if before.node.forced and not after.node.forced:
+    if before.forced and not after.forced:
         return f"forcing: {name} = {value:g} in every cell, left out{too}; no time terms"
     if before.links and not after.links:
         return f"coupling: {name} = {value:g} in every cell, left out{too}; no links"

@@ -8,7 +8,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from ..console.outcome import FAILED, FINE, WrongUse, print_json, wrong_use
+from ..console.outcome import FAILED, FINE, WrongUse, discard_output, print_json, wrong_use
 
 if TYPE_CHECKING:
     from synchain.models.claims.verdict import Verdict
@@ -58,9 +58,9 @@ def execute(arguments: Namespace) -> int:
     code = FAILED if _wrong(found) else FINE
     try:
         _print(arguments, found, open_ones)
-    except BrokenPipeError as closed:  # the reader has seen enough, but the answer counts
-        setattr(closed, "exit_code", code)  # noqa: B010
-        raise
+    except BrokenPipeError:  # the reader has seen enough, but the answer counts
+        discard_output()
+        return code
     if open_ones:
         number, _, why = open_ones[0]
         more = f" (and {len(open_ones) - 1} more)" * (len(open_ones) > 1)

@@ -6,12 +6,11 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..console.arguments import above_zero, add_allow_code, add_workers, folder, positive, spaced, whole
-from ..console.drive import at_frequency
+from ..console.arguments import above_zero, add_allow_code, add_workers, folder, positive, spaced
+from ..console.network import add_network, named_network, scene_on
 from ..console.outcome import FINE, Failed, WrongUse, print_json, sentence, warn, wrong_use
 
 if TYPE_CHECKING:
-    from synchain.models.graphs.topology import Topology
     from synchain.models.scenes.scene import Scene
 
     from ..console.line_report import LineReport
@@ -40,7 +39,6 @@ def configure(parser: ArgumentParser) -> None:
         "--alpha", metavar="LO:HI:N", type=spaced, help="strengths, -sigma times an eigenvalue (default: 0:1.2:241)"
     )
     parser.add_argument("--beta", metavar="LO:HI:N", type=spaced, help="imaginary parts: look at complex strengths")
-    parser.add_argument("--omega", metavar="W", type=above_zero, help="frequency of the drive (default: the scene's)")
     parser.add_argument(
         "--precision", metavar="P", type=above_zero, help="standard error to be reached (default: 0.001)"
     )
@@ -48,9 +46,7 @@ def configure(parser: ArgumentParser) -> None:
         "--periods", metavar="T", type=above_zero, help="drive periods (else units of 2 pi) at most (default: 5000)"
     )
     parser.add_argument("--starts", metavar="K", type=positive, help="initial states (default: 4)")
-    parser.add_argument("--topology", metavar="NAME", help="network: a family of graphs (default: the scene's)")
-    parser.add_argument("--n", metavar="N", type=whole, help="network: number of oscillators")
-    parser.add_argument("--matrix", metavar="FILE", help="network: connectivity matrix in a text file")
+    add_network(parser)
     parser.add_argument("--json", action="store_true", help="print JSON: alpha, exponent, stderr, intervals, class ...")
     parser.add_argument("--out", metavar="DIR", type=folder, help="write a figure (PNG) and the numbers (CSV) there")
     add_allow_code(parser)
@@ -100,41 +96,20 @@ def _tell(report: LineReport | PlaneReport, json: bool, files: list[Path]) -> No
 
 
 def _scene(arguments: Namespace) -> tuple[Scene, bool]:
-    """The oscillator with its network, and whether it has one; ValueError where it cannot be."""
+    """The oscillator with its network, and whether it has one; without one, two oscillators stand for it."""
     from synchain.models.graphs.families import topology
     from synchain.models.scenes.file import load_scene
-    from synchain.models.scenes.scene import Scene
 
     scene = None if arguments.scene is None else load_scene(arguments.scene)
-    graph = _graph(arguments, scene)
-    given = Scene(topology=graph or topology("chain", 2)) if scene is None else scene
-    chosen = at_frequency(given, arguments.omega, arguments.scene)
-    if graph is not None and graph != given.topology:
-        given = given.replace(topology=graph, axes=(), zipped=False, continuation="none", record=None)
-    return given.replace(axes=(), zipped=False, continuation="none", record=None, **chosen), graph is not None
-
-
-def _graph(arguments: Namespace, scene: Scene | None) -> Topology | None:
-    """The network by file, by name and size, or the scene's; None where there is none."""
-    from synchain.models.graphs.families import names, topology
-    from synchain.models.graphs.topology import read_matrix
-
-    if arguments.matrix is not None:
-        if arguments.n is not None or arguments.topology is not None:
-            raise WrongUse("found --matrix beside --n or --topology; expected the matrix alone")
-        graph = read_matrix(arguments.matrix)
-    elif arguments.n is None and arguments.topology is None:
-        return scene.topology if scene is not None and scene.topology.links else None
-    else:
-        known = scene is not None and scene.topology.name in names()
-        name = arguments.topology or (scene.topology.name if scene is not None and known else "chain")
-        size = arguments.n if arguments.n is not None else scene.n if scene is not None else None
-        if size is None:
-            raise WrongUse(f"--topology {name}: expected its number of oscillators too, e.g. --n 5")
-        graph = topology(name, size)
-    if not graph.links:
-        raise WrongUse(f"{graph.name}({graph.n}) has no links; expected a network of at least two coupled oscillators")
-    return graph
+    network = named_network(arguments, scene)
+    if network is not None and not network.links:
+        raise WrongUse(
+            f"{network.name}({network.n}) has no links; expected a network of at least two coupled oscillators"
+        )
+    if network is None and scene is not None and scene.topology.links:
+        network = scene.topology
+    stand_in = scene.topology if scene is not None else topology("chain", 2)
+    return scene_on(network or stand_in, scene, arguments), network is not None
 
 
 def _check(scene: Scene, network: bool, arguments: Namespace) -> None:

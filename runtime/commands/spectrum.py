@@ -6,6 +6,7 @@ from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
 from ..console.arguments import add_allow_code, whole
+from ..console.network import FILES, named_graph, named_values
 from ..console.outcome import FINE, WrongUse, print_json, warn, wrong_use
 
 if TYPE_CHECKING:
@@ -24,8 +25,6 @@ EXAMPLES = (
     "synchain spectrum --graphml network.graphml",
 )
 
-FILES = ("matrix", "edges", "graphml")
-
 PROVED = 500
 """Up to so many nodes closed forms are multiplied out here; this takes about two seconds."""
 
@@ -43,9 +42,12 @@ def configure(parser: ArgumentParser) -> None:
     )
     parser.add_argument("n", metavar="N", nargs="?", type=whole, help="number of nodes")
     parser.add_argument(
-        "--option", metavar="NAME=VALUE", action="append", default=[],
+        "--option",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
         help="an option of the family, e.g. offsets=1,3 or p=1/10 (see: synchain topologies); may be repeated",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--matrix",
         metavar="FILE",
@@ -75,20 +77,20 @@ def execute(arguments: Namespace) -> int:
     """Print the spectrum as a table or as JSON."""
     if arguments.value and not (arguments.symbolic and arguments.matrix):
         raise WrongUse("found --value without --symbolic --matrix FILE; expected all of them")
-    from synchain.models.spectra.solve import spectrum
+    from synchain.models.spectra.solve import Proof, spectrum
     from synchain.models.spectra.spectrum import table
 
     if arguments.symbolic:
         return _symbolic(arguments)
     with wrong_use():
-        chosen = graph(arguments)
-        found = spectrum(chosen, prove=chosen.n <= PROVED or ("primes" if chosen.n <= CHECKED else False))
-    if found.zeros > 1:
-        warn([f"zero is an eigenvalue of multiplicity {found.zeros}: {_reason(chosen)}"])
+        graph = named_graph(arguments)
+        eigenvalues = spectrum(graph, Proof.of_size(graph.n, PROVED, CHECKED))
+    if eigenvalues.zeros > 1:
+        warn([f"zero is an eigenvalue of multiplicity {eigenvalues.zeros}: {_reason(graph)}"])
     if arguments.json:
-        print_json(found.as_dict())
+        print_json(eigenvalues.as_dict())
     else:
-        print(table(found, None if arguments.all else SHOWN))
+        print(table(eigenvalues, None if arguments.all else SHOWN))
     return FINE
 
 
@@ -99,18 +101,18 @@ def _symbolic(arguments: Namespace) -> int:
 
     if arguments.matrix is not None and arguments.topology is None:
         return _letters(arguments)
-    given = [key for key in FILES if getattr(arguments, key) is not None]
-    if arguments.topology is None or arguments.n is not None or given:
+    files = [key for key in FILES if getattr(arguments, key) is not None]
+    if arguments.topology is None or arguments.n is not None or files:
         raise WrongUse("--symbolic: expected a family without its size, e.g. synchain spectrum chain --symbolic")
-    name, options = arguments.topology, _options(arguments.option)
+    name, options = arguments.topology, named_values(arguments.option)
     if is_composed(name) and options:
         raise WrongUse("--option: expected in the text of a product, e.g. 'cartesian(chain, torus(shape=(p, q)))'")
     with wrong_use():
-        found = read_form(name) if is_composed(name) else closed_form(name, **options)
+        form = read_form(name) if is_composed(name) else closed_form(name, **options)
     if arguments.json:
-        print_json({"topology": found.name, **found.as_dict()})
+        print_json({"topology": form.name, **form.as_dict()})
     else:
-        print(found.text)
+        print(form.text)
     return FINE
 
 
@@ -120,63 +122,19 @@ def _letters(arguments: Namespace) -> int:
     from synchain.models.spectra.spectrum import table
 
     with wrong_use():
-        found = read_symbols(arguments.matrix)
+        matrix = read_symbols(arguments.matrix)
         if arguments.value:
-            exact = found.at(**_options(arguments.value, "--value")).spectrum
-            text, listed = table(exact), exact.as_dict()
+            values = named_values(arguments.value, "--value", "NAME=NUMBER, e.g. a=1/2")
+            exact = matrix.at(**values).spectrum
+            text, as_dict = table(exact), exact.as_dict()
         else:
-            spectrum = found.spectrum
-            text, listed = spectrum.text, spectrum.as_dict()
+            symbolic = matrix.spectrum
+            text, as_dict = symbolic.text, symbolic.as_dict()
     if arguments.json:
-        print_json(listed)
+        print_json(as_dict)
     else:
         print(text)
     return FINE
-
-
-def graph(arguments: Namespace) -> Topology:
-    """The graph that the arguments ask for: of a family or of one of the files."""
-    from synchain.models.graphs.families import topology
-    from synchain.models.graphs.graph_text import is_composed, read_graph
-    from synchain.models.graphs.readers import read_edges, read_graphml
-    from synchain.models.graphs.topology import read_matrix
-
-    files = [key for key in FILES if getattr(arguments, key) is not None]
-    if arguments.directed and files != ["edges"]:
-        raise WrongUse("found --directed without --edges; GraphML files and matrices say themselves what is one-way")
-    if len(files) > 1:
-        raise WrongUse(f"found {' and '.join(f'--{key}' for key in files)}; expected one of them")
-    if files and (arguments.topology is not None or arguments.option):
-        raise WrongUse(f"found both a topology and --{files[0]}; expected one of them")
-    if arguments.matrix is not None:
-        return read_matrix(arguments.matrix)
-    if arguments.edges is not None:
-        return read_edges(arguments.edges, directed=arguments.directed)
-    if arguments.graphml is not None:
-        return read_graphml(arguments.graphml)
-    if arguments.topology is not None and is_composed(arguments.topology):
-        if arguments.n is not None or arguments.option:
-            raise WrongUse(
-                "found a product with N or --option; expected both in its text: 'cartesian(chain(4), ring(5))'"
-            )
-        return read_graph(arguments.topology)
-    if arguments.topology is None or arguments.n is None:
-        files_text = ", ".join(f"--{key} FILE" for key in FILES)
-        raise WrongUse(f"expected TOPOLOGY and N, e.g. synchain spectrum chain 4, or one of {files_text}")
-    return topology(arguments.topology, arguments.n, **_options(arguments.option))
-
-
-def _options(given: list[str], flag: str = "--option") -> dict[str, str]:
-    found: dict[str, str] = {}
-    for text in given:
-        name, equals, value = text.partition("=")
-        if not equals or not name.isidentifier():
-            example = "NAME=NUMBER, e.g. a=1/2" if flag == "--value" else "NAME=VALUE, e.g. offsets=1,3"
-            raise WrongUse(f"{flag}: found {text!r}; expected {example}")
-        if name in found:
-            raise WrongUse(f"{flag} {name} is given twice; expected it once")
-        found[name] = value
-    return found
 
 
 def _reason(graph: Topology) -> str:

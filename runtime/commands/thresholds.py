@@ -6,12 +6,12 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..console.arguments import above_zero, add_allow_code, add_workers, grid, positive, whole
-from ..console.drive import at_frequency, drive_words
+from ..console.arguments import above_zero, add_allow_code, add_workers, grid, positive
+from ..console.drive import drive_words
+from ..console.network import add_network, named_network, scene_on
 from ..console.outcome import FINE, WrongUse, print_json, warn, wrong_use
 
 if TYPE_CHECKING:
-    from synchain.models.graphs.topology import Topology
     from synchain.models.scenes.scene import Scene
 
     from ..prediction.intervals import Interval
@@ -32,12 +32,7 @@ RESOLUTION, COARSE = 5e-4, 2e-3
 
 def configure(parser: ArgumentParser) -> None:
     """Add network, drive, grid and criterion."""
-    parser.add_argument("--n", metavar="N", type=whole, help="number of oscillators")
-    parser.add_argument("--omega", metavar="W", type=above_zero, help="frequency of the drive (default: the scene's)")
-    parser.add_argument("--topology", metavar="T", help="family of graphs (see: synchain topologies; default: chain)")
-    parser.add_argument(
-        "--matrix", metavar="FILE", help="connectivity matrix in a text file, in place of --n, --topology"
-    )
+    add_network(parser)
     parser.add_argument(
         "--scene", metavar="SCENE", help="take oscillators and parameters from a scene (default: table 1)"
     )
@@ -98,38 +93,18 @@ def _effort(arguments: Namespace) -> dict[str, Any]:
 
 
 def _scene(arguments: Namespace) -> Scene:
-    """The network that the arguments describe; ValueError where it cannot be."""
+    """The network that the arguments describe; ValueError if there is none."""
     from synchain.models.scenes.file import load_scene
-    from synchain.models.scenes.scene import Scene
 
     scene = None if arguments.scene is None else load_scene(arguments.scene)
-    graph = _graph(arguments, scene)
+    network = named_network(arguments, scene)
     if scene is not None:
         scene.equations.expect_alike("thresholds")
-    given = Scene(topology=graph) if scene is None else scene
-    chosen = at_frequency(given, arguments.omega, arguments.scene)
-    if graph != given.topology:
-        given = given.replace(topology=graph, axes=(), zipped=False, continuation="none", record=None)
-    return given.replace(axes=(), zipped=False, continuation="none", record=None, **chosen)
-
-
-def _graph(arguments: Namespace, scene: Scene | None) -> Topology:
-    """The graph by file, by name and size, or the scene's."""
-    from synchain.models.graphs.families import names, topology
-    from synchain.models.graphs.topology import read_matrix
-
-    if arguments.matrix is not None:
-        if arguments.n is not None or arguments.topology is not None:
-            raise WrongUse("found --matrix beside --n or --topology; expected the matrix alone")
-        return read_matrix(arguments.matrix)
-    if scene is None:
-        if arguments.n is None:
+    if network is None:
+        if scene is None:
             raise WrongUse("expected a network, e.g. --n 4, --matrix FILE or --scene SCENE")
-        return topology(arguments.topology or "chain", arguments.n)
-    if arguments.n is None and arguments.topology is None:
-        return scene.topology
-    name = arguments.topology or (scene.topology.name if scene.topology.name in names() else "chain")
-    return topology(name, scene.n if arguments.n is None else arguments.n)
+        network = scene.topology
+    return scene_on(network, scene, arguments)
 
 
 def report(found: Thresholds, criterion: Criterion) -> str:

@@ -16,12 +16,11 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Print name, summary, smallest size and options of every family."""
-    from synchain.models.graphs.families import defaults, family, names
+    from synchain.models.graphs.families import family, names
 
-    rows = [(name, family(name)) for name in names()]
-    wide = max(len(name) for name, _ in rows)
-    for name, module in rows:
-        chosen = ", ".join(defaults(module))
-        more = f"; options: {chosen}" if chosen else ""
-        print(f"{name:<{wide}}  {module.SUMMARY}, {module.MINIMUM} or more nodes{more}")
+    families = [family(name) for name in names()]
+    width = max(len(each.name) for each in families)
+    for each in families:
+        options = f"; options: {', '.join(each.options)}" if each.options else ""
+        print(f"{each.name:<{width}}  {each.summary}, {each.minimum} or more nodes{options}")
     return FINE

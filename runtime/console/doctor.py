@@ -1,37 +1,45 @@
-"""Is this installation sound?  Versions, cache, processor, elementary functions, and answers that are known."""
+"""Checks of an installation: versions, cache, processor, an exact spectrum and a trial kernel."""
 
 from __future__ import annotations
 
 import importlib.metadata
-import math
 import os
 import platform
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-__all__ = ["CHECKS", "Check", "examine"]
+if TYPE_CHECKING:
+    import sympy as sp
+
+__all__ = ["CHECKS", "Check", "examine", "judge_spectrum", "judge_trajectory"]
 
 FINE, DOUBTFUL, WRONG = "fine", "doubtful", "wrong"
-LANE_ERROR = 1.5
-"""Largest error of an elementary function, in units of the last place."""
-EDGES: dict[str, tuple[float, ...]] = {
-    "exp": (0.0, -0.0, 1e-300, 0.5 * math.log(2.0), 1.0, -1.0, 709.78, -708.3, -744.0),
-    "expm1": (1e-300, -1e-16, 0.34, 0.35, -0.3, 1.0, 700.0, -40.0),
-    "log": (1.0, 1.0 - 2.0**-53, 1.0 + 2.0**-52, 5e-324, 2.2250738585072014e-308, math.sqrt(0.5), 2.0, 1.7e308),
-    "atan": (0.0, 5e-324, -1e-8, 0.4375, 1.0, -1.0, 2.4142135623730951, 1e5, -1e16, 1.7e308),
-    "sin": (0.0, 1e-300, math.pi / 4, math.pi / 2, math.pi, -22.0, 355.0, 1e5, 1e9),
-    "cos": (0.0, 1e-300, math.pi / 4, math.pi / 2, math.pi, -22.0, 355.0, 1e5, 1e9),
-    "tanh": (0.0, 1e-300, 0.625, -0.55, 1.0, 18.9, 22.0, -800.0),
-}
-"""Function -> arguments beside its seams, zeros, and the ends of the range of double precision."""
+
 TRAJECTORY_ERROR = 1e-9
+"""Largest error of a state of the trial kernel."""
+
+Answer = tuple[str, str, str]
+"""Outcome, what was found, what helps."""
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """What was looked at, how it is ("fine", "doubtful" or "wrong"), what was found, and what helps."""
+    """The outcome of one check.
+
+    Attributes
+    ----------
+    name : str
+        What was checked.
+    outcome : str
+        "fine", "doubtful" or "wrong".
+    found : str
+        What the check saw.
+    remedy : str
+        What the user can do; empty if the outcome is fine.
+    """
 
     name: str
     outcome: str
@@ -43,19 +51,26 @@ class Check:
         return {"name": self.name, "outcome": self.outcome, "found": self.found, "remedy": self.remedy}
 
 
-def examine() -> Iterator[Check]:
-    """Yield the checks one after the other; one that cannot be made is wrong and says why."""
-    for name, look in CHECKS.items():
+def examine(checks: Mapping[str, Callable[[], Answer]] | None = None) -> Iterator[Check]:
+    """Run checks one after the other.
+
+    Parameters
+    ----------
+    checks : mapping of str to callable, optional
+        Name -> function that returns outcome, finding and remedy; CHECKS by default.
+
+    Yields
+    ------
+    Check
+        One for each function; an exception in it is the outcome "wrong".
+    """
+    for name, check in (CHECKS if checks is None else checks).items():
         try:
-            outcome, found, remedy = look()
+            outcome, found, remedy = check()
         except Exception as problem:  # a broken installation may raise anything anywhere
             reason = " ".join(str(problem).split()) or "no reason given"
             outcome, found, remedy = WRONG, f"{type(problem).__name__}: {reason}", "install synchain anew"
         yield Check(name, outcome, found, remedy)
-
-
-Answer = tuple[str, str, str]
-"""Outcome, what was found, what helps."""
 
 
 def _packages() -> Answer:
@@ -108,61 +123,19 @@ def _processor() -> Answer:
     return FINE, words, ""
 
 
-def _elementary_functions() -> Answer:
-    from synchain.codegen.simd.lane_types import native_width
-
-    width = native_width()
-    worst = max((_lane_error(name, width), name) for name in EDGES)
-    words = f"largest error {worst[0]:.2f} units of the last place, in {worst[1]}, {width} lanes"
-    if not worst[0] <= LANE_ERROR:
-        return WRONG, f"{words}; expected at most {LANE_ERROR}", "report this with the lines above"
-    return FINE, words, ""
-
-
-def _lane_error(name: str, width: int) -> float:
-    """The largest error at the edges, in units of the last place of the result."""
-    import mpmath
-
-    points = np.array(EDGES[name])
-    found = _evaluate(name, points, width)
-    if not np.isfinite(found).all():
-        return math.inf
-    with mpmath.workdps(60):
-        exact = [getattr(mpmath, name)(mpmath.mpf(float(x))) for x in points]
-        gaps = [abs(mpmath.mpf(float(y)) - e) for y, e in zip(found, exact, strict=True)]
-        units = np.spacing(np.maximum(np.abs([float(e) for e in exact]), np.finfo(float).tiny))
-        return float(max(gap / mpmath.mpf(float(unit)) for gap, unit in zip(gaps, units, strict=True)))
-
-
-def _evaluate(name: str, points: np.ndarray, width: int) -> np.ndarray:
-    """The values (m,) of an elementary function of lanes at the points (m,)."""
-    from numba import njit
-
-    from synchain.codegen.simd import elementary
-    from synchain.codegen.simd.lanes import load, store
-
-    function = getattr(elementary, name)
-
-    @njit(error_model="numpy")
-    def loop(a: np.ndarray, out: np.ndarray) -> None:
-        for i in range(a.size // width):
-            store(out, i, function(load(a, i, width)))
-
-    padded = np.concatenate([points, np.ones(-len(points) % width)])
-    out = np.empty_like(padded)
-    loop(padded, out)
-    return out[: len(points)]
-
-
 def _spectrum() -> Answer:
-    import sympy as sp
-
     from synchain.models.graphs.families import topology
 
-    found = [(e.exact, e.multiplicity) for e in topology("chain", 4).spectrum.eigenvalues]
+    return judge_spectrum({e.exact: e.multiplicity for e in topology("chain", 4).spectrum.eigenvalues})
+
+
+def judge_spectrum(eigenvalues: Mapping[sp.Expr, int]) -> Answer:
+    """Compare exact eigenvalues and their multiplicities with those of the chain of four nodes."""
+    import sympy as sp
+
     root = sp.sqrt(2)
-    if dict(found) != {sp.S.Zero: 1, root - 2: 1, sp.Integer(-2): 1, -root - 2: 1}:
-        return WRONG, f"the chain of 4 has {found}", "install sympy and python-flint anew"
+    if dict(eigenvalues) != {sp.S.Zero: 1, root - 2: 1, sp.Integer(-2): 1, -root - 2: 1}:
+        return WRONG, f"the chain of 4 has {dict(eigenvalues)}", "install sympy and python-flint anew"
     return FINE, "the chain of 4 has 0, -2+√2, -2, -2-√2, exactly", ""
 
 
@@ -172,19 +145,22 @@ def _trajectory() -> Answer:
 
     case = read_case("friction, n = 1").within(5)
     states, counts = prepare(case, "rodas5p", 1)(1e-11, 1e-12, case.times)
-    error = float(np.abs(states - case.states).max())
-    words = f"stick-slip over 5 periods: error {error:.1e} in {int(counts[-1, 1])} steps"
+    return judge_trajectory(float(np.abs(states - case.states).max()), int(counts[-1, 1]))
+
+
+def judge_trajectory(error: float, steps: int) -> Answer:
+    """Judge the largest error of a state over five drive periods; NaN is wrong."""
+    words = f"stick-slip over 5 periods: error {error:.1e} in {steps} steps"
     if not error <= TRAJECTORY_ERROR:
         return WRONG, f"{words}; expected at most {TRAJECTORY_ERROR:g}", "run: synchain cache clear"
     return FINE, words, ""
 
 
-CHECKS: dict[str, Callable[[], Answer]] = {
+CHECKS: Mapping[str, Callable[[], Answer]] = {
     "packages": _packages,
     "cache": _cache,
     "processor": _processor,
-    "elementary functions": _elementary_functions,
     "spectrum": _spectrum,
     "trajectory": _trajectory,
 }
-"""Name -> look."""
+"""Name -> check."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from synchain.models.scenes.scene import Scene
+from typing import TYPE_CHECKING
 
 from .outcome import WrongUse
+
+if TYPE_CHECKING:
+    from synchain.models.scenes.scene import Scene
 
 __all__ = ["at_frequency", "drive_words"]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from synchain.models.graphs.topology import Topology
 
-from ..prediction.modes import transversal
+from ..prediction.modes import transversal_modes
 from ..prediction.synchronisability import Verdict, verdict
 from ..stability.msf import MSF
 from .words import (
@@ -34,7 +34,7 @@ GRID_ENDS = "undecided: the function is negative where the grid of alpha ends"
 
 def complex_modes(graph: Topology, highest: float) -> list[str]:
     """A sentence where a network has complex eigenvalues, so that a line of real strengths says nothing about it."""
-    gammas = [complex(mode.eigenvalue.value) for mode in transversal(graph)]
+    gammas = [complex(mode.eigenvalue.value) for mode in transversal_modes(graph)]
     slopes = [abs(g.imag / g.real) for g in gammas if g.imag and g.real]
     if not any(g.imag for g in gammas):
         return []

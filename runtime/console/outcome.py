@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from typing import Any
+from contextlib import contextmanager, suppress
 
-__all__ = ["FAILED", "FINE", "WRONG_USE", "Failed", "WrongUse", "print_json", "sentence", "warn", "wrong_use"]
+__all__ = [
+    "FAILED",
+    "FINE",
+    "WRONG_USE",
+    "Failed",
+    "WrongUse",
+    "discard_output",
+    "print_json",
+    "sentence",
+    "warn",
+    "wrong_use",
+]
 
 FINE, FAILED, WRONG_USE = 0, 1, 2
 
@@ -33,7 +44,7 @@ def wrong_use() -> Iterator[None]:
     """Errors about values, types and files inside the block are the user's; anything else stays what it is."""
     try:
         yield
-    except BrokenPipeError:  # nobody's mistake: whoever reads the output has seen enough
+    except BrokenPipeError:  # no mistake: the reader of the output has seen enough
         raise
     except (ValueError, TypeError, OSError) as problem:
         raise WrongUse(sentence(problem)) from problem
@@ -45,7 +56,16 @@ def warn(sentences: Iterable[str]) -> None:
         print(f"warning: {words}", file=sys.stderr)
 
 
-def print_json(value: Any) -> None:
+def discard_output() -> None:
+    """Send the rest of stdout's buffer to nowhere, so that the interpreter ends without a complaint."""
+    with suppress(OSError, ValueError):
+        descriptor = sys.stdout.fileno()
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, descriptor)
+        os.close(nowhere)
+
+
+def print_json(value: object) -> None:
     """Write JSON to stdout; NaN and infinity are refused."""
     import json
 

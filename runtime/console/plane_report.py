@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..prediction.modes import transversal
-from ..prediction.one_way import windows_complex
-from ..prediction.synchronisability import Window
+from ..prediction.modes import transversal_modes
+from ..prediction.synchronisability import Window, windows_complex
 from ..stability.msf import Plane
 from .words import defective_rows, finite, headline, how, rows_of, window_dict, window_text, write_files
 
@@ -85,7 +84,7 @@ def plane_windows(found: Plane) -> tuple[Window, ...]:
     value = np.nan_to_num(found.exponent, nan=size, posinf=size, neginf=-size)
     at = RegularGridInterpolator((found.alpha, found.beta), value, bounds_error=False, fill_value=math.inf)
     graph = found.scene.topology
-    top = min((_leaves(found, -complex(mode.eigenvalue.value)) for mode in transversal(graph)), default=0.0)
+    top = min((_leaves(found, -complex(mode.eigenvalue.value)) for mode in transversal_modes(graph)), default=0.0)
     if not 0 < top < math.inf:
         return ()
 

@@ -13,7 +13,7 @@ import numpy as np
 from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 
-from ..prediction.modes import Mode
+from ..prediction.modes import NetworkMode
 from ..prediction.synchronisability import Window
 from .drive import drive_words
 
@@ -86,7 +86,7 @@ def window_dict(window: Window) -> dict[str, Any]:
     return {**{name: getattr(window, name) for name in names}, **modes}
 
 
-def exact(mode: Mode | None) -> str | None:
+def exact(mode: NetworkMode | None) -> str | None:
     """The eigenvalue of a mode as exact text."""
     return None if mode is None else mode.eigenvalue.text
 

@@ -4,7 +4,7 @@ A figure is a module of this folder with
 
 * NAMES: the figures that it makes, and perhaps EXTRA: more of them, made only when asked for by name,
 * SIZE: width and height in inches,
-* ``compute(name, study) -> data``: the numbers, through the runs that a `Study` shares between figures,
+* ``compute(name, runs) -> data``: the numbers, through the runs that a `FigureRuns` shares between figures,
 * ``table(data) -> Table``: the same numbers as columns; perhaps ``ranges(data) -> Table``, ``document(data) -> str``
   (Markdown) beside it,
 * ``draw(axes, data) -> axes``: takes and returns matplotlib axes and never shows anything,
@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 from synchain.models.inputs.checks import suggestion
 
 if TYPE_CHECKING:
-    from .study import Study
+    from .figure_runs import FigureRuns
     from .tables import Table
 
 __all__ = ["Drawing", "load", "names"]
@@ -43,9 +43,9 @@ class Drawing:
         """Width and height in inches."""
         return self.module.SIZE
 
-    def compute(self, study: Study) -> Any:
+    def compute(self, runs: FigureRuns) -> Any:
         """Return the numbers of the figure, simulated where the study has not got them yet."""
-        return self.module.compute(self.name, study)
+        return self.module.compute(self.name, runs)
 
     def table(self, data: Any) -> Table:
         """Return the numbers as columns for `<name>.csv`."""

@@ -15,8 +15,8 @@ from synchain.models.scenes.file import load_scene
 
 from ..results.result import Result
 from ..support.status import Status
+from .figure_runs import FigureRuns
 from .published import published
-from .study import Study
 from .style import BLACK, COLUMN, ORANGE, bands, bracket, failures, note
 from .sync_error import synchronous
 from .tables import Table, status_names
@@ -38,7 +38,7 @@ class Diagram:
     published: tuple[tuple[float, float], ...]
 
 
-def compute(name: str, study: Study) -> Diagram:
+def compute(name: str, runs: FigureRuns) -> Diagram:
     """Run the scene of a figure; one with several oscillators also records its synchronisation error."""
     plain, _, direction = name.removeprefix("figure_").partition("_")
     scene = load_scene(f"figure_{plain}")
@@ -47,7 +47,7 @@ def compute(name: str, study: Study) -> Diagram:
     if direction:
         scene = scene.replace(continuation=direction)
     row = published(scene.n, scene.parameters["omega"]) if scene.n > 1 else None
-    return Diagram(study.run(scene), scene.axes[0].name, row.intervals if row else ())
+    return Diagram(runs.run(scene), scene.axes[0].name, row.intervals if row else ())
 
 
 def points(data: Diagram) -> tuple[np.ndarray, np.ndarray]:

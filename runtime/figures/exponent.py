@@ -15,8 +15,8 @@ from synchain.models.scenes.scene import Scene
 
 from ..prediction.intervals import Interval, scale
 from ..stability.msf import MSF, msf
+from .figure_runs import FigureRuns
 from .published import PAIRS, published
-from .study import Study
 from .style import BLUE, COLUMN, ORANGE, bands, bracket
 from .tables import Table
 
@@ -39,31 +39,31 @@ SIZE = (COLUMN, 4.4)
 HIGHEST = 1.2
 """Largest strength: that of the paper's probe, sigma = 0.6 of two oscillators."""
 
-_KEPT: WeakKeyDictionary[Study, dict[Scene, MSF]] = WeakKeyDictionary()
+_KEPT: WeakKeyDictionary[FigureRuns, dict[Scene, MSF]] = WeakKeyDictionary()
 
 
-def curve(scene: Scene, study: Study) -> MSF:
+def curve(scene: Scene, runs: FigureRuns) -> MSF:
     """The function of a scene's oscillator on 0 … HIGHEST; figures that share a study share it."""
     pair = scene.replace(topology=topology("chain", 2), initial=None, axes=(), record=None, title="", sigma=0.0)
-    kept = _KEPT.setdefault(study, {})
+    kept = _KEPT.setdefault(runs, {})
     if pair not in kept:
-        alpha = np.linspace(0.0, HIGHEST, min(study.quality.points or 241, 241))
-        kept[pair] = msf(pair, alpha, **effort(study))
+        alpha = np.linspace(0.0, HIGHEST, min(runs.quality.points or 241, 241))
+        kept[pair] = msf(pair, alpha, **effort(runs))
     return kept[pair]
 
 
-def effort(study: Study) -> dict[str, Any]:
-    """Options of `exponents` that fit the quality of a study."""
-    quality = study.quality
+def effort(runs: FigureRuns) -> dict[str, Any]:
+    """Options of `exponents` that fit the quality of a runs."""
+    quality = runs.quality
     return {
         "precision": 2.0 * quality.resolution, "periods": 5.0 * quality.criterion.transient, "transient": 200.0,
-        "starts": min(quality.criterion.starts, 4), "workers": study.workers, "show_progress": study.show_progress,
+        "starts": min(quality.criterion.starts, 4), "workers": runs.workers, "show_progress": runs.show_progress,
     }  # fmt: skip
 
 
-def compute(name: str, study: Study) -> tuple[MSF, ...]:
+def compute(name: str, runs: FigureRuns) -> tuple[MSF, ...]:
     """The function at each of the paper's frequencies."""
-    return tuple(curve(Scene(topology=topology("chain", 2), parameters={"omega": omega}), study) for omega in PAIRS)
+    return tuple(curve(Scene(topology=topology("chain", 2), parameters={"omega": omega}), runs) for omega in PAIRS)
 
 
 def table(data: tuple[MSF, ...]) -> Table:

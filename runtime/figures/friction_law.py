@@ -13,7 +13,7 @@ from synchain.models.mechanics.friction import regularise
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 
-from .study import Study
+from .figure_runs import FigureRuns
 from .style import BLUE, COLUMN, ORANGE
 from .tables import Table
 
@@ -33,7 +33,7 @@ class Law:
     kappa: float
 
 
-def compute(name: str, study: Study) -> Law:
+def compute(name: str, runs: FigureRuns) -> Law:
     """Evaluate the friction law of the scene; nothing is simulated."""
     scene = load_scene(name)
     kappa = scene.parameters["kappa"]

@@ -11,7 +11,7 @@ from tqdm import tqdm
 from ..support.files import output_folder, write_text
 from . import Drawing, load
 from . import names as all_names
-from .study import FULL, QUICK, Study
+from .figure_runs import FULL, QUICK, FigureRuns
 from .style import context, new_figure, save
 from .tables import as_csv
 
@@ -35,18 +35,18 @@ def make(
     """
     wanted = [load(name) for name in dict.fromkeys(names or all_names())]
     folder = output_folder(out)
-    study = Study(QUICK if quick else FULL, workers=workers)
+    runs = FigureRuns(QUICK if quick else FULL, workers=workers)
     written: list[Path] = []
     with tqdm(wanted, unit="figure", disable=None if show_progress is None else not show_progress) as bar:
         for drawing in bar:
             bar.set_postfix_str(drawing.name)
-            written += produce(drawing, study, folder)
+            written += produce(drawing, runs, folder)
     return written
 
 
-def produce(drawing: Drawing, study: Study, folder: Path) -> list[Path]:
+def produce(drawing: Drawing, runs: FigureRuns, folder: Path) -> list[Path]:
     """Compute one figure and write its files: the numbers first, then what they look like."""
-    data = drawing.compute(study)
+    data = drawing.compute(runs)
     texts = {f"{drawing.name}.csv": as_csv(drawing.table(data))}
     if hasattr(drawing.module, "ranges"):
         texts[f"{drawing.name}_ranges.csv"] = as_csv(drawing.module.ranges(data))

@@ -16,10 +16,10 @@ from matplotlib.colors import TwoSlopeNorm
 from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 
-from ..prediction.modes import transversal
+from ..prediction.modes import transversal_modes
 from ..stability.msf import Plane, plane
 from .exponent import HIGHEST, effort, finite
-from .study import Study
+from .figure_runs import FigureRuns
 from .style import BLACK, COLUMN
 from .tables import Table
 
@@ -51,12 +51,12 @@ def uneven_ring(n: int, back: Fraction = Fraction(1, 2)) -> Topology:
     return Topology("uneven ring", n, tuple(sorted(links)))
 
 
-def compute(name: str, study: Study) -> Rays:
+def compute(name: str, runs: FigureRuns) -> Rays:
     """The function at one frequency, for the upper half of the plane; the lower one mirrors it."""
     scene = Scene(topology=uneven_ring(NODES), parameters={"omega": OMEGA})
-    count = min(study.quality.grid or 161, 161)
+    count = min(runs.quality.grid or 161, 161)
     alpha, beta = np.linspace(0.0, HIGHEST, count), np.linspace(0.0, TOP, count // 2 + 1)
-    return Rays(plane(scene, alpha, beta, **effort(study)), SIGMA)
+    return Rays(plane(scene, alpha, beta, **effort(runs)), SIGMA)
 
 
 def table(data: Rays | Plane) -> Table:
@@ -112,7 +112,7 @@ def draw_rays(axes: Any, found: Plane, sigma: float | None = None) -> Any:
     """
     graph = found.scene.topology
     still: dict[str, Any] = {"scalex": False, "scaley": False}
-    for mode in transversal(graph):
+    for mode in transversal_modes(graph):
         unit = -complex(mode.eigenvalue.value)
         (ray,) = axes.plot([0.0, FAR * unit.real], [0.0, FAR * unit.imag], **RAY, **still)
         ray.set_label(rf"$-\sigma\gamma_k$ of {graph.name}({graph.n})" if mode.number == 1 else "")

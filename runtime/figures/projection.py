@@ -24,8 +24,8 @@ from ..prediction.intervals import Interval, intersect, scale
 from ..stability.msf import MSF
 from ..synchronisation.threshold import Sweep
 from .exponent import curve, finite
+from .figure_runs import FigureRuns
 from .published import published
-from .study import Study
 from .style import BLACK, BLUE, COLUMN, GREEN, GREY, ORANGE, PURPLE, bands, bracket, failures, note
 from .tables import Table
 
@@ -49,13 +49,13 @@ class Projection:
     exponent: MSF
 
 
-def compute(name: str, study: Study) -> Projection:
+def compute(name: str, runs: FigureRuns) -> Projection:
     """Sweep the probe and the network of a figure's scene, and take the exponent from its tangent equations."""
     scene = load_scene(name)
     row = published(scene.n, scene.parameters["omega"])
     return Projection(
-        scene, study.pair(scene), study.network(scene), tuple(study.predicted(scene)), row.intervals if row else (),
-        curve(scene, study),
+        scene, runs.pair(scene), runs.network(scene), tuple(runs.predicted(scene)), row.intervals if row else (),
+        curve(scene, runs),
     )  # fmt: skip
 
 

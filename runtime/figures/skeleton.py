@@ -18,12 +18,13 @@ from synchain.models.scenes.axis import Axis
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 
+from ..bifurcation.bifurcations import BifurcationKind
 from ..bifurcation.branches import Branch
 from ..bifurcation.periodic import PeriodicOrbit
 from ..bifurcation.skeleton import skeleton
 from ..sweeps.run import run
 from .bifurcation import Diagram, points
-from .study import Study
+from .figure_runs import FigureRuns
 from .style import BLACK, BLUE, COLUMN, ORANGE, PURPLE
 from .tables import Table
 
@@ -37,7 +38,12 @@ COLOURS = {1: PURPLE, 2: ORANGE, 4: BLUE}
 CLOUD = "#b4b4b4"
 CROWDED, INSET = ((1.443, 1.484), (0.585, 0.611)), (0.11, 0.08, 0.36, 0.35)
 """The part that is drawn larger, and where."""
-KINDS = {"period doubling": "o", "fold": "s", "grazing": "^", "stick loss": "v"}
+MARKERS = {
+    BifurcationKind.PERIOD_DOUBLING: "o",
+    BifurcationKind.FOLD: "s",
+    BifurcationKind.GRAZING: "^",
+    BifurcationKind.STICK_LOSS: "v",
+}
 STABLE: dict[str, Any] = {"linestyle": "-", "linewidth": 1.2}
 UNSTABLE: dict[str, Any] = {"linestyle": "--", "dashes": (2.5, 1.2), "linewidth": 0.8}
 MARK: dict[str, Any] = {"linestyle": "none", "markersize": 3.6, "markerfacecolor": "white", "markeredgewidth": 0.9,
@@ -57,7 +63,7 @@ class Place:
     orbit: PeriodicOrbit
     x: np.ndarray
     phases: str = ""
-    kind: str | None = None
+    kind: BifurcationKind | None = None
     residual: float = 0.0
 
 
@@ -69,15 +75,15 @@ class Skeleton:
     branches: tuple[tuple[Place, ...], ...]
 
 
-def compute(name: str, study: Study) -> Skeleton:
+def compute(name: str, runs: FigureRuns) -> Skeleton:
     """Run the scene of figure 3 with set-valued friction, and find its orbits of one, two and four drive periods."""
     scene = load_scene("figure_3").replace(contact="set-valued")
     cloud, values, looks = FULL
-    grid = study.quality.grid
+    grid = runs.quality.grid
     values, looks = (values, looks) if grid is None else (max(3, (grid + 1) // 3), max(1, grid // 12))
     swept = scene.replace(axes=(Axis.between("omega", LOW, HIGH, cloud),))
     found = skeleton(scene.replace(axes=()), "omega", np.linspace(LOW, HIGH, values), PERIODS, looks)
-    return Skeleton(Diagram(study.run(swept), "omega", ()), tuple(_placed(scene, branch) for branch in found))
+    return Skeleton(Diagram(runs.run(swept), "omega", ()), tuple(_placed(scene, branch) for branch in found))
 
 
 def _placed(scene: Scene, branch: Branch) -> tuple[Place, ...]:
@@ -86,8 +92,7 @@ def _placed(scene: Scene, branch: Branch) -> tuple[Place, ...]:
         Place(float(value), orbit, np.empty(0), phases.words)
         for value, orbit, phases in zip(branch.values, branch.orbits, branch.phases, strict=True)
     ]
-    for (value, words), residual, orbit in zip(branch.bifurcations, branch.residuals, branch.at, strict=True):
-        found.append(Place(value, orbit, np.empty(0), "", words, residual))
+    found += [Place(each.value, each.orbit, np.empty(0), "", each.kind, each.residual) for each in branch.bifurcations]
     found.sort(key=lambda place: place.value)
     crossed = _crossings(scene, branch.name, [place.orbit for place in found])
     return tuple(replace(place, x=x) for place, x in zip(found, crossed, strict=True))
@@ -178,7 +183,7 @@ def _diagram(axes: Any, data: Skeleton, size: float) -> None:
         for place in branch:
             if place.kind is not None:
                 across = np.full(len(place.x), place.value)
-                axes.plot(across, place.x, markeredgecolor=colour, **MARK, marker=KINDS[place.kind])
+                axes.plot(across, place.x, markeredgecolor=colour, **MARK, marker=MARKERS[place.kind])
 
 
 def curves(branch: tuple[Place, ...]) -> list[tuple[bool, list[tuple[float, float]]]]:
@@ -209,10 +214,10 @@ def _key(data: Skeleton) -> list[Line2D]:
     """What colours, lines and marks stand for, those that occur."""
     counts = sorted({_periods(branch) for branch in data.branches})
     found = {place.kind for branch in data.branches for place in branch}
-    kinds = [kind for kind in KINDS if kind in found]
+    kinds = [kind for kind in MARKERS if kind in found]
     return [
         *(Line2D([], [], color=COLOURS.get(n, BLACK), label=f"{n} drive period{'s' if n > 1 else ''}") for n in counts),
         Line2D([], [], color=BLACK, label="stable", **STABLE), Line2D([], [], color=BLACK, label="unstable", **UNSTABLE),
         Line2D([], [], color=CLOUD, marker=".", linestyle="none", label="motion"),
-        *(Line2D([], [], markeredgecolor=BLACK, marker=KINDS[kind], label=kind, **MARK) for kind in kinds),
+        *(Line2D([], [], markeredgecolor=BLACK, marker=MARKERS[kind], label=kind, **MARK) for kind in kinds),
     ]  # fmt: skip

@@ -9,12 +9,12 @@ import numpy as np
 
 from synchain.models.scenes.file import load_scene
 
-from ..prediction.intervals import Interval, runs
+from ..prediction.intervals import Interval, grid_intervals
 from ..results.result import Result
 from ..support.status import Status
 from ..synchronisation.threshold import Criterion
+from .figure_runs import FigureRuns
 from .published import published
-from .study import Study
 from .style import BLUE, COLUMN, ORANGE, bands, bracket, failures, note
 from .tables import Table, status_names
 
@@ -32,11 +32,11 @@ class Errors:
     published: tuple[Interval, ...]
 
 
-def compute(name: str, study: Study) -> Errors:
+def compute(name: str, runs: FigureRuns) -> Errors:
     """Run the scene of a figure; the section is recorded too, so that figures 4d-f share the runs."""
     scene = load_scene(name)
     row = published(scene.n, scene.parameters["omega"])
-    return Errors(study.run(scene.replace(record=("sync_error", "section"))), row.intervals if row else ())
+    return Errors(runs.run(scene.replace(record=("sync_error", "section"))), row.intervals if row else ())
 
 
 def synchronous(result: Result, tolerance: float = Criterion().tolerance) -> list[Interval]:
@@ -46,7 +46,7 @@ def synchronous(result: Result, tolerance: float = Criterion().tolerance) -> lis
     middles = 0.5 * (x[1:] + x[:-1])
     lower, upper = np.append(x[:1], middles), np.append(middles, x[-1:])
     left, right = dict(zip(x, lower, strict=True)), dict(zip(x, upper, strict=True))
-    return [(float(left[a]), float(right[b])) for a, b in runs(x, good)]
+    return [(float(left[a]), float(right[b])) for a, b in grid_intervals(x, good)]
 
 
 def table(data: Errors) -> Table:

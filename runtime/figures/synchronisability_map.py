@@ -16,11 +16,11 @@ from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 
-from ..prediction.modes import transversal
-from ..stability.transversal import exponents
+from ..prediction.modes import transversal_modes
+from ..stability.exponents import exponents
 from .exponent import effort
+from .figure_runs import FigureRuns
 from .published import PAIRS, published
-from .study import Study
 from .style import COLUMN, ORANGE
 from .tables import Table
 
@@ -47,15 +47,15 @@ class Map:
     attractors: tuple[str, ...]
 
 
-def compute(name: str, study: Study) -> Map:
+def compute(name: str, runs: FigureRuns) -> Map:
     """One run over all strengths for each frequency."""
-    grid = study.quality.grid or 241
-    omega = np.linspace(LOW, HIGH, grid // 2 + 1 if study.quality.grid else 161)
+    grid = runs.quality.grid or 241
+    omega = np.linspace(LOW, HIGH, grid // 2 + 1 if runs.quality.grid else 161)
     sigma = np.linspace(0.0, SIGMA, grid)
-    steepest = max(mode.size for graph in _graphs() for mode in transversal(graph))
+    steepest = max(mode.size for graph in _graphs() for mode in transversal_modes(graph))
     alpha = np.linspace(0.0, SIGMA * steepest, 2 * grid - 1)
-    options = {**effort(study), "precision": 10.0 * study.quality.resolution, "transient": 100.0}
-    options.update(periods=study.quality.criterion.transient, starts=min(study.quality.criterion.starts, 3))
+    options = {**effort(runs), "precision": 10.0 * runs.quality.resolution, "transient": 100.0}
+    options.update(periods=runs.quality.criterion.transient, starts=min(runs.quality.criterion.starts, 3))
     pair = Scene(topology=topology("chain", 2))
     found = [exponents(pair, alpha, omega=float(value), **options) for value in omega]
     kinds = tuple("; ".join(dict.fromkeys(a.kind for a in e.attractors)) for e in found)
@@ -68,7 +68,7 @@ def _graphs() -> list[Topology]:
 
 def largest_exponent(data: Map, graph: Topology) -> np.ndarray:
     """The largest exponent (omegas, sigmas) of a network's modes, interpolated between strengths: the starts' median."""
-    strengths = [data.sigma * mode.size for mode in transversal(graph)]
+    strengths = [data.sigma * mode.size for mode in transversal_modes(graph)]
     worst = [[[np.interp(x, data.alpha, row) for x in strengths] for row in starts] for starts in data.exponent]
     return np.asarray(np.median(np.max(worst, axis=2), axis=1))
 

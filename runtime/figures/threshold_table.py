@@ -12,8 +12,8 @@ from synchain.models.scenes.scene import Scene
 
 from ..prediction.intervals import Interval, intersect
 from . import projection
+from .figure_runs import FigureRuns, Quality
 from .published import NOT_PERIODIC, PUBLISHED, Published, published
-from .study import Quality, Study
 from .style import BLUE, COLUMN, GREEN, ORANGE, failures
 from .tables import Table
 
@@ -70,27 +70,27 @@ class Comparison:
     quality: Quality
 
 
-def compute(name: str, study: Study) -> Comparison:
+def compute(name: str, runs: FigureRuns) -> Comparison:
     """Measure the published rows and longer chains where the motion is not periodic."""
     cases = [(row.n, row.omega) for row in PUBLISHED]
-    cases += [(n, omega) for n in study.quality.networks for omega in NOT_PERIODIC]
-    return Comparison(tuple(_row(n, omega, study) for n, omega in cases), study.quality)
+    cases += [(n, omega) for n in runs.quality.networks for omega in NOT_PERIODIC]
+    return Comparison(tuple(_row(n, omega, runs) for n, omega in cases), runs.quality)
 
 
-def _row(n: int, omega: float, study: Study) -> Row:
-    scene = scene_of(n, omega, study)
-    found = study.network(scene)
-    predicted = tuple(study.predicted(scene))
+def _row(n: int, omega: float, runs: FigureRuns) -> Row:
+    scene = scene_of(n, omega, runs)
+    found = runs.network(scene)
+    predicted = tuple(runs.predicted(scene))
     failed = int((~np.isfinite(found.error)).sum())
     return Row(n, omega, found.intervals, predicted, published(n, omega), failed, len(found.x))
 
 
-def scene_of(n: int, omega: float, study: Study) -> Scene:
+def scene_of(n: int, omega: float, runs: FigureRuns) -> Scene:
     """The scene of the figure that shows this chain, so that both share their runs, or one made for it."""
     for scene in map(load_scene, projection.NAMES):
         if (scene.n, scene.parameters["omega"]) == (n, omega):
             return scene
-    return study.chain(n, omega)
+    return runs.chain(n, omega)
 
 
 def joined(found: tuple[Interval, ...], gap: float = GAP) -> tuple[Interval, ...]:

@@ -13,8 +13,8 @@ from matplotlib.ticker import MaxNLocator
 
 from ..prediction.intervals import Interval
 from ..synchronisation.threshold import Sweep
+from .figure_runs import FigureRuns
 from .published import NOT_PERIODIC, PUBLISHED, Published
-from .study import Study
 from .style import COLUMN, ORANGE
 from .tables import Table
 from .threshold_table import scene_of
@@ -37,19 +37,19 @@ class Trial:
     sweeps: tuple[Sweep, ...]
 
 
-def compute(name: str, study: Study) -> tuple[Trial, ...]:
+def compute(name: str, runs: FigureRuns) -> tuple[Trial, ...]:
     """Sweep sigma round the published ends of the rows without periodic motion."""
-    transients = tuple(sorted(factor * study.quality.criterion.transient for factor in LENGTHS))
+    transients = tuple(sorted(factor * runs.quality.criterion.transient for factor in LENGTHS))
     trials = []
     for row in ROWS:
-        scene, sigma = scene_of(row.n, row.omega, study), _grid(row.intervals[0], study)
-        trials.append(Trial(row, transients, tuple(study.after(scene, sigma, length) for length in transients)))
+        scene, sigma = scene_of(row.n, row.omega, runs), _grid(row.intervals[0], runs)
+        trials.append(Trial(row, transients, tuple(runs.after(scene, sigma, length) for length in transients)))
     return tuple(trials)
 
 
-def _grid(interval: Interval, study: Study) -> np.ndarray:
+def _grid(interval: Interval, runs: FigureRuns) -> np.ndarray:
     """Values of sigma within 0.02 of either end, and a few between."""
-    step = 0.001 if study.quality.grid is None else 0.004
+    step = 0.001 if runs.quality.grid is None else 0.004
     near = [end + step * np.arange(-round(0.02 / step), round(0.02 / step) + 1) for end in interval]
     return np.unique(np.round(np.concatenate([*near, np.linspace(*interval, 6)]), 6))
 

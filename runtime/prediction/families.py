@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from fractions import Fraction
 
 from flint import arb, fmpq
@@ -19,14 +20,29 @@ from synchain.models.algebra.balls import Ball, precision
 from synchain.models.graphs.families import family as plugin
 from synchain.models.graphs.families import topology
 
-from .stable_ranges import Range, stated, widened
+from .stable_ranges import StableRange, exact_ranges, widen
 from .synchronisability import possible
 
-__all__ = ["Largest", "eigenratio", "largest"]
+__all__ = ["LargestNetwork", "Method", "SizeUnit", "eigenratio", "largest_network"]
+
+
+class SizeUnit(StrEnum):
+    """What the size of a network counts."""
+
+    NODES = "nodes"
+    DIMENSION = "dimension"
+
+
+class Method(StrEnum):
+    """How the largest network was found."""
+
+    CLOSED_FORM = "closed form"
+    OPEN_RANGE = "open range"
+    SEARCH = "search"
 
 
 @dataclass(frozen=True, slots=True)
-class Largest:
+class LargestNetwork:
     """The largest network of a family that can synchronise for some sigma > 0.
 
     `n` holds for the ranges as stated, `certain` for all and `possible` for at least one within their errors: None where
@@ -39,17 +55,17 @@ class Largest:
     n: int | None
     certain: int | None
     possible: int | None
-    counts: str
-    how: str
+    counts: SizeUnit
+    how: Method
     limit: int | None = None
 
 
-def largest(
+def largest_network(
     family: str,
     ranges: Sequence[tuple[float, float]],
     errors: Sequence[tuple[float, float]] | None = None,
     limit: int = 64,
-) -> Largest:
+) -> LargestNetwork:
     """The largest n (hypercubes: dimension) for which a family of graphs can synchronise, decided exactly.
 
     `ranges` and `errors` as of `windows`.  One range and a closed form of the eigenratio (see CLOSED), or a range that
@@ -58,25 +74,25 @@ def largest(
     """
     if limit < 2:
         raise ValueError(f"limit = {limit}; expected at least 2 nodes")
-    directed = getattr(plugin(family), "DIRECTED", False)
-    given = stated(ranges, errors)
-    sets = [given, widened(given, -1), widened(given, 1)]
-    counts = "dimension" if family == "hypercube" else "nodes"
+    directed = plugin(family).directed
+    given = exact_ranges(ranges, errors)
+    sets = [given, widen(given, -1), widen(given, 1)]
+    counts = SizeUnit.DIMENSION if family == "hypercube" else SizeUnit.NODES
     if not directed and all(_open(found) for found in sets):
-        return Largest(family, None, None, None, counts, "open range")
+        return LargestNetwork(family, None, None, None, counts, Method.OPEN_RANGE)
     if family in CLOSED and all(_open(found) or len(found) <= 1 for found in sets):
         n, certain, most = (_by_ratio(family, found) for found in sets)
-        return Largest(family, n, certain, most, counts, "closed form")
+        return LargestNetwork(family, n, certain, most, counts, Method.CLOSED_FORM)
     n, certain, most = (_by_search(family, found, limit) for found in sets)
-    return Largest(family, n, certain, most, counts, "search", limit)
+    return LargestNetwork(family, n, certain, most, counts, Method.SEARCH, limit)
 
 
-def _open(ranges: Sequence[Range]) -> bool:
+def _open(ranges: Sequence[StableRange]) -> bool:
     """True where one range holds every eigenratio: some alpha > 0, from 0 or without end."""
     return any(r.high is None or (r.low == 0 and r.high > 0) for r in ranges)
 
 
-def _by_ratio(family: str, ranges: Sequence[Range]) -> int | None:
+def _by_ratio(family: str, ranges: Sequence[StableRange]) -> int | None:
     if _open(ranges):
         return None
     if not ranges or ranges[0].high is None or ranges[0].high == 0:
@@ -153,10 +169,10 @@ def eigenratio(family: str, n: int) -> Ball:
     return 1 if ratio is None else ratio(n)
 
 
-def _by_search(family: str, ranges: Sequence[Range], limit: int) -> int | None:
-    if _open(ranges) and not getattr(plugin(family), "DIRECTED", False):
+def _by_search(family: str, ranges: Sequence[StableRange], limit: int) -> int | None:
+    if _open(ranges) and not plugin(family).directed:
         return None
     cube = family == "hypercube"
-    sizes = range(1, limit.bit_length()) if cube else range(max(2, plugin(family).MINIMUM), limit + 1)
+    sizes = range(1, limit.bit_length()) if cube else range(max(2, plugin(family).minimum), limit + 1)
     found = [size for size in sizes if possible(ranges, topology(family, 2**size if cube else size))]
     return max(found, default=0)

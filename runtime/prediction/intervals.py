@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-__all__ = ["Interval", "find", "intersect", "refine", "runs", "scale"]
+__all__ = ["Interval", "find", "grid_intervals", "intersect", "refine", "scale"]
 
 Interval = tuple[float, float]
-Judge = Callable[[np.ndarray], np.ndarray]
+Predicate = Callable[[np.ndarray], np.ndarray]
 
 
-def runs(x: np.ndarray, good: np.ndarray) -> list[Interval]:
+def grid_intervals(x: np.ndarray, good: np.ndarray) -> list[Interval]:
     """The maximal runs of good points of an increasing grid, as intervals from their first to their last point."""
     found: list[Interval] = []
     for i in range(len(x)):
@@ -22,7 +22,7 @@ def runs(x: np.ndarray, good: np.ndarray) -> list[Interval]:
     return found
 
 
-def find(judge: Judge, x: np.ndarray, resolution: float, fan: int = 7) -> tuple[list[Interval], np.ndarray]:
+def find(judge: Predicate, x: np.ndarray, resolution: float, fan: int = 7) -> tuple[list[Interval], np.ndarray]:
     """Return the intervals where `judge` holds, ends refined to `resolution`, and its verdict on the grid `x`.
 
     `judge` maps an array of points to an array of truth values.  Between neighbours of the grid that differ, `fan` equally
@@ -57,8 +57,8 @@ def refine(
     return [(float(a), float(b)) for a, b in zip(ends[::2], ends[1::2], strict=True)]
 
 
-def _narrow(judge: Judge, good: np.ndarray, bad: np.ndarray, fan: int) -> tuple[np.ndarray, np.ndarray]:
-    """Judge `fan` points in every bracket and keep the part between the last good point and the first bad one."""
+def _narrow(judge: Predicate, good: np.ndarray, bad: np.ndarray, fan: int) -> tuple[np.ndarray, np.ndarray]:
+    """Predicate `fan` points in every bracket and keep the part between the last good point and the first bad one."""
     parts = np.arange(1, fan + 1) / (fan + 1)
     points = good[:, None] + (bad - good)[:, None] * parts
     verdict = np.asarray(judge(points.reshape(-1)), dtype=bool).reshape(points.shape)

@@ -10,14 +10,14 @@ from synchain.models.graphs.topology import Topology
 from synchain.models.spectra.eigenvalue import Eigenvalue
 from synchain.models.spectra.jordan import geometric_multiplicity
 
-__all__ = ["Mode", "loose_parts", "transversal"]
+__all__ = ["NetworkMode", "has_loose_parts", "transversal_modes"]
 
 VECTOR_LIMIT = 2000
 """Most nodes for which an eigenvector is computed: the matrix is dense."""
 
 
 @dataclass(frozen=True, slots=True)
-class Mode:
+class NetworkMode:
     """One distinct non-zero eigenvalue of a network.
 
     `number` is its place in the spectrum, 0 the synchronous motion, every eigenvalue counted as often as it occurs.
@@ -60,16 +60,16 @@ class Mode:
         return np.asarray(column / np.linalg.norm(column))
 
 
-def transversal(graph: Topology) -> tuple[Mode, ...]:
+def transversal_modes(graph: Topology) -> tuple[NetworkMode, ...]:
     """The modes of a network other than 0, in the order of its spectrum."""
     found, number = [], 0
     for eigenvalue in graph.spectrum.eigenvalues:
         if eigenvalue.value != 0:
-            found.append(Mode(graph, number, eigenvalue))
+            found.append(NetworkMode(graph, number, eigenvalue))
         number += eigenvalue.multiplicity
     return tuple(found)
 
 
-def loose_parts(graph: Topology) -> bool:
+def has_loose_parts(graph: Topology) -> bool:
     """True where 0 is a multiple eigenvalue: parts of the network that nothing couples to each other."""
     return graph.spectrum.zeros > 1

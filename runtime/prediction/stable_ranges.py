@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-__all__ = ["Range", "stated", "widened"]
+__all__ = ["StableRange", "exact_ranges", "widen"]
 
 
 @dataclass(frozen=True, slots=True)
-class Range:
+class StableRange:
     """Stable alpha from `low` >= 0 to `high` (None: without end), both included, and the uncertainties of the ends."""
 
     low: Fraction
@@ -28,7 +28,9 @@ class Range:
         return float(self.high / self.low)
 
 
-def stated(ranges: Sequence[tuple[float, float]], errors: Sequence[tuple[float, float]] | None = None) -> list[Range]:
+def exact_ranges(
+    ranges: Sequence[tuple[float, float]], errors: Sequence[tuple[float, float]] | None = None
+) -> list[StableRange]:
     """The ranges as given, cut at alpha = 0; an end that is cut, and one at infinity, has no error.
 
     Raises ValueError where they are not ascending and disjoint, or an error is negative, infinite or missing.
@@ -50,7 +52,7 @@ def stated(ranges: Sequence[tuple[float, float]], errors: Sequence[tuple[float, 
         if high >= 0:
             end = None if high == math.inf else _exact(high)
             kept = (float(below) if low > 0 else 0.0, float(above) if end is not None else 0.0)
-            found.append(Range(max(_exact(low), Fraction(0)), end, kept))
+            found.append(StableRange(max(_exact(low), Fraction(0)), end, kept))
     return found
 
 
@@ -59,9 +61,9 @@ def _exact(x: float) -> Fraction:
     return Fraction(x) if isinstance(x, (int, float, Fraction)) else Fraction(float(x))
 
 
-def widened(ranges: Sequence[Range], sign: int) -> list[Range]:
+def widen(ranges: Sequence[StableRange], sign: int) -> list[StableRange]:
     """The largest ranges (sign 1) or the smallest (sign -1) that the errors allow; those that meet are joined."""
-    found: list[Range] = []
+    found: list[StableRange] = []
     for r in ranges:
         below, above = (sign * Fraction(e) for e in r.errors)
         low, high = max(r.low - below, Fraction(0)), None if r.high is None else r.high + above
@@ -70,7 +72,7 @@ def widened(ranges: Sequence[Range], sign: int) -> list[Range]:
         last = found[-1] if found else None
         if last is not None and (last.high is None or low <= last.high):
             high = None if high is None or last.high is None else max(high, last.high)
-            found[-1] = Range(last.low, high)
+            found[-1] = StableRange(last.low, high)
         else:
-            found.append(Range(low, high))
+            found.append(StableRange(low, high))
     return found

@@ -12,25 +12,39 @@ eigenratio; Stefański, Perlikowski & Kapitaniak, Phys. Rev. E 75, 016210 (2007)
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from fractions import Fraction
 
+import numpy as np
 import sympy as sp
 
 from synchain.models.graphs.topology import Topology
 from synchain.models.spectra.order import compare
 
-from .modes import Mode, loose_parts, transversal
-from .stable_ranges import Range, stated, widened
+from .intervals import find
+from .modes import NetworkMode, has_loose_parts, transversal_modes
+from .stable_ranges import StableRange, exact_ranges, widen
 
-__all__ = ["Verdict", "Window", "possible", "verdict", "windows"]
+__all__ = ["Answer", "OneWay", "Verdict", "Window", "possible", "verdict", "windows", "windows_complex"]
 
-ANSWERS = ("no", "undecided within the error", "yes")
+
+class Answer(StrEnum):
+    """Answer of a verdict."""
+
+    NO = "no"
+    UNDECIDED = "undecided within the error"
+    YES = "yes"
+
+
+Region = Callable[[np.ndarray], np.ndarray]
+"""Maps complex alpha (m,) with an imaginary part >= 0 to truth values (m,)."""
+
 LONGEST = 60
 """An exact ratio with more letters than this is not written out."""
 
-_EVERYTHING = Range(Fraction(0), None)
+_EVERYTHING = StableRange(Fraction(0), None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,35 +59,43 @@ class Window:
     high: float
     low_error: float
     high_error: float
-    low_mode: Mode | None
-    high_mode: Mode | None
+    low_mode: NetworkMode | None
+    high_mode: NetworkMode | None
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """Whether a network can synchronise for some sigma > 0, and why.
 
-    `answer` is one of ANSWERS; `ratio` is the exact eigenratio where it is short, `ratio_value` its float (nan without
+    `answer` is an Answer; `ratio` is the exact eigenratio where it is short, `ratio_value` its float (nan without
     coupled modes), `allowed` the largest ratio of the ends of a range; `slowest` and `fastest` are the modes of smallest and
     largest |gamma|; `windows` hold for the ranges as stated.
     """
 
-    answer: str
+    answer: Answer
     ratio: sp.Expr | None
     ratio_value: float
     allowed: float
-    slowest: Mode | None
-    fastest: Mode | None
+    slowest: NetworkMode | None
+    fastest: NetworkMode | None
     windows: tuple[Window, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class OneWay:
+    """Windows of sigma, and the modes that lack eigenvectors: there errors may grow at first, but die out in the end."""
+
+    windows: tuple[Window, ...]
+    defective: tuple[NetworkMode, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class _End:
     """sigma = alpha / |gamma| of a mode at an end of a range; without a mode it is 0, or infinite for an open range."""
 
-    range: Range
+    range: StableRange
     upper: bool
-    mode: Mode | None
+    mode: NetworkMode | None
 
     @property
     def sigma(self) -> float:
@@ -97,7 +119,51 @@ def windows(
     stable.  Raises ValueError for ranges or errors that are no such intervals, and for eigenvalues that are complex or
     positive.
     """
-    return tuple(_window(low, high) for low, high in _intersection(stated(ranges, errors), graph))
+    return tuple(_window(low, high) for low, high in _intersection(exact_ranges(ranges, errors), graph))
+
+
+def windows_complex(
+    stable: Region, graph: Topology, sigma_grid: Sequence[float] | np.ndarray, resolution: float
+) -> OneWay:
+    """The intervals of sigma on which every transversal mode is stable, found on a grid and refined by bisection.
+
+    `stable` maps complex alpha (m,) with imaginary part >= 0 to truth values (m,): conjugate modes share their stability.
+    Windows that fit between two points of the grid are not seen.  Raises ValueError for a grid that does not increase, a
+    resolution that is not positive, and a `stable` that does not answer every point.
+    """
+    modes = tuple(mode for mode in transversal_modes(graph) if complex(mode.eigenvalue.value).imag <= 0)
+    values = np.array([mode.eigenvalue.value for mode in modes] + [0.0] * has_loose_parts(graph), dtype=complex)
+
+    def verdicts(sigma: np.ndarray) -> np.ndarray:
+        alpha = -np.multiply.outer(sigma, values)
+        answer = np.asarray(stable(alpha.ravel() + 0.0), dtype=bool)
+        if answer.shape != (alpha.size,):
+            raise ValueError(
+                f"stable: found shape {answer.shape} for {alpha.size} points; expected one truth value for each"
+            )
+        return answer.reshape(alpha.shape)
+
+    def lost(sigma: float) -> NetworkMode | None:
+        bad = np.flatnonzero(~verdicts(np.array([sigma]))[0, : len(modes)])
+        return modes[bad[0]] if len(bad) else None
+
+    grid = np.asarray(sigma_grid, dtype=float)
+    intervals, _ = find(lambda sigma: np.atleast_1d(verdicts(sigma).all(axis=1)), grid, resolution)
+    reach = 0.5 * resolution
+    windows = []
+    for low, high in intervals:
+        inner_low, inner_high = low > grid[0], high < grid[-1]
+        windows.append(
+            Window(
+                low,
+                high,
+                low_error=reach if inner_low else 0.0,
+                high_error=reach if inner_high else 0.0,
+                low_mode=lost(low - reach) if inner_low else None,
+                high_mode=lost(high + reach) if inner_high else None,
+            )
+        )
+    return OneWay(tuple(windows), tuple(mode for mode in transversal_modes(graph) if mode.defective))
 
 
 def verdict(
@@ -107,12 +173,12 @@ def verdict(
 
     "yes" holds for all, "no" for none of the ranges within the errors, otherwise it is "undecided within the error".
     """
-    given = stated(ranges, errors)
+    given = exact_ranges(ranges, errors)
     modes = sorted(_real_modes(graph), key=lambda mode: mode.size)
     slowest, fastest = (modes[0], modes[-1]) if modes else (None, None)
-    certain, maybe = (possible(widened(given, sign), graph) for sign in (-1, 1))
+    certain, maybe = (possible(widen(given, sign), graph) for sign in (-1, 1))
     return Verdict(
-        ANSWERS[certain + maybe],
+        (Answer.NO, Answer.UNDECIDED, Answer.YES)[certain + maybe],
         _exact_ratio(slowest, fastest),
         fastest.size / slowest.size if slowest and fastest else math.nan,
         max((r.ratio for r in given), default=math.nan),
@@ -122,7 +188,7 @@ def verdict(
     )
 
 
-def possible(ranges: Sequence[Range], graph: Topology) -> bool:
+def possible(ranges: Sequence[StableRange], graph: Topology) -> bool:
     """True where some sigma > 0 puts every mode of a graph into one of the exact ranges."""
     return any(_follows(high) for _, high in _intersection(ranges, graph))
 
@@ -132,10 +198,10 @@ def _follows(high: _End) -> bool:
     return high.range.high is None or (high.mode is not None and high.range.high > 0)
 
 
-def _intersection(ranges: Sequence[Range], graph: Topology) -> list[tuple[_End, _End]]:
+def _intersection(ranges: Sequence[StableRange], graph: Topology) -> list[tuple[_End, _End]]:
     """The windows by their exact ends."""
     modes = _real_modes(graph)
-    if loose_parts(graph) and not any(r.low == 0 for r in ranges):
+    if has_loose_parts(graph) and not any(r.low == 0 for r in ranges):
         return []
     allowed = [(_End(_EVERYTHING, False, None), _End(_EVERYTHING, True, None))]
     for mode in modes:
@@ -167,15 +233,15 @@ def _window(low: _End, high: _End) -> Window:
     return Window(low.sigma, high.sigma, low.error, high.error, low.mode, high.mode)
 
 
-def _real_modes(graph: Topology) -> tuple[Mode, ...]:
+def _real_modes(graph: Topology) -> tuple[NetworkMode, ...]:
     """The transversal modes; ValueError where one is complex or positive."""
-    modes = transversal(graph)
+    modes = transversal_modes(graph)
     for mode in modes:
         gamma = mode.eigenvalue.value
         if isinstance(gamma, complex):
             raise ValueError(
                 f"{graph.name}({graph.n}) has the complex eigenvalue {gamma:.6g}; expected real ones: stable ranges of real "
-                "alpha say nothing about it. Use synchain.runtime.prediction.one_way.windows_complex"
+                "alpha say nothing about it. Use synchain.runtime.prediction.synchronisability.windows_complex"
             )
         if gamma > 0:
             raise ValueError(
@@ -185,7 +251,7 @@ def _real_modes(graph: Topology) -> tuple[Mode, ...]:
     return modes
 
 
-def _exact_ratio(slowest: Mode | None, fastest: Mode | None) -> sp.Expr | None:
+def _exact_ratio(slowest: NetworkMode | None, fastest: NetworkMode | None) -> sp.Expr | None:
     """The eigenratio as a short SymPy expression, or None."""
     if slowest is None or fastest is None:
         return None

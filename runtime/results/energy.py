@@ -92,10 +92,10 @@ class EnergyFunction:
 def energy_function(scene: Scene) -> EnergyFunction:
     """Return the compiled energy of a scene's network; ValueError as `synchain.models.scenes.energy.energy`."""
     exact = energy(scene)
-    equations, places = exact.equations, exact.equations.places()
+    equations, places = exact.equations, exact.equations.places
     groups = []
     for kind, (share, node) in enumerate(zip(exact.nodes, equations.nodes, strict=True)):
-        members = [i for i in range(equations.n) if equations.kind(i) == kind]
+        members = [i for i, k in enumerate(equations.kind_of) if k == kind]
         states = list(np.array([places[i] for i in members]).T)
         names = _names(equations, node.parameters, members)
         groups.append(_Group(_compiled(share, (TIME, *node.state, *node.parameters)), None, states, names))

@@ -1,41 +1,83 @@
-"""What kind of motion an orbit has settled on: a fixed point, a periodic orbit locked to the drive, or neither."""
+"""Classification of the motion that an orbit has settled on.
+
+The motion is a fixed point, a periodic orbit locked to the drive, or neither.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 import sympy as sp
 
 from synchain.models.dynamics.variational import MODE, Variation
 
-from .interpolation import exact
+from .interpolation import exact_interpolation
 from .orbits import Orbits
 
-__all__ = ["Attractor", "find_attractor", "over_one_cycle"]
+__all__ = ["Attractor", "Motion", "cycle_propagators", "find_attractor"]
 
 LONGEST = 32
-"""Longest cycle, in periods of the drive, that is looked for."""
+"""Longest cycle that is looked for, in periods of the drive."""
 
 RETURN = 1e-9
-"""A cycle is closed where the state returns to within this distance relative to its size, or to within a tenth of
-rtol."""
+"""Largest distance of a closed cycle, relative to the size of the state; 0.1 rtol if that is
+larger.
+"""
+
+
+class Motion(StrEnum):
+    """Kind of motion on an attractor."""
+
+    LINEAR = "linear"
+    FIXED_POINT = "fixed point"
+    PERIODIC = "periodic"
+    APERIODIC = "aperiodic"
 
 
 @dataclass(frozen=True, slots=True)
 class Attractor:
-    """The motion of one start: `kind` in words, its cycle in units of time (0: none).
+    """Motion of one start.
 
-    propagators (2, m, p, p): those of all modes over two successive cycles; for a fixed point the matrices of the
-    variational equation, twice; None where the motion is neither.
+    Parameters
+    ----------
+    motion : Motion
+        Kind of the motion.
+    cycle : float
+        Length of one cycle in units of non-dimensional time; 0 if the motion is not a cycle.
+    propagators : ndarray, shape (2, m, p, p), optional
+        Propagators of all m modes over two successive cycles. For a fixed point and a linear
+        motion, the matrix of the variational equation, twice. None for aperiodic motion.
+    periods : int
+        Drive periods of one cycle.
     """
 
-    kind: str
+    motion: Motion
     cycle: float
     propagators: np.ndarray | None = field(default=None, repr=False)
+    periods: int = 1
+
+    @property
+    def kind(self) -> str:
+        """The motion in words, with the drive periods of its cycle if there are several."""
+        return str(self.motion) if self.periods == 1 else f"{self.motion}, {self.periods} drive periods"
 
     def exponents(self) -> tuple[np.ndarray, np.ndarray]:
-        """Exponents (m,), and the difference between the two cycles as their error."""
+        """Compute the exponents from the eigenvalues of the propagators.
+
+        Returns
+        -------
+        values : ndarray, shape (m,)
+            Largest exponent of each mode, per unit of non-dimensional time.
+        error : ndarray, shape (m,)
+            Difference between the two cycles.
+
+        Raises
+        ------
+        ValueError
+            If the motion is aperiodic.
+        """
         if self.propagators is None:
             raise ValueError(f"{self.kind} motion has no eigenvalues to take exponents from")
         values = np.linalg.eigvals(self.propagators)
@@ -48,80 +90,109 @@ class Attractor:
 
 
 def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
-    """Look for a fixed point or a cycle of 1 … LONGEST drive periods of one start, which is moved on meanwhile.
+    """Look for a fixed point or a cycle of 1 … LONGEST drive periods.
 
-    A state that comes back, but not yet closely enough, is given `patience` more periods, twice.
+    Parameters
+    ----------
+    orbits : Orbits
+        Orbits after their transient. The state of `row` is advanced.
+    row : int
+        Index of the start.
+    patience : float
+        Additional transient in drive periods, used at most twice, for a state that returns, but not
+        yet closely enough.
+
+    Returns
+    -------
+    Attractor
     """
     own = orbits.part([row])
     if not any(e.has(sp.Symbol("t", real=True), *_states(own.variation)) for _, e in own.variation.matrix):
-        return _steady(own, "linear")
+        return _steady(own, Motion.LINEAR)
     if not own.scene.forced:
         return _fixed_point(own)
-    carrier = own.carry(own.strengths[:1])
+    integrator = own.integrator_of(own.strengths[:1])
     closed = max(RETURN, 0.1 * own.scene.rtol)
     for _ in range(3):
-        states = [carrier.state[0]]
+        states = [integrator.state[0]]
         for _ in range(LONGEST):
-            carrier.advance(own.unit)
-            states.append(carrier.state[0])
+            integrator.advance(own.unit)
+            states.append(integrator.state[0])
         gaps = [_distance(state, states[-1]) for state in states[-2::-1]]
         cycle = next((k + 1 for k, gap in enumerate(gaps) if gap < closed), 0)
         orbits.state[row] = own.state[0] = states[-1]
         if cycle:
-            found = np.concatenate([over_one_cycle(own, cycle) for _ in range(2)])
-            words = "periodic" if cycle == 1 else f"periodic, {cycle} drive periods"
-            return Attractor(words, cycle * own.unit, found)
+            found = np.concatenate([cycle_propagators(own, cycle) for _ in range(2)])
+            return Attractor(Motion.PERIODIC, cycle * own.unit, found, cycle)
         if min(gaps) > 1e-3:
             break
-        carrier.advance(max(1, round(patience)) * own.unit)
-    return Attractor("aperiodic", 0.0)
+        integrator.advance(max(1, round(patience)) * own.unit)
+    return Attractor(Motion.APERIODIC, 0.0)
 
 
 def _distance(a: np.ndarray, b: np.ndarray) -> float:
+    """Largest difference of two states, relative to the second."""
     return float(np.abs(a - b).max() / max(1e-3, np.abs(b).max()))
 
 
-def over_one_cycle(own: Orbits, cycle: int) -> np.ndarray:
-    """Propagators (1, m, p, p) of all modes over one cycle, from where the orbit is."""
-    own.chosen, own.block = exact(own.strengths), 1.0
-    own.carrier = own.carry(own.strengths)
+def cycle_propagators(own: Orbits, cycle: int) -> np.ndarray:
+    """Integrate the propagators of all modes over one cycle, from the current state.
+
+    Parameters
+    ----------
+    own : Orbits
+        A single orbit; its state is advanced by the cycle.
+    cycle : int
+        Number of drive periods.
+
+    Returns
+    -------
+    ndarray, shape (1, m, p, p)
+        Propagators of the m modes with p components each.
+    """
+    own.interpolation, own.block = exact_interpolation(own.strengths), 1.0
+    own.integrator = own.integrator_of(own.strengths)
     total = own.propagators()
     for _ in range(cycle - 1):
         total = own.propagators() @ total
-    own.state = own.carrier.state
+    own.state = own.integrator.state
     return total
 
 
 def _states(variation: Variation) -> list[sp.Symbol]:
+    """Symbols of the states of the orbit."""
     return [sp.Symbol(name, real=True) for name in variation.orbit.state]
 
 
 def _fixed_point(own: Orbits) -> Attractor:
-    """Whether the orbit rests; the matrices of the variational equation there."""
+    """Return a fixed point with its variational matrices if the orbit rests, else aperiodic
+    motion.
+    """
     rates = sp.lambdify(_symbols(own.variation), list(own.variation.orbit.rhs()), "numpy")(*_values(own))
     if not np.abs(rates).max() < RETURN * max(1.0, np.abs(own.state).max()):
-        return Attractor("aperiodic", 0.0)
-    return _steady(own, "fixed point")
+        return Attractor(Motion.APERIODIC, 0.0)
+    return _steady(own, Motion.FIXED_POINT)
 
 
-def _steady(own: Orbits, kind: str) -> Attractor:
-    """Motion along which the variational equation does not change."""
+def _steady(own: Orbits, motion: Motion) -> Attractor:
+    """Return motion along which the variational equation is constant."""
     matrix = _matrix(own.variation, _symbols(own.variation), _values(own), own.strengths)
-    return Attractor(kind, 0.0, np.stack([matrix, matrix]))
+    return Attractor(motion, 0.0, np.stack([matrix, matrix]))
 
 
 def _symbols(variation: Variation) -> list[sp.Symbol]:
+    """Symbols of states, parameters and time."""
     names = [*variation.orbit.state, *variation.orbit.parameters, "t"]
     return [sp.Symbol(name, real=True) for name in names]
 
 
 def _values(own: Orbits) -> list[float]:
-    """Numbers for `_symbols` at the orbit's state."""
+    """Values of `_symbols` at the orbit's state."""
     return [*own.state[0], *(own.scene.parameters[name] for name in own.variation.orbit.parameters), 0.0]
 
 
 def _matrix(variation: Variation, symbols: list[sp.Symbol], values: list[float], strengths: np.ndarray) -> np.ndarray:
-    """The matrix A (m, p, p) of the variational equation at a state, for each strength."""
+    """Evaluate the matrices (m, p, p) of the variational equation at a state, for each strength."""
     p = variation.size // len(variation.parameters)
     made = np.zeros((len(strengths), p, p), dtype=strengths.dtype)
     for (r, c), e in variation.matrix:

@@ -1,4 +1,4 @@
-"""Averages over batches of a long run, with their standard error."""
+"""Averages over batches of a long run, with their standard errors."""
 
 from __future__ import annotations
 
@@ -10,11 +10,32 @@ import numpy as np
 __all__ = ["Batches"]
 
 BATCHES = 64
+"""Most batches that are kept."""
 
 
 @dataclass(slots=True)
 class Batches:
-    """Means over batches of blocks; when BATCHES of them are full they are joined in pairs, so memory does not grow."""
+    """Means of growth rates over batches of blocks.
+
+    When BATCHES batches are full, they are joined in pairs, so that memory does not grow.
+
+    Parameters
+    ----------
+    length : float
+        Length of one block in units of non-dimensional time.
+    blocks : int
+        Number of blocks so far.
+    per_batch : int
+        Number of blocks in a batch.
+    sums : list of ndarray, shape (starts, m)
+        Growth over each batch.
+    due : bool
+        True if enough new batches are complete for another check of the error.
+
+    References
+    ----------
+    Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989).
+    """
 
     length: float
     blocks: int = 0
@@ -23,7 +44,13 @@ class Batches:
     due: bool = False
 
     def add(self, growth: np.ndarray) -> None:
-        """Take the growth (starts, m) over one more block."""
+        """Add the growth over one more block.
+
+        Parameters
+        ----------
+        growth : ndarray, shape (starts, m)
+            Logarithm of the growth of each deviation over the block.
+        """
         if self.blocks % self.per_batch == 0:
             if len(self.sums) == BATCHES:
                 self.sums = [a + b for a, b in zip(self.sums[::2], self.sums[1::2], strict=True)]
@@ -34,11 +61,18 @@ class Batches:
         self.due = self.blocks % self.per_batch == 0 and self.blocks >= BATCHES and len(self.sums) % 8 == 0
 
     def mean(self) -> np.ndarray:
-        """Growth per unit of time (starts, m)."""
+        """Return the growth per unit of time, an ndarray of shape (starts, m)."""
         return np.asarray(np.sum(self.sums, axis=0) / (self.blocks * self.length))
 
     def error_by_start(self) -> np.ndarray:
-        """Standard errors (starts, m): the largest over batches as they are, joined in twos and in fours."""
+        """Estimate the standard error of each start.
+
+        Returns
+        -------
+        ndarray, shape (starts, m)
+            The largest estimate from the batches alone, joined in twos and joined in fours; inf if
+            there is a single batch.
+        """
         rates = np.array(self.sums[: self.blocks // self.per_batch]) / (self.per_batch * self.length)
         found = []
         for join in (1, 2, 4):
@@ -51,6 +85,6 @@ class Batches:
         return np.asarray(np.max(found, axis=0))
 
     def error(self) -> np.ndarray:
-        """Standard error (m,) of the mean over the starts."""
+        """Return the standard error of the mean over the starts, an ndarray of shape (m,)."""
         each = self.error_by_start()
         return np.asarray(np.sqrt((each**2).sum(axis=0)) / len(each))

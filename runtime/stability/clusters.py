@@ -1,7 +1,9 @@
-"""Whether a cluster state of a network is stable: exponents of the differences within its clusters, block by block.
+"""Stability of cluster states: transversal exponents of a network, block by block.
 
-One orbit of the quotient network carries a deviation for each block and one for the motion of the clusters themselves
-(Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014)).
+One orbit of the quotient network carries a deviation for each block and one for the motion of the
+clusters themselves.
+
+Source: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014).
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -21,23 +24,42 @@ from synchain.models.scenes.scene import Scene
 from ..cells.initial_modes import with_modes
 from ..support.arrays import averaging
 from .averages import Batches
-from .carrier import Carrier
+from .exponents import single_cell
 from .orbits import unit_of_time
-from .transversal import one_cell
+from .variational_integrator import VariationalIntegrator
 
-__all__ = ["ClusterExponents", "cluster_exponents"]
+__all__ = ["BlockVerdict", "ClusterExponents", "cluster_exponents"]
 
-ANSWERS = {-1: "stable", 0: "undecided within the error", 1: "unstable"}
+
+class BlockVerdict(StrEnum):
+    """Stability of one block of a cluster state."""
+
+    STABLE = "stable"
+    UNDECIDED = "undecided within the error"
+    UNSTABLE = "unstable"
 
 
 @dataclass(frozen=True, slots=True)
 class ClusterExponents:
-    """Largest transversal exponent (blocks,) of each block of a cluster state, per unit of non-dimensional time, with its
-    standard error.
+    """Transversal exponents of a cluster state.
 
-    `motion` is the largest exponent of the clusters' own motion, with its error; `separation` (clusters, clusters) the
-    largest difference of two clusters' states seen at the ends of blocks: 0 where two have merged, so that the exponents
-    are those of a coarser state.  `time` is the length averaged over.
+    Parameters
+    ----------
+    state : Clusters
+        The cluster state with its blocks.
+    exponent : ndarray, shape (blocks,)
+        Largest exponent of each block per unit of non-dimensional time.
+    stderr : ndarray, shape (blocks,)
+        Standard errors of `exponent`.
+    motion : float
+        Largest exponent of the clusters' own motion.
+    motion_error : float
+        Standard error of `motion`.
+    separation : ndarray, shape (clusters, clusters)
+        Largest difference between the states of two clusters at the ends of blocks of time. It is 0
+        if the clusters have merged; then the exponents are those of a coarser state.
+    time : float
+        Time averaged over.
     """
 
     state: Clusters
@@ -49,37 +71,47 @@ class ClusterExponents:
     time: float
 
     @property
-    def verdicts(self) -> tuple[str, ...]:
-        """In words for each block: stable or unstable by more than two standard errors, else undecided."""
+    def verdicts(self) -> tuple[BlockVerdict, ...]:
+        """Verdict on each block, decided if the exponent exceeds two standard errors."""
         signs = np.where(np.abs(self.exponent) > 2.0 * self.stderr, np.sign(self.exponent), 0.0)
-        return tuple(ANSWERS[int(sign)] for sign in signs)
+        verdicts = {-1: BlockVerdict.STABLE, 0: BlockVerdict.UNDECIDED, 1: BlockVerdict.UNSTABLE}
+        return tuple(verdicts[int(sign)] for sign in signs)
 
     @property
     def intertwined(self) -> tuple[tuple[int, ...], ...]:
-        """The clusters of each block: they lose their synchrony together."""
+        """The clusters of each block; they lose their synchrony together."""
         return tuple(block.clusters for block in self.state.blocks)
 
     @property
     def merged(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of clusters that were never seen more than 1e-9 apart: the motion is that of a coarser partition."""
+        """Pairs of clusters that never were more than 1e-9 apart, so that the motion is a coarser
+        partition's.
+        """
         first, second = np.nonzero(np.triu(self.separation < 1e-9, 1))
         return tuple((int(a), int(b)) for a, b in zip(first, second, strict=True))
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON-ready: classes, blocks (clusters, nodes, exponent, stderr, verdict), motion and its error, merged, time."""
+        """Return classes, blocks (clusters, nodes, exponent, stderr, verdict), motion, merged, time
+        for JSON.
+        """
         rows = zip(self.state.blocks, self.exponent, self.stderr, self.verdicts, strict=True)
         return {
             "classes": list(self.state.classes),
             "blocks": [
-                {"clusters": list(block.clusters), "nodes": sorted({i for pair in block.pairs for i in pair}),
-                 "exponent": float(found), "stderr": float(error), "verdict": words}
-                for block, found, error, words in rows
+                {
+                    "clusters": list(block.clusters),
+                    "nodes": sorted({i for pair in block.pairs for i in pair}),
+                    "exponent": float(exponent),
+                    "stderr": float(error),
+                    "verdict": verdict.value,
+                }
+                for block, exponent, error, verdict in rows
             ],
             "motion": self.motion,
             "motion_stderr": self.motion_error,
             "merged": [list(pair) for pair in self.merged],
             "time": self.time,
-        }  # fmt: skip
+        }
 
 
 def cluster_exponents(
@@ -94,29 +126,55 @@ def cluster_exponents(
     show_progress: bool | None = False,
     **parameters: float,
 ) -> ClusterExponents:
-    """Return the transversal exponents of a cluster state of a scene's network at its coupling strength.
+    """Compute the transversal exponents of a cluster state of a scene's network.
 
-    `state` is a partition of the nodes, from `synchain.models.graphs.clusters` or as the cluster of each node; clusters start as
-    their first nodes do.  Times count periods of the drive, or 2 pi where there is none.  After `transient` the averages run
-    until every standard error is below `precision`, or for `periods`.  `rtol` is the tolerance of the integration, never
-    looser than what the friction law asks for; `seed` chooses the first deviations.
+    Parameters
+    ----------
+    scene : Scene
+        Network of at most eight clusters with its coupling strength.
+    state : Clusters or sequence of int
+        Partition of the nodes, from `synchain.models.graphs.clusters` or as the cluster of each
+        node. Each cluster starts from the state of its first node.
+    precision : float
+        Averaging stops if every standard error is below this value.
+    periods : float
+        Longest average, in periods of the drive, or in units of 2 pi if there is none.
+    transient : float
+        Transient before the average, in the same units.
+    rtol : float
+        Relative tolerance of the integration. The friction law may require a smaller one.
+    seed : int
+        Seed of the initial deviations.
+    show_progress : bool or None
+        Whether to show a progress bar; None shows it on terminals only.
+    **parameters : float
+        Parameters of the scene to set.
 
-    Raises ValueError for a partition that is not balanced or of another graph, for a coupling that is not linear in the
-    difference of states, more than eight clusters, and time dependence without a known period; FloatingPointError where
-    an integration fails.
+    Returns
+    -------
+    ClusterExponents
+
+    Raises
+    ------
+    ValueError
+        If the partition is not balanced or belongs to another graph, if the coupling is not linear
+        in the difference of states, if there are more than eight clusters, or if time enters
+        without a known period.
+    FloatingPointError
+        If the integration fails.
     """
     precision, periods, transient, seed = averaging(precision, periods, transient, seed)
-    scene = one_cell(cluster_exponents, scene, rtol, parameters)
+    scene = single_cell(cluster_exponents, scene, rtol, parameters)
     found = _of_graph(scene, state)
     variation, unit = clustered(scene.equations, found), unit_of_time(scene)
-    carrier = _carrier(scene, found, variation, seed)
+    integrator = _integrator(scene, found, variation, seed)
     for _ in range(round(transient)):
-        carrier.advance(unit)
+        integrator.advance(unit)
     batches, apart = Batches(unit), np.zeros((found.quotient.n,) * 2)
     with tqdm(total=math.ceil(periods), unit="period", disable=not show_progress and show_progress is not None) as bar:
         while batches.blocks < periods:
-            batches.add(carrier.advance(unit))
-            apart = np.maximum(apart, _differences(carrier.state[0], found.quotient.n, _deviating(variation)))
+            batches.add(integrator.advance(unit))
+            apart = np.maximum(apart, _differences(integrator.state[0], found.quotient.n, _deviating(variation)))
             bar.update(1)
             if batches.due and np.all(batches.error() <= precision):
                 break
@@ -125,7 +183,7 @@ def cluster_exponents(
 
 
 def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
-    """The partition with its blocks, proved to belong to the scene's graph."""
+    """Compute the blocks of a partition and check that it belongs to the scene's graph."""
     classes = state.classes if isinstance(state, Clusters) else state
     found = clusters(scene.topology, classes)
     if isinstance(state, Clusters) and (found.quotient.links, found.blocks) != (state.quotient.links, state.blocks):
@@ -137,30 +195,34 @@ def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
     return found
 
 
-def _carrier(scene: Scene, found: Clusters, variation: Variation, seed: int) -> Carrier:
-    """The quotient's orbit with one deviation along it and one in each block, which stay there."""
+def _integrator(scene: Scene, found: Clusters, variation: Variation, seed: int) -> VariationalIntegrator:
+    """Set up the quotient's orbit with one deviation along it and one in each block, which stay
+    there.
+    """
     firsts = [members[0] for members in found.members]
     state = np.array([[values[i] for values in scene.initial.values() for i in firsts]])
     numbers = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])
     state = with_modes(variation.orbit, state, numbers)
     components = _deviating(variation)
     parts = list(_parts(found, components))
-    carrier = Carrier.make(scene, variation, state, numbers, np.full((1, len(parts)), scene.parameters["sigma"]), 1)
+    integrator = VariationalIntegrator.make(
+        scene, variation, state, numbers, np.full((1, len(parts)), scene.parameters["sigma"]), 1
+    )
     random = np.random.default_rng(seed)
     deviations = np.zeros((1, variation.size, len(parts)))
     for k, part in enumerate(parts):
         deviations[0, part, k] = random.normal(size=part.stop - part.start)
-    carrier.point(deviations)
-    return carrier
+    integrator.set_deviations(deviations)
+    return integrator
 
 
 def _deviating(variation: Variation) -> int:
-    """Components of an oscillator that deviate: all but the mode of a contact."""
-    return len(variation.orbit.node.state) if variation.events is None else 2
+    """Number of components of an oscillator that deviate: all but the slip state of a contact."""
+    return len(variation.orbit.node.continuous)
 
 
 def _parts(found: Clusters, components: int) -> Iterator[slice]:
-    """Where the clusters' motion and each block stand among the coordinates of the variational equation."""
+    """Yield the slices of the clusters' motion and of each block in the variational equation."""
     first, last = 0, found.quotient.n * components
     yield slice(first, last)
     for block in found.blocks:
@@ -169,6 +231,6 @@ def _parts(found: Clusters, components: int) -> Iterator[slice]:
 
 
 def _differences(state: np.ndarray, count: int, components: int) -> np.ndarray:
-    """Largest difference between the first components of every two of `count` clusters."""
+    """Largest difference between the components of every two of `count` clusters."""
     rows = state.reshape(-1, count)[:components]
     return np.asarray(np.abs(rows[:, :, None] - rows[:, None, :]).max(axis=0))

@@ -1,10 +1,13 @@
-"""Propagators of many modes from few, along one orbit.
+"""Interpolation of the propagators of many modes from few, along one orbit.
 
-The propagator of a mode over a stretch of time is an entire function of its strength, so a short polynomial in the
-strength gives it for all of them.  Strengths are parted into panels, pieces of the real line or squares of the plane.  On
-each panel the propagators of some nodes are integrated and the others interpolated from them (barycentric formula: at
-Chebyshev points, Berrut & Trefethen, SIAM Review 46, 501 (2004); on a circle, Austin, Kravanja & Trefethen, SIAM J.
-Numer. Anal. 52, 1795 (2014)).  Every panel has further strengths that are integrated only to compare.
+The propagator of a mode over a stretch of time is an entire function of its strength, so a short
+polynomial in the strength gives it for all modes. The strengths are divided into panels, pieces of
+the real line or squares of the plane. On each panel the propagators of some nodes are integrated,
+and the others are interpolated from them. Every panel has further strengths that are integrated
+for comparison only.
+
+Sources: barycentric formula at Chebyshev points, Berrut & Trefethen, SIAM Review 46, 501 (2004);
+on a circle, Austin, Kravanja & Trefethen, SIAM J. Numer. Anal. 52, 1795 (2014).
 """
 
 from __future__ import annotations
@@ -15,21 +18,34 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Interpolation", "exact", "interpolation"]
+__all__ = ["Interpolation", "combine", "exact_interpolation", "strength_interpolation"]
 
 SINGLE = 2**18
-"""Multiplications of one matrix product; OpenBLAS takes more threads than one, whatever `workers` says, above this."""
+"""Most multiplications of one matrix product.
+
+Above this OpenBLAS uses several threads, whatever the number of workers.
+"""
 
 Panel = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Rows of the strengths on the panel, nodes, their barycentric weights, strengths to compare at."""
+"""Indices of the strengths on the panel, nodes, barycentric weights, strengths for comparison."""
 
 
 @dataclass(frozen=True, slots=True)
 class Interpolation:
-    """How the propagators of `strengths` (m,) follow from those of `nodes` (k,).
+    """Linear map from the propagators of nodes to those of all strengths.
 
-    weights (m, k): propagators = weights @ propagators of the nodes; checked (c,): nodes that only serve to
-    compare, checks (c, k): how they follow from the others.
+    Parameters
+    ----------
+    strengths : ndarray, shape (m,)
+        All strengths, real or complex.
+    nodes : ndarray, shape (k,)
+        Strengths that are integrated.
+    weights : ndarray, shape (m, k)
+        Propagators of the strengths = weights @ propagators of the nodes.
+    checked : ndarray, shape (c,)
+        Indices of the nodes that serve for comparison only.
+    checks : ndarray, shape (c, k)
+        Weights that give the propagators of the checked nodes from the other nodes.
     """
 
     strengths: np.ndarray
@@ -38,43 +54,79 @@ class Interpolation:
     checked: np.ndarray
     checks: np.ndarray
 
-    def apply(self, found: np.ndarray) -> np.ndarray:
-        """Propagators (cells, m, p, p) of all strengths from those of the nodes (cells, k, p, p)."""
-        return found if self.exact else _combine(self.weights, found)
+    def apply(self, propagators: np.ndarray) -> np.ndarray:
+        """Compute the propagators of all strengths.
 
-    def error(self, found: np.ndarray) -> float:
-        """The largest difference between integrated and interpolated propagators, relative to their size."""
+        Parameters
+        ----------
+        propagators : ndarray, shape (cells, k, p, p)
+            Propagators of the nodes.
+
+        Returns
+        -------
+        ndarray, shape (cells, m, p, p)
+        """
+        return propagators if self.is_exact else combine(self.weights, propagators)
+
+    def error(self, propagators: np.ndarray) -> float:
+        """Compare interpolated with integrated propagators.
+
+        Parameters
+        ----------
+        propagators : ndarray, shape (cells, k, p, p)
+            Propagators of the nodes.
+
+        Returns
+        -------
+        float
+            Largest difference at the checked nodes, relative to the size of the propagator.
+        """
         if len(self.checked) == 0:
             return 0.0
-        own = found[:, self.checked]
+        own = propagators[:, self.checked]
         sizes = np.maximum(np.abs(own).max(axis=(2, 3)), 1e-300)
-        return float((np.abs(_combine(self.checks, found) - own).max(axis=(2, 3)) / sizes).max())
+        return float((np.abs(combine(self.checks, propagators) - own).max(axis=(2, 3)) / sizes).max())
 
     @property
-    def exact(self) -> bool:
-        """True where every strength is integrated."""
+    def is_exact(self) -> bool:
+        """True if every strength is integrated."""
         return self.nodes is self.strengths
 
 
-def exact(strengths: np.ndarray) -> Interpolation:
-    """Integrate every strength."""
+def exact_interpolation(strengths: np.ndarray) -> Interpolation:
+    """Return the trivial map: every strength is integrated."""
     nothing = np.zeros((0, len(strengths)))
     return Interpolation(strengths, strengths, nothing, np.zeros(0, dtype=int), nothing)
 
 
-def interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) -> Interpolation:
-    """Cut the range of strengths into panels, `parts` a side, each with Chebyshev points, or twice as many on a circle.
+def strength_interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) -> Interpolation:
+    """Divide the range of the strengths into panels with interpolation nodes.
 
-    The answer is `exact` where that takes as many nodes as there are strengths.
+    Parameters
+    ----------
+    strengths : ndarray, shape (m,)
+        Real or complex strengths.
+    nodes : int
+        Chebyshev points on each piece of the real line; a square has twice as many on a circle.
+    parts : int
+        Panels on each side of the range.
 
-    Raises ValueError where there is no strength.
+    Returns
+    -------
+    Interpolation
+        `exact_interpolation(strengths)` if the panels need as many nodes as there are strengths.
+
+    Raises
+    ------
+    ValueError
+        If there is no strength.
     """
     if len(strengths) == 0:
         raise ValueError("found no strength of a mode; expected at least one")
     panels = list((_squares if np.iscomplexobj(strengths) else _pieces)(strengths, parts, nodes))
     total = sum(len(own) + len(extra) for _, own, _, extra in panels)
     if total >= len(strengths):
-        return exact(strengths)
+        return exact_interpolation(strengths)
     weights = np.zeros((len(strengths), total), dtype=strengths.dtype)
     found, checked, checks = [], [], []
     first = 0
@@ -91,8 +143,10 @@ def interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) -> Interpol
 
 
 def _pieces(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
-    """Equal pieces of the real line with Chebyshev points of the second kind; comparisons lie between the outer
-    points."""
+    """Yield equal pieces of the real line with Chebyshev points of the second kind.
+
+    The strengths for comparison lie between the outer points.
+    """
     edges = np.linspace(strengths.min(), strengths.max(), count + 1)
     which = np.clip(np.searchsorted(edges, strengths, side="right") - 1, 0, count - 1)
     unit = np.cos(np.arange(nodes) * math.pi / (nodes - 1))
@@ -105,7 +159,10 @@ def _pieces(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
 
 
 def _squares(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
-    """Squares that cover the rectangle around the strengths, each with nodes on the circle through its corners."""
+    """Yield squares that cover the rectangle of the strengths.
+
+    The nodes of each lie on the circle through its corners.
+    """
     low = complex(strengths.real.min(), strengths.imag.min())
     size = complex(strengths.real.max(), strengths.imag.max()) - low
     side = max(size.real, size.imag) / count
@@ -119,7 +176,7 @@ def _squares(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
 
 
 def _barycentric(x: np.ndarray, nodes: np.ndarray, signs: np.ndarray) -> np.ndarray:
-    """The interpolating polynomial as a matrix (len(x), len(nodes)); exact at the nodes."""
+    """Interpolating polynomial as a matrix (len(x), len(nodes)); exact at the nodes."""
     gaps = x[:, None] - nodes
     at = gaps == 0.0
     terms = signs / np.where(at, 1.0, gaps)
@@ -128,9 +185,24 @@ def _barycentric(x: np.ndarray, nodes: np.ndarray, signs: np.ndarray) -> np.ndar
     return np.asarray(terms / terms.sum(axis=1, keepdims=True))
 
 
-def _combine(weights: np.ndarray, found: np.ndarray) -> np.ndarray:
-    cells, count, p, _ = found.shape
-    table = found.transpose(1, 0, 2, 3).reshape(count, -1)
-    rows = max(1, SINGLE // table.size)
+def combine(weights: np.ndarray, propagators: np.ndarray, largest: int = SINGLE) -> np.ndarray:
+    """Multiply a matrix of weights with propagators, in pieces that stay on one thread.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (m, k)
+        Weights.
+    propagators : ndarray, shape (cells, k, p, p)
+        Propagators of the nodes.
+    largest : int
+        Most multiplications of one matrix product.
+
+    Returns
+    -------
+    ndarray, shape (cells, m, p, p)
+    """
+    cells, count, p, _ = propagators.shape
+    table = propagators.transpose(1, 0, 2, 3).reshape(count, -1)
+    rows = max(1, largest // table.size)
     made = np.concatenate([weights[i : i + rows] @ table for i in range(0, max(len(weights), 1), rows)])
     return np.asarray(made.reshape(len(weights), cells, p, p).transpose(1, 0, 2, 3))

@@ -1,13 +1,16 @@
 """Lyapunov exponents of a whole network, from its own start.
 
-Deviations are carried over short blocks of time and made orthogonal after each (Benettin, Galgani, Giorgilli & Strelcyn,
-Meccanica 15, 9 (1980)).  A block is short enough where every direction stands out of the error of the integration; under a
-smoothed friction law oscillators that stick lose their velocity deviations so fast that no block is, and exponents lost
-in this error are not reported as numbers.  Their sum is known all the same: the sum of all exponents is the mean
-divergence of the equations, which is integrated along the orbit by itself.
+Deviations are integrated over short blocks of time and made orthogonal after each. A block is short
+enough if every direction stands out of the error of the integration. Under a smoothed friction law,
+oscillators that stick lose their velocity deviations so fast that no block is short enough;
+exponents lost in this error are not reported as numbers. Their sum is known all the same: the sum
+of all exponents is the mean divergence of the equations, which is integrated along the orbit.
 
-Under set-valued friction stick makes the velocity of a deviation zero, so that directions vanish within finite time: their
-exponent is -inf by rule, and so is the sum.  Such a direction comes out of a block with the length of a rounding.
+Under set-valued friction, stick makes the velocity of a deviation zero, so that directions vanish
+within finite time. Their exponent is -inf by definition, and so is the sum. Such a direction comes
+out of a block with the length of a rounding error.
+
+Source: Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15, 9 (1980).
 """
 
 from __future__ import annotations
@@ -18,42 +21,58 @@ from dataclasses import dataclass
 import numpy as np
 from tqdm import tqdm
 
-from synchain.models.dynamics.variational import PHASE, Variation, phased, with_volume
-from synchain.models.dynamics.variational import whole as whole_network
+from synchain.models.dynamics.variational import PHASE, Variation, network_variation, phase_shifted, with_volume
 from synchain.models.inputs.checks import whole
 from synchain.models.scenes.scene import Scene
 
 from ..cells.initial_modes import with_modes
 from ..support.arrays import averaging
 from .averages import Batches
-from .carrier import Carrier
+from .exponents import single_cell
 from .orbits import unit_of_time
-from .transversal import one_cell
+from .variational_integrator import VariationalIntegrator
 
 __all__ = ["Lyapunov", "lyapunov_spectrum"]
 
 PARTS = (1, 2, 4, 8, 16, 32, 64)
-"""Blocks a period that are tried, from few to many."""
+"""Numbers of blocks in a period that are tried, in ascending order."""
 
 TRIAL = 4
-"""Periods each of them is tried for, and periods that are left out after the choice."""
+"""Periods of each trial, and periods that are dropped after the choice."""
 
 CLEAR, LOST = 1e4, 10.0
-"""A direction is clear of the error where it is this many tolerances long after a block, lost where it is shorter than
-that."""
+"""Length of a direction after a block, in tolerances, from which it is clear of the error, and
+below which it is lost.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Lyapunov:
-    """Exponents (count,) per unit of non-dimensional time, from the largest down, with their standard errors.
+    """Lyapunov exponents of a network.
 
-    resolved (count,): False where a direction decays faster than can be followed; its exponent is -inf, without error.
-    divergence: mean of the divergence along the same orbit, the sum of all exponents of the network, with its error.  With
-    set-valued friction it is that sum itself: -inf where an oscillator has stuck, nan where not all exponents are asked
-    for.
-    `time` is the length averaged over, `block` the time between two orthogonalisations, `components` the number of all
-    exponents.  Exponents that differ by less than about 1/time have not parted yet: they share their sum, and the errors do
-    not say so.
+    Exponents that differ by less than about 1/time are not separated yet: they share their sum, and
+    the errors do not include this.
+
+    Parameters
+    ----------
+    exponent : ndarray, shape (count,)
+        Exponents per unit of non-dimensional time in descending order.
+    stderr : ndarray, shape (count,)
+        Standard errors.
+    resolved : ndarray of bool, shape (count,)
+        False if a direction decays faster than can be followed; its exponent is -inf, its error 0.
+    divergence : float
+        Mean divergence along the orbit: the sum of all exponents of the network. With set-valued
+        friction it is that sum itself, -inf if an oscillator has stuck, nan if not all exponents
+        are computed.
+    divergence_error : float
+        Standard error of `divergence`.
+    time : float
+        Time averaged over.
+    block : float
+        Time between two orthogonalisations.
+    components : int
+        Number of all exponents.
     """
 
     exponent: np.ndarray
@@ -67,13 +86,17 @@ class Lyapunov:
 
     @property
     def rest(self) -> float:
-        """The sum of the exponents that are not known one by one: the divergence less the resolved ones."""
+        """Sum of the exponents that are not resolved: the divergence less the resolved ones."""
         return self.divergence - float(self.exponent[self.resolved].sum())
 
     @property
     def dimension(self) -> float:
-        """Kaplan-Yorke dimension (Springer Lecture Notes in Mathematics 730, 204 (1979)); nan where too few exponents are
-        known."""
+        """Kaplan-Yorke dimension; nan if too few exponents are known.
+
+        References
+        ----------
+        Kaplan & Yorke, Springer Lecture Notes in Mathematics 730, 204 (1979).
+        """
         sums = np.cumsum(self.exponent)
         below = np.flatnonzero(sums < 0.0)
         if len(below) == 0:
@@ -94,50 +117,84 @@ def lyapunov_spectrum(
     show_progress: bool | None = False,
     **parameters: float,
 ) -> Lyapunov:
-    """Return all Lyapunov exponents of a scene's network, or the `count` largest, along the motion from its own start.
+    """Compute the Lyapunov exponents of a scene's network along the motion from its own start.
 
-    Times count periods of the drive, or 2 pi where there is none.  After `transient` the averages run until every
-    standard error is below `precision`, or for `periods`.  `rtol` is the tolerance of the integration, never looser than
-    what the friction law asks for; `seed` chooses the first directions.
+    Parameters
+    ----------
+    scene : Scene
+        Network of at most eight oscillators.
+    count : int, optional
+        Number of largest exponents; all by default.
+    precision : float
+        Averaging stops if every standard error is below this value.
+    periods : float
+        Longest average, in periods of the drive, or in units of 2 pi if there is none.
+    transient : float
+        Transient before the average, in the same units.
+    rtol : float
+        Relative tolerance of the integration. The friction law may require a smaller one.
+    seed : int
+        Seed of the initial directions.
+    show_progress : bool or None
+        Whether to show a progress bar; None shows it on terminals only.
+    **parameters : float
+        Parameters of the scene to set.
 
-    Raises ValueError for more than eight oscillators, a count that the network does not have, and for time dependence
-    without a known period; FloatingPointError where an integration fails.
+    Returns
+    -------
+    Lyapunov
+
+    Raises
+    ------
+    ValueError
+        If there are more than eight oscillators, if `count` exceeds the number of exponents, or if
+        time enters without a known period.
+    FloatingPointError
+        If the integration fails.
     """
     precision, periods, transient, seed = averaging(precision, periods, transient, seed)
-    scene = one_cell(lyapunov_spectrum, scene, rtol, parameters)
-    walk = Walk.make(scene, _counted(scene, count), seed)
+    scene = single_cell(lyapunov_spectrum, scene, rtol, parameters)
+    frame = TangentFrame.make(scene, _counted(scene, count), seed)
     for _ in range(round(transient)):
-        walk.advance()
-    walk.choose()
-    batches, lost = Batches(walk.unit / walk.parts), np.zeros(walk.count, dtype=bool)
+        frame.advance()
+    frame.choose_block()
+    batches, lost = Batches(frame.unit / frame.parts), np.zeros(frame.count, dtype=bool)
     hidden = None if show_progress is None else not show_progress
     with tqdm(total=math.ceil(periods), unit="period", disable=hidden) as bar:
-        while batches.blocks < periods * walk.parts:
-            growth, share, volume = walk.advance()
-            lost |= share < LOST * walk.rtol
+        while batches.blocks < periods * frame.parts:
+            growth, share, volume = frame.advance()
+            lost |= share < LOST * frame.rtol
             batches.add(np.append(np.where(np.isfinite(growth), growth, 0.0), volume)[None])
-            bar.update(1.0 / walk.parts)
+            bar.update(1.0 / frame.parts)
             if batches.due and np.all(batches.error()[:-1][~lost] <= precision):
                 break
-    return _report(walk, batches, lost)
+    return _report(frame, batches, lost)
 
 
-def _report(walk: Walk, batches: Batches, lost: np.ndarray) -> Lyapunov:
-    """Means and errors; what comes after a lost direction is lost as well."""
+def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray) -> Lyapunov:
+    """Means and errors; exponents after a lost direction are lost as well."""
     resolved = ~np.logical_or.accumulate(lost)
     mean, error = batches.mean()[0], batches.error_by_start()[0]
     found, spread = np.where(resolved, mean[:-1], -np.inf), np.where(resolved, error[:-1], 0.0)
     order = np.argsort(-found, kind="stable")
     time, volume = batches.blocks * batches.length, (float(mean[-1]), float(error[-1]))
-    if walk.variation.events is not None:
-        known = len(found) == walk.variation.size
+    if frame.variation.events is not None:
+        known = len(found) == frame.variation.size
         volume = (float(found.sum()), float(np.hypot.reduce(spread))) if known else (math.nan, math.nan)
-    return Lyapunov(found[order], spread[order], resolved[order], *volume, time, walk.unit / walk.parts,
-                    walk.variation.size)  # fmt: skip
+    return Lyapunov(
+        found[order],
+        spread[order],
+        resolved[order],
+        *volume,
+        time=time,
+        block=frame.unit / frame.parts,
+        components=frame.variation.size,
+    )
 
 
 def _counted(scene: Scene, count: int | None) -> int:
-    dimension = scene.n * (len(scene.components) if scene.equations.node.contact is None else 2)
+    """Number of exponents to compute, checked against the network's state."""
+    dimension = scene.n * len(scene.equations.nodes[0].continuous)
     if count is None:
         return dimension
     if not 1 <= whole("count", count, -dimension) <= dimension:
@@ -146,32 +203,65 @@ def _counted(scene: Scene, count: int | None) -> int:
 
 
 @dataclass(slots=True)
-class Walk:
-    """One orbit with `count` orthogonal deviations, taken over blocks of 1/parts of a period; `phase` counts them."""
+class TangentFrame:
+    """One orbit with orthogonal deviations, advanced over blocks of 1/parts of a period.
+
+    Parameters
+    ----------
+    scene : Scene
+        Network and its start.
+    variation : Variation
+        Variational equation of the whole network.
+    integrator : VariationalIntegrator
+        Integrator of the orbit and its deviations.
+    basis : ndarray, shape (size, count)
+        Orthonormal deviations.
+    unit : float
+        Period of the drive, or 2 pi.
+    parts : int
+        Blocks in a period.
+    phase : int
+        Block within the period.
+    """
 
     scene: Scene
     variation: Variation
-    carrier: Carrier
+    integrator: VariationalIntegrator
     basis: np.ndarray
     unit: float
     parts: int = 1
     phase: int = 0
 
     @classmethod
-    def make(cls, scene: Scene, count: int, seed: int) -> Walk:
-        """At the scene's start, with random directions; ValueError where time enters without a known period."""
+    def make(cls, scene: Scene, count: int, seed: int) -> TangentFrame:
+        """Set up the frame at the scene's start, with random directions.
+
+        Parameters
+        ----------
+        scene : Scene
+            Network and its start.
+        count : int
+            Number of deviations.
+        seed : int
+            Seed of the directions.
+
+        Raises
+        ------
+        ValueError
+            If time enters without a known period.
+        """
         unit = unit_of_time(scene)
-        own = whole_network(scene.equations)
+        own = network_variation(scene.equations)
         sticks = own.events is not None
         variation = own if sticks else Variation(with_volume(own.orbit), own.size, own.matrix)
-        variation = phased(variation) if scene.forced else variation
+        variation = phase_shifted(variation) if scene.forced else variation
         values = {**scene.parameters, PHASE.name: 0.0}
         numbers = np.array([[values[name] for name in variation.orbit.parameters]])
         state = np.array([[*scene.y0, *(0.0 for _ in range(0 if sticks else scene.n))]])
         state = with_modes(variation.orbit, state, numbers)
-        carrier = Carrier.make(scene, variation, state, numbers, np.zeros((0, count)), 1)
+        integrator = VariationalIntegrator.make(scene, variation, state, numbers, np.zeros((0, count)), 1)
         basis = np.linalg.qr(np.random.default_rng(seed).normal(size=(own.size, count)))[0]
-        return cls(scene, variation, carrier, basis, unit)
+        return cls(scene, variation, integrator, basis, unit)
 
     @property
     def count(self) -> int:
@@ -180,34 +270,39 @@ class Walk:
 
     @property
     def rtol(self) -> float:
-        """The tolerance integrated with."""
-        return float(self.carrier.control[0])
+        """Relative tolerance of the integration."""
+        return float(self.integrator.control[0])
 
     def advance(self) -> tuple[np.ndarray, np.ndarray, float]:
         """Advance by one block.
 
-        Returns the logarithms of the growth in each direction (count,), the length of each direction after the block over
-        the longest that its deviation has been (count,), and the logarithm of the growth of volumes (nan with set-valued
-        friction).
+        Returns
+        -------
+        growth : ndarray, shape (count,)
+            Logarithm of the growth in each direction.
+        share : ndarray, shape (count,)
+            Length of each direction after the block over the longest length of its deviation.
+        volume : float
+            Logarithm of the growth of volumes; nan with set-valued friction.
         """
         names = self.variation.orbit.parameters
         if PHASE.name in names:
-            self.carrier.numbers[:, names.index(PHASE.name)] = self.phase * (self.unit / self.parts)
+            self.integrator.numbers[:, names.index(PHASE.name)] = self.phase * (self.unit / self.parts)
         self.phase = (self.phase + 1) % self.parts
-        self.carrier.point(self.basis[None])
-        whole_growth = self.carrier.advance(self.unit / self.parts)[0]
-        self.basis, triangle = np.linalg.qr(self.carrier.deviations[0])
+        self.integrator.set_deviations(self.basis[None])
+        whole_growth = self.integrator.advance(self.unit / self.parts)[0]
+        self.basis, triangle = np.linalg.qr(self.integrator.deviations[0])
         own = np.abs(np.diagonal(triangle))
         volume = np.nan
         if self.variation.events is None:
-            shares = self.carrier.state[:, -self.scene.n :]
+            shares = self.integrator.state[:, -self.scene.n :]
             volume = float(shares.sum())
             shares[:] = 0.0
         with np.errstate(divide="ignore"):
             return whole_growth + np.log(own), own * np.exp(np.minimum(whole_growth, 0.0)), volume
 
-    def choose(self) -> None:
-        """Take the fewest blocks a period that keep as many directions clear of the error as any number does."""
+    def choose_block(self) -> None:
+        """Choose the fewest blocks in a period that keep most directions clear of the error."""
         best = -1
         chosen = 1
         for parts in PARTS:

@@ -1,4 +1,4 @@
-"""Synchronous orbits with all their modes: settled on an attractor, then advanced block by block."""
+"""Synchronous orbits with all their modes, settled on an attractor, then advanced block by block."""
 
 from __future__ import annotations
 
@@ -15,25 +15,49 @@ from synchain.models.dynamics.variational import Variation, mode
 from synchain.models.scenes.scene import Scene
 
 from ..cells.initial_modes import with_modes
-from .carrier import Carrier
-from .interpolation import Interpolation, exact, interpolation
+from .interpolation import Interpolation, exact_interpolation, strength_interpolation
+from .variational_integrator import VariationalIntegrator
 
 __all__ = ["Orbits", "unit_of_time"]
 
 NODES, PARTS = (14, 20, 28, 40, 60), (1, 2, 4, 8, 16)
-"""Nodes of a panel of strengths, and panels a side, that are tried."""
+"""Nodes of a panel of strengths, and panels on each side, that are tried."""
 
 LOOSENESS = 10.0
-"""Times the tolerance that modes are allowed where their growth is averaged: it moves exponents by less than rtol."""
+"""Ratio of the tolerance of the modes to that of the orbit if their growth is averaged.
+
+It moves exponents by less than rtol.
+"""
 
 
 @dataclass(slots=True)
 class Orbits:
-    """Orbits from several starts and the modes of `strengths` (m,) along them.
+    """Orbits from several starts with the modes of all strengths along them.
 
-    strengths: those of the variational equation, alpha + i beta unless links have inertia; state (starts, components);
-    unit: the period of the drive, or 2 pi; block: how many of them are advanced at once;
-    deviations (starts, m, components), at unit length.
+    Parameters
+    ----------
+    scene : Scene
+        Oscillator, coupling and numerical settings.
+    variation : Variation
+        Variational equation of a mode.
+    strengths : ndarray, shape (m,)
+        Strengths in the variational equation: alpha + i beta unless links have inertia.
+    state : ndarray, shape (starts, components)
+        Current states.
+    workers : int or None
+        Number of threads.
+    unit : float
+        Period of the drive, or 2 pi if there is none, in units of non-dimensional time.
+    block : float
+        Number of units of one call of `advance`.
+    interpolation : Interpolation, optional
+        Interpolation in the strength, set by `prepare`.
+    integrator : VariationalIntegrator, optional
+        Integrator of the nodes of the interpolation, set by `prepare`.
+    deviations : ndarray, shape (starts, m, components), optional
+        Deviations at unit length.
+    interpolation_error : float
+        Largest error of the interpolation so far.
     """
 
     scene: Scene
@@ -43,16 +67,31 @@ class Orbits:
     workers: int | None
     unit: float
     block: float = 1.0
-    chosen: Interpolation | None = None
-    carrier: Carrier | None = None
+    interpolation: Interpolation | None = None
+    integrator: VariationalIntegrator | None = None
     deviations: np.ndarray | None = None
     interpolation_error: float = 0.0
 
     @classmethod
     def make(cls, scene: Scene, strengths: np.ndarray, state: np.ndarray, workers: int | None) -> Orbits:
-        """Orbits at the start of their transient, `strengths` alpha + i beta of their modes.
+        """Set up orbits at the start of their transient.
 
-        Raises ValueError where time enters without a known period, and for a strength at which a mode has no mass.
+        Parameters
+        ----------
+        scene : Scene
+            Scene with coupling.
+        strengths : ndarray, shape (m,)
+            Strengths alpha + i beta of the modes.
+        state : ndarray, shape (starts, components)
+            Initial states.
+        workers : int or None
+            Number of threads.
+
+        Raises
+        ------
+        ValueError
+            If time enters without a known period, or if a mode has no positive mass at its
+            strength.
         """
         variation = _variation(scene.equations, bool(np.iscomplexobj(strengths)))
         unit = unit_of_time(scene)
@@ -66,61 +105,95 @@ class Orbits:
         return self.variation.size // len(self.variation.parameters)
 
     def part(self, rows: list[int]) -> Orbits:
-        """The orbits of some starts."""
+        """Return the orbits of some starts."""
         return Orbits(self.scene, self.variation, self.strengths, self.state[rows], self.workers, self.unit)
 
-    def carry(self, strengths: np.ndarray, looseness: float = 1.0) -> Carrier:
-        """A carrier of these strengths along the orbits from where they are, one deviation for each component."""
+    def integrator_of(self, strengths: np.ndarray, looseness: float = 1.0) -> VariationalIntegrator:
+        """Return an integrator along the orbits from their current states.
+
+        Parameters
+        ----------
+        strengths : ndarray, shape (k,)
+            Strengths; each has one deviation for each component.
+        looseness : float
+            Ratio of the tolerance of the deviations to that of the orbit.
+        """
         repeated = np.repeat(strengths, self.components)
         rows = np.stack([repeated.real, repeated.imag]) if np.iscomplexobj(self.strengths) else repeated[None]
         names = self.variation.orbit.parameters
         numbers = np.tile([self.scene.parameters[name] for name in names], (len(self.state), 1))
-        return Carrier.make(self.scene, self.variation, self.state, numbers, rows, self.workers, looseness)
+        return VariationalIntegrator.make(
+            self.scene, self.variation, self.state, numbers, rows, self.workers, looseness
+        )
 
     def settle(self, periods: float) -> None:
-        """Run through a transient."""
-        carrier = self.carry(self.strengths[:1])
+        """Advance all orbits over a transient of a number of units."""
+        integrator = self.integrator_of(self.strengths[:1])
         for length in _stretches(round(periods)):
-            carrier.advance(length * self.unit)
-        self.state = carrier.state
+            integrator.advance(length * self.unit)
+        self.state = integrator.state
 
     def prepare(self) -> None:
-        """Choose the block and the panels of strengths, tried on the next block of the orbits, and start the deviations."""
+        """Choose the block and the interpolation by trial on the next blocks, and start the
+        deviations.
+        """
         limit = max(0.1 * self.scene.rtol, 1e-12)
         for block, nodes, parts in _choices(self.scene.forced):
-            self.block, self.chosen = block, interpolation(self.strengths, nodes, parts)
-            self.carrier = self.carry(self.chosen.nodes, LOOSENESS)
-            if self.chosen.exact or self.chosen.error(self.propagators()) < limit:
+            self.block, self.interpolation = block, strength_interpolation(self.strengths, nodes, parts)
+            self.integrator = self.integrator_of(self.interpolation.nodes, LOOSENESS)
+            if self.interpolation.is_exact or self.interpolation.error(self.propagators()) < limit:
                 break
         else:
-            self.chosen = exact(self.strengths)
-        self.carrier = self.carry(self.chosen.nodes, LOOSENESS)
+            self.interpolation = exact_interpolation(self.strengths)
+        self.integrator = self.integrator_of(self.interpolation.nodes, LOOSENESS)
         start = np.ones((len(self.state), len(self.strengths), self.components), dtype=self.strengths.dtype)
         self.deviations = start / math.sqrt(self.components)
 
     def propagators(self) -> np.ndarray:
-        """Advance by one block; returns the propagators (starts, nodes, components, components)."""
-        carrier, p = self.carrier, self.components
-        if carrier is None:
+        """Advance by one block.
+
+        Returns
+        -------
+        ndarray, shape (starts, nodes, components, components)
+            Propagators of the nodes over the block.
+
+        Raises
+        ------
+        RuntimeError
+            If the orbits are not prepared.
+        """
+        integrator, p = self.integrator, self.components
+        if integrator is None:
             raise RuntimeError("orbits are not prepared")
         size = self.variation.size
-        basis = np.zeros((len(self.state), size, len(carrier.order)))
+        basis = np.zeros((len(self.state), size, len(integrator.order)))
         for k in range(p):
             basis[:, k, k::p] = 1.0
-        carrier.point(basis)
-        growth = carrier.advance(self.block * self.unit)
-        found = carrier.deviations * np.exp(growth)[:, None, :]
+        integrator.set_deviations(basis)
+        growth = integrator.advance(self.block * self.unit)
+        found = integrator.deviations * np.exp(growth)[:, None, :]
         if size != p:
             found = found[:, :p] + 1j * found[:, p:]
         return np.asarray(found.reshape(len(self.state), p, -1, p).transpose(0, 2, 1, 3))
 
     def advance(self) -> np.ndarray:
-        """Advance orbits and deviations by one block; returns the logarithm of their growth (starts, m)."""
-        if self.chosen is None or self.deviations is None:
+        """Advance orbits and deviations by one block.
+
+        Returns
+        -------
+        ndarray, shape (starts, m)
+            Logarithm of the growth of each deviation.
+
+        Raises
+        ------
+        RuntimeError
+            If the orbits are not prepared.
+        """
+        if self.interpolation is None or self.deviations is None:
             raise RuntimeError("orbits are not prepared")
         nodes = self.propagators()
-        self.interpolation_error = max(self.interpolation_error, self.chosen.error(nodes))
-        found = self.chosen.apply(nodes)
+        self.interpolation_error = max(self.interpolation_error, self.interpolation.error(nodes))
+        found = self.interpolation.apply(nodes)
         moved = sum(found[..., k] * self.deviations[..., k, None] for k in range(self.components))
         length = np.linalg.norm(moved, axis=2)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -129,7 +202,10 @@ class Orbits:
 
 
 def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:
-    """The strengths tau = alpha/(1 + b alpha) of modes whose links have inertia (`synchain.models.dynamics.mode_inertia`)."""
+    """Strengths tau = alpha/(1 + b alpha) of modes whose links have inertia.
+
+    See `synchain.models.dynamics.mode_inertia`.
+    """
     _, share = inertia_of_modes(scene.equations)
     if share == 0:
         return alpha
@@ -143,12 +219,20 @@ def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _variation(equations: Equations, plane: bool) -> Variation:
-    """The variational equation of a mode: Newton's method on an orbit asks for it at every step."""
+    """Variational equation of a mode, cached because Newton's method on an orbit needs it at every
+    step.
+    """
     return mode(equations, plane=plane)
 
 
 def unit_of_time(scene: Scene) -> float:
-    """The period of the drive, or 2 pi if there is none; ValueError if time enters without a known period."""
+    """Return the period of the drive, or 2 pi if there is none, in units of non-dimensional time.
+
+    Raises
+    ------
+    ValueError
+        If time enters the equations without a known period.
+    """
     drive = scene.drive
     if scene.forced and drive.frequency is None:
         raise ValueError(
@@ -159,13 +243,16 @@ def unit_of_time(scene: Scene) -> float:
 
 
 def _choices(forced: bool) -> list[tuple[float, int, int]]:
-    """Blocks, nodes of a panel and panels a side, the cheapest first; each block costs as much as some nodes by itself."""
+    """Blocks, nodes of a panel and panels on each side, the cheapest first.
+
+    Each block costs as much as twenty nodes by itself.
+    """
     blocks = (4.0, 2.0, 1.0) if forced else (1.0, 0.5, 0.25, 0.125)
     made = [(block, nodes, parts) for block in blocks for nodes in NODES for parts in PARTS]
     return sorted(made, key=lambda choice: (20.0 + choice[1] * choice[2]) / choice[0])
 
 
 def _stretches(periods: int) -> list[int]:
-    """A number of periods in pieces, so that Ctrl-C is heard."""
+    """Split a number of periods into pieces, so that Ctrl-C is noticed."""
     whole, rest = divmod(max(periods, 0), 100)
     return [100] * whole + ([rest] if rest else [])

@@ -18,8 +18,8 @@ from synchain.models.scenes.sweep import rest_in_sweep
 
 from ..cells.plan import Planner
 from ..results.certificate import Certificate
+from ..stability.exponents import Exponents, exponents
 from ..stability.orbits import unit_of_time
-from ..stability.transversal import Exponents, exponents
 
 __all__ = ["certify", "check_certifiable"]
 

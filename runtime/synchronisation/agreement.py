@@ -21,7 +21,7 @@ from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 
 from ..cells.keywords import with_parameters
-from ..stability.transversal import Exponents, exponents
+from ..stability.exponents import Exponents, exponents
 from .threshold import Criterion, check_probe, simulate
 
 __all__ = ["CAUSES", "OUTCOMES", "Agreement", "Cell", "agreement", "strengths"]

@@ -153,7 +153,7 @@ def ring_of_three(equations: Equations) -> Equations:
     turned = Edge(edge.here, edge.there, edge.weight, rates, (*others, MODE_ALPHA, MODE_BETA))
     there = [(i, (i + 1) % 3, Fraction(1)) for i in range(3)]
     back = [(i, (i + 2) % 3, Fraction(-1)) for i in range(3)]
-    return Equations(equations.node, turned, 3, (*there, *back))
+    return Equations.of_equal_nodes(equations.node, turned, 3, (*there, *back))
 
 
 def _check_coupling(edge: Edge) -> None:

@@ -44,7 +44,7 @@ def energy_residual(scene: Scene, end: np.ndarray) -> float:
 
 def _with_energy(scene: Scene) -> tuple[Scene, dict[str, float]]:
     """A scene with the same energy that has one, and the numbers to put in: smoothed, and with springs for "x->v"."""
-    if scene.equations.node.contact is not None:
+    if scene.equations.sticks:
         return scene.replace(contact="atan", initial={name: scene.initial[name] for name in ("x", "v")}), {}
     if scene.coupling == "x->v" and scene.equations.links:
         return scene.replace(coupling="spring", sigma=0.0), {"sigma": scene.parameters["sigma"]}
@@ -79,7 +79,7 @@ def _with_work(equations: Equations, exact: Energy) -> Equations:
     if edge is not None:
         rates = (*edge.rhs, _link_power(node, edge))
         edge = Edge((*edge.here, here), (*edge.there, there), edge.weight, rates, edge.parameters)
-    return Equations(single, edge, equations.n, equations.links)
+    return Equations.of_equal_nodes(single, edge, equations.n, equations.links)
 
 
 def _link_power(node: Node, edge: Edge) -> sp.Expr:

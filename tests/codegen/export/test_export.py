@@ -54,7 +54,7 @@ def one_way(n: int) -> Equations:
     p, q, r, s, w, sigma = real("p", "q", "r", "s", "w", "sigma")
     edge = Edge((p, q), (r, s), w, (w * sigma * sp.sin(r - p), a * w**2 * (s - q) * p), (sigma, a))
     links = tuple((i, (i + 1) % n, Fraction(i + 1, 3)) for i in range(n))
-    return Equations(node, edge, n, tuple(sorted(links)))
+    return Equations.of_equal_nodes(node, edge, n, tuple(sorted(links)))
 
 
 def ill_named(n: int) -> Equations:
@@ -84,7 +84,7 @@ def ill_named(n: int) -> Equations:
     there = real("x_i_2", "w2")
     edge = Edge((x, v), (there[0], there[1]), sp.Symbol("weight", real=True),
                 (sp.S.Zero, symbols[0] * sp.Symbol("weight", real=True) * (there[0] - x)), (symbols[0],))  # fmt: skip
-    return Equations(node, edge, n, tuple((i, i + 1, Fraction(1, 3)) for i in range(n - 1)))
+    return Equations.of_equal_nodes(node, edge, n, tuple((i, i + 1, Fraction(1, 3)) for i in range(n - 1)))
 
 
 def heterogeneous(n: int) -> Equations:
@@ -136,7 +136,7 @@ NETWORKS: dict[str, Equations] = {
         parameters={"a": [0.1 * i for i in range(7)]},
     ).equations,
     **{f"inertial {n}": inertial(n) for n in (3, 9)},
-    "alone 9": Equations(Node((sp.Symbol("x", real=True),), (sp.S.One,), ()), None, 9),
+    "alone 9": Equations.of_equal_nodes(Node((sp.Symbol("x", real=True),), (sp.S.One,), ()), None, 9),
 }
 
 
@@ -358,7 +358,7 @@ def usual(n: int, inertia: bool) -> Equations:
     mass = ((0, 0), (0, w * symbols[5])), ((0, 0), (0, -w * symbols[5]))
     blocks = tuple(tuple(tuple(map(sp.sympify, row)) for row in block) for block in mass) if inertia else ()
     edge = Edge((x, v), (x_2, v_2), w, (sp.S.Zero, symbols[0] * w * (x_2 - x)), (symbols[0], symbols[5]), blocks)
-    return Equations(node, edge, n, tuple((i, i + 1, Fraction(1, 3)) for i in range(n - 1)))
+    return Equations.of_equal_nodes(node, edge, n, tuple((i, i + 1, Fraction(1, 3)) for i in range(n - 1)))
 
 
 @pytest.mark.parametrize("language", RUNS)
@@ -379,7 +379,7 @@ def test_exported_functions_keep_the_names_of_mechanics(n: int, inertia: bool, l
 def test_a_name_cannot_leave_its_comment() -> None:
     bad = sp.Symbol("a*/\nint evil;/*\\", real=True)
     x = sp.Symbol("x", real=True)
-    equations = Equations(Node((x,), (bad * x,), (bad,)), None, 1)
+    equations = Equations.of_equal_nodes(Node((x,), (bad * x,), (bad,)), None, 1)
     for text, mark in ((to_c(equations), " *"), (to_python(equations), "#"), (to_numba(equations), "#")):
         assert all(line.startswith((mark, "/*")) for line in text.splitlines() if "evil" in line and "Renamed" in line)
         assert not any(line.strip().startswith("int evil") for line in text.splitlines())

@@ -30,7 +30,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import Node
 
 x, v = real("x", "v")
-SWING = Equations(Node((x, v), (v, -x), ()), None, 1)
+SWING = Equations.of_equal_nodes(Node((x, v), (v, -x), ()), None, 1)
 REAL = emit(SWING, "cash_karp", (), width=1)
 MORE = ", ".join(f"more_{i}" for i in range(len(loading.SIGNATURE.args) - 7))
 TINY = """
@@ -65,6 +65,16 @@ PROGRAM = textwrap.dedent(
                       "warnings": [str(w.message) for w in caught]}))
     """
 )
+
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from synchain.codegen.kernels.cache import open_folder
+with open_folder(Path(sys.argv[1])) as folder, folder.turn(sys.argv[2]):
+    print("held", flush=True)
+    time.sleep(600)
+"""
 
 
 def start(folder: Path, *arguments: str) -> subprocess.Popen:
@@ -137,13 +147,28 @@ def test_a_real_kernel_is_loaded_without_compiling(tmp_path):
     assert reports[0]["end"] == reports[1]["end"]
 
 
-def test_two_processes_may_compile_at_once(folder):
+def test_of_two_processes_that_miss_a_kernel_one_compiles_it(folder):
     jobs = [start(folder), start(folder)]
     reports = [finish(job) for job in jobs]
     assert all(r["warnings"] == [] for r in reports)
-    assert not list(folder.glob("*.tmp"))
+    assert sorted(r["from_cache"] for r in reports) == [False, True]
+    assert not [*folder.glob("*.tmp"), *folder.glob("*.lock")]
     assert len(list(folder.glob("kernel_*.py"))) == 1
     assert works(fresh())
+
+
+def test_the_lock_of_a_process_that_was_killed_keeps_nobody_waiting(folder):
+    name = f"kernel_{loading._fingerprint(SOURCE)[:32]}"
+    holder = subprocess.Popen([sys.executable, "-c", HOLDER, str(folder), name], stdout=subprocess.PIPE, text=True)
+    assert holder.stdout is not None
+    assert holder.stdout.readline() == "held\n"
+    waiting = start(folder)
+    with pytest.raises(subprocess.TimeoutExpired):
+        waiting.wait(5.0)
+    holder.kill()
+    holder.wait()
+    assert finish(waiting)["from_cache"] is False
+    assert not list(folder.glob("*.lock"))
 
 
 def test_the_kernel_keeps_its_text(compiled_folder, folder):

@@ -7,18 +7,19 @@ import pytest
 import scipy.integrate
 import scipy.linalg
 import sympy as sp
+from variational_reference import transversal_equations
 
 from synchain.codegen.kernels.compile import load
 from synchain.codegen.kernels.modes import emit_modes
 from synchain.codegen.kernels.sweep import emit
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.variational import Variation, mode, transversal, whole
+from synchain.models.dynamics.variational import Variation, mode, network_variation
 from synchain.models.graphs.families import topology
 from synchain.models.mechanics.components import Node
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.plan import control_array
-from synchain.runtime.stability.carrier import Carrier
+from synchain.runtime.stability.variational_integrator import VariationalIntegrator
 
 OMEGA = 1.4
 
@@ -27,12 +28,16 @@ def scene(name: str, coupling: str, n: int = 2, **more: object) -> Scene:
     return Scene(oscillator=name, coupling=coupling, topology=topology("chain", n), **more)  # type: ignore[arg-type]
 
 
-def carrier(s: Scene, variation: Variation, state: list[float], strengths: np.ndarray, rtol: float = 1e-10) -> Carrier:
+def integrator(
+    s: Scene, variation: Variation, state: list[float], strengths: np.ndarray, rtol: float = 1e-10
+) -> VariationalIntegrator:
     numbers = np.array([[s.parameters[name] for name in variation.orbit.parameters]])
-    return Carrier.make(s.replace(rtol=rtol, atol=rtol * 1e-2), variation, np.array([state]), numbers, strengths, 1)
+    return VariationalIntegrator.make(
+        s.replace(rtol=rtol, atol=rtol * 1e-2), variation, np.array([state]), numbers, strengths, 1
+    )
 
 
-def moved(c: Carrier, length: float) -> np.ndarray:
+def moved(c: VariationalIntegrator, length: float) -> np.ndarray:
     """Deviations (size, modes) after a length of time, as long as they are."""
     growth = c.advance(length)
     return (c.deviations * np.exp(growth)[:, None])[0]
@@ -43,7 +48,7 @@ ALPHA = np.array([3.0, 0.0, 0.4, 1.1, 25.0])
 
 def test_modes_of_a_linear_node_follow_the_matrix_exponential() -> None:
     s = scene("harmonic", "damper")
-    found = moved(carrier(s, mode(s.equations), [0.3, 0.1], ALPHA[None]), 2.0)
+    found = moved(integrator(s, mode(s.equations), [0.3, 0.1], ALPHA[None]), 2.0)
     for k, alpha in enumerate(ALPHA):
         exact = scipy.linalg.expm(2.0 * np.array([[0.0, 1.0], [-1.0, -alpha]])) @ (np.ones(2) / np.sqrt(2))
         np.testing.assert_allclose(found[:, k], exact, rtol=0, atol=2e-9 * np.abs(exact).max())
@@ -52,7 +57,7 @@ def test_modes_of_a_linear_node_follow_the_matrix_exponential() -> None:
 def test_complex_strengths_of_a_linear_node() -> None:
     s = scene("harmonic", "spring")
     strengths = np.array([[0.5, 0.5, -0.2], [0.7, -0.7, 2.0]])
-    found = moved(carrier(s, mode(s.equations, plane=True), [0.3, 0.1], strengths), 2.0)
+    found = moved(integrator(s, mode(s.equations, plane=True), [0.3, 0.1], strengths), 2.0)
     for k, z in enumerate(strengths[0] + 1j * strengths[1]):
         exact = scipy.linalg.expm(2.0 * np.array([[0.0, 1.0], [-1.0 - z, 0.0]])) @ (np.full(2, 0.5 + 0.5j))
         np.testing.assert_allclose(found[:2, k] + 1j * found[2:, k], exact, rtol=0, atol=1e-9 * np.abs(exact).max())
@@ -69,7 +74,7 @@ def test_complex_strengths_of_a_linear_node() -> None:
 def test_modes_are_those_of_the_extended_system(name: str, coupling: str, state: list[float]) -> None:
     """Orbit and deviation as one state in an ordinary kernel, whose Jacobian SymPy derives anew."""
     s = scene(name, coupling)
-    made = transversal(s.equations)
+    made = transversal_equations(s.equations)
     kernel = load(emit(made, "rodas5p", (), width=1))
     length = s.period or 6.0
     size = len(state)
@@ -80,7 +85,7 @@ def test_modes_are_those_of_the_extended_system(name: str, coupling: str, state:
     limit = 0.5 * (s.period or np.inf)
     kernel.drive(0, 3, start, numbers, np.tile([0.0, length, s.period or 0.0, 0.0], (3, 1)),
                  control_array(1e-10, 1e-12, limit, 10**7), *buffers.arrays())  # fmt: skip
-    c = carrier(s, mode(s.equations), state, alphas[None])
+    c = integrator(s, mode(s.equations), state, alphas[None])
     found = moved(c, length)
     np.testing.assert_allclose(c.state[0], buffers.end[0, :size], rtol=0, atol=1e-7)
     np.testing.assert_allclose(found.T, buffers.end[:, size:], rtol=0, atol=2e-6 * np.abs(found).max())
@@ -90,9 +95,9 @@ def test_modes_are_those_of_the_extended_system(name: str, coupling: str, state:
 def test_the_whole_network_follows_differences_of_its_trajectories() -> None:
     s = scene("duffing", "spring", 2, parameters={"sigma": 0.3})
     y0 = np.array([1.0, 0.7, 0.1, -0.2])
-    variation = whole(s.equations)
-    c = carrier(s, variation, list(y0), np.zeros((0, 4)))
-    c.point(np.eye(4)[None])
+    variation = network_variation(s.equations)
+    c = integrator(s, variation, list(y0), np.zeros((0, 4)))
+    c.set_deviations(np.eye(4)[None])
     found = moved(c, s.period or 0.0)
     rhs = sp.lambdify([sp.Symbol(n, real=True) for n in ("t", *s.equations.state, *s.equations.parameters)],
                       list(s.equations.rhs()), "numpy")  # fmt: skip
@@ -112,20 +117,20 @@ def test_the_whole_network_follows_differences_of_its_trajectories() -> None:
 def test_growth_over_any_number_of_decades_is_counted() -> None:
     """A pair x' = x (alpha - 1 …): growth of e^4000 would overflow, decay of e^-4000 would vanish."""
     x = sp.Symbol("x", real=True)
-    orbit = Equations(Node((x,), (-x,), ()), None, 1)
+    orbit = Equations.of_equal_nodes(Node((x,), (-x,), ()), None, 1)
     strength = sp.Symbol("mode_alpha", real=True)
     variation = Variation(orbit, 1, (((0, 0), strength),), (strength,))
     s = scene("harmonic", "spring")
     rates = np.array([[-40.0, 0.0, 40.0, 2.0]])
-    c = Carrier.make(s, variation, np.array([[1.0]]), np.zeros((1, 0)), rates, 1)
+    c = VariationalIntegrator.make(s, variation, np.array([[1.0]]), np.zeros((1, 0)), rates, 1)
     np.testing.assert_allclose(c.advance(100.0)[0], 100.0 * rates[0], rtol=1e-7, atol=1e-6)
     np.testing.assert_allclose(c.deviations, 1.0)
 
 
 def test_a_deviation_of_zero_stays_zero_and_has_no_exponent() -> None:
     s = scene("friction", "spring")
-    c = carrier(s, mode(s.equations), [0.3, 0.0], np.array([[0.1, 0.2, 0.3]]))
-    c.point(np.array([[[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]]))
+    c = integrator(s, mode(s.equations), [0.3, 0.0], np.array([[0.1, 0.2, 0.3]]))
+    c.set_deviations(np.array([[[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]]))
     growth = c.advance(s.period or 0.0)
     assert growth[0, 0] == -np.inf
     assert np.all(np.isfinite(growth[0, 1:]))
@@ -134,19 +139,19 @@ def test_a_deviation_of_zero_stays_zero_and_has_no_exponent() -> None:
 
 def test_modes_do_not_depend_on_their_order_or_their_neighbours() -> None:
     s = scene("friction", "spring")
-    one = carrier(s, mode(s.equations), [0.3, 0.0], ALPHA[None])
-    other = carrier(s, mode(s.equations), [0.3, 0.0], ALPHA[None, ::-1])
+    one = integrator(s, mode(s.equations), [0.3, 0.0], ALPHA[None])
+    other = integrator(s, mode(s.equations), [0.3, 0.0], ALPHA[None, ::-1])
     np.testing.assert_array_equal(moved(one, s.period or 0.0), moved(other, s.period or 0.0)[:, ::-1])
 
 
 @pytest.mark.long
 def test_names_of_the_model_cannot_collide_with_those_of_the_kernel() -> None:
     x, lag, value = (sp.Symbol(n, real=True) for n in ("x", "lag", "value_1_0"))
-    orbit = Equations(Node((x,), (-lag * x + value * sp.sin(x),), (lag, value)), None, 1)
+    orbit = Equations.of_equal_nodes(Node((x,), (-lag * x + value * sp.sin(x),), (lag, value)), None, 1)
     strength = sp.Symbol("mode_alpha", real=True)
     slope = -lag + value * sp.cos(orbit.symbols(0)[0])
     variation = Variation(orbit, 1, (((0, 0), slope - strength),), (strength,))
-    c = Carrier.make(
+    c = VariationalIntegrator.make(
         scene("harmonic", "spring"), variation, np.zeros((1, 1)), np.array([[2.0, 0.5]]), np.zeros((1, 1)), 1
     )
     np.testing.assert_allclose(c.advance(3.0), -4.5, rtol=1e-7)
@@ -155,18 +160,18 @@ def test_names_of_the_model_cannot_collide_with_those_of_the_kernel() -> None:
 def test_what_a_variation_refuses() -> None:
     x = sp.Symbol("x", real=True)
     strength = sp.Symbol("mode_alpha", real=True)
-    orbit = Equations(Node((x,), (-x,), ()), None, 1)
+    orbit = Equations.of_equal_nodes(Node((x,), (-x,), ()), None, 1)
     with pytest.raises(ValueError, match="outside the 1 x 1 matrix"):
         Variation(orbit, 1, (((0, 1), strength),), (strength,))
     with pytest.raises(ValueError, match="not linear in the strengths"):
         Variation(orbit, 1, (((0, 0), strength**2),), (strength,))
     with pytest.raises(ValueError, match="unknown symbol 'q'"):
         Variation(orbit, 1, (((0, 0), sp.Symbol("q", real=True)),), (strength,))
-    taken = Equations(Node((x,), (-strength * x,), (strength,)), None, 1)
+    taken = Equations.of_equal_nodes(Node((x,), (-strength * x,), (strength,)), None, 1)
     with pytest.raises(ValueError, match="'mode_alpha' is needed for the strength of a mode"):
         Variation(taken, 1, (((0, 0), strength),), (strength,))
 
 
 def test_large_networks_are_refused_in_words() -> None:
     with pytest.raises(ValueError, match="tangent dynamics of 9 oscillators; expected at most 8"):
-        emit_modes(whole(Scene(topology=topology("chain", 9)).equations))
+        emit_modes(network_variation(Scene(topology=topology("chain", 9)).equations))

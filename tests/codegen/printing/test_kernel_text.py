@@ -68,7 +68,9 @@ def test_records_that_are_not_wanted_cost_nothing():
 
 def test_unforced_equations_have_no_time_terms():
     x, v = real("x", "v")
-    text = emit(Equations(Node((x, v), (v, -sp.sin(x)), ()), None, 1), "rodas5p").text.split("def step")[1]
+    text = emit(Equations.of_equal_nodes(Node((x, v), (v, -sp.sin(x)), ()), None, 1), "rodas5p").text.split("def step")[
+        1
+    ]
     assert "cos(t" not in text
     assert "*h*w" not in text
 
@@ -106,7 +108,7 @@ def test_sections_are_checked():
 def test_what_cannot_be_printed_is_refused():
     x = real("x")[0]
     with pytest.raises(printer.UnprintableError, match="no printing rule for gamma"):
-        emit(Equations(Node((x,), (sp.gamma(x),), ()), None, 1))
+        emit(Equations.of_equal_nodes(Node((x,), (sp.gamma(x),), ()), None, 1))
 
 
 def test_the_head_of_a_kernel_names_the_states_that_are_called_otherwise():

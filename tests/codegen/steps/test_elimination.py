@@ -182,9 +182,9 @@ def test_the_program_solves_the_system(links, weighted):
     dice = np.random.default_rng(8)
     weight = {p: Fraction(int(dice.integers(1, 5)), 3) if weighted else Fraction(1) for p in links(n)}
     ends = sorted((*p, w) for (i, j), w in weight.items() for p in ((i, j), (j, i)))
-    eq = Equations(harmonic_chain(2).node, spring(), n, tuple(ends))
+    eq = Equations.of_equal_nodes(harmonic_chain(2).node, spring(), n, tuple(ends))
     made = program(eq)
-    arrays = dict(zip(skeleton_names(), made.arrays, strict=True))
+    arrays = dict(zip(driver_names(), made.arrays, strict=True))
     matrix = np.zeros((2 * n, 2 * n))
     for (r, c), e in eq.jacobian().items():
         matrix[r, c] = float(e.subs({"sigma": 0.0}).xreplace({sp.Symbol("sigma", real=True): sp.Rational(2, 5)}))
@@ -203,7 +203,7 @@ def test_the_program_solves_the_system(links, weighted):
     np.testing.assert_allclose(dense[x:scratch], np.linalg.solve(shifted, right), rtol=1e-11, atol=1e-13)
 
 
-def skeleton_names() -> tuple[str, ...]:
+def driver_names() -> tuple[str, ...]:
     from synchain.codegen.printing.names import NAMES
 
     return NAMES

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import random
-import sys
 
 import mpmath
 import numpy as np
@@ -168,22 +167,19 @@ def refused(eq: Equations, m: integrators.Integrator, looped: bool) -> str:
 @pytest.mark.parametrize("looped", [False, True], ids=["written out", "looped"])
 @pytest.mark.parametrize("method", integrators.names())
 @pytest.mark.parametrize("case", NETWORKS)
-def test_a_step_is_what_its_definition_says(case, method, looped, exact_numbers, monkeypatch):
+def test_a_step_is_what_its_definition_says(case, method, looped, exact_numbers):
     eq, m = NETWORKS[case], integrators.integrator(method)
+    unroll = 0 if looped else 8
     refusal = refused(eq, m, looped)
     if refusal:
-        monkeypatch.setattr(sys.modules["synchain.codegen.kernels.sweep"], "LARGEST_UNROLLED", 0 if looped else 8)
         with pytest.raises(ValueError, match=refusal):
-            emit(eq, method, (), width=1)
+            emit(eq, method, (), width=1, unroll=unroll)
         return
     if looped and m.inexact:
-        monkeypatch.setattr(sys.modules["synchain.codegen.kernels.sweep"], "LARGEST_UNROLLED", 0)
         with pytest.raises(ValueError, match="steps at most 0 nodes"):
-            emit(eq, method, (), width=1)
+            emit(eq, method, (), width=1, unroll=unroll)
         return
-    if looped:
-        monkeypatch.setattr(sys.modules["synchain.codegen.kernels.sweep"], "LARGEST_UNROLLED", 0)
-    space = plain(emit(eq, method, ("trajectory",), width=1).text, EXACT)
+    space = plain(emit(eq, method, ("trajectory",), width=1, unroll=unroll).text, EXACT)
     assert space["LOOPED"] is looped
     weights = [mpf(w.numerator) / w.denominator for _, _, w in by_joint(eq)]
     graph = (program(eq).arrays, np.array(weights, object)) if looped else ()
@@ -269,7 +265,7 @@ def test_dense_output_meets_both_ends():
 @pytest.mark.parametrize("broken", [mpf("nan"), mpf("inf")])
 def test_an_undefined_estimate_is_never_accepted(broken, method):
     # two nodes without links: what is wrong with one leaves the estimates of the other small
-    space = plain(emit(Equations(harmonic_chain(2).node, None, 2), method, (), width=1).text, DIGITS)
+    space = plain(emit(Equations.of_equal_nodes(harmonic_chain(2).node, None, 2), method, (), width=1).text, DIGITS)
     tiny = mpf(10) ** -6
     assert take_step(space, mpf(0), tiny, [mpf(1)] * 4, [], mpf(1), mpf(1)).error < 1
     for slot in range(4):

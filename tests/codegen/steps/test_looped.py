@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from samples import FLOATS, plain
+from samples import FLOATS, kernel, plain, run_cells
 
-import synchain.codegen.kernels.compile as load_module
-import synchain.codegen.kernels.sweep as emit_module
 from synchain.codegen import driver
 from synchain.codegen.printing.names import NAMES
-from synchain.codegen.steps import program as sparse
-from synchain.codegen.steps.program import order, program
+from synchain.codegen.steps.program import Program, order, program
 from synchain.models import chain, complete, grid, random_cubic, ring, star, tree
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
@@ -20,16 +17,10 @@ from synchain.runtime.cells.kernels import kernel_source
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run
 
+INCOMPLETE = 0.0
+"""The limit of fill with which every elimination keeps only the first level of it, and solutions are refined."""
+
 GRAPHS = [ring(5), star(5), complete(4), from_matrix([[-1, 1, 0], [0, "-1/2", "1/2"], [2, 0, -2]])]
-
-
-@pytest.fixture
-def always_looped(monkeypatch):
-    for module in (emit_module, load_module):
-        monkeypatch.setattr(module, "LARGEST_UNROLLED", 0)
-    load_module._load.cache_clear()
-    yield
-    load_module._load.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -40,18 +31,17 @@ def always_looped(monkeypatch):
         pytest.param(GRAPHS[3], "dop853", marks=pytest.mark.long, id="matrix3-dop853"),
     ],
 )
-def test_looped_step_equals_the_unrolled_one(graph, integrator, request):
+def test_looped_step_equals_the_unrolled_one(graph, integrator):
     scene = Scene(
         topology=graph, transient=0, window=1, integrator=integrator, rtol=1e-9,
         parameters={"sigma": 0.1, "kappa": 1e5 if integrator == "rodas5p" else 10.0},
     )  # fmt: skip
-    plain = run(scene)
-    request.getfixturevalue("always_looped")
-    looped = run(scene)
-    assert "for i in range(NODES)" in emit_module.emit(scene.equations, integrator, width=1).text
+    kernels = [kernel(scene.equations, integrator, ("sync_error",), width=1, unroll=n) for n in (8, 0)]
+    assert ["for i in range(NODES)" in k.source for k in kernels] == [False, True]
+    plain, looped = (run_cells(k, scene) for k in kernels)
     np.testing.assert_allclose(looped.end, plain.end, atol=1e-8)
-    np.testing.assert_allclose(looped.sync_error, plain.sync_error, atol=1e-7)
-    assert abs(int(looped.steps) - int(plain.steps)) <= 0.02 * int(plain.steps)
+    np.testing.assert_allclose(looped.sums[:, 0], plain.sums[:, 0], atol=1e-7)
+    assert abs(looped.steps[0] - plain.steps[0]) <= 0.02 * plain.steps[0]
 
 
 @pytest.mark.long
@@ -67,15 +57,6 @@ def test_large_ring_runs_in_loops_and_keeps_its_symmetry():
     np.testing.assert_allclose(large.end.values.reshape(2, 12)[:, :2], small.end.values.reshape(2, 2), atol=1e-8)
 
 
-@pytest.fixture
-def incomplete(monkeypatch):
-    """Every elimination keeps only the first level of fill, and solutions are refined."""
-    monkeypatch.setattr(sparse, "FILL_LIMIT", 0.0)
-    sparse._program.cache_clear()
-    yield
-    sparse._program.cache_clear()
-
-
 def strong(equations, shift: float) -> np.ndarray:
     """shift - J for random entries of J between -1 and 1."""
     random = np.random.default_rng(1)
@@ -85,9 +66,9 @@ def strong(equations, shift: float) -> np.ndarray:
     return matrix
 
 
-def solved(equations, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+def solved(equations, made: Program, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """The solution by the generated program, run by Python itself."""
-    made, size = program(equations), equations.dimension
+    size = equations.dimension
     arrays = dict(zip(NAMES, made.arrays, strict=True))
     space = plain(driver.text("sparse"), {**FLOATS, "DIMENSION": size, "WIDTH": 1})
     rows = np.repeat(arrays["order"], np.diff(arrays["row_start"]))
@@ -105,33 +86,34 @@ def solved(equations, matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("graph", GRAPHS, ids=lambda g: f"{g.name}{g.n}")
 def test_program_solves_like_numpy(graph):
     equations = Scene(topology=graph, parameters={"sigma": 0.1}).equations
-    assert program(equations).exact
+    made = program(equations)
+    assert made.exact
     matrix, right = strong(equations, 6.0), np.random.default_rng(2).normal(size=equations.dimension)
-    np.testing.assert_allclose(solved(equations, matrix, right), np.linalg.solve(matrix, right), rtol=1e-12)
+    np.testing.assert_allclose(solved(equations, made, matrix, right), np.linalg.solve(matrix, right), rtol=1e-12)
 
 
 @pytest.mark.parametrize("shift", [8.0, 100.0, 1e6])
 @pytest.mark.parametrize("graph", [grid(30), random_cubic(20)], ids=lambda g: g.name)
-def test_incomplete_elimination_solves_to_rounding(graph, shift, incomplete):
+def test_incomplete_elimination_solves_to_rounding(graph, shift):
     equations = Scene(topology=graph).equations
-    made = program(equations)
+    made = program(equations, INCOMPLETE)
     assert not made.exact
     matrix, right = strong(equations, shift), np.random.default_rng(2).normal(size=equations.dimension)
-    found, expected = solved(equations, matrix, right), np.linalg.solve(matrix, right)
+    found, expected = solved(equations, made, matrix, right), np.linalg.solve(matrix, right)
     assert np.abs(found - expected).max() <= 4e-15 * np.abs(expected).max()
 
 
-def test_refinement_that_does_not_converge_says_so(incomplete):
+def test_refinement_that_does_not_converge_says_so():
     equations = Scene(topology=grid(30)).equations
+    made = program(equations, INCOMPLETE)
     right = np.ones(equations.dimension)
-    assert np.isnan(solved(equations, strong(equations, 0.5), right)).all()
+    assert np.isnan(solved(equations, made, strong(equations, 0.5), right)).all()
 
 
-def test_incomplete_factors_keep_the_first_level_of_fill(incomplete):
+def test_incomplete_factors_keep_the_first_level_of_fill():
     """Positions first: (v_j, v_i) for every link and (v_i, v_i), which is the diagonal; nothing else."""
     graph = grid(30)
-    equations = Scene(topology=graph).equations
-    made = program(equations)
+    made = program(Scene(topology=graph).equations, INCOMPLETE)
     links = len(graph.links)
     assert made.entries == 2 * 30 + 2 * 30 + 2 * links
     arrays = dict(zip(NAMES, made.arrays, strict=True))
@@ -147,28 +129,26 @@ def test_large_fill_is_not_built(name, n):
 
 
 @pytest.mark.long
-def test_incomplete_elimination_changes_no_result(incomplete, request):
+def test_incomplete_elimination_changes_no_result():
     scene = Scene(topology=grid(12), transient=0, window=1, rtol=1e-9, parameters={"sigma": 0.3})
-    refined = run(scene)
-    assert "solve(dense, MATRIX, ENTRIES, K1" in emit_module.emit(scene.equations, width=1).text
-    sparse.FILL_LIMIT = 1e9  # the fixture restores it
-    sparse._program.cache_clear()
-    load_module._load.cache_clear()
-    exact = run(scene)
+    kernels = [kernel(scene.equations, width=2, fill=fill) for fill in (INCOMPLETE, 1e9)]
+    assert ["solve(dense, MATRIX, ENTRIES, K1" in k.source for k in kernels] == [True, False]
+    refined, exact = (run_cells(k, scene) for k in kernels)
     np.testing.assert_allclose(refined.end, exact.end, atol=1e-8)
-    assert abs(int(refined.steps) - int(exact.steps)) <= 0.02 * int(exact.steps)
+    assert abs(refined.steps[0] - exact.steps[0]) <= 0.02 * exact.steps[0]
 
 
 @pytest.mark.long
-def test_lanes_are_refined_independently(incomplete):
+def test_lanes_are_refined_independently():
     """A lane with strong coupling needs more corrections than its neighbours, and changes nothing in them."""
     scene = Scene(topology=grid(12), transient=0, window=0.2)
     strengths = [0.1, 0.2, 1e4, 0.3, 0.0, 30.0, 0.5, 0.6]
-    together = run(scene, sigma=strengths, width=2)
-    assert (together.status == Status.FINISHED).all()
+    refined = kernel(scene.equations, width=2, fill=INCOMPLETE)
+    together = run_cells(refined, scene.replace(axes={"sigma": strengths}))
+    assert (together.counts[:, 0] == Status.FINISHED).all()
     for i in (0, 2, 4):
-        alone = run(scene, sigma=[strengths[i]], width=2)
-        np.testing.assert_array_equal(alone.end.values[0], together.end.values[i])
+        alone = run_cells(refined, scene.replace(axes={"sigma": [strengths[i]]}))
+        np.testing.assert_array_equal(alone.end[0], together.end[i])
 
 
 @pytest.mark.parametrize("graph", [chain(2000), star(2000), ring(2000), tree(2000)], ids=lambda g: g.name)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from scipy.integrate import solve_ivp
 
 from synchain.codegen.export.python import to_python
 from synchain.codegen.kernels.sweep import emit
-from synchain.codegen.steps import program as sparse
 from synchain.codegen.steps.places import by_joint
 from synchain.codegen.steps.program import program
 from synchain.models import ring, star
@@ -56,26 +54,22 @@ def by_scipy(scene: Scene, end: float) -> np.ndarray:
 
 @pytest.mark.parametrize("method", ["cash_karp", "dop853", "rodas5p"])
 @pytest.mark.parametrize("case", ["three kinds", "clocks", "clocks, incomplete"])
-def test_loops_do_what_the_written_statements_do(case: str, method: str, monkeypatch) -> None:
+def test_loops_do_what_the_written_statements_do(case: str, method: str) -> None:
     """Ten steps of the same network by either kernel, in plain Python."""
     equations = three_kinds() if case == "three kinds" else clocks(6)
-    if "incomplete" in case:
-        monkeypatch.setattr(sparse, "FILL_LIMIT", 0.0)
-        sparse._program.cache_clear()
+    fill = 0.0 if "incomplete" in case else 3.0
     random = np.random.default_rng(4)
     y, p = random.uniform(-1, 1, equations.dimension), random.uniform(0.5, 1.5, len(equations.parameters))
     ends = []
     for limit in (8, 0):
-        monkeypatch.setattr(sys.modules["synchain.codegen.kernels.sweep"], "LARGEST_UNROLLED", limit)
-        space = plain(emit(equations, method, (), width=1).text, FLOATS)
+        space = plain(emit(equations, method, (), width=1, unroll=limit, fill=fill).text, FLOATS)
         assert space["LOOPED"] is (limit == 0)
         weights = [float(weight) for _, _, weight in by_joint(equations)]
         state, t, h = list(y), 0.0, 0.05
         for _ in range(10):
-            graph = (program(equations).arrays, weights) if limit == 0 else ()
+            graph = (program(equations, fill).arrays, weights) if limit == 0 else ()
             state, t = take_step(space, t, h, state, list(p), 1e-6, 1e-6, *graph).y_new, t + h
         ends.append(state)
-    sparse._program.cache_clear()
     assert program(equations).weights.tolist() == weights
     np.testing.assert_allclose(*ends, rtol=1e-11, atol=1e-11)
     assert np.abs(np.array(ends[0]) - y).max() > 0.1
@@ -108,6 +102,7 @@ def kept(scene: Scene, drift: float) -> None:
     assert abs(end - start) < drift * abs(start)
 
 
+@pytest.mark.long  # steps of six clocks, in loops and written out, are compared above
 def test_forty_clocks_on_a_beam_move_as_their_exported_equations_say() -> None:
     scene = hanging(40, integrator="rodas5p")
     found = run(scene)

@@ -59,10 +59,18 @@ def test_other_rings_are_other_polynomials() -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "-4*sin(k*pi/n)**2", "cos((pi*k)*2/n)", "sin((2*k+1)*pi/(2*n))**2", "cos(pi*(k/3-1)/2)", "cos(-pi*k/7)*cos(pi*k/7)",
-        "cos(pi*(3-k)/n)+1/n", "(cos(pi*k/5)-sin(pi*k/5))**3", "cos(pi*2*k/n)/(n-1)", "cos(pi/7)", "cos(-k*pi/n)*n",
+        "-4*sin(k*pi/n)**2",
+        "cos((pi*k)*2/n)",
+        "sin((2*k+1)*pi/(2*n))**2",
+        "cos(pi*(k/3-1)/2)",
+        "cos(-pi*k/7)*cos(pi*k/7)",
+        "cos(pi*(3-k)/n)+1/n",
+        "(cos(pi*k/5)-sin(pi*k/5))**3",
+        "cos(pi*2*k/n)/(n-1)",
+        "cos(pi/7)",
+        "cos(-k*pi/n)*n",
     ],
-)  # fmt: skip
+)
 def test_an_open_letter_gives_the_numbers_one_by_one(text: str) -> None:
     for n in (5, 12):
         wave = angle_wave(text, {"n": n}, "k")

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from synchain.models.algebra import roots as algebraic
 from synchain.models.algebra.balls import disjoint, precision
-from synchain.models.algebra.real_roots import Disc, discs, sharpened
+from synchain.models.algebra.isolation import Disc, discs, sharpened
 from synchain.models.algebra.roots import ComplexRoot, RealRoot, roots
 
 

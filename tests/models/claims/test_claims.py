@@ -77,8 +77,10 @@ def test_right(text: str, tmp_path: Path) -> None:
 def test_wrong(text: str, problems: list[str], tmp_path: Path) -> None:
     (found,) = verdicts(tmp_path, text)
     assert len(found.problems) == len(problems)
-    assert all(problem.replace("-1-I/3", "-1 - I/3").startswith(words)
-               for problem, words in zip(found.problems, problems, strict=True)), found.problems  # fmt: skip
+    assert all(
+        problem.replace("-1-I/3", "-1 - I/3").startswith(words)
+        for problem, words in zip(found.problems, problems, strict=True)
+    ), found.problems
 
 
 def test_a_difference_far_below_any_float_is_found(tmp_path: Path) -> None:
@@ -150,9 +152,16 @@ def test_sums_of_fractions_have_the_bound_of_their_common_denominator() -> None:
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [("-2-sqrt(2)", -2 - sp.sqrt(2)), ("1/2", sp.Rational(1, 2)), ("2**-1", sp.Rational(1, 2)), ("3*I", 3 * sp.I),
-     ("4*sin(pi/6)**2", sp.S.One), ("exp(I*pi)", -sp.S.One), ("cos(pi*(1/3 + 1/6))", sp.S.Zero)],
-)  # fmt: skip
+    [
+        ("-2-sqrt(2)", -2 - sp.sqrt(2)),
+        ("1/2", sp.Rational(1, 2)),
+        ("2**-1", sp.Rational(1, 2)),
+        ("3*I", 3 * sp.I),
+        ("4*sin(pi/6)**2", sp.S.One),
+        ("exp(I*pi)", -sp.S.One),
+        ("cos(pi*(1/3 + 1/6))", sp.S.Zero),
+    ],
+)
 def test_numbers(text: str, value: sp.Expr) -> None:
     found = exact_number(text)
     assert found == value
@@ -270,17 +279,25 @@ def test_exit_codes_and_forms(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     out = capsys.readouterr().out.splitlines()
     assert out[0] == "line 2: chain 3: right"
     assert out[1] == "line 4: star n = 3 … 9: WRONG"
-    assert out[2:5] == ["  n = 3: claimed -5: no eigenvalue; the nearest is -3", "  n = 3: not claimed: -3, once",
-                        "  n = 3: right: 0, -1, -3"]  # fmt: skip
+    assert out[2:5] == [
+        "  n = 3: claimed -5: no eigenvalue; the nearest is -3",
+        "  n = 3: not claimed: -3, once",
+        "  n = 3: right: 0, -1, -3",
+    ]
     assert out[-2:] == ["  and so on: wrong for 6 of 7 sizes", "2 claims: 1 right, 1 wrong"]
     assert main(["check", str(path), "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert (found["right"], found["wrong"]) == (1, 1)
     assert [(c["line"], c["right"], len(c["graphs"])) for c in found["claims"]] == [(2, True, 1), (4, False, 7)]
     assert found["claims"][1]["graphs"][2] == {
-        "topology": "star", "n": 5, "options": {}, "right": True, "proved": True, "problems": [],
-        "expected": "0, -1^3, -5"
-    }  # fmt: skip
+        "topology": "star",
+        "n": 5,
+        "options": {},
+        "right": True,
+        "proved": True,
+        "problems": [],
+        "expected": "0, -1^3, -5",
+    }
     suites = ElementTree.parse(report).getroot()
     cases = suites.findall("testsuite/testcase")
     assert [suites.get("tests"), suites.get("failures"), len(cases)] == ["2", "1", 2]

@@ -9,7 +9,7 @@ from event_reference import Reference
 from mpmath import mp, mpf
 
 from synchain.models.dynamics.saltation import of_network
-from synchain.models.dynamics.variational import MODE, clustered, mode, whole
+from synchain.models.dynamics.variational import MODE, clustered, mode, network_variation
 from synchain.models.graphs.clusters import clusters
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
@@ -69,7 +69,7 @@ def test_exits_of_clusters_are_those_of_the_network() -> None:
 
 def test_dampers_and_a_jump_have_no_tangent() -> None:
     scene = Scene(topology=PAIR, friction="coulomb_static", contact="set-valued", coupling="damper")
-    for refused in (mode, whole):
+    for refused in (mode, network_variation):
         with pytest.raises(ValueError, match="links act on velocities, so the order of simultaneous releases matters"):
             refused(scene.equations)
 
@@ -87,7 +87,7 @@ def test_the_propagator_of_a_law_with_a_jump_against_fifty_digits() -> None:
     """A release, slip, a landing and another release: differences of the flow, 1e-15 apart, right to 15 digits."""
     scene = jumping().replace(rtol=1e-12)
     orbits = Orbits.make(scene, np.array([0.0]), np.array([[0.1, 0.1, 0.0]]), 1)
-    orbits.block, orbits.carrier = 2.0, orbits.carry(orbits.strengths)
+    orbits.block, orbits.integrator = 2.0, orbits.integrator_of(orbits.strengths)
     found = orbits.propagators()[0, 0]
     length = 4.0 * np.pi / JUMP["omega"]
     with mp.workdps(50):
@@ -104,7 +104,7 @@ def test_a_pair_out_of_phase_follows_its_mode() -> None:
 
     scene = jumping(sigma=0.15).replace(transient=0.0, window=2.0, record=(), rtol=1e-12)
     orbits = Orbits.make(scene, np.array([0.3]), np.array([[0.1, 0.1, 0.0]]), 1)
-    orbits.block, orbits.carrier = 2.0, orbits.carry(orbits.strengths)
+    orbits.block, orbits.integrator = 2.0, orbits.integrator_of(orbits.strengths)
     found = orbits.propagators()[0, 0][:, 0]
     d = 1e-6
     end = run(scene, reduce=False, show_progress=False, x_1=0.1 + d, x_2=0.1 - d).end.values
@@ -114,7 +114,7 @@ def test_a_pair_out_of_phase_follows_its_mode() -> None:
 def exponents_of(scene: Scene, periods: int, *alpha: float) -> np.ndarray:
     orbit = periodic_orbit(scene, periods)
     length = periods * 2 * np.pi / scene.parameters["omega"]
-    return np.array([np.log(abs(orbit.transversal(a)[0])) / length for a in alpha])
+    return np.array([np.log(abs(orbit.transversal_multipliers(a)[0])) / length for a in alpha])
 
 
 def test_the_spectrum_of_a_synchronous_pair_is_that_of_its_periodic_orbit() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sympy as sp
-from samples import TABLE, Outcome, blank, friction_chain, kernel, numbers
+from samples import TABLE, Outcome, blank, friction_chain, friction_scene, kernel, numbers
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import angular_frequency
@@ -16,7 +16,7 @@ PERIOD = 2 * np.pi / 1.15
 
 
 def integrate(n: int, records: tuple[str, ...], start, spans, jumps: bool, **values: float) -> Outcome:
-    eq = friction_chain(n)
+    eq = friction_scene(n)
     section = sp.Symbol("v_1", real=True)
     compiled = kernel(eq, "rodas5p", records, section if "section" in records else None, 4)
     start, spans = np.array(start, float), np.array(spans, float)
@@ -104,7 +104,7 @@ a, b = sp.symbols("a b", real=True)
 )
 def test_the_frequency_of_the_drive_is_derived(force, expected):
     node = Node((x, v), (v, force - v), tuple(sorted((force.free_symbols - {x, v, TIME}), key=str)))
-    assert angular_frequency(Equations(node, None, 1)) == expected
+    assert angular_frequency(Equations.of_equal_nodes(node, None, 1)) == expected
 
 
 def test_the_frequency_of_the_friction_oscillator():

@@ -16,11 +16,10 @@ from synchain.runtime.bifurcation.branches import follow
 from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
 from synchain.runtime.cells.plan import longest_step, plan
-from synchain.runtime.stability import msf
 from synchain.runtime.stability.clusters import cluster_exponents
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum
-from synchain.runtime.stability.msf import plane
-from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.stability.msf import msf, plane
 from synchain.runtime.sweeps.certify import check_certifiable
 from synchain.runtime.sweeps.run import run
 

@@ -16,6 +16,7 @@ from effort import effort
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.families import topology
+from synchain.models.graphs.links import Link
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.calculus import derivative
 from synchain.models.mechanics.components import TIME, Edge, Node
@@ -78,7 +79,7 @@ def test_the_stick_slope_is_that_of_a_steep_arcus_tangent() -> None:
 @pytest.mark.parametrize("name", ["paper", "one-way", "stribeck damper"])
 def test_links_and_nodes_add_up_to_the_jacobian(name: str) -> None:
     equations = MODELS[name]
-    total: dict[tuple[int, int], sp.Expr] = dict(Equations(equations.node, None, equations.n).jacobian())
+    total: dict[tuple[int, int], sp.Expr] = dict(Equations.of_equal_nodes(equations.node, None, equations.n).jacobian())
     shares = list(equations.link_jacobian())
     for key, value in shares:
         total[key] = total.get(key, sp.S.Zero) + value
@@ -96,8 +97,8 @@ def test_the_links_of_a_one_way_network_reach_their_targets_only() -> None:
 
 
 def test_without_links_there_is_no_link_jacobian() -> None:
-    assert list(Equations(HARMONIC, SPRING, 2).link_jacobian()) == []
-    assert list(Equations(HARMONIC, None, 2).link_jacobian()) == []
+    assert list(Equations.of_equal_nodes(HARMONIC, SPRING, 2).link_jacobian()) == []
+    assert list(Equations.of_equal_nodes(HARMONIC, None, 2).link_jacobian()) == []
 
 
 @pytest.mark.parametrize(
@@ -139,7 +140,7 @@ def test_states_and_parameters_come_in_a_fixed_order() -> None:
     equations = MODELS["paper"]
     assert equations.state == ("x_1", "x_2", "x_3", "v_1", "v_2", "v_3")
     assert equations.parameters == ("theta_b", "epsilon", "u", "omega", "mu_s", "mu_k", "a", "kappa", "sigma")
-    assert Equations(equations.node, equations.edge, 3).parameters == equations.parameters[:-1]
+    assert Equations.of_equal_nodes(equations.node, equations.edge, 3).parameters == equations.parameters[:-1]
     assert [s.name for s in equations.symbols(2)] == ["x_3", "v_3"]
 
 
@@ -150,6 +151,7 @@ from fractions import Fraction
 from synchain.models.dynamics.network import edge, network, node
 from synchain.models.presentation.equations import as_dict
 from synchain.models.graphs.families import topology
+from synchain.models.graphs.links import Link
 for oscillator, law in (("friction", "stribeck"), ("duffing", None)):
     single = node(oscillator, law, "atan")
     made = network(single, edge("spring", single, oscillator), topology("ring", 3))
@@ -168,25 +170,29 @@ def test_the_digest_and_the_text_do_not_depend_on_the_hash_seed() -> None:
 
 
 def test_different_equations_have_different_digests() -> None:
-    chain = Equations(HARMONIC, SPRING, 2, ((0, 1, ONE), (1, 0, ONE)))
+    chain = Equations.of_equal_nodes(HARMONIC, SPRING, 2, ((0, 1, ONE), (1, 0, ONE)))
     others = [
         *MODELS.values(),
         chain,
-        replace(chain, n=3),
+        replace(chain, kind_of=(0, 0, 0)),
         replace(chain, links=((0, 1, ONE),)),
         replace(chain, links=((0, 1, HALF), (1, 0, ONE))),
-        replace(chain, node=Node((X, V), (V, -2 * X), ())),
-        replace(chain, node=Node((X, W), (W, -X), ())),
-        replace(chain, node=Node((X, V), (V, -X), (A,))),
-        replace(chain, edge=replace(SPRING, rhs=(sp.S.Zero, SIGMA * WEIGHT * (X_I - X_J)))),
+        replace(chain, nodes=(Node((X, V), (V, -2 * X), ()),)),
+        replace(chain, nodes=(Node((X, W), (W, -X), ()),)),
+        replace(chain, nodes=(Node((X, V), (V, -X), (A,)),)),
+        replace(chain, edge_of=(((0, 0), replace(SPRING, rhs=(sp.S.Zero, SIGMA * WEIGHT * (X_I - X_J)))),)),
     ]
     assert len({e.digest for e in others}) == len(others)
 
 
 def test_equal_equations_have_equal_digests() -> None:
     pair = ((0, 1, ONE), (1, 0, ONE))
-    assert Equations(HARMONIC, SPRING, 2, pair).digest == made(topology("chain", 2), "harmonic", None).digest
-    assert Equations(HARMONIC, SPRING, 2).digest == Equations(HARMONIC, None, 2).digest  # an edge that joins nothing
+    assert network_of(SPRING, pair).digest == made(topology("chain", 2), "harmonic", None).digest
+    assert network_of(SPRING).digest == network_of(None).digest  # an edge that joins nothing
+
+
+def network_of(edge: Edge | None, links: tuple[Link, ...] = ()) -> Equations:
+    return Equations.of_equal_nodes(HARMONIC, edge, 2, links)
 
 
 # -- refusals ------------------------------------------------------------------------------------------------
@@ -242,13 +248,13 @@ NAMED_LIKE_A_STATE = Node((X, V), (V, -sp.Symbol("x_2", real=True) * X), (sp.Sym
 )
 def test_equations_refuse(arguments: tuple, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        Equations(*arguments)
+        Equations.of_equal_nodes(*arguments)
 
 
 def test_a_name_is_taken_only_where_the_network_reaches_it() -> None:
-    assert Equations(NAMED_LIKE_A_STATE, None, 1).state == ("x_1", "v_1")
+    assert Equations.of_equal_nodes(NAMED_LIKE_A_STATE, None, 1).state == ("x_1", "v_1")
 
 
 def test_equations_without_an_edge_have_no_link_to_put_in() -> None:
     with pytest.raises(ValueError, match="these equations have no edge"):
-        Equations(HARMONIC, None, 1).at_link((0, 1, ONE))
+        Equations.of_equal_nodes(HARMONIC, None, 2).at_link((0, 1, ONE))

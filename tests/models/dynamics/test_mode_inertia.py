@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 import scipy.linalg
 import sympy as sp
+from variational_reference import ALPHA, transversal_equations
 
 from synchain.models import chain
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import network
-from synchain.models.dynamics.variational import ALPHA, MODE, clustered, mode, transversal
+from synchain.models.dynamics.variational import MODE, clustered, mode
 from synchain.models.graphs.clusters import orbital_partitions
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.mechanics.link import edge
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.certify import certify
 
 GRAPH = from_matrix([[-3, 1, 2], [1, -2, 1], [2, 1, -3]])
@@ -84,7 +85,7 @@ def test_modes_are_those_of_the_whole_network(case: str) -> None:
     size = len(node.state)
     template = {real(f"{s}_1")[0]: s for s in node.state}
     of_mode = sp.Matrix(sp.SparseMatrix(size, size, dict(mode(equations).matrix))).xreplace(template)
-    single = sp.Matrix(transversal(equations).node.rhs[size:])
+    single = sp.Matrix(transversal_equations(equations).node.rhs[size:])
     by_alpha = single.jacobian(real(*(f"d_{s}" for s in node.state)))
     for gamma, _, (vector,) in sp.Matrix(GRAPH.rows).applyfunc(sp.Rational).eigenvects():
         alpha = -sigma * gamma

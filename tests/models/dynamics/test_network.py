@@ -6,11 +6,12 @@ from fractions import Fraction
 
 import pytest
 import sympy as sp
+from connectivity import connectivity
 from effort import effort
 from sympy.physics import mechanics
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.network import connectivity, network, node, parameters
+from synchain.models.dynamics.network import network, node, parameters
 from synchain.models.graphs.families import names as families
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology, from_matrix

@@ -15,7 +15,7 @@ from samples import friction_chain, harmonic_chain, looped, real
 from synchain.models import chain, complete, ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import network, node
-from synchain.models.dynamics.reduction import collapse, fold, quotient
+from synchain.models.dynamics.reduction import collapse, quotient, substitute_constants
 from synchain.models.graphs.partitions import coarsest_balanced
 from synchain.models.mechanics.components import TIME, Edge, Node
 from synchain.models.mechanics.link import edge
@@ -30,21 +30,21 @@ def coupled(graph, oscillator: str = "duffing", coupling: str = "spring") -> Equ
 
 def linked(n: int, links) -> Equations:
     """Harmonic oscillators on any links (target, source, weight)."""
-    return Equations(harmonic_chain(2).node, harmonic_chain(2).edge, n, tuple(links))
+    return Equations.of_equal_nodes(harmonic_chain(2).node, harmonic_chain(2).edge, n, tuple(links))
 
 
 # -- fold ----------------------------------------------------------------------------------------------------
 
 
 def test_no_forcing_takes_the_frequency_along():
-    made = fold(friction_chain(2), {"u": 0})
+    made = substitute_constants(friction_chain(2), {"u": 0})
     assert not made.node.forced
     assert set(friction_chain(2).parameters) - set(made.parameters) == {"u", "omega"}
     assert made.links == friction_chain(2).links
 
 
 def test_no_coupling_leaves_no_edge():
-    made = fold(friction_chain(3), {"sigma": 0})
+    made = substitute_constants(friction_chain(3), {"sigma": 0})
     assert made.edge is None
     assert made.links == ()
     assert "sigma" not in made.parameters
@@ -54,7 +54,7 @@ def test_no_coupling_leaves_no_edge():
 def test_folded_equations_are_the_substituted_ones():
     full = looped()
     values = {"mu": Fraction(3, 7), "sigma": Fraction(-2), "c": 0}
-    made = fold(full, values)
+    made = substitute_constants(full, values)
     swap = {sp.Symbol(name, real=True): sp.Rational(v.numerator, v.denominator) for name, v in values.items()}
     for a, b in zip(made.rhs(), full.rhs(), strict=True):
         assert sp.simplify(a - b.xreplace(swap)) == 0
@@ -63,24 +63,24 @@ def test_folded_equations_are_the_substituted_ones():
 
 
 def test_nothing_to_fold_changes_nothing():
-    assert fold(looped(), {}) is looped() or fold(looped(), {}) == looped()
+    assert substitute_constants(looped(), {}) is looped() or substitute_constants(looped(), {}) == looped()
 
 
 @pytest.mark.parametrize("value", [0.5, True, "1", np.float64(0.0)])
 def test_inexact_numbers_are_refused(value):
     with pytest.raises(TypeError, match=r"fold u: found .*expected an int or a Fraction"):
-        fold(friction_chain(1), {"u": value})
+        substitute_constants(friction_chain(1), {"u": value})
 
 
 def test_unknown_parameters_are_refused():
     with pytest.raises(ValueError, match="unknown parameter 'sigma'; known: theta_b"):
-        fold(friction_chain(1), {"sigma": 0})
+        substitute_constants(friction_chain(1), {"sigma": 0})
 
 
 def test_a_number_at_which_the_equations_are_undefined_is_refused():
     x, a = real("x", "a")
     with pytest.raises(ValueError, match="undefined at a = 0"):
-        fold(Equations(Node((x,), (-x / a,), (a,)), None, 1), {"a": 0})
+        substitute_constants(Equations.of_equal_nodes(Node((x,), (-x / a,), (a,)), None, 1), {"a": 0})
 
 
 # -- partitions ----------------------------------------------------------------------------------------------
@@ -253,7 +253,7 @@ def test_trajectories_of_quotients_are_those_of_random_graphs(seed):
         doubled.add_edge(i, 4 + j)
         doubled.add_edge(j, 4 + i)
     links = sorted((a, b, Fraction(1)) for i, j in doubled.edges for a, b in ((i, j), (j, i)))
-    full = Equations(coupled(chain(2)).node, coupled(chain(2)).edge, 8, tuple(links))
+    full = Equations.of_equal_nodes(coupled(chain(2)).node, coupled(chain(2)).edge, 8, tuple(links))
     small, classes = quotient(full, [i % 4 for i in range(8)])
     assert small.n == 4
     values = {"delta": 0.1, "beta": 1.0, "u": 0.3, "omega": 1.0, "sigma": 0.3}
@@ -261,7 +261,7 @@ def test_trajectories_of_quotients_are_those_of_random_graphs(seed):
     columns = [c * 4 + k for c in range(2) for k in classes]
     whole, fewer = trajectory(full, begin[columns], values), trajectory(small, begin, values)
     assert np.abs(whole - fewer[:, columns]).max() < 1e-12
-    wrong = Equations(small.node, small.edge, 4, tuple((a, b, w / 2) for a, b, w in small.links))
+    wrong = Equations.of_equal_nodes(small.node, small.edge, 4, tuple((a, b, w / 2) for a, b, w in small.links))
     assert np.abs(whole - trajectory(wrong, begin, values)[:, columns]).max() > 1e-2
 
 
@@ -275,7 +275,7 @@ def test_a_wrong_partition_is_caught():
     for wrong in ((0, 1, 1), (0, 2, 2, 0), (1, 1, 1, 1)):
         with pytest.raises(ValueError, match="expected"):
             collapse(full, wrong)
-    merged = Equations(full.node, full.edge, 2, ((0, 1, Fraction(1)), (1, 0, Fraction(2))))
+    merged = Equations.of_equal_nodes(full.node, full.edge, 2, ((0, 1, Fraction(1)), (1, 0, Fraction(2))))
     assert not lifted(merged, (0, 1, 0, 1), full)  # the check of the tests above can fail
 
 
@@ -292,7 +292,7 @@ def test_a_network_without_equal_colours_is_itself():
 
 
 def test_uncoupled_nodes_of_one_colour_are_one():
-    small, classes = quotient(fold(friction_chain(4), {"sigma": 0}), "abab")
+    small, classes = quotient(substitute_constants(friction_chain(4), {"sigma": 0}), "abab")
     assert classes == (0, 1, 0, 1)
     assert small.n == 2
 
@@ -304,4 +304,4 @@ def test_couplings_without_an_exact_quotient_are_refused():
     waves = Edge((x,), (x_2,), w, (sigma * sp.sin(w * (x_2 - x)),), (sigma,))
     links = ((0, 1, Fraction(1)), (1, 0, Fraction(1)))
     with pytest.raises(ValueError, match="not proportional to its weight"):
-        quotient(Equations(Node((x,), (-x,), ()), waves, 2, links), "aa")
+        quotient(Equations.of_equal_nodes(Node((x,), (-x,), ()), waves, 2, links), "aa")

@@ -8,10 +8,10 @@ import mpmath
 import pytest
 import sympy as sp
 from differences import DIGITS, TABLE, close, evaluate, made, slopes, states
+from variational_reference import ALPHA, deviation_names, tangent_equations, transversal_equations
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import node
-from synchain.models.dynamics.variational import ALPHA, deviation_names, tangent, transversal
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.mechanics.components import Edge, Node
@@ -29,8 +29,8 @@ def fifty_digits():
 
 def extended(kind: str, oscillator: str, law: str | None, contact: str) -> Equations:
     if kind == "tangent":
-        return tangent(node(oscillator, law, contact))
-    return transversal(made(topology("chain", 2), oscillator, law, contact, kind))
+        return tangent_equations(node(oscillator, law, contact))
+    return transversal_equations(made(topology("chain", 2), oscillator, law, contact, kind))
 
 
 def at_states(equations: Equations, seed: int, near: float | None) -> dict[sp.Symbol, mpmath.mpf]:
@@ -47,11 +47,11 @@ def at_states(equations: Equations, seed: int, near: float | None) -> dict[sp.Sy
 @pytest.mark.parametrize("model", OSCILLATORS, ids=str)
 def test_a_deviation_obeys_the_directional_derivative_of_the_node(model: tuple, near: float | None) -> None:
     single = node(*model)
-    equations = tangent(single)
+    equations = tangent_equations(single)
     values = at_states(equations, 3, near)
     x, v, d_x, d_v = equations.symbols(0)
     found = evaluate(equations.rhs(), values)
-    orbit = Equations(single, None, 1).rhs()
+    orbit = Equations.of_equal_nodes(single, None, 1).rhs()
     assert found[:2] == evaluate(orbit, values)
     assert close(found[2:], slopes(orbit, {x: values[d_x], v: values[d_v]}, values))
 
@@ -62,7 +62,7 @@ def test_a_deviation_obeys_the_directional_derivative_of_the_node(model: tuple, 
 def test_a_mode_obeys_the_derivative_along_a_pair_moving_apart(model: tuple, coupling: str, near: float | None) -> None:
     """Two nodes at d and -d: the mode with gamma = -2 of chain(2), alpha = 2 sigma."""
     pair = made(topology("chain", 2), *model, coupling)
-    mode = transversal(pair)
+    mode = transversal_equations(pair)
     values = at_states(mode, 4, near)
     x, v, d_x, d_v = mode.symbols(0)
     (x_1, v_1), (x_2, v_2) = pair.symbols(0), pair.symbols(1)
@@ -122,7 +122,7 @@ def both_spectra(graph: Topology, coupling: str, near: float | None) -> tuple[li
     """Eigenvalues of the network's Jacobian on the synchronous state, and of all its modes; 80 digits."""
     with mpmath.workdps(80):
         whole = made(graph, coupling=coupling)
-        mode = transversal(whole)
+        mode = transversal_equations(whole)
         values = at_states(mode, 6, near)
         x, v = mode.symbols(0)[:2]
         together = dict(values)
@@ -146,8 +146,8 @@ def test_modes_of_a_one_way_chain_are_those_of_its_triangle(coupling: str) -> No
 
 def test_without_strength_a_mode_is_the_tangent() -> None:
     single = node("friction", "exponential", "atan")
-    mode = transversal(made(topology("chain", 2)))
-    assert tuple(e.xreplace({ALPHA: sp.S.Zero}) for e in mode.node.rhs) == tangent(single).node.rhs
+    mode = transversal_equations(made(topology("chain", 2)))
+    assert tuple(e.xreplace({ALPHA: sp.S.Zero}) for e in mode.node.rhs) == tangent_equations(single).node.rhs
     assert mode.node.parameters == (*single.parameters, ALPHA)
     assert mode.state == ("x_1", "v_1", "d_x_1", "d_v_1")
 
@@ -165,39 +165,39 @@ def with_link(change) -> Equations:  # type: ignore[no-untyped-def]
     """The harmonic pair with another force along its links."""
     spring = edge("spring", node("harmonic", None, "atan"), "harmonic")
     symbols = {s.name: s for s in (*spring.here, *spring.there, *spring.parameters, spring.weight)}
-    return replace(PAIR, edge=replace(spring, rhs=(sp.S.Zero, change(symbols))))
+    return replace(PAIR, edge_of=(((0, 0), replace(spring, rhs=(sp.S.Zero, change(symbols)))),))
 
 
 def test_a_mode_needs_links() -> None:
     with pytest.raises(ValueError, match="these equations have no coupling; a transversal mode needs links"):
-        transversal(made(topology("chain", 1), coupling=None))
+        transversal_equations(made(topology("chain", 1), coupling=None))
 
 
 def test_a_mode_needs_a_synchronous_state() -> None:
     with pytest.raises(ValueError, match="between equal states, so complete synchronisation is no solution"):
-        transversal(with_link(lambda s: s["sigma"] * s["weight"] * s["x_j"]))
+        transversal_equations(with_link(lambda s: s["sigma"] * s["weight"] * s["x_j"]))
 
 
 def test_a_mode_needs_one_strength() -> None:
     with pytest.raises(ValueError, match="links are not proportional to sigma; a mode has no single strength alpha"):
-        transversal(with_link(lambda s: s["sigma"] ** 2 * s["weight"] * (s["x_j"] - s["x_i"])))
+        transversal_equations(with_link(lambda s: s["sigma"] ** 2 * s["weight"] * (s["x_j"] - s["x_i"])))
     other = sp.Symbol("strength", real=True)
     spring = with_link(lambda s: s["weight"] * (s["x_j"] - s["x_i"])).edge
     assert spring is not None
     renamed = Edge(spring.here, spring.there, spring.weight, (sp.S.Zero, other * spring.rhs[1]), (other,))
     with pytest.raises(ValueError, match="links depend on strength; expected sigma alone"):
-        transversal(replace(PAIR, edge=renamed))
+        transversal_equations(replace(PAIR, edge_of=(((0, 0), renamed),)))
 
 
 @pytest.mark.parametrize("name", ["d_x", "d_v"])
 def test_a_model_must_leave_the_names_of_deviations(name: str) -> None:
     x, v, taken = (sp.Symbol(s, real=True) for s in ("x", "v", name))
     with pytest.raises(ValueError, match=f"the symbol '{name}' is needed for the deviation; rename it in the model"):
-        tangent(Node((x, v), (v, -taken * x), (taken,)))
+        tangent_equations(Node((x, v), (v, -taken * x), (taken,)))
 
 
 def test_a_model_must_leave_alpha() -> None:
     x, v = sp.symbols("x v", real=True)
     single = Node((x, v), (v, -ALPHA * x), (ALPHA,))
     with pytest.raises(ValueError, match="the symbol 'alpha' is needed for the deviation"):
-        transversal(Equations(single, edge("spring", single), 2, PAIR.links))
+        transversal_equations(Equations.of_equal_nodes(single, edge("spring", single), 2, PAIR.links))

@@ -15,7 +15,7 @@ from synchain.models.graphs.clusters import clusters, orbital_partitions
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.symmetry import automorphisms
 from synchain.models.graphs.topology import Topology, from_matrix
-from synchain.models.spectra.proof import ProofError
+from synchain.models.spectra.eigenvalue import ProofError
 
 ONE = Fraction(1)
 

@@ -16,12 +16,12 @@ from effort import effort
 
 from synchain.models.graphs.families import family, names, topology
 from synchain.models.graphs.topology import Topology
-from synchain.models.spectra.solve import spectrum
+from synchain.models.spectra.solve import Proof, spectrum
 
 fresh = spectrum.__wrapped__
 
-CLOSED = [name for name in names() if hasattr(family(name), "spectrum")]
-COUNTED = [name for name in names() if hasattr(family(name), "count")]
+CLOSED = [name for name in names() if family(name).spectrum]
+COUNTED = [name for name in names() if family(name).count]
 
 SAME = [
     (("complete_bipartite", 9), nx.complete_bipartite_graph(4, 5)),
@@ -92,7 +92,7 @@ def test_one_way_graphs_by_hand() -> None:
 
 @pytest.mark.parametrize("name", COUNTED)
 def test_counts_are_those_of_the_edges(name: str) -> None:
-    for n in range(family(name).MINIMUM, 31):
+    for n in range(family(name).minimum, 31):
         graph = topology(name, n)
         promised = graph.link_count
         assert len(graph.links) == promised, n
@@ -115,7 +115,7 @@ def test_closed_forms_of_a_thousand_nodes_cost_little_a_node(name: str, monkeypa
     ],
 )  # fmt: skip
 def test_closed_forms_beyond_the_limit_are_proved_on_request(name: str, options: dict) -> None:
-    assert spectrum(topology(name, 216, **options), prove=True).verified
+    assert spectrum(topology(name, 216, **options), proof=Proof.EXACT).verified
 
 
 def test_the_largest_eigenvalue_of_a_cube_of_nodes() -> None:
@@ -330,7 +330,7 @@ def test_a_million_nodes_cost_nothing_until_asked() -> None:
 
 def test_lazy_spectra_are_those_that_are_proved() -> None:
     for name, n in product(("chain", "ring", "wheel"), (201, 202, 301)):
-        lazy, proved = topology(name, n).spectrum, spectrum(topology(name, n), prove=True)
+        lazy, proved = topology(name, n).spectrum, spectrum(topology(name, n), proof=Proof.EXACT)
         assert tuple(lazy) == tuple(proved)
         assert lazy.values == proved.values
         assert (lazy.n, len(lazy), lazy.largest, lazy.slowest) == (n, len(proved), proved.largest, proved.slowest)
@@ -353,7 +353,7 @@ def test_lists_of_tori_and_grids_make_no_expression_until_asked() -> None:
 def test_lazy_sums_of_cosines_are_the_proved_ones(name: str, shape: tuple[int, ...]) -> None:
     """Among them are equal sums of different cosines, such as 2 cos 20° + 2 cos 100° + 2 cos 140° = 0."""
     graph = topology(name, int(np.prod(shape)), shape=shape)
-    listed, proved = graph.closed_form(), spectrum(graph, prove=True)
+    listed, proved = graph.closed_form(), spectrum(graph, proof=Proof.EXACT)
     assert [(number, times) for number, times in listed] == [(e.exact, e.multiplicity) for e in proved]
 
 

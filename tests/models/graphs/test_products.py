@@ -19,7 +19,7 @@ from synchain.models.algebra.cosine_sums import AngleSum, expression, merged, mi
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.products import cartesian, complement, kronecker, union, weighted
 from synchain.models.graphs.topology import Topology, from_matrix
-from synchain.models.spectra.solve import spectrum
+from synchain.models.spectra.solve import Proof, spectrum
 
 OTHERS = [
     topology("chain", 5),
@@ -125,7 +125,7 @@ def test_large_products_need_no_matrix() -> None:
     assert not found.verified
     assert found.n == 2000
     assert found.slowest == topology("chain", 50).spectrum.exact[1]
-    assert spectrum(cartesian(topology("ring", 15), topology("star", 15)), prove=True).verified
+    assert spectrum(cartesian(topology("ring", 15), topology("star", 15)), proof=Proof.EXACT).verified
 
 
 def test_products_travel() -> None:

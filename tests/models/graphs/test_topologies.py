@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections import Counter
+from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
 from itertools import product
@@ -29,14 +30,14 @@ PAIRS_OF_EIGHT = {(0, 2), (1, 6), (3, 5), (4, 7)}
 
 @pytest.mark.parametrize("name", names())
 def test_every_family_says_what_it_is_and_where_it_comes_from(name: str) -> None:
-    module = family(name)
-    assert module.SUMMARY
-    assert module.SOURCE
-    assert module.MINIMUM >= 1
-    graph = topology(name, module.MINIMUM)
-    assert graph.n == module.MINIMUM
-    with pytest.raises(ValueError, match=f"topology {name}: n = {module.MINIMUM - 1}; expected at least"):
-        topology(name, module.MINIMUM - 1)
+    made = family(name)
+    assert made.summary
+    assert made.source
+    assert made.minimum >= 1
+    graph = topology(name, made.minimum)
+    assert graph.n == made.minimum
+    with pytest.raises(ValueError, match=f"topology {name}: n = {made.minimum - 1}; expected at least"):
+        topology(name, made.minimum - 1)
 
 
 def test_float_rows_are_closed_exactly_and_real_errors_stay_errors() -> None:
@@ -54,12 +55,12 @@ def test_float_rows_are_closed_exactly_and_real_errors_stay_errors() -> None:
 @pytest.mark.parametrize("name", names())
 @pytest.mark.parametrize("n", [3, 4, 9])
 def test_every_family_gives_a_connected_graph_with_zero_row_sums(name: str, n: int) -> None:
-    n = max(n, family(name).MINIMUM)
+    n = max(n, family(name).minimum)
     graph = topology(name, n)
-    assert graph.components == 1 or not getattr(family(name), "CONNECTED", True)
+    assert graph.components == 1 or not family(name).connected
     assert all(sum(row) == 0 for row in graph.rows)
     assert graph.symmetric == (graph.matrix == graph.matrix.T)
-    assert graph.symmetric != getattr(family(name), "DIRECTED", False)
+    assert graph.symmetric != family(name).directed
     assert from_matrix(graph.matrix).links == graph.links
     assert graph.matrix == sp.ImmutableDenseMatrix(
         n, n, lambda i, j: sp.Rational(graph.rows[i][j].numerator, graph.rows[i][j].denominator)
@@ -129,14 +130,14 @@ def test_a_long_chain_is_built_at_once() -> None:
     assert calls < 8 * len(links)
 
 
-def test_too_many_links_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("synchain.models.graphs.links.LINK_LIMIT", 100)
+def test_too_many_links_are_refused() -> None:
+    random, complete = (replace(family(name), link_limit=100) for name in ("erdos_renyi", "complete"))
     with pytest.raises(ValueError, match="erdos_renyi: n = 30 has too many links, 434 or more; expected at most 100"):
-        topology("erdos_renyi", 30)
-    assert len(topology("complete", 10).links) == 90
+        random(30)
+    assert len(complete(10).links) == 90
     with pytest.raises(ValueError, match="complete: n = 11 has too many links, 110 or more; expected at most 100"):
-        topology("complete", 11).links  # noqa: B018
-    assert topology("complete", 5000).spectrum.largest == -5000
+        complete(11).links  # noqa: B018
+    assert complete(5000).spectrum.largest == -5000
 
 
 @pytest.mark.parametrize(

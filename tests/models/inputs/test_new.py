@@ -95,12 +95,20 @@ def test_nothing_is_overwritten(kind: str, tmp_path: Path, capsys: pytest.Captur
 @pytest.mark.parametrize(
     ("kind", "name", "words"),
     [
-        ("friction", "../x", "small letters"), ("friction", "lambda", "no word of Python"), ("friction", "X", "small"),
-        ("friction", "_x", "small letters"), ("friction", "x.py", "small letters"), ("friction", "a" * 41, "at most 40"),
-        ("friction", "none", "neither"), ("friction", "coulomb", "exists already"), ("topology", "chain", "exists already"),
-        ("oscillator", "lorenz", "exists already"), ("coupling", "spring", "exists already"), ("graph", "x", "invalid"),
+        ("friction", "../x", "small letters"),
+        ("friction", "lambda", "no word of Python"),
+        ("friction", "X", "small"),
+        ("friction", "_x", "small letters"),
+        ("friction", "x.py", "small letters"),
+        ("friction", "a" * 41, "at most 40"),
+        ("friction", "none", "neither"),
+        ("friction", "coulomb", "exists already"),
+        ("topology", "chain", "exists already"),
+        ("oscillator", "lorenz", "exists already"),
+        ("coupling", "spring", "exists already"),
+        ("graph", "x", "invalid"),
     ],
-)  # fmt: skip
+)
 def test_wrong_names(kind: str, name: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["new", kind, name, "--dir", str(tmp_path)]) == 2
     assert words in capsys.readouterr().err
@@ -399,21 +407,33 @@ FAMILY = (
         ("oscillator", WELL + "damping = 3\n", "line 11: found 'damping'"),
         ("oscillator", WELL + "if True:\n    damping = 3\n", "line 12: found 'damping'"),
         ("coupling", PULL + "def force(v_i, v_j):\n    return 0\n", "line 8: found 'force'; a coupling file knows"),
-        ("friction", RUB.replace("def force", "def forces"), "no force; expected a friction file; found 'forces' in line 7"),
+        (
+            "friction",
+            RUB.replace("def force", "def forces"),
+            "no force; expected a friction file; found 'forces' in line 7",
+        ),
         ("topology", FAMILY + "def conut(n, *, step=1):\n    return n\n", "did you mean 'count'?"),
         ("oscillator", FIELD + "def kinetic(v):\n    return v**2\n", "line 10: found kinetic beside field"),
         ("oscillator", WELL + "STATE = ('x', 'v')\n", "line 11: found STATE without field"),
         ("oscillator", WELL + "UNITS = {'m': 'kg'}\n", "line 11: found UNITS without scales"),
-        ("oscillator", DAMPED + WELL.replace("PARAMETERS = {}\n", ""), "line 5: no function uses the parameter 'delta'"),
+        (
+            "oscillator",
+            DAMPED + WELL.replace("PARAMETERS = {}\n", ""),
+            "line 5: no function uses the parameter 'delta'",
+        ),
         ("oscillator", SCALED.replace("-d * v", "-v"), "no function uses the parameter 'delta' (d in the"),
         ("friction", RUB.replace("return c * w", "return w"), "line 6: no function uses the parameter 'c'"),
         ("coupling", PULL.replace("sigma * weight", "weight"), "line 5: no function uses the parameter 'sigma'"),
         ("coupling", PULL.replace("sigma * weight", "sigma"), "line 6: potential does not use weight"),
         ("oscillator", WELL.replace("False", "True"), "line 5: FRICTION is True, but no function uses friction"),
-        ("oscillator", WELL + "def force(v, friction):\n    return friction(v)\n", "FRICTION is False, but a function uses"),
+        (
+            "oscillator",
+            WELL + "def force(v, friction):\n    return friction(v)\n",
+            "FRICTION is False, but a function uses",
+        ),
         ("topology", FAMILY.replace(", *, step=1", "", 1).replace("step", "1", 2), "found settle without options"),
     ],
-)  # fmt: skip
+)
 def test_what_would_be_ignored_is_refused(kind: str, text: str, words: str, tmp_path: Path) -> None:
     assert words in refusal(kind, tmp_path / "part.py", text)
 
@@ -421,22 +441,44 @@ def test_what_would_be_ignored_is_refused(kind: str, text: str, words: str, tmp_
 @pytest.mark.parametrize(
     ("kind", "text", "words"),
     [
-        ("oscillator", WELL.replace("{}", '{"k": 2.0}'), "line 6: PARAMETERS['k'] is 2.0; expected Parameter(2.0, \"1\","),
+        (
+            "oscillator",
+            WELL.replace("{}", '{"k": 2.0}'),
+            "line 6: PARAMETERS['k'] is 2.0; expected Parameter(2.0, \"1\",",
+        ),
         ("oscillator", WELL.partition("def potential")[0], "part.py: found no potential; expected an oscillator file"),
         ("oscillator", FIELD.replace("STATE = ('x', 'y')\n", ""), "part.py: found no STATE"),
         ("oscillator", FIELD.replace("('x', 'y')", "'xy'"), "line 7: STATE is 'xy'; expected a tuple of names"),
-        ("oscillator", FIELD.replace("y, -x", "-x").replace("'x', 'y'", "'x',").replace("x, y", "x"),
-         "line 8: field returns -x alone; expected a tuple of 1, one for each of x"),
+        (
+            "oscillator",
+            FIELD.replace("y, -x", "-x").replace("'x', 'y'", "'x',").replace("x, y", "x"),
+            "line 8: field returns -x alone; expected a tuple of 1, one for each of x",
+        ),
         ("oscillator", WELL + "COORDINATES = {'x': 'v'}\n", "line 11: COORDINATES has 'x': 'v'; expected a"),
-        ("oscillator", DOUBLE.replace("-v, -w", "-v"),
-         "line 12: force returns -v alone; expected a tuple of 2, one for each of x, y"),
+        (
+            "oscillator",
+            DOUBLE.replace("-v, -w", "-v"),
+            "line 12: force returns -v alone; expected a tuple of 2, one for each of x, y",
+        ),
         ("oscillator", WELL.replace("return x**2 / 2", "x**2 / 2"), "line 9: potential returns None (NoneType)"),
-        ("oscillator", WELL.replace("def potential(x):\n    return x**2 / 2", "potential = 3"), "line 9: potential is 3"),
+        (
+            "oscillator",
+            WELL.replace("def potential(x):\n    return x**2 / 2", "potential = 3"),
+            "line 9: potential is 3",
+        ),
         ("oscillator", SCALED.replace('"kg": m, ', ""), "line 15: scales returns a dict of 'm', 's'"),
         ("oscillator", SCALED.replace('{"delta": "d"}', "{}"), "line 7: PHYSICAL is {}; expected the physical"),
         ("oscillator", SCALED.replace('UNITS = {"m": "kg", "k": "N/m", "l": "m"}\n', ""), "part.py: found no UNITS"),
-        ("oscillator", SCALED.replace('"m": "kg"', '"m": 1'), "line 8: UNITS is {'m': 1, 'k': 'N/m', 'l': 'm'}; expected"),
-        ("oscillator", WELL + "INITIAL = {'y': 1}\n", "line 11: INITIAL is {'y': 1}; expected a dict with keys out of x, v"),
+        (
+            "oscillator",
+            SCALED.replace('"m": "kg"', '"m": 1'),
+            "line 8: UNITS is {'m': 1, 'k': 'N/m', 'l': 'm'}; expected",
+        ),
+        (
+            "oscillator",
+            WELL + "INITIAL = {'y': 1}\n",
+            "line 11: INITIAL is {'y': 1}; expected a dict with keys out of x, v",
+        ),
         ("friction", RUB + "ORDER = (('c', 'd'),)\n", "line 9: ORDER is (('c', 'd'),); expected pairs of parameters"),
         ("friction", RUB.replace("True", "'yes'"), "line 5: ODD is 'yes'; expected True or False"),
         ("friction", RUB.replace('"s/m"', "1"), "line 6: TypeError: unit 1 is a int; expected text such as 'N/m'"),
@@ -446,7 +488,7 @@ def test_what_would_be_ignored_is_refused(kind: str, text: str, words: str, tmp_
         ("topology", FAMILY + "def count(n):\n    return n\n", "line 10: count lacks the option 'step' of edges"),
         ("topology", FAMILY.replace("step=1", "step"), "line 6: the option 'step' of edges has no default"),
     ],
-)  # fmt: skip
+)
 def test_an_incomplete_file_is_refused_in_one_line(kind: str, text: str, words: str, tmp_path: Path) -> None:
     assert words in refusal(kind, tmp_path / "part.py", text)
 

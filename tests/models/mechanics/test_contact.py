@@ -7,11 +7,11 @@ import pytest
 import sympy as sp
 
 from synchain.models.dynamics.network import node
-from synchain.models.dynamics.reduction import fold
+from synchain.models.dynamics.reduction import substitute_constants
 from synchain.models.graphs.families import topology
 from synchain.models.mechanics.stick_slip import SLIP, set_valued
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.run import run
 
 X, V, W = (sp.Symbol(name, real=True) for name in ("x", "v", "w"))
@@ -141,7 +141,7 @@ def test_the_clock_starts_anew_where_there_is_no_drive() -> None:
     from synchain.runtime.cells.initial_modes import CLOCK, local_clock
 
     driven, rows = scene().equations, np.zeros(3)
-    alone = fold(driven, {"u": 0})
+    alone = substitute_constants(driven, {"u": 0})
     np.testing.assert_array_equal(local_clock(driven, rows + 5.0), rows + 5.0)
     np.testing.assert_array_equal(local_clock(alone, rows), rows + CLOCK)
     assert np.frexp(CLOCK)[0] == 0.5

@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
+from connectivity import connectivity
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from variational_reference import ALPHA, deviation_names, transversal_equations
 
 from synchain.codegen.printing.printer import show
 from synchain.models import chain, ring
-from synchain.models.dynamics.network import connectivity, network, node, parameters
-from synchain.models.dynamics.variational import ALPHA, deviation_names, transversal
+from synchain.models.dynamics.network import network, node, parameters
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.components import Node
@@ -161,8 +162,8 @@ def test_a_network_by_hand() -> None:
 def test_the_identity_shifts_every_mode_by_alpha() -> None:
     """H = I: d' = (J - alpha) d, so that every exponent is that of one oscillator less alpha."""
     single = node("lorenz")
-    mode = transversal(network(single, edge("x->x, y->y, z->z", single), chain(2)))
-    alone = transversal(network(single, edge("x->x", single), chain(2)))
+    mode = transversal_equations(network(single, edge("x->x, y->y, z->z", single), chain(2)))
+    alone = transversal_equations(network(single, edge("x->x", single), chain(2)))
     for k, d in enumerate(deviation_names(single)):
         jacobian = alone.node.rhs[3 + k].xreplace({ALPHA: sp.S.Zero})
         assert sp.expand(mode.node.rhs[3 + k] - (jacobian - ALPHA * d)) == 0

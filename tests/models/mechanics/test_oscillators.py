@@ -10,7 +10,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from synchain.models import chain, ring, star
-from synchain.models.dynamics.network import drawn, node
+from synchain.models.dynamics.network import node, oriented_links
 from synchain.models.dynamics.variational import coupling_slope
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.plugins import load, names
@@ -19,7 +19,7 @@ from synchain.models.scenes.energy import energy
 from synchain.models.scenes.scene import Scene
 from synchain.models.scenes.section import Section
 from synchain.models.scenes.start import default_start
-from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.run import run
 
 X, Y, Z, V = sp.symbols("x y z v", real=True)
@@ -198,10 +198,10 @@ def test_the_fermi_pasta_ulam_ring_is_that_of_the_report() -> None:
 
 
 def test_a_chain_is_drawn_from_its_first_node_and_a_star_from_its_hub() -> None:
-    assert [(i, j, int(w)) for i, j, w in drawn(chain(3))] == [(0, 1, 1), (1, 0, -1), (1, 2, 1), (2, 1, -1)]
-    assert {(i, j): int(w) for i, j, w in drawn(star(4))} == {(0, 1): 1, (0, 2): 1, (0, 3): 1,
+    assert [(i, j, int(w)) for i, j, w in oriented_links(chain(3))] == [(0, 1, 1), (1, 0, -1), (1, 2, 1), (2, 1, -1)]
+    assert {(i, j): int(w) for i, j, w in oriented_links(star(4))} == {(0, 1): 1, (0, 2): 1, (0, 3): 1,
                                                               (1, 0): -1, (2, 0): -1, (3, 0): -1}  # fmt: skip
-    assert {(i, j) for i, j, w in drawn(ring(4)) if w > 0} == {(0, 1), (1, 2), (2, 3), (3, 0)}
+    assert {(i, j) for i, j, w in oriented_links(ring(4)) if w > 0} == {(0, 1), (1, 2), (2, 3), (3, 0)}
     for graph in (from_matrix([[-2, 2], [2, -2]]), from_matrix([[0, 0], [1, -1]])):
         with pytest.raises(ValueError, match="found one-way links or weights other than 1; expected neither"):
             Scene(oscillator="mass", coupling="fput", topology=graph).equations  # noqa: B018

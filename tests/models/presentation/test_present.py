@@ -9,10 +9,10 @@ from fractions import Fraction
 import pytest
 import sympy as sp
 from differences import made
+from variational_reference import tangent_equations, transversal_equations
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import node
-from synchain.models.dynamics.variational import tangent, transversal
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.plugins import load, names
@@ -93,7 +93,9 @@ def test_a_law_is_named_only_where_the_model_has_one() -> None:
     nerve = made(topology("chain", 1), "fitzhugh_nagumo", None, coupling=None)
     assert text(nerve).splitlines() == ["x' = c (current + x + y - (1/3) x³)", "y' = (a - x - b y)/c"]
     x, v, mu, kappa = (sp.Symbol(name, real=True) for name in ("x", "v", "mu", "kappa"))
-    smooth = Equations(Node((x, v), (v, 2 * mu * sp.atan(kappa * (x - v)) / sp.pi), (mu, kappa)), None, 1)
+    smooth = Equations.of_equal_nodes(
+        Node((x, v), (v, 2 * mu * sp.atan(kappa * (x - v)) / sp.pi), (mu, kappa)), None, 1
+    )
     assert text(smooth).splitlines() == ["x'' = (2/π) μ atan(κ (x - x'))"]
 
 
@@ -112,19 +114,21 @@ def test_other_oscillators_keep_their_letters() -> None:
 def test_a_vector_field_is_written_to_first_order() -> None:
     """Lorenz, J. Atmos. Sci. 20, 130 (1963)."""
     s, r, b = sp.symbols("s rho beta", real=True)
-    lorenz = Equations(Node((X, Y, Z), (s * (Y - X), X * (r - Z) - Y, X * Y - b * Z), (s, r, b)), None, 1)
+    lorenz = Equations.of_equal_nodes(
+        Node((X, Y, Z), (s * (Y - X), X * (r - Z) - Y, X * Y - b * Z), (s, r, b)), None, 1
+    )
     assert text(lorenz).splitlines() == ["x' = s (y - x)", "y' = -y + x (ρ - z)", "z' = x y - β z"]
 
 
 def test_powers_of_a_velocity_are_no_further_primes() -> None:
     x, v = sp.symbols("x v", real=True)
-    braked = Equations(Node((x, v), (v, -x - v**2), ()), None, 2)
+    braked = Equations.of_equal_nodes(Node((x, v), (v, -x - v**2), ()), None, 2)
     assert text(braked).splitlines() == ["x_1'' = -x_1 - (x_1')²", "x_2'' = -x_2 - (x_2')²"]
     assert body(braked)[0] == "x_1'' = -x_1 - (x_1')^2"
 
 
 def test_a_chain_of_derivatives_is_written_to_first_order() -> None:
-    jerk = Equations(Node((X, Y, Z), (Y, Z, -X), ()), None, 1)
+    jerk = Equations.of_equal_nodes(Node((X, Y, Z), (Y, Z, -X), ()), None, 1)
     assert text(jerk).splitlines() == ["x' = y", "y' = z", "z' = -x"]
 
 
@@ -132,7 +136,7 @@ def test_links_into_a_coordinate_are_not_lost() -> None:
     """Coupling in x: x' is no longer v, so both equations are of first order."""
     x, v, x_i, v_i, x_j, v_j, weight, sigma = sp.symbols("x v x_i v_i x_j v_j weight sigma", real=True)
     drift = Edge((x_i, v_i), (x_j, v_j), weight, (sigma * weight * (x_j - x_i), sp.S.Zero), (sigma,))
-    made_here = Equations(Node((x, v), (v, -x), ()), drift, 2, PAIR.links)
+    made_here = Equations.of_equal_nodes(Node((x, v), (v, -x), ()), drift, 2, PAIR.links)
     assert text(made_here).splitlines()[:2] == ["x_1' = v_1 + σ (x_2 - x_1)", "v_1' = -x_1"]
 
 
@@ -141,7 +145,7 @@ def test_a_name_that_the_law_needs_keeps_it_written_in_place(clash: str) -> None
     single = node("friction", "coulomb", "sign")
     taken = sp.Symbol(clash, real=True)
     clashing = Node(single.state, (single.rhs[0], single.rhs[1] - taken), (*single.parameters, taken))
-    assert text(Equations(clashing, None, 1)) == f"x'' = -x + ε μ sgn(ϑ_b - x') - {clash} + u cos(ω t)"
+    assert text(Equations.of_equal_nodes(clashing, None, 1)) == f"x'' = -x + ε μ sgn(ϑ_b - x') - {clash} + u cos(ω t)"
 
 
 @pytest.mark.parametrize("clash", ["chi", "tau"])
@@ -149,17 +153,17 @@ def test_a_parameter_called_chi_or_tau_keeps_x_and_t(clash: str) -> None:
     single = node("friction", "coulomb", "sign")
     taken = sp.Symbol(clash, real=True)
     clashing = Node(single.state, (single.rhs[0], single.rhs[1] - taken), (*single.parameters, taken))
-    shown = text(Equations(clashing, None, 1))
+    shown = text(Equations.of_equal_nodes(clashing, None, 1))
     assert shown.startswith("x'' = ")
     assert "cos(ω t)" in shown
 
 
 def test_tangent_equations_are_written_too() -> None:
-    lines = text(transversal(PAIR)).splitlines()
+    lines = text(transversal_equations(PAIR)).splitlines()
     assert lines[0] == "χ'' = -χ + u cos(ω τ) + ε f(ϑ_b - χ')"
     assert lines[1].startswith("d_x'' = -d_x (1 + α) + d_x' (")
     assert len(lines) == 3
-    assert len(body(tangent(node("friction", "exponential", "atan")))) == 3
+    assert len(body(tangent_equations(node("friction", "exponential", "atan")))) == 3
 
 
 # -- pieces --------------------------------------------------------------------------------------------------
@@ -189,14 +193,14 @@ def test_tangent_equations_are_written_too() -> None:
 )
 def test_expressions(expression: sp.Expr, plain: str, tex: str) -> None:
     parameters = tuple(sorted(expression.free_symbols - {X}, key=str))
-    equations = Equations(Node((X,), (expression,), parameters), None, 1)
+    equations = Equations.of_equal_nodes(Node((X,), (expression,), parameters), None, 1)
     assert text(equations) == f"x' = {plain}"
     assert body(equations) == [f"x' = {tex}"]
 
 
 def test_what_has_no_rule_is_left_to_sympy() -> None:
     piece = sp.Piecewise((X, X > 0), (0, True))
-    equations = Equations(Node((X,), (piece,), ()), None, 1)
+    equations = Equations.of_equal_nodes(Node((X,), (piece,), ()), None, 1)
     assert text(equations) == "x' = Piecewise((x, x > 0), (0, True))"
     assert r"\begin{cases} x" in latex(equations)
 
@@ -224,14 +228,17 @@ def test_the_largest_network_that_is_written_out(n: int) -> None:
 
 
 def test_many_nodes_without_links() -> None:
-    assert text(Equations(node("harmonic", None, "atan"), None, 9)).splitlines() == ["x_i'' = -x_i", "i = 1, …, 9"]
+    assert text(Equations.of_equal_nodes(node("harmonic", None, "atan"), None, 9)).splitlines() == [
+        "x_i'' = -x_i",
+        "i = 1, …, 9",
+    ]
 
 
 def test_a_force_turned_round_keeps_its_sign() -> None:
     single = node("harmonic", None, "atan")
     spring = edge("spring", single, "harmonic")
     push = Edge(spring.here, spring.there, spring.weight, (sp.S.Zero, -spring.weight * sp.sin(spring.there[0])), ())
-    lines = text(Equations(single, push, 7, ((0, 1, Fraction(1)),))).splitlines()
+    lines = text(Equations.of_equal_nodes(single, push, 7, ((0, 1, Fraction(1)),))).splitlines()
     assert lines[0] == "x_i'' = -x_i - Σ_j G_ij sin(x_j)"
 
 
@@ -258,16 +265,19 @@ def test_latex_of_every_oscillator_balances(oscillator: str, n: int) -> None:
 def test_vector_fields_and_links_between_components() -> None:
     """The right-hand sides as they stand in the papers; a link from two components in one pair of parentheses."""
     assert text(made(topology("chain", 2), "rossler", None, coupling="x->x, -1/2 z->y")).splitlines()[:2] == [
-        "x_1' = -y_1 - z_1 + σ (x_2 - x_1)", "y_1' = x_1 + a y_1 - (1/2) σ (z_2 - z_1)",
-    ]  # fmt: skip
+        "x_1' = -y_1 - z_1 + σ (x_2 - x_1)",
+        "y_1' = x_1 + a y_1 - (1/2) σ (z_2 - z_1)",
+    ]
     assert text(made(topology("chain", 1), "lorenz", None, coupling=None)).splitlines() == [
-        "x' = prandtl (y - x)", "y' = -y + x (rayleigh - z)", "z' = x y - b z",
-    ]  # fmt: skip
+        "x' = prandtl (y - x)",
+        "y' = -y + x (rayleigh - z)",
+        "z' = x y - b z",
+    ]
     many = text(made(topology("ring", 9), "rossler", None, coupling="x->x, 1/2 y->x, -1/2 z->y")).splitlines()
     assert many[:2] == [
         "x_i' = -y_i - z_i + σ Σ_j G_ij (x_j + (1/2) y_j - x_i - (1/2) y_i)",
         "y_i' = x_i + a y_i - (1/2) σ Σ_j G_ij (z_j - z_i)",
-    ]  # fmt: skip
+    ]
 
 
 # -- for programs --------------------------------------------------------------------------------------------
@@ -296,6 +306,10 @@ def test_the_dictionary_is_read_back_exactly(contact: str) -> None:
 def test_the_keys_of_the_jacobian() -> None:
     keys = as_dict(made(topology("chain", 2), "harmonic", None))["jacobian"]
     assert keys == {
-        "x_1,v_1": "1", "x_2,v_2": "1", "v_1,x_1": "-sigma - 1", "v_1,x_2": "sigma", "v_2,x_1": "sigma",
+        "x_1,v_1": "1",
+        "x_2,v_2": "1",
+        "v_1,x_1": "-sigma - 1",
+        "v_1,x_2": "sigma",
+        "v_2,x_1": "sigma",
         "v_2,x_2": "-sigma - 1",
-    }  # fmt: skip
+    }

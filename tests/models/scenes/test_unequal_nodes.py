@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
+from variational_reference import transversal_equations
 
 from synchain.codegen.export.python import to_python
 from synchain.codegen.kernels.sweep import emit
 from synchain.models import chain, ring, star
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.variational import transversal
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Node
 from synchain.models.presentation.equations import text
@@ -21,7 +21,7 @@ from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.results.open import open_result
-from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.certify import certify
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.synchronisation.probe import ring_of_three
@@ -104,9 +104,9 @@ def test_lists_that_fit_no_network(given: dict, message: str) -> None:
 def test_a_name_that_two_parameters_would_have() -> None:
     x, v, a, twin = (real(name) for name in ("x", "v", "a", "a_2"))
     node = Node((x, v), (v, -a * x - twin * v), (a, twin))
-    assert Equations(node, None, 2).parameters == ("a", "a_2")
+    assert Equations.of_equal_nodes(node, None, 2).parameters == ("a", "a_2")
     with pytest.raises(ValueError, match="'a_2' stands for two parameters"):
-        Equations(node, None, 2, varied=("a",))
+        Equations.of_equal_nodes(node, None, 2, varied=("a",))
 
 
 def test_a_swept_parameter_of_one_node() -> None:
@@ -150,12 +150,12 @@ def test_nodes_merge_where_their_parameters_agree() -> None:
 
 def test_what_needs_equal_nodes_says_so() -> None:
     made = scene(parameters={"sigma": 0.1, "delta": [0.1, 0.2, 0.3]})
-    for refuse in (lambda: transversal(made.equations), lambda: ring_of_three(made.equations), lambda: certify(made),
+    for refuse in (lambda: transversal_equations(made.equations), lambda: ring_of_three(made.equations), lambda: certify(made),
                    lambda: exponents(made, [0.1])):  # fmt: skip
         with pytest.raises(ValueError, match="nodes that differ in delta; expected equal nodes"):
             refuse()
     with pytest.raises(ValueError, match="nodes of several kinds; expected equal nodes"):
-        transversal(mixed().equations)
+        transversal_equations(mixed().equations)
     assert any("differ in delta" in words and "no complete synchronisation" in words for words in made.warnings)
 
 
@@ -261,7 +261,7 @@ def test_the_text_of_a_kernel_does_not_grow_with_the_network() -> None:
 def test_a_star_of_two_kinds_may_be_one_way() -> None:
     graph = from_matrix([[0, 0, 0], [1, -1, 0], [1, 0, -1]])
     made = mixed(topology=graph, nodes=[{"oscillator": "van_der_pol", "at": [1]}])
-    assert [pair for pair, _ in made.equations.joints] == [(1, 0)]
+    assert [ends for ends, _ in made.equations.edge_of] == [(1, 0)]
     assert star(3).n == made.n
 
 

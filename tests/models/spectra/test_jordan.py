@@ -17,7 +17,7 @@ from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.spectra.characteristic import characteristic
 from synchain.models.spectra.eigenvalue import Blocks, Eigenvalue
 from synchain.models.spectra.jordan import geometric_multiplicity, nullity
-from synchain.models.spectra.solve import spectrum
+from synchain.models.spectra.solve import Proof, spectrum
 from synchain.models.spectra.spectrum import Spectrum, table
 from synchain.runtime.cli import main
 from synchain.runtime.console.words import defective_rows
@@ -116,7 +116,7 @@ def test_undirected_graphs_are_never_defective() -> None:
 def test_nothing_is_said_where_nobody_looked() -> None:
     last = feed_forward(300).spectrum.eigenvalues[1]
     assert (last.blocks, last.geometric, last.defective) == (None, None, False)
-    looked = spectrum(feed_forward(300), prove=True).eigenvalues[1]
+    looked = spectrum(feed_forward(300), proof=Proof.EXACT).eigenvalues[1]
     assert (looked.blocks, looked.geometric, looked.defective) == (((299, 1),), 1, True)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from itertools import islice
 from math import lcm
 
@@ -14,13 +15,13 @@ from synchain.models.graphs.families import family, names, topology
 from synchain.models.graphs.products import cartesian, complement, kronecker, union, weighted
 from synchain.models.graphs.topology import Topology
 from synchain.models.spectra.characteristic import characteristic
+from synchain.models.spectra.eigenvalue import ProofError
 from synchain.models.spectra.modular import _characteristic, _claimed, _powers, _primes, _unit, check_modulo
-from synchain.models.spectra.proof import ProofError
-from synchain.models.spectra.solve import spectrum
+from synchain.models.spectra.solve import Proof, spectrum
 from synchain.models.spectra.spectrum import table
 from synchain.runtime.cli import main
 
-CLOSED = [name for name in names() if hasattr(family(name), "spectrum")]
+CLOSED = [name for name in names() if family(name).spectrum]
 COMPOSED = [
     cartesian(chain(4), ring(5)),
     kronecker(ring(5), ring(7)),
@@ -104,14 +105,14 @@ def test_numbers_that_are_no_sums_of_roots_of_unity_are_not_checked() -> None:
 
 def test_large_spectra_say_how_they_were_checked(capsys: pytest.CaptureFixture[str]) -> None:
     fresh = spectrum.__wrapped__
-    assert (fresh(ring(200)).verified, fresh(ring(200)).chance) == (True, None)
+    assert (fresh(ring(200)).verified, fresh(ring(200)).error_probability) == (True, None)
     middle = fresh(topology("hypercube", 256))
     assert not middle.verified
-    assert middle.chance is not None
-    assert middle.chance < 1e-40
-    assert fresh(topology("hypercube", 512)).chance is None
-    assert fresh(topology("hypercube", 512), prove="primes").chance is not None
-    assert fresh(chain(600), prove=False).chance is None
+    assert middle.error_probability is not None
+    assert middle.error_probability < 1e-40
+    assert fresh(topology("hypercube", 512)).error_probability is None
+    assert fresh(topology("hypercube", 512), proof=Proof.MODULAR).error_probability is not None
+    assert fresh(chain(600), proof=Proof.NONE).error_probability is None
     assert "the same modulo three large primes" in table(middle)
     assert main(["spectrum", "ring", "600"]) == 0
     last = capsys.readouterr().out.splitlines()[-1]
@@ -120,9 +121,9 @@ def test_large_spectra_say_how_they_were_checked(capsys: pytest.CaptureFixture[s
     )
 
 
-def test_a_wrong_closed_form_of_a_large_graph_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_closed_form_of_a_large_graph_is_refused() -> None:
     wrong = listed(topology("star", 300))
     wrong[1:] = [(sp.Integer(-1), 297), (sp.Integer(-300), 2)]
-    monkeypatch.setattr(family("star"), "spectrum", lambda n: wrong)
+    star = replace(family("star"), spectrum=lambda n: wrong)
     with pytest.raises(ProofError, match="star 300"):
-        spectrum.__wrapped__(topology("star", 300))
+        spectrum.__wrapped__(star(300))

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise, product
 
@@ -21,16 +22,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synchain.models.algebra.cosines import biquadratic, cosine, linear_cosine, minimal_polynomial
-from synchain.models.algebra.real_roots import discs, sign
+from synchain.models.algebra.isolation import discs, sign
 from synchain.models.algebra.roots import ComplexRoot, RealRoot, roots
-from synchain.models.graphs import topology as graphs
-from synchain.models.graphs.families import names, topology
+from synchain.models.graphs.families import family, names, topology
 from synchain.models.graphs.readers import from_graph
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.spectra.characteristic import characteristic
-from synchain.models.spectra.eigenvalue import Eigenvalue, ordered
-from synchain.models.spectra.proof import ProofError
-from synchain.models.spectra.solve import spectrum
+from synchain.models.spectra.eigenvalue import Eigenvalue, ProofError, ordered
+from synchain.models.spectra.solve import Proof, spectrum
 from synchain.models.spectra.spectrum import Spectrum, table
 
 ONE = Fraction(1)
@@ -76,7 +75,7 @@ def test_the_first_lines_a_user_types() -> None:
 
 @pytest.mark.parametrize("name", names())
 def test_closed_forms_agree_with_the_characteristic_polynomial_route(name: str) -> None:
-    for n in range(graphs.family(name).MINIMUM, 31):
+    for n in range(family(name).minimum, 31):
         closed = topology(name, n)
         other = anonymous(closed).spectrum
         assert closed.spectrum.verified
@@ -151,32 +150,30 @@ def root_two(n: int) -> list[tuple[sp.Expr, int]]:
     ],
 )
 def test_a_wrong_closed_form_is_refused(
-    wrong: Callable[[list[tuple[sp.Expr, int]]], list[tuple[sp.Expr, int]]], monkeypatch: pytest.MonkeyPatch
+    wrong: Callable[[list[tuple[sp.Expr, int]]], list[tuple[sp.Expr, int]]],
 ) -> None:
-    chain = graphs.family("chain")
-    monkeypatch.setattr(chain, "spectrum", root_two)
-    assert fresh(topology("chain", 4)).verified
-    monkeypatch.setattr(chain, "spectrum", lambda n: wrong(root_two(n)))
+    chain = family("chain")
+    assert fresh(replace(chain, spectrum=root_two)(4)).verified
+    wrong_chain = replace(chain, spectrum=lambda n: wrong(root_two(n)))
     with pytest.raises(ProofError, match=r"spectrum of chain 4: .* correct the closed form"):
-        fresh(topology("chain", 4))
+        fresh(wrong_chain(4))
 
 
-def test_a_wrong_angle_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    chain = graphs.family("chain")
+def test_a_wrong_angle_is_refused() -> None:
+    chain = family("chain")
     right = chain.spectrum(7)
     for wrong in ([*right[:-1], right[1]], [*right[:-1], (right[1][0] + sp.Rational(1, 10**20), 1)]):
-        monkeypatch.setattr(chain, "spectrum", lambda n, wrong=wrong: wrong)
+        wrong_chain = replace(chain, spectrum=lambda n, wrong=wrong: wrong)
         with pytest.raises(ProofError, match="correct the closed form"):
-            fresh(topology("chain", 7))
+            fresh(wrong_chain(7))
 
 
-def test_large_closed_forms_say_that_they_are_not_proved(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("synchain.models.spectra.solve.PROOF_LIMIT", 10)
-    monkeypatch.setattr("synchain.models.spectra.solve.CHECK_LIMIT", 10)
-    assert fresh(topology("ring", 10)).verified
-    assert not fresh(topology("ring", 11)).verified
-    assert fresh(topology("ring", 11), prove=True).verified
-    assert "not proved" in table(fresh(topology("ring", 11)))
+def test_large_closed_forms_say_that_they_are_not_proved() -> None:
+    unproved = fresh(topology("ring", 11), Proof.of_size(11, exact=10, modular=10))
+    assert fresh(topology("ring", 10), Proof.of_size(10, exact=10, modular=10)).verified
+    assert not unproved.verified
+    assert fresh(topology("ring", 11), proof=Proof.EXACT).verified
+    assert "not proved" in table(unproved)
     assert fresh(anonymous(topology("ring", 11))).verified
 
 
@@ -471,12 +468,10 @@ def test_the_characteristic_polynomial_of_fractions_is_monic() -> None:
 
 
 @pytest.mark.parametrize(("name", "n"), [("chain", 7), ("ring", 5), ("star", 4), ("complete", 9)])
-def test_a_graph_by_the_name_and_links_of_a_family_has_its_closed_form(
-    name: str, n: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_graph_by_the_name_and_links_of_a_family_has_its_closed_form(name: str, n: int) -> None:
     family = topology(name, n)
-    monkeypatch.setattr("synchain.models.spectra.solve._by_factors", lambda *_: pytest.fail("factors were looked for"))
-    assert spectrum(Topology(name, n, family.links)).exact == family.spectrum.exact
+    found = family.spectrum
+    assert spectrum(Topology(name, n, family.links)) is found
 
 
 @pytest.mark.parametrize(("name", "n"), [("chain", 7), ("ring", 2), ("hypercube", 6)])

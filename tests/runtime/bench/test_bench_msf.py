@@ -48,10 +48,12 @@ def test_costs_are_beside_the_orbit_alone(rows) -> None:
 def test_modes_run_along_the_stretch_that_the_orbit_alone_does() -> None:
     """Once more from the settled state: as many steps as before, and the same end."""
     settled = msf._settled(1.15, np.array([0.5]))
-    first = msf._along(settled, 8), settled.carrier.state.copy()
+    first = msf._along(settled, 8), settled.integrator.state.copy()
     assert first[0] == msf._along(settled, 8)
-    np.testing.assert_array_equal(first[1], settled.carrier.state)
-    np.testing.assert_allclose(settled.carrier.state, settled.state, atol=1e-5)  # two periods of the drive, four times
+    np.testing.assert_array_equal(first[1], settled.integrator.state)
+    np.testing.assert_allclose(
+        settled.integrator.state, settled.state, atol=1e-5
+    )  # two periods of the drive, four times
     assert 0 < msf._alone(settled, 8)() < 2 * first[0]
 
 

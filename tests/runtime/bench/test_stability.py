@@ -12,7 +12,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.bench import stability
 from synchain.runtime.bench.kit.stability_cases import Case, cases
 from synchain.runtime.bench.kit.stability_reference import end_state
-from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run
 

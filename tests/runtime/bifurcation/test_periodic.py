@@ -76,7 +76,8 @@ def test_the_end_of_the_stable_range_to_rounding() -> None:
 def test_a_period_doubling_is_found_where_the_double_period_is_born() -> None:
     first = periodic_orbit(scene(), 2, omega=1.2)
     branch = follow(scene(), "omega", np.linspace(1.2, 1.24, 5), first)
-    ((at, words),) = branch.bifurcations
+    (change,) = branch.bifurcations
+    at, words = change.value, change.kind
     assert words == "period doubling"
     assert len(branch.orbits) == 5
     assert [orbit.stable for orbit in branch.orbits] == [bool(value < at) for value in branch.values]
@@ -104,13 +105,14 @@ def test_stops_begin_where_den_hartogs_motion_ends() -> None:
     last = r * np.sqrt(1 + u**2 * beta**4) / (abs(v) * beta**2)
     first = periodic_orbit(coulomb(1.2 * last))
     assert first.phases is not None
-    assert first.phases.modes == (-1, 1)
+    assert first.phases.slip_states == (-1, 1)
     branch = follow(coulomb(1.2 * last), "u", np.linspace(1.2 * last, 0.9 * last, 3), first)
-    ((at, words),) = branch.bifurcations
+    (change,) = branch.bifurcations
+    at, words = change.value, change.kind
     assert words == "stick loss"
     assert at == pytest.approx(last, abs=1e-8)
-    assert branch.residuals[0] < 1e-8
-    assert [len(phases.modes) for phases in branch.phases] == [2, 2, 4]
+    assert branch.bifurcations[0].residual < 1e-8
+    assert [len(phases.slip_states) for phases in branch.phases] == [2, 2, 4]
     load = np.sqrt((v * branch.values[0]) ** 2 - (r * u) ** 2) * beta**2  # at the turning point
     assert branch.phases[0].landing == pytest.approx(r - load, abs=1e-9)
 
@@ -120,14 +122,14 @@ def test_a_branch_goes_through_a_graze_to_its_fold() -> None:
     at which its gap has fallen; beyond, the orbit lets go twice, and ends where it meets another one."""
     made = scene(transient=60.0, parameters={"omega": 0.7, "u": 0.15})
     branch = follow(made, "u", [0.15, 0.25, 0.35, 0.45, 0.5, 0.55], periodic_orbit(made))
-    assert [words for _, words in branch.bifurcations] == ["period doubling", "grazing", "period doubling", "fold"]
+    assert [each.kind for each in branch.bifurcations] == ["period doubling", "grazing", "period doubling", "fold"]
     assert len(branch.orbits) == 5
     gaps = [phases.gap for phases in branch.phases[-2:]]
-    at = branch.bifurcations[1][0]
+    at = branch.bifurcations[1].value
     assert at == pytest.approx(0.5 + 0.05 * gaps[1] / (gaps[0] - gaps[1]), abs=2e-4)
-    assert max(branch.residuals) < 3e-12
-    assert [len(orbit.phases.modes) for orbit in branch.at if orbit.phases] == [2, 2, 4, 4]
-    edge, turn = branch.bifurcations[-1][0], branch.at[-1].state
+    assert max(each.residual for each in branch.bifurcations) < 3e-12
+    assert [len(each.orbit.phases.slip_states) for each in branch.bifurcations if each.orbit.phases] == [2, 2, 4, 4]
+    edge, turn = branch.bifurcations[-1].value, branch.bifurcations[-1].orbit.state
     here = follow(made, "u", [0.5, 0.53, edge - 1e-4], branch.orbits[-1]).orbits[-1]
     other = periodic_orbit(made, 1, 2.0 * turn - here.state, u=edge - 1e-4)  # the sheets lie on both sides of the fold
     assert sum(orbit.multipliers[0].real > 1.0 for orbit in (here, other)) == 1
@@ -142,9 +144,9 @@ def test_the_skeleton_of_a_diagram_has_stable_and_unstable_orbits() -> None:
     (branch,) = found
     assert [orbit.periods for orbit in branch.orbits] == [2, 2, 2]
     assert [orbit.stable for orbit in branch.orbits] == [True, True, False]
-    assert [words for _, words in branch.bifurcations] == ["period doubling"]
-    assert branch.residuals[0] < 1e-9
-    assert {phases.modes for phases in branch.phases} == {(0, 1)}
+    assert [each.kind for each in branch.bifurcations] == ["period doubling"]
+    assert branch.bifurcations[0].residual < 1e-9
+    assert {phases.slip_states for phases in branch.phases} == {(0, 1)}
     assert {phases.words for phases in branch.phases} == {"stick, slip +"}
 
 

@@ -7,9 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 import sympy as sp
-from samples import TABLE, Outcome, blank, drive, friction_chain, kernel, numbers
+from samples import TABLE, Outcome, blank, drive, friction_scene, kernel, numbers
 
-EQ = friction_chain(2)
+EQ = friction_scene(2)
 ALL = ("sync_error", "section", "trajectory")
 PERIOD = 2 * np.pi / TABLE["omega"]
 CELLS, ROOM, SAMPLES = 29, 24, 9

@@ -187,9 +187,9 @@ def test_a_wrong_way_back_is_caught(monkeypatch):
 
     def turned(self, found):
         made = right(self, found)
-        return replace(made, end=made.end[:, ::-1].copy()) if self.skipped else made
+        return replace(made, end=made.end[:, ::-1].copy()) if self.merges else made
 
-    monkeypatch.setattr(skip_module.Reduction, "expand", turned)
+    monkeypatch.setattr(skip_module.NodeMerge, "expand", turned)
     with pytest.raises(AssertionError, match="end"):
         compare(MIRRORED, nodes=2)
 

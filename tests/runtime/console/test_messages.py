@@ -20,7 +20,6 @@ from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.cli import main
 from synchain.runtime.commands.run import _nothing_to_do
 from synchain.runtime.console.arguments import grid, spaced
-from synchain.runtime.stability import interpolation
 from synchain.runtime.sweeps import job
 from synchain.runtime.sweeps.certify import check_certifiable
 from synchain.runtime.sweeps.run import run
@@ -140,13 +139,3 @@ def test_messages_about_files_name_the_keyword_and_the_option(tmp_path):
     (tmp_path / "a.nc").write_bytes(b"no netCDF")
     with pytest.raises(OSError, match=r"a\.nc is no netCDF file; expected a netCDF 3 result"):
         claim(reduce_scene(PAIR), tmp_path / "a.nc")
-
-
-@pytest.mark.parametrize("size", [1, 2, 4, 40])
-def test_products_in_pieces_are_those_of_the_whole(size, monkeypatch):
-    random = np.random.default_rng(0)
-    weights, found = random.normal(size=(301, 17)), random.normal(size=(4, 17, 2, 2))
-    whole = np.einsum("mk,ckpq->cmpq", weights, found)
-    monkeypatch.setattr(interpolation, "SINGLE", 17 * 16 * size)
-    np.testing.assert_allclose(interpolation._combine(weights, found), whole, rtol=1e-13, atol=1e-13)
-    assert interpolation._combine(np.zeros((0, 17)), found).shape == (4, 0, 2, 2)

@@ -23,9 +23,9 @@ from synchain.runtime.cli import main
 from synchain.runtime.console.line_report import GRID_ENDS, LineReport
 from synchain.runtime.console.plane_report import plane_windows
 from synchain.runtime.stability import orbits
-from synchain.runtime.stability.attractor import Attractor
+from synchain.runtime.stability.attractor import Attractor, Motion
+from synchain.runtime.stability.exponents import Exponents
 from synchain.runtime.stability.msf import MSF, Plane
-from synchain.runtime.stability.transversal import Exponents
 
 ONE_WAY = "-1 1 0\n0 -1 1\n1 0 -1\n"
 LOW, HIGH = 0.1, 0.6
@@ -34,7 +34,7 @@ LOW, HIGH = 0.1, 0.6
 
 def line(alpha: np.ndarray, low: float = LOW, high: float = HIGH, error: float = 1e-3) -> Exponents:
     value = (alpha - low) * (alpha - high)
-    kinds = (Attractor("aperiodic", 0.0), Attractor("periodic", 1.0), Attractor("aperiodic", 0.0))
+    kinds = (Attractor(Motion.APERIODIC, 0.0), Attractor(Motion.PERIODIC, 1.0), Attractor(Motion.APERIODIC, 0.0))
     return Exponents(alpha, value, np.full(len(alpha), error), 500.0, 3, value[None], kinds)
 
 

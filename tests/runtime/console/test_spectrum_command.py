@@ -8,7 +8,7 @@ from pathlib import Path
 import networkx as nx
 import pytest
 
-from synchain.models.graphs.families import defaults, family, names
+from synchain.models.graphs.families import family, names
 from synchain.runtime.cli import main
 
 
@@ -69,4 +69,4 @@ def test_topologies_name_their_options(capsys: pytest.CaptureFixture[str]) -> No
     assert set(lines) == set(names())
     assert lines["small_world"].endswith("; options: neighbours, p, seed")
     for name in names():
-        assert ("options: " in lines[name]) == bool(defaults(family(name)))
+        assert ("options: " in lines[name]) == bool(family(name).options)

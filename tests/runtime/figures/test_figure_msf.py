@@ -15,8 +15,8 @@ from synchain.models import chain, complete
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.figures import exponent, load, plane, style, synchronisability_map
+from synchain.runtime.figures.figure_runs import QUICK, FigureRuns, Quality
 from synchain.runtime.figures.make import make
-from synchain.runtime.figures.study import QUICK, Quality, Study
 from synchain.runtime.stability.msf import MSF, Plane
 from synchain.runtime.synchronisation.threshold import Criterion
 
@@ -28,7 +28,7 @@ def simulation(monkeypatch: pytest.MonkeyPatch) -> Simulation:
 
 
 def test_exponents_are_drawn_with_their_stable_range_and_error(simulation: Simulation) -> None:
-    panels, data = drawn("msf", Study(TINY))
+    panels, data = drawn("msf", FigureRuns(TINY))
     assert [found.scene.parameters["omega"] for found in data] == [1.15, 1.4, 1.55]
     for panel, found, (low, high) in zip(panels, data, ((0.0, 0.466), (0.09, 0.6), (0.176, 0.594)), strict=True):
         band = next(patch for patch in panel.patches if patch.get_facecolor() == to_rgba(style.GREY))
@@ -66,27 +66,27 @@ def test_numbers_of_the_exponents_are_written(simulation: Simulation, tmp_path: 
     assert float(ranges[2]["low_error"]) == pytest.approx(1e-3 / (0.594 - 0.176), rel=0.05)
 
 
-def test_one_function_serves_every_figure_of_a_study_and_no_other(simulation: Simulation) -> None:
-    study = Study(TINY)
+def test_one_function_serves_every_figure_of_the_same_runs_and_no_other(simulation: Simulation) -> None:
+    runs = FigureRuns(TINY)
     for name in ("figure_5", "figure_7", "msf"):
-        load(name).compute(study)
+        load(name).compute(runs)
     assert [omega for kind, omega, _ in simulation.functions] == [1.15, 1.4, 1.55]
-    assert exponent.curve(load_scene("figure_8"), study) is load("msf").compute(study)[1]
-    exponent.curve(load_scene("figure_8"), Study(TINY))
+    assert exponent.curve(load_scene("figure_8"), runs) is load("msf").compute(runs)[1]
+    exponent.curve(load_scene("figure_8"), FigureRuns(TINY))
     assert len(simulation.functions) == 4
 
 
 def test_effort_follows_the_quality() -> None:
-    assert exponent.effort(Study(Quality(), workers=3)) == {
+    assert exponent.effort(FigureRuns(Quality(), workers=3)) == {
         "precision": 1e-3, "periods": 5000.0, "transient": 200.0, "starts": 4, "workers": 3, "show_progress": False
     }  # fmt: skip
-    quick = exponent.effort(Study(QUICK))
+    quick = exponent.effort(FigureRuns(QUICK))
     assert quick["precision"] > 1e-3
     assert quick["periods"] < 5000
 
 
 def test_the_plane_shows_contour_rays_and_dots(simulation: Simulation, tmp_path: Path) -> None:
-    axes, data = drawn("msf_plane", Study(TINY))
+    axes, data = drawn("msf_plane", FigureRuns(TINY))
     assert [kind for kind, _, _ in simulation.functions] == ["plane"]
     contour = next(line for line in axes.lines if line.get_label() == r"$\Lambda=0$")
     radius = np.hypot(contour.get_xdata() - 0.345, contour.get_ydata())  # (alpha - 0.09)(alpha - 0.6) + beta^2 = 0
@@ -135,8 +135,8 @@ def test_an_uneven_ring_has_the_weights_asked_for() -> None:
 
 
 def test_the_map_takes_the_worst_mode_of_every_network(simulation: Simulation) -> None:
-    study = Study(TINY)
-    panels, data = drawn("synchronisability_map", study)
+    runs = FigureRuns(TINY)
+    panels, data = drawn("synchronisability_map", runs)
     assert len(simulation.functions) == len(data.omega) == 7
     at = int(np.argmin(np.abs(data.omega - 1.4)))
     low, high = 0.09, 0.6
@@ -177,8 +177,8 @@ def test_the_map_is_written_with_a_column_for_each_network(simulation: Simulatio
 
 
 def test_a_tiny_function_from_a_real_run() -> None:
-    study = Study(Quality(points=3, criterion=Criterion(starts=1, transient=2.0)), workers=1)
-    (found, *_) = (exponent.curve(load_scene("figure_5"), study),)
+    runs = FigureRuns(Quality(points=3, criterion=Criterion(starts=1, transient=2.0)), workers=1)
+    (found, *_) = (exponent.curve(load_scene("figure_5"), runs),)
     assert found.alpha.tolist() == [0.0, 0.6, 1.2]
     assert found.exponent[0] < 0 < found.exponent[1]
     assert found.attractors == ("periodic, 2 drive periods",)

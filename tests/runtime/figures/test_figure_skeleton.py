@@ -11,9 +11,9 @@ from figure_samples import rows
 
 from synchain.runtime.figures import load, names, skeleton, style
 from synchain.runtime.figures import make as maker
+from synchain.runtime.figures.figure_runs import FigureRuns, Quality
 from synchain.runtime.figures.make import make
 from synchain.runtime.figures.skeleton import Place, Skeleton, curves
-from synchain.runtime.figures.study import Quality, Study
 
 SMALL = Quality(points=5, grid=9)
 DOUBLING = 1.2222040752683
@@ -30,7 +30,7 @@ def narrow(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @cache
 def small() -> Skeleton:
-    data: Skeleton = load("skeleton").compute(Study(SMALL, workers=1))
+    data: Skeleton = load("skeleton").compute(FigureRuns(SMALL, workers=1))
     return data
 
 
@@ -65,7 +65,7 @@ def test_stable_pieces_are_lines_and_unstable_ones_dashed() -> None:
         axes = drawing.draw(drawing.layout(style.new_figure(drawing.size)), small())
     styles = {line.get_linestyle() for line in axes.lines}
     assert {"-", "--", "None"} <= styles
-    (mark,) = (line for line in axes.lines if line.get_marker() == skeleton.KINDS["period doubling"])
+    (mark,) = (line for line in axes.lines if line.get_marker() == skeleton.MARKERS["period doubling"])
     np.testing.assert_allclose(mark.get_xdata(), DOUBLING)
     (legend,) = axes.figure.legends
     assert [text.get_text() for text in legend.get_texts()] == [
@@ -82,7 +82,7 @@ def test_curves_stay_apart_where_crossings_change_places() -> None:
 
 
 def test_files_beside_the_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(skeleton, "compute", lambda name, study: small())
+    monkeypatch.setattr(skeleton, "compute", lambda name, runs: small())
     monkeypatch.setattr(maker, "QUICK", SMALL)
     written = make(["skeleton"], tmp_path, quick=True)
     assert {path.name for path in written} == {

@@ -13,8 +13,8 @@ from synchain.models import chain
 from synchain.models.scenes.file import load_scene
 from synchain.runtime.figures import load, published
 from synchain.runtime.figures import threshold_table as tables_of_thresholds
+from synchain.runtime.figures.figure_runs import FigureRuns
 from synchain.runtime.figures.make import make
-from synchain.runtime.figures.study import Study
 from synchain.runtime.prediction.intervals import scale
 from synchain.runtime.synchronisation.threshold import project
 
@@ -26,7 +26,7 @@ def simulation(monkeypatch: pytest.MonkeyPatch) -> Simulation:
 
 
 def test_projection_shows_probe_lines_and_network(simulation: Simulation, tmp_path: Path) -> None:
-    (probe, lines, network), data = drawn("figure_8", Study(TINY))
+    (probe, lines, network), data = drawn("figure_8", FigureRuns(TINY))
     np.testing.assert_allclose(data.predicted, [(0.09 / (2 - math.sqrt(2)), 0.6 / (2 + math.sqrt(2)))])
     thick = [line for line in lines.lines if line.get_linewidth() > 1.5]
     assert len(thick) == 3
@@ -56,20 +56,20 @@ def test_projection_writes_curves_and_ranges(simulation: Simulation, tmp_path: P
     ranges = rows(tmp_path / "figure_6_ranges.csv")
     assert [row["range"] for row in ranges] == ["probe", "exponent", "predicted", "measured", "published"]
     assert (ranges[-1]["low"], ranges[-1]["high"]) == ("0.176", "0.196")
-    (_, lines, network), _ = drawn("figure_6", Study(TINY))
+    (_, lines, network), _ = drawn("figure_6", FigureRuns(TINY))
     assert "1 of 26 cells failed and are left out" in words(lines)
     assert any(np.isnan(line.get_ydata()).any() for line in network.lines)
 
 
 def test_published_numbers_are_never_used(simulation: Simulation, monkeypatch: pytest.MonkeyPatch) -> None:
-    before = load("thresholds").compute(Study(TINY))
-    drawn_before = load("figure_8").compute(Study(TINY))
+    before = load("thresholds").compute(FigureRuns(TINY))
+    drawn_before = load("figure_8").compute(FigureRuns(TINY))
     wrong = tuple(published.Published(r.n, r.omega, ((0.01, 0.02),), "wrong") for r in published.PUBLISHED)
     monkeypatch.setattr(published, "PUBLISHED", wrong)
-    after = load("thresholds").compute(Study(TINY))
+    after = load("thresholds").compute(FigureRuns(TINY))
     assert [(r.measured, r.predicted) for r in after.rows] == [(r.measured, r.predicted) for r in before.rows]
     assert after.rows[0].printed == ((0.01, 0.02),)
-    drawn_after = load("figure_8").compute(Study(TINY))
+    drawn_after = load("figure_8").compute(FigureRuns(TINY))
     assert drawn_after.predicted == drawn_before.predicted
     assert drawn_after.network.intervals == drawn_before.network.intervals
     assert drawn_after.published == ((0.01, 0.02),)
@@ -140,8 +140,8 @@ def test_failed_values_of_sigma_are_said_in_the_table(simulation: Simulation, tm
 
 
 def test_the_probe_of_a_pair_is_its_own_network(simulation: Simulation) -> None:
-    study = Study(TINY)
-    pair = study.network(load_scene("figure_4b"))
+    runs = FigureRuns(TINY)
+    pair = runs.network(load_scene("figure_4b"))
     assert pair.intervals == ((0.045, 0.3),)
     assert pair.x[-1] == 0.6
     assert simulation.networks == []

@@ -16,8 +16,8 @@ from figure_samples import TINY, Simulation, drawn, pretend, rows, words
 from synchain.models.scenes.file import load_scene, scene_names
 from synchain.runtime.figures import Drawing, load, names, projection, style, sync_error
 from synchain.runtime.figures import make as maker
+from synchain.runtime.figures.figure_runs import FULL, QUICK, FigureRuns, Quality, thin
 from synchain.runtime.figures.make import make
-from synchain.runtime.figures.study import FULL, QUICK, Quality, Study, thin
 from synchain.runtime.figures.tables import Table, as_csv
 from synchain.runtime.support.status import Status
 
@@ -95,7 +95,7 @@ def test_a_figure_is_written_as_png_svg_and_csv(name: str, tmp_path: Path, simul
 def test_all_figures_are_made_without_names(
     tmp_path: Path, simulation: Simulation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(maker, "produce", lambda drawing, study, folder: [folder / drawing.name])
+    monkeypatch.setattr(maker, "produce", lambda drawing, runs, folder: [folder / drawing.name])
     assert make(None, tmp_path) == make([], tmp_path) == [tmp_path / name for name in PAPER]
 
 
@@ -167,9 +167,9 @@ def test_full_quality_keeps_the_scenes_and_quick_is_coarser() -> None:
 
 
 def test_figures_share_their_runs(simulation: Simulation) -> None:
-    study = Study(TINY)
+    runs = FigureRuns(TINY)
     for name in names():
-        load(name).compute(study)
+        load(name).compute(runs)
     assert len(simulation.runs) == 4  # figure 3 and three frequencies of figure 4
     assert sorted(omega for omega, _ in simulation.probes) == [1.15, 1.4, 1.55]
     assert sorted(omega for kind, omega, _ in simulation.functions if kind == "msf") == [1.15, 1.4, 1.55]
@@ -180,7 +180,7 @@ def test_figures_share_their_runs(simulation: Simulation) -> None:
 
 
 def test_the_friction_law_is_that_of_the_equations() -> None:
-    data = load("figure_1b").compute(Study(TINY))
+    data = load("figure_1b").compute(FigureRuns(TINY))
     scene = load_scene("figure_1b")
     p = dict(scene.parameters)
     equations = scene.equations
@@ -203,7 +203,7 @@ def test_error_curve_and_its_numbers(simulation: Simulation, tmp_path: Path) -> 
     found = rows(tmp_path / "figure_4b.csv")
     assert list(found[0]) == ["sigma", "e_avg", "e_max", "e_end", "status"]
     assert [row["status"] for row in found] == ["finished"] * 4 + ["diverged"] + ["finished"] * 4
-    axes, _ = drawn("figure_4b", Study(TINY))
+    axes, _ = drawn("figure_4b", FigureRuns(TINY))
     (curve,) = (line for line in axes.lines if len(line.get_xdata()) == 9)
     assert np.isnan(curve.get_ydata()).tolist() == [k == 4 for k in range(9)]
     assert "1 of 9 cells failed and are left out" in words(axes)
@@ -231,7 +231,7 @@ def test_bifurcation_diagram_and_its_numbers(
     assert list(found[0]) == [axis, "time", *states, "status"]
     assert len(found) == 1 + 1 + 2 + 1 + 1 + 1 + 1 + 1 + 2  # cells have 0, 1, 2, 0 … points; a row of its own for none
     assert [row["x_1"] for row in found if row["status"] == "diverged"] == [""]
-    axes, _ = drawn(name, Study(TINY))
+    axes, _ = drawn(name, FigureRuns(TINY))
     (dots,) = (line for line in axes.lines if line.get_marker() == ".")
     np.testing.assert_allclose(dots.get_ydata(), [0.1, 0.2, 0.2, 0.4, 0.7, 0.8, 0.8])
     assert "1 of 9 cells failed and are left out" in words(axes)
@@ -239,9 +239,9 @@ def test_bifurcation_diagram_and_its_numbers(
 
 @pytest.mark.parametrize("direction", ["up", "down"])
 def test_diagrams_can_be_continued(direction: str, simulation: Simulation) -> None:
-    study = Study(TINY)
-    load("figure_4e").compute(study)
-    load(f"figure_4e_{direction}").compute(study)
+    runs = FigureRuns(TINY)
+    load("figure_4e").compute(runs)
+    load(f"figure_4e_{direction}").compute(runs)
     assert [scene.continuation for scene in simulation.runs] == ["none", direction]
     assert f"figure_4e_{direction}" not in names()
 

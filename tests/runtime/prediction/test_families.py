@@ -9,7 +9,7 @@ import pytest
 from flint import arb
 
 from synchain.models.graphs.families import topology
-from synchain.runtime.prediction.families import CLOSED, eigenratio, largest
+from synchain.runtime.prediction.families import CLOSED, eigenratio, largest_network
 from synchain.runtime.prediction.synchronisability import verdict
 
 
@@ -46,7 +46,7 @@ def test_rational_eigenratios_are_whole_numbers_and_only_those(family: str) -> N
 @pytest.mark.parametrize("family", sorted(set(CLOSED) - {"complete"}))
 @pytest.mark.parametrize("high", [1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 5.9, 6.0])
 def test_bisection_agrees_with_every_size_tried(family: str, high: float) -> None:
-    found = largest(family, [(1.0, high)])
+    found = largest_network(family, [(1.0, high)])
     assert (found.how, found.limit) == ("closed form", None)
     assert found.n == found.certain == found.possible == brute(family, [(1.0, high)], 9)
 
@@ -55,8 +55,8 @@ def test_bisection_agrees_with_every_size_tried(family: str, high: float) -> Non
     ("family", "n", "ratio"), [("chain", 3, 3), ("ring", 4, 2), ("ring", 6, 4), ("star", 17, 17), ("hypercube", 9, 9)]
 )
 def test_exact_ties_count_and_the_next_smaller_float_does_not(family: str, n: int, ratio: int) -> None:
-    assert largest(family, [(1.0, float(ratio))]).n == n
-    assert largest(family, [(1.0, math.nextafter(ratio, 0))]).n == n - 1
+    assert largest_network(family, [(1.0, float(ratio))]).n == n
+    assert largest_network(family, [(1.0, math.nextafter(ratio, 0))]).n == n - 1
 
 
 @pytest.mark.parametrize(("p", "q", "n"), [(4, 1, 4), (9, 2, 5)])
@@ -64,7 +64,7 @@ def test_quotients_of_floats_close_to_the_eigenratio_are_decided(p: int, q: int,
     """Chain of 5: cot²(π/10) = 5 + 2 sqrt(5); times 9 + 2 sqrt(20), p² - 20 q² stays -4 (below) or 1 (above)."""
     while 40 * (5 * q + p) < 2**53:
         p, q = 9 * p + 40 * q, 2 * p + 9 * q
-        assert largest("chain", [(float(q), float(5 * q + p))]).n == n
+        assert largest_network("chain", [(float(q), float(5 * q + p))]).n == n
     assert abs(p * p - 20 * q * q) <= 4
     assert q > 10**12
 
@@ -75,27 +75,27 @@ def test_a_long_chain_is_counted_to_the_node() -> None:
         for high in (1e6, 12345.678e9, 1e30, 1e200):
             with mpmath.workdps(250):
                 expected = int(mpmath.floor(mpmath.pi / (2 * mpmath.atan(1 / mpmath.sqrt(mpmath.mpf(high))))))
-            assert largest("chain", [(1.0, high)]).n == expected
+            assert largest_network("chain", [(1.0, high)]).n == expected
 
 
 def test_the_two_rossler_zeros_give_the_sizes_of_each_family() -> None:
     """(0.186, 4.614), ratio 24.8 (Rössler a = b = 0.2, c = 9, x to x): n by hand from the closed forms."""
     ranges = [(0.186, 4.614)]
-    assert largest("chain", ranges).n == math.floor(math.pi / 2 / math.atan(math.sqrt(0.186 / 4.614)))
-    assert largest("star", ranges).n == 24
-    found = largest("hypercube", ranges)
+    assert largest_network("chain", ranges).n == math.floor(math.pi / 2 / math.atan(math.sqrt(0.186 / 4.614)))
+    assert largest_network("star", ranges).n == 24
+    found = largest_network("hypercube", ranges)
     assert (found.n, found.counts) == (24, "dimension")
     ratio = 4.614 / 0.186
     odd = [n for n in range(3, 99, 2) if 1 / (4 * math.sin(math.pi / 2 / n) ** 2) <= ratio]
     even = [n for n in range(4, 99, 2) if 1 / math.sin(math.pi / n) ** 2 <= ratio]
-    assert largest("ring", ranges).n == max(odd + even)
+    assert largest_network("ring", ranges).n == max(odd + even)
 
 
 def test_errors_give_a_certain_and_a_possible_size() -> None:
-    found = largest("star", [(1.0, 10.5)], [(0.1, 0.5)])
+    found = largest_network("star", [(1.0, 10.5)], [(0.1, 0.5)])
     assert (found.n, found.certain, found.possible) == (10, math.floor(10.0 / 1.1), math.floor(11.0 / 0.9))
-    assert largest("star", [(1.0, 1.1)], [(0.2, 0.2)]).certain == 0
-    assert largest("star", [(0.1, 1.0)], [(0.1, 0.0)]).possible is None
+    assert largest_network("star", [(1.0, 1.1)], [(0.2, 0.2)]).certain == 0
+    assert largest_network("star", [(0.1, 1.0)], [(0.1, 0.0)]).possible is None
 
 
 @pytest.mark.parametrize(
@@ -108,30 +108,30 @@ def test_errors_give_a_certain_and_a_possible_size() -> None:
     ],
 )
 def test_every_size_is_none(family: str, ranges, how: str) -> None:
-    found = largest(family, ranges)
+    found = largest_network(family, ranges)
     assert (found.n, found.certain, found.possible, found.how) == (None, None, None, how)
 
 
 def test_other_families_are_searched_to_the_limit_beyond_gaps() -> None:
     """Sums of two chains: 2x2 has the ratio 2, 2x3 5, 3x3 6, 2x4 9.2, 2x5 14.1; 5 and 7 nodes make a chain."""
-    found = largest("grid", [(1.0, 6.0)], limit=10)
+    found = largest_network("grid", [(1.0, 6.0)], limit=10)
     assert (found.n, found.how, found.limit) == (9, "search", 10)
     assert verdict([(1.0, 6.0)], topology("grid", 8)).answer == "no"
 
 
 def test_several_ranges_are_searched() -> None:
     """Star: sigma in [1, 2] and n sigma <= 7, so n <= 7; cubes: 2, 4, 6 sigma are 1, 2, 3 at 0.5, and 8 sigma is lost."""
-    found = largest("star", [(1.0, 2.0), (6.0, 7.0)], limit=12)
+    found = largest_network("star", [(1.0, 2.0), (6.0, 7.0)], limit=12)
     assert (found.n, found.how) == (7, "search")
-    assert largest("hypercube", [(1.0, 2.1), (2.9, 3.1)], limit=16).n == 3
+    assert largest_network("hypercube", [(1.0, 2.1), (2.9, 3.1)], limit=16).n == 3
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: largest("rnig", [(1.0, 2.0)]), "unknown topology 'rnig'"),
-        (lambda: largest("chain", [(1.0, 2.0)], limit=1), "limit = 1; expected at least 2 nodes"),
-        (lambda: largest("chain", [(2.0, 1.0)]), "stable range 1"),
+        (lambda: largest_network("rnig", [(1.0, 2.0)]), "unknown topology 'rnig'"),
+        (lambda: largest_network("chain", [(1.0, 2.0)], limit=1), "limit = 1; expected at least 2 nodes"),
+        (lambda: largest_network("chain", [(2.0, 1.0)]), "stable range 1"),
         (lambda: eigenratio("grid", 4), "no closed form; known: chain"),
         (lambda: eigenratio("star", 2), "size 2; expected at least 3"),
     ],

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from synchain.runtime.prediction.intervals import find, intersect, runs, scale
+from synchain.runtime.prediction.intervals import find, grid_intervals, intersect, scale
 
 
 def test_runs_of_good_points():
     x = np.arange(6.0)
     good = np.array([True, True, False, True, False, True])
-    assert runs(x, good) == [(0.0, 1.0), (3.0, 3.0), (5.0, 5.0)]
+    assert grid_intervals(x, good) == [(0.0, 1.0), (3.0, 3.0), (5.0, 5.0)]
 
 
 @given(st.lists(st.floats(0.02, 0.98), min_size=2, max_size=6, unique=True), st.booleans())

@@ -10,8 +10,7 @@ import pytest
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
 from synchain.runtime.prediction.intervals import intersect
-from synchain.runtime.prediction.one_way import windows_complex
-from synchain.runtime.prediction.synchronisability import windows
+from synchain.runtime.prediction.synchronisability import windows, windows_complex
 
 ONE = Fraction(1)
 GRID = np.linspace(0.0, 3.0, 301)

@@ -18,8 +18,8 @@ from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.spectra.eigenvalue import Eigenvalue
 from synchain.models.spectra.jordan import geometric_multiplicity
 from synchain.models.spectra.order import compare
-from synchain.runtime.prediction.modes import transversal
-from synchain.runtime.prediction.stable_ranges import Range, stated, widened
+from synchain.runtime.prediction.modes import transversal_modes
+from synchain.runtime.prediction.stable_ranges import StableRange, exact_ranges, widen
 from synchain.runtime.prediction.synchronisability import verdict, windows
 from synchain.runtime.synchronisation.threshold import project
 
@@ -213,38 +213,38 @@ def test_an_end_at_zero_is_no_measured_end() -> None:
     [(1, 3, 3.0), (2, 3, 1.5), (3, 3, 1.0), (1, None, math.inf), (0, None, math.inf), (0, 2, math.inf), (0, 0, 0.0)],
 )
 def test_the_largest_eigenratio_that_a_range_holds(low: int, high: int | None, ratio: float) -> None:
-    assert Range(Fraction(low), None if high is None else Fraction(high)).ratio == ratio
+    assert StableRange(Fraction(low), None if high is None else Fraction(high)).ratio == ratio
 
 
 def test_what_lies_below_zero_is_cut_off_with_its_errors() -> None:
     given = [(-3.0, -2.0), (-1.0, 0.5), (1.0, 2.0), (3.0, math.inf)]
-    assert stated(given, [(0.25, 0.25)] * 4) == [
-        Range(Fraction(0), Fraction(1, 2), (0.0, 0.25)),
-        Range(Fraction(1), Fraction(2), (0.25, 0.25)),
-        Range(Fraction(3), None, (0.25, 0.0)),
+    assert exact_ranges(given, [(0.25, 0.25)] * 4) == [
+        StableRange(Fraction(0), Fraction(1, 2), (0.0, 0.25)),
+        StableRange(Fraction(1), Fraction(2), (0.25, 0.25)),
+        StableRange(Fraction(3), None, (0.25, 0.0)),
     ]
-    assert stated([(-1.0, 0.0)], [(0.25, 0.25)]) == [Range(Fraction(0), Fraction(0), (0.0, 0.25))]
-    assert stated([(0.0, 1.0)], [(0.25, 0.25)]) == [Range(Fraction(0), Fraction(1), (0.0, 0.25))]
+    assert exact_ranges([(-1.0, 0.0)], [(0.25, 0.25)]) == [StableRange(Fraction(0), Fraction(0), (0.0, 0.25))]
+    assert exact_ranges([(0.0, 1.0)], [(0.25, 0.25)]) == [StableRange(Fraction(0), Fraction(1), (0.0, 0.25))]
 
 
 def test_ranges_that_just_meet_are_joined_and_one_that_shrinks_to_a_point_stays() -> None:
-    given = stated([(1.0, 1.5), (2.0, 3.0)], [(0.25, 0.25), (0.25, 0.25)])
-    assert widened(given, 1) == [Range(Fraction(3, 4), Fraction(13, 4))]
-    assert widened(given, -1)[0] == Range(Fraction(5, 4), Fraction(5, 4))
-    below = stated([(0.125, 1.0), (2.0, 2.0)], [(0.25, 0.0), (2.0, 0.0)])
-    assert widened(below, 1) == [Range(Fraction(0), Fraction(2))]  # no range begins below 0
-    unending = stated([(1.0, 1.5), (2.0, math.inf)], [(0.25, 0.25), (0.25, 0.0)])
-    assert [(r.low, r.high, r.errors) for r in widened(unending, 1)] == [(Fraction(3, 4), None, (0.0, 0.0))]
-    later = stated([(1.0, 2.0), (4.0, 5.0), (5.25, 6.0)], [(0.25, 0.25)] * 3)
-    assert [(r.low, r.high) for r in widened(later, 1)] == [(0.75, 2.25), (3.75, 6.25)]
-    inside = stated([(1.0, 4.0), (5.0, 6.0)], [(0.0, 3.0), (2.0, 0.0)])
-    assert widened(inside, 1) == [Range(Fraction(1), Fraction(7))]
+    given = exact_ranges([(1.0, 1.5), (2.0, 3.0)], [(0.25, 0.25), (0.25, 0.25)])
+    assert widen(given, 1) == [StableRange(Fraction(3, 4), Fraction(13, 4))]
+    assert widen(given, -1)[0] == StableRange(Fraction(5, 4), Fraction(5, 4))
+    below = exact_ranges([(0.125, 1.0), (2.0, 2.0)], [(0.25, 0.0), (2.0, 0.0)])
+    assert widen(below, 1) == [StableRange(Fraction(0), Fraction(2))]  # no range begins below 0
+    unending = exact_ranges([(1.0, 1.5), (2.0, math.inf)], [(0.25, 0.25), (0.25, 0.0)])
+    assert [(r.low, r.high, r.errors) for r in widen(unending, 1)] == [(Fraction(3, 4), None, (0.0, 0.0))]
+    later = exact_ranges([(1.0, 2.0), (4.0, 5.0), (5.25, 6.0)], [(0.25, 0.25)] * 3)
+    assert [(r.low, r.high) for r in widen(later, 1)] == [(0.75, 2.25), (3.75, 6.25)]
+    inside = exact_ranges([(1.0, 4.0), (5.0, 6.0)], [(0.0, 3.0), (2.0, 0.0)])
+    assert widen(inside, 1) == [StableRange(Fraction(1), Fraction(7))]
 
 
 def test_ranges_that_meet_within_their_errors_are_one() -> None:
-    wide = widened(stated([(1.0, 2.0), (3.0, 4.0), (6.0, math.inf)], [(0.5, 0.5), (0.5, 0.25), (0.5, 0.0)]), 1)
+    wide = widen(exact_ranges([(1.0, 2.0), (3.0, 4.0), (6.0, math.inf)], [(0.5, 0.5), (0.5, 0.25), (0.5, 0.0)]), 1)
     assert [(r.low, r.high) for r in wide] == [(0.5, 4.25), (5.5, None)]
-    narrow = widened(stated([(1.0, 2.0), (3.0, 4.0)], [(0.75, 0.5), (0.25, 0.25)]), -1)
+    narrow = widen(exact_ranges([(1.0, 2.0), (3.0, 4.0)], [(0.75, 0.5), (0.25, 0.25)]), -1)
     assert [(r.low, r.high) for r in narrow] == [(3.25, 3.75)]
 
 
@@ -285,7 +285,9 @@ def test_wrong_ranges_are_refused(ranges, errors, words: str) -> None:
 
 def test_complex_and_positive_eigenvalues_are_refused() -> None:
     one_way = Topology("one-way ring", 3, tuple((i, (i + 1) % 3, ONE) for i in range(3)))
-    with pytest.raises(ValueError, match=r"complex eigenvalue .* Use synchain\.runtime\.one_way\.windows_complex"):
+    with pytest.raises(
+        ValueError, match=r"complex eigenvalue .* Use synchain\.runtime\.prediction\.synchronisability\.windows_complex"
+    ):
         windows([(0.0, 1.0)], one_way)
     with pytest.raises(ValueError, match=r"positive eigenvalue 2, .* negate it"):
         verdict([(0.0, 1.0)], from_matrix([[1, -1], [-1, 1]]))
@@ -296,7 +298,7 @@ def test_complex_and_positive_eigenvalues_are_refused() -> None:
 
 @pytest.mark.parametrize("n", [2, 3, 4, 9])
 def test_the_vectors_of_a_chain_are_cosines(n: int) -> None:
-    for k, mode in enumerate(transversal(topology("chain", n)), 1):
+    for k, mode in enumerate(transversal_modes(topology("chain", n)), 1):
         expected = np.cos(np.pi * k * (np.arange(n) + 0.5) / n)
         expected /= np.linalg.norm(expected)
         assert mode.number == k
@@ -306,20 +308,20 @@ def test_the_vectors_of_a_chain_are_cosines(n: int) -> None:
 
 
 def test_the_vector_of_a_multiple_mode_is_the_one_that_stands_out_at_one_leaf() -> None:
-    slow, fast = transversal(topology("star", 5))
+    slow, fast = transversal_modes(topology("star", 5))
     assert (slow.number, slow.multiplicity, fast.number) == (1, 3, 4)
     assert slow.vector == pytest.approx(np.array([0, 3, -1, -1, -1]) / math.sqrt(12), abs=1e-12)
     assert fast.vector == pytest.approx(np.array([4, -1, -1, -1, -1]) / math.sqrt(20), abs=1e-12)
 
 
 def test_large_networks_have_modes_but_no_dense_vectors() -> None:
-    mode = transversal(topology("star", 3000))[0]
+    mode = transversal_modes(topology("star", 3000))[0]
     with pytest.raises(ValueError, match=r"eigenvector of star\(3000\): expected at most 2000 nodes"):
         _ = mode.vector
 
 
 def test_a_feed_forward_chain_has_one_eigenvector_for_all_its_modes() -> None:
-    (mode,) = transversal(feed_forward(6))
+    (mode,) = transversal_modes(feed_forward(6))
     assert (mode.eigenvalue.number, mode.multiplicity, mode.defective) == (-1, 5, True)
     assert geometric_multiplicity(mode.graph, mode.eigenvalue) == 1
     assert mode.vector == pytest.approx(np.eye(6)[5], abs=1e-12)
@@ -329,7 +331,8 @@ def test_a_feed_forward_chain_has_one_eigenvector_for_all_its_modes() -> None:
 def test_missing_eigenvectors_of_irrational_modes_are_counted_exactly() -> None:
     graph = nested(topology("chain", 4))
     found = {
-        str(m.eigenvalue): (m.multiplicity, geometric_multiplicity(graph, m.eigenvalue)) for m in transversal(graph)
+        str(m.eigenvalue): (m.multiplicity, geometric_multiplicity(graph, m.eigenvalue))
+        for m in transversal_modes(graph)
     }
     assert found == {"-1": (2, 1), "-3 + sqrt(2)": (2, 1), "-3": (2, 1), "-3 - sqrt(2)": (2, 1)}
 
@@ -338,4 +341,4 @@ def test_modes_that_occur_twice_with_all_their_vectors_are_not_defective() -> No
     chain = topology("chain", 4)
     links = [(1 + i, 1 + j, w) for i, j, w in chain.links] + [(5 + i, 5 + j, w) for i, j, w in chain.links]
     graph = Topology("driven twice", 9, tuple(sorted(links + [(i, 0, ONE) for i in range(1, 9)])))
-    assert [(m.multiplicity, m.defective) for m in transversal(graph)] == [(2, False)] * 4
+    assert [(m.multiplicity, m.defective) for m in transversal_modes(graph)] == [(2, False)] * 4

@@ -17,7 +17,7 @@ from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.mechanics.components import Edge
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.clusters import ClusterExponents, cluster_exponents
-from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.run import run
 
 pytestmark = pytest.mark.long
@@ -153,9 +153,9 @@ def test_a_coupling_with_a_state_in_its_derivative_is_refused() -> None:
     push = edge.parameters[0] * edge.weight * (gap + gap**3)
     bent = Edge(edge.here, edge.there, edge.weight, (sp.S.Zero, push), edge.parameters)
     with pytest.raises(ValueError, match="has a derivative that depends on the states it joins"):
-        clustered(replace(equations, edge=bent), clusters(PAIR, (0, 0)))
+        clustered(replace(equations, edge_of=(((0, 0), bent),)), clusters(PAIR, (0, 0)))
     with pytest.raises(ValueError, match="these equations have no coupling"):
-        clustered(Equations(equations.node, None, 2), clusters(PAIR, (0, 0)))
+        clustered(Equations.of_equal_nodes(equations.node, None, 2), clusters(PAIR, (0, 0)))
 
 
 def test_what_is_refused() -> None:

@@ -15,8 +15,8 @@ from synchain.models.graphs.families import topology
 from synchain.models.inputs.plugins import allow_code
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.results.result import Result
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.stability.orbits import Orbits
-from synchain.runtime.stability.transversal import exponents
 from synchain.runtime.sweeps.run import run
 
 ONE = topology("chain", 1)
@@ -166,10 +166,19 @@ def damped(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 def damped_scene(oscillator: str, x: float, v: float, window: float, rtol: float, speed: float) -> Scene:
     return Scene(
-        oscillator=oscillator, topology=ONE, friction="exponential", contact="set-valued", time_unit="time",
-        transient=0.0, window=window, rtol=rtol, record=(), parameters={**STRIBECK, "theta_b": speed}, initial={"x": [x],
-        "v": [v]},
-    )  # fmt: skip
+        oscillator=oscillator,
+        topology=ONE,
+        friction="exponential",
+        contact="set-valued",
+        time_unit="time",
+        transient=0.0,
+        window=window,
+        rtol=rtol,
+        record=("section",),
+        section="v_1 falling",
+        parameters={**STRIBECK, "theta_b": speed},
+        initial={"x": [x], "v": [v]},
+    )
 
 
 def test_hopf_point(damped: str) -> None:
@@ -194,7 +203,7 @@ def test_share_of_starts_at_rest(damped: str) -> None:
     numbers, count = np.random.default_rng(1), 2000
     scene = damped_scene(damped, 0.0, 0.0, 400.0, 1e-7, 1.5)
     starts = {"x_1": numbers.uniform(-2.0, 2.0, count), "v_1": numbers.uniform(0.0, 2.0, count)}
-    scene = scene.replace(axes=starts, zipped=True)
+    scene = scene.replace(axes=starts, zipped=True, record=())
     ends = finished(scene).data.end.values
     rest = 0.5 + 0.5 * math.exp(-3.0)
     distance = np.hypot(ends[:, 0] - rest, ends[:, 1])
@@ -207,7 +216,7 @@ def test_share_of_starts_at_rest(damped: str) -> None:
 def test_events_keep_their_digits_in_long_runs(damped: str) -> None:
     """Without a drive the clock starts anew every 8 units: the top of the stick-slip cycle is the same at t = 1e3 and
     1e5."""
-    scene = damped_scene(damped, 1.0, 0.0, 30.0, 1e-12, 1.0).replace(record=("section",), section="v_1 falling")
+    scene = damped_scene(damped, 1.0, 0.0, 30.0, 1e-12, 1.0)
     tops = [finished(scene.replace(transient=t)).data.section.values[:, 0] for t in (1e3, 1e5)]
     assert min(map(len, tops)) >= 2
     assert np.ptp(np.concatenate(tops)) < 2e-12
@@ -242,7 +251,7 @@ def test_propagator_against_differences_of_the_flow(
     scene = scene.replace(record=(), samples=0)
     pair = scene.replace(topology=topology("chain", 2), initial={"x": [x, x], "v": [v, v]})
     orbits = Orbits.make(pair, np.array([0.0]), np.array([[x, v, 0.0]]), 1)
-    orbits.block, orbits.carrier = 1.0, orbits.carry(orbits.strengths)
+    orbits.block, orbits.integrator = 1.0, orbits.integrator_of(orbits.strengths)
     found = orbits.propagators()[0, 0]
     d = 1e-6
     by_x, by_v = (flow(scene, x + p, v + q) - flow(scene, x - p, v - q) for p, q in ((d, 0.0), (0.0, d)))

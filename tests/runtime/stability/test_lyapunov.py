@@ -7,13 +7,13 @@ import pytest
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.variational import PHASE, phased, whole, with_volume
+from synchain.models.dynamics.variational import PHASE, network_variation, phase_shifted, with_volume
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import Node
 from synchain.models.scenes.scene import Scene
-from synchain.runtime.stability.lyapunov import Lyapunov, Walk, lyapunov_spectrum
-from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.stability.exponents import exponents
+from synchain.runtime.stability.lyapunov import Lyapunov, TangentFrame, lyapunov_spectrum
 from synchain.runtime.sweeps.run import run
 
 pytestmark = pytest.mark.long
@@ -79,10 +79,10 @@ def test_blocks_of_a_part_of_a_period_see_the_drive_at_its_phase() -> None:
     """The same orbit in one block a period and in eight: end and divergence agree, and the growth of all directions."""
     made = []
     for parts in (1, 8):
-        walk = Walk.make(lone("duffing", u=4.0), 2, seed=0)
-        walk.parts = parts
-        growth = [walk.advance() for _ in range(5 * parts)]
-        made.append((walk.carrier.state[0], sum(g[0].sum() for g in growth), sum(g[2] for g in growth)))
+        frame = TangentFrame.make(lone("duffing", u=4.0), 2, seed=0)
+        frame.parts = parts
+        growth = [frame.advance() for _ in range(5 * parts)]
+        made.append((frame.integrator.state[0], sum(g[0].sum() for g in growth), sum(g[2] for g in growth)))
     for whole_block, eighths in zip(*made, strict=True):
         np.testing.assert_allclose(eighths, whole_block, atol=1e-6)
 
@@ -130,13 +130,13 @@ def test_the_log_of_a_volume_grows_by_the_divergence_of_the_network() -> None:
 
 
 def test_a_clock_set_later_shifts_equations_and_matrix() -> None:
-    made = phased(whole(lone("duffing").equations))
+    made = phase_shifted(network_variation(lone("duffing").equations))
     t, omega, u = sp.Symbol("t", real=True), sp.Symbol("omega", real=True), sp.Symbol("u", real=True)
     assert made.orbit.node.rhs[1].coeff(u) == sp.cos(omega * (t + PHASE))
     assert made.orbit.parameters[-1] == "phase"
     x, d = sp.symbols("x d", real=True)
-    wave = Equations(Node((x,), (sp.cos(omega * t) * x - d * x,), (omega, d)), None, 1)
-    assert dict(phased(whole(wave)).matrix) == {(0, 0): sp.cos(omega * (t + PHASE)) - d}
+    wave = Equations.of_equal_nodes(Node((x,), (sp.cos(omega * t) * x - d * x,), (omega, d)), None, 1)
+    assert dict(phase_shifted(network_variation(wave)).matrix) == {(0, 0): sp.cos(omega * (t + PHASE)) - d}
 
 
 def test_dimension_by_hand() -> None:

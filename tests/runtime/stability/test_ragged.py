@@ -13,8 +13,8 @@ import pytest
 from synchain.models.graphs.families import topology
 from synchain.models.inputs.plugins import allow_code
 from synchain.models.scenes.scene import Scene
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.stability.msf import classify
-from synchain.runtime.stability.transversal import exponents
 from synchain.runtime.sweeps.run import run
 
 pytestmark = pytest.mark.long

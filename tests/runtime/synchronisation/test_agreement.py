@@ -9,7 +9,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.scenes.scene import Scene
 from synchain.runtime import bench
-from synchain.runtime.stability.transversal import Exponents, exponents
+from synchain.runtime.stability.exponents import Exponents, exponents
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.synchronisation.agreement import (
     CAUSES,

@@ -166,7 +166,9 @@ def model(edge_rhs="sigma*weight*(x_j - x_i)", node_parameters=("c",)) -> Equati
         edge_rhs, locals={s.name: s for s in (x_i, x_j, weight)} | {"sigma": sp.Symbol("sigma", real=True)}
     )
     used = tuple(sorted(rhs.free_symbols - {x_i, x_j, weight}, key=str))
-    return Equations(Node((x,), (-sum(rest) * x,), tuple(rest)), Edge((x_i,), (x_j,), weight, (rhs,), used), 2)
+    return Equations.of_equal_nodes(
+        Node((x,), (-sum(rest) * x,), tuple(rest)), Edge((x_i,), (x_j,), weight, (rhs,), used), 2
+    )
 
 
 def test_nonlinear_couplings_keep_their_form():

@@ -12,7 +12,7 @@ from synchain.models import chain, complete, star
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
-from synchain.runtime.stability.transversal import exponents
+from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.support.status import Status
 from synchain.runtime.synchronisation import threshold
 from synchain.runtime.synchronisation.threshold import (

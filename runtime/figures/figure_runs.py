@@ -17,7 +17,7 @@ from ..results.result import Result
 from ..sweeps.run import run
 from ..synchronisation.threshold import Criterion, Sweep, probe, project, simulate
 
-__all__ = ["FULL", "QUICK", "Quality", "Study", "thin"]
+__all__ = ["FULL", "QUICK", "FigureRuns", "Quality", "thin"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ FULL = Quality()
 QUICK = Quality(241, 121, Criterion(starts=5, transient=400.0, window=50.0), 2e-3, (5,))
 
 
-class Study:
+class FigureRuns:
     """Runs each scene once and keeps what came out, for all figures that want it.
 
     `workers` is the number of threads; a bar for each run is shown where `show_progress` says so.

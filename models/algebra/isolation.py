@@ -90,7 +90,7 @@ def sign(f: fmpz_poly, x: fmpq) -> int:
             if value > 0 or value < 0:
                 return 1 if value > 0 else -1
     exact = f(x)
-    return (exact > 0) - (exact < 0)
+    return int(exact > 0) - int(exact < 0)
 
 
 def dyadic(ball: arb) -> fmpq:
@@ -101,7 +101,7 @@ def dyadic(ball: arb) -> fmpq:
 
 def _usual(f: fmpz_poly) -> int:
     """Bits that usually cancel in a value of f between its roots: some per root, however large the roots are."""
-    return 4 * f.degree() + 64
+    return 4 * int(f.degree()) + 64
 
 
 def _isolated(f: fmpz_poly, real: bool) -> list[Disc] | None:

@@ -1,4 +1,7 @@
-"""Orbits that carry deviations: arrays around the kernels of `synchain.codegen.kernels.modes`, stretch after stretch of time."""
+"""Integration of orbits together with deviations, one stretch of time after the other.
+
+The arrays here surround the kernels of `synchain.codegen.kernels.modes`.
+"""
 
 from __future__ import annotations
 
@@ -21,16 +24,35 @@ from ..cells.plan import control_array, half_swing, periods, tolerances
 from ..support.status import Status
 from ..support.threads import worker_count
 
-__all__ = ["Carrier"]
+__all__ = ["VariationalIntegrator"]
 
 
 @dataclass(slots=True)
-class Carrier:
-    """Orbits (cells) with deviations, `modes` of them each, which differ in their strengths.
+class VariationalIntegrator:
+    """Orbits with several deviations each, which differ in their strengths.
 
-    state (cells, dimension), numbers (cells, parameters), period (cells,): after which the clock starts anew, 0 for none;
-    strengths (number of strengths, padded modes) sorted by size, order (modes,): where each mode of the caller stands;
-    vectors (cells, size, padded modes).
+    Parameters
+    ----------
+    kernel : Kernel
+        Compiled variational equation.
+    state : ndarray, shape (cells, dimension)
+        States of the orbits.
+    numbers : ndarray, shape (cells, parameters)
+        Values of the parameters.
+    period : ndarray, shape (cells,)
+        Time after which the clock restarts; 0 if it does not.
+    control : ndarray
+        Tolerances, limits and the cancel flag for the kernel.
+    strengths : ndarray, shape (number of strengths, padded modes)
+        Strengths sorted by size, padded to a multiple of the lanes.
+    order : ndarray, shape (modes,)
+        Position of each mode of the caller in `strengths`.
+    vectors : ndarray, shape (cells, size, padded modes)
+        Deviations.
+    workers : int
+        Number of threads.
+    steps : int
+        Steps taken so far.
     """
 
     kernel: Kernel
@@ -54,11 +76,25 @@ class Carrier:
         strengths: np.ndarray,
         workers: int | None = None,
         looseness: float = 1.0,
-    ) -> Carrier:
-        """Prepare the kernel and the arrays; tolerances and step budget are the scene's.
+    ) -> VariationalIntegrator:
+        """Prepare the kernel and the arrays; tolerances and the step budget are those of the scene.
 
-        strengths: (number of strengths, modes), any order.  Deviations start along (1, 1, …).  `looseness`: how many
-        times the tolerance of the orbit the deviations are allowed.
+        Parameters
+        ----------
+        scene : Scene
+            Source of the tolerances and the largest number of steps.
+        variation : Variation
+            Orbit with its variational equation.
+        state : ndarray, shape (cells, dimension)
+            Initial states.
+        numbers : ndarray, shape (cells, parameters)
+            Values of the parameters of `variation`.
+        strengths : ndarray, shape (number of strengths, modes)
+            Strengths of the modes in any order. All deviations start along (1, 1, …).
+        workers : int, optional
+            Number of threads; all cores by default.
+        looseness : float
+            Ratio of the tolerance of the deviations to that of the orbit.
         """
         kernel = _kernel(variation)
         width, count = kernel.origin.width, strengths.shape[1]
@@ -74,37 +110,77 @@ class Carrier:
         vectors = np.full((len(state), variation.size, padded), 1.0 / math.sqrt(variation.size))
         kept = np.ascontiguousarray(strengths[:, chosen], dtype=float)
         kept = kept if len(kept) else np.zeros((1, padded))
-        rows = np.ascontiguousarray(state, dtype=float).copy()
-        clock = local_clock(kernel.equations, repeat)
-        return cls(kernel, rows, np.ascontiguousarray(numbers, dtype=float), clock, control, kept, where, vectors,
-                   worker_count(workers))  # fmt: skip
+        return cls(
+            kernel=kernel,
+            state=np.ascontiguousarray(state, dtype=float).copy(),
+            numbers=np.ascontiguousarray(numbers, dtype=float),
+            period=local_clock(kernel.equations, repeat),
+            control=control,
+            strengths=kept,
+            order=where,
+            vectors=vectors,
+            workers=worker_count(workers),
+        )
 
     @property
     def deviations(self) -> np.ndarray:
-        """The deviations (cells, size, modes) in the caller's order, at unit length."""
+        """The deviations at unit length in the caller's order, shape (cells, size, modes)."""
         return self.vectors[:, :, self.order]
 
-    def point(self, vectors: np.ndarray) -> None:
-        """Set the deviations (cells, size, modes), in the caller's order; lengths other than 1 are kept."""
+    def set_deviations(self, vectors: np.ndarray) -> None:
+        """Set the deviations.
+
+        Parameters
+        ----------
+        vectors : ndarray, shape (cells, size, modes)
+            Deviations in the caller's order; lengths other than 1 are kept.
+        """
         self.vectors[:, :, self.order] = vectors
         spare = self.vectors.shape[2] - len(self.order)
         if spare:
             self.vectors[:, :, -spare:] = self.vectors[:, :, -spare - 1 : -spare]
 
     def advance(self, length: float | np.ndarray) -> np.ndarray:
-        """Integrate over a length of time (one for all cells, or one each); returns log growth (cells, modes).
+        """Integrate over a length of time.
 
-        Where the equations are periodic in time the length must be a whole number of periods: the next stretch begins at
-        the phase 0 again.  Deviations come out at unit length; the growth of one that has become zero is -inf.
-        Raises FloatingPointError where an orbit cannot be integrated, KeyboardInterrupt on Ctrl-C.
+        Parameters
+        ----------
+        length : float or ndarray, shape (cells,)
+            Length in units of non-dimensional time, one for all cells or one each. If the equations
+            are periodic in time, it must be a whole number of periods: each stretch begins at phase
+            0.
+
+        Returns
+        -------
+        ndarray, shape (cells, modes)
+            Logarithm of the growth of each deviation; -inf for one that has become zero. The
+            deviations have unit length afterwards.
+
+        Raises
+        ------
+        FloatingPointError
+            If an orbit cannot be integrated.
+        KeyboardInterrupt
+            On Ctrl-C.
         """
         cells, dimension = self.state.shape
         spans = np.zeros((cells, 4))
         spans[:, 1], spans[:, 2] = length, self.period
         growth = np.empty((cells, self.strengths.shape[1]))
         end, sums, counts = np.empty((cells, dimension)), np.empty((cells, 4)), np.zeros((cells, 6), dtype=np.int64)
-        rest = (self.state, self.numbers, spans, self.control, self.strengths, self.vectors, growth, end, sums, counts,
-                np.empty((cells, 0, dimension)))  # fmt: skip
+        rest = (
+            self.state,
+            self.numbers,
+            spans,
+            self.control,
+            self.strengths,
+            self.vectors,
+            growth,
+            end,
+            sums,
+            counts,
+            np.empty((cells, 0, dimension)),
+        )
         cuts = np.linspace(0, cells, min(cells, self.workers) + 1).astype(int)
         if len(cuts) == 2:
             self.kernel.entry(0, cells, *rest)
@@ -119,7 +195,7 @@ class Carrier:
         return growth[:, self.order]
 
     def _share(self, cuts: np.ndarray, rest: tuple[np.ndarray, ...]) -> None:
-        """Run the parts of the cells on threads; on Ctrl-C they stop at once."""
+        """Run parts of the cells on threads; Ctrl-C stops them at once."""
         with ThreadPoolExecutor(self.workers) as pool:
             jobs = [pool.submit(self.kernel.entry, a, b, *rest) for a, b in itertools.pairwise(cuts)]
             try:
@@ -132,4 +208,5 @@ class Carrier:
 
 @lru_cache(maxsize=64)
 def _kernel(variation: Variation) -> Kernel:
+    """Compiled kernel of a variational equation."""
     return load(emit_modes(variation))

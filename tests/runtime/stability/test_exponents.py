@@ -8,9 +8,9 @@ import pytest
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.averages import Batches
-from synchain.runtime.stability.interpolation import interpolation
+from synchain.runtime.stability.exponents import exponents
+from synchain.runtime.stability.interpolation import combine, strength_interpolation
 from synchain.runtime.stability.msf import classify, msf, plane
-from synchain.runtime.stability.transversal import exponents
 
 PAIR = topology("chain", 2)
 
@@ -75,8 +75,8 @@ def test_an_interpolation_is_as_good_as_its_check_says() -> None:
     for strengths in (np.linspace(0.0, 30.0, 500), square):
         errors = []
         for nodes, parts in ((6, 1), (10, 1), (20, 1), (40, 1)):
-            made = interpolation(strengths, nodes, parts)
-            assert not made.exact
+            made = strength_interpolation(strengths, nodes, parts)
+            assert not made.is_exact
             own = propagators(made.nodes)
             exact = propagators(strengths)
             size = np.abs(exact).max(axis=(2, 3), keepdims=True)
@@ -217,3 +217,13 @@ def test_what_is_refused() -> None:
 def test_a_line_of_strengths_that_is_none_is_named(strengths: object, words: str) -> None:
     with pytest.raises(ValueError, match=f"alpha: .*{words}"):
         msf(scene("harmonic", "spring"), strengths)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("size", [1, 2, 4, 40])
+def test_products_in_pieces_are_those_of_the_whole(size: int) -> None:
+    random = np.random.default_rng(0)
+    weights, propagators = random.normal(size=(301, 17)), random.normal(size=(4, 17, 2, 2))
+    whole = np.einsum("mk,ckpq->cmpq", weights, propagators)
+    pieces = combine(weights, propagators, 17 * 16 * size)
+    np.testing.assert_allclose(pieces, whole, rtol=1e-13, atol=1e-13)
+    assert combine(np.zeros((0, 17)), propagators, 17 * 16 * size).shape == (4, 0, 2, 2)

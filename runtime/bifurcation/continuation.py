@@ -1,24 +1,27 @@
-"""Folds: where a branch of periodic orbits turns back in its parameter, found by following it along its arc.
+"""A smooth piece of a branch of periodic orbits, along which all pass through the same phases of stick and slip.
 
-State and parameter are unknowns together, and the length along the arc is given (pseudo-arclength continuation), so
-Newton's method goes through the fold, at which a multiplier is 1 and the parameter alone does not lead on.
-
-Source: Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems, in Rabinowitz (ed.), Applications of
-Bifurcation Theory (Academic Press, 1977), pages 359-384; Seydel, Practical Bifurcation and Stability Analysis, 3rd ed.
-(Springer, 2010), chapter 4.
+Newton's method starts from a polynomial through the nearest orbits that are known, so that it stays on the piece where
+the branch beside it has a kink, as it has where a phase comes or goes.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import brentq
 
-from .arcs import Arc
-from .periodic import PeriodicOrbit, orbit_through, strobe
+from synchain.models.scenes.scene import Scene
 
-__all__ = ["fold"]
+from .periodic import PeriodicOrbit, orbit_through, periodic_orbit, strobe
+from .phases import Phases
+
+__all__ = ["Arc", "find_fold"]
+
+NEAR = 3
+"""Orbits that the polynomial goes through."""
+
 
 MOST_STEPS = 24
 """Steps along the arc on the way to a fold, each at most twice as long as the one before."""
@@ -30,13 +33,50 @@ DIFFERENCE = 1e-6
 """Step of the difference for the derivative by the parameter, relative to it."""
 
 
-def fold(arc: Arc, beyond: float) -> tuple[float, PeriodicOrbit] | None:
+@dataclass(slots=True)
+class Arc:
+    """Orbits of `periods` drive periods at values of the parameter `name`, in the order in which they were found, with
+    their phases (None for friction that is not set-valued)."""
+
+    scene: Scene
+    name: str
+    periods: int
+    values: list[float] = field(default_factory=list)
+    orbits: list[PeriodicOrbit] = field(default_factory=list)
+    phases: list[Phases | None] = field(default_factory=list)
+
+    def take(self, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> Arc:
+        """Add an orbit at the end, and return the arc."""
+        self.values.append(value)
+        self.orbits.append(orbit)
+        self.phases.append(phases)
+        return self
+
+    def empty(self) -> Arc:
+        """An arc of the same scene without orbits."""
+        return Arc(self.scene, self.name, self.periods)
+
+    def guess(self, value: float) -> np.ndarray:
+        """The state (components,) that the nearest orbits let expect at a value."""
+        order = np.argsort(np.abs(np.array(self.values) - value), kind="stable")[:NEAR].tolist()
+        made = np.zeros_like(self.orbits[-1].state)
+        for k in order:
+            share = math.prod((value - self.values[j]) / (self.values[k] - self.values[j]) for j in order if j != k)
+            made += share * self.orbits[k].state
+        return made
+
+    def at(self, value: float) -> PeriodicOrbit:
+        """The orbit at a value; ArithmeticError where Newton's method does not find it."""
+        return periodic_orbit(self.scene, self.periods, self.guess(value), **{self.name: value})
+
+
+def find_fold(arc: Arc, beyond: float) -> tuple[float, PeriodicOrbit] | None:
     """The value of the parameter and the orbit where the arc turns back before `beyond`; None where it does not."""
     if len(arc.values) < 2:
         return None
-    modes = None if arc.phases[-1] is None else arc.phases[-1].modes
+    modes = None if arc.phases[-1] is None else arc.phases[-1].slip_states
     here, before = (np.append(arc.orbits[k].state, arc.values[k]) for k in (-1, -2))
-    way = Way(arc, here, here - before)
+    way = ArclengthStep(arc, here, here - before)
     length, side = float(np.linalg.norm(here - before)), way.side(here)
     shortest = SHORTEST * length
     for _ in range(MOST_STEPS):
@@ -50,18 +90,18 @@ def fold(arc: Arc, beyond: float) -> tuple[float, PeriodicOrbit] | None:
             return way.root(length)
         if not (beyond - there[-1]) * (there[-1] - way.start[-1]) > 0.0:  # past the end, or back without a fold
             return None
-        way = Way(arc, there, there - way.start)
+        way = ArclengthStep(arc, there, there - way.start)
         length *= 2.0
     return None
 
 
 def _modes(orbit: PeriodicOrbit) -> tuple[int, ...] | None:
     phases = orbit.phases
-    return None if phases is None else phases.modes
+    return None if phases is None else phases.slip_states
 
 
 @dataclass(slots=True)
-class Way:
+class ArclengthStep:
     """From a point (state, parameter) of an arc on along a direction."""
 
     arc: Arc

@@ -1,0 +1,27 @@
+"""Rational numbers of Python, FLINT and SymPy, turned into each other."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import sympy as sp
+from flint import fmpq
+
+__all__ = ["to_flint", "to_fraction", "to_sympy"]
+
+
+def to_fraction(x: fmpq | sp.Rational) -> Fraction:
+    """Return a rational number of FLINT or SymPy as a Fraction."""
+    return Fraction(int(x.p), int(x.q))
+
+
+def to_flint(x: Fraction | sp.Rational) -> fmpq:
+    """Return a Fraction or a rational number of SymPy as an fmpq."""
+    return fmpq(int(x.numerator), int(x.denominator))
+
+
+def to_sympy(x: Fraction | fmpq) -> sp.Rational:
+    """Return a Fraction or an fmpq as a rational number of SymPy."""
+    if isinstance(x, Fraction):
+        return sp.Rational(x.numerator, x.denominator)
+    return sp.Rational(int(x.p), int(x.q))

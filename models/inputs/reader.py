@@ -1,0 +1,202 @@
+"""The one reader of expressions written by a user: a whitelist over `ast`, so that nothing in a text is ever run.
+
+`parse` turns a text into an `Expression`; `Expression.evaluate` walks its tree and leaves the meaning of every number,
+name and operation to an `Algebra`: floats, exact numbers, sums of cosines, symbolic weights and graphs are algebras.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, NoReturn, TypeVar
+
+__all__ = ["Algebra", "Expression", "NoMeaning", "parse", "stray_character"]
+
+V = TypeVar("V")
+
+_ARITHMETIC = re.compile(r"[0-9A-Za-z_.+\-*/() \t]*")
+
+
+class NoMeaning(Exception):
+    """An operation, a name or a call that the expressions of an algebra may not contain, and perhaps why."""
+
+    def __init__(self, reason: str = "") -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+class Algebra(Generic[V]):
+    """The meaning of expressions: what a number, a name, an operation and a call give, and how a text is refused.
+
+    Values are of any type V.  A subclass defines what its expressions may contain; every method that it leaves out
+    raises NotImplementedError, which the reader turns into `refuse` with the piece of the expression.  A method that
+    may take long or grow large checks the sizes of its operands first.
+
+    Attributes
+    ----------
+    deepest : int
+        Most operations that may be nested.
+    """
+
+    deepest: int
+
+    def refuse(self, node: ast.expr, reason: str) -> NoReturn:
+        """Raise the error for a piece of the expression that has no meaning here; `reason` is that of NoMeaning."""
+        raise NoMeaning(reason)
+
+    def refuse_depth(self) -> NoReturn:
+        """Raise the error for more than `deepest` nested operations."""
+        raise NoMeaning
+
+    def number(self, value: int | float) -> V:
+        """The value of a literal that is not negative."""
+        raise NoMeaning
+
+    def name(self, name: str) -> V:
+        """The value of a name."""
+        raise NoMeaning
+
+    def positive(self, value: V) -> V:
+        """+ value."""
+        raise NoMeaning
+
+    def negative(self, value: V) -> V:
+        """- value."""
+        raise NoMeaning
+
+    def add(self, a: V, b: V) -> V:
+        """a + b."""
+        raise NoMeaning
+
+    def subtract(self, a: V, b: V) -> V:
+        """a - b."""
+        return self.add(a, self.negative(b))
+
+    def multiply(self, a: V, b: V) -> V:
+        """a * b."""
+        raise NoMeaning
+
+    def divide(self, a: V, b: V) -> V:
+        """a / b."""
+        raise NoMeaning
+
+    def power(self, base: V, exponent: V) -> V:
+        """base ** exponent."""
+        raise NoMeaning
+
+    def whole_power(self, base: V, exponent: int) -> V:
+        """base ** exponent, the exponent a literal whole number."""
+        return self.power(base, self.number(exponent))
+
+    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[Any] | None]:
+        """The algebras that read the arguments of a call; the call is refused here, before they are read.
+
+        Parameters
+        ----------
+        function : str
+            The name that is called.
+        count : int
+            Number of arguments without a name.
+        options : sequence of str
+            The names of the other arguments.
+
+        Returns
+        -------
+        sequence of Algebra or None
+            One for each argument without a name; None takes the argument as it is written, as a str.
+        """
+        raise NoMeaning
+
+    def call(self, function: str, arguments: Sequence[Any], options: Mapping[str, str]) -> V:
+        """The value of a call; `options` are the arguments with a name, as they are written."""
+        raise NoMeaning
+
+
+@dataclass(frozen=True, slots=True)
+class Expression:
+    """A text and its syntax tree, made by `parse`."""
+
+    text: str
+    tree: ast.expr
+
+    def evaluate(self, algebra: Algebra[V]) -> V:
+        """Return the value of the expression in an algebra; raises the errors of the algebra."""
+        return self._value(self.tree, algebra, 0)
+
+    def _value(self, node: ast.expr, algebra: Algebra[V], depth: int) -> V:
+        if depth > algebra.deepest:
+            algebra.refuse_depth()
+        try:
+            match node:
+                case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
+                    return algebra.number(number)
+                case ast.Name(id=name):
+                    return algebra.name(name)
+                case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+                    return algebra.positive(self._value(operand, algebra, depth + 1))
+                case ast.UnaryOp(op=ast.USub(), operand=operand):
+                    return algebra.negative(self._value(operand, algebra, depth + 1))
+                case ast.BinOp():
+                    return self._operation(node, algebra, depth + 1)
+                case ast.Call(func=ast.Name(id=function)):
+                    return self._call(function, node, algebra, depth + 1)
+        except NoMeaning as error:
+            algebra.refuse(node, error.reason)
+        algebra.refuse(node, "")
+
+    def _operation(self, node: ast.BinOp, algebra: Algebra[V], depth: int) -> V:
+        if not isinstance(node.op, (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow)):
+            raise NoMeaning
+        a = self._value(node.left, algebra, depth)
+        match node.op, node.right:
+            case ast.Pow(), ast.Constant(value=int() as exponent) if not isinstance(exponent, bool):
+                return algebra.whole_power(a, exponent)
+        b = self._value(node.right, algebra, depth)
+        match node.op:
+            case ast.Add():
+                return algebra.add(a, b)
+            case ast.Sub():
+                return algebra.subtract(a, b)
+            case ast.Mult():
+                return algebra.multiply(a, b)
+            case ast.Div():
+                return algebra.divide(a, b)
+        return algebra.power(a, b)
+
+    def _call(self, function: str, node: ast.Call, algebra: Algebra[V], depth: int) -> V:
+        names = [keyword.arg for keyword in node.keywords if keyword.arg is not None]
+        if len(names) < len(node.keywords):  # f(**options)
+            raise NoMeaning
+        readers = algebra.arguments(function, len(node.args), names)
+        arguments = [
+            self._written(argument) if reader is None else self._value(argument, reader, depth)
+            for argument, reader in zip(node.args, readers, strict=True)
+        ]
+        values = (self._written(keyword.value) for keyword in node.keywords)
+        return algebra.call(function, arguments, dict(zip(names, values, strict=True)))
+
+    def _written(self, node: ast.expr) -> str:
+        """A piece as a command line has it: (3, 4) as 3,4; 1 / 10 as 1/10; digits stay as they are written."""
+        if isinstance(node, ast.Tuple):
+            return ",".join(self._written(element) for element in node.elts)
+        return (ast.get_source_segment(self.text, node) or "").replace(" ", "")
+
+
+def parse(text: str) -> Expression | None:
+    """Return a text as an expression, None if Python cannot read it; the caller bounds its length beforehand."""
+    stripped = text.strip()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return Expression(stripped, ast.parse(stripped, mode="eval").body)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return None
+
+
+def stray_character(text: str) -> str:
+    """Return the first character that no arithmetic contains, "" if there is none."""
+    arithmetic = _ARITHMETIC.match(text)
+    return text[arithmetic.end() :][:1] if arithmetic else text[:1]

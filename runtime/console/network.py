@@ -1,0 +1,175 @@
+"""The network that the words of a command line mean: by file, by family and size, or by a scene."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from .arguments import above_zero, whole
+from .drive import at_frequency
+from .outcome import WrongUse
+
+if TYPE_CHECKING:
+    from synchain.models.graphs.topology import Topology
+    from synchain.models.scenes.scene import Scene
+
+__all__ = ["add_network", "named_graph", "named_network", "named_values", "scene_on"]
+
+FILES = ("matrix", "edges", "graphml")
+"""Options that name a file with a graph."""
+
+
+def add_network(parser: ArgumentParser) -> None:
+    """Add --n, --topology and --matrix, which `named_network` reads, and --omega, which `scene_on` reads."""
+    parser.add_argument("--n", metavar="N", type=whole, help="number of oscillators (default: the scene's)")
+    parser.add_argument(
+        "--topology",
+        metavar="NAME",
+        help="family of graphs (see: synchain topologies; default: the scene's, else chain)",
+    )
+    parser.add_argument(
+        "--matrix", metavar="FILE", help="connectivity matrix in a text file, in place of --n and --topology"
+    )
+    parser.add_argument("--omega", metavar="W", type=above_zero, help="frequency of the drive (default: the scene's)")
+
+
+def named_network(arguments: Namespace, scene: Scene | None) -> Topology | None:
+    """Return the network of --matrix, or of --topology and --n.
+
+    Parameters
+    ----------
+    arguments : Namespace
+        Holds `matrix`, `topology` and `n`, each None if it is not given.
+    scene : Scene or None
+        Supplies a family or a size that is not given.
+
+    Returns
+    -------
+    Topology or None
+        None if no argument names a network.
+
+    Raises
+    ------
+    WrongUse
+        If the arguments contradict one another, or if the size is missing.
+    ValueError, OSError
+        If the file or the family cannot make the network.
+    """
+    from synchain.models.graphs.families import names, topology
+    from synchain.models.graphs.topology import read_matrix
+
+    if arguments.matrix is not None:
+        if arguments.n is not None or arguments.topology is not None:
+            raise WrongUse("found --matrix beside --n or --topology; expected the matrix alone")
+        return read_matrix(arguments.matrix)
+    if arguments.n is None and arguments.topology is None:
+        return None
+    name, n = arguments.topology, arguments.n
+    if scene is not None:
+        name = name or (scene.topology.name if scene.topology.name in names() else None)
+        n = scene.n if n is None else n
+    if n is None:
+        raise WrongUse(f"--topology {name}: expected its number of oscillators too, e.g. --n 5")
+    return topology(name or "chain", n)
+
+
+def scene_on(network: Topology, scene: Scene | None, arguments: Namespace) -> Scene:
+    """Return one cell of a scene on a network, without records, at the frequency of --omega.
+
+    Parameters
+    ----------
+    network : Topology
+        The network of the returned scene.
+    scene : Scene or None
+        The oscillators and their parameters; the default scene if None.
+    arguments : Namespace
+        Holds `omega`, a frequency or None, and `scene`, the user's word for the scene or None.
+
+    Returns
+    -------
+    Scene
+        The scene without axes.
+
+    Raises
+    ------
+    WrongUse
+        If the scene has no single frequency of the drive that fits `omega`; see `at_frequency`.
+    """
+    from synchain.models.scenes.scene import Scene
+
+    if scene is None:
+        scene = Scene(topology=network)
+    frequency = at_frequency(scene, arguments.omega, arguments.scene)
+    return scene.replace(topology=network, axes=(), zipped=False, continuation="none", record=None, **frequency)
+
+
+def named_graph(arguments: Namespace) -> Topology:
+    """Return the graph of a family and a size, of a product, or of one of the files.
+
+    Parameters
+    ----------
+    arguments : Namespace
+        Holds `topology` (a family or the text of a product), `n`, `option`, the names of the files
+        `matrix`, `edges` and `graphml`, and `directed`.
+
+    Raises
+    ------
+    WrongUse
+        If the arguments name no graph or more than one.
+    ValueError, OSError
+        If the graph cannot be made or read.
+    """
+    files = [key for key in FILES if getattr(arguments, key) is not None]
+    if arguments.directed and files != ["edges"]:
+        raise WrongUse("found --directed without --edges; GraphML files and matrices say themselves what is one-way")
+    if len(files) > 1:
+        raise WrongUse(f"found {' and '.join(f'--{key}' for key in files)}; expected one of them")
+    if files and (arguments.topology is not None or arguments.option):
+        raise WrongUse(f"found both a topology and --{files[0]}; expected one of them")
+    return _graph_of_file(arguments) if files else _graph_of_family(arguments)
+
+
+def _graph_of_file(arguments: Namespace) -> Topology:
+    """The graph of the file that is given."""
+    from synchain.models.graphs.readers import read_edges, read_graphml
+    from synchain.models.graphs.topology import read_matrix
+
+    if arguments.matrix is not None:
+        return read_matrix(arguments.matrix)
+    if arguments.edges is not None:
+        return read_edges(arguments.edges, directed=arguments.directed)
+    return read_graphml(arguments.graphml)
+
+
+def _graph_of_family(arguments: Namespace) -> Topology:
+    """The graph of a family and a size, or of the text of a product."""
+    from synchain.models.graphs.families import topology
+    from synchain.models.graphs.graph_text import is_composed, read_graph
+
+    name, n = arguments.topology, arguments.n
+    if name is not None and is_composed(name):
+        if n is not None or arguments.option:
+            raise WrongUse(
+                "found a product with N or --option; expected both in its text: 'cartesian(chain(4), ring(5))'"
+            )
+        return read_graph(name)
+    if name is None or n is None:
+        files = ", ".join(f"--{key} FILE" for key in FILES)
+        raise WrongUse(f"expected TOPOLOGY and N, e.g. synchain spectrum chain 4, or one of {files}")
+    return topology(name, n, **named_values(arguments.option))
+
+
+def named_values(
+    texts: Sequence[str], flag: str = "--option", example: str = "NAME=VALUE, e.g. offsets=1,3"
+) -> dict[str, str]:
+    """Return names and values of texts NAME=VALUE; WrongUse if one is no such text or is doubled."""
+    values: dict[str, str] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals or not name.isidentifier():
+            raise WrongUse(f"{flag}: found {text!r}; expected {example}")
+        if name in values:
+            raise WrongUse(f"{flag} {name} is given twice; expected it once")
+        values[name] = value
+    return values

@@ -1,0 +1,310 @@
+"""Transversal Lyapunov exponents of the synchronous state: the master stability function.
+
+One orbit carries the modes of all strengths alpha + i beta = -sigma gamma at once
+(`synchain.codegen.kernels.modes`). The propagators of most modes are interpolated in the strength
+(`synchain.runtime.stability.interpolation`). On a fixed point or a periodic orbit locked to the
+drive the exponents follow from eigenvalues. Elsewhere they are the mean growth of a deviation, with
+an error from batch means.
+
+Sources: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); Benettin, Galgani, Giorgilli &
+Strelcyn, Meccanica 15, 9 (1980); batch means: Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from synchain.models.graphs.families import topology
+from synchain.models.inputs.checks import whole
+from synchain.models.scenes.scene import Scene, a_scene
+
+from ..cells.keywords import with_parameters
+from ..prediction.intervals import Interval
+from ..support.arrays import averaging
+from ..support.arrays import row as row_of
+from ..support.threads import worker_count
+from .attractor import Attractor, find_attractor
+from .averages import Batches
+from .orbits import Orbits
+
+__all__ = ["Exponents", "coupled_cell", "exponents", "group_by_attractor", "initial_states", "single_cell"]
+
+
+@dataclass(frozen=True, slots=True)
+class Exponents:
+    """Largest transversal exponent at each strength.
+
+    The mean is over the starts that reached the attractor found most often.
+
+    Parameters
+    ----------
+    alpha : ndarray, shape (m,)
+        Strengths, real or complex.
+    exponent : ndarray, shape (m,)
+        Exponents per unit of non-dimensional time.
+    stderr : ndarray, shape (m,)
+        Standard errors. On fixed points and drive-locked periodic orbits, the difference of two
+        cycles; elsewhere from the scatter of batch means.
+    time : float
+        Time averaged over for each start.
+    starts : int
+        Number of starts.
+    by_start : ndarray, shape (starts, m)
+        Exponents of each start.
+    attractors : tuple of Attractor
+        Motion of each start.
+    """
+
+    alpha: np.ndarray
+    exponent: np.ndarray
+    stderr: np.ndarray
+    time: float
+    starts: int
+    by_start: np.ndarray = field(repr=False)
+    attractors: tuple[Attractor, ...] = ()
+
+    @property
+    def averaged(self) -> int:
+        """Number of starts in the mean."""
+        return max(map(len, self.groups))
+
+    @property
+    def groups(self) -> list[list[int]]:
+        """Indices of the starts, grouped by attractor."""
+        return group_by_attractor(self.attractors, self.by_start)
+
+    @property
+    def intervals(self) -> tuple[Interval, ...]:
+        """Intervals of real strengths with a negative exponent, interpolated linearly between grid
+        points.
+        """
+        return tuple((low, high) for (low, _), (high, _) in self.ranges)
+
+    @property
+    def ranges(self) -> tuple[tuple[Interval, Interval], ...]:
+        """The intervals as ((low, its uncertainty), (high, its uncertainty)).
+
+        The uncertainty is the standard error over the slope, and 0 at the ends of the grid.
+
+        Raises
+        ------
+        ValueError
+            If the strengths are complex.
+        """
+        x, y, error = self.alpha, self.exponent, self.stderr
+        if np.iscomplexobj(x):
+            raise ValueError("strengths are complex; ranges need real ones")
+        ends: list[Interval] = [(float(x[0]), 0.0)] if y[0] < 0 else []
+        for i in map(int, np.flatnonzero((y[1:] < 0) != (y[:-1] < 0))):
+            a, b = max(i - 2, 0), min(i + 3, len(x) - 1)
+            step = y[i + 1] - y[i] if np.isfinite(y[i] * y[i + 1]) else np.inf  # an exponent of -inf has no slope
+            smooth = b - a >= 3 and bool(np.all(np.isfinite(y[a:b])))
+            slope = abs(np.polyfit(x[a:b], y[a:b], 1)[0] if smooth else step / (x[i + 1] - x[i]))
+            zero = x[i] - y[i] / step * (x[i + 1] - x[i]) if np.isfinite(step) else (x[i] if y[i] >= 0 else x[i + 1])
+            ends.append((float(zero), float(max(error[i], error[i + 1]) / max(slope, 1e-300))))
+        if y[-1] < 0:
+            ends.append((float(x[-1]), 0.0))
+        return tuple(zip(ends[::2], ends[1::2], strict=True))
+
+
+def exponents(
+    scene: Scene,
+    alpha: Sequence[float] | Sequence[complex] | np.ndarray,
+    *,
+    precision: float = 1e-3,
+    periods: float = 5000,
+    transient: float = 300,
+    starts: int = 4,
+    rtol: float = 1e-6,
+    seed: int = 0,
+    workers: int | None = None,
+    show_progress: bool | None = False,
+    **parameters: float,
+) -> Exponents:
+    """Compute the largest transversal exponent of an oscillator and coupling at each strength.
+
+    Parameters
+    ----------
+    scene : Scene
+        Source of the oscillator and the coupling; a lone oscillator gets a partner.
+    alpha : array_like, shape (m,)
+        Strengths alpha + i beta = -sigma gamma, real or complex.
+    precision : float
+        Averaging stops if the standard error of every exponent is below this value.
+    periods : float
+        Longest average, in periods of the drive, or in units of 2 pi if there is none.
+    transient : float
+        Transient before the average, in the same units.
+    starts : int
+        Number of initial states: that of the scene's first oscillator, and copies displaced at
+        random by up to 0.4 in the first component.
+    rtol : float
+        Relative tolerance of the integration. The friction law may require a smaller one.
+    seed : int
+        Seed of the displacements.
+    workers : int, optional
+        Number of threads; all cores by default.
+    show_progress : bool or None
+        Whether to show a progress bar; None shows it on terminals only.
+    **parameters : float
+        Parameters of the scene to set.
+
+    Returns
+    -------
+    Exponents
+
+    Raises
+    ------
+    ValueError
+        If the network has no coupling, if the coupling has no synchronous state, or if time enters
+        without a known period.
+    FloatingPointError
+        If an integration fails.
+    """
+    scene, strengths = coupled_cell(exponents, scene, rtol, parameters), row_of("alpha", alpha, complex_too=True)
+    precision, periods, transient, seed = averaging(precision, periods, transient, seed)
+    orbits = Orbits.make(scene, strengths, initial_states(scene, starts, seed), worker_count(workers))
+    orbits.settle(transient)
+    attractors = tuple(find_attractor(orbits, row, transient) for row in range(starts))
+    by_start, error, length = _by_start(orbits, attractors, precision, periods, show_progress)
+    chosen = max(group_by_attractor(attractors, by_start), key=len)
+    mean, spread = by_start[chosen].mean(axis=0), np.sqrt((error[chosen] ** 2).sum(axis=0)) / len(chosen)
+    return Exponents(strengths, mean, spread, length, starts, by_start, attractors)
+
+
+def _by_start(
+    orbits: Orbits, attractors: Sequence[Attractor], precision: float, periods: float, show_progress: bool | None
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Exponents and errors (starts, m) from eigenvalues or averages, and the time averaged over."""
+    found = np.empty((len(attractors), len(orbits.strengths)))
+    error = np.empty_like(found)
+    rest = [row for row, attractor in enumerate(attractors) if attractor.propagators is None]
+    for row, attractor in enumerate(attractors):
+        if attractor.propagators is not None:
+            found[row], error[row] = attractor.exponents()
+    length = max(attractor.cycle for attractor in attractors)
+    if rest:
+        found[rest], error[rest], length = _average(orbits.part(rest), precision, periods, show_progress)
+    return found, error, length
+
+
+def coupled_cell(function: Callable[..., Any], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
+    """Return a single cell whose network has a coupling: a lone oscillator gets a partner.
+
+    Parameters
+    ----------
+    function : callable
+        Public function that took the parameters; error messages name it.
+    scene : Scene
+        Scene to change.
+    rtol : float
+        Relative tolerance.
+    parameters : dict of str to float
+        Parameters to set.
+    """
+    graph = scene.topology if a_scene(scene).topology.links else topology("chain", 2)
+    coupled = scene.replace(topology=graph, axes=(), zipped=False, continuation="none")
+    return single_cell(function, coupled, rtol, parameters)
+
+
+def single_cell(function: Callable[..., Any], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
+    """Return a scene without axes and records, with the parameters passed to a public function.
+
+    Parameters
+    ----------
+    function : callable
+        Public function that took the parameters; error messages name it.
+    scene : Scene
+        Scene to change.
+    rtol : float
+        Relative tolerance.
+    parameters : dict of str to float
+        Parameters to set.
+
+    Raises
+    ------
+    TypeError
+        If `scene` is no Scene.
+    ValueError
+        If a parameter is unknown.
+    """
+    return with_parameters(
+        function, scene, parameters, axes=(), zipped=False, continuation="none", record=(), rtol=rtol, atol=None
+    )
+
+
+def initial_states(scene: Scene, starts: int, seed: int) -> np.ndarray:
+    """Return initial states near that of the first oscillator.
+
+    Parameters
+    ----------
+    scene : Scene
+        Source of the first state.
+    starts : int
+        Number of states.
+    seed : int
+        Seed of the displacements of up to 0.4 in the first component.
+
+    Returns
+    -------
+    ndarray, shape (starts, components)
+    """
+    starts = whole("starts", starts, 1)
+    state = np.tile([values[0] for values in scene.initial.values()], (starts, 1))
+    state[1:, 0] += np.random.default_rng(seed).uniform(-0.4, 0.4, starts - 1)
+    return state
+
+
+def group_by_attractor(attractors: Sequence[Attractor], by_start: np.ndarray) -> list[list[int]]:
+    """Group the starts by attractor.
+
+    Two attractors are the same if they are of one kind and, for exponents from eigenvalues, if
+    their exponents agree.
+
+    Parameters
+    ----------
+    attractors : sequence of Attractor
+        Motion of each start.
+    by_start : ndarray, shape (starts, m)
+        Exponents of each start.
+
+    Returns
+    -------
+    list of list of int
+        Indices of the starts on each attractor.
+    """
+    found: list[list[int]] = []
+    for row, attractor in enumerate(attractors):
+        for others in found:
+            alike = attractors[others[0]].kind == attractor.kind
+            if alike and attractor.propagators is not None:
+                alike = np.allclose(by_start[others[0]], by_start[row], rtol=1e-3, atol=1e-4)
+            if alike:
+                others.append(row)
+                break
+        else:
+            found.append([row])
+    return found
+
+
+def _average(
+    orbits: Orbits, precision: float, periods: float, show_progress: bool | None
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Mean growth rates (starts, m), their standard errors and the time averaged over."""
+    orbits.prepare()
+    batches = Batches(orbits.unit * orbits.block)
+    hidden = None if show_progress is None else not show_progress
+    with tqdm(total=math.ceil(periods / orbits.block), unit="block", disable=hidden) as bar:
+        while batches.blocks * orbits.block < periods:
+            batches.add(orbits.advance())
+            bar.update(1)
+            if batches.due and np.all(batches.error() <= precision):
+                break
+    mean, error = batches.mean(), batches.error_by_start()
+    return mean, error, batches.blocks * batches.length
