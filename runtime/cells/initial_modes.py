@@ -63,10 +63,11 @@ def _link_forces(
 
 
 def local_clock(equations: Equations, period: np.ndarray) -> np.ndarray:
-    """Return the times (cells,) after which the clocks of cells start anew: their `period` (cells,), 0 for none.
+    """Return the times (cells,) after which the clocks of cells start anew: their `period`
+    (cells,), 0 for none.
 
-    Events are located on the clock, to rounding.  If time does not enter the equations any length is a period, and a
-    short one keeps the digits of events in long runs.
+    Events are located on the clock, to rounding.  If time does not enter the equations any length
+    is a period, and a short one keeps the digits of events in long runs.
     """
     if not equations.sticks or any(e.has(TIME) for e in equations.node.expressions):
         return period

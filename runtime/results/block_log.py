@@ -1,9 +1,10 @@
 """The file of a sweep that is under way: blocks of finished cells, appended as they come.
 
-A file begins with MAGIC and one JSON line (its length, its checksum, then the text), which says what the sweep is; both
-stand there twice, and each copy begins a page of the disk.  Records follow, one for each finished block: a head with the
-number of the block and two checksums, then the numbers themselves, little endian.  Nothing is ever changed in place, so that
-a process that dies at any moment leaves whole records and at most one torn one at the end, which is written over.  A damaged
+A file begins with MAGIC and one JSON line (its length, its checksum, then the text), which says
+what the sweep is; both stand there twice, and each copy begins a page of the disk.  Records follow,
+one for each finished block: a head with the number of the block and two checksums, then the numbers
+themselves, little endian.  Nothing is ever changed in place, so that a process that dies at any
+moment leaves whole records and at most one torn one at the end, which is written over.  A damaged
 record costs itself alone: reading goes on at the next mark that begins a head with a good checksum.
 """
 
@@ -38,7 +39,9 @@ PAGE = 4096
 """Bytes that a disk loses together."""
 LINE = struct.Struct("<QI")
 HEAD = struct.Struct(f"<4sQQIII{CODES}QI")
-"""Mark, block, bytes and CRC-32 of the numbers, cells, most section points, how many ended how, CRC-32 of all this."""
+"""Mark, block, bytes and CRC-32 of the numbers, cells, most section points, how many ended how,
+CRC-32 of all this.
+"""
 MARK = b"blk\0"
 PIECE = 2**20
 """Bytes that are searched for a mark at a time."""
@@ -50,7 +53,9 @@ FLUSH = 5.0
 
 
 def is_block_log(path: str | os.PathLike[str]) -> bool:
-    """True if a file begins like a log of blocks, or is called one and does not begin like a result."""
+    """True if a file begins like a log of blocks, or is called one and does not begin like a
+    result.
+    """
     try:
         with open_regular(path) as file:
             start = file.read(len(KIND))
@@ -93,7 +98,9 @@ class BlockLog:
 
     @staticmethod
     def create(path: str | os.PathLike[str], about: Mapping[str, Any]) -> None:
-        """Create a log without blocks; `about` is what JSON can hold and says how many `blocks` there are."""
+        """Create a log without blocks; `about` is what JSON can hold and says how many `blocks`
+        there are.
+        """
         text = json.dumps(about).encode()
         if os.path.exists(path):
             with open_regular(path, writing=True) as old:
@@ -173,7 +180,9 @@ class BlockLog:
         self._flushed = time.monotonic()
 
     def read(self, block: int) -> Buffers:
-        """Return the numbers of a stored block; OSError if they were damaged since the log was opened."""
+        """Return the numbers of a stored block; OSError if they were damaged since the log was
+        opened.
+        """
         self._file.seek(int(self.places[block]))
         head = HEAD.unpack(self._file.read(HEAD.size))
         body = self._file.read(head[2])
@@ -200,7 +209,9 @@ def _second(length: int) -> int:
 
 
 def _about(file: FileIO, path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The description of the sweep, from the first copy that is sound; the file is left at its first record."""
+    """The description of the sweep, from the first copy that is sound; the file is left at its
+    first record.
+    """
     size = os.fstat(file.fileno()).st_size
     if size == 0:
         raise ValueError(f"{os.fspath(path)} is empty; expected an unfinished run; {AGAIN}")
@@ -276,7 +287,9 @@ def _exists(buffers: Buffers) -> np.ndarray:
 
 
 def _unpacked(body: bytes, cells: int, most: int, dimension: int, samples: int) -> Buffers | None:
-    """The numbers of a block; None if there are not as many as its cells need, the most section points among them."""
+    """The numbers of a block; None if there are not as many as its cells need, the most section
+    points among them.
+    """
     if len(body) < cells * len(Count) * 8:
         return None
     counts = np.frombuffer(body, "<i8", cells * len(Count)).reshape(cells, len(Count)).astype(np.int64)
@@ -296,7 +309,9 @@ def _unpacked(body: bytes, cells: int, most: int, dimension: int, samples: int) 
 
 
 def _lock(file: FileIO, path: str | os.PathLike[str]) -> None:
-    """Keep other processes from writing to the same store; the lock ends with the process, however that ends."""
+    """Keep other processes from writing to the same store; the lock ends with the process, however
+    that ends.
+    """
     try:
         import fcntl
     except ImportError:  # Windows

@@ -31,19 +31,19 @@ __all__ = ["Result", "attributes_of", "gather", "read_result"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:
-    """Labelled arrays of a run; a variable `name` of the data is also an attribute: `result.sync_error`.
+    """Labelled arrays of a run; a variable `name` of the data is also an attribute:
+    `result.sync_error`.
 
     Attributes
     ----------
     data : xarray.Dataset
-        Its dimensions are the names of the axes (or "cell" if the axes are zipped), then "state", "point" or "sample".  Its
-        attributes say how the result came about.
+        Its dimensions are the names of the axes (or "cell" if the axes are zipped), then "state",
+        "point" or "sample".  Its attributes say how the result came about.
     scene : Scene
         The scene, with its axes.
 
-    Notes
-    -----
-    Every cell has a `status`; `synchain.runtime.Status` names the codes.  Times are non-dimensional.
+    Notes ----- Every cell has a `status`; `synchain.runtime.Status` names the codes.  Times are
+    non-dimensional.
     """
 
     data: xr.Dataset
@@ -74,9 +74,11 @@ class Result:
         return "; ".join(parts)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a netCDF file that opens in xarray and in `open_result`; it appears whole or not at all.
+        """Write a netCDF file that opens in xarray and in `open_result`; it appears whole or not at
+        all.
 
-        Its attribute `digest` is the SHA-256 of the file, by which `open_result` and `stream` see whether it was damaged.
+        Its attribute `digest` is the SHA-256 of the file, by which `open_result` and `stream` see
+        whether it was damaged.
         """
         with whole_file(path) as temporary:
             unsealed(self.data).to_netcdf(temporary, engine="scipy", format="NETCDF3_64BIT")
@@ -88,7 +90,9 @@ class Result:
         return alike(self.scene, scene)
 
     def stepped(self, equations: Equations) -> bool:
-        """True if these are the equations that were integrated: the scene's, or what was left of them to step."""
+        """True if these are the equations that were integrated: the scene's, or what was left of
+        them to step.
+        """
         return bool(self.data.attrs["equations"] == equations.digest)
 
     def restore(self, scene: Scene, buffers: Buffers, equations: Equations) -> None:
@@ -106,8 +110,8 @@ class Result:
         Raises
         ------
         ValueError
-            If the scenes differ in more than their titles, or if this result comes of other equations or of another kind of
-            processor.
+            If the scenes differ in more than their titles, or if this result comes of other
+            equations or of another kind of processor.
         """
         if not self.belongs_to(scene):
             raise ValueError("the result to resume belongs to another scene; run without resume")

@@ -28,7 +28,9 @@ __all__ = [
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path beside `path`; it replaces `path` at the end of the with block, or vanishes on an error."""
+    """Yield a temporary path beside `path`; it replaces `path` at the end of the with block, or
+    vanishes on an error.
+    """
     target = Path(path)
     check_replaceable(target)
     try:
@@ -66,7 +68,9 @@ def check_replaceable(target: Path) -> None:
 
 
 def drop_leftovers(path: str | os.PathLike[str]) -> None:
-    """Delete temporary files of processes that were killed while they wrote `path`; no other process may be writing it."""
+    """Delete temporary files of processes that were killed while they wrote `path`; no other
+    process may be writing it.
+    """
     target = Path(path)
     for leftover in target.parent.glob(f".{escape(target.stem)}-*{escape(target.suffix)}"):
         leftover.unlink(missing_ok=True)
@@ -74,7 +78,9 @@ def drop_leftovers(path: str | os.PathLike[str]) -> None:
 
 @contextmanager
 def netcdf_data(path: Path) -> Iterator[xr.Dataset]:
-    """Yield the open data of a netCDF file; OSError in one line if there is none or if it is damaged."""
+    """Yield the open data of a netCDF file; OSError in one line if there is none or if it is
+    damaged.
+    """
     import xarray as xr
 
     from .netcdf import DIGEST, is_sealed
@@ -108,7 +114,9 @@ def netcdf_data(path: Path) -> Iterator[xr.Dataset]:
 
 @contextmanager
 def understood(path: Path) -> Iterator[None]:
-    """Turn any error that a forged file makes its reader raise into one ValueError that names the file."""
+    """Turn any error that a forged file makes its reader raise into one ValueError that names the
+    file.
+    """
     try:
         yield
     except (OSError, MemoryError):

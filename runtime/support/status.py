@@ -13,7 +13,9 @@ CODES = 16
 
 
 class Status(IntEnum):
-    """Status of one cell; `FINISHED` alone is success.  The numbers are those of the generated kernels."""
+    """Status of one cell; `FINISHED` alone is success.  The numbers are those of the generated
+    kernels.
+    """
 
     NOT_RUN = 0
     FINISHED = 1

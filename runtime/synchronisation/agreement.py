@@ -1,10 +1,12 @@
-"""The stability of synchronous motion from exponents beside direct simulation, value by value of sigma.
+"""The stability of synchronous motion from exponents beside direct simulation, value by value of
+sigma.
 
-The projection says yes where every transversal exponent is negative by more than two standard errors, no where one is
-positive by more than that.  Where a simulation says otherwise, further simulations look for the reason.
+The projection says yes where every transversal exponent is negative by more than two standard
+errors, no where one is positive by more than that.  Where a simulation says otherwise, further
+simulations look for the reason.
 
-Sources: bubbling: Ashwin, Buescu & Stewart, Phys. Lett. A 193, 126 (1994); mergers by round-off: Pikovsky, Phys. Rev.
-Lett. 73, 2931 (1994).
+Sources: bubbling: Ashwin, Buescu & Stewart, Phys. Lett. A 193, 126 (1994); mergers by round-off:
+Pikovsky, Phys. Rev. Lett. 73, 2931 (1994).
 """
 
 from __future__ import annotations
@@ -46,10 +48,12 @@ NUDGE = 1e-5
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One value of sigma: the largest transversal exponent with its standard error, and what a simulation does.
+    """One value of sigma: the largest transversal exponent with its standard error, and what a
+    simulation does.
 
-    `share` is the part of the starts that synchronised, `error` the median of their mean synchronisation errors; `outcome`
-    is one of OUTCOMES, `cause` one of CAUSES where the two disagree, else empty.
+    `share` is the part of the starts that synchronised, `error` the median of their mean
+    synchronisation errors; `outcome` is one of OUTCOMES, `cause` one of CAUSES where the two
+    disagree, else empty.
     """
 
     sigma: float
@@ -89,10 +93,11 @@ class Agreement:
 
 
 def strengths(graph: Topology, sigma: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Return the strengths alpha = sigma |gamma_k| (sigma, modes) of a graph's distinct transversal modes.
+    """Return the strengths alpha = sigma |gamma_k| (sigma, modes) of a graph's distinct transversal
+    modes.
 
-    A part of the network that nothing couples to the rest has the strength 0.  Raises ValueError for a graph without
-    links, and for eigenvalues that are complex or positive.
+    A part of the network that nothing couples to the rest has the strength 0.  Raises ValueError
+    for a graph without links, and for eigenvalues that are complex or positive.
     """
     spectrum = graph.spectrum
     check_probe(graph, spectrum)
@@ -120,8 +125,8 @@ def agreement(
     sigma : sequence of float
         Increasing numbers from 0 up.
     line : Exponents, optional
-        Exponents at all `strengths` of the graph (and perhaps others), of the same oscillator and parameters; by default
-        they are computed.
+        Exponents at all `strengths` of the graph (and perhaps others), of the same oscillator and
+        parameters; by default they are computed.
     criterion : Criterion, optional
         When a simulation counts as synchronous.
     workers, show_progress
@@ -132,7 +137,8 @@ def agreement(
     Raises
     ------
     ValueError
-        If the line lacks a strength, or if sigma is negative, not finite or does not increase; as `strengths` does.
+        If the line lacks a strength, or if sigma is negative, not finite or does not increase; as
+        `strengths` does.
     """
     fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ("sync_error",)}
     scene = with_parameters(agreement, scene, parameters, **fixed)
@@ -198,7 +204,9 @@ class DirectSimulation:
     show_progress: bool | None
 
     def simulate(self, sigma: np.ndarray, longer: float = 1.0, near: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Share of the starts that synchronised and median error (sigma,); `near` starts next to the synchronous state."""
+        """Share of the starts that synchronised and median error (sigma,); `near` starts next to
+        the synchronous state.
+        """
         scene = self.scene
         if near:
             first = {name: np.array(values[:1] * scene.n) for name, values in scene.initial.items()}
@@ -217,7 +225,9 @@ class DirectSimulation:
 
 
 def _explained(simulation: DirectSimulation, cells: Sequence[Cell], split: Sequence[bool]) -> list[Cell]:
-    """The cells with causes: disagreements are simulated again, longer, and from next to the synchronous state."""
+    """The cells with causes: disagreements are simulated again, longer, and from next to the
+    synchronous state.
+    """
     made = list(cells)
     odd = [i for i, cell in enumerate(cells) if cell.outcome in OUTCOMES[2:4]]
     if not odd:
@@ -231,7 +241,9 @@ def _explained(simulation: DirectSimulation, cells: Sequence[Cell], split: Seque
 
 
 def _cause(cell: Cell, longer: float, near: float, split: bool) -> str:
-    """Why a simulation disagrees, from the shares of starts that synchronise after a longer transient and from nearby."""
+    """Why a simulation disagrees, from the shares of starts that synchronise after a longer
+    transient and from nearby.
+    """
     stable = cell.outcome == OUTCOMES[2]
     mixed = 0.0 < cell.share < 1.0 or 0.0 < longer < 1.0
     if not stable and cell.error < MERGED:
