@@ -75,8 +75,7 @@ from synchain.models.presentation.equations import text
 
 from synchain.runtime.cli import main  # isort: skip
 from synchain.runtime.results.energy import energy_function  # isort: skip
-from synchain.runtime.cells.kernels import as_reduction  # isort: skip
-from synchain.runtime.cells.reduce import explain  # isort: skip
+from synchain.runtime.cells.reduce import as_reduction, explain  # isort: skip
 from synchain.runtime.synchronisation.threshold import Criterion  # isort: skip
 
 __all__ = ["SCENES", "Picture", "camera", "compare", "take"]
@@ -228,7 +227,7 @@ def simulated(given: Scene, width: int = WIDTH, **options: Any) -> Quantities:
     counts = ("steps", "rejected", "periods_skipped")
     for name, values in found.data.data_vars.items():
         seen[str(name)] = Counts(values.values) if name in counts else values.values
-    return seen | written(found.scene, options.get("skip", True))
+    return seen | written(found.scene, options.get("reduce", True))
 
 
 def _parts(given: Scene) -> str:
@@ -240,14 +239,14 @@ def _parts(given: Scene) -> str:
     return ", ".join(f"{kind} {name}" for kind, name in dict.fromkeys(named) if name)
 
 
-def written(given: Scene, skip: Any = True) -> Quantities:
+def written(given: Scene, reduce: Any = True) -> Quantities:
     """Texts of a scene: file, equations, exports, reductions, warnings."""
     equations = given.equations
     seen: Quantities = {
         "scene": json.dumps(given.as_dict(), sort_keys=True),
         "equations": text(equations),
         "latex": latex(equations),
-        "explain": explain(as_reduction(given, skip)),
+        "explain": explain(as_reduction(given, reduce)),
         "warnings": "\n".join(given.warnings),
     }
     for language, export in (("python", to_python), ("numba", to_numba), ("c", to_c)):

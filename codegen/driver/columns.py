@@ -1,6 +1,7 @@
 """Columns of the arrays that a kernel reads and writes, by name.
 
-The text of every kernel defines the same numbers for itself (`recording.py`); a test compares the two.
+The text of every kernel defines the same numbers for itself (`recording.py`); a test compares the
+two.
 """
 
 from __future__ import annotations
@@ -34,11 +35,15 @@ class Span(IntEnum):
     PERIOD = 2
     """After so much time the equations repeat themselves; 0 if they do not."""
     NEAR = 3
-    """Synchronisation error below which a cell is known to stay synchronous; 0 if that is not known."""
+    """Synchronisation error below which a cell is known to stay synchronous; 0 if that is not
+    known.
+    """
 
 
 class Sum(IntEnum):
-    """Columns of `sums` (cells, 4): synchronisation error over the window, and the time at which the cell stopped."""
+    """Columns of `sums` (cells, 4): synchronisation error over the window, and the time at which
+    the cell stopped.
+    """
 
     MEAN = 0
     PEAK = 1

@@ -1,1 +1,7 @@
-"""From a scene to the rows of numbers that a kernel takes, and to the buffers that it fills."""
+"""From a scene to what a kernel takes and fills: reduction, kernel text, rows of cells, buffers.
+
+* cell: one simulation of a sweep
+* row: the numbers of a cell that a kernel takes
+* span: the times of a cell
+* block: cells that are run, stored and resumed together
+"""

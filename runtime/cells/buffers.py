@@ -23,7 +23,8 @@ def numbers_of_a_cell(dimension: int, room: int, samples: int) -> int:
 
 @dataclass(slots=True)
 class Buffers:
-    """The arrays that a kernel fills, one row for each cell; the docstring of `drive` in a kernel describes them.
+    """The arrays that a kernel fills, one row for each cell; the docstring of `drive` in a kernel
+    describes them.
 
     Attributes
     ----------
@@ -72,7 +73,9 @@ class Buffers:
 
     @property
     def ended(self) -> bool:
-        """True if every cell came to its end, good or bad; False if one did not run or was interrupted."""
+        """True if every cell came to its end, good or bad; False if one did not run or was
+        interrupted.
+        """
         return not bool(np.isin(self.status, (Status.NOT_RUN, Status.INTERRUPTED)).any())
 
     @property
@@ -94,7 +97,9 @@ class Buffers:
             self.points = points
 
     def put(self, cells: np.ndarray, part: Buffers) -> None:
-        """Copy the rows of `part` into the rows `cells`, whose room for section points grows if it has to."""
+        """Copy the rows of `part` into the rows `cells`, whose room for section points grows if it
+        has to.
+        """
         self.widen(part.points.shape[1])
         self.points[cells, : part.points.shape[1]] = part.points
         self.end[cells], self.sums[cells] = part.end, part.sums

@@ -1,4 +1,4 @@
-"""Whether each oscillator sticks or slips at its start, and the clock by which its events are timed."""
+"""Slip states of oscillators at their start, and the clock that times their events."""
 
 from __future__ import annotations
 
@@ -14,13 +14,20 @@ from synchain.models.mechanics.components import TIME
 __all__ = ["CLOCK", "local_clock", "with_modes"]
 
 CLOCK = 8.0
-"""After so much time the clock of an oscillator without a drive starts anew: a power of two, so that no digit is lost."""
+"""Period of the clock of an oscillator without a drive: a power of two, so that no digit is lost."""
 
 
 def with_modes(equations: Equations, start: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-    """The rows of `start` (cells, 3 n) with the modes that their velocities and loads ask for at the time 0.
+    """Return initial states with the slip states that velocities and loads imply at the time 0.
 
-    An oscillator at exactly the ground's velocity sticks where static friction can hold it.
+    An oscillator at exactly the ground's velocity sticks if static friction can hold it.
+
+    Parameters
+    ----------
+    equations : Equations
+    start : ndarray, shape (cells, 3 n)
+        Positions, velocities and slip states; without contacts they are returned as they are.
+    numbers : ndarray, shape (cells, parameters)
     """
     n = equations.n
     contact = equations.node.contact if equations.sticks else None
@@ -40,7 +47,7 @@ def with_modes(equations: Equations, start: np.ndarray, numbers: np.ndarray) -> 
 def _link_forces(
     equations: Equations, speed: sp.Expr, state: np.ndarray, given: dict[sp.Symbol, np.ndarray]
 ) -> np.ndarray:
-    """What the links push each oscillator with, if it moves with the ground (cells, n)."""
+    """Forces (cells, n) of the links on each oscillator if it moves with the ground."""
     n = equations.n
     total = np.zeros((len(state), n))
     if not equations.edges:
@@ -56,10 +63,11 @@ def _link_forces(
 
 
 def local_clock(equations: Equations, period: np.ndarray) -> np.ndarray:
-    """The times after which the clocks of cells start anew: their `period` (cells,), 0 for none.
+    """Return the times (cells,) after which the clocks of cells start anew: their `period`
+    (cells,), 0 for none.
 
-    Events are located on the clock, to rounding.  Where time does not enter the equations any length is a period, and a
-    short one keeps the digits of events in long runs.
+    Events are located on the clock, to rounding.  If time does not enter the equations any length
+    is a period, and a short one keeps the digits of events in long runs.
     """
     if not equations.sticks or any(e.has(TIME) for e in equations.node.expressions):
         return period

@@ -42,12 +42,16 @@ def kernel(scene: Scene, width: int | None = None, reduce: bool | Reduction = Tr
 
 
 def kernel_source(scene: Scene, width: int | None = None, reduce: bool | Reduction = True) -> KernelSource:
-    """Return the text of a scene's kernel without compiling it; parameters and errors as for `kernel`."""
+    """Return the text of a scene's kernel without compiling it; parameters and errors as for
+    `kernel`.
+    """
     return write_kernel(as_reduction(scene, reduce), width)
 
 
 def write_kernel(reduction: Reduction, width: int | None = None) -> KernelSource:
-    """Return the text of the kernel that integrates what is left of a scene; `width` as for `kernel`."""
+    """Return the text of the kernel that integrates what is left of a scene; `width` as for
+    `kernel`.
+    """
     scene = reduction.scene
     width = 1 if width is None and scene.cells == 1 else width
     if width is not None and whole("width", width, 1) not in WIDTHS:
@@ -76,14 +80,17 @@ def _emitted(
 def best_integrator(equations: Equations, rtol: float) -> str:
     """Return what "auto" stands for: the fastest integrator at equal error (docs/performance.md).
 
-    Two oscillators at a tight tolerance gain from DOP853 while none of them sticks; of more, some nearly always stick.
+    Two oscillators at a tight tolerance gain from DOP853 while none of them sticks; of more, some
+    nearly always stick.
     """
     pair = equations.n == 2 and not (equations.mixed or equations.inertial) and rtol <= 1e-9
     return "dop853" if equations.sticks else "switching" if pair else AUTO
 
 
 def warn_of_chords(source: KernelSource) -> None:
-    """Warn if states between steps are recorded by an integrator that has only straight lines there."""
+    """Warn if states between steps are recorded by an integrator that has only straight lines
+    there.
+    """
     between = [record for record in ("trajectory", "section") if record in source.records]
     if between and integrator(source.integrator).dense_order < 2:
         warnings.warn(

@@ -1,4 +1,6 @@
-"""Keywords of functions that take parameters of a scene beside keywords of their own: run(scene, workers=2, omega=1.2)."""
+"""Keywords of functions that take parameters of a scene beside keywords of their own: run(scene,
+workers=2, omega=1.2).
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,8 @@ def with_axes(function: Callable[..., Any], scene: Scene, axes: Mapping[str, Any
         The function whose keywords they are; an error names it.
     scene : Scene
     axes : mapping of str to number or sequence
-        A number fixes a parameter, a setting or an initial state; a sequence makes an axis of it, after those of the scene.
+        A number fixes a parameter, a setting or an initial state; a sequence makes an axis of it,
+        after those of the scene.
 
     Raises
     ------
@@ -48,12 +51,14 @@ def with_axes(function: Callable[..., Any], scene: Scene, axes: Mapping[str, Any
 def with_parameters(
     function: Callable[..., Any], scene: Scene, parameters: Mapping[str, Any], **settings: Any
 ) -> Scene:
-    """Return the scene with the settings that a function needs and the parameters that its caller passed.
+    """Return the scene with the settings that a function needs and the parameters that its caller
+    passed.
 
     Raises
     ------
     ValueError
-        If a name is no parameter or setting of the scene, or a setting that the function sets itself.
+        If a name is no parameter or setting of the scene, or a setting that the function sets
+        itself.
     """
     check_keywords(function, a_scene(scene), parameters, taken=settings)
     return scene.replace(**settings, **parameters)
@@ -67,10 +72,11 @@ def check_keywords(
     states: bool = False,
     taken: Iterable[str] = (),
 ) -> None:
-    """Raise ValueError for a name that is no parameter or setting of the scene nor, with `states`, an initial state.
+    """Raise ValueError for a name that is no parameter or setting of the scene nor, with `states`,
+    an initial state.
 
-    The function's own keywords are among the known names, since one of them may be what was meant; settings that are
-    `taken` are not.
+    The function's own keywords are among the known names, since one of them may be what was meant;
+    settings that are `taken` are not.
     """
     settings = [name for name in KEYWORDS if name not in taken]
     strange = next(
@@ -86,7 +92,9 @@ def check_keywords(
 
 
 def _is_state(scene: Scene, name: str) -> bool:
-    """True for the name of an initial state; equations are derived only for a name that looks like one."""
+    """True for the name of an initial state; equations are derived only for a name that looks like
+    one.
+    """
     return name.rpartition("_")[0] in scene.components and name in scene.equations.state
 
 

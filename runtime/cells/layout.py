@@ -18,15 +18,17 @@ SHARE = 8
 """A block is at most this part of what one worker has to do, so that all are busy to the end."""
 
 LONGEST = 1e7
-"""A block of more oscillators times periods is cut smaller, to what the lanes need: about a minute of work."""
+"""A block of more oscillators times periods is cut smaller, to what the lanes need: about a minute
+of work.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
     """Blocks of `size` cells, in C order over the axes.
 
-    In a continued sweep (`columns` values of the last axis, `falling` where it runs downwards) a block is one column of up
-    to `size` rows, and each block needs the one before it in its row.
+    In a continued sweep (`columns` values of the last axis, `falling` if it runs downwards) a block
+    is one column of up to `size` rows, and each block needs the one before it in its row.
     """
 
     cells: int
@@ -36,7 +38,7 @@ class Layout:
 
     @classmethod
     def of(cls, scene: Scene, size: int) -> Layout:
-        """The layout of a scene's sweep in blocks of this size."""
+        """Return the layout of a scene's sweep in blocks of this size."""
         if scene.continuation == "none":
             return cls(scene.cells, size)
         return cls(scene.cells, size, scene.shape[-1], scene.continuation == "down")
@@ -48,7 +50,7 @@ class Layout:
         return math.ceil(self.cells / steps / self.size) * steps
 
     def rows(self, block: int) -> np.ndarray:
-        """Numbers of the cells of a block."""
+        """Return the numbers of the cells of a block."""
         if not self.columns:
             return np.arange(block * self.size, min((block + 1) * self.size, self.cells))
         group, place = divmod(block, self.columns)
@@ -78,7 +80,8 @@ def block_size(scene: Scene, width: int, workers: int, cells: int | None = None)
     workers : int
         Blocks that run at a time.
     cells : int, optional
-        Cells that can run at a time (default: those of the scene, of its first column if the sweep is continued).
+        Cells that can run at a time (default: those of the scene, of its first column if the sweep
+        is continued).
     """
     if cells is None:
         cells = scene.cells // (scene.shape[-1] if scene.continuation != "none" else 1)

@@ -49,8 +49,8 @@ class Plan:
     numbers : ndarray, shape (cells, parameters)
         Parameters, in the order of `Equations.parameters`.
     spans : ndarray, shape (cells, len(Span))
-        Start and end of the window and the period of the equations, in non-dimensional time, and the synchronisation
-        error below which a cell ends early (0: none does).
+        Start and end of the window and the period of the equations, in non-dimensional time, and
+        the synchronisation error below which a cell ends early (0: none does).
     """
 
     start: np.ndarray
@@ -81,7 +81,8 @@ def plan(scene: Scene, near: np.ndarray | None = None) -> Plan:
     Raises
     ------
     ValueError
-        If a window in drive periods meets a drive of frequency 0, or if it is too long for double precision.
+        If a window in drive periods meets a drive of frequency 0, or if it is too long for double
+        precision.
     """
     return Planner(scene).rows(np.arange(scene.cells), near)
 
@@ -102,7 +103,9 @@ class Planner:
         return {name: values[place] for (name, values), place in zip(self.values.items(), places, strict=True)}
 
     def rows(self, cells: np.ndarray, near: np.ndarray | None = None) -> Plan:
-        """Return the rows of these cells; `near` (cells,) is the last column of their spans (default: 0)."""
+        """Return the rows of these cells; `near` (cells,) is the last column of their spans
+        (default: 0).
+        """
         columns, state = self.columns(cells), self.equations.state
         numbers = self._numbers(columns, len(cells))
         start = np.empty((len(cells), len(self.scene.y0)))
@@ -136,7 +139,9 @@ class Planner:
         return spans
 
     def extremes(self) -> Plan:
-        """Return the rows of a few cells in which every axis takes its smallest, its largest and its value nearest to 0."""
+        """Return the rows of a few cells in which every axis takes its smallest, its largest and
+        its value nearest to 0.
+        """
         ends = [(v.argmin(), v.argmax(), np.abs(v).argmin()) for v in self.values.values()]
         if not ends:
             return self.rows(np.arange(1))
@@ -148,7 +153,9 @@ class Planner:
 
 
 def periods(equations: Equations, numbers: np.ndarray) -> np.ndarray:
-    """The period of the equations for each row of parameters; 0 where time does not enter or no period is known."""
+    """Return the period of the equations for each row of parameters; 0 if time does not enter or no
+    period is known.
+    """
     if len(numbers) == 0:
         return np.zeros(0)
     frequency = drive_of(equations.nodes, equations.varied).frequency
@@ -160,7 +167,9 @@ def periods(equations: Equations, numbers: np.ndarray) -> np.ndarray:
 
 
 def _sizes(frequency: sp.Expr, values: Mapping[str, np.ndarray], rows: int) -> np.ndarray:
-    """The absolute values (rows,) of a frequency, by the same function as `Scene.angular_frequency`."""
+    """The absolute values (rows,) of a frequency, by the same function as
+    `Scene.angular_frequency`.
+    """
     names = names_in(frequency)
     if not names:
         return np.full(rows, abs(as_function(frequency)()))
@@ -169,7 +178,7 @@ def _sizes(frequency: sp.Expr, values: Mapping[str, np.ndarray], rows: int) -> n
 
 
 def half_swing(equations: Equations, values: Mapping[str, np.ndarray]) -> float:
-    """Half the period of the fastest sine or cosine of time at arrays of parameters of one length; inf without a drive.
+    """Return half the period of the fastest sine or cosine of time; inf without a drive.
 
     No step may be longer, so that none can miss a whole swing of the drive.
     """
@@ -180,7 +189,9 @@ def half_swing(equations: Equations, values: Mapping[str, np.ndarray]) -> float:
 
 
 def longest_step(scene: Scene) -> float:
-    """The half swing at the ends of all that a scene's nodes and axes give to the parameters of its drive."""
+    """Return the half swing at the extremes of the drive's parameters over all nodes and axes of a
+    scene.
+    """
     known = dict.fromkeys(name for wave in scene.drive.waves for name in names_in(wave))
     ends = []
     for names in (parameter_names(scene, name) for name in known):
@@ -192,7 +203,9 @@ def longest_step(scene: Scene) -> float:
 
 
 def parameter_names(scene: Scene, name: str) -> tuple[str, ...]:
-    """The names under which a scene has a parameter: one, a_1 … a_n where nodes differ, none where it has no such."""
+    """Return the names under which a scene has a parameter: one, a_1 … a_n if nodes differ, none if
+    it has no such.
+    """
     if name not in scene.varied:
         return (name,) if name in scene.parameters else ()
     return tuple(own for own in scene.parameters if (parts := NodeName.parse(own)) and parts.base == name)
@@ -248,9 +261,9 @@ def control_of(planner: Planner, jumps: bool) -> np.ndarray:
 def tolerances(scene: Scene, numbers: np.ndarray) -> tuple[float, float]:
     """Return (rtol, atol) as integrated with.
 
-    A smoothed jump of friction is 1/kappa wide in velocity; a step control that does not see this width lets oscillators
-    slip through it unnoticed.  With contact "atan" rtol is therefore at most 1/kappa and atol at most 0.1/kappa (not below
-    1e-13), for the largest kappa of the sweep.
+    A smoothed jump of friction is 1/kappa wide in velocity; a step control that does not see this
+    width lets oscillators slip through it unnoticed.  With contact "atan" rtol is therefore at most
+    1/kappa and atol at most 0.1/kappa (not below 1e-13), for the largest kappa of the sweep.
     """
     rtol, atol = scene.rtol, scene.atol
     columns = [k for k, name in enumerate(scene.equations.parameters) if name in parameter_names(scene, "kappa")]

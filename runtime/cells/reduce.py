@@ -1,7 +1,9 @@
-"""Exact reduction of a scene: terms that are zero in every cell, and oscillators that move as one, are left out.
+"""Exact reduction of a scene: terms that are zero in every cell, and oscillators that move as one,
+are left out.
 
-`synchain.models.dynamics.reduction` proves each reduction; it is undone before the result, which is that of the whole
-network.  docs/skips.md lists all reductions, also those of the emitted text and of the kernel's driver.
+`synchain.models.dynamics.reduction` proves each reduction; it is undone before the result, which is
+that of the whole network.  docs/skips.md lists all reductions, also those of the emitted text and
+of the kernel's driver.
 """
 
 from __future__ import annotations
@@ -44,7 +46,8 @@ class NodeMerge:
     places : ndarray of int
         Column of the reduced state in which each state of the whole network is found.
     together : bool
-        True if all oscillators are stepped as one and their synchronisation error, which is 0, is a record.
+        True if all oscillators are stepped as one and their synchronisation error, which is 0, is a
+        record.
     """
 
     states: np.ndarray
@@ -138,7 +141,9 @@ class Reduction:
             )
 
     def section_variable(self) -> str:
-        """Return the state variable of the reduced network that stands for the scene's section variable."""
+        """Return the state variable of the reduced network that stands for the scene's section
+        variable.
+        """
         whole = self.scene.equations.state.index(self.scene.section.variable)
         return self.equations.state[int(self.merge.places[whole])]
 
@@ -181,8 +186,8 @@ def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> R
     reduce : bool
         If False, everything is integrated as it stands.
     fold_all : bool
-        Substitute all parameters that have one value in every cell, by their shortest decimals.  By default only zeros
-        are substituted, so that scenes that differ in numbers share a kernel.
+        Substitute all parameters that have one value in every cell, by their shortest decimals.  By
+        default only zeros are substituted, so that scenes that differ in numbers share a kernel.
     """
     whole = scene.equations
     skipped: list[str] = []
@@ -224,7 +229,7 @@ def _node_merge(whole: Equations, reduced: Equations, classes: tuple[int, ...], 
 
 
 def _column(name: str, equations: Equations, first: list[int]) -> str:
-    """The name in the whole network of a parameter of the reduced one, whose node k stands for node first[k]."""
+    """The name in the whole network of a parameter of a reduced one; node k stands for first[k]."""
     parts = NodeName.parse(name)
     return str(NodeName(parts.base, first[parts.index])) if parts and parts.base in equations.varied else name
 
@@ -277,7 +282,9 @@ def _consequence(before: Equations, after: Equations, name: str, value: float) -
 def _merge(
     scene: Scene, equations: Equations, skipped: list[str], kept: list[str]
 ) -> tuple[Equations, tuple[int, ...]]:
-    """Make one node of oscillators that move as one in every cell; returns the class of each oscillator."""
+    """Make one node of oscillators that move as one in every cell; returns the class of each
+    oscillator.
+    """
     n, alone = scene.n, tuple(range(scene.n))
     if equations.mixed:
         kept.append("quotient: nodes of several kinds are stepped one by one")
@@ -304,7 +311,9 @@ def _merge(
 
 
 def _colours(scene: Scene) -> list[Hashable]:
-    """For each oscillator its start and its own parameters in all cells; equal where these are equal in every cell."""
+    """For each oscillator its start and its own parameters in all cells; equal if these are equal
+    in every cell.
+    """
     swept = {axis.name: axis.values for axis in scene.axes}
     colours: list[Hashable] = []
     for i in range(scene.n):
@@ -322,7 +331,7 @@ def _colours(scene: Scene) -> list[Hashable]:
 
 
 def _multiplicity(scene: Scene, classes: tuple[int, ...]) -> tuple[int, ...] | None:
-    """Oscillators in each class where the synchronisation error must count them, else None.
+    """Oscillators in each class if the synchronisation error must count them, else None.
 
     It is the sum of the distances from the first oscillator, whose own class does not contribute.
     """
@@ -333,7 +342,9 @@ def _multiplicity(scene: Scene, classes: tuple[int, ...]) -> tuple[int, ...] | N
 
 
 def explain(reduction: Reduction) -> str:
-    """Return in words what is left out of a scene and why, what is not, and what a cell may leave out at run time."""
+    """Return in words what is left out of a scene and why, what is not, and what a cell may leave
+    out at run time.
+    """
     parts = (
         ("left out", (*reduction.skipped, *_unwritten(reduction))),
         ("not left out", reduction.kept),

@@ -1,9 +1,10 @@
 """The file of a sweep that is under way: blocks of finished cells, appended as they come.
 
-A file begins with MAGIC and one JSON line (its length, its checksum, then the text), which says what the sweep is; both
-stand there twice, and each copy begins a page of the disk.  Records follow, one for each finished block: a head with the
-number of the block and two checksums, then the numbers themselves, little endian.  Nothing is ever changed in place, so that
-a process that dies at any moment leaves whole records and at most one torn one at the end, which is written over.  A damaged
+A file begins with MAGIC and one JSON line (its length, its checksum, then the text), which says
+what the sweep is; both stand there twice, and each copy begins a page of the disk.  Records follow,
+one for each finished block: a head with the number of the block and two checksums, then the numbers
+themselves, little endian.  Nothing is ever changed in place, so that a process that dies at any
+moment leaves whole records and at most one torn one at the end, which is written over.  A damaged
 record costs itself alone: reading goes on at the next mark that begins a head with a good checksum.
 """
 
@@ -38,7 +39,9 @@ PAGE = 4096
 """Bytes that a disk loses together."""
 LINE = struct.Struct("<QI")
 HEAD = struct.Struct(f"<4sQQIII{CODES}QI")
-"""Mark, block, bytes and CRC-32 of the numbers, cells, most section points, how many ended how, CRC-32 of all this."""
+"""Mark, block, bytes and CRC-32 of the numbers, cells, most section points, how many ended how,
+CRC-32 of all this.
+"""
 MARK = b"blk\0"
 PIECE = 2**20
 """Bytes that are searched for a mark at a time."""
@@ -50,7 +53,9 @@ FLUSH = 5.0
 
 
 def is_block_log(path: str | os.PathLike[str]) -> bool:
-    """True if a file begins like a store, or is called one and does not begin like a result."""
+    """True if a file begins like a log of blocks, or is called one and does not begin like a
+    result.
+    """
     try:
         with open_regular(path) as file:
             start = file.read(len(KIND))
@@ -61,9 +66,19 @@ def is_block_log(path: str | os.PathLike[str]) -> bool:
 
 @dataclass(slots=True)
 class BlockLog:
-    """An open store: `about` says what the sweep is, `places` (blocks,) where each block's record begins, -1 for none.
+    """An open log of finished blocks.
 
-    counts (CODES,): how many cells of the stored blocks ended how; `most`: section points of the cell that has most.
+    Attributes
+    ----------
+    path : Path
+    about : mapping
+        Description of the sweep (`synchain.runtime.results.partial.describe_sweep`).
+    places : ndarray of int, shape (blocks,)
+        Offsets of the records of the blocks, -1 for none.
+    counts : ndarray, shape (CODES,)
+        How many cells of the stored blocks ended with each status.
+    most : int
+        Section points of the cell that has most.
     """
 
     path: Path
@@ -77,13 +92,15 @@ class BlockLog:
 
     @staticmethod
     def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
-        """What the sweep of a store is, without a look at its blocks; ValueError where it cannot be told."""
+        """Return the description of the sweep, without its blocks; ValueError if it is damaged."""
         with open_regular(path) as file:
             return _about(file, path)
 
     @staticmethod
     def create(path: str | os.PathLike[str], about: Mapping[str, Any]) -> None:
-        """Make a store without blocks; `about` is what JSON can hold and says how many `blocks` there are."""
+        """Create a log without blocks; `about` is what JSON can hold and says how many `blocks`
+        there are.
+        """
         text = json.dumps(about).encode()
         if os.path.exists(path):
             with open_regular(path, writing=True) as old:
@@ -96,10 +113,14 @@ class BlockLog:
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], writing: bool = False) -> BlockLog:
-        """Open a store and find its whole blocks; a record that is torn or damaged counts as none.
+        """Open a log and find its whole blocks; a record that is torn or damaged counts as none.
 
-        Raises ValueError if the file is no store or both copies of its first line are damaged, BlockingIOError if another
-        process writes to it.
+        Raises
+        ------
+        ValueError
+            If the file is no log, or if both copies of its first line are damaged.
+        BlockingIOError
+            If another process writes to it.
         """
         file = open_regular(path, writing=writing)
         try:
@@ -138,7 +159,7 @@ class BlockLog:
         return self.places >= 0
 
     def append(self, block: int, buffers: Buffers) -> None:
-        """Add a finished block; OSError where it cannot be written, after which the store is as it was."""
+        """Add a finished block; OSError if it cannot be written, after which the log is as it was."""
         counts, most = tally(buffers.status), buffers.most_points
         body = _packed(buffers)
         head = HEAD.pack(MARK, block, len(body), zlib.crc32(body), len(buffers.counts), most, *counts.tolist(), 0)
@@ -159,7 +180,9 @@ class BlockLog:
         self._flushed = time.monotonic()
 
     def read(self, block: int) -> Buffers:
-        """The numbers of a stored block; OSError where they were damaged since the store was opened."""
+        """Return the numbers of a stored block; OSError if they were damaged since the log was
+        opened.
+        """
         self._file.seek(int(self.places[block]))
         head = HEAD.unpack(self._file.read(HEAD.size))
         body = self._file.read(head[2])
@@ -186,7 +209,9 @@ def _second(length: int) -> int:
 
 
 def _about(file: FileIO, path: str | os.PathLike[str]) -> dict[str, Any]:
-    """What the sweep is, from the first copy that is sound; leaves the file where its records begin."""
+    """The description of the sweep, from the first copy that is sound; the file is left at its
+    first record.
+    """
     size = os.fstat(file.fileno()).st_size
     if size == 0:
         raise ValueError(f"{os.fspath(path)} is empty; expected an unfinished run; {AGAIN}")
@@ -262,7 +287,9 @@ def _exists(buffers: Buffers) -> np.ndarray:
 
 
 def _unpacked(body: bytes, cells: int, most: int, dimension: int, samples: int) -> Buffers | None:
-    """The numbers of a block; None if there are not as many as its cells need, the most section points among them."""
+    """The numbers of a block; None if there are not as many as its cells need, the most section
+    points among them.
+    """
     if len(body) < cells * len(Count) * 8:
         return None
     counts = np.frombuffer(body, "<i8", cells * len(Count)).reshape(cells, len(Count)).astype(np.int64)
@@ -282,7 +309,9 @@ def _unpacked(body: bytes, cells: int, most: int, dimension: int, samples: int) 
 
 
 def _lock(file: FileIO, path: str | os.PathLike[str]) -> None:
-    """Keep other processes from writing to the same store; the lock ends with the process, however that ends."""
+    """Keep other processes from writing to the same store; the lock ends with the process, however
+    that ends.
+    """
     try:
         import fcntl
     except ImportError:  # Windows

@@ -1,4 +1,4 @@
-"""What is known of the synchronous state of each cell: exponents, classes and verdicts."""
+"""Certificates: exponents of the synchronous state of each cell, and the verdicts that follow."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ NEAR = 1e-11
 """Synchronisation error below which a certified cell ends."""
 
 ERRORS, CHANCE = 5.0, 1e-6
-"""A cell may end early where its exponent is below 0 by so many standard errors, and where the chance of a burst from
-NEAR to BURST is below CHANCE."""
+"""A cell may end early if its exponent is below 0 by so many standard errors, and if the chance of
+a burst from NEAR to BURST is below CHANCE.
+"""
 
 BURST, SYNCHRONOUS = 1e-6, 1e-3
-"""Synchronisation error that a certified cell must not reach again; mean error below which a cell counts as synchronous,
-as in `synchain.runtime.synchronisation.threshold`."""
+"""Synchronisation error that a certified cell must not reach again; mean error below which a cell
+counts as synchronous, as in `synchain.runtime.synchronisation.threshold`.
+"""
 
 VERDICTS = (
     "did not finish",
@@ -34,9 +36,11 @@ VERDICTS = (
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """The largest transversal exponent (cells,) of the network's synchronous state in each cell, and its standard error.
+    """The largest transversal exponent (cells,) of the network's synchronous state in each cell,
+    and its standard error.
 
-    diffusion (cells,): variance of the logarithm of a deviation, per unit of time, about its mean growth.
+    diffusion (cells,): variance of the logarithm of a deviation, per unit of time, about its mean
+    growth.
     """
 
     exponent: np.ndarray
@@ -45,10 +49,12 @@ class Certificate:
 
     @property
     def near(self) -> np.ndarray:
-        """The synchronisation error (cells,) below which a cell is taken to stay synchronous; 0 where that is not safe.
+        """The synchronisation error (cells,) below which a cell is taken to stay synchronous; 0 if
+        that is not safe.
 
-        A deviation whose logarithm drifts down at the rate -exponent and diffuses ever climbs by g with the chance
-        exp(-2 g |exponent| / diffusion) (Redner, A Guide to First-Passage Processes (Cambridge, 2001), section 3.2).
+        A deviation whose logarithm drifts down at the rate -exponent and diffuses ever climbs by g
+        with the chance exp(-2 g |exponent| / diffusion) (Redner, A Guide to First-Passage Processes
+        (Cambridge, 2001), section 3.2).
         """
         climb = math.log(BURST / NEAR)
         rare = -2.0 * climb * self.exponent > -math.log(CHANCE) * self.diffusion
@@ -59,10 +65,12 @@ class Certificate:
         return Certificate(self.exponent[cells], self.stderr[cells], self.diffusion[cells])
 
     def verdicts(self, finished: np.ndarray, error: np.ndarray, largest: np.ndarray) -> np.ndarray:
-        """Index into VERDICTS for each cell, from whether it finished, its mean and its largest synchronisation error.
+        """Index into VERDICTS for each cell, from whether it finished, its mean and its largest
+        synchronisation error.
 
-        Near the loss of stability trajectories within the synchronous state are unstable, and a small distance bursts
-        although the exponent is negative (Ashwin, Buescu & Stewart, Phys. Lett. A 193, 126 (1994)).
+        Near the loss of stability trajectories within the synchronous state are unstable, and a
+        small distance bursts although the exponent is negative (Ashwin, Buescu & Stewart, Phys.
+        Lett. A 193, 126 (1994)).
         """
         sign = np.where(self.exponent + 2 * self.stderr < 0.0, -1, np.where(self.exponent > 2 * self.stderr, 1, 0))
         together = np.where((sign < 0) & (largest >= SYNCHRONOUS), 7, np.array([1, 2, 3])[sign + 1])

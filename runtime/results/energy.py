@@ -27,10 +27,11 @@ Values = Mapping[str, float] | None
 
 @dataclass(frozen=True, slots=True)
 class _Group:
-    """Nodes or links of one kind: energy and power as functions of (t or weight, states, parameters).
+    """Nodes or links of one kind: energy and power as functions of (t or weight, states,
+    parameters).
 
-    states (count,) each: where a state of each of them stands, of a link those of its target, then of its source.
-    parameters (count,) or one name each: what they are called in a scene.
+    states (count,) each: where a state of each of them stands, of a link those of its target, then
+    of its source. parameters (count,) or one name each: what they are called in a scene.
     """
 
     formulas: tuple[Formula, Formula]
@@ -48,10 +49,12 @@ class _Group:
 
 @dataclass(frozen=True, slots=True)
 class EnergyFunction:
-    """The energy of a scene's network as functions of state arrays (…, dimension), in state order; all non-dimensional.
+    """The energy of a scene's network as functions of state arrays (…, dimension), in state order;
+    all non-dimensional.
 
-    One formula for the nodes and one for the links of each kind are applied to all of them at once, so that large networks
-    and long trajectories cost array operations alone.  `parameters` replace numbers of the scene by others.
+    One formula for the nodes and one for the links of each kind are applied to all of them at once,
+    so that large networks and long trajectories cost array operations alone.  `parameters` replace
+    numbers of the scene by others.
     """
 
     scene: Scene
@@ -67,10 +70,12 @@ class EnergyFunction:
         return self._sum(True, states, t, parameters)
 
     def imbalance(self, t: Array, states: Array, parameters: Values = None) -> Array:
-        """Return E(t) - E(t_0) - (integral of the power) of a trajectory: states (samples, dimension) at times t (samples).
+        """Return E(t) - E(t_0) - (integral of the power) of a trajectory: states (samples,
+        dimension) at times t (samples).
 
-        The integral is Simpson's rule on the samples, so its own error falls with the third power of their distance, at
-        every other sample with the fourth.  Raises ValueError for fewer than three samples.
+        The integral is Simpson's rule on the samples, so its own error falls with the third power
+        of their distance, at every other sample with the fourth.  Raises ValueError for fewer than
+        three samples.
         """
         if np.ndim(t) != 1 or len(t) < 3:
             raise ValueError(f"imbalance: found {np.size(t)} samples; expected at least three; raise samples")
@@ -90,7 +95,9 @@ class EnergyFunction:
 
 
 def energy_function(scene: Scene) -> EnergyFunction:
-    """Return the compiled energy of a scene's network; ValueError as `synchain.models.scenes.energy.energy`."""
+    """Return the compiled energy of a scene's network; ValueError as
+    `synchain.models.scenes.energy.energy`.
+    """
     exact = energy(scene)
     equations, places = exact.equations, exact.equations.places
     groups = []

@@ -147,7 +147,8 @@ def scene_of(attributes: Mapping[Any, Any]) -> Scene:
     Raises
     ------
     ValueError, TypeError
-        If the attributes are not those of `provenance`, or if the installed models cannot make the scene.
+        If the attributes are not those of `provenance`, or if the installed models cannot make the
+        scene.
     """
     missing = [name for name in TOLD if not isinstance(attributes.get(name), str)]
     if "scene" in missing:
@@ -165,13 +166,17 @@ def scene_of(attributes: Mapping[Any, Any]) -> Scene:
 
 
 def alike(first: Scene, second: Scene) -> bool:
-    """True if two scenes differ at most in their titles and in the text of the files of code that they name."""
+    """True if two scenes differ at most in their titles and in the text of the files of code that
+    they name.
+    """
     one, other = first.replace(title=""), second.replace(title="")
     return one == other or one.as_dict() == other.as_dict()
 
 
 def changed(attributes: Mapping[Any, Any], scene: Scene) -> bool:
-    """True if the code behind the names of a scene's parts has changed since the result was computed."""
+    """True if the code behind the names of a scene's parts has changed since the result was
+    computed.
+    """
     return "model" in attributes and attributes["model"] != scene.equations.digest
 
 
@@ -183,7 +188,9 @@ def provenance(
     versions: str,
     processor: str,
 ) -> dict[str, Any]:
-    """Return how a result came about, as its attributes; `skipped` says what was left out of the equations."""
+    """Return how a result came about, as its attributes; `skipped` says what was left out of the
+    equations.
+    """
     return {
         "title": scene.title or repr(scene),
         "scene": json.dumps(scene.as_dict()),

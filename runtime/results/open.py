@@ -21,7 +21,8 @@ def open_result(path: str | os.PathLike[str]) -> Result:
     Parameters
     ----------
     path : str or path
-        A file written by `Result.save` or `stream`, or the file ".partial" beside it while a run is not finished.
+        A file written by `Result.save` or `stream`, or the file ".partial" beside it while a run is
+        not finished.
 
     Returns
     -------
@@ -36,10 +37,11 @@ def open_result(path: str | os.PathLike[str]) -> Result:
     Warns
     -----
     RuntimeWarning
-        If the file has no digest because another program or an earlier version wrote it: damage cannot be seen.
+        If the file has no digest because another program or an earlier version wrote it: damage
+        cannot be seen.
     UserWarning
-        If the code of the model has changed since: the numbers are those of the former model, the scene names the
-        present one.
+        If the code of the model has changed since: the numbers are those of the former model, the
+        scene names the present one.
     """
     path = a_path("result", path)
     result = read_partial(path) if is_block_log(path) else read_result(path)

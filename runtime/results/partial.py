@@ -1,4 +1,6 @@
-"""Results out of the blocks of a sweep on disk: of the cells so far in memory, or of all cells in a netCDF file."""
+"""Results out of the blocks of a sweep on disk: of the cells so far in memory, or of all cells in a
+netCDF file.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ __all__ = ["certificate_of", "describe_sweep", "layout_of", "partial_path", "rea
 def describe_sweep(
     reduction: Reduction, layout: Layout, attributes: Mapping[str, Any], certificate: Certificate | None
 ) -> dict[str, Any]:
-    """Return what a block log says of its sweep, in JSON types, so that it can be read without the kernel."""
+    """Return what a block log says of its sweep, in JSON types, so that it can be read without the
+    kernel.
+    """
     merge = reduction.merge
     exponents = None if certificate is None else (certificate.exponent, certificate.stderr, certificate.diffusion)
     return {
@@ -122,12 +126,14 @@ def _so_far(reader: _Reader) -> Result:
 
 
 def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> dict[str, int]:
-    """Write the netCDF file of a scene's log that has all blocks, with one block in memory at a time.
+    """Write the netCDF file of a scene's log that has all blocks, with one block in memory at a
+    time.
 
     Returns
     -------
     dict of str to int
-        How many cells have each verdict, and how many "ended early"; empty if the cells are not certified.
+        How many cells have each verdict, and how many "ended early"; empty if the cells are not
+        certified.
     """
     reader = _Reader(log, scene)
     verdicts: dict[str, int] = {}

@@ -31,9 +31,19 @@ __all__ = ["Result", "attributes_of", "gather", "read_result"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:
-    """Labelled arrays of a run (`data`, an xarray.Dataset) and the scene that they belong to.
+    """Labelled arrays of a run; a variable `name` of the data is also an attribute:
+    `result.sync_error`.
 
-    Dimensions are the names of the axes (or "cell" where the axes are zipped), then "state", "point" or "sample".
+    Attributes
+    ----------
+    data : xarray.Dataset
+        Its dimensions are the names of the axes (or "cell" if the axes are zipped), then "state",
+        "point" or "sample".  Its attributes say how the result came about.
+    scene : Scene
+        The scene, with its axes.
+
+    Notes ----- Every cell has a `status`; `synchain.runtime.Status` names the codes.  Times are
+    non-dimensional.
     """
 
     data: xr.Dataset
@@ -51,7 +61,7 @@ class Result:
 
     @property
     def success(self) -> bool:
-        """True where every cell reached the end of its window."""
+        """True if every cell reached the end of its window."""
         return bool((self.data.status == Status.FINISHED).all())
 
     @property
@@ -64,9 +74,11 @@ class Result:
         return "; ".join(parts)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a netCDF file that opens in xarray and in `open_result`; it appears whole or not at all.
+        """Write a netCDF file that opens in xarray and in `open_result`; it appears whole or not at
+        all.
 
-        Its attribute `digest` is the SHA-256 of the file, by which `open_result` and `stream` see whether it was damaged.
+        Its attribute `digest` is the SHA-256 of the file, by which `open_result` and `stream` see
+        whether it was damaged.
         """
         with whole_file(path) as temporary:
             unsealed(self.data).to_netcdf(temporary, engine="scipy", format="NETCDF3_64BIT")
@@ -74,18 +86,32 @@ class Result:
                 seal(file)
 
     def belongs_to(self, scene: Scene) -> bool:
-        """True where the scene is this result's but for its title."""
+        """True if the scene is this result's but for its title."""
         return alike(self.scene, scene)
 
     def stepped(self, equations: Equations) -> bool:
-        """True where these are the equations that were integrated: the scene's, or what was left of them to step."""
+        """True if these are the equations that were integrated: the scene's, or what was left of
+        them to step.
+        """
         return bool(self.data.attrs["equations"] == equations.digest)
 
     def restore(self, scene: Scene, buffers: Buffers, equations: Equations) -> None:
-        """Put the finished cells of this result into the buffers of a new run of the same scene that steps these equations.
+        """Copy the finished cells of this result into the buffers of a new run of the same scene.
 
-        Raises ValueError if the scenes differ in more than their titles, or if this result comes of other equations or of
-        another kind of processor.
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the new run.
+        buffers : Buffers
+            Buffers of all its cells.
+        equations : Equations
+            The equations that the new run steps.
+
+        Raises
+        ------
+        ValueError
+            If the scenes differ in more than their titles, or if this result comes of other
+            equations or of another kind of processor.
         """
         if not self.belongs_to(scene):
             raise ValueError("the result to resume belongs to another scene; run without resume")

@@ -12,7 +12,8 @@ __all__ = ["averaging", "numbers", "row"]
 
 
 def numbers(what: str, values: Any, *, complex_too: bool = False) -> np.ndarray:
-    """Return the values as an array of any shape, of floats or, if `complex_too`, of complex numbers.
+    """Return the values as an array of any shape, of floats or, if `complex_too`, of complex
+    numbers.
 
     Raises
     ------
@@ -30,7 +31,9 @@ def numbers(what: str, values: Any, *, complex_too: bool = False) -> np.ndarray:
 
 
 def averaging(precision: Any, periods: Any, transient: Any, seed: Any) -> tuple[float, float, float, int]:
-    """Return the settings of an average along an orbit, checked: standard error, length, transient and random seed."""
+    """Return the settings of an average along an orbit, checked: standard error, length, transient
+    and random seed.
+    """
     return (
         positive("precision", precision, zero=True),
         positive("periods", periods),

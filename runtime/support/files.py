@@ -28,7 +28,9 @@ __all__ = [
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path beside `path`; it replaces `path` at the end of the with block, or vanishes on an error."""
+    """Yield a temporary path beside `path`; it replaces `path` at the end of the with block, or
+    vanishes on an error.
+    """
     target = Path(path)
     check_replaceable(target)
     try:
@@ -48,7 +50,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 @contextmanager
 def _named(target: Path, temporary: str) -> Iterator[None]:
-    """Let an error of the system name the file that the user knows, not none and not a temporary one."""
+    """Make an error of the system name the file of the user instead of none or a temporary one."""
     try:
         yield
     except OSError as problem:
@@ -58,7 +60,7 @@ def _named(target: Path, temporary: str) -> Iterator[None]:
 
 
 def check_replaceable(target: Path) -> None:
-    """Raise OSError if something that is no file is where a file is to be written."""
+    """Raise OSError if `target` exists and is no file."""
     if target.is_dir():
         raise IsADirectoryError(f"{target} is a folder; expected a file or nothing there; choose another path (--out)")
     if target.exists() and not target.is_file():
@@ -66,7 +68,9 @@ def check_replaceable(target: Path) -> None:
 
 
 def drop_leftovers(path: str | os.PathLike[str]) -> None:
-    """Delete the temporary files of processes that were killed while they wrote `path`; only for who alone writes it."""
+    """Delete temporary files of processes that were killed while they wrote `path`; no other
+    process may be writing it.
+    """
     target = Path(path)
     for leftover in target.parent.glob(f".{escape(target.stem)}-*{escape(target.suffix)}"):
         leftover.unlink(missing_ok=True)
@@ -74,7 +78,9 @@ def drop_leftovers(path: str | os.PathLike[str]) -> None:
 
 @contextmanager
 def netcdf_data(path: Path) -> Iterator[xr.Dataset]:
-    """The open data of a netCDF file; OSError in one line where there is none, or where it is damaged."""
+    """Yield the open data of a netCDF file; OSError in one line if there is none or if it is
+    damaged.
+    """
     import xarray as xr
 
     from .netcdf import DIGEST, is_sealed
@@ -108,7 +114,9 @@ def netcdf_data(path: Path) -> Iterator[xr.Dataset]:
 
 @contextmanager
 def understood(path: Path) -> Iterator[None]:
-    """Raise one ValueError that names the file for whatever a forged file makes its reader raise."""
+    """Turn any error that a forged file makes its reader raise into one ValueError that names the
+    file.
+    """
     try:
         yield
     except (OSError, MemoryError):
@@ -125,7 +133,7 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 
 
 def output_folder(path: str | os.PathLike[str]) -> Path:
-    """Create a folder for output and return it; OSError with a clear sentence where that cannot be done."""
+    """Create a folder for output and return it; OSError in a clear sentence if that cannot be done."""
     folder = Path(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)

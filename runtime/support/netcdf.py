@@ -1,9 +1,12 @@
-"""A netCDF file written piece by piece: as large as the disk, with no more in memory than one piece.
+"""A netCDF file written piece by piece: as large as the disk, with no more in memory than one
+piece.
 
-The form is that of netCDF "64-bit offset" files, as SciPy writes it for `Result.save`, byte for byte: the header says where
-each variable begins, then the variables follow, whole, big endian (NetCDF Classic Format Specification, Unidata).
+The form is that of netCDF "64-bit offset" files, as SciPy writes it for `Result.save`, byte for
+byte: the header says where each variable begins, then the variables follow, whole, big endian
+(NetCDF Classic Format Specification, Unidata).
 
-The first attribute of a result is a digest of the whole file, taken with zeros in the place of the digest itself.
+The first attribute of a result is a digest of the whole file, taken with zeros in the place of the
+digest itself.
 """
 
 from __future__ import annotations
@@ -30,13 +33,17 @@ TYPES = {"b": 1, "c": 2, "h": 3, "i": 4, "l": 4, "f": 5, "d": 6}
 PIECE = 2**20
 """Bytes that are read at a time."""
 LARGEST = 2**32 - 4
-"""Bytes of the largest variable whose size the header can hold; of a larger one it says 2^32 - 1, and readers count."""
+"""Bytes of the largest variable whose size the header can hold; of a larger one it says 2^32 - 1,
+and readers count.
+"""
 
 
 class Sheet:
-    """A file for data shaped like `template` but for other lengths of some dimensions; written by `put`.
+    """A file for data shaped like `template` but for other lengths of some dimensions; written by
+    `put`.
 
-    The template holds the variables, dimensions and attributes; where a length is given the template's own is not used.
+    The template holds the variables, dimensions and attributes; if a length is given, the
+    template's own is not used.
     """
 
     def __init__(self, file: BinaryIO, template: xr.Dataset, lengths: Mapping[str, int]) -> None:
@@ -63,7 +70,9 @@ class Sheet:
             self._write(self.begins[name], np.asarray(values, dtype=self.types[name]))
 
     def put(self, name: str, rows: np.ndarray, values: np.ndarray) -> None:
-        """Write rows of a variable, numbered over its leading dimensions together; values (rows, …)."""
+        """Write rows of a variable, numbered over its leading dimensions together; values (rows,
+        …).
+        """
         values = np.ascontiguousarray(values, dtype=self.types[name])
         length = values.nbytes // max(len(rows), 1)
         for run in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows) != 1) + 1):
@@ -99,7 +108,9 @@ def unsealed(data: xr.Dataset) -> xr.Dataset:
 
 
 def seal(file: BinaryIO) -> None:
-    """Write the digest of a file of `unsealed` data, which is open for reading and writing, into its room."""
+    """Write the digest of a file of `unsealed` data, which is open for reading and writing, into
+    its room.
+    """
     place = _digest_place(file)
     if place is None:
         raise ValueError("the file has no room for a digest")

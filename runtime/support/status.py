@@ -9,11 +9,13 @@ import numpy as np
 __all__ = ["CODES", "Status", "tally"]
 
 CODES = 16
-"""Room for codes where they are counted, also in files: more than there are, so that new ones find a place."""
+"""Room for codes in counts, also in files: more than exist, so that new ones find a place."""
 
 
 class Status(IntEnum):
-    """Status of one cell; `FINISHED` alone is success.  The numbers are those of the generated kernels."""
+    """Status of one cell; `FINISHED` alone is success.  The numbers are those of the generated
+    kernels.
+    """
 
     NOT_RUN = 0
     FINISHED = 1

@@ -10,7 +10,9 @@ __all__ = ["worker_count"]
 
 
 def worker_count(workers: int | None) -> int:
-    """Number of threads to use; ValueError for less than one, TypeError where it is no whole number."""
+    """Return the number of threads (default: all cores); ValueError for less than one, TypeError
+    for no whole number.
+    """
     if workers is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return whole("workers", workers, 1)

@@ -1,9 +1,10 @@
-"""Certification: the transversal exponents of every cell of a sweep say whether its synchronous state is stable.
+"""Certification: the transversal exponents of every cell of a sweep say whether its synchronous
+state is stable.
 
-Two oscillators can become equal bit for bit by rounding and then stay together although the state is unstable (Pikovsky,
-Phys. Rev. Lett. 73, 2931 (1994)), and a cell that starts outside the basin or waits too short a time is not synchronous
-although the state is stable.  The exponents tell these cases apart, and let a cell that is certain to stay synchronous
-end early.
+Two oscillators can become equal bit for bit by rounding and then stay together although the state
+is unstable (Pikovsky, Phys. Rev. Lett. 73, 2931 (1994)), and a cell that starts outside the basin
+or waits too short a time is not synchronous although the state is stable.  The exponents tell these
+cases apart, and let a cell that is certain to stay synchronous end early.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ MOST = 10**7
 def certify(scene: Scene, *, precision: float = 2e-3, periods: float = 2000, workers: int | None = None) -> Certificate:
     """Return the exponents of every cell's synchronous state.
 
-    Cells that differ only in sigma and starts share one orbit.  Of several kinds of attractor found by four starts the least
-    stable counts.
+    Cells that differ only in sigma and starts share one orbit.  Of several kinds of attractor found
+    by four starts the least stable counts.
 
     Parameters
     ----------

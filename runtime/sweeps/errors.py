@@ -8,7 +8,9 @@ __all__ = ["SweepFailed", "SweepInterrupted"]
 
 
 class SweepInterrupted(KeyboardInterrupt):
-    """Ctrl-C during a sweep; `finished` of `cells` had finished, `result` holds them if no file does."""
+    """Ctrl-C during a sweep; `finished` of `cells` had finished, `result` holds them if no file
+    does.
+    """
 
     def __init__(self, finished: int, cells: int, result: Result | None = None) -> None:
         super().__init__(f"interrupted with {finished} of {cells} cells finished")
@@ -23,7 +25,9 @@ class SweepInterrupted(KeyboardInterrupt):
 
 
 class SweepFailed(RuntimeError):
-    """A worker or the disk has failed; `finished` of `cells` had finished, `result` holds them if no file does."""
+    """A worker or the disk has failed; `finished` of `cells` had finished, `result` holds them if
+    no file does.
+    """
 
     def __init__(self, reason: str, finished: int, cells: int, result: Result | None = None) -> None:
         super().__init__(f"{reason}; {finished} of {cells} cells had finished")

@@ -1,7 +1,9 @@
-"""Jobs: a compiled kernel with all that it needs to run cells, and the specification that rebuilds it elsewhere.
+"""Jobs: a compiled kernel with all that it needs to run cells, and the specification that rebuilds
+it elsewhere.
 
-A job runs in threads of this process.  A worker that does not share its memory, another process or another machine,
-gets the specification once, packed, and compiles the kernel from its own installation (`worker.py`).
+A job runs in threads of this process.  A worker that does not share its memory, another process or
+another machine, gets the specification once, packed, and compiles the kernel from its own
+installation (`worker.py`).
 """
 
 from __future__ import annotations
@@ -35,7 +37,9 @@ LARGEST_ROOM = 2**25
 """Numbers that the room for section points of a block has at first, 268 MB."""
 
 Start = tuple[np.ndarray, np.ndarray]
-"""States (cells, dimension) to start from in place of the scene's, and for which cells (cells,) they are good."""
+"""States (cells, dimension) to start from in place of the scene's, and for which cells (cells,)
+they are good.
+"""
 
 
 class Job(Protocol):
@@ -139,7 +143,9 @@ class JobSpec:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SweepSpec:
-    """The sweep of a scene, or what is left of it to integrate; `room` are section points to make room for at first."""
+    """The sweep of a scene, or what is left of it to integrate; `room` are section points to make
+    room for at first.
+    """
 
     reduction: Reduction
     room: int | None = None
@@ -157,8 +163,8 @@ class SweepSpec:
 class SweepJob:
     """A kernel, ready to run any cells of a scene's sweep.
 
-    `room` are section points of a cell to make room for at first; by default two a period, as far as memory allows.  Cells
-    with more are run again with what they need.
+    `room` are section points of a cell to make room for at first; by default two a period, as far
+    as memory allows.  Cells with more are run again with what they need.
     """
 
     spec: JobSpec
@@ -209,7 +215,8 @@ class SweepJob:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RowsSpec:
-    """Equations without a sweep, whose cells come as rows; the synchronisation error is the only record.
+    """Equations without a sweep, whose cells come as rows; the synchronisation error is the only
+    record.
 
     Attributes
     ----------
@@ -268,7 +275,9 @@ def versions() -> str:
 
 
 def first_room(scene: Scene, row: int) -> int:
-    """Return the section points to make room for at first: two a period, if one more needs `row` numbers."""
+    """Return the section points to make room for at first: two a period, if one more needs `row`
+    numbers.
+    """
     if "section" not in scene.record:
         return 0
     periods = scene.window if scene.time_unit == "period" else scene.window / math.pi

@@ -41,7 +41,9 @@ class Memory:
         return cls(prepared, prepared.layout(), reduction.merge.contract(whole))
 
     def done(self) -> np.ndarray:
-        """True for each block (blocks,) that has finished, with those that it needed; in a continued sweep clears others."""
+        """True for each block (blocks,) that has finished, with those that it needed; in a
+        continued sweep clears others.
+        """
         finished = self.buffers.finished
         done = np.zeros(self.layout.blocks, dtype=bool)
         for block in range(self.layout.blocks):

@@ -65,8 +65,8 @@ class WorkerPool:
     def run(self, tasks: Iterator[Task], finish: Finish) -> None:
         """Run the tasks and those that `finish` adds.
 
-        On Ctrl-C the blocks in flight are finished first if that is possible; a second Ctrl-C leaves them.  Raises what a
-        worker raised.
+        On Ctrl-C the blocks in flight are finished first if that is possible; a second Ctrl-C
+        leaves them.  Raises what a worker raised.
         """
         arrived: SimpleQueue[Future[Any]] = SimpleQueue()
         flying: dict[Future[Any], Task] = {}
@@ -96,7 +96,9 @@ class WorkerPool:
             raise
 
     def submit(self, task: Task, introduce: bool = False) -> Future[Any]:
-        """Give a task to a worker; the first ones, and with `introduce`, come with the specification of the job."""
+        """Give a task to a worker; the first ones, and with `introduce`, come with the
+        specification of the job.
+        """
         if self.shared:
             return self.executor.submit(self.job.run, *task.arguments)
         introduce = introduce or self.sent < self.limit
@@ -124,7 +126,9 @@ class WorkerPool:
 
 
 def pool_size(executor: Executor | None, workers: int | None) -> int:
-    """Return how many blocks can run at a time: `workers`, else as far as the executor tells, else all cores."""
+    """Return how many blocks can run at a time: `workers`, else as far as the executor tells, else
+    all cores.
+    """
     if executor is not None:
         instance("executor", executor, Executor, "a concurrent.futures.Executor, e.g. ProcessPoolExecutor(2)")
     if executor is None or workers is not None:

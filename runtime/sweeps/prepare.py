@@ -1,4 +1,6 @@
-"""From what is left of a scene to a job that can run: the text of its kernel, the exponents of its cells, machine code."""
+"""From what is left of a scene to a job that can run: the text of its kernel, the exponents of its
+cells, machine code.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Progress of a sweep: a bar on a terminal, a line a minute elsewhere, and a value for a hook of the caller."""
+"""Progress of a sweep: a bar on a terminal, a line a minute elsewhere, and a value for a hook of
+the caller.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ from ..support.status import CODES, Status
 __all__ = ["Hook", "Progress", "Reporter", "check_reporting", "duration"]
 
 EVERY = 60.0
-"""Seconds between two lines where stderr is no terminal."""
+"""Seconds between two lines if stderr is no terminal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +39,8 @@ class Progress:
     running : float
         Seconds since the first cell began.
     preparing : float
-        Seconds before that without the compilation: equations, text of the kernel, exponents of a certified run.
+        Seconds before that without the compilation: equations, text of the kernel, exponents of a
+        certified run.
     """
 
     cells: int
@@ -60,7 +63,9 @@ class Progress:
 
     @property
     def failures(self) -> str:
-        """How many cells ended otherwise than at the end of their window, in words; empty if none did."""
+        """How many cells ended otherwise than at the end of their window, in words; empty if none
+        did.
+        """
         bad = ((s, n) for s, n in self.statuses.items() if s != Status.FINISHED and n)
         return ", ".join(f"{n} {s.name.lower().replace('_', ' ')}" for s, n in bad)
 
@@ -83,7 +88,9 @@ def duration(seconds: float) -> str:
 
 
 def check_reporting(show: bool | None, hook: Hook | None) -> None:
-    """Raise TypeError if a hook cannot be called or if `show_progress` is neither True, False nor None."""
+    """Raise TypeError if a hook cannot be called or if `show_progress` is neither True, False nor
+    None.
+    """
     if hook is not None:
         a_callable("progress", hook)
     if show is not None:
@@ -92,7 +99,9 @@ def check_reporting(show: bool | None, hook: Hook | None) -> None:
 
 @dataclass(slots=True)
 class Reporter:
-    """Counts cells as they end and shows a bar on a terminal, else a line every minute; `show` False shows nothing."""
+    """Counts cells as they end and shows a bar on a terminal, else a line every minute; `show`
+    False shows nothing.
+    """
 
     cells: int
     show: bool | None = None

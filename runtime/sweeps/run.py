@@ -45,18 +45,18 @@ def run(
     width : int, optional
         Number of lanes: 1, 2, 4, 8 or 16 (default: what the processor has, one for a single cell).
     reduce : bool or Reduction
-        Whether to leave out, exactly, what the scene does not need (docs/skips.md).  False integrates it as it stands; a
-        Reduction of this scene is taken as it is.
+        Whether to leave out, exactly, what the scene does not need (docs/skips.md).  False
+        integrates it as it stands; a Reduction of this scene is taken as it is.
     certified : bool
-        Add the transversal exponent of every cell and a verdict on its synchronisation, and end cells early that are
-        certain to stay synchronous (see `synchain.runtime.sweeps.certify`).
+        Add the transversal exponent of every cell and a verdict on its synchronisation, and end
+        cells early that are certain to stay synchronous (see `synchain.runtime.sweeps.certify`).
     executor : concurrent.futures.Executor, optional
         Runs the blocks in place of threads (docs/scale.md).
     progress : callable, optional
         Is called with a `Progress` after each block.
     **axes : number or sequence
-        Parameters, initial states or settings of the scene.  A number fixes one; a sequence makes it an axis of the sweep,
-        after those of the scene, and replaces an axis of the same name.
+        Parameters, initial states or settings of the scene.  A number fixes one; a sequence makes
+        it an axis of the sweep, after those of the scene, and replaces an axis of the same name.
 
     Returns
     -------
@@ -66,7 +66,8 @@ def run(
     Raises
     ------
     ValueError
-        If an axis is unknown, if `resume` or `reduce` belongs to another scene, or if the sweep does not fit into memory.
+        If an axis is unknown, if `resume` or `reduce` belongs to another scene, or if the sweep
+        does not fit into memory.
     SweepInterrupted
         On Ctrl-C; its `result` has the cells that had finished.
     SweepFailed

@@ -1,4 +1,6 @@
-"""Schedules the blocks of a sweep that are not finished: which can run, and where they go when they have ended."""
+"""Schedules the blocks of a sweep that are not finished: which can run, and where they go when they
+have ended.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,9 @@ class BlockScheduler:
     reporter: Reporter
 
     def run(self, executor: Executor | None) -> None:
-        """Run all blocks that the sink does not have; raises what a worker raises, and KeyboardInterrupt on Ctrl-C."""
+        """Run all blocks that the sink does not have; raises what a worker raises, and
+        KeyboardInterrupt on Ctrl-C.
+        """
         if self.done.all():
             return
         with WorkerPool(self.prepared.job, executor, self.prepared.workers) as pool:

@@ -1,4 +1,6 @@
-"""Runs a scene to a file: blocks go to disk as they end, so a crash loses at most the blocks being computed."""
+"""Runs a scene to a file: blocks go to disk as they end, so a crash loses at most the blocks being
+computed.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,9 @@ __all__ = ["Streamed", "claim", "stream"]
 
 @dataclass(frozen=True, slots=True)
 class Streamed:
-    """A finished run: its file, how its cells ended, and how many have each verdict (certified runs only)."""
+    """A finished run: its file, how its cells ended, and how many have each verdict (certified runs
+    only).
+    """
 
     path: Path
     progress: Progress
@@ -67,8 +71,8 @@ def stream(
 ) -> Streamed:
     """Run every cell of a scene and write its result to a netCDF file, block by block.
 
-    Memory does not grow with the sweep.  Until all cells have ended, their blocks are kept beside `path` in a file
-    ".partial", which `open_result` opens too.
+    Memory does not grow with the sweep.  Until all cells have ended, their blocks are kept beside
+    `path` in a file ".partial", which `open_result` opens too.
 
     Parameters
     ----------
@@ -76,7 +80,8 @@ def stream(
     path : str or path
         File of the result; it ends in .nc by custom.
     resume : bool
-        Go on with a run that was not finished; its result is, byte for byte, that of a run without interruption.
+        Go on with a run that was not finished; its result is, byte for byte, that of a run without
+        interruption.
     overwrite : bool
         Replace what is there already.
     workers, show_progress, width, reduce, certified, executor, progress, **axes
@@ -141,7 +146,8 @@ def claim(
     overwrite: bool = False,
     certified: bool = False,
 ) -> str:
-    """Return what can be done about a result at `path`: "begin", "continue", or nothing because it is "complete".
+    """Return what can be done about a result at `path`: "begin", "continue", or nothing because it
+    is "complete".
 
     Raises
     ------

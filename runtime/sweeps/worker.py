@@ -1,4 +1,6 @@
-"""The worker of a pool that does not share the memory of the main program: it rebuilds jobs and runs their blocks."""
+"""The worker of a pool that does not share the memory of the main program: it rebuilds jobs and
+runs their blocks.
+"""
 
 from __future__ import annotations
 

@@ -1,10 +1,12 @@
-"""The stability of synchronous motion from exponents beside direct simulation, value by value of sigma.
+"""The stability of synchronous motion from exponents beside direct simulation, value by value of
+sigma.
 
-The projection says yes where every transversal exponent is negative by more than two standard errors, no where one is
-positive by more than that.  Where a simulation says otherwise, further simulations look for the reason.
+The projection says yes where every transversal exponent is negative by more than two standard
+errors, no where one is positive by more than that.  Where a simulation says otherwise, further
+simulations look for the reason.
 
-Sources: bubbling: Ashwin, Buescu & Stewart, Phys. Lett. A 193, 126 (1994); mergers by round-off: Pikovsky, Phys. Rev.
-Lett. 73, 2931 (1994).
+Sources: bubbling: Ashwin, Buescu & Stewart, Phys. Lett. A 193, 126 (1994); mergers by round-off:
+Pikovsky, Phys. Rev. Lett. 73, 2931 (1994).
 """
 
 from __future__ import annotations
@@ -46,10 +48,12 @@ NUDGE = 1e-5
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One value of sigma: the largest transversal exponent with its standard error, and what a simulation does.
+    """One value of sigma: the largest transversal exponent with its standard error, and what a
+    simulation does.
 
-    `share` is the part of the starts that synchronised, `error` the median of their mean synchronisation errors; `outcome`
-    is one of OUTCOMES, `cause` one of CAUSES where the two disagree, else empty.
+    `share` is the part of the starts that synchronised, `error` the median of their mean
+    synchronisation errors; `outcome` is one of OUTCOMES, `cause` one of CAUSES where the two
+    disagree, else empty.
     """
 
     sigma: float
@@ -89,10 +93,11 @@ class Agreement:
 
 
 def strengths(graph: Topology, sigma: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Return the strengths alpha = sigma |gamma_k| (sigma, modes) of a graph's distinct transversal modes.
+    """Return the strengths alpha = sigma |gamma_k| (sigma, modes) of a graph's distinct transversal
+    modes.
 
-    A part of the network that nothing couples to the rest has the strength 0.  Raises ValueError for a graph without
-    links, and for eigenvalues that are complex or positive.
+    A part of the network that nothing couples to the rest has the strength 0.  Raises ValueError
+    for a graph without links, and for eigenvalues that are complex or positive.
     """
     spectrum = graph.spectrum
     check_probe(graph, spectrum)
@@ -111,11 +116,29 @@ def agreement(
     show_progress: bool | None = False,
     **parameters: float,
 ) -> Agreement:
-    """Judge synchronisation by exponents and by direct simulation for each sigma; `parameters` override the scene's.
+    """Judge synchronisation by exponents and by direct simulation for each sigma.
 
-    `line` holds the exponents at all `strengths` of the graph (and perhaps others), of the same oscillator and parameters;
-    without it they are computed.  Raises ValueError for a line that lacks a strength, for a sigma that is negative or not
-    finite or does not increase, and as `strengths` does.
+    Parameters
+    ----------
+    scene : Scene
+        The network; its axes and records are not used.
+    sigma : sequence of float
+        Increasing numbers from 0 up.
+    line : Exponents, optional
+        Exponents at all `strengths` of the graph (and perhaps others), of the same oscillator and
+        parameters; by default they are computed.
+    criterion : Criterion, optional
+        When a simulation counts as synchronous.
+    workers, show_progress
+        As for `run`.
+    **parameters : float
+        Override the parameters of the scene.
+
+    Raises
+    ------
+    ValueError
+        If the line lacks a strength, or if sigma is negative, not finite or does not increase; as
+        `strengths` does.
     """
     fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ("sync_error",)}
     scene = with_parameters(agreement, scene, parameters, **fixed)
@@ -123,11 +146,11 @@ def agreement(
     grid = np.atleast_1d(np.asarray(sigma, dtype=float))
     if grid.ndim != 1 or not (np.all(np.isfinite(grid)) and np.all(np.diff(grid) > 0.0) and np.all(grid >= 0.0)):
         raise ValueError("sigma: expected finite numbers from 0 up that increase")
-    judge = Judge(scene, criterion or Criterion(), workers, show_progress)
+    simulation = DirectSimulation(scene, criterion or Criterion(), workers, show_progress)
     alpha = strengths(scene.topology, grid)
     line = line or exponents(scene, np.unique(alpha), workers=workers, show_progress=show_progress)
     places = _places(line, alpha)
-    share, error = judge.simulate(grid)
+    share, error = simulation.simulate(grid)
     projected = [_projected(line.exponent[row], line.stderr[row]) for row in places]
     outcomes = [_outcome(sign, part >= 0.5) for sign, part in zip(projected, share, strict=True)]
     largest = [row[int(np.argmax(line.exponent[row]))] for row in places]
@@ -136,7 +159,7 @@ def agreement(
         for s, k, a, e, words in zip(grid, largest, share, error, outcomes, strict=True)
     ]
     split = [_split(line, row) for row in places]
-    return Agreement(scene, judge.criterion, tuple(_explained(judge, cells, split)))
+    return Agreement(scene, simulation.criterion, tuple(_explained(simulation, cells, split)))
 
 
 def _places(line: Exponents, alpha: np.ndarray) -> np.ndarray:
@@ -151,7 +174,7 @@ def _places(line: Exponents, alpha: np.ndarray) -> np.ndarray:
 
 
 def _projected(exponent: np.ndarray, error: np.ndarray) -> int:
-    """1 where all exponents are surely negative, -1 where one is surely not, else 0."""
+    """1 if all exponents are surely negative, -1 if one is surely not, else 0."""
     if np.all(exponent + 2.0 * error < 0.0):
         return 1
     return -1 if np.any(exponent - 2.0 * error > 0.0) else 0
@@ -166,13 +189,13 @@ def _outcome(projected: int, simulated: bool) -> str:
 
 
 def _split(line: Exponents, places: np.ndarray) -> bool:
-    """True where the synchronous motions of different starts have exponents of different signs."""
+    """True if the synchronous motions of different starts have exponents of different signs."""
     largest = line.by_start[:, places].max(axis=1)
     return bool(largest.min() < 0.0 < largest.max())
 
 
 @dataclass(frozen=True, slots=True)
-class Judge:
+class DirectSimulation:
     """Direct simulation of one scene."""
 
     scene: Scene
@@ -181,7 +204,9 @@ class Judge:
     show_progress: bool | None
 
     def simulate(self, sigma: np.ndarray, longer: float = 1.0, near: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Share of the starts that synchronised and median error (sigma,); `near` starts next to the synchronous state."""
+        """Share of the starts that synchronised and median error (sigma,); `near` starts next to
+        the synchronous state.
+        """
         scene = self.scene
         if near:
             first = {name: np.array(values[:1] * scene.n) for name, values in scene.initial.items()}
@@ -199,22 +224,26 @@ class Judge:
         return sweep.share, sweep.error
 
 
-def _explained(judge: Judge, cells: Sequence[Cell], split: Sequence[bool]) -> list[Cell]:
-    """The cells with causes: disagreements are simulated again, longer, and from next to the synchronous state."""
+def _explained(simulation: DirectSimulation, cells: Sequence[Cell], split: Sequence[bool]) -> list[Cell]:
+    """The cells with causes: disagreements are simulated again, longer, and from next to the
+    synchronous state.
+    """
     made = list(cells)
     odd = [i for i, cell in enumerate(cells) if cell.outcome in OUTCOMES[2:4]]
     if not odd:
         return made
     sigma = np.array([cells[i].sigma for i in odd])
-    longer = judge.simulate(sigma, LONGER)[0]
-    near = judge.simulate(sigma, LONGER, near=True)[0]
+    longer = simulation.simulate(sigma, LONGER)[0]
+    near = simulation.simulate(sigma, LONGER, near=True)[0]
     for i, later, close in zip(odd, longer, near, strict=True):
         made[i] = replace(cells[i], cause=_cause(cells[i], float(later), float(close), split[i]))
     return made
 
 
 def _cause(cell: Cell, longer: float, near: float, split: bool) -> str:
-    """Why a simulation disagrees, from the shares of starts that synchronise after a longer transient and from nearby."""
+    """Why a simulation disagrees, from the shares of starts that synchronise after a longer
+    transient and from nearby.
+    """
     stable = cell.outcome == OUTCOMES[2]
     mixed = 0.0 < cell.share < 1.0 or 0.0 < longer < 1.0
     if not stable and cell.error < MERGED:

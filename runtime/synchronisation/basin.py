@@ -1,8 +1,10 @@
 """Basin stability: the share of random starts from which a network synchronises.
 
-Each start is one throw of a coin, so the share has the exact confidence interval of a binomial proportion.
+Each start is one throw of a coin, so the share has the exact confidence interval of a binomial
+proportion.
 
-Sources: Menck, Heitzig, Marwan & Kurths, Nature Phys. 9, 89 (2013); Clopper & Pearson, Biometrika 26, 404 (1934).
+Sources: Menck, Heitzig, Marwan & Kurths, Nature Phys. 9, 89 (2013); Clopper & Pearson, Biometrika
+26, 404 (1934).
 """
 
 from __future__ import annotations
@@ -38,9 +40,10 @@ SAMPLE_LIMIT = 10_000_000
 class Basin:
     """Which random starts of a scene's network synchronise.
 
-    start (samples, dimension), in the order of the state; error (samples,): mean synchronisation error, infinite where a
-    cell did not finish; status (samples,): how it ended.  A start is synchronous where the error is below `tolerance`.  A
-    cell that did not finish counts among the samples as not synchronous, and `statuses` says how many there are and why.
+    start (samples, dimension), in the order of the state; error (samples,): mean synchronisation
+    error, infinite where a cell did not finish; status (samples,): how it ended.  A start is
+    synchronous where the error is below `tolerance`.  A cell that did not finish counts among the
+    samples as not synchronous, and `statuses` says how many there are and why.
     """
 
     scene: Scene
@@ -72,7 +75,9 @@ class Basin:
 
     @property
     def interval(self) -> Range:
-        """Exact confidence interval of the share among all possible starts, of the level `confidence` or a higher one."""
+        """Exact confidence interval of the share among all possible starts, of the level
+        `confidence` or a higher one.
+        """
         from scipy.stats import binomtest
 
         found = binomtest(self.count, self.samples).proportion_ci(self.confidence, method="exact")
@@ -111,8 +116,8 @@ def basin(
 ) -> Basin:
     """Start a scene's network from random states and count those that synchronise.
 
-    Every oscillator has a state of its own, uniform in `ranges`.  The result depends on the seed and not on the workers, and
-    the first starts of a larger sample are those of a smaller one.
+    Every oscillator has a state of its own, uniform in `ranges`.  The result depends on the seed
+    and not on the workers, and the first starts of a larger sample are those of a smaller one.
 
     Parameters
     ----------
@@ -121,8 +126,8 @@ def basin(
     samples : int
         Number of starts.
     ranges : mapping of str to (float, float), optional
-        Lowest and highest value of a component (default: -1 and 1 for all components); a component that is not named
-        starts as in the scene.
+        Lowest and highest value of a component (default: -1 and 1 for all components); a component
+        that is not named starts as in the scene.
     tolerance : float
         A start is synchronous if its mean synchronisation error over the window is below this.
     transient, window : float
@@ -174,7 +179,9 @@ def _check(scene: Scene, samples: Any, tolerance: Any, confidence: Any, seed: An
 
 
 def _box(scene: Scene, ranges: Mapping[str, Range] | None) -> dict[str, Range]:
-    """The ranges in the order of the components, checked; the mode of a contact follows from the other states."""
+    """The ranges in the order of the components, checked; the mode of a contact follows from the
+    other states.
+    """
     known = tuple(name for name in scene.components if name != SLIP.name)
     if ranges is None:
         return dict.fromkeys(known, (-1.0, 1.0))

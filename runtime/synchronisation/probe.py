@@ -1,10 +1,12 @@
-"""The three-oscillator universal probe: which complex strengths of a mode synchronise, by direct simulation.
+"""The three-oscillator universal probe: which complex strengths of a mode synchronise, by direct
+simulation.
 
-Three cells in a ring with the weights a and b in its two directions have the transversal eigenvalues
-gamma = -(3/2)(a + b) ± i (sqrt(3)/2)(a - b).  With alpha + i beta = -sigma gamma and sigma = 1, a and b are
-alpha/3 ± beta/sqrt(3): the weights reach every point of the complex plane, and a network whose -sigma gamma_k all lie where
-the three synchronise should synchronise too, one-way links included (Fink, Johnson, Carroll, Mar & Pecora, Phys. Rev. E 61,
-5080 (2000)).  a and b are parameters of one kernel, so that a whole plane needs one compilation.
+Three cells in a ring with the weights a and b in its two directions have the transversal
+eigenvalues gamma = -(3/2)(a + b) ± i (sqrt(3)/2)(a - b).  With alpha + i beta = -sigma gamma and
+sigma = 1, a and b are alpha/3 ± beta/sqrt(3): the weights reach every point of the complex plane,
+and a network whose -sigma gamma_k all lie where the three synchronise should synchronise too,
+one-way links included (Fink, Johnson, Carroll, Mar & Pecora, Phys. Rev. E 61, 5080 (2000)).  a and
+b are parameters of one kernel, so that a whole plane needs one compilation.
 """
 
 from __future__ import annotations
@@ -40,9 +42,9 @@ MODE_BETA = sp.Symbol("mode_beta", real=True)
 class Probe:
     """Verdicts of the probe over complex strengths alpha + i beta.
 
-    alpha, beta, error and share have one shape: error is the median over the starts of the mean synchronisation error
-    (infinite where a cell did not finish), share the part of the starts that synchronised.  status (…, starts) says how each
-    cell ended.
+    alpha, beta, error and share have one shape: error is the median over the starts of the mean
+    synchronisation error (infinite where a cell did not finish), share the part of the starts that
+    synchronised.  status (…, starts) says how each cell ended.
     """
 
     scene: Scene
@@ -55,7 +57,9 @@ class Probe:
 
     @property
     def synchronous(self) -> np.ndarray:
-        """True where at least half of the starts synchronised, as in `synchain.runtime.synchronisation.threshold`."""
+        """True if at least half of the starts synchronised, as in
+        `synchain.runtime.synchronisation.threshold`.
+        """
         return self.share >= 0.5
 
 
@@ -77,7 +81,8 @@ def universal_probe(
     scene : Scene
         Oscillator, coupling and parameters; its network, axes, start and sigma are not used.
     alpha, beta : array_like
-        Real and imaginary part of the strengths, broadcast against each other; negative numbers are allowed.
+        Real and imaginary part of the strengths, broadcast against each other; negative numbers are
+        allowed.
     criterion : Criterion, optional
         Starts, tolerance and times, as for `thresholds`.
     workers, executor, show_progress, progress
@@ -91,8 +96,8 @@ def universal_probe(
     Raises
     ------
     ValueError
-        If strengths are missing or not finite, if the scene has no coupling, or if its coupling is not proportional to
-        sigma and to the weight of a link.
+        If strengths are missing or not finite, if the scene has no coupling, or if its coupling is
+        not proportional to sigma and to the weight of a link.
     """
     criterion = checked(criterion)
     real, imaginary = _broadcast(alpha, beta)
@@ -127,11 +132,17 @@ def universal_probe(
 
 
 def ring_of_three(equations: Equations) -> Equations:
-    """Return three nodes in a ring, with links of the weight alpha/3 + beta/sqrt(3) one way and alpha/3 - beta/sqrt(3) back.
+    """Return three nodes in a ring, with links of the weight alpha/3 + beta/sqrt(3) one way and
+    alpha/3 - beta/sqrt(3) back.
 
-    The parameters `mode_alpha` and `mode_beta` take the place of sigma; the weight of a link, 1 or -1, is its direction.
-    Raises ValueError where there is no coupling, where a link is not proportional to sigma and to its weight or does not
-    vanish between equal states, and where the model uses one of the two names itself.
+    The parameters `mode_alpha` and `mode_beta` take the place of sigma; the weight of a link, 1 or
+    -1, is its direction.
+
+    Raises
+    ------
+    ValueError
+        If there is no coupling, if a link is not proportional to sigma and to its weight or does
+        not vanish between equal states, or if the model uses one of the two names itself.
     """
     equations.expect_alike("the three-oscillator probe")
     edge = equations.edge
@@ -153,7 +164,9 @@ def ring_of_three(equations: Equations) -> Equations:
 
 
 def _check_coupling(edge: Edge) -> None:
-    """Prove that a link is sigma times its weight times a function that is zero between equal states."""
+    """Prove that a link is sigma times its weight times a function that is zero between equal
+    states.
+    """
     strength = _sigma(edge)
     if not edge.diffusive:
         raise ValueError("a link acts between equal states, so complete synchronisation is no solution of this network")
@@ -172,7 +185,9 @@ def _sigma(edge: Edge) -> sp.Symbol:
 
 
 def _broadcast(alpha: ArrayLike, beta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """Both parts of the strengths in one shape; ValueError where they have none, are empty or not finite."""
+    """Both parts of the strengths in one shape; ValueError if they have none, are empty or not
+    finite.
+    """
     parts = numbers("alpha", alpha), numbers("beta", beta)
     for part in parts:
         if part.size == 0:
@@ -188,7 +203,9 @@ def _broadcast(alpha: ArrayLike, beta: ArrayLike) -> tuple[np.ndarray, np.ndarra
 
 
 def _rows(planner: Planner, names: tuple[str, ...], alpha: np.ndarray, beta: np.ndarray, criterion: Criterion) -> Plan:
-    """Rows of every strength and start, the starts fastest; a start moves all oscillators alike in the position."""
+    """Rows of every strength and start, the starts fastest; a start moves all oscillators alike in
+    the position.
+    """
     one, scene, starts = planner.rows(np.arange(1)), planner.scene, criterion.starts
     count = len(alpha) * starts
     values = {**scene.parameters, MODE_ALPHA.name: 0.0, MODE_BETA.name: 0.0}

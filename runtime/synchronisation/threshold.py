@@ -1,8 +1,10 @@
-"""Where a network synchronises: probe, projection through the spectrum, and the check by direct simulation.
+"""Where a network synchronises: probe, projection through the spectrum, and the check by direct
+simulation.
 
-The two-oscillator probe tells for which alpha = sigma |gamma| the mode of a network dies out: in its own network the one
-non-zero eigenvalue is -2.  Any other network synchronises where every non-zero |sigma gamma_k| lies in the probe's ranges
-(Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); Fink et al., Phys. Rev. E 61, 5080 (2000)).
+The two-oscillator probe tells for which alpha = sigma |gamma| the mode of a network dies out: in
+its own network the one non-zero eigenvalue is -2.  Any other network synchronises where every
+non-zero |sigma gamma_k| lies in the probe's ranges (Pecora & Carroll, Phys. Rev. Lett. 80, 2109
+(1998); Fink et al., Phys. Rev. E 61, 5080 (2000)).
 """
 
 from __future__ import annotations
@@ -56,10 +58,11 @@ Measure = Callable[[np.ndarray], np.ndarray]
 class Criterion:
     """When a value of sigma counts as synchronous.
 
-    From `starts` different initial states (the scene's own, and copies of it moved as a whole by a random amount of up to
-    `reach` in the position), at least half must end with a mean synchronisation error below `tolerance`, averaged over
-    `window` drive periods after a transient of `transient`.  Near the ends of a range of chaotic motion single starts
-    synchronise or burst by chance; their majority does not depend on one of them.
+    From `starts` different initial states (the scene's own, and copies of it moved as a whole by a
+    random amount of up to `reach` in the position), at least half must end with a mean
+    synchronisation error below `tolerance`, averaged over `window` drive periods after a transient
+    of `transient`.  Near the ends of a range of chaotic motion single starts synchronise or burst
+    by chance; their majority does not depend on one of them.
     """
 
     tolerance: float = 1e-3
@@ -79,7 +82,7 @@ class Criterion:
 
 
 def checked(criterion: Criterion | None) -> Criterion:
-    """The criterion that was given, or the usual one; TypeError where it is none."""
+    """Return the criterion, or the default one for None; TypeError for anything else."""
     if criterion is None:
         return Criterion()
     return instance("criterion", criterion, Criterion, "a Criterion, e.g. Criterion(starts=4)")
@@ -89,8 +92,8 @@ def checked(criterion: Criterion | None) -> Criterion:
 class Sweep:
     """Verdicts of one sweep over sigma (or alpha) and what they rest on.
 
-    x (m,), error (m,): median over the starts of the mean synchronisation error; share (m,): part of the starts that
-    synchronised; intervals: where at least half do, ends refined.
+    x (m,), error (m,): median over the starts of the mean synchronisation error; share (m,): part
+    of the starts that synchronised; intervals: where at least half do, ends refined.
     """
 
     x: np.ndarray = field(repr=False)
@@ -114,7 +117,9 @@ class Thresholds:
     warnings: tuple[str, ...] = field(default=())
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON-ready: {"intervals", "probe", "predicted"}, sigma for the first and last, alpha for the probe."""
+        """JSON-ready: {"intervals", "probe", "predicted"}, sigma for the first and last, alpha for
+        the probe.
+        """
         return {
             "intervals": [list(i) for i in self.direct.intervals],
             "probe": [list(i) for i in self.probe.intervals],
@@ -135,17 +140,19 @@ def thresholds(
     progress: Hook | None = None,
     **parameters: float,
 ) -> Thresholds:
-    """Find where a scene's network synchronises: by the probe, by projection, and by direct simulation.
+    """Find where a scene's network synchronises: by the probe, by projection, and by direct
+    simulation.
 
     Parameters
     ----------
     scene : Scene
         The network; its axes and records are not used.
     sigma : sequence of float, optional
-        An increasing grid on which ranges are looked for (default: `default_grid`); narrower ranges are not seen.  The
-        probe's grid in alpha covers every sigma |gamma|.
+        An increasing grid on which ranges are looked for (default: `default_grid`); narrower ranges
+        are not seen.  The probe's grid in alpha covers every sigma |gamma|.
     resolution : float
-        Ends of ranges are refined to this width in sigma, those of the probe to twice as much in alpha.
+        Ends of ranges are refined to this width in sigma, those of the probe to twice as much in
+        alpha.
     criterion : Criterion, optional
         When a value of sigma counts as synchronous.
     workers, executor, show_progress, progress
@@ -161,8 +168,8 @@ def thresholds(
     Raises
     ------
     ValueError
-        For a network without links, for one-way links whose eigenvalues are complex, for unequal nodes and for links with
-        inertia.
+        For a network without links, for one-way links whose eigenvalues are complex, for unequal
+        nodes and for links with inertia.
     """
     a_scene(scene).equations.expect_alike("thresholds")
     fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ()}
@@ -187,13 +194,17 @@ def thresholds(
 
 
 def default_grid(spectrum: Spectrum, step: float = 0.0025) -> np.ndarray:
-    """Sigma from 0 to where the largest |sigma gamma| is 1.2, in at least 60 steps of at most `step`."""
+    """Return values of sigma from 0 to the one with 1.2 as largest |sigma gamma|, in at least 60
+    steps of at most `step`.
+    """
     highest = 1.2 / max(abs(value) for value in spectrum.values)
     return np.linspace(0.0, highest, max(math.ceil(highest / step), 60) + 1)
 
 
 def _probe_grid(sigma: np.ndarray, spectrum: Spectrum) -> np.ndarray:
-    """Values of alpha that cover sigma |gamma| for every mode, as many as sigma has and at least one every 0.01."""
+    """Values of alpha that cover sigma |gamma| for every mode, as many as sigma has and at least
+    one every 0.01.
+    """
     sizes = [abs(value) for value in spectrum.values if abs(value) > 0.0]
     low = 0.0 if 0.0 in sigma or spectrum.multiplicities[0] > 1 else sigma[0] * min(sizes)
     high = sigma[-1] * max(sizes)
@@ -201,7 +212,7 @@ def _probe_grid(sigma: np.ndarray, spectrum: Spectrum) -> np.ndarray:
 
 
 def check_probe(graph: Topology, spectrum: Spectrum) -> None:
-    """Raise ValueError where the two-oscillator probe says nothing about a network."""
+    """Raise ValueError if the two-oscillator probe says nothing about a network."""
     if graph.n < 2 or not graph.links:
         raise ValueError(f"{graph.name}({graph.n}) has no links; thresholds need at least two coupled oscillators")
     if any(isinstance(value, complex) for value in spectrum.values):
@@ -325,7 +336,7 @@ def judge(measure: Measure, x: np.ndarray, resolution: float, criterion: Criteri
 
 
 def offsets(criterion: Criterion) -> np.ndarray:
-    """How far the starts are moved: not at all, then at random."""
+    """Return how far the starts are moved: not at all, then at random."""
     random = np.random.default_rng(criterion.seed)
     return np.concatenate([[0.0], random.uniform(-criterion.reach, criterion.reach, criterion.starts - 1)])
 
@@ -347,10 +358,12 @@ def cells_of(scene: Scene, sigma: np.ndarray, criterion: Criterion) -> Scene:
 
 
 def project(ranges: Sequence[Interval], spectrum: Spectrum, highest: float = math.inf) -> list[Interval]:
-    """The sigma for which every transversal |sigma gamma_k| lies in one of the ranges of alpha, up to `highest`.
+    """The sigma for which every transversal |sigma gamma_k| lies in one of the ranges of alpha, up
+    to `highest`.
 
-    One zero eigenvalue belongs to the synchronous motion itself.  Every further one is a part of the network that nothing
-    couples to the rest: it asks that alpha = 0 be in a range (identical oscillators that the drive alone locks).
+    One zero eigenvalue belongs to the synchronous motion itself.  Every further one is a part of
+    the network that nothing couples to the rest: it asks that alpha = 0 be in a range (identical
+    oscillators that the drive alone locks).
     """
     allowed: list[Interval] = [(0.0, highest)]
     for value, multiplicity in zip(spectrum.values, spectrum.multiplicities, strict=True):
@@ -362,7 +375,9 @@ def project(ranges: Sequence[Interval], spectrum: Spectrum, highest: float = mat
 
 
 def critical_ratio(spectrum: Spectrum) -> float:
-    """Largest over smallest non-zero |gamma|; a bounded range of alpha must be at least this wide (as a ratio)."""
+    """Largest over smallest non-zero |gamma|; a bounded range of alpha must be at least this wide
+    (as a ratio).
+    """
     sizes = [abs(value) for value in spectrum.values if abs(value) > 0.0]
     return max(sizes) / min(sizes)
 
@@ -370,8 +385,8 @@ def critical_ratio(spectrum: Spectrum) -> float:
 def wu_chua(sigma: float, known: Spectrum, wanted: Spectrum) -> float:
     """Carry the end of a range that starts at zero coupling from one network to another.
 
-    sigma_m gamma_1(m) = sigma_n gamma_1(n), with gamma_1 the eigenvalue of largest modulus where the end is the upper one.
-    Source: Wu & Chua, IEEE Trans. Circuits Syst. I 43, 161 (1996).
+    sigma_m gamma_1(m) = sigma_n gamma_1(n), with gamma_1 the eigenvalue of largest modulus where
+    the end is the upper one. Source: Wu & Chua, IEEE Trans. Circuits Syst. I 43, 161 (1996).
     """
     largest = [max(abs(value) for value in s.values) for s in (known, wanted)]
     return sigma * largest[0] / largest[1]

@@ -1,4 +1,6 @@
-"""Trials: cells whose mean synchronisation error alone is asked for, run in rounds by one kernel on one pool of workers."""
+"""Trials: cells whose mean synchronisation error alone is asked for, run in rounds by one kernel on
+one pool of workers.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,8 @@ Rows = Callable[[np.ndarray], Plan]
 
 
 class Trials:
-    """One compiled kernel and one pool of workers for any number of rounds; a context manager that closes the pool.
+    """One compiled kernel and one pool of workers for any number of rounds; a context manager that
+    closes the pool.
 
     Parameters
     ----------

@@ -193,7 +193,7 @@ def test_the_grid_and_the_rounds_that_refine_its_ends_run_one_kernel():
             show_progress=False,
         )
     assert found.share.tolist() == [0.0, 1.0]
-    assert 0.1 < found.intervals[0][0] < 0.5
+    assert 0.0 < found.intervals[0][0] < 0.5
     assert len(executor.jobs) > 2
     assert all(job is executor.jobs[0] for job in executor.jobs)
 
