@@ -80,8 +80,8 @@ from synchain.runtime.synchronisation.threshold import Criterion  # isort: skip
 
 __all__ = ["SCENES", "Picture", "camera", "compare", "take"]
 
-WIDTH, PAIR_WIDTH = 4, 8
-"""Lanes of every sweep, and of the friction pair, whose kernel other tests have too where registers are as wide."""
+WIDTH = 4
+"""Lanes of every sweep; tests/runtime/cells/test_determinism.py has the kernel of the friction pair too."""
 
 ALL = ("sync_error", "section", "trajectory")
 LONGEST = 200
@@ -220,9 +220,9 @@ def _words(value: Any) -> str:
 # -- what is seen of a scene -----------------------------------------------------------------------------------
 
 
-def simulated(given: Scene, width: int = WIDTH, **options: Any) -> Quantities:
+def simulated(given: Scene, **options: Any) -> Quantities:
     """A sweep: what it found, what it left out, and the texts of its equations."""
-    found = run(given, width=width, workers=1, show_progress=False, **options)
+    found = run(given, width=WIDTH, workers=1, show_progress=False, **options)
     seen: Quantities = {"message": found.message, "left out": found.data.attrs["skipped"], "parts": _parts(found.scene)}
     counts = ("steps", "rejected", "periods_skipped")
     for name, values in found.data.data_vars.items():
@@ -289,43 +289,37 @@ def pair(**given: Any) -> Scene:
 
 @scene("friction pair, grid of sigma and omega")
 def _() -> Quantities:
-    return simulated(pair(), sigma=[0.05, 0.2, 0.45], omega=[1.15, 1.4], width=PAIR_WIDTH)
+    return simulated(pair(), sigma=[0.05, 0.2, 0.45], omega=[1.15, 1.4])
 
 
 @scene("friction pair, zipped axes")
 def _() -> Quantities:
-    return simulated(pair(zipped=True, axes={"sigma": [0.1, 0.3], "x_1": [0.2, -0.1]}), width=PAIR_WIDTH)
+    return simulated(pair(zipped=True, axes={"sigma": [0.1, 0.3], "x_1": [0.2, -0.1]}))
 
 
 @scene("friction pair, continued upwards")
 def _() -> Quantities:
-    return simulated(
-        pair(continuation="up", axes={"sigma": [0.05, 0.1, 0.2]}, parameters={"omega": 1.55}), width=PAIR_WIDTH
-    )
+    return simulated(pair(continuation="up", axes={"sigma": [0.05, 0.1, 0.2]}, parameters={"omega": 1.55}))
 
 
 @scene("friction pair, continued downwards")
 def _() -> Quantities:
-    return simulated(
-        pair(continuation="down", axes={"omega": [1.3, 1.35, 1.4]}, parameters={"sigma": 0.12}), width=PAIR_WIDTH
-    )
+    return simulated(pair(continuation="down", axes={"omega": [1.3, 1.35, 1.4]}, parameters={"sigma": 0.12}))
 
 
 @scene("friction pair without drive, as it stands")
 def _() -> Quantities:
-    return simulated(pair(parameters={"u": 0, "sigma": 0.1}), reduce=False, width=PAIR_WIDTH)
+    return simulated(pair(parameters={"u": 0, "sigma": 0.1}), reduce=False)
 
 
 @scene("friction pair, too few steps")
 def _() -> Quantities:
-    return simulated(pair(max_steps=40), sigma=[0.1, 0.2], width=PAIR_WIDTH)
+    return simulated(pair(max_steps=40), sigma=[0.1, 0.2])
 
 
 @scene("friction pair, random starts")
 def _() -> Quantities:
-    return simulated(
-        pair(initial={"x": {"low": -0.4, "high": 0.4, "seed": 7}, "v": [0.1, -0.1]}), sigma=[0.1, 0.2], width=PAIR_WIDTH
-    )
+    return simulated(pair(initial={"x": {"low": -0.4, "high": 0.4, "seed": 7}, "v": [0.1, -0.1]}), sigma=[0.1, 0.2])
 
 
 @scene("friction pair, folded drive and coupling", long=True)
@@ -335,7 +329,7 @@ def _() -> Quantities:
 
 @scene("friction pair, certified")
 def _() -> Quantities:
-    return simulated(pair(transient=20.0), sigma=[0.02, 0.3], certified=True, width=PAIR_WIDTH)
+    return simulated(pair(transient=20.0), sigma=[0.02, 0.3], certified=True)
 
 
 @scene("friction, ring of six that moves as two", long=True)
@@ -532,7 +526,7 @@ def balance(given: Scene) -> Quantities:
 # -- results on disk -------------------------------------------------------------------------------------------
 
 
-@scene("friction pair, streamed to a file", long=True)
+@scene("friction pair, streamed to a file")
 def _() -> Quantities:
     with tempfile.TemporaryDirectory() as folder:
         path, again = Path(folder) / "streamed.nc", Path(folder) / "saved.nc"

@@ -101,7 +101,7 @@ class Integrator:
     @property
     def implicit(self) -> bool:
         """True for a Rosenbrock method, whose stages solve linear systems with the Jacobian."""
-        return self.kind is IntegratorKind.ROSENBROCK
+        return self.kind == IntegratorKind.ROSENBROCK
 
     @property
     def stages(self) -> int:
