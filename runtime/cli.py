@@ -1,4 +1,6 @@
-"""The command `synchain`: finds the command, runs it, and turns every error into a sentence and an exit code."""
+"""The command `synchain`: finds the command, runs it, and turns every error into a sentence and an
+exit code.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +68,9 @@ def _negative_values(words: Sequence[str]) -> list[str]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run `synchain` with these words (default: the command line's) and return its exit code, 0, 1 or 2."""
+    """Run `synchain` with these words (default: the command line's) and return its exit code, 0, 1
+    or 2.
+    """
     words = list(sys.argv[1:] if argv is None else argv)
     name = f"synchain {words[0]}" if words and words[0] in names() else "synchain"
     _readable(sys.stdout)

@@ -1,7 +1,8 @@
 """The commands of `synchain`, one file each.
 
-A command has SUMMARY (one line), EXAMPLES (command lines), `configure(parser)` and `execute(arguments) -> exit code`.
-It imports what it needs when it runs, so that `synchain --help` is fast.
+A command has SUMMARY (one line), EXAMPLES (command lines), `configure(parser)` and
+`execute(arguments) -> exit code`. It imports what it needs when it runs, so that `synchain --help`
+is fast.
 """
 
 from __future__ import annotations

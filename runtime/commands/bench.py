@@ -26,7 +26,9 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Run the benchmarks one after the other and print a Markdown table of each; with a folder, write files as well."""
+    """Run the benchmarks one after the other and print a Markdown table of each; with a folder,
+    write files as well.
+    """
     from ..bench import load, machine, text, write
     from ..bench import names as known
     from ..support.files import output_folder

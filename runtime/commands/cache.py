@@ -15,7 +15,7 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         "action",
         choices=("info", "clear"),
-        help="info: folder, number of kernels and size; clear: delete the kernels, which are compiled again when needed",
+        help="info: folder, number of kernels and size; clear: delete the kernels; they are compiled again when needed",
     )
 
 

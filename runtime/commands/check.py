@@ -124,11 +124,17 @@ def _problems(line: Sequence[Verdict]) -> list[str]:
 
 def _as_dict(line: Sequence[Verdict]) -> dict[str, Any]:
     graphs = [
-        {"topology": v.claim.graph.name, "n": v.claim.graph.n, "options": dict(v.claim.graph.options),
-         "right": v.right, "proved": v.proved, "problems": list(v.problems),
-         "expected": v.expected}
+        {
+            "topology": v.claim.graph.name,
+            "n": v.claim.graph.n,
+            "options": dict(v.claim.graph.options),
+            "right": v.right,
+            "proved": v.proved,
+            "problems": list(v.problems),
+            "expected": v.expected,
+        }
         for v in line
-    ]  # fmt: skip
+    ]
     first = line[0].claim
     return {"line": first.line, "claim": first.text, "right": all(v.right for v in line), "graphs": graphs}
 

@@ -183,7 +183,8 @@ def _nothing_to_do(target: Path) -> int:
 
 @contextmanager
 def stopped_by_signals() -> Iterator[None]:
-    """SIGTERM, with which batch systems announce the end, and SIGHUP of a closed terminal stop like Ctrl-C.
+    """SIGTERM, with which batch systems announce the end, and SIGHUP of a closed terminal stop like
+    Ctrl-C.
 
     A signal that is ignored (nohup) stays so.
     """

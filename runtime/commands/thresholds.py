@@ -49,7 +49,7 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--quick",
         action="store_true",
-        help=f"defaults of {QUICK['starts']} starts, {QUICK['transient']:g} periods and half the grid; ends to {COARSE:g}",
+        help=f"defaults of {QUICK['starts']} starts, {QUICK['transient']:g} periods, half the grid; ends to {COARSE:g}",
     )
     parser.add_argument("--json", action="store_true", help="print JSON: intervals, probe, predicted, warnings")
     add_allow_code(parser)
@@ -131,7 +131,9 @@ def report(found: Thresholds, criterion: Criterion) -> str:
 
 
 def _wu_chua(found: Thresholds) -> list[tuple[str, str]]:
-    """The conjecture's row, where the probe's first range starts at no coupling and ends on the grid."""
+    """The conjecture's row, where the probe's first range starts at no coupling and ends on the
+    grid.
+    """
     from synchain.models.graphs.families import topology
 
     from ..synchronisation.threshold import wu_chua

@@ -1,4 +1,6 @@
-"""The frequency of the drive on the command line: set by `--omega`, whatever the model calls it, and told in reports."""
+"""The frequency of the drive on the command line: set by `--omega`, whatever the model calls it,
+and told in reports.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +15,12 @@ __all__ = ["at_frequency", "drive_words"]
 
 
 def at_frequency(scene: Scene, omega: float | None, where: str | None) -> dict[str, float]:
-    """The parameter that puts the drive of a scene at the frequency `omega` of the arguments, none if that is None.
+    """The parameter that puts the drive of a scene at the frequency `omega` of the arguments, none
+    if that is None.
 
-    Raises WrongUse if the scene of the file `where` has no drive whose frequency is a parameter, and without `omega` if an
-    axis of the scene moves the frequency or there is neither a file nor `omega`.
+    Raises WrongUse if the scene of the file `where` has no drive whose frequency is a parameter,
+    and without `omega` if an axis of the scene moves the frequency or there is neither a file nor
+    `omega`.
     """
     frequency = scene.drive.frequency
     if omega is not None:

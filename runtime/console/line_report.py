@@ -1,4 +1,6 @@
-"""What the exponents on a line of real strengths say about a scene's network: as text, as JSON, and as files."""
+"""What the exponents on a line of real strengths say about a scene's network: as text, as JSON, and
+as files.
+"""
 
 from __future__ import annotations
 
@@ -33,15 +35,17 @@ GRID_ENDS = "undecided: the function is negative where the grid of alpha ends"
 
 
 def complex_modes(graph: Topology, highest: float) -> list[str]:
-    """A sentence where a network has complex eigenvalues, so that a line of real strengths says nothing about it."""
+    """A sentence where a network has complex eigenvalues, so that a line of real strengths says
+    nothing about it.
+    """
     gammas = [complex(mode.eigenvalue.value) for mode in transversal(graph)]
     slopes = [abs(g.imag / g.real) for g in gammas if g.imag and g.real]
     if not any(g.imag for g in gammas):
         return []
     top = max(slopes, default=1.0) * highest
     return [
-        f"{graph.name}({graph.n}) has complex eigenvalues, for which a line of alpha says nothing; no windows of sigma are "
-        f"given: add --beta, e.g. --beta 0:{top:.2g}:61"
+        f"{graph.name}({graph.n}) has complex eigenvalues, for which a line of alpha says nothing; "
+        f"no windows of sigma are given: add --beta, e.g. --beta 0:{top:.2g}:61"
     ]
 
 
@@ -59,7 +63,9 @@ class LineReport:
 
     @property
     def verdict(self) -> tuple[str, Verdict]:
-        """Whether the network can synchronise, in words that mind the ends of the grid, and what that rests on."""
+        """Whether the network can synchronise, in words that mind the ends of the grid, and what
+        that rests on.
+        """
         graph, ranges = self.found.scene.topology, list(self.found.intervals)
         given = verdict(ranges, graph, self.found.errors)
         line = self.found.fine.alpha
@@ -68,7 +74,9 @@ class LineReport:
         return (given.answer if further.answer == given.answer else GRID_ENDS), given
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON-ready: MSF.as_dict, "windows" and "verdict"; null where a number is not finite or there is no network."""
+        """JSON-ready: MSF.as_dict, "windows" and "verdict"; null where a number is not finite or
+        there is no network.
+        """
         seen: dict[str, Any] = {**self.found.as_dict(), "windows": None, "verdict": None}
         if self.judged:
             answer, given = self.verdict

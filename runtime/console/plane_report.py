@@ -1,4 +1,6 @@
-"""What the exponents over complex strengths say about a scene's network: as text, as JSON, and as files."""
+"""What the exponents over complex strengths say about a scene's network: as text, as JSON, and as
+files.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ class PlaneReport:
     network: bool
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON-ready: Plane.as_dict and "windows"; null where a number is not finite or there is no network."""
+        """JSON-ready: Plane.as_dict and "windows"; null where a number is not finite or there is no
+        network.
+        """
         seen: dict[str, Any] = {**self.found.as_dict(), "windows": None}
         if self.network:
             seen["windows"] = [window_dict(window) for window in plane_windows(self.found)]
@@ -40,7 +44,10 @@ class PlaneReport:
         found = self.found
         alpha, beta = found.alpha, found.beta
         contours = [
-            f"alpha {line[:, 0].min():.4f} … {line[:, 0].max():.4f}, beta {line[:, 1].min():.4f} … {line[:, 1].max():.4f}"
+            ", ".join(
+                f"{name} {part.min():.4f} … {part.max():.4f}"
+                for name, part in zip(("alpha", "beta"), line.T, strict=True)
+            )
             for line in found.contours
         ]
         rows = [
@@ -63,7 +70,9 @@ class PlaneReport:
         return "\n".join(lines)
 
     def write(self, folder: Path) -> list[Path]:
-        """Write plane.csv and plane.png, with the rays of the network and dots at the scene's sigma."""
+        """Write plane.csv and plane.png, with the rays of the network and dots at the scene's
+        sigma.
+        """
         from ..figures.plane import draw_plane, draw_rays, table
 
         def draw(axes: Any) -> None:
@@ -75,9 +84,11 @@ class PlaneReport:
 
 
 def plane_windows(found: Plane) -> tuple[Window, ...]:
-    """The windows of sigma in which every mode of the scene's network lies where the plane is negative.
+    """The windows of sigma in which every mode of the scene's network lies where the plane is
+    negative.
 
-    Between the strengths of the plane the exponent is interpolated; what lies outside counts as unstable.
+    Between the strengths of the plane the exponent is interpolated; what lies outside counts as
+    unstable.
     """
     from scipy.interpolate import RegularGridInterpolator
 
@@ -97,7 +108,9 @@ def plane_windows(found: Plane) -> tuple[Window, ...]:
 
 
 def _leaves(found: Plane, unit: complex) -> float:
-    """The sigma at which a mode leaves the plane; just inside, so that rounding does not put it out."""
+    """The sigma at which a mode leaves the plane; just inside, so that rounding does not put it
+    out.
+    """
     reach = max(-found.beta[0], found.beta[-1]) if found.beta[0] < 0 else found.beta[-1]
     edge = found.alpha[-1] if unit.real > 0 else -found.alpha[0]
     limits = [edge / abs(unit.real)] if unit.real else []

@@ -120,7 +120,9 @@ def write_files(folder: Path, name: str, numbers: Any, draw: Any) -> list[Path]:
 
 
 def defective_rows(graph: Topology) -> list[tuple[str, str]]:
-    """A row for each eigenvalue that lacks eigenvectors: how its errors go while its exponent is lambda."""
+    """A row for each eigenvalue that lacks eigenvectors: how its errors go while its exponent is
+    lambda.
+    """
     rows = []
     for e in graph.spectrum.defective:
         power = e.blocks[0][0] - 1 if e.blocks else 0

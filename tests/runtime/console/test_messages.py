@@ -1,4 +1,6 @@
-"""Words for the user: lines while something compiles, hints, limits before memory is taken, names as formulas."""
+"""Words for the user: lines while something compiles, hints, limits before memory is taken, names
+as formulas.
+"""
 
 from __future__ import annotations
 
@@ -75,9 +77,11 @@ def test_names_have_one_subscript(name, written, indexed):
 
 @pytest.mark.parametrize(
     ("words", "expected"),
-    [("--symbolic --matrix {file} --value a", "--value: found 'a'; expected NAME=NUMBER, e.g. a=1/2"),
-     ("circulant 9 --option a", "--option: found 'a'; expected NAME=VALUE, e.g. offsets=1,3")],
-)  # fmt: skip
+    [
+        ("--symbolic --matrix {file} --value a", "--value: found 'a'; expected NAME=NUMBER, e.g. a=1/2"),
+        ("circulant 9 --option a", "--option: found 'a'; expected NAME=VALUE, e.g. offsets=1,3"),
+    ],
+)
 def test_a_hint_shows_the_option_that_was_used(words, expected, tmp_path, capsys):
     (tmp_path / "S.txt").write_text("a -a\n-b b\n")
     assert main(["spectrum", *words.format(file=tmp_path / "S.txt").split()]) == 2
@@ -95,8 +99,13 @@ def test_a_sweep_that_does_not_fit_is_refused_before_memory_is_taken(monkeypatch
     with pytest.raises(ValueError, match=r"1000000000 cells, 112 GB in memory; expected at most 8 GB; .* with stream"):
         sweep._fits(scene, 4)
     sweep._fits(PAIR.replace(axes={name: values[:400] for name, values in LARGE.items()}), 4)
-    monkeypatch.setattr(sweep, "prepare", lambda given, *rest: SimpleNamespace(
-        shop=SimpleNamespace(recipe=SimpleNamespace(chosen=decide(given, skip=False)), samples=0)))  # fmt: skip
+    monkeypatch.setattr(
+        sweep,
+        "prepare",
+        lambda given, *rest: SimpleNamespace(
+            shop=SimpleNamespace(recipe=SimpleNamespace(chosen=decide(given, skip=False)), samples=0)
+        ),
+    )
     with pytest.raises(ValueError, match="expected at most 8 GB"):
         run(scene)
     with pytest.raises(ValueError, match="found 1000000000, expected at most 10000000"):
