@@ -13,7 +13,6 @@ import warnings
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from types import ModuleType
 from typing import Any, NoReturn
 
 from synchain.codegen.kernels.installation import InstallationError
@@ -21,7 +20,7 @@ from synchain.codegen.kernels.installation import InstallationError
 from .commands import command, names
 from .console.outcome import FAILED, FINE, WRONG_USE, Failed, WrongUse, discard_output, sentence, wrong_use
 
-__all__ = ["main"]
+__all__ = ["main", "parser"]
 
 ABOUT = "Networks of coupled oscillators: exact equations and spectra, generated kernels, sweeps, thresholds, figures."
 EXAMPLES = (
@@ -108,9 +107,8 @@ def _dispatch(words: list[str]) -> int:
         module = command(first)
     except ValueError as problem:
         raise WrongUse(f"{problem}\nsee: synchain --help") from None
-    parser = _parser(first, module)
     try:
-        arguments = parser.read(rest)
+        arguments = parser(first).read(rest)
     except SystemExit:  # --help has been printed
         return FINE
     arguments.command_line = ("synchain", *words)
@@ -122,16 +120,18 @@ def _dispatch(words: list[str]) -> int:
     return int(module.execute(arguments))
 
 
-def _parser(name: str, module: ModuleType) -> Parser:
-    parser = Parser(
+def parser(name: str) -> Parser:
+    """Return the parser of a command; ValueError if there is none of this name."""
+    module = command(name)
+    reader = Parser(
         prog=f"synchain {name}",
         description=f"{module.SUMMARY[0].upper()}{module.SUMMARY[1:]}.",
         epilog=_examples(module.EXAMPLES),
         formatter_class=RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    module.configure(parser)
-    return parser
+    module.configure(reader)
+    return reader
 
 
 def _help() -> str:
