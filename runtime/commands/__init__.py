@@ -16,7 +16,7 @@ __all__ = ["command", "names"]
 
 def names() -> tuple[str, ...]:
     """All commands: the files of this folder, sorted."""
-    return tuple(sorted(found.name for found in iter_modules(__path__) if not found.name.startswith("_")))
+    return tuple(sorted(module.name for module in iter_modules(__path__) if not module.name.startswith("_")))
 
 
 def command(name: str) -> ModuleType:

@@ -21,7 +21,7 @@ def execute(arguments: Namespace) -> int:
     rows = [(name, family(name)) for name in names()]
     wide = max(len(name) for name, _ in rows)
     for name, module in rows:
-        chosen = ", ".join(defaults(module))
-        more = f"; options: {chosen}" if chosen else ""
+        options = ", ".join(defaults(module))
+        more = f"; options: {options}" if options else ""
         print(f"{name:<{wide}}  {module.SUMMARY}, {module.MINIMUM} or more nodes{more}")
     return FINE

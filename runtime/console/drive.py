@@ -1,6 +1,4 @@
-"""The frequency of the drive on the command line: set by `--omega`, whatever the model calls it,
-and told in reports.
-"""
+"""The frequency of the drive on the command line: set by `--omega`, and named in reports."""
 
 from __future__ import annotations
 

@@ -227,17 +227,17 @@ def test_where_the_grid_ends_no_mode_is_lost_and_no_is_not_said() -> None:
     scene = Scene(topology=chain(4))
     cut = LineReport(function(scene, end=0.4), True)
     assert cut.verdict[0] == GRID_ENDS
-    assert cut.found.windows == ()
+    assert cut.function.windows == ()
     assert "0.1000 ± 0.0020 … 0.4..." in cut.text()
     pair = LineReport(function(Scene(topology=chain(2)), end=0.4), True)
     assert pair.verdict[0] == "yes"
-    (window,) = pair.found.windows
+    (window,) = pair.function.windows
     assert window.low_mode is not None
     assert window.high_mode is None
     assert "0.2000..." in pair.text()
     assert LineReport(function(scene), True).verdict[0] == "yes"
     assert LineReport(function(scene, high=0.3), True).verdict[0] == "no"
-    assert LineReport(function(scene, low=-0.1), True).found.windows[0].low == 0.0
+    assert LineReport(function(scene, low=-0.1), True).function.windows[0].low == 0.0
 
 
 def test_windows_in_python_are_those_of_the_command() -> None:
@@ -259,7 +259,7 @@ def test_a_ratio_within_the_error_is_undecided() -> None:
 
 def test_numbers_that_are_not_finite_are_null_in_json() -> None:
     report = LineReport(function(Scene(topology=chain(3)), error=math.inf), True)
-    report.found.fine.exponent[60] = -math.inf
+    report.function.fine.exponent[60] = -math.inf
     found = report.as_dict()
     assert found["exponent"][60] is None
     assert set(found["stderr"]) == {None}
