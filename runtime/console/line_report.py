@@ -1,13 +1,10 @@
-"""What the exponents on a line of real strengths say about a scene's network: as text, as JSON, and
-as files.
-"""
+"""Report on a master stability function over real strengths: text, JSON, files."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -35,8 +32,19 @@ GRID_ENDS = "undecided: the function is negative where the grid of alpha ends"
 
 
 def complex_modes(graph: Topology, highest: float) -> list[str]:
-    """A sentence where a network has complex eigenvalues, so that a line of real strengths says
-    nothing about it.
+    """Return warnings if a network has complex eigenvalues: a line of alpha does not serve them.
+
+    Parameters
+    ----------
+    graph : Topology
+        The network.
+    highest : float
+        Largest alpha of the line, from which a range of beta is proposed.
+
+    Returns
+    -------
+    list of str
+        One sentence; none if all eigenvalues are real.
     """
     gammas = [complex(mode.eigenvalue.value) for mode in transversal(graph)]
     slopes = [abs(g.imag / g.real) for g in gammas if g.imag and g.real]
@@ -51,21 +59,27 @@ def complex_modes(graph: Topology, highest: float) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class LineReport:
-    """The function on a line; `network` where the scene has one to be judged."""
+    """A master stability function over real strengths and what it says about a network.
+
+    Attributes
+    ----------
+    function : MSF
+        The exponents on a line of alpha.
+    network : bool
+        Whether the scene has a network to be judged.
+    """
 
     function: MSF
     network: bool
 
     @property
     def judged(self) -> bool:
-        """True where there is a network with real eigenvalues."""
+        """True if there is a network with real eigenvalues."""
         return self.network and not complex_modes(self.function.scene.topology, 1.0)
 
     @property
     def verdict(self) -> tuple[str, Verdict]:
-        """Whether the network can synchronise, in words that mind the ends of the grid, and what
-        that rests on.
-        """
+        """The answer in words that consider the ends of the grid, and the verdict."""
         graph, ranges = self.function.scene.topology, list(self.function.intervals)
         judgement = verdict(ranges, graph, self.function.errors)
         line = self.function.fine.alpha
@@ -73,11 +87,12 @@ class LineReport:
         further = verdict(open_ranges, graph, self.function.errors)
         return (judgement.answer if further.answer == judgement.answer else GRID_ENDS), judgement
 
-    def as_dict(self) -> dict[str, Any]:
-        """JSON-ready: MSF.as_dict, "windows" and "verdict"; null where a number is not finite or
-        there is no network.
+    def as_dict(self) -> dict[str, object]:
+        """Return MSF.as_dict, "windows" and "verdict" in JSON types.
+
+        A number that is not finite is null; so are windows and verdict without a network.
         """
-        report: dict[str, Any] = {**self.function.as_dict(), "windows": None, "verdict": None}
+        report: dict[str, object] = {**self.function.as_dict(), "windows": None, "verdict": None}
         if self.judged:
             answer, judgement = self.verdict
             report["windows"] = [window_dict(window) for window in self.function.windows]
@@ -89,10 +104,10 @@ class LineReport:
                 "slowest": exact(judgement.slowest),
                 "fastest": exact(judgement.fastest),
             }
-        return dict(finite(report))
+        return {name: finite(value) for name, value in report.items()}
 
     def text(self) -> str:
-        """The report as lines."""
+        """Return the report as lines of text."""
         function, line = self.function, self.function.fine.alpha
         ranges = [
             f"{measured(low, a, low == line[0])} … {measured(high, b, high == line[-1])}"
@@ -128,7 +143,7 @@ class LineReport:
         return [title, *rows_of([*rows, ("possible", answer), *defective_rows(graph)])]
 
     def write(self, folder: Path) -> list[Path]:
-        """Write msf.csv and msf.png."""
+        """Write msf.csv and msf.png to a folder and return their paths."""
         from ..figures.exponent import draw_exponent
         from ..figures.tables import Table
 

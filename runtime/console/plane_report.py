@@ -1,13 +1,11 @@
-"""What the exponents over complex strengths say about a scene's network: as text, as JSON, and as
-files.
-"""
+"""Report on a master stability function over complex strengths: text, JSON, files."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +15,9 @@ from ..prediction.synchronisability import Window
 from ..stability.msf import Plane
 from .words import defective_rows, finite, headline, how, rows_of, window_dict, window_text, write_files
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 __all__ = ["PlaneReport", "plane_windows"]
 
 STEPS = 2001
@@ -25,22 +26,31 @@ STEPS = 2001
 
 @dataclass(frozen=True, slots=True)
 class PlaneReport:
-    """The function over a plane; `network` where the scene has one to be judged."""
+    """A master stability function over complex strengths and what it says about a network.
+
+    Attributes
+    ----------
+    plane : Plane
+        The exponents over alpha + i beta.
+    network : bool
+        Whether the scene has a network to be judged.
+    """
 
     plane: Plane
     network: bool
 
-    def as_dict(self) -> dict[str, Any]:
-        """JSON-ready: Plane.as_dict and "windows"; null where a number is not finite or there is no
-        network.
+    def as_dict(self) -> dict[str, object]:
+        """Return Plane.as_dict and "windows" in JSON types.
+
+        A number that is not finite is null; so are the windows without a network.
         """
-        report: dict[str, Any] = {**self.plane.as_dict(), "windows": None}
+        report: dict[str, object] = {**self.plane.as_dict(), "windows": None}
         if self.network:
             report["windows"] = [window_dict(window) for window in plane_windows(self.plane)]
-        return dict(finite(report))
+        return {name: finite(value) for name, value in report.items()}
 
     def text(self) -> str:
-        """The report as lines."""
+        """Return the report as lines of text."""
         plane = self.plane
         alpha, beta = plane.alpha, plane.beta
         contours = [
@@ -70,12 +80,10 @@ class PlaneReport:
         return "\n".join(lines)
 
     def write(self, folder: Path) -> list[Path]:
-        """Write plane.csv and plane.png, with the rays of the network and dots at the scene's
-        sigma.
-        """
+        """Write plane.csv and plane.png with the rays of the network; dots mark sigma."""
         from ..figures.plane import draw_plane, draw_rays, table
 
-        def draw(axes: Any) -> None:
+        def draw(axes: Axes) -> None:
             draw_plane(axes, self.plane)
             if self.network:
                 draw_rays(axes, self.plane, self.plane.scene.parameters.get("sigma") or None)
@@ -84,11 +92,19 @@ class PlaneReport:
 
 
 def plane_windows(plane: Plane) -> tuple[Window, ...]:
-    """The windows of sigma in which every mode of the scene's network lies where the plane is
-    negative.
+    """Return the windows of sigma in which all modes of the network are stable.
 
-    Between the strengths of the plane the exponent is interpolated; what lies outside counts as
-    unstable.
+    The exponent is interpolated between the strengths of the plane; outside it counts as unstable.
+
+    Parameters
+    ----------
+    plane : Plane
+        Exponents (alpha, beta) of a scene with a network.
+
+    Returns
+    -------
+    tuple of Window
+        Windows with the modes that are lost at their ends.
     """
     from scipy.interpolate import RegularGridInterpolator
 
@@ -108,9 +124,7 @@ def plane_windows(plane: Plane) -> tuple[Window, ...]:
 
 
 def _leaves(plane: Plane, unit: complex) -> float:
-    """The sigma at which a mode leaves the plane; just inside, so that rounding does not put it
-    out.
-    """
+    """The sigma at which a mode leaves the plane, reduced by a rounding error."""
     reach = max(-plane.beta[0], plane.beta[-1]) if plane.beta[0] < 0 else plane.beta[-1]
     edge = plane.alpha[-1] if unit.real > 0 else -plane.alpha[0]
     limits = [edge / abs(unit.real)] if unit.real else []
