@@ -1,4 +1,5 @@
-"""From equations to machine code: text of one step, whole kernel modules, their compilation, and exports.
+"""From equations to machine code: text of one step, whole kernel modules, their compilation, and
+exports.
 
 Glossary
 --------

@@ -1,14 +1,14 @@
 """From a Lagrangian and a graph to exact equations and exact spectra.
 
-Names are loaded on first use, so that importing this package costs next to nothing.  Every file of the
-folder `topologies` is offered as a function of the number of nodes and of its options:
+Names are loaded on first use, so that importing this package costs next to nothing. Every file of
+the folder `topologies` is offered as a function of the number of nodes and of its options:
 ``circulant(10, offsets=(1, 3))`` is ``topology("circulant", 10, offsets=(1, 3))``.
 
 Glossary
 --------
 node, link    An oscillator of a network; what node j does to node i, with an exact weight.
-kind          Nodes of one kind have the same oscillator, friction law and contact, hence one set of equations.
-topology      Number of nodes and weighted links: adjacency minus degree is the connectivity matrix G.
+kind          Nodes of one kind have the same oscillator, friction law and contact, and equations.
+topology      Nodes and weighted links; adjacency minus degree is the connectivity matrix G.
 family        A rule that makes the topology of any number of nodes: chain, ring, star.
 spectrum      The exact eigenvalues γ of G with their multiplicities; largest first, the first is 0.
 coupling      Energy or dissipation of a link, or a matrix between states; its strength is σ.

@@ -6,13 +6,14 @@ Glossary
 --------
 cell          One point of the axes of a scene: one initial-value problem with a status of its own.
 row           The numbers of one cell as a kernel takes them: parameters, initial states, span.
-span          Of one cell: the ends of its window, its period, and the error from which it is synchronous.
+span          Of one cell: the ends of its window, its period, and the error of a synchronous cell.
 block         Cells that are run, stored and resumed as one piece.
-lane          One of the numbers in a SIMD register; each lane of a kernel integrates a cell of its own.
+lane          One of the numbers in a SIMD register; each lane integrates a cell of its own.
 transient     Time that is integrated before anything is recorded; the window follows it.
-strength      α = -σγ, real or complex: what one eigenvalue γ of the network feels of the coupling σ.
-mode          A deviation from synchrony along an eigenvector of the network; it grows with its exponent.
-interval      A range of strengths with negative exponent; a window of σ has every mode in one of these.
+strength      α = -σγ, real or complex, of an eigenvalue γ of the network and the coupling σ.
+mode          A deviation from synchrony along an eigenvector of the network.
+interval      A range of strengths with negative exponent.
+window        Of a run: the time that is recorded. Of σ: a range in which every mode dies out.
 verdict       Whether and where a network synchronises, decided from the intervals and the spectrum.
 probe         Two or three oscillators whose simulation stands for a mode of any network.
 certificate   Exponents and verdict of the synchronous state of each cell of a sweep.

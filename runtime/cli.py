@@ -1,4 +1,6 @@
-"""The command `synchain`: finds the command, runs it, and turns every error into a sentence and an exit code."""
+"""The command `synchain`: finds the command, runs it, and turns every error into a sentence and an
+exit code.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,6 @@ import warnings
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from types import ModuleType
 from typing import Any, NoReturn
 
 from synchain.codegen.kernels.installation import InstallationError
@@ -19,7 +20,7 @@ from synchain.codegen.kernels.installation import InstallationError
 from .commands import command, names
 from .console.outcome import FAILED, FINE, WRONG_USE, Failed, WrongUse, discard_output, sentence, wrong_use
 
-__all__ = ["main"]
+__all__ = ["main", "parser"]
 
 ABOUT = "Networks of coupled oscillators: exact equations and spectra, generated kernels, sweeps, thresholds, figures."
 EXAMPLES = (
@@ -66,7 +67,9 @@ def _negative_values(words: Sequence[str]) -> list[str]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run `synchain` with these words (default: the command line's) and return its exit code, 0, 1 or 2."""
+    """Run `synchain` with these words (default: the command line's) and return its exit code, 0, 1
+    or 2.
+    """
     words = list(sys.argv[1:] if argv is None else argv)
     name = f"synchain {words[0]}" if words and words[0] in names() else "synchain"
     _readable(sys.stdout)
@@ -104,9 +107,8 @@ def _dispatch(words: list[str]) -> int:
         module = command(first)
     except ValueError as problem:
         raise WrongUse(f"{problem}\nsee: synchain --help") from None
-    parser = _parser(first, module)
     try:
-        arguments = parser.read(rest)
+        arguments = parser(first).read(rest)
     except SystemExit:  # --help has been printed
         return FINE
     arguments.command_line = ("synchain", *words)
@@ -118,16 +120,18 @@ def _dispatch(words: list[str]) -> int:
     return int(module.execute(arguments))
 
 
-def _parser(name: str, module: ModuleType) -> Parser:
-    parser = Parser(
+def parser(name: str) -> Parser:
+    """Return the parser of a command; ValueError if there is none of this name."""
+    module = command(name)
+    reader = Parser(
         prog=f"synchain {name}",
         description=f"{module.SUMMARY[0].upper()}{module.SUMMARY[1:]}.",
         epilog=_examples(module.EXAMPLES),
         formatter_class=RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    module.configure(parser)
-    return parser
+    module.configure(reader)
+    return reader
 
 
 def _help() -> str:

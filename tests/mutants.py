@@ -1,9 +1,11 @@
-"""Mutation testing of the symbolic core and of the code of thresholds: `python tests/mutants.py [MODULE ...]`.
+"""Mutation testing of the symbolic core and of the code of thresholds:
+`python tests/mutants.py [MODULE ...]`.
 
-Operators are those of Cosmic Ray.  Each mutant is tried in a fork of a process that has loaded the third-party packages and
-nothing of ours, so that no cache of a right run hides it; its source replaces the module's while it is imported, and no file
-is written.  It meets the tests that ran its statement, by coverage contexts, shortest first, until one fails.
-Results are added to .mutants/results.jsonl; a mutant that is listed there is not tried again.
+Operators are those of Cosmic Ray. Each mutant is tried in a fork of a process that has loaded the
+third-party packages and nothing of ours, so that no cache of a right run hides it; its source
+replaces the module's while it is imported, and no file is written. It meets the tests that ran its
+statement, by coverage contexts, shortest first, until one fails. Results are added to
+.mutants/results.jsonl; a mutant that is listed there is not tried again.
 """
 
 from __future__ import annotations
@@ -61,12 +63,16 @@ OPERATORS = [
     *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ExceptionReplacer", "ZeroIterationForLoop"),
     "NumberReplacer",
 ]
-"""Of the operators that put something in the same place the one whose result is hardest to tell from the right one."""
+"""Of the operators that put something in the same place the one whose result is hardest to tell
+from the right one.
+"""
 PRELOADED = "sympy flint mpmath numpy scipy.stats scipy.integrate scipy.io numba xarray tqdm networkx hypothesis pytest"
 
 
 def spans(tree: ast.AST) -> tuple[list[tuple[int, int]], list[tuple[tuple[int, int], tuple[int, int]]]]:
-    """Lines of the statements (of compound ones the head), and places of annotations, which no run looks at."""
+    """Lines of the statements (of compound ones the head), and places of annotations, which no run
+    looks at.
+    """
     lines, annotations = [], []
     for node in ast.walk(tree):
         if isinstance(node, ast.stmt):
@@ -153,7 +159,9 @@ def baseline(name: str) -> tuple[Path, dict[str, float]]:
 
 
 def reached(module: str) -> tuple[dict[int, set[str]], dict[str, float]]:
-    """For every line of a module the tests that run it, and the seconds that these take; '' runs while it is imported."""
+    """For every line of a module the tests that run it, and the seconds that these take; '' runs
+    while it is imported.
+    """
     import coverage
 
     lines: dict[int, set[str]] = {}
@@ -171,7 +179,9 @@ def reached(module: str) -> tuple[dict[int, set[str]], dict[str, float]]:
 
 
 def chosen(mutant: dict[str, Any], lines: dict[int, set[str]], seconds: dict[str, float], limit: float) -> list[str]:
-    """The tests that a mutant meets, shortest first, of `limit` seconds in all; none where no test runs its statement."""
+    """The tests that a mutant meets, shortest first, of `limit` seconds in all; none where no test
+    runs its statement.
+    """
     first, last = mutant["statement"]
     contexts = set().union(*(lines.get(k, set()) for k in range(first, last + 1)))
     if "" in contexts:  # run on import: whatever uses the module may see it
@@ -224,7 +234,9 @@ def _run(module: str, source: str, tests: list[str], cpu: int) -> int:
 
 
 def drawn(mutant: dict[str, Any], share: float, seed: int) -> bool:
-    """Whether a mutant belongs to the sample; a larger share of the same seed holds the smaller one."""
+    """Whether a mutant belongs to the sample; a larger share of the same seed holds the smaller
+    one.
+    """
     return random.Random(f"{seed} {mutant['key']}").random() < share
 
 

@@ -1,4 +1,6 @@
-"""The rooms and their doors: which room may import which, that every room is installed, what a start costs."""
+"""The rooms and their doors: which room may import which, that every room is installed, what a
+start costs.
+"""
 
 from __future__ import annotations
 
@@ -60,11 +62,13 @@ ARROWS = {
     "runtime.commands": "console bench figures bifurcation synchronisation sweeps stability results prediction cells "
     "support codegen models",
 }
-"""The rooms that a room may import, beside itself; names without a package are rooms of the same package, a package
-stands for all of its rooms."""
+"""The rooms that a room may import, beside itself; names without a package are rooms of the same
+package, a package stands for all of its rooms.
+"""
 
 FRONT = {"models", "codegen", "runtime"}
-"""The packages themselves offer names of their rooms, and the command line is the top of the house."""
+"""The packages themselves offer names of their rooms, and the command line is the top of the house.
+"""
 
 
 def sources() -> list[Path]:
@@ -77,7 +81,9 @@ def rooms() -> set[str]:
 
 
 def imported(path: Path, tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """Yield (line, absolute dotted name) of every import in a file, at any depth, those for type checks too."""
+    """Yield (line, absolute dotted name) of every import in a file, at any depth, those for type
+    checks too.
+    """
     package = ("synchain", *path.relative_to(ROOT).parts[:-1])
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):

@@ -1,8 +1,9 @@
-"""Benchmarks, one file each: cases as data, `measure(quick) -> list of rows`, and `COLUMNS`; run by `synchain bench`.
+"""Benchmarks, one file each: cases as data, `measure(quick) -> list of rows`, and `COLUMNS`; run by
+`synchain bench`.
 
-Optional: `summary(rows) -> str`, more tables in Markdown; `notes() -> list of lines`, what is left out here and why;
-`measure_long() -> list of rows` for runs of hours; `draw(rows)`, a Matplotlib figure of the rows, called within the style
-of `synchain.runtime.figures.style`.
+Optional: `summary(rows) -> str`, more tables in Markdown; `notes() -> list of lines`, what is left
+out here and why; `measure_long() -> list of rows` for runs of hours; `draw(rows)`, a Matplotlib
+figure of the rows, called within the style of `synchain.runtime.figures.style`.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ def machine() -> str:
     import llvmlite.binding as llvm
     import numba
 
-    return f"{llvm.get_host_cpu_name()}, {platform.system()}, Python {platform.python_version()}, Numba {numba.__version__}"
+    versions = f"Python {platform.python_version()}, Numba {numba.__version__}"
+    return f"{llvm.get_host_cpu_name()}, {platform.system()}, {versions}"
 
 
 def csv_text(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
@@ -58,7 +60,9 @@ def text(module: ModuleType, rows: Sequence[Sequence[Any]]) -> str:
 
 
 def write(name: str, module: ModuleType, rows: Sequence[Sequence[Any]], folder: Path) -> list[Path]:
-    """Write `<name>.csv`, `<name>.md` and, where the benchmark draws, `<name>.png` and `.svg`; returns their paths."""
+    """Write `<name>.csv`, `<name>.md` and, where the benchmark draws, `<name>.png` and `.svg`;
+    returns their paths.
+    """
     from ..support.files import write_text
 
     table, page = folder / f"{name}.csv", folder / f"{name}.md"

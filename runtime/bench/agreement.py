@@ -1,6 +1,8 @@
-"""How often exponents and direct simulation say the same about the synchronisation of small networks, and why not.
+"""How often exponents and direct simulation say the same about the synchronisation of small
+networks, and why not.
 
-One line of exponents for each frequency serves all graphs: each network asks for it at its own strengths sigma |gamma_k|.
+One line of exponents for each frequency serves all graphs: each network asks for it at its own
+strengths sigma |gamma_k|.
 """
 
 from __future__ import annotations
@@ -23,8 +25,15 @@ __all__ = ["COLUMNS", "GRAPHS", "OMEGAS", "measure", "summary"]
 
 COLUMNS = ("graph", "omega", "values of sigma", *OUTCOMES, "causes of disagreement")
 GRAPHS = (
-    ("chain", 3), ("chain", 4), ("chain", 5), ("chain", 6), ("ring", 4), ("ring", 6), ("star", 4), ("star", 6),
-)  # fmt: skip
+    ("chain", 3),
+    ("chain", 4),
+    ("chain", 5),
+    ("chain", 6),
+    ("ring", 4),
+    ("ring", 6),
+    ("star", 4),
+    ("star", 6),
+)
 OMEGAS = (1.15, 1.40, 1.55)
 
 POINTS, HIGHEST = 40, 1.2
@@ -32,7 +41,9 @@ POINTS, HIGHEST = 40, 1.2
 
 
 def measure(quick: bool = False) -> list[tuple[object, ...]]:
-    """Return the rows of the table, in the order of COLUMNS; `quick` takes two graphs, one frequency and short runs."""
+    """Return the rows of the table, in the order of COLUMNS; `quick` takes two graphs, one
+    frequency and short runs.
+    """
     graphs = [topology(*case) for case in (GRAPHS[0], GRAPHS[6]) if quick] or [topology(*case) for case in GRAPHS]
     criterion = Criterion(transient=300.0, window=50.0, starts=4) if quick else Criterion()
     rows: list[tuple[object, ...]] = []

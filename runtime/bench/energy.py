@@ -1,8 +1,9 @@
 """How far the energy of conservative models drifts over many periods, for each integrator.
 
-No method here is symplectic: all of them control their local error, which lets the energy drift or wander.  Each row is
-one trajectory; the drift is the largest |E - E_0| over |E_0| at samples spread over the whole run.  The period is that of
-the model's slowest small oscillation.  The long form runs for a hundred times as many periods.
+No method here is symplectic: all of them control their local error, which lets the energy drift or
+wander. Each row is one trajectory; the drift is the largest |E - E_0| over |E_0| at samples spread
+over the whole run. The period is that of the model's slowest small oscillation. The long form runs
+for a hundred times as many periods.
 """
 
 from __future__ import annotations
@@ -21,11 +22,21 @@ from ..sweeps.run import run
 
 __all__ = ["CASES", "COLUMNS", "INTEGRATORS", "Case", "drift", "measure", "measure_long"]
 
-COLUMNS = ("case", "integrator", "rtol", "periods", "largest drift", "drift at the end", "drift in the first tenth",
-           "steps per period")  # fmt: skip
+COLUMNS = (
+    "case",
+    "integrator",
+    "rtol",
+    "periods",
+    "largest drift",
+    "drift at the end",
+    "drift in the first tenth",
+    "steps per period",
+)
 INTEGRATORS = ("cash_karp", "dop853", "rodas5p", "rodas6p")
 CHORDS = ("rodas6p",)
-"""Methods that join the ends of their steps by chords: samples within a step say nothing about the drift."""
+"""Methods that join the ends of their steps by chords: samples within a step say nothing about the
+drift.
+"""
 RTOL = 1e-9
 PERIODS, LONGER = 10_000, 100
 SAMPLES = 401
@@ -33,7 +44,9 @@ SAMPLES = 401
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A conservative scene, the period of its slowest small oscillation, and the share of PERIODS that it is run for."""
+    """A conservative scene, the period of its slowest small oscillation, and the share of PERIODS
+    that it is run for.
+    """
 
     name: str
     scene: Scene
@@ -52,15 +65,30 @@ def _bump(n: int, k: int) -> list[float]:
 
 
 CASES = (
-    Case("Duffing, undamped", _scene("duffing", parameters={"delta": 0.0, "u": 0.0}, initial={"x": 1.0, "v": 0.0}),
-         2 * math.pi),
-    Case("harmonic chain, n = 4", _scene("harmonic", topology=topology("chain", 4), parameters={"sigma": 0.5},
-                                         initial={"x": [1.0, 0.0, 0.0, 0.0]}), 2 * math.pi),
-    Case("double pendulum", _scene("double_pendulum", initial={"phi": 0.5, "psi": 0.3}),
-         2 * math.pi / math.sqrt(2 - math.sqrt(2))),
-    Case("FPUT ring, n = 16, alpha = 1/4", _scene("mass", coupling="fput", topology=topology("ring", 16),
-                                                  initial={"x": _bump(16, 1)}), math.pi / math.sin(math.pi / 16), 0.1),
-)  # fmt: skip
+    Case(
+        "Duffing, undamped",
+        _scene("duffing", parameters={"delta": 0.0, "u": 0.0}, initial={"x": 1.0, "v": 0.0}),
+        2 * math.pi,
+    ),
+    Case(
+        "harmonic chain, n = 4",
+        _scene(
+            "harmonic", topology=topology("chain", 4), parameters={"sigma": 0.5}, initial={"x": [1.0, 0.0, 0.0, 0.0]}
+        ),
+        2 * math.pi,
+    ),
+    Case(
+        "double pendulum",
+        _scene("double_pendulum", initial={"phi": 0.5, "psi": 0.3}),
+        2 * math.pi / math.sqrt(2 - math.sqrt(2)),
+    ),
+    Case(
+        "FPUT ring, n = 16, alpha = 1/4",
+        _scene("mass", coupling="fput", topology=topology("ring", 16), initial={"x": _bump(16, 1)}),
+        math.pi / math.sin(math.pi / 16),
+        0.1,
+    ),
+)
 
 
 def measure(quick: bool = False) -> list[tuple[Any, ...]]:
@@ -79,7 +107,8 @@ def _rows(case: Case, factor: float) -> list[tuple[Any, ...]]:
 
 
 def drift(case: Case, integrator: str, rtol: float, periods: int) -> tuple[float, float, float, float]:
-    """Return the largest drift, that at the end, the largest in the first tenth, and steps per period.
+    """Return the largest drift, that at the end, the largest in the first tenth, and steps per
+    period.
 
     Raises RuntimeError where the run fails.
     """

@@ -1,8 +1,9 @@
 """Are the narrow synchronous windows of chains made by the smoothing of the friction law?
 
-For each drive frequency the range of alpha with a negative transversal exponent is measured under the smoothed law, at
-several steepnesses kappa, and under the exact set-valued law.  A chain synchronises where all its sigma |gamma_k| lie in
-the range, so a window of sigma exists where the ratio of the range's ends exceeds that of the chain's eigenvalues.
+For each drive frequency the range of alpha with a negative transversal exponent is measured under
+the smoothed law, at several steepnesses kappa, and under the exact set-valued law. A chain
+synchronises where all its sigma |gamma_k| lie in the range, so a window of sigma exists where the
+ratio of the range's ends exceeds that of the chain's eigenvalues.
 """
 
 from __future__ import annotations
@@ -24,9 +25,21 @@ if TYPE_CHECKING:
 __all__ = ["CASES", "COLUMNS", "KAPPAS", "draw", "measure", "row"]
 
 COLUMNS = (
-    "omega", "n", "kappa", "alpha from", "+-", "alpha to", "+-", "ratio", "+-", "needed", "sigma from", "sigma to",
-    "time per start", "starts",
-)  # fmt: skip
+    "omega",
+    "n",
+    "kappa",
+    "alpha from",
+    "+-",
+    "alpha to",
+    "+-",
+    "ratio",
+    "+-",
+    "needed",
+    "sigma from",
+    "sigma to",
+    "time per start",
+    "starts",
+)
 CASES = ((1.40, 4), (1.55, 3))
 """Frequency of the drive, and the chain whose window the paper shows there."""
 
@@ -38,7 +51,9 @@ Row = tuple[object, ...]
 
 
 def measure(quick: bool = False) -> list[Row]:
-    """Return the rows of the table, in the order of COLUMNS; `quick` averages over a hundredth of the time."""
+    """Return the rows of the table, in the order of COLUMNS; `quick` averages over a hundredth of
+    the time.
+    """
     rows = []
     for omega, n in CASES:
         for kappa in (1e5, math.inf) if quick else KAPPAS:
@@ -72,7 +87,9 @@ def _widest(found: Exponents) -> tuple[tuple[float, float], tuple[float, float]]
 
 
 def draw(rows: list[Row]) -> Figure:
-    """The ratio of the range's ends against kappa, with what the chain needs; the exact law at the right."""
+    """The ratio of the range's ends against kappa, with what the chain needs; the exact law at the
+    right.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.0, 3.2), layout="constrained")
@@ -81,8 +98,14 @@ def draw(rows: list[Row]) -> Figure:
         own = [r for r in rows if (r[0], r[1]) == (omega, n)]
         smooth = [r for r in own if not math.isinf(float(str(r[2])))]
         exact = [r for r in own if r not in smooth]
-        axes.errorbar([r[2] for r in smooth], [r[7] for r in smooth], [r[8] for r in smooth], fmt="o-", capsize=3,
-                      label="smoothed law")  # fmt: skip
+        axes.errorbar(
+            [r[2] for r in smooth],
+            [r[7] for r in smooth],
+            [r[8] for r in smooth],
+            fmt="o-",
+            capsize=3,
+            label="smoothed law",
+        )
         for r in exact:
             value, error = float(str(r[7])), float(str(r[8]))
             axes.axhspan(value - error, value + error, color="C1", alpha=0.3, label="set-valued law")

@@ -1,12 +1,15 @@
-"""How large a network of a family can be and still synchronise: predicted from one oscillator, tried by direct simulation.
+"""How large a network of a family can be and still synchronise: predicted from one oscillator,
+tried by direct simulation.
 
-For each drive frequency and each form of the friction law the transversal exponent of one oscillator gives the stable ranges
-of alpha.  The exact eigenratio of a graph says whether some sigma puts every mode into them; the network is then integrated
-with that sigma, in the middle of the predicted window.  Where no window is predicted, sigma is such that the slowest and the
-fastest mode miss the widest range by the same factor, the best choice there is.  Starts are those of
-`Criterion`; near the end of a window chaotic motion can burst although every exponent is negative.
+For each drive frequency and each form of the friction law the transversal exponent of one
+oscillator gives the stable ranges of alpha. The exact eigenratio of a graph says whether some sigma
+puts every mode into them; the network is then integrated with that sigma, in the middle of the
+predicted window. Where no window is predicted, sigma is such that the slowest and the fastest mode
+miss the widest range by the same factor, the best choice there is. Starts are those of `Criterion`;
+near the end of a window chaotic motion can burst although every exponent is negative.
 
-The second table has the largest size of each family, and in brackets that for all and for some ranges within their errors.
+The second table has the largest size of each family, and in brackets that for all and for some
+ranges within their errors.
 """
 
 from __future__ import annotations
@@ -30,22 +33,40 @@ from .kit.tables import markdown
 __all__ = ["CASES", "COLUMNS", "GRAPHS", "function_of", "measure", "sigma_of", "summary"]
 
 COLUMNS = (
-    "omega", "contact", "ranges of alpha", "graph", "eigenratio", "allowed", "predicted", "window of sigma", "sigma",
-    "share of starts synchronous", "median error",
-)  # fmt: skip
+    "omega",
+    "contact",
+    "ranges of alpha",
+    "graph",
+    "eigenratio",
+    "allowed",
+    "predicted",
+    "window of sigma",
+    "sigma",
+    "share of starts synchronous",
+    "median error",
+)
 CASES = tuple((omega, contact) for omega in (1.15, 1.40, 1.55) for contact in ("atan", "set-valued"))
 ALPHA = (0.0, 1.2)
 """Strengths at which the exponent is known; what lies beyond counts as unstable."""
 GRAPHS = (
-    ("chain", 4), ("chain", 5), ("ring", 6), ("ring", 8), ("star", 6), ("star", 8), ("complete", 12), ("hypercube", 32),
+    ("chain", 4),
+    ("chain", 5),
+    ("ring", 6),
+    ("ring", 8),
+    ("star", 6),
+    ("star", 8),
+    ("complete", 12),
+    ("hypercube", 32),
     ("hypercube", 64),
-)  # fmt: skip
+)
 
 Row = tuple[object, ...]
 
 
 def measure(quick: bool = False) -> list[Row]:
-    """Return the rows of the table, in the order of COLUMNS; `quick` takes one frequency, two graphs and a short run."""
+    """Return the rows of the table, in the order of COLUMNS; `quick` takes one frequency, two
+    graphs and a short run.
+    """
     rows = []
     for omega, contact in CASES[2:3] if quick else CASES:
         found = function_of(omega, contact)
@@ -56,7 +77,9 @@ def measure(quick: bool = False) -> list[Row]:
 
 @lru_cache
 def function_of(omega: float, contact: str) -> MSF:
-    """The transversal exponents of the friction oscillator at one frequency, under one form of its law."""
+    """The transversal exponents of the friction oscillator at one frequency, under one form of its
+    law.
+    """
     scene = Scene(topology=topology("chain", 2), contact=contact, parameters={"omega": omega}, record=())
     return msf(scene, np.linspace(*ALPHA, 121))
 
@@ -70,7 +93,8 @@ def _row(omega: float, contact: str, found: MSF, graph: Topology, quick: bool) -
 
 
 def sigma_of(found: MSF, said: Verdict) -> float:
-    """The middle of the widest window of sigma; without one, where the slowest and the fastest mode are equally far outside.
+    """The middle of the widest window of sigma; without one, where the slowest and the fastest mode
+    are equally far outside.
 
     NaN where nothing is stable or no mode is coupled.
     """
@@ -114,6 +138,8 @@ def summary(rows: Sequence[Sequence[object]]) -> str:
 
 
 def _size(found: LargestNetwork) -> str:
-    """The size for the ranges as they are and, where that differs, for all and for some within the errors."""
+    """The size for the ranges as they are and, where that differs, for all and for some within the
+    errors.
+    """
     sizes = ["any" if n is None else str(n) for n in (found.n, found.certain, found.possible)]
     return sizes[0] if len(set(sizes)) == 1 else f"{sizes[0]} ({sizes[1]} … {sizes[2]})"

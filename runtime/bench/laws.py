@@ -1,8 +1,9 @@
-"""Work and precision of both friction laws: the set-valued one, and the smoothed one at the paper's steepness 1e5.
+"""Work and precision of both friction laws: the set-valued one, and the smoothed one at the paper's
+steepness 1e5.
 
-Each law is measured against its own solution at the same times: the smoothed one against the runs in quadruple
-precision of `precision`, the set-valued one against its own run at a tolerance of REFERENCE, which an independent
-integrator in 50 digits confirms (tests/test_contact_events.py).
+Each law is measured against its own solution at the same times: the smoothed one against the runs
+in quadruple precision of `precision`, the set-valued one against its own run at a tolerance of
+REFERENCE, which an independent integrator in 50 digits confirms (tests/test_contact_events.py).
 """
 
 from __future__ import annotations
@@ -31,7 +32,9 @@ OWN = {"rodas5p", "switching", "dop853, set-valued"}
 
 
 def measure(quick: bool = False) -> list[tuple[Any, ...]]:
-    """Return the rows of the table, in the order of COLUMNS; every method with one lane and with all."""
+    """Return the rows of the table, in the order of COLUMNS; every method with one lane and with
+    all.
+    """
     rows: list[tuple[Any, ...]] = []
     for name in CASES[:1] if quick else CASES:
         smooth = read_case(name)
@@ -43,7 +46,9 @@ def measure(quick: bool = False) -> list[tuple[Any, ...]]:
 
 
 def exact(case: Case) -> Case:
-    """The same problem under the set-valued law, with its own solution; states (m, 2 n) without the modes."""
+    """The same problem under the set-valued law, with its own solution; states (m, 2 n) without the
+    modes.
+    """
     parameters = {name: value for name, value in case.scene.parameters.items() if name != "kappa"}
     scene = case.scene.replace(contact="set-valued", parameters=parameters)
     made = Case(case.name, scene, case.times, np.empty((0, 0)))

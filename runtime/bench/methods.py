@@ -1,9 +1,10 @@
-"""Which integrator, and how many lanes: time per drive period and core against the error, all in the same driver.
+"""Which integrator, and how many lanes: time per drive period and core against the error, all in
+the same driver.
 
-The cases are the friction oscillators of `precision`. Every lane works through eight cells, so that what a scheduler
-loses at the end counts as it does in a sweep. The last column is the time that the same error costs on the log-log
-line through the rows of rodas5p in one register, over the time of the row: above 1 the row is the better choice at
-its error.
+The cases are the friction oscillators of `precision`. Every lane works through eight cells, so that
+what a scheduler loses at the end counts as it does in a sweep. The last column is the time that the
+same error costs on the log-log line through the rows of rodas5p in one register, over the time of
+the row: above 1 the row is the better choice at its error.
 """
 
 from __future__ import annotations
@@ -29,7 +30,9 @@ CHOICES: tuple[tuple[str, int, tuple[float, ...]], ...] = (
     ("rodas6p", 1, (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)),
     ("ros34pw2", 1, (1e-4, 1e-5, 1e-6)),
 )
-"""Integrator, registers that the lanes fill, and relative tolerances; the first is what the others are compared with."""
+"""Integrator, registers that the lanes fill, and relative tolerances; the first is what the others
+are compared with.
+"""
 
 
 def measure(quick: bool = False) -> list[tuple[Any, ...]]:
@@ -54,7 +57,9 @@ def points(
 
 
 def gain(point: tuple[Any, ...], first: list[tuple[Any, ...]]) -> float:
-    """Time at the error of a point on the line through the first choice's points, over the time of the point."""
+    """Time at the error of a point on the line through the first choice's points, over the time of
+    the point.
+    """
     errors, times = (np.log([p[k] for p in first]) for k in (3, 4))
     slope, level = np.polyfit(errors, times, 1)
     return float(np.exp(level + slope * np.log(point[3])) / point[4])

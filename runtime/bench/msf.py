@@ -1,14 +1,17 @@
-"""What a master stability function costs: many strengths along one orbit, and the same exponents by JiTCODE.
+"""What a master stability function costs: many strengths along one orbit, and the same exponents by
+JiTCODE.
 
-"one orbit" is the friction oscillator's: CPU time of one drive period with all strengths along it, one start, one thread,
-beside the same stretch of the orbit by itself (the kernel of one oscillator, the same method and tolerance).  `integrated`
-strengths are carried along, the others interpolated; differences are those of the mean growth with interpolation from that
-with every strength integrated, along a periodic orbit.  The largest one lies where a multiplier passes through zero and the
-exponent dips towards -inf: there any relative accuracy of the propagators is lost in the logarithm.
+"one orbit" is the friction oscillator's: CPU time of one drive period with all strengths along it,
+one start, one thread, beside the same stretch of the orbit by itself (the kernel of one oscillator,
+the same method and tolerance). `integrated` strengths are carried along, the others interpolated;
+differences are those of the mean growth with interpolation from that with every strength
+integrated, along a periodic orbit. The largest one lies where a multiplier passes through zero and
+the exponent dips towards -inf: there any relative accuracy of the propagators is lost in the
+logarithm.
 
-"to an error bar" is the CPU time from the start of the transient until the standard error of every exponent is below
-PRECISION, by the same estimate from batches; medians over several starts (of the standard error: the largest), compilation
-apart.
+"to an error bar" is the CPU time from the start of the transient until the standard error of every
+exponent is below PRECISION, by the same estimate from batches; medians over several starts (of the
+standard error: the largest), compilation apart.
 """
 
 from __future__ import annotations
@@ -42,12 +45,27 @@ from .peers import _jitcode_transversal as jitcode
 __all__ = ["CASES", "COLUMNS", "Case", "difference", "measure", "notes", "orbit_rows", "strengths", "summary"]
 
 COLUMNS = (
-    "what", "system", "program", "alpha", "strengths", "integrated", "steps per period", "microseconds per period",
-    "times the orbit alone", "largest difference", "median difference", "periods", "seconds", "exponent", "standard error",
-)  # fmt: skip
+    "what",
+    "system",
+    "program",
+    "alpha",
+    "strengths",
+    "integrated",
+    "steps per period",
+    "microseconds per period",
+    "times the orbit alone",
+    "largest difference",
+    "median difference",
+    "periods",
+    "seconds",
+    "exponent",
+    "standard error",
+)
 COUNTS = (1, 8, 100, 1_000, 10_000)
 SIDE = 60
-"""Strengths a side of the plane, alpha from 0 to 1.2 and beta from 0 to 0.6; negative beta would say the same again."""
+"""Strengths a side of the plane, alpha from 0 to 1.2 and beta from 0 to 0.6; negative beta would
+say the same again.
+"""
 RTOL = 1e-6
 SETTLED = 300
 PRECISION = 5e-3
@@ -62,9 +80,11 @@ Row = tuple[object, ...]
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A pair of oscillators, three strengths, the range of a thousand, and the peer's method: the fastest that it has.
+    """A pair of oscillators, three strengths, the range of a thousand, and the peer's method: the
+    fastest that it has.
 
-    `block` is the time between two renormalisations in units of `unit`, as long as this program's own.
+    `block` is the time between two renormalisations in units of `unit`, as long as this program's
+    own.
     """
 
     name: str
@@ -93,7 +113,9 @@ def notes() -> list[str]:
 
 
 def measure(quick: bool = False) -> list[Row]:
-    """Return the rows of the table, in the order of COLUMNS; `quick` takes few strengths and a loose error bar."""
+    """Return the rows of the table, in the order of COLUMNS; `quick` takes few strengths and a
+    loose error bar.
+    """
     rows = _one_thread(orbit_rows, quick)
     for case in CASES[:1] if quick else CASES:
         rows += _one_thread(_own_rows, case, quick)
@@ -103,7 +125,9 @@ def measure(quick: bool = False) -> list[Row]:
 
 
 def _one_thread(function: Callable[..., list[Row]], *arguments: object) -> list[Row]:
-    """Call a function in a process whose linear algebra has one thread; waiting threads would count as CPU time."""
+    """Call a function in a process whose linear algebra has one thread; waiting threads would count
+    as CPU time.
+    """
     with mock.patch.dict(os.environ, dict.fromkeys(BLAS, "1")), ProcessPoolExecutor(1, get_context("spawn")) as pool:
         return pool.submit(function, *arguments).result()
 
@@ -116,7 +140,9 @@ def strengths(count: int) -> np.ndarray:
 
 
 def orbit_rows(quick: bool) -> list[Row]:
-    """The orbit by itself, then with more and more strengths; timed in turn, the best of several rounds."""
+    """The orbit by itself, then with more and more strengths; timed in turn, the best of several
+    rounds.
+    """
     periods, rounds = (16, 2) if quick else (128, 12)
     chosen = [strengths(count) for count in ((1, 100) if quick else (*COUNTS, 0))]
     ready = [_settled(1.4, values) for values in chosen]
@@ -168,9 +194,14 @@ def _along(orbits: Orbits, periods: int) -> int:
 def _alone(orbits: Orbits, periods: int) -> Callable[[], int]:
     """A function that runs the same stretch of the orbit without modes and returns its steps."""
     scene = Scene(
-        topology=topology("chain", 1), record=(), integrator="rodas5p", rtol=RTOL, transient=0.0, window=periods,
+        topology=topology("chain", 1),
+        record=(),
+        integrator="rodas5p",
+        rtol=RTOL,
+        transient=0.0,
+        window=periods,
         parameters={"omega": orbits.scene.parameters["omega"]},
-    )  # fmt: skip
+    )
     cells, compiled = plan(scene), kernel(scene, 1, reduce=False)
     rtol, atol = tolerances(scene, cells.numbers)
     control = control_array(rtol, atol, 0.5 * orbits.unit, scene.max_steps, jumps=False)
@@ -185,7 +216,8 @@ def _alone(orbits: Orbits, periods: int) -> Callable[[], int]:
 
 
 def difference(values: np.ndarray, periods: int) -> tuple[float, float]:
-    """The largest and the median difference of mean growth, with strengths interpolated and with all of them integrated.
+    """The largest and the median difference of mean growth, with strengths interpolated and with
+    all of them integrated.
 
     Along the periodic orbit at omega = 1.15, over so many periods.
     """
@@ -267,7 +299,9 @@ def _timed(
 
 
 def summary(rows: Sequence[Sequence[object]]) -> str:
-    """A second table in Markdown: the peer's time for one value of alpha over this program's, alone and among a thousand."""
+    """A second table in Markdown: the peer's time for one value of alpha over this program's, alone
+    and among a thousand.
+    """
     known = [dict(zip(COLUMNS, row, strict=True)) for row in rows if row[0] == TO_ERROR]
     made = []
     for other in [row for row in known if row["program"] != "synchain"]:
@@ -277,9 +311,14 @@ def summary(rows: Sequence[Sequence[object]]) -> str:
         theirs = _number(other["seconds"])
         made.append((other["system"], other["alpha"], theirs, alone, theirs / alone, 1e3 * many, theirs / many))
     columns = (
-        "system", "alpha", f"{jitcode.NAME}, seconds", "synchain, seconds", "ratio",
-        "synchain, one of a thousand, milliseconds", "ratio",
-    )  # fmt: skip
+        "system",
+        "alpha",
+        f"{jitcode.NAME}, seconds",
+        "synchain, seconds",
+        "ratio",
+        "synchain, one of a thousand, milliseconds",
+        "ratio",
+    )
     return markdown(columns, made) if made else "No peer to compare with."
 
 

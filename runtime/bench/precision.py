@@ -1,9 +1,11 @@
-"""Work and precision: time per drive period and core against the error of the state, for this program and its peers.
+"""Work and precision: time per drive period and core against the error of the state, for this
+program and its peers.
 
-The cases are those of `_cases.py`; the error is the largest over all components of the state at the case's times, half of
-them at period boundaries and half at spread phases.  "cash_karp" at 1e-12 and 1e-15 is the source paper's method and
-tolerances through this program's own kernel; one lane is the scalar kernel.  Peers are the files of `peers/`; one that is
-not installed is named and left out.  Times are CPU times of one core, per drive period and trajectory, compilation apart.
+The cases are those of `_cases.py`; the error is the largest over all components of the state at the
+case's times, half of them at period boundaries and half at spread phases. "cash_karp" at 1e-12 and
+1e-15 is the source paper's method and tolerances through this program's own kernel; one lane is the
+scalar kernel. Peers are the files of `peers/`; one that is not installed is named and left out.
+Times are CPU times of one core, per drive period and trajectory, compilation apart.
 """
 
 from __future__ import annotations
@@ -37,9 +39,18 @@ __all__ = [
 ]
 
 COLUMNS = (
-    "case", "method", "lanes", "rtol", "atol", "error", "microseconds per period", "steps per period", "periods",
-    "compile seconds", "remark",
-)  # fmt: skip
+    "case",
+    "method",
+    "lanes",
+    "rtol",
+    "atol",
+    "error",
+    "microseconds per period",
+    "steps per period",
+    "periods",
+    "compile seconds",
+    "remark",
+)
 LADDER = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
 PAPER = (1e-12, 1e-15)
 """The source paper's (rtol, atol) of Cash-Karp."""
@@ -47,7 +58,9 @@ PAPER = (1e-12, 1e-15)
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """Rows of the benchmark: an integrator of this program with full lanes or one, on stiff cases or on all."""
+    """Rows of the benchmark: an integrator of this program with full lanes or one, on stiff cases
+    or on all.
+    """
 
     integrator: str
     full: bool
@@ -70,7 +83,9 @@ METHODS = (
     Method("dop853", False, TOLERANCES, stiff=False),
     Method("dop853", True, TOLERANCES, stiff=False),
 )
-"""This program's rows; `stiff` False leaves out the cases in which stability holds an explicit method back."""
+"""This program's rows; `stiff` False leaves out the cases in which stability holds an explicit
+method back.
+"""
 
 
 def notes() -> list[str]:
@@ -110,13 +125,24 @@ def row(case: Case, point: Point) -> tuple[Any, ...]:
     """A point of a case in the order of COLUMNS."""
     steps = "" if np.isnan(point.steps) else point.steps
     return (
-        case.name, point.method, point.lanes, point.rtol, point.atol, point.error, 1e6 * point.seconds, steps,
-        point.periods, point.compile, point.remark,
-    )  # fmt: skip
+        case.name,
+        point.method,
+        point.lanes,
+        point.rtol,
+        point.atol,
+        point.error,
+        1e6 * point.seconds,
+        steps,
+        point.periods,
+        point.compile,
+        point.remark,
+    )
 
 
 def summary(rows: list[tuple[Any, ...]]) -> str:
-    """A second table in Markdown: time of every method at the same error, and its ratio to the full lanes."""
+    """A second table in Markdown: time of every method at the same error, and its ratio to the full
+    lanes.
+    """
     from .kit.compare import table
 
     return table([dict(zip(COLUMNS, row, strict=False)) for row in rows], own={method.integrator for method in METHODS})

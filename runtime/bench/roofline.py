@@ -1,8 +1,10 @@
-"""How much of the processor's arithmetic a step of rodas5p uses: operations over time against a measured peak.
+"""How much of the processor's arithmetic a step of rodas5p uses: operations over time against a
+measured peak.
 
-How operations are counted stands in `_operations.py`; a division counts as one although the processor needs many times
-longer for it.  The peak is that of independent chains of fused multiply-adds on the same lanes; both are timed in turn, so
-that they see the same clock, and the share is the median over the rounds.
+How operations are counted stands in `_operations.py`; a division counts as one although the
+processor needs many times longer for it. The peak is that of independent chains of fused
+multiply-adds on the same lanes; both are timed in turn, so that they see the same clock, and the
+share is the median over the rounds.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ __all__ = ["COLUMNS", "measure"]
 
 COLUMNS = ("n", "lanes", "flops per step and lane", "nanoseconds per step", "Gflop/s", "peak Gflop/s", "share of peak")
 CHAINS = 12
-"""Independent multiply-adds in flight: at least latency times units, at most the vector registers."""
+"""Independent multiply-adds in flight: at least latency times units, at most the vector registers.
+"""
 
 PEAK = """
 @njit(error_model="numpy")

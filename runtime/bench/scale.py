@@ -1,8 +1,10 @@
-"""Sweeps that stream to disk: a map over omega and sigma of 100 … 100 000 cells, or a million with `--long`.
+"""Sweeps that stream to disk: a map over omega and sigma of 100 … 100 000 cells, or a million with
+`--long`.
 
-Two oscillators, 100 periods of the drive and a window of 20 (for a million cells 20 and a window of 10), on two threads;
-the time is that of the cells without the kernel, the memory is the peak of a fresh process, program included, and the
-file is the finished result.  Memory that does not grow with the number of cells is what this is for.
+Two oscillators, 100 periods of the drive and a window of 20 (for a million cells 20 and a window of
+10), on two threads; the time is that of the cells without the kernel, the memory is the peak of a
+fresh process, program included, and the file is the finished result. Memory that does not grow with
+the number of cells is what this is for.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ Row = tuple[object, ...]
 
 
 def measure(quick: bool = False) -> list[Row]:
-    """Return the rows of the table, in the order of COLUMNS; `quick` takes the two smallest maps."""
+    """Return the rows of the table in the order of COLUMNS; `quick` takes the two smallest maps."""
     return [apart(row, side) for side in (SIDES[:2] if quick else SIDES)]
 
 

@@ -1,9 +1,12 @@
-"""What one step of one oscillator costs in networks of 1 … 100 000, and in sweeps of 1 … 100 000 cells.
+"""What one step of one oscillator costs in networks of 1 … 100 000, and in sweeps of 1 … 100 000
+cells.
 
-Networks: a fixed number of steps from the default start, one cell in a scalar kernel and, for chains, as many cells as the
-processor has lanes; the time is that of the kernel alone.  Sweeps: two oscillators, cells that differ in the coupling, one
-drive period each, on one and two threads; the time is that of the whole `run`, without compilation.  Every row has a fresh
-process, so that its peak of memory is its own (NaN where the platform does not tell); that peak contains the program itself.
+Networks: a fixed number of steps from the default start, one cell in a scalar kernel and, for
+chains, as many cells as the processor has lanes; the time is that of the kernel alone. Sweeps: two
+oscillators, cells that differ in the coupling, one drive period each, on one and two threads; the
+time is that of the whole `run`, without compilation. Every row has a fresh process, so that its
+peak of memory is its own (NaN where the platform does not tell); that peak contains the program
+itself.
 """
 
 from __future__ import annotations
@@ -31,9 +34,16 @@ if TYPE_CHECKING:
 __all__ = ["COLUMNS", "FAMILIES", "apart", "draw", "measure", "network_row", "peak_memory", "sweep_row"]
 
 COLUMNS = (
-    "network", "n", "cells", "lanes", "threads", "steps per cell", "seconds", "nanoseconds per step and oscillator",
+    "network",
+    "n",
+    "cells",
+    "lanes",
+    "threads",
+    "steps per cell",
+    "seconds",
+    "nanoseconds per step and oscillator",
     "peak MB",
-)  # fmt: skip
+)
 FAMILIES = ("chain", "ring", "star", "tree", "grid", "random_cubic")
 NODES = (1, 2, 5, 10, 100, 1_000, 10_000, 100_000)
 CELLS = (1, 10, 100, 1_000, 10_000, 100_000)
@@ -45,7 +55,9 @@ Row = tuple[object, ...]
 
 
 def measure(quick: bool = False) -> list[Row]:
-    """Return the rows of the table, in the order of COLUMNS; `quick` takes one small case of each kind."""
+    """Return the rows of the table, in the order of COLUMNS; `quick` takes one small case of each
+    kind.
+    """
     nodes = (2, 10) if quick else NODES
     work = 2_000 if quick else WORK
     rows = []
@@ -67,7 +79,9 @@ def apart(function: Any, *arguments: object) -> Row:
 
 
 def network_row(name: str, n: int, lanes: int, work: int) -> Row:
-    """Time a fixed number of steps of one network, the best of three runs; the kernel is compiled before."""
+    """Time a fixed number of steps of one network, the best of three runs; the kernel is compiled
+    before.
+    """
     scene = Scene(topology=topology(name, n), record=(), time_unit="time", transient=0.0, window=1e6)
     compiled = kernel(scene, lanes, reduce=False)
     one = plan(scene)
@@ -84,7 +98,9 @@ def network_row(name: str, n: int, lanes: int, work: int) -> Row:
 
 
 def sweep_row(cells: int, threads: int) -> Row:
-    """Time a sweep of the coupling of two oscillators over one drive period; the kernel is compiled before."""
+    """Time a sweep of the coupling of two oscillators over one drive period; the kernel is compiled
+    before.
+    """
     scene = Scene(topology=topology("chain", 2), record=("sync_error",), transient=0.0, window=1.0)
     run(scene, sigma=[0.0, 0.1], workers=1, show_progress=False)
     sigma = np.linspace(0.0, 0.3, cells)

@@ -1,7 +1,8 @@
 """What the measured thresholds hang on: one choice of the criterion changed at a time.
 
-Each row is the widest synchronous range of sigma found with one choice changed, ends refined to 5e-4.  The exponent's row
-is where the transversal exponent of the synchronous state is negative: it knows no zero-error threshold and no transient.
+Each row is the widest synchronous range of sigma found with one choice changed, ends refined to
+5e-4. The exponent's row is where the transversal exponent of the synchronous state is negative: it
+knows no zero-error threshold and no transient.
 """
 
 from __future__ import annotations
@@ -42,7 +43,9 @@ CHANGES: tuple[tuple[str, dict[str, float | int]], ...] = (
 
 
 def measure(quick: bool = False) -> list[tuple[object, ...]]:
-    """Return the rows of the table, in the order of COLUMNS; `quick` takes the first case and three choices."""
+    """Return the rows of the table, in the order of COLUMNS; `quick` takes the first case and three
+    choices.
+    """
     rows: list[tuple[object, ...]] = []
     for n, omega, low, high in CASES[:1] if quick else CASES:
         scene = _chain(n, omega)

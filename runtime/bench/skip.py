@@ -1,9 +1,10 @@
 """What each skip saves: arithmetic operations of a step, time and answer with it and without it.
 
-Operations are those of one step of all oscillators, counted as `_operations.py` says; searching sections, sampling and the
-synchronisation error are not part of a step and show in the time alone, which is CPU time of whole runs.  The answer is
-everything that both runs record: the largest difference over all cells, relative where a number is larger than 1, over the
-first twentieth of the time and at rtol 1e-10, since unstable motions part by rounding alone when they are given the time.
+Operations are those of one step of all oscillators, counted as `_operations.py` says; searching
+sections, sampling and the synchronisation error are not part of a step and show in the time alone,
+which is CPU time of whole runs. The answer is everything that both runs record: the largest
+difference over all cells, relative where a number is larger than 1, over the first twentieth of the
+time and at rtol 1e-10, since unstable motions part by rounding alone when they are given the time.
 """
 
 from __future__ import annotations
@@ -27,18 +28,26 @@ from .kit.operations import operations
 __all__ = ["CASES", "COLUMNS", "Case", "difference", "measure", "operations"]
 
 COLUMNS = (
-    "skipped", "oscillators", "operations a step", "operations without the skip", "milliseconds",
-    "milliseconds without the skip", "times faster", "largest difference",
-)  # fmt: skip
+    "skipped",
+    "oscillators",
+    "operations a step",
+    "operations without the skip",
+    "milliseconds",
+    "milliseconds without the skip",
+    "times faster",
+    "largest difference",
+)
 
 PARAMETERS = {"theta_b": 0.1, "sigma": 0.3}
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A skip and a scene in which it applies; `less` is what the scene with the skip has otherwise than the one without.
+    """A skip and a scene in which it applies; `less` is what the scene with the skip has otherwise
+    than the one without.
 
-    Without `less` the skip is a reduction, and the same scene is run with and without it; `fold_all` folds every number.
+    Without `less` the skip is a reduction, and the same scene is run with and without it;
+    `fold_all` folds every number.
     """
 
     name: str
@@ -66,12 +75,14 @@ QUICK = 2
 
 
 def measure(quick: bool = False) -> list[tuple[object, ...]]:
-    """Return the rows of the table, in the order of COLUMNS; `quick` runs two cases with fewer cells for shorter times."""
+    """Return the rows of the table, in the order of COLUMNS; `quick` runs two cases with fewer
+    cells for shorter times.
+    """
     return [_row(case, quick) for case in (CASES[:QUICK] if quick else CASES)]
 
 
 def scenes(case: Case, quick: bool) -> tuple[Reduction, Reduction]:
-    """What is run with the skip and without it: cells of one core over the frequency of the drive."""
+    """What runs with the skip and without it: cells of one core over the frequency of the drive."""
     axis = Axis.between("omega", 1.1, 1.2, 8 if quick else 64)
     given = {"parameters": PARAMETERS, "transient": 0.0, "window": 20.0 if quick else 100.0, **case.given}
     if quick and "time_unit" in given:
@@ -106,7 +117,9 @@ def _worst(case: Case, pair: tuple[Reduction, Reduction]) -> float:
 
 
 def difference(one: Result, other: Result) -> float:
-    """The largest difference of what both results have; infinite where statuses or counts of section points differ."""
+    """The largest difference of what both results have; infinite where statuses or counts of
+    section points differ.
+    """
     worst = 0.0
     for name in ("status", "section_count", "end", "end_time", "sync_error", "sync_error_end", "section", "trajectory"):
         if name not in one.data or name not in other.data:

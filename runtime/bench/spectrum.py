@@ -1,8 +1,10 @@
-"""What exact spectra cost beside SymPy, python-flint alone and NumPy, and how many digits NumPy's eigenvalues have.
+"""What exact spectra cost beside SymPy, python-flint alone and NumPy, and how many digits NumPy's
+eigenvalues have.
 
-Graphs with random whole weights have no structure to use: their characteristic polynomial is 0 once and one irreducible
-factor.  The families have closed forms, proved up to 200 nodes.  `digits` are those of the worst eigenvalue other than 0,
-relative to itself, counted against 40 exact ones; NaN where a method gives no numbers or fails.  Times are CPU seconds.
+Graphs with random whole weights have no structure to use: their characteristic polynomial is 0 once
+and one irreducible factor. The families have closed forms, proved up to 200 nodes. `digits` are
+those of the worst eigenvalue other than 0, relative to itself, counted against 40 exact ones; NaN
+where a method gives no numbers or fails. Times are CPU seconds.
 """
 
 from __future__ import annotations
@@ -31,9 +33,19 @@ __all__ = ["COLUMNS", "FAMILIES", "SIZES", "digits", "draw", "measure", "random_
 COLUMNS = ("graph", "n", "method", "seconds", "digits", "eigenvalues", "state")
 SIZES = (4, 6, 10, 20, 50, 100, 200)
 FAMILIES = (
-    "chain", "circulant", "complete", "complete_bipartite", "grid", "hypercube", "ladder", "one_way_ring", "ring", "star",
-    "torus", "wheel",
-)  # fmt: skip
+    "chain",
+    "circulant",
+    "complete",
+    "complete_bipartite",
+    "grid",
+    "hypercube",
+    "ladder",
+    "one_way_ring",
+    "ring",
+    "star",
+    "torus",
+    "wheel",
+)
 LARGE = 1000
 SYMPY_LIMIT = 50
 """SymPy is timed up to so many nodes."""
@@ -43,7 +55,9 @@ nan = float("nan")
 
 
 def measure(quick: bool = False) -> list[Row]:
-    """Return the rows of the table, in the order of COLUMNS; `quick` takes small graphs and few families."""
+    """Return the rows of the table, in the order of COLUMNS; `quick` takes small graphs and few
+    families.
+    """
     sizes, families, large = ((4, 10), ("complete", "grid"), 30) if quick else (SIZES, FAMILIES, LARGE)
     rows = [row for n in sizes for row in _compared("random integers", random_integers(n), quick)]
     for name in families:
@@ -52,7 +66,9 @@ def measure(quick: bool = False) -> list[Row]:
 
 
 def random_integers(n: int, share: float = 0.5, seed: int = 1) -> Topology:
-    """A chain, so that it is connected, and each other pair with a chance of `share`; weights 1 … 9."""
+    """A chain, so that it is connected, and each other pair with a chance of `share`; weights 1 …
+    9.
+    """
     stream, weights = random.Random(seed), dict[tuple[int, int], Fraction]()
     for i in range(n):
         for j in range(i):
@@ -102,7 +118,9 @@ def _sympy(graph: Topology) -> tuple[float, float, int, str]:
 
 
 def digits(exact: Spectrum, values: Any) -> float:
-    """The decimal digits of the worst of the values, in the order of the distinct eigenvalues other than 0."""
+    """The decimal digits of the worst of the values, in the order of the distinct eigenvalues other
+    than 0.
+    """
     worst = 0.0
     for eigenvalue, value in zip(exact.eigenvalues, values, strict=True):
         if eigenvalue.value != 0:

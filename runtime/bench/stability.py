@@ -1,8 +1,10 @@
-"""Hard cases: is every end state right to a hundred tolerances, or does its status or a warning say why not?
+"""Hard cases: is every end state right to a hundred tolerances, or does its status or a warning say
+why not?
 
-The error is the largest over all components; allowed are 100 (atol + rtol size) and what the reference itself may be off,
-size the largest component of the end state.  The energy residual is E(end) - E(0) - W over the larger of |E(0)|, |E(end)|
-and 1, with the work W of drives and friction integrated as one more state of every oscillator.
+The error is the largest over all components; allowed are 100 (atol + rtol size) and what the
+reference itself may be off, size the largest component of the end state. The energy residual is
+E(end) - E(0) - W over the larger of |E(0)|, |E(end)| and 1, with the work W of drives and friction
+integrated as one more state of every oscillator.
 """
 
 from __future__ import annotations
@@ -26,13 +28,24 @@ if TYPE_CHECKING:
 __all__ = ["COLUMNS", "SAFETY", "draw", "measure", "row", "summary"]
 
 COLUMNS = (
-    "group", "case", "rtol", "rtol used", "status", "steps", "rejected", "error", "allowed", "energy residual",
+    "group",
+    "case",
+    "rtol",
+    "rtol used",
+    "status",
+    "steps",
+    "rejected",
+    "error",
+    "allowed",
+    "energy residual",
     "verdict",
-)  # fmt: skip
+)
 SAFETY = 100.0
 """How many tolerances an end state may be off."""
 TWICE = 1000
-"""Most oscillators of a case that is integrated a second time, for its energy; nor are cases of a million periods."""
+"""Most oscillators of a case that is integrated a second time, for its energy; nor are cases of a
+million periods.
+"""
 Row = tuple[Any, ...]
 
 
@@ -59,9 +72,18 @@ def row(case: Case) -> Row:
     balanced = status == Status.FINISHED and twice
     residual = energy_residual(case.scene, end) if balanced else math.nan
     return (
-        case.group, case.name, case.scene.rtol, rtol, status.name, int(found.steps), int(found.rejected), error,
-        allowed, residual, _verdict(status, error, allowed, any("add up" in words for words in case.scene.warnings)),
-    )  # fmt: skip
+        case.group,
+        case.name,
+        case.scene.rtol,
+        rtol,
+        status.name,
+        int(found.steps),
+        int(found.rejected),
+        error,
+        allowed,
+        residual,
+        _verdict(status, error, allowed, any("add up" in words for words in case.scene.warnings)),
+    )
 
 
 def _verdict(status: Status, error: float, allowed: float, warned: bool = False) -> str:
@@ -73,7 +95,9 @@ def _verdict(status: Status, error: float, allowed: float, warned: bool = False)
 
 
 def summary(rows: list[Row]) -> str:
-    """How many cases are right, say that they are not, and are wrong; and the largest error in units of what is allowed."""
+    """How many cases are right, say that they are not, and are wrong; and the largest error in
+    units of what is allowed.
+    """
     table = [dict(zip(COLUMNS, r, strict=True)) for r in rows]
     verdicts = [r["verdict"] for r in table]
     right = [r for r in table if r["verdict"] == "right"]
@@ -83,7 +107,8 @@ def summary(rows: list[Row]) -> str:
     worst = max(right, key=lambda r: r["error"] / r["allowed"])
     share, energy = worst["error"] / worst["allowed"], max(right, key=_imbalance)
     return (
-        f"{words}; nearest to its limit: {worst['group']}, {worst['case']}, rtol = {worst['rtol']:g}: {share:.2g} of it; "
+        f"{words}; nearest to its limit: {worst['group']}, {worst['case']}, "
+        f"rtol = {worst['rtol']:g}: {share:.2g} of it; "
         f"largest energy residual: {energy['group']}, {energy['case']}: {_imbalance(energy):.2g} of {SAFETY:g} rtol"
     )
 

@@ -1,7 +1,9 @@
-"""What a first use costs: import, derivation, text of the kernel, compilation, and loading from the cache.
+"""What a first use costs: import, derivation, text of the kernel, compilation, and loading from the
+cache.
 
-Every column is the time of one stage inside a fresh process; the cache of kernels is a temporary folder, empty at the first
-process and filled at the second.  Importing Numba alone is listed for comparison: it is part of `import`.
+Every column is the time of one stage inside a fresh process; the cache of kernels is a temporary
+folder, empty at the first process and filled at the second. Importing Numba alone is listed for
+comparison: it is part of `import`.
 """
 
 from __future__ import annotations
@@ -48,7 +50,9 @@ print(json.dumps([[time.perf_counter() - begin], False]))
 
 
 def measure(quick: bool = False) -> list[tuple[object, ...]]:
-    """Return the rows of the table, in the order of COLUMNS: medians of five processes, of one where `quick`."""
+    """Return the rows of the table, in the order of COLUMNS: medians of five processes, of one
+    where `quick`.
+    """
     repeats = 1 if quick else REPEATS
     rows: list[tuple[object, ...]] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -64,7 +68,9 @@ def measure(quick: bool = False) -> list[tuple[object, ...]]:
 
 
 def stages(n: int, folder: str, cached: bool) -> list[float]:
-    """Seconds of each of STAGES in one fresh process; RuntimeError where the kernel was cached against expectation."""
+    """Seconds of each of STAGES in one fresh process; RuntimeError where the kernel was cached
+    against expectation.
+    """
     times, from_cache = _child(CHILD, folder, str(n))
     if from_cache is not cached:
         raise RuntimeError(f"the kernel of {n} oscillators came from the cache: {from_cache}; expected {cached}")

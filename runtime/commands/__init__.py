@@ -1,7 +1,8 @@
 """The commands of `synchain`, one file each.
 
-A command has SUMMARY (one line), EXAMPLES (command lines), `configure(parser)` and `execute(arguments) -> exit code`.
-It imports what it needs when it runs, so that `synchain --help` is fast.
+A command has SUMMARY (one line), EXAMPLES (command lines), `configure(parser)` and
+`execute(arguments) -> exit code`. It imports what it needs when it runs, so that `synchain --help`
+is fast.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ __all__ = ["command", "names"]
 
 def names() -> tuple[str, ...]:
     """All commands: the files of this folder, sorted."""
-    return tuple(sorted(found.name for found in iter_modules(__path__) if not found.name.startswith("_")))
+    return tuple(sorted(module.name for module in iter_modules(__path__) if not module.name.startswith("_")))
 
 
 def command(name: str) -> ModuleType:

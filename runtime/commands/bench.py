@@ -26,19 +26,21 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Run the benchmarks one after the other and print a Markdown table of each; with a folder, write files as well."""
+    """Run the benchmarks one after the other and print a Markdown table of each; with a folder,
+    write files as well.
+    """
     from ..bench import load, machine, text, write
     from ..bench import names as known
     from ..support.files import output_folder
 
     with wrong_use():
-        chosen = [(name, load(name)) for name in arguments.names or known()]
-        short = [name for name, module in chosen if arguments.long and not hasattr(module, "measure_long")]
+        benchmarks = [(name, load(name)) for name in arguments.names or known()]
+        short = [name for name, module in benchmarks if arguments.long and not hasattr(module, "measure_long")]
         if short:
             raise ValueError(f"benchmark {short[0]!r} has no long form; leave out --long or name others")
         target = None if arguments.out is None else output_folder(arguments.out)
     print(machine())
-    for name, module in chosen:
+    for name, module in benchmarks:
         for line in module.notes() if hasattr(module, "notes") else ():
             print(line, file=sys.stderr)
         rows = module.measure_long() if arguments.long else module.measure(arguments.quick)

@@ -15,7 +15,7 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         "action",
         choices=("info", "clear"),
-        help="info: folder, number of kernels and size; clear: delete the kernels, which are compiled again when needed",
+        help="info: folder, number of kernels and size; clear: delete the kernels; they are compiled again when needed",
     )
 
 
@@ -24,11 +24,11 @@ def execute(arguments: Namespace) -> int:
     from synchain.codegen.kernels.cache import clear, describe
 
     try:
-        found = describe()
+        info = describe()
         if arguments.action == "info":
-            print(f"folder   {found['folder']}\nkernels  {found['kernels']}\nsize     {_size(int(found['bytes']))}")
+            print(f"folder   {info['folder']}\nkernels  {info['kernels']}\nsize     {_size(int(info['bytes']))}")
         else:
-            print(f"deleted {_counted(clear())} from {found['folder']}")
+            print(f"deleted {_counted(clear())} from {info['folder']}")
     except PermissionError as problem:
         raise Failed(f"the kernel cache cannot be read or emptied: {sentence(problem)}") from problem
     except RuntimeError as problem:  # no home folder

@@ -45,46 +45,46 @@ def execute(arguments: Namespace) -> int:
 
     with wrong_use():
         lines = read_claims(arguments.file)
-    found: list[list[Verdict]] = []
-    open_ones: list[Undecided] = []
+    judged: list[list[Verdict]] = []
+    undecided: list[Undecided] = []
     for line in lines:
         try:
-            found.append([verify(claim) for claim in line])
+            judged.append([verify(claim) for claim in line])
         except (ValueError, TypeError) as problem:
-            open_ones.append((line[0].line, line[0].text, " ".join(str(problem).split())))
+            undecided.append((line[0].line, line[0].text, " ".join(str(problem).split())))
     if arguments.junit is not None:
         with wrong_use():
-            _write_junit(arguments.junit, arguments.file, found, open_ones)
-    code = FAILED if _wrong(found) else FINE
+            _write_junit(arguments.junit, arguments.file, judged, undecided)
+    code = FAILED if _wrong(judged) else FINE
     try:
-        _print(arguments, found, open_ones)
+        _print(arguments, judged, undecided)
     except BrokenPipeError:  # the reader has seen enough, but the answer counts
         discard_output()
         return code
-    if open_ones:
-        number, _, why = open_ones[0]
-        more = f" (and {len(open_ones) - 1} more)" * (len(open_ones) > 1)
+    if undecided:
+        number, _, why = undecided[0]
+        more = f" (and {len(undecided) - 1} more)" * (len(undecided) > 1)
         raise WrongUse(f"{arguments.file}, line {number}: {why}{more}")
     return code
 
 
-def _wrong(found: Sequence[Sequence[Verdict]]) -> int:
+def _wrong(judged: Sequence[Sequence[Verdict]]) -> int:
     """How many lines hold a wrong claim."""
-    return sum(not all(v.right for v in line) for line in found)
+    return sum(not all(v.right for v in line) for line in judged)
 
 
-def _print(arguments: Namespace, found: Sequence[Sequence[Verdict]], open_ones: Sequence[Undecided]) -> None:
+def _print(arguments: Namespace, judged: Sequence[Sequence[Verdict]], undecided: Sequence[Undecided]) -> None:
     """Print all claims as JSON or text."""
-    wrong = _wrong(found)
+    wrong = _wrong(judged)
     if arguments.json:
-        claims = [_as_dict(line) for line in found]
-        undecided = [{"line": line, "claim": text, "why": why} for line, text, why in open_ones]
-        counts = {"right": len(found) - wrong, "wrong": wrong}
-        print_json({"file": arguments.file, **counts, "claims": claims, "undecided": undecided})
+        claims = [_as_dict(line) for line in judged]
+        reasons = [{"line": line, "claim": text, "why": why} for line, text, why in undecided]
+        counts = {"right": len(judged) - wrong, "wrong": wrong}
+        print_json({"file": arguments.file, **counts, "claims": claims, "undecided": reasons})
     else:
-        for verdicts in found:
+        for verdicts in judged:
             print("\n".join(_report(verdicts)))
-        print(f"{len(found)} claim{'s' * (len(found) != 1)}: {len(found) - wrong} right, {wrong} wrong")
+        print(f"{len(judged)} claim{'s' * (len(judged) != 1)}: {len(judged) - wrong} right, {wrong} wrong")
     if sys.stdout is not None:
         sys.stdout.flush()
 
@@ -95,8 +95,8 @@ def _name(line: Sequence[Verdict]) -> str:
     if "(" in first.graph.name and first.n is None:
         return first.graph.name
     sizes = f"n = {first.n} … {last.n}" if first.n is not None else str(first.graph.n)
-    chosen = "".join(f" {key}={_option(value)}" for key, value in first.graph.options)
-    return f"{first.graph.name} {sizes}{chosen}"
+    options = "".join(f" {key}={_option(value)}" for key, value in first.graph.options)
+    return f"{first.graph.name} {sizes}{options}"
 
 
 def _option(value: object) -> str:
@@ -105,8 +105,8 @@ def _option(value: object) -> str:
 
 def _report(line: Sequence[Verdict]) -> list[str]:
     wrong = [v for v in line if not v.right]
-    believed = "" if all(v.proved for v in line) else " (closed form, not multiplied out)"
-    return [f"line {line[0].claim.line}: {_name(line)}: {'WRONG' if wrong else 'right'}{believed}", *_problems(line)]
+    unproved = "" if all(v.proved for v in line) else " (closed form, not multiplied out)"
+    return [f"line {line[0].claim.line}: {_name(line)}: {'WRONG' if wrong else 'right'}{unproved}", *_problems(line)]
 
 
 def _problems(line: Sequence[Verdict]) -> list[str]:
@@ -124,21 +124,31 @@ def _problems(line: Sequence[Verdict]) -> list[str]:
 
 def _as_dict(line: Sequence[Verdict]) -> dict[str, Any]:
     graphs = [
-        {"topology": v.claim.graph.name, "n": v.claim.graph.n, "options": dict(v.claim.graph.options),
-         "right": v.right, "proved": v.proved, "problems": list(v.problems),
-         "expected": v.expected}
+        {
+            "topology": v.claim.graph.name,
+            "n": v.claim.graph.n,
+            "options": dict(v.claim.graph.options),
+            "right": v.right,
+            "proved": v.proved,
+            "problems": list(v.problems),
+            "expected": v.expected,
+        }
         for v in line
-    ]  # fmt: skip
+    ]
     first = line[0].claim
     return {"line": first.line, "claim": first.text, "right": all(v.right for v in line), "graphs": graphs}
 
 
-def _write_junit(path: str, file: str, found: Sequence[Sequence[Verdict]], open_ones: Sequence[Undecided]) -> None:
+def _write_junit(path: str, file: str, judged: Sequence[Sequence[Verdict]], undecided: Sequence[Undecided]) -> None:
     from xml.etree import ElementTree as Tree
 
     from ..support.files import write_text
 
-    counts = {"tests": str(len(found) + len(open_ones)), "failures": str(_wrong(found)), "errors": str(len(open_ones))}
+    counts = {
+        "tests": str(len(judged) + len(undecided)),
+        "failures": str(_wrong(judged)),
+        "errors": str(len(undecided)),
+    }
     suites = Tree.Element("testsuites", counts)
     suite = Tree.SubElement(suites, "testsuite", {"name": _legal(f"synchain check {file}"), **counts})
 
@@ -146,12 +156,12 @@ def _write_junit(path: str, file: str, found: Sequence[Sequence[Verdict]], open_
         about = {"name": _legal(f"line {number}: {text}"), "classname": "claims", "file": _legal(file)}
         return Tree.SubElement(suite, "testcase", about)
 
-    for line in found:
+    for line in judged:
         one = case(line[0].claim.line, line[0].claim.text)
         problems = [row.strip() for row in _problems(line)]
         if problems:
             Tree.SubElement(one, "failure", {"message": _legal(problems[0])}).text = _legal("\n".join(problems))
-    for number, text, why in open_ones:
+    for number, text, why in undecided:
         Tree.SubElement(case(number, text), "error", {"message": _legal(why)})
     Tree.indent(suites)
     write_text(path, '<?xml version="1.0" encoding="utf-8"?>\n' + Tree.tostring(suites, encoding="unicode") + "\n")

@@ -21,17 +21,17 @@ def execute(arguments: Namespace) -> int:
     """Print one line for each check; exit code 1 where something is wrong."""
     from ..console.doctor import examine
 
-    found = []
+    checks = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # that kernels are not kept on disk is a line of its own
         for check in examine():
-            found.append(check)
+            checks.append(check)
             if not arguments.json:
                 remedy = f"\n{'':32}{check.remedy}" if check.remedy else ""
                 print(f"{check.outcome:<9} {check.name:<21} {check.found}{remedy}", flush=True)
-    wrong = [check.name for check in found if check.outcome == "wrong"]
+    wrong = [check.name for check in checks if check.outcome == "wrong"]
     if arguments.json:
-        print_json({"sound": not wrong, "checks": [check.as_dict() for check in found]})
+        print_json({"sound": not wrong, "checks": [check.as_dict() for check in checks]})
     if wrong:
         print(f"synchain doctor: wrong: {', '.join(wrong)}", file=sys.stderr)
     return FAILED if wrong else FINE

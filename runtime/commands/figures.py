@@ -1,4 +1,6 @@
-"""`synchain figures`: every figure and threshold of the paper, and the master stability function beside them."""
+"""`synchain figures`: every figure and threshold of the paper, and the master stability function
+beside them.
+"""
 
 from __future__ import annotations
 

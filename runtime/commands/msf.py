@@ -1,4 +1,6 @@
-"""`synchain msf`: exponents of the modes of a network against their strength, and what they say about the network."""
+"""`synchain msf`: exponents of the modes of a network against their strength, and what they say
+about the network.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +56,9 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def execute(arguments: Namespace) -> int:
-    """Compute the function on a line or over a plane; print what it says, and write files where asked to."""
+    """Compute the function on a line or over a plane; print what it says, and write files where
+    asked to.
+    """
     import numpy as np
 
     from ..console.line_report import LineReport, complex_modes
@@ -96,7 +100,9 @@ def _tell(report: LineReport | PlaneReport, json: bool, files: list[Path]) -> No
 
 
 def _scene(arguments: Namespace) -> tuple[Scene, bool]:
-    """The oscillator with its network, and whether it has one; without one, two oscillators stand for it."""
+    """The oscillator with its network, and whether it has one; without one, two oscillators stand
+    for it.
+    """
     from synchain.models.graphs.families import topology
     from synchain.models.scenes.file import load_scene
 

@@ -100,8 +100,8 @@ def execute(arguments: Namespace) -> int:
         _check(skip, arguments)
         if target is None:
             return FINE
-        given = {"resume": arguments.resume, "overwrite": arguments.overwrite, "certified": arguments.certify}
-        if claim(skip, target, **given) == "complete":
+        options = {"resume": arguments.resume, "overwrite": arguments.overwrite, "certified": arguments.certify}
+        if claim(skip, target, **options) == "complete":
             return _nothing_to_do(target)
         output_folder(target.parent)
     warn(scene.warnings)
@@ -109,7 +109,7 @@ def execute(arguments: Namespace) -> int:
         kernel(scene, reduce=skip)  # before the connection is there, which would not be answered while it compiles
     with stopped_by_signals(), _executor(arguments.dask) as executor:
         try:
-            done = stream(scene, target, reduce=skip, workers=arguments.workers, executor=executor, **given)
+            done = stream(scene, target, reduce=skip, workers=arguments.workers, executor=executor, **options)
         except (SweepInterrupted, SweepFailed) as stop:
             raise _stopped(stop, target, arguments) from None
     _summary(name, scene, done, target)
@@ -157,7 +157,7 @@ def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[st
 
 
 def _check(skip: Reduction, arguments: Namespace) -> None:
-    """Find out whatever can go wrong before the first cell runs."""
+    """Raise now what would stop the run later."""
     from ..cells.kernels import kernel_source
     from ..cells.plan import Planner
     from ..sweeps.certify import check_certifiable
@@ -184,7 +184,8 @@ def _nothing_to_do(target: Path) -> int:
 
 @contextmanager
 def stopped_by_signals() -> Iterator[None]:
-    """SIGTERM, with which batch systems announce the end, and SIGHUP of a closed terminal stop like Ctrl-C.
+    """SIGTERM, with which batch systems announce the end, and SIGHUP of a closed terminal stop like
+    Ctrl-C.
 
     A signal that is ignored (nohup) stays so.
     """
@@ -205,7 +206,7 @@ def stopped_by_signals() -> Iterator[None]:
 
 @contextmanager
 def _executor(address: str | None) -> Iterator[Executor | None]:
-    """The workers of a Dask scheduler; None, for threads, where no address is given."""
+    """The workers of a Dask scheduler; None, which means threads, without an address."""
     if address is None:
         yield None
         return
@@ -242,7 +243,7 @@ def _stopped(stop: SweepInterrupted | SweepFailed, target: Path, arguments: Name
 
 
 def _drawn(target: Path) -> Path:
-    """Draw the figure; whatever stops that says that the result is complete."""
+    """Draw the figure; an error says that the result itself is complete."""
     try:
         return _draw(target)
     except (Exception, KeyboardInterrupt) as problem:

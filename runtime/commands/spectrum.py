@@ -95,7 +95,9 @@ def execute(arguments: Namespace) -> int:
 
 
 def _symbolic(arguments: Namespace) -> int:
-    """Print the closed form of a family with symbols for its size, or the spectrum of a matrix of letters."""
+    """Print the closed form of a family with symbols for its size, or the spectrum of a matrix of
+    letters.
+    """
     from synchain.models.graphs.closed_forms import closed_form
     from synchain.models.graphs.graph_text import is_composed, read_form
 

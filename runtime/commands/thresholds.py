@@ -49,7 +49,7 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--quick",
         action="store_true",
-        help=f"defaults of {QUICK['starts']} starts, {QUICK['transient']:g} periods and half the grid; ends to {COARSE:g}",
+        help=f"defaults of {QUICK['starts']} starts, {QUICK['transient']:g} periods, half the grid; ends to {COARSE:g}",
     )
     parser.add_argument("--json", action="store_true", help="print JSON: intervals, probe, predicted, warnings")
     add_allow_code(parser)
@@ -71,7 +71,7 @@ def execute(arguments: Namespace) -> int:
         kernel_source(scene)
         criterion = Criterion(**_effort(arguments))
     warn(scene.warnings)
-    found = thresholds(
+    result = thresholds(
         scene,
         sigma=arguments.sigma or default_grid(scene.topology.spectrum, 0.005 if arguments.quick else 0.0025),
         resolution=COARSE if arguments.quick else RESOLUTION,
@@ -79,9 +79,9 @@ def execute(arguments: Namespace) -> int:
         workers=arguments.workers,
     )
     if arguments.json:
-        print_json(found.as_dict())
+        print_json(result.as_dict())
     else:
-        print(report(found, criterion))
+        print(report(result, criterion))
     return FINE
 
 
@@ -107,16 +107,16 @@ def _scene(arguments: Namespace) -> Scene:
     return scene_on(network, scene, arguments)
 
 
-def report(found: Thresholds, criterion: Criterion) -> str:
+def report(result: Thresholds, criterion: Criterion) -> str:
     """The ranges as a table."""
-    scene, end, reach = found.scene, float(found.direct.x[-1]), float(found.probe.x[-1])
+    scene, end, reach = result.scene, float(result.direct.x[-1]), float(result.probe.x[-1])
     steepest = max(abs(value) for value in scene.topology.spectrum.values)
     unit = "drive periods" if scene.time_unit == "period" else "units of time"
     rows = [
-        ("sigma, simulated", _written(found.direct.intervals, end)),
-        ("sigma, predicted by the probe", _written(found.predicted, min(end, reach / steepest))),
-        *_wu_chua(found),
-        ("alpha = sigma |gamma|, probe", _written(found.probe.intervals, reach)),
+        ("sigma, simulated", _written(result.direct.intervals, end)),
+        ("sigma, predicted by the probe", _written(result.predicted, min(end, reach / steepest))),
+        *_wu_chua(result),
+        ("alpha = sigma |gamma|, probe", _written(result.probe.intervals, reach)),
     ]
     wide = max(len(name) for name, _ in rows)
     return "\n".join(
@@ -130,18 +130,20 @@ def report(found: Thresholds, criterion: Criterion) -> str:
     )
 
 
-def _wu_chua(found: Thresholds) -> list[tuple[str, str]]:
-    """The conjecture's row, where the probe's first range starts at no coupling and ends on the grid."""
+def _wu_chua(result: Thresholds) -> list[tuple[str, str]]:
+    """The conjecture's row, where the probe's first range starts at no coupling and ends on the
+    grid.
+    """
     from synchain.models.graphs.families import topology
 
     from ..synchronisation.threshold import wu_chua
 
-    if not found.probe.intervals:
+    if not result.probe.intervals:
         return []
-    low, high = found.probe.intervals[0]
-    if low > 0.0 or high >= found.probe.x[-1]:
+    low, high = result.probe.intervals[0]
+    if low > 0.0 or high >= result.probe.x[-1]:
         return []
-    end = wu_chua(high / 2.0, topology("chain", 2).spectrum, found.scene.topology.spectrum)
+    end = wu_chua(high / 2.0, topology("chain", 2).spectrum, result.scene.topology.spectrum)
     return [("sigma, Wu-Chua conjecture", _written([(0.0, end)], float("inf")))]
 
 

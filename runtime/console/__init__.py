@@ -1,1 +1,1 @@
-"""What the commands share: arguments, outcomes, reports and the doctor."""
+"""What the commands share: arguments, networks, outcomes, reports, the doctor. Computes nothing."""

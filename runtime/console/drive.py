@@ -1,4 +1,4 @@
-"""The frequency of the drive on the command line: set by `--omega`, whatever the model calls it, and told in reports."""
+"""The frequency of the drive on the command line: set by `--omega`, and named in reports."""
 
 from __future__ import annotations
 
@@ -13,10 +13,27 @@ __all__ = ["at_frequency", "drive_words"]
 
 
 def at_frequency(scene: Scene, omega: float | None, where: str | None) -> dict[str, float]:
-    """The parameter that puts the drive of a scene at the frequency `omega` of the arguments, none if that is None.
+    """Return the parameter that sets the frequency of a scene's drive.
 
-    Raises WrongUse if the scene of the file `where` has no drive whose frequency is a parameter, and without `omega` if an
-    axis of the scene moves the frequency or there is neither a file nor `omega`.
+    Parameters
+    ----------
+    scene : Scene
+        The scene with its drive.
+    omega : float or None
+        The frequency that --omega asks for, in radians per unit of time.
+    where : str or None
+        The user's word for the scene, for messages; None if no scene is named.
+
+    Returns
+    -------
+    dict of str to float
+        The parameter and its value; empty if `omega` is None.
+
+    Raises
+    ------
+    WrongUse
+        If `omega` is asked for and the drive has no frequency that is a parameter. Without
+        `omega`: if an axis of the scene moves the frequency, or if no scene is named.
     """
     frequency = scene.drive.frequency
     if omega is not None:

@@ -1,11 +1,10 @@
-"""What the exponents on a line of real strengths say about a scene's network: as text, as JSON, and as files."""
+"""Report on a master stability function over real strengths: text, JSON, files."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -33,70 +32,94 @@ GRID_ENDS = "undecided: the function is negative where the grid of alpha ends"
 
 
 def complex_modes(graph: Topology, highest: float) -> list[str]:
-    """A sentence where a network has complex eigenvalues, so that a line of real strengths says nothing about it."""
+    """Return warnings if a network has complex eigenvalues: a line of alpha does not serve them.
+
+    Parameters
+    ----------
+    graph : Topology
+        The network.
+    highest : float
+        Largest alpha of the line, from which a range of beta is proposed.
+
+    Returns
+    -------
+    list of str
+        One sentence; none if all eigenvalues are real.
+    """
     gammas = [complex(mode.eigenvalue.value) for mode in transversal_modes(graph)]
     slopes = [abs(g.imag / g.real) for g in gammas if g.imag and g.real]
     if not any(g.imag for g in gammas):
         return []
     top = max(slopes, default=1.0) * highest
     return [
-        f"{graph.name}({graph.n}) has complex eigenvalues, for which a line of alpha says nothing; no windows of sigma are "
-        f"given: add --beta, e.g. --beta 0:{top:.2g}:61"
+        f"{graph.name}({graph.n}) has complex eigenvalues, for which a line of alpha says nothing; "
+        f"no windows of sigma are given: add --beta, e.g. --beta 0:{top:.2g}:61"
     ]
 
 
 @dataclass(frozen=True, slots=True)
 class LineReport:
-    """The function on a line; `network` where the scene has one to be judged."""
+    """A master stability function over real strengths and what it says about a network.
 
-    found: MSF
+    Attributes
+    ----------
+    function : MSF
+        The exponents on a line of alpha.
+    network : bool
+        Whether the scene has a network to be judged.
+    """
+
+    function: MSF
     network: bool
 
     @property
     def judged(self) -> bool:
-        """True where there is a network with real eigenvalues."""
-        return self.network and not complex_modes(self.found.scene.topology, 1.0)
+        """True if there is a network with real eigenvalues."""
+        return self.network and not complex_modes(self.function.scene.topology, 1.0)
 
     @property
     def verdict(self) -> tuple[str, Verdict]:
-        """Whether the network can synchronise, in words that mind the ends of the grid, and what that rests on."""
-        graph, ranges = self.found.scene.topology, list(self.found.intervals)
-        given = verdict(ranges, graph, self.found.errors)
-        line = self.found.fine.alpha
+        """The answer in words that consider the ends of the grid, and the verdict."""
+        graph, ranges = self.function.scene.topology, list(self.function.intervals)
+        judgement = verdict(ranges, graph, self.function.errors)
+        line = self.function.fine.alpha
         open_ranges = [(0.0 if a == line[0] else a, math.inf if b == line[-1] else b) for a, b in ranges]
-        further = verdict(open_ranges, graph, self.found.errors)
-        return (given.answer if further.answer == given.answer else GRID_ENDS), given
+        further = verdict(open_ranges, graph, self.function.errors)
+        return (judgement.answer if further.answer == judgement.answer else GRID_ENDS), judgement
 
-    def as_dict(self) -> dict[str, Any]:
-        """JSON-ready: MSF.as_dict, "windows" and "verdict"; null where a number is not finite or there is no network."""
-        seen: dict[str, Any] = {**self.found.as_dict(), "windows": None, "verdict": None}
+    def as_dict(self) -> dict[str, object]:
+        """Return MSF.as_dict, "windows" and "verdict" in JSON types.
+
+        A number that is not finite is null; so are windows and verdict without a network.
+        """
+        report: dict[str, object] = {**self.function.as_dict(), "windows": None, "verdict": None}
         if self.judged:
-            answer, given = self.verdict
-            seen["windows"] = [window_dict(window) for window in self.found.windows]
-            seen["verdict"] = {
+            answer, judgement = self.verdict
+            report["windows"] = [window_dict(window) for window in self.function.windows]
+            report["verdict"] = {
                 "answer": answer,
-                "ratio": None if given.ratio is None else str(given.ratio),
-                "ratio_value": given.ratio_value,
-                "allowed": given.allowed,
-                "slowest": exact(given.slowest),
-                "fastest": exact(given.fastest),
+                "ratio": None if judgement.ratio is None else str(judgement.ratio),
+                "ratio_value": judgement.ratio_value,
+                "allowed": judgement.allowed,
+                "slowest": exact(judgement.slowest),
+                "fastest": exact(judgement.fastest),
             }
-        return dict(finite(seen))
+        return {name: finite(value) for name, value in report.items()}
 
     def text(self) -> str:
-        """The report as lines."""
-        found, line = self.found, self.found.fine.alpha
+        """Return the report as lines of text."""
+        function, line = self.function, self.function.fine.alpha
         ranges = [
             f"{measured(low, a, low == line[0])} … {measured(high, b, high == line[-1])}"
-            for (low, high), (a, b) in zip(found.intervals, found.errors or found.uncertainties, strict=True)
+            for (low, high), (a, b) in zip(function.intervals, function.errors or function.uncertainties, strict=True)
         ]
         rows = [
-            ("class", f"{found.kind}, for alpha from {line[0]:g} to {line[-1]:g}"),
+            ("class", f"{function.kind}, for alpha from {line[0]:g} to {line[-1]:g}"),
             ("negative for alpha", "; ".join(ranges) or "none"),
-            ("smallest, largest", f"{np.min(found.exponent):.4f}, {np.max(found.exponent):.4f}"),
-            *how(found.scene, found.attractors, found.fine.time, found.stderr),
+            ("smallest, largest", f"{np.min(function.exponent):.4f}, {np.max(function.exponent):.4f}"),
+            *how(function.scene, function.attractors, function.fine.time, function.stderr),
         ]
-        lines = [f"{headline(found.scene)}, alpha = -sigma gamma", *rows_of(rows)]
+        lines = [f"{headline(function.scene)}, alpha = -sigma gamma", *rows_of(rows)]
         if self.judged:
             lines += self._network_text()
         if any("..." in words for words in lines):
@@ -104,20 +127,26 @@ class LineReport:
         return "\n".join(lines)
 
     def _network_text(self) -> list[str]:
-        graph, (answer, given) = self.found.scene.topology, self.verdict
-        if given.ratio_value == given.ratio_value:
-            exact = f"{given.ratio} = " if given.ratio is not None and not given.ratio.is_Rational else ""
-            allowed = "any" if given.allowed == math.inf else f"{given.allowed:.6g}" if given.allowed > 0 else "none"
-            answer += f" (largest over smallest |gamma|: {exact}{given.ratio_value:.6g}; allowed: {allowed})"
-        rows = [("sigma", words) for words in map(window_text, self.found.windows)] or [("sigma", "none")]
+        graph, (answer, judgement) = self.function.scene.topology, self.verdict
+        if judgement.ratio_value == judgement.ratio_value:
+            exact = f"{judgement.ratio} = " if judgement.ratio is not None and not judgement.ratio.is_Rational else ""
+            allowed = (
+                "any"
+                if judgement.allowed == math.inf
+                else f"{judgement.allowed:.6g}"
+                if judgement.allowed > 0
+                else "none"
+            )
+            answer += f" (largest over smallest |gamma|: {exact}{judgement.ratio_value:.6g}; allowed: {allowed})"
+        rows = [("sigma", words) for words in map(window_text, self.function.windows)] or [("sigma", "none")]
         title = f"{graph.name}({graph.n}): every mode dies out for"
         return [title, *rows_of([*rows, ("possible", answer), *defective_rows(graph)])]
 
     def write(self, folder: Path) -> list[Path]:
-        """Write msf.csv and msf.png."""
+        """Write msf.csv and msf.png to a folder and return their paths."""
         from ..figures.exponent import draw_exponent
         from ..figures.tables import Table
 
-        found = self.found
-        numbers = Table.of(alpha=found.alpha, exponent=found.exponent, stderr=found.stderr)
-        return write_files(folder, "msf", numbers, lambda axes: draw_exponent(axes, found))
+        function = self.function
+        numbers = Table.of(alpha=function.alpha, exponent=function.exponent, stderr=function.stderr)
+        return write_files(folder, "msf", numbers, lambda axes: draw_exponent(axes, function))

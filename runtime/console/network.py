@@ -21,7 +21,9 @@ FILES = ("matrix", "edges", "graphml")
 
 
 def add_network(parser: ArgumentParser) -> None:
-    """Add --n, --topology and --matrix, which `named_network` reads, and --omega, which `scene_on` reads."""
+    """Add --n, --topology and --matrix, which `named_network` reads, and --omega, which `scene_on`
+    reads.
+    """
     parser.add_argument("--n", metavar="N", type=whole, help="number of oscillators (default: the scene's)")
     parser.add_argument(
         "--topology",
@@ -163,7 +165,7 @@ def _graph_of_family(arguments: Namespace) -> Topology:
 def named_values(
     texts: Sequence[str], flag: str = "--option", example: str = "NAME=VALUE, e.g. offsets=1,3"
 ) -> dict[str, str]:
-    """Return names and values of texts NAME=VALUE; WrongUse if one is no such text or is doubled."""
+    """Return names and values of texts NAME=VALUE; WrongUse if one is wrong or occurs twice."""
     values: dict[str, str] = {}
     for text in texts:
         name, equals, value = text.partition("=")

@@ -41,7 +41,9 @@ def sentence(problem: BaseException) -> str:
 
 @contextmanager
 def wrong_use() -> Iterator[None]:
-    """Errors about values, types and files inside the block are the user's; anything else stays what it is."""
+    """Errors about values, types and files inside the block are the user's; anything else stays
+    what it is.
+    """
     try:
         yield
     except BrokenPipeError:  # no mistake: the reader of the output has seen enough
@@ -57,7 +59,9 @@ def warn(sentences: Iterable[str]) -> None:
 
 
 def discard_output() -> None:
-    """Send the rest of stdout's buffer to nowhere, so that the interpreter ends without a complaint."""
+    """Send the rest of stdout's buffer to nowhere, so that the interpreter ends without a
+    complaint.
+    """
     with suppress(OSError, ValueError):
         descriptor = sys.stdout.fileno()
         nowhere = os.open(os.devnull, os.O_WRONLY)

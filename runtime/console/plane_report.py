@@ -1,11 +1,11 @@
-"""What the exponents over complex strengths say about a scene's network: as text, as JSON, and as files."""
+"""Report on a master stability function over complex strengths: text, JSON, files."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from ..prediction.modes import transversal_modes
 from ..prediction.synchronisability import Window, windows_complex
 from ..stability.msf import Plane
 from .words import defective_rows, finite, headline, how, rows_of, window_dict, window_text, write_files
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 __all__ = ["PlaneReport", "plane_windows"]
 
@@ -22,37 +25,51 @@ STEPS = 2001
 
 @dataclass(frozen=True, slots=True)
 class PlaneReport:
-    """The function over a plane; `network` where the scene has one to be judged."""
+    """A master stability function over complex strengths and what it says about a network.
 
-    found: Plane
+    Attributes
+    ----------
+    plane : Plane
+        The exponents over alpha + i beta.
+    network : bool
+        Whether the scene has a network to be judged.
+    """
+
+    plane: Plane
     network: bool
 
-    def as_dict(self) -> dict[str, Any]:
-        """JSON-ready: Plane.as_dict and "windows"; null where a number is not finite or there is no network."""
-        seen: dict[str, Any] = {**self.found.as_dict(), "windows": None}
+    def as_dict(self) -> dict[str, object]:
+        """Return Plane.as_dict and "windows" in JSON types.
+
+        A number that is not finite is null; so are the windows without a network.
+        """
+        report: dict[str, object] = {**self.plane.as_dict(), "windows": None}
         if self.network:
-            seen["windows"] = [window_dict(window) for window in plane_windows(self.found)]
-        return dict(finite(seen))
+            report["windows"] = [window_dict(window) for window in plane_windows(self.plane)]
+        return {name: finite(value) for name, value in report.items()}
 
     def text(self) -> str:
-        """The report as lines."""
-        found = self.found
-        alpha, beta = found.alpha, found.beta
+        """Return the report as lines of text."""
+        plane = self.plane
+        alpha, beta = plane.alpha, plane.beta
         contours = [
-            f"alpha {line[:, 0].min():.4f} … {line[:, 0].max():.4f}, beta {line[:, 1].min():.4f} … {line[:, 1].max():.4f}"
-            for line in found.contours
+            ", ".join(
+                f"{name} {part.min():.4f} … {part.max():.4f}"
+                for name, part in zip(("alpha", "beta"), line.T, strict=True)
+            )
+            for line in plane.contours
         ]
         rows = [
             ("plane", f"alpha {alpha[0]:g} … {alpha[-1]:g}, beta {beta[0]:g} … {beta[-1]:g}"),
             *[("zero contour", words) for words in contours or ["none"]],
-            ("negative", f"at {np.count_nonzero(found.exponent < 0)} of {found.exponent.size} strengths"),
-            ("smallest, largest", f"{np.min(found.exponent):.4f}, {np.max(found.exponent):.4f}"),
-            *how(found.scene, found.attractors, found.time, found.stderr),
+            ("negative", f"at {np.count_nonzero(plane.exponent < 0)} of {plane.exponent.size} strengths"),
+            ("smallest, largest", f"{np.min(plane.exponent):.4f}, {np.max(plane.exponent):.4f}"),
+            *how(plane.scene, plane.attractors, plane.time, plane.stderr),
         ]
-        lines = [f"{headline(found.scene)}, alpha + i beta = -sigma gamma", *rows_of(rows)]
+        lines = [f"{headline(plane.scene)}, alpha + i beta = -sigma gamma", *rows_of(rows)]
         if self.network:
-            graph = found.scene.topology
-            ranges = [window_text(window, error=False) for window in plane_windows(found)] or ["none in this plane"]
+            graph = plane.scene.topology
+            ranges = [window_text(window, error=False) for window in plane_windows(plane)] or ["none in this plane"]
             lines += [
                 f"{graph.name}({graph.n}): every mode dies out for",
                 *rows_of([*(("sigma", words) for words in ranges), *defective_rows(graph)]),
@@ -62,29 +79,39 @@ class PlaneReport:
         return "\n".join(lines)
 
     def write(self, folder: Path) -> list[Path]:
-        """Write plane.csv and plane.png, with the rays of the network and dots at the scene's sigma."""
+        """Write plane.csv and plane.png with the rays of the network; dots mark sigma."""
         from ..figures.plane import draw_plane, draw_rays, table
 
-        def draw(axes: Any) -> None:
-            draw_plane(axes, self.found)
+        def draw(axes: Axes) -> None:
+            draw_plane(axes, self.plane)
             if self.network:
-                draw_rays(axes, self.found, self.found.scene.parameters.get("sigma") or None)
+                draw_rays(axes, self.plane, self.plane.scene.parameters.get("sigma") or None)
 
-        return write_files(folder, "plane", table(self.found), draw)
+        return write_files(folder, "plane", table(self.plane), draw)
 
 
-def plane_windows(found: Plane) -> tuple[Window, ...]:
-    """The windows of sigma in which every mode of the scene's network lies where the plane is negative.
+def plane_windows(plane: Plane) -> tuple[Window, ...]:
+    """Return the windows of sigma in which all modes of the network are stable.
 
-    Between the strengths of the plane the exponent is interpolated; what lies outside counts as unstable.
+    The exponent is interpolated between the strengths of the plane; outside it counts as unstable.
+
+    Parameters
+    ----------
+    plane : Plane
+        Exponents (alpha, beta) of a scene with a network.
+
+    Returns
+    -------
+    tuple of Window
+        Windows with the modes that are lost at their ends.
     """
     from scipy.interpolate import RegularGridInterpolator
 
-    size = np.max(np.abs(found.exponent[np.isfinite(found.exponent)]), initial=1e-300)
-    value = np.nan_to_num(found.exponent, nan=size, posinf=size, neginf=-size)
-    at = RegularGridInterpolator((found.alpha, found.beta), value, bounds_error=False, fill_value=math.inf)
-    graph = found.scene.topology
-    top = min((_leaves(found, -complex(mode.eigenvalue.value)) for mode in transversal_modes(graph)), default=0.0)
+    size = np.max(np.abs(plane.exponent[np.isfinite(plane.exponent)]), initial=1e-300)
+    value = np.nan_to_num(plane.exponent, nan=size, posinf=size, neginf=-size)
+    at = RegularGridInterpolator((plane.alpha, plane.beta), value, bounds_error=False, fill_value=math.inf)
+    graph = plane.scene.topology
+    top = min((_leaves(plane, -complex(mode.eigenvalue.value)) for mode in transversal_modes(graph)), default=0.0)
     if not 0 < top < math.inf:
         return ()
 
@@ -95,10 +122,10 @@ def plane_windows(found: Plane) -> tuple[Window, ...]:
     return windows_complex(stable, graph, np.linspace(0.0, top, STEPS), 1e-6 * top).windows
 
 
-def _leaves(found: Plane, unit: complex) -> float:
-    """The sigma at which a mode leaves the plane; just inside, so that rounding does not put it out."""
-    reach = max(-found.beta[0], found.beta[-1]) if found.beta[0] < 0 else found.beta[-1]
-    edge = found.alpha[-1] if unit.real > 0 else -found.alpha[0]
+def _leaves(plane: Plane, unit: complex) -> float:
+    """The sigma at which a mode leaves the plane, reduced by a rounding error."""
+    reach = max(-plane.beta[0], plane.beta[-1]) if plane.beta[0] < 0 else plane.beta[-1]
+    edge = plane.alpha[-1] if unit.real > 0 else -plane.alpha[0]
     limits = [edge / abs(unit.real)] if unit.real else []
     if unit.imag:
         limits.append(reach / abs(unit.imag))

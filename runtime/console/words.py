@@ -1,12 +1,12 @@
-"""How reports on master stability functions are worded and written to files."""
+"""Words and files of the reports on master stability functions."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +16,11 @@ from synchain.models.scenes.scene import Scene
 from ..prediction.modes import NetworkMode
 from ..prediction.synchronisability import Window
 from .drive import drive_words
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..figures.tables import Table
 
 __all__ = [
     "defective_rows",
@@ -32,14 +37,31 @@ __all__ = [
 
 
 def headline(scene: Scene) -> str:
-    """What oscillates, and what is computed."""
+    """Return the first line of a report: oscillators, coupling, drive, unit of the exponents."""
     coupling = f", {scene.coupling} coupling" if scene.coupling else ""
     oscillators = " and ".join(dict.fromkeys(kind.oscillator.name for kind in scene.model.kinds))
     return f"{oscillators} oscillator{coupling}{drive_words(scene)}: exponents per unit of time"
 
 
 def how(scene: Scene, attractors: Sequence[str], time: float, stderr: np.ndarray) -> list[tuple[str, str]]:
-    """What the orbits settled on, and how long the average is."""
+    """Return the rows on the orbits and on the length of the average.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene with its drive.
+    attractors : sequence of str
+        The kind of attractor that each start settled on.
+    time : float
+        Units of time that each start was averaged over; 0 if no average was needed.
+    stderr : ndarray
+        Standard errors of the exponents, in units of 1/time.
+
+    Returns
+    -------
+    list of (str, str)
+        Names and words of the rows.
+    """
     kinds = "; ".join(
         f"{kind} ({count} of {len(attractors)} starts)" for kind, count in Counter(attractors).most_common()
     )
@@ -51,13 +73,13 @@ def how(scene: Scene, attractors: Sequence[str], time: float, stderr: np.ndarray
 
 
 def rows_of(rows: Sequence[tuple[str, str]]) -> list[str]:
-    """Names and words as lines in two columns."""
+    """Return names and words as lines in two columns."""
     wide = max(len(name) for name, _ in rows)
     return [f"  {name:<{wide}}  {words}" for name, words in rows]
 
 
 def measured(value: float, error: float, at_end: bool = False) -> str:
-    """A number with its error, to as many digits as that is good for; dots where a grid ends."""
+    """Return a number with its error, to the digits that are certain; dots if a grid ends at it."""
     if at_end:
         return f"{value:g}" + ("..." if value else "")
     if not (error > 0 and math.isfinite(error)):
@@ -67,7 +89,7 @@ def measured(value: float, error: float, at_end: bool = False) -> str:
 
 
 def window_text(window: Window, error: bool = True) -> str:
-    """A window of sigma and the modes that are lost at its ends; dots where a grid ends."""
+    """Return a window of sigma and the modes lost at its ends; dots if a grid ends there."""
     ends, lost = [], []
     for side in ("low", "high"):
         sigma, mode = getattr(window, side), getattr(window, f"{side}_mode")
@@ -79,20 +101,20 @@ def window_text(window: Window, error: bool = True) -> str:
     return "; ".join([" … ".join(ends), *lost])
 
 
-def window_dict(window: Window) -> dict[str, Any]:
-    """A window in JSON types; a mode by its exact eigenvalue, None where none is lost."""
+def window_dict(window: Window) -> dict[str, object]:
+    """Return a window in JSON types; a mode is its exact eigenvalue, or None if none is lost."""
     names = ("low", "high", "low_error", "high_error")
     modes = {name: exact(getattr(window, name)) for name in ("low_mode", "high_mode")}
     return {**{name: getattr(window, name) for name in names}, **modes}
 
 
 def exact(mode: NetworkMode | None) -> str | None:
-    """The eigenvalue of a mode as exact text."""
+    """Return the eigenvalue of a mode as exact text."""
     return None if mode is None else mode.eigenvalue.text
 
 
-def finite(value: Any) -> Any:
-    """The value with None in place of every number that JSON does not have."""
+def finite(value: object) -> object:
+    """Return the value with None in place of NaN and infinities, which JSON does not have."""
     if isinstance(value, dict):
         return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -100,8 +122,25 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def write_files(folder: Path, name: str, numbers: Any, draw: Any) -> list[Path]:
-    """Write the numbers, then the figure."""
+def write_files(folder: Path, name: str, numbers: Table, draw: Callable[[Axes], object]) -> list[Path]:
+    """Write numbers to NAME.csv and a figure to NAME.png.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of the files.
+    name : str
+        The name of both files without extension.
+    numbers : Table
+        The columns of the CSV file.
+    draw : callable
+        Draws on the axes that it is called with.
+
+    Returns
+    -------
+    list of Path
+        The two files.
+    """
     import matplotlib
 
     matplotlib.use("Agg")
@@ -120,7 +159,7 @@ def write_files(folder: Path, name: str, numbers: Any, draw: Any) -> list[Path]:
 
 
 def defective_rows(graph: Topology) -> list[tuple[str, str]]:
-    """A row for each eigenvalue that lacks eigenvectors: how its errors go while its exponent is lambda."""
+    """Return a row for each defective eigenvalue: how its errors grow if its exponent is lambda."""
     rows = []
     for e in graph.spectrum.defective:
         power = e.blocks[0][0] - 1 if e.blocks else 0

@@ -1,7 +1,9 @@
-"""Cases of the work-precision benchmark as data: a scene, times, and states that are known far better than any row.
+"""Cases of the work-precision benchmark as data: a scene, times, and states that are known far
+better than any row.
 
-The friction cases and the smooth one are reference runs in quadruple precision, kept as files in `data/` that say how they
-were made.  The frictionless chain is linear and needs no run: `normal_modes` gives its states.
+The friction cases and the smooth one are reference runs in quadruple precision, kept as files in
+`data/` that say how they were made. The frictionless chain is linear and needs no run:
+`normal_modes` gives its states.
 """
 
 from __future__ import annotations
@@ -39,7 +41,9 @@ OLD_NAMES = {"vb": "theta_b", "eps": "epsilon"}
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A problem with its solution: times (m,) in non-dimensional time, ascending, and states (m, dimension)."""
+    """A problem with its solution: times (m,) in non-dimensional time, ascending, and states (m,
+    dimension).
+    """
 
     name: str
     scene: Scene
@@ -89,9 +93,10 @@ def read_case(name: str) -> Case:
 def normal_modes(scene: Scene, times: np.ndarray) -> np.ndarray:
     """States (m, 2 n) of a driven chain without friction, from its normal modes.
 
-    Mode k has the frequency sqrt(1 - sigma gamma_k), gamma_k the eigenvalues of the connectivity matrix, and its share of
-    the drive u cos(omega t).  Accurate to about 1e-16 times the time.  Raises ValueError for a scene with friction or
-    links of unequal weight in the two directions.  Source: Rayleigh, The Theory of Sound, vol. 1, ch. 4-5 (Macmillan, 1877).
+    Mode k has the frequency sqrt(1 - sigma gamma_k), gamma_k the eigenvalues of the connectivity
+    matrix, and its share of the drive u cos(omega t). Accurate to about 1e-16 times the time.
+    Raises ValueError for a scene with friction or links of unequal weight in the two directions.
+    Source: Rayleigh, The Theory of Sound, vol. 1, ch. 4-5 (Macmillan, 1877).
     """
     values = scene.parameters
     if values["mu_s"] != 0.0 or values["mu_k"] != 0.0:
@@ -114,7 +119,8 @@ def normal_modes(scene: Scene, times: np.ndarray) -> np.ndarray:
 def _driven(frequency: np.ndarray, omega: float, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Solution of q'' = -frequency^2 q + cos(omega t) from rest, and its rate; finite at resonance.
 
-    (cos(omega t) - cos(frequency t))/(frequency^2 - omega^2), the difference of cosines written as a product.
+    (cos(omega t) - cos(frequency t))/(frequency^2 - omega^2), the difference of cosines written as
+    a product.
     """
     half, mean = 0.5 * (frequency - omega), 0.5 * (frequency + omega)
     swing = t * np.sinc(half * t / np.pi)  # sin(half t)/half

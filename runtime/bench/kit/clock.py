@@ -25,9 +25,11 @@ GIVE_UP = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One method at one tolerance: error (largest over times and components), seconds per period and core.
+    """One method at one tolerance: error (largest over times and components), seconds per period
+    and core.
 
-    `periods` is how much of the case was run, `compile` the seconds of preparation, `remark` why numbers are NaN or few.
+    `periods` is how much of the case was run, `compile` the seconds of preparation, `remark` why
+    numbers are NaN or few.
     """
 
     method: str
@@ -43,8 +45,9 @@ class Point:
 
 
 def best_time(run: Callable[[], object], quick: bool) -> float:
-    """CPU seconds of one call: the best of three groups of repetitions of at least SHORTEST seconds each, or one call
-    where that takes LONGEST or more."""
+    """CPU seconds of one call: the best of three groups of repetitions of at least SHORTEST seconds
+    each, or one call where that takes LONGEST or more.
+    """
     first = _seconds(run, 1)
     if quick or first >= LONGEST:
         return first
@@ -60,7 +63,9 @@ def _seconds(run: Callable[[], object], repetitions: int) -> float:
 
 
 def curve(peer: ModuleType, case: Case, quick: bool) -> Iterator[Point]:
-    """Yield a point for each tolerance of a peer, loose first; a failure is a point with NaN and a remark."""
+    """Yield a point for each tolerance of a peer, loose first; a failure is a point with NaN and a
+    remark.
+    """
     lanes = getattr(peer, "CELLS", 1)
     tolerances = peer.TOLERANCES[:: max(2, len(peer.TOLERANCES) // 2)] if quick else peer.TOLERANCES
     begin = time.perf_counter()
@@ -93,7 +98,9 @@ def _pilot(solve: Solve, rtol: float, atol: float, period: float) -> float:
 
 
 def _measure(solve: Solve, rtol: float, atol: float, case: Case, cost: float, quick: bool) -> tuple[int, float, float]:
-    """Periods run, error and CPU seconds a period; the timed run has one end, as the pilot had, for which JAX compiled."""
+    """Periods run, error and CPU seconds a period; the timed run has one end, as the pilot had, for
+    which JAX compiled.
+    """
     longest = 0.1 * LONGEST if quick else LONGEST
     fewest = max(
         2 if quick else FEWEST, int(np.ceil(case.times[1] / case.period * (1.0 - 1e-12)))

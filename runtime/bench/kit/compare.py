@@ -18,10 +18,12 @@ Curve = list[tuple[float, float]]
 
 
 def time_at(points: Sequence[tuple[float, float]], target: float) -> float:
-    """The least time at which a method reaches an error, from its points (error, time) in the order of its tolerances.
+    """The least time at which a method reaches an error, from its points (error, time) in the order
+    of its tolerances.
 
-    A point counts whose error is at most the target, and so does a place between two neighbours on either side of
-    it, by interpolation in the logarithms.  NaN where no point reaches the target: nothing is extrapolated.
+    A point counts whose error is at most the target, and so does a place between two neighbours on
+    either side of it, by interpolation in the logarithms. NaN where no point reaches the target:
+    nothing is extrapolated.
     """
     found = [seconds for error, seconds in points if error <= target]
     for (error, seconds), (next_error, next_seconds) in pairwise(points):
@@ -32,7 +34,9 @@ def time_at(points: Sequence[tuple[float, float]], target: float) -> float:
 
 
 def curves(rows: Iterable[Mapping[str, Any]]) -> dict[str, dict[tuple[str, int], Curve]]:
-    """Points (error, microseconds) by case and (method, lanes), in the order of the rows; rows without are left out."""
+    """Points (error, microseconds) by case and (method, lanes), in the order of the rows; rows
+    without are left out.
+    """
     found: dict[str, dict[tuple[str, int], Curve]] = {}
     for row in rows:
         error, cost = row.get("error", math.nan), row.get("microseconds per period", math.nan)
@@ -43,7 +47,9 @@ def curves(rows: Iterable[Mapping[str, Any]]) -> dict[str, dict[tuple[str, int],
 
 
 def table(rows: Iterable[Mapping[str, Any]], own: set[str]) -> str:
-    """Microseconds per period at each target, and ratios to this program's fastest with full lanes; "" without rows."""
+    """Microseconds per period at each target, and ratios to this program's fastest with full lanes;
+    "" without rows.
+    """
     columns = [
         "case",
         "method",

@@ -1,4 +1,4 @@
-"""Work-precision diagrams: time per period against error, one panel a case, both axes logarithmic."""
+"""Work-precision diagrams: time per period against error, one panel a case, log-log."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ MARKERS = ("s", "^", "v", "D", "P", "X")
 
 
 def figure(rows: Iterable[Mapping[str, Any]], own: set[str]) -> Figure:
-    """Draw the rows: this program's methods in blue, dashed for one lane; peers told apart by colour and marker."""
+    """Draw the rows: this program's methods in blue, dashed for one lane; peers told apart by
+    colour and marker.
+    """
     cases = curves(rows)
     wide = min(3, max(1, len(cases) + 1))
     high = -(-(len(cases) + 1) // wide)

@@ -1,7 +1,9 @@
-"""Floating-point operations of a step, counted in the text of its kernel and of every function that it calls.
+"""Floating-point operations of a step, counted in the text of its kernel and of every function that
+it calls.
 
-One for each +, -, *, / and square root, two for a fused multiply-add, and those of its own text for an elementary function;
-none for signs, comparisons, selections, maxima, roundings, conversions, work on bits, loads and stores.
+One for each +, -, *, / and square root, two for a fused multiply-add, and those of its own text for
+an elementary function; none for signs, comparisons, selections, maxima, roundings, conversions,
+work on bits, loads and stores.
 """
 
 from __future__ import annotations
@@ -15,9 +17,27 @@ from synchain.codegen.simd import elementary
 __all__ = ["PRIMITIVE", "Counter", "operations"]
 
 PRIMITIVE = {"fma": 2, "sqrt": 1} | dict.fromkeys(
-    ("absolute", "any_lane", "broadcast", "copysign", "floor", "lane_bits", "load", "maximum", "minimum", "one_lane",
-     "round_even", "scale_binary", "select", "split_binary", "store", "truncated", "range"), 0,
-)  # fmt: skip
+    (
+        "absolute",
+        "any_lane",
+        "broadcast",
+        "copysign",
+        "floor",
+        "lane_bits",
+        "load",
+        "maximum",
+        "minimum",
+        "one_lane",
+        "round_even",
+        "scale_binary",
+        "select",
+        "split_binary",
+        "store",
+        "truncated",
+        "range",
+    ),
+    0,
+)
 """Operations of what is no function of the text."""
 
 FREE = (ast.BitAnd, ast.BitOr, ast.BitXor, ast.LShift, ast.RShift)
@@ -25,7 +45,9 @@ FREE = (ast.BitAnd, ast.BitOr, ast.BitXor, ast.LShift, ast.RShift)
 
 @dataclass(slots=True)
 class Counter:
-    """Counts the floating-point operations of functions in texts, each text given as its module's source."""
+    """Counts the floating-point operations of functions in texts, each text given as its module's
+    source.
+    """
 
     functions: dict[str, ast.FunctionDef] = field(default_factory=dict)
     constants: dict[str, object] = field(default_factory=dict)
@@ -44,7 +66,9 @@ class Counter:
                         self.constants[name.id] = statement.value.value
 
     def count(self, name: str) -> int:
-        """Operations of one call; ValueError for what cannot be counted in the text (loops over data, powers)."""
+        """Operations of one call; ValueError for what cannot be counted in the text (loops over
+        data, powers).
+        """
         if name not in self.known:
             if name in PRIMITIVE:
                 self.known[name] = PRIMITIVE[name]
@@ -91,7 +115,9 @@ class Counter:
 
 
 def operations(text: str) -> int:
-    """Operations of one step in one lane, from the text of a kernel that is written out; ValueError for one with loops."""
+    """Operations of one step in one lane, from the text of a kernel that is written out; ValueError
+    for one with loops.
+    """
     counter = Counter()
     counter.read(inspect.getsource(elementary))
     counter.read(text)

@@ -1,4 +1,6 @@
-"""How long this program's own kernels take and how far off they are; the peers' counterpart is `_clock.curve`."""
+"""How long this program's own kernels take and how far off they are; the peers' counterpart is
+`_clock.curve`.
+"""
 
 from __future__ import annotations
 
@@ -22,13 +24,17 @@ Ends = tuple[np.ndarray, np.ndarray]
 Integrate = Callable[[float, float, np.ndarray], Ends]
 
 REFILLS = 8
-"""Cells that each lane works through in the rows with full lanes: the last ones cost what they do in a sweep."""
+"""Cells that each lane works through in the rows with full lanes: the last ones cost what they do
+in a sweep.
+"""
 
 
 def prepare(case: Case, integrator: str, width: int) -> Integrate:
-    """Compile or load the kernel of a case; returns solve(rtol, atol, ends) -> (states (m, dimension), counts).
+    """Compile or load the kernel of a case; returns solve(rtol, atol, ends) -> (states (m,
+    dimension), counts).
 
-    `solve` integrates one cell to each of the end times and raises RuntimeError where a cell did not reach its end.
+    `solve` integrates one cell to each of the end times and raises RuntimeError where a cell did
+    not reach its end.
     """
     compiled = kernel(case.scene.replace(integrator=integrator), width, reduce=False)
     one = np.array([case.scene.parameters[name] for name in case.scene.equations.parameters])
@@ -51,7 +57,9 @@ def prepare(case: Case, integrator: str, width: int) -> Integrate:
 
 @dataclass(frozen=True, slots=True)
 class Own:
-    """An integrator with its kernel for a case: `cells` in `lanes` run over `periods` of the drive when they are timed."""
+    """An integrator with its kernel for a case: `cells` in `lanes` run over `periods` of the drive
+    when they are timed.
+    """
 
     case: Case
     integrator: str

@@ -1,4 +1,5 @@
-"""A mass on a belt that turns back and forth, held by a spring: x'' = -x + epsilon f(theta_b cos(nu t) - x').
+"""A mass on a belt that turns back and forth, held by a spring: x'' = -x + epsilon f(theta_b cos(nu
+t) - x').
 
 A plug-in of the benchmark `stability`, named there by its path.
 """

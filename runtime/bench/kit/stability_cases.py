@@ -1,4 +1,5 @@
-"""Hard cases as data: scenes at the ends of their parameters, and how each one's end state is known independently.
+"""Hard cases as data: scenes at the ends of their parameters, and how each one's end state is known
+independently.
 
 Scenes of one group differ in numbers only and share a kernel.
 """
@@ -30,9 +31,11 @@ LENGTH = 6.0
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A scene, and the independent source of its end state, a name in `_stability_reference.REFERENCES`.
+    """A scene, and the independent source of its end state, a name in
+    `_stability_reference.REFERENCES`.
 
-    With `skip` it is run as everybody runs it, with whatever `run` may leave out; else every step is made.
+    With `skip` it is run as everybody runs it, with whatever `run` may leave out; else every step
+    is made.
     """
 
     group: str
@@ -43,7 +46,9 @@ class Case:
 
 
 def cases(quick: bool = False) -> Iterator[Case]:
-    """Yield all cases; `quick` leaves out sizes, most tolerances and the cases with long references."""
+    """Yield all cases; `quick` leaves out sizes, most tolerances and the cases with long
+    references.
+    """
     yield from _steepness(quick)
     yield from _laws(quick)
     yield from _belts(quick)
@@ -56,9 +61,13 @@ def cases(quick: bool = False) -> Iterator[Case]:
 
 def _scene(n: int = 1, **changes: object) -> Scene:
     given: dict[str, object] = {
-        "topology": topology("chain", n), "record": (), "time_unit": "time", "transient": 0.0, "window": LENGTH,
+        "topology": topology("chain", n),
+        "record": (),
+        "time_unit": "time",
+        "transient": 0.0,
+        "window": LENGTH,
         "max_steps": BUDGET,
-    }  # fmt: skip
+    }
     return Scene(**{**given, **changes})  # type: ignore[arg-type]
 
 
@@ -71,20 +80,35 @@ def _steepness(quick: bool) -> Iterator[Case]:
 
 
 LAWS = {
-    "mu_s = mu_k": {"mu_k": 0.3}, "a = 0": {"a": 0.0}, "a = 1e4": {"a": 1e4}, "no drive": {"u": 0.0},
-    "drive 1e4": {"u": 1e4}, "belt at rest": {"theta_b": 0.0}, "belt reversed": {"theta_b": -0.1},
-    "no load": {"epsilon": 0.0}, "load 1e4": {"epsilon": 1e4}, "omega = 0": {"omega": 0.0},
-    "omega = 1e-3": {"omega": 1e-3}, "omega = 1e3": {"omega": 1e3}, "no friction": {"mu_s": 0.0, "mu_k": 0.0},
-}  # fmt: skip
+    "mu_s = mu_k": {"mu_k": 0.3},
+    "a = 0": {"a": 0.0},
+    "a = 1e4": {"a": 1e4},
+    "no drive": {"u": 0.0},
+    "drive 1e4": {"u": 1e4},
+    "belt at rest": {"theta_b": 0.0},
+    "belt reversed": {"theta_b": -0.1},
+    "no load": {"epsilon": 0.0},
+    "load 1e4": {"epsilon": 1e4},
+    "omega = 0": {"omega": 0.0},
+    "omega = 1e-3": {"omega": 1e-3},
+    "omega = 1e3": {"omega": 1e3},
+    "no friction": {"mu_s": 0.0, "mu_k": 0.0},
+}
 STARTS = {
-    "0": (0.0, 0.0), "the belt": (0.3, 0.1), "above the belt": (0.3, math.nextafter(0.1, 1.0)),
-    "below the belt": (0.3, math.nextafter(0.1, 0.0)), "the release": (0.6, 0.1), "1e-300": (1e-300, 1e-300),
+    "0": (0.0, 0.0),
+    "the belt": (0.3, 0.1),
+    "above the belt": (0.3, math.nextafter(0.1, 1.0)),
+    "below the belt": (0.3, math.nextafter(0.1, 0.0)),
+    "the release": (0.6, 0.1),
+    "1e-300": (1e-300, 1e-300),
     "1e6": (1e6, 1e6),
-}  # fmt: skip
+}
 
 
 def _laws(quick: bool) -> Iterator[Case]:
-    """Friction laws, drives and belts at the ends of their ranges, and starts on the edges of the law."""
+    """Friction laws, drives and belts at the ends of their ranges, and starts on the edges of the
+    law.
+    """
     left_out = ("omega = 1e3", "load 1e4", "drive 1e4", "1e6") if quick else ()
     for name, numbers in LAWS.items():
         if name not in left_out:
@@ -96,14 +120,18 @@ def _laws(quick: bool) -> Iterator[Case]:
 
 
 def _belts(quick: bool) -> Iterator[Case]:
-    """A belt whose speed turns back and forth, theta_b cos(nu t): slowly, at about the pace of the mass, and fast."""
+    """A belt whose speed turns back and forth, theta_b cos(nu t): slowly, at about the pace of the
+    mass, and fast.
+    """
     allow_code(REVERSING)
     for nu in (3.0,) if quick else (0.3, 1.0, 3.0, 30.0):
         for kappa in (1e5,) if quick else (1e2, 1e5, 1e12):
             scene = _scene(
-                oscillator=REVERSING, initial={"x": 0.3, "v": 0.0}, parameters={"nu": nu, "kappa": kappa},
+                oscillator=REVERSING,
+                initial={"x": 0.3, "v": 0.0},
+                parameters={"nu": nu, "kappa": kappa},
                 window=0.5 if nu > 10 else LENGTH,
-            )  # fmt: skip
+            )
             yield Case("reversing belt", f"nu = {nu:g}, kappa = {kappa:g}", scene)
 
 
@@ -129,7 +157,9 @@ def _coupled(quick: bool) -> Iterator[Case]:
 
 
 def _linear(quick: bool) -> Iterator[Case]:
-    """Three oscillators without friction from none to very stiff coupling, and two whose link drives them apart."""
+    """Three oscillators without friction from none to very stiff coupling, and two whose link
+    drives them apart.
+    """
     free = _scene(3, parameters={"mu_s": 0.0, "mu_k": 0.0}, integrator="rodas5p")
     for sigma in (0.0, 1.0, 1e8) if quick else (0.0, 1e-8, 1.0, 1e2, 1e4, 1e6, 1e8):
         for digits in (8,) if quick else (4, 8, 12):
@@ -141,7 +171,7 @@ def _linear(quick: bool) -> Iterator[Case]:
 
 
 def _sizes(quick: bool) -> Iterator[Case]:
-    """Chains in one normal mode, and chains of equal friction oscillators, which move as one alone."""
+    """Chains in one normal mode, and chains of equal friction oscillators, which move as one."""
     for n in () if quick else (1, 10, 1000, 100_000):
         shape = np.cos(np.pi * (np.arange(n) + 0.5) / n) if n > 1 else np.ones(1)
         strength = {"sigma": 1.0} if n > 1 else {}
@@ -154,11 +184,18 @@ def _sizes(quick: bool) -> Iterator[Case]:
 
 
 def _long(quick: bool) -> Iterator[Case]:
-    """A driven linear oscillator long after its transient: where it repeats itself whole cycles are left out, or not."""
+    """A driven linear oscillator long after its transient: where it repeats itself whole cycles are
+    left out, or not.
+    """
     for periods in (1000,) if quick else (1000, 100_000, 1_000_000):
         scene = _scene(
-            oscillator="duffing", friction=None, parameters={"delta": 0.1, "beta": 0.0, "u": 0.3, "omega": 1.15},
-            time_unit="period", transient=float(periods), window=0.3, max_steps=100 * periods,
-        )  # fmt: skip
+            oscillator="duffing",
+            friction=None,
+            parameters={"delta": 0.1, "beta": 0.0, "u": 0.3, "omega": 1.15},
+            time_unit="period",
+            transient=float(periods),
+            window=0.3,
+            max_steps=100 * periods,
+        )
         yield Case("long", f"{periods:g} periods", scene, "steady", skip=True)
         yield Case("long", f"{periods:g} periods, every step", scene, "steady")

@@ -1,4 +1,6 @@
-"""The energy balance of a run: what forces have done is integrated as one more state of every oscillator."""
+"""The energy balance of a run: what forces have done is integrated as one more state of every
+oscillator.
+"""
 
 from __future__ import annotations
 
@@ -24,10 +26,12 @@ __all__ = ["energy_residual"]
 
 
 def energy_residual(scene: Scene, end: np.ndarray) -> float:
-    """(E(end) - E(0) - W) / max(|E(0)|, |E(end)|, 1) of a network, W the work of its drives and of friction.
+    """(E(end) - E(0) - W) / max(|E(0)|, |E(end)|, 1) of a network, W the work of its drives and of
+    friction.
 
-    Where no power is fed in or lost W is zero and `end` (dimension,) is the end state; else the equations are integrated
-    again with the work, at the scene's tolerance.  NaN where that did not finish.
+    Where no power is fed in or lost W is zero and `end` (dimension,) is the end state; else the
+    equations are integrated again with the work, at the scene's tolerance. NaN where that did not
+    finish.
     """
     twin, numbers = _with_energy(scene)
     function = energy_function(twin)
@@ -43,7 +47,9 @@ def energy_residual(scene: Scene, end: np.ndarray) -> float:
 
 
 def _with_energy(scene: Scene) -> tuple[Scene, dict[str, float]]:
-    """A scene with the same energy that has one, and the numbers to put in: smoothed, and with springs for "x->v"."""
+    """A scene with the same energy that has one, and the numbers to put in: smoothed, and with
+    springs for "x->v".
+    """
     if scene.equations.sticks:
         return scene.replace(contact="atan", initial={name: scene.initial[name] for name in ("x", "v")}), {}
     if str(scene.coupling) == "x->v" and scene.equations.links:
@@ -83,7 +89,9 @@ def _with_work(equations: Equations, exact: Energy) -> Equations:
 
 
 def _link_power(node: Node, edge: Edge) -> sp.Expr:
-    """What stick adds to the work on an oscillator: friction holds it against its links, which the node does not know."""
+    """What stick adds to the work on an oscillator: friction holds it against its links, which the
+    node does not know.
+    """
     if node.contact is None:
         return sp.S.Zero
     velocity, mode = edge.here[1:3]

@@ -1,4 +1,6 @@
-"""End states of hard cases by other means: SciPy's Radau at a tight tolerance, normal modes, closed forms."""
+"""End states of hard cases by other means: SciPy's Radau at a tight tolerance, normal modes, closed
+forms.
+"""
 
 from __future__ import annotations
 
@@ -19,9 +21,18 @@ from .cases import normal_modes
 __all__ = ["FLOOR", "REFERENCES", "end_state"]
 
 RTOL, ATOL = 1e-11, 1e-13
-FLOOR = {"radau": 1e-11, "smooth": 1e-6, "modes": 1e-13, "growth": 1e-13, "wave": 1e-13, "steady": 1e-10,
-         "alone": 1e-11}  # fmt: skip
-"""How far a reference itself may be off, relative to the size of the state; "smooth" is another law, O(kappa^-1/2) away."""
+FLOOR = {
+    "radau": 1e-11,
+    "smooth": 1e-6,
+    "modes": 1e-13,
+    "growth": 1e-13,
+    "wave": 1e-13,
+    "steady": 1e-10,
+    "alone": 1e-11,
+}
+"""How far a reference itself may be off, relative to the size of the state; "smooth" is another
+law, O(kappa^-1/2) away.
+"""
 
 
 def end_state(scene: Scene, reference: str) -> np.ndarray:
@@ -30,7 +41,7 @@ def end_state(scene: Scene, reference: str) -> np.ndarray:
 
 
 @functools.lru_cache(maxsize=8)
-def _functions(equations: Equations) -> tuple[Callable, Callable]:
+def _functions(equations: Equations) -> tuple[Callable[..., np.ndarray], Callable[..., np.ndarray]]:
     """Right-hand side f(t, y, p) and Jacobian j(t, y, p) of the equations as plain Python."""
     state = [sp.Symbol(name, real=True) for name in equations.state]
     numbers = [sp.Symbol(name, real=True) for name in equations.parameters]
@@ -49,9 +60,14 @@ def _radau(scene: Scene, start: np.ndarray | None = None) -> np.ndarray:
     p = [scene.parameters[name] for name in scene.equations.parameters]
     y0 = np.array(scene.y0) if start is None else start
     done = solve_ivp(
-        lambda t, y: f(t, y, p), (0.0, scene.transient + scene.window), y0, method="Radau",
-        jac=lambda t, y: np.array(j(t, y, p)), rtol=RTOL, atol=ATOL,
-    )  # fmt: skip
+        lambda t, y: f(t, y, p),
+        (0.0, scene.transient + scene.window),
+        y0,
+        method="Radau",
+        jac=lambda t, y: np.array(j(t, y, p)),
+        rtol=RTOL,
+        atol=ATOL,
+    )
     if not done.success:
         raise RuntimeError(f"Radau stopped at t = {done.t[-1]:g}: {done.message}")
     return np.array(done.y[:, -1])
@@ -75,7 +91,9 @@ def _modes(scene: Scene) -> np.ndarray:
 
 
 def _growth(scene: Scene) -> np.ndarray:
-    """Two oscillators x'' = -x + sigma (x_j - x_i): their mean swings, their difference grows where sigma < -1/2."""
+    """Two oscillators x'' = -x + sigma (x_j - x_i): their mean swings, their difference grows where
+    sigma < -1/2.
+    """
     x, t = np.array(scene.y0[:2]), scene.window
     mean, half = x.mean(), 0.5 * (x[0] - x[1])
     root = np.sqrt(1.0 + 2.0 * scene.parameters["sigma"] + 0j)
@@ -85,7 +103,9 @@ def _growth(scene: Scene) -> np.ndarray:
 
 
 def _wave(scene: Scene) -> np.ndarray:
-    """The longest wave of a chain: x_i = cos(pi (i + 1/2)/n) cos(w t), w^2 = 1 + 4 sigma sin^2(pi/2n); of one: cos t."""
+    """The longest wave of a chain: x_i = cos(pi (i + 1/2)/n) cos(w t), w^2 = 1 + 4 sigma
+    sin^2(pi/2n); of one: cos t.
+    """
     shape, n, t = np.array(scene.y0[: scene.n]), scene.n, scene.window
     w = math.sqrt(1.0 + 4.0 * scene.parameters.get("sigma", 0.0) * math.sin(math.pi / (2 * n)) ** 2)
     return np.concatenate([shape * math.cos(w * t), -w * shape * math.sin(w * t)])

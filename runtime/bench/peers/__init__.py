@@ -1,11 +1,12 @@
 """Other programs that solve the benchmark's problems, one file each; a new peer is a new file.
 
-A file holds `NAME`; `PACKAGE`, what to install; `REQUIRES`, the modules it imports and the programs it starts, as
-{"module": (…), "program": (…)}; `TOLERANCES`, the pairs (rtol, atol) tried, loose first; and
-`prepare(problem) -> solve`, which may compile and is timed apart.  `solve(rtol, atol, times) -> states` integrates from the
-start of the problem to ascending times (m,) and returns states (m, dimension); it raises an error where the solver gives
-up.  Optional: `CELLS`, how many copies of the problem one call solves together (default 1), and `missing() -> str`, why
-the peer cannot run beyond the modules and programs, empty where it can.
+A file holds `NAME`; `PACKAGE`, what to install; `REQUIRES`, the modules it imports and the programs
+it starts, as {"module": (…), "program": (…)}; `TOLERANCES`, the pairs (rtol, atol) tried, loose
+first; and `prepare(problem) -> solve`, which may compile and is timed apart.
+`solve(rtol, atol, times) -> states` integrates from the start of the problem to ascending times
+(m,) and returns states (m, dimension); it raises an error where the solver gives up. Optional:
+`CELLS`, how many copies of the problem one call solves together (default 1), and
+`missing() -> str`, why the peer cannot run beyond the modules and programs, empty where it can.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Taylor series of adaptive order through heyoka, compiled by LLVM for one tolerance and one number of lanes."""
+"""Taylor series of adaptive order through heyoka, compiled by LLVM for one tolerance and one number
+of lanes.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +15,13 @@ __all__ = ["prepare"]
 
 
 def prepare(problem: Problem, lanes: int) -> Solve:
-    """Return a solver by Taylor series, for `lanes` equal copies at once; it compiles at the first call of a tolerance.
+    """Return a solver by Taylor series, for `lanes` equal copies at once; it compiles at the first
+    call of a tolerance.
 
-    Parameters are run-time values, so that friction of size zero is still evaluated, as all others do.  heyoka has one
-    tolerance, relative to the largest component: it is given atol, the smaller one.  |w| becomes relu(w) + relu(-w), whose
-    side is fixed within a step.  Compact mode, 2 to 3 times slower here, is off; constants in place of run-time values saved
-    5 % at most.
+    Parameters are run-time values, so that friction of size zero is still evaluated, as all others
+    do. heyoka has one tolerance, relative to the largest component: it is given atol, the smaller
+    one. |w| becomes relu(w) + relu(-w), whose side is fixed within a step. Compact mode, 2 to 3
+    times slower here, is off; constants in place of run-time values saved 5 % at most.
     """
     import heyoka as hy
 

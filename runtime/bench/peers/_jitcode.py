@@ -16,7 +16,9 @@ __all__ = ["prepare"]
 
 
 def prepare(problem: Problem, method: str, jacobian: bool) -> Solve:
-    """Return a solver by one method of SciPy's ode; the compiler is that of Python's own build, at -O3 and -march=native."""
+    """Return a solver by one method of SciPy's ode; the compiler is that of Python's own build, at
+    -O3 and -march=native.
+    """
     import symengine
     from jitcode import jitcode, t, y
 

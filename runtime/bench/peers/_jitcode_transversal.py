@@ -1,7 +1,9 @@
-"""JiTCODE's transversal exponents: growth of a deviation that leaves the synchronous state of two coupled oscillators.
+"""JiTCODE's transversal exponents: growth of a deviation that leaves the synchronous state of two
+coupled oscillators.
 
-The class is `jitcode_transversal_lyap` (Ansmann, Chaos 28, 043116 (2018)): C code of one oscillator and of the variational
-equation, derived by JiTCODE from the right-hand side of the pair, integrated by a method of SciPy's ode.
+The class is `jitcode_transversal_lyap` (Ansmann, Chaos 28, 043116 (2018)): C code of one oscillator
+and of the variational equation, derived by JiTCODE from the right-hand side of the pair, integrated
+by a method of SciPy's ode.
 """
 
 from __future__ import annotations
@@ -26,14 +28,17 @@ PACKAGE = "jitcode and a C compiler"
 REQUIRES = {"module": ("jitcode", "symengine")}
 
 Growths = Callable[[float, np.ndarray, float, int], Iterator[float]]
-"""growths(alpha, start (components,), block, skipped): the logarithms of the growth over one block of time after the other,
-without end; the first `skipped` blocks are the transient and not among them."""
+"""growths(alpha, start (components,), block, skipped): the logarithms of the growth over one block
+of time after the other, without end; the first `skipped` blocks are the transient and not among
+them.
+"""
 
 STRENGTH = "strength"
 
 
 def prepare(scene: Scene, method: str, rtol: float) -> Growths:
-    """Compile the transversal mode of a scene with two oscillators; the strength alpha stays a parameter.  atol is rtol/10.
+    """Compile the transversal mode of a scene with two oscillators; the strength alpha stays a
+    parameter. atol is rtol/10.
 
     Raises ValueError for another number of oscillators.
     """
@@ -44,9 +49,13 @@ def prepare(scene: Scene, method: str, rtol: float) -> Growths:
 
     groups = [[2 * k, 2 * k + 1] for k in range(len(scene.components))]
     system = jitcode_transversal_lyap(
-        _right_hand_side(Problem(scene)), groups=groups, simplify=False, verbose=False,
-        control_pars=[symengine.Symbol(STRENGTH)], wants_jacobian=method == "lsoda",
-    )  # fmt: skip
+        _right_hand_side(Problem(scene)),
+        groups=groups,
+        simplify=False,
+        verbose=False,
+        control_pars=[symengine.Symbol(STRENGTH)],
+        wants_jacobian=method == "lsoda",
+    )
     level = logging.root.level
     with tempfile.TemporaryDirectory() as folder, chdir(folder):  # setuptools reads a pyproject.toml where it works
         system.compile_C(extra_compile_args=["-O3", "-march=native", "-w"])
@@ -69,7 +78,9 @@ def prepare(scene: Scene, method: str, rtol: float) -> Growths:
 
 
 def _right_hand_side(problem: Problem) -> list[Any]:
-    """The equations of the pair for JiTCODE, sigma = alpha/2: the eigenvalue of two coupled oscillators is -2."""
+    """The equations of the pair for JiTCODE, sigma = alpha/2: the eigenvalue of two coupled
+    oscillators is -2.
+    """
     import symengine
     from jitcode import t, y
 

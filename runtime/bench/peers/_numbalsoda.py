@@ -13,7 +13,9 @@ REQUIRES = {"module": ("numbalsoda",)}
 
 
 def compiled(problem: Problem) -> Any:
-    """Return the right-hand side as a C callback; its `address` is valid for as long as the callback is kept."""
+    """Return the right-hand side as a C callback; its `address` is valid for as long as the
+    callback is kept.
+    """
     import numba
     from numbalsoda import lsoda_sig
 

@@ -1,7 +1,9 @@
-"""What a peer is given: start, numbers, and right-hand side and Jacobian as text in its language or compiled by Numba.
+"""What a peer is given: start, numbers, and right-hand side and Jacobian as text in its language or
+compiled by Numba.
 
-All of it is printed from the derived equations, after the elimination of common subexpressions; no peer has equations
-typed in by hand.  The parameters are constants in the text, so that a compiler can fold them.
+All of it is printed from the derived equations, after the elimination of common subexpressions; no
+peer has equations typed in by hand. The parameters are constants in the text, so that a compiler
+can fold them.
 """
 
 from __future__ import annotations
@@ -60,7 +62,9 @@ class Problem:
     def statements(
         self, expressions: Sequence[sp.Expr], target: str, show: Callable[[sp.Expr], str], declare: str = ""
     ) -> list[str]:
-        """Assignments of the expressions to `target.format(i)`; state in y[i], time in t, end of line not included."""
+        """Assignments of the expressions to `target.format(i)`; state in y[i], time in t, end of
+        line not included.
+        """
         parts, results = sp.cse(expressions, symbols=sp.numbered_symbols("part"), order="canonical")
         lines = [f"{declare}{name} = {value!r}" for name, value in self.numbers.items()]
         lines += [f"{declare}{name} = y[{i}]" for i, name in enumerate(self.equations.state)]
@@ -79,7 +83,9 @@ class Problem:
         return _function(header, ["out[:] = 0.0", *lines])
 
     def compiled(self) -> tuple[Any, Any]:
-        """Right-hand side f(t, y, out) and Jacobian j(t, y, out), out (dimension, dimension), compiled by Numba."""
+        """Right-hand side f(t, y, out) and Jacobian j(t, y, out), out (dimension, dimension),
+        compiled by Numba.
+        """
         import numba
 
         number, vector, matrix = numba.float64, numba.float64[::1], numba.float64[:, ::1]
@@ -113,7 +119,9 @@ class Problem:
 
 
 def load(text: str, name: str) -> Any:
-    """Execute the text of a function, printed from equations by this module, and return the function."""
+    """Execute the text of a function, printed from equations by this module, and return the
+    function.
+    """
     space: dict[str, Any] = {"math": math}
     exec(compile(text, f"<{name} of a benchmark problem>", "exec"), space)
     return space[name]

@@ -12,7 +12,8 @@ __all__ = ["prepare"]
 def prepare(problem: Problem, method: str, implicit: bool) -> Solve:
     """Return a solver by one method of solve_ivp.
 
-    Each output time ends one call and starts the next: dense output of Radau and BDF is of lower order than their steps.
+    Each output time ends one call and starts the next: dense output of Radau and BDF is of lower
+    order than their steps.
     """
     from scipy.integrate import solve_ivp
 

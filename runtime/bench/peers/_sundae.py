@@ -10,7 +10,9 @@ __all__ = ["prepare"]
 
 
 def prepare(problem: Problem, method: str) -> Solve:
-    """Return a solver by CVODE, `method` "BDF" or "Adams"; both solve their equations by Newton's method."""
+    """Return a solver by CVODE, `method` "BDF" or "Adams"; both solve their equations by Newton's
+    method.
+    """
     from sksundae.cvode import CVODE
 
     f, j = problem.compiled()

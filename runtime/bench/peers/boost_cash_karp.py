@@ -1,7 +1,8 @@
-"""The source paper's own method: Cash-Karp 5(4) of Boost Odeint, in C++ compiled at -O3 -march=native.
+"""The source paper's own method: Cash-Karp 5(4) of Boost Odeint, in C++ compiled at -O3
+-march=native.
 
-The paper's tolerances, 1e-15 absolute and 1e-12 relative, are the last pair.  Without a C++ compiler or Boost, the rows of
-the same method through this program's own kernels stand for it.
+The paper's tolerances, 1e-15 absolute and 1e-12 relative, are the last pair. Without a C++ compiler
+or Boost, the rows of the same method through this program's own kernels stand for it.
 """
 
 from __future__ import annotations
@@ -63,7 +64,9 @@ def missing() -> str:
 
 
 def prepare(problem: Problem) -> Solve:
-    """Return a solver compiled in a temporary folder; RuntimeError with the compiler's words where that fails."""
+    """Return a solver compiled in a temporary folder; RuntimeError with the compiler's words where
+    that fails.
+    """
     lines = problem.statements(problem.rhs(), "out[{}]", sp.ccode, "const double ")
     text = SOURCE.substitute(size=problem.equations.dimension, rhs=";\n    ".join(lines) + ";")
     with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,6 @@
-"""Kvaerno5, a stiff Runge-Kutta method of order 5, through diffrax in double precision, compiled by JAX."""
+"""Kvaerno5, a stiff Runge-Kutta method of order 5, through diffrax in double precision, compiled by
+JAX.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,8 @@ TOLERANCES = ladder(4, 10, 2)
 
 
 def prepare(problem: Problem) -> Solve:
-    """Return a solver by Kvaerno5 that steps to every output time; JAX compiles at the first call of a number of times.
+    """Return a solver by Kvaerno5 that steps to every output time; JAX compiles at the first call
+    of a number of times.
 
     JAX is switched to double precision for the whole process.
     """
@@ -33,9 +36,17 @@ def prepare(problem: Problem) -> Solve:
     def run(rtol: float, atol: float, times: Any) -> Any:
         control = diffrax.ClipStepSizeController(diffrax.PIDController(rtol, atol), step_ts=times)
         done = diffrax.diffeqsolve(
-            term, diffrax.Kvaerno5(), 0.0, times[-1], None, jnp.asarray(problem.y0), max_steps=None,
-            stepsize_controller=control, saveat=diffrax.SaveAt(ts=times), throw=False,
-        )  # fmt: skip
+            term,
+            diffrax.Kvaerno5(),
+            0.0,
+            times[-1],
+            None,
+            jnp.asarray(problem.y0),
+            max_steps=None,
+            stepsize_controller=control,
+            saveat=diffrax.SaveAt(ts=times),
+            throw=False,
+        )
         return done.ys, done.result == diffrax.RESULTS.successful
 
     def solve(rtol: float, atol: float, times: np.ndarray) -> np.ndarray:

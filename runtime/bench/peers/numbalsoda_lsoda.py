@@ -1,7 +1,8 @@
-"""LSODA in C++ through numbalsoda, with a right-hand side compiled by Numba; its interface takes no Jacobian.
+"""LSODA in C++ through numbalsoda, with a right-hand side compiled by Numba; its interface takes no
+Jacobian.
 
-numbalsoda builds its library at installation and needs a Fortran compiler for it: without one pip ends with "Failed
-building wheel for numbalsoda", and installing gfortran is the remedy.
+numbalsoda builds its library at installation and needs a Fortran compiler for it: without one pip
+ends with "Failed building wheel for numbalsoda", and installing gfortran is the remedy.
 """
 
 from __future__ import annotations

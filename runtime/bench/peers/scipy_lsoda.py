@@ -1,4 +1,6 @@
-"""LSODA through SciPy's odeint, whose loop over steps is compiled (solve_ivp's is Python), with a compiled Jacobian."""
+"""LSODA through SciPy's odeint, whose loop over steps is compiled (solve_ivp's is Python), with a
+compiled Jacobian.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""SUNDIALS CVODE (Adams) through scikit-SUNDAE, with right-hand side and Jacobian compiled by Numba."""
+"""SUNDIALS CVODE (Adams) through scikit-SUNDAE, with right-hand side and Jacobian compiled by
+Numba.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""SUNDIALS CVODE (BDF) through scikit-SUNDAE, with right-hand side and Jacobian compiled by Numba."""
+"""SUNDIALS CVODE (BDF) through scikit-SUNDAE, right-hand side and Jacobian compiled by Numba."""
 
 from __future__ import annotations
 

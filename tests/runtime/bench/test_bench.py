@@ -64,7 +64,9 @@ def test_the_command_writes_to_the_folder_and_says_so(monkeypatch, tmp_path, cap
 
 @pytest.mark.long
 def test_sensitivity_brackets_the_published_end(monkeypatch):
-    """A short run of the first case: every choice finds one range, and its end lies near the exponent's."""
+    """A short run of the first case: every choice finds one range, and its end lies near the
+    exponent's.
+    """
     changes = (("short", {"transient": 200.0, "window": 20.0, "starts": 1}),)
     monkeypatch.setattr(sensitivity, "CHANGES", changes)
     rows = sensitivity.measure(quick=True)

@@ -1,4 +1,6 @@
-"""The benchmark of the largest networks: windows, the sigma that is tried, sizes, and what direct simulation says."""
+"""The benchmark of the largest networks: windows, the sigma that is tried, sizes, and what direct
+simulation says.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,9 @@ def test_nothing_is_tried_where_nothing_is_stable() -> None:
 
 
 def test_largest_sizes_by_hand(monkeypatch) -> None:
-    """Ratio 6.98: chain of 4 has 5.83, of 5 9.47; ring of 8 6.83, of 9 8.29; stars have n, cubes their dimension."""
+    """Ratio 6.98: chain of 4 has 5.83, of 5 9.47; ring of 8 6.83, of 9 8.29; stars have n, cubes
+    their dimension.
+    """
     monkeypatch.setattr(families, "function_of", lambda omega, contact: function((1.0, 6.98), error=0.01))
     header, _, line = families.summary([(1.4, "atan"), (1.4, "atan")]).splitlines()
     assert header.split(" | ")[3:] == ["chain", "complete", "hypercube (dimension)", "ring", "star |"]

@@ -1,4 +1,6 @@
-"""Both friction laws on the same axes: each is measured against its own solution, and the exact one needs fewer steps."""
+"""Both friction laws on the same axes: each is measured against its own solution, and the exact one
+needs fewer steps.
+"""
 
 from __future__ import annotations
 

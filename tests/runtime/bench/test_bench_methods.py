@@ -1,4 +1,6 @@
-"""Which integrator: rows whose error and steps are those of the same kernel driven by hand, and gains read off a line."""
+"""Which integrator: rows whose error and steps are those of the same kernel driven by hand, and
+gains read off a line.
+"""
 
 from __future__ import annotations
 

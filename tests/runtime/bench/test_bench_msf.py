@@ -1,4 +1,6 @@
-"""The benchmark of the master stability function: its rows, its error bars, its differences and its ratios."""
+"""The benchmark of the master stability function: its rows, its error bars, its differences and its
+ratios.
+"""
 
 from __future__ import annotations
 
@@ -82,7 +84,9 @@ def test_every_row_to_an_error_bar_reaches_it(rows) -> None:
 
 @pytest.mark.parametrize("bar", [0.02, 0.005])
 def test_the_peers_average_ends_at_the_error_bar(bar: float) -> None:
-    """White noise of deviation 1 in each block of 4 periods, after a transient that would spoil the mean."""
+    """White noise of deviation 1 in each block of 4 periods, after a transient that would spoil the
+    mean.
+    """
     case = msf.CASES[0]
     asked = []
 

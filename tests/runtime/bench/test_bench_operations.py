@@ -1,4 +1,6 @@
-"""Operations are counted as they are written, elementary functions by their own text, and alike in every benchmark."""
+"""Operations are counted as they are written, elementary functions by their own text, and alike in
+every benchmark.
+"""
 
 from __future__ import annotations
 
@@ -74,7 +76,9 @@ def test_elementary_functions_count_their_multiply_adds():
 
 
 def test_an_elementary_function_costs_what_its_text_does_in_both_benchmarks():
-    """tanh by hand: 9 additions, 3 products, 1 quotient, 2 fused multiply-adds, and what `_expm1_parts` does."""
+    """tanh by hand: 9 additions, 3 products, 1 quotient, 2 fused multiply-adds, and what
+    `_expm1_parts` does.
+    """
     made = counter(inspect.getsource(elementary))
     text = "LOOPED = False\ndef step(y, p):\n    return tanh(load(y, 0, 1))*load(y, 1, 1)\n"
     assert operations(text) == 1 + made.count("tanh")

@@ -1,4 +1,6 @@
-"""Work and precision: right references, cases and peers that run, and times at equal error that are read off correctly."""
+"""Work and precision: right references, cases and peers that run, and times at equal error that are
+read off correctly.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +54,9 @@ def test_a_case_can_be_shortened():
 
 @pytest.mark.parametrize("omega", [1.15, 1.0, math.sqrt(1.2)])
 def test_normal_modes_solve_the_equations(omega):
-    """x' = v and v' = rhs by central differences: off resonance, on it, and at the frequency of an undriven mode."""
+    """x' = v and v' = rhs by central differences: off resonance, on it, and at the frequency of an
+    undriven mode.
+    """
     scene = read_case("frictionless, n = 4").scene.replace(
         omega=omega, initial={"x": (0.3, -0.1, 0.2, 0.7), "v": (0.4, -0.2, 0.1, 0.3)}
     )
@@ -88,7 +92,9 @@ def test_the_printed_jacobian_is_the_derivative_of_the_printed_right_hand_side(n
 
 @pytest.mark.long
 def test_the_paper_method_is_held_back_by_stability():
-    """Cash-Karp at 1e-15/1e-12 needs 15 thousand steps a period, more than a hundred times those of a stiff method."""
+    """Cash-Karp at 1e-15/1e-12 needs 15 thousand steps a period, more than a hundred times those of
+    a stiff method.
+    """
     case = read_case(STIFF)
     end = np.array([10 * case.period])
     _, slow = precision.prepare(case, "cash_karp", 1)(*precision.PAPER, end)
@@ -108,7 +114,9 @@ def test_peers_solve_the_smooth_case(peer):
 
 
 def test_the_callback_of_numbalsoda_is_the_right_hand_side(monkeypatch):
-    """Through its C address, as the solvers call it; the signature is that of the package, which need not be there."""
+    """Through its C address, as the solvers call it; the signature is that of the package, which
+    need not be there.
+    """
     numba = pytest.importorskip("numba")
     pointer = numba.types.CPointer(numba.float64)
     fake = types.SimpleNamespace(lsoda_sig=numba.types.void(numba.float64, pointer, pointer, pointer))
@@ -213,9 +221,12 @@ def test_ratios_are_to_the_fastest_own_method_with_full_lanes():
         return {"case": "c", "method": method, "lanes": lanes, "error": error, "microseconds per period": cost}
 
     rows = [
-        row("ours", 1, 1e-12, 8.0), row("ours", 8, 1e-12, 2.0), row("other", 8, 1e-12, 4.0), row("theirs", 8, 1e-7, 1.0),
+        row("ours", 1, 1e-12, 8.0),
+        row("ours", 8, 1e-12, 2.0),
+        row("other", 8, 1e-12, 4.0),
+        row("theirs", 8, 1e-7, 1.0),
         row("theirs", 8, math.nan, math.nan),
-    ]  # fmt: skip
+    ]
     lines = table(rows, own={"ours", "other"}).splitlines()[4:]
     assert lines[0] == "| c | ours | 1 | 8 | 4 | 8 | 4 | 8 | 4 |"
     assert lines[1] == "| c | ours | 8 | 2 | 1 | 2 | 1 | 2 | 1 |"

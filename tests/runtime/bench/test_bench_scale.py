@@ -1,4 +1,6 @@
-"""The benchmark of streamed sweeps: its rows are what its columns say, and memory does not grow with the sweep."""
+"""The benchmark of streamed sweeps: its rows are what its columns say, and memory does not grow
+with the sweep.
+"""
 
 from __future__ import annotations
 

@@ -19,8 +19,11 @@ def rows() -> list[tuple]:
 def test_quick_rows(rows: list[tuple]) -> None:
     assert all(len(row) == len(bench.COLUMNS) for row in rows)
     assert {(row[0], row[1]) for row in rows} == {
-        ("random integers", 4), ("random integers", 10), ("complete", 30), ("grid", 30),
-    }  # fmt: skip
+        ("random integers", 4),
+        ("random integers", 10),
+        ("complete", 30),
+        ("grid", 30),
+    }
     methods = [row[2] for row in rows if row[:2] == ("random integers", 4)]
     assert methods == ["synchain", "numpy eigvalsh", "python-flint factors", "sympy eigenvals"]
     own = [row for row in rows if row[2] == "synchain"]
@@ -59,6 +62,9 @@ def test_random_graphs_are_connected_and_have_no_structure() -> None:
 def test_figure_has_a_line_for_each_method(rows: list[tuple]) -> None:
     times, found = bench.draw(rows).axes
     assert [line.get_label() for line in times.lines] == [
-        "synchain", "numpy eigvalsh", "python-flint factors", "sympy eigenvals",
-    ]  # fmt: skip
+        "synchain",
+        "numpy eigvalsh",
+        "python-flint factors",
+        "sympy eigenvals",
+    ]
     assert [line.get_label() for line in found.lines] == ["synchain", "numpy eigvalsh"]

@@ -12,9 +12,14 @@ def test_a_row_for_each_stage():
     rows = start.measure(quick=True)
     names = [row[0] for row in rows]
     assert names == [
-        "import Numba alone", "import the models", "derive", "import the runtime", "emit", "compile, nothing in the cache",
+        "import Numba alone",
+        "import the models",
+        "derive",
+        "import the runtime",
+        "emit",
+        "compile, nothing in the cache",
         "load from the cache",
-    ]  # fmt: skip
+    ]
     assert all(len(row) == len(start.COLUMNS) and row[2] > 0 for row in rows)
 
 

@@ -39,7 +39,9 @@ def test_verdicts() -> None:
 
 
 def test_stiff_springs_are_said() -> None:
-    """sigma = 1e8: at rtol = 1e-4 the error is several hundred tolerances, measured by `synchain bench stability`."""
+    """sigma = 1e8: at rtol = 1e-4 the error is several hundred tolerances, measured by
+    `synchain bench stability`.
+    """
     scene = next(c.scene for c in QUICK if c.name == "sigma = 1e+08")
     assert any("a mode of frequency 2e+04 swings 1.91e+04 times" in words for words in scene.warnings)
     assert Scene(topology=topology("chain", 4), parameters={"sigma": 0.6}).warnings == ()
@@ -59,9 +61,16 @@ def test_a_wrong_law_is_seen() -> None:
 def apart(sigma: float, length: float) -> Scene:
     """Two oscillators that a negative coupling drives apart."""
     return Scene(
-        oscillator="harmonic", topology=topology("chain", 2), coupling="x->v", parameters={"sigma": sigma}, record=(),
-        integrator="rodas5p", transient=0.0, window=length, time_unit="time",
-    )  # fmt: skip
+        oscillator="harmonic",
+        topology=topology("chain", 2),
+        coupling="x->v",
+        parameters={"sigma": sigma},
+        record=(),
+        integrator="rodas5p",
+        transient=0.0,
+        window=length,
+        time_unit="time",
+    )
 
 
 def test_growth_is_right_until_it_has_left_double_precision_behind() -> None:
@@ -86,12 +95,18 @@ def test_the_phase_of_the_drive_after_a_million_periods(periods: float) -> None:
 
 @pytest.mark.parametrize("name", names())
 def test_equal_starts_stay_equal_to_the_last_bit(name: str) -> None:
-    """At a coupling at which the synchronous state is unstable, on every graph, as `run` integrates it."""
+    """At a coupling at which the synchronous state is unstable, on every graph, as `run` integrates
+    it.
+    """
     graph = topology(name, 8)
     scene = Scene(
-        topology=graph, initial={"x": 0.3, "v": 0.0}, transient=0.0, window=60.0, time_unit="time",
+        topology=graph,
+        initial={"x": 0.3, "v": 0.0},
+        transient=0.0,
+        window=60.0,
+        time_unit="time",
         parameters={"sigma": 2.0, "omega": 1.15},
-    )  # fmt: skip
+    )
     for width in (1, 8):
         found = run(scene, width=width, show_progress=False)
         x, v = found.end.values.reshape(2, 8)
@@ -106,17 +121,25 @@ def test_equal_starts_stay_equal_to_the_last_bit(name: str) -> None:
 def test_a_small_difference_follows_the_transversal_exponent(
     sigma: float, gap: float, least: float, rel: float
 ) -> None:
-    """The logarithm of the difference at every second period, on the attractor, against the exponent.
+    """The logarithm of the difference at every second period, on the attractor, against the
+    exponent.
 
     Below `least` the difference is made of rounding.
     """
     settled = Scene(parameters={"omega": 1.15}, transient=400.0, window=0.0, record=())
     x, v = run(settled, show_progress=False).end.values
     scene = Scene(
-        topology=topology("chain", 2), parameters={"omega": 1.15, "sigma": sigma}, transient=0.0,
-        window=30.0, record=("trajectory",), samples=16, rtol=1e-11, atol=1e-15,
-        integrator="rodas5p", initial={"x": [float(x), float(x) + gap], "v": [float(v), float(v)]},
-    )  # fmt: skip
+        topology=topology("chain", 2),
+        parameters={"omega": 1.15, "sigma": sigma},
+        transient=0.0,
+        window=30.0,
+        record=("trajectory",),
+        samples=16,
+        rtol=1e-11,
+        atol=1e-15,
+        integrator="rodas5p",
+        initial={"x": [float(x), float(x) + gap], "v": [float(v), float(v)]},
+    )
     found = run(scene, reduce=False, show_progress=False)
     assert int(found.status) == Status.FINISHED
     states, times = found.trajectory.values, found.trajectory_time.values
@@ -131,9 +154,17 @@ def test_a_small_difference_follows_the_transversal_exponent(
 
 @pytest.mark.long
 def test_many_equal_oscillators_move_as_one_alone() -> None:
-    """A hundred in a chain, every one integrated by an explicit method: bit for bit the motion of one."""
-    settings = {"integrator": "dop853", "initial": {"x": 0.3, "v": 0.0}, "transient": 0.0, "window": 6.0,
-                "time_unit": "time", "record": ()}  # fmt: skip
+    """A hundred in a chain, every one integrated by an explicit method: bit for bit the motion of
+    one.
+    """
+    settings = {
+        "integrator": "dop853",
+        "initial": {"x": 0.3, "v": 0.0},
+        "transient": 0.0,
+        "window": 6.0,
+        "time_unit": "time",
+        "record": (),
+    }
     numbers = {"kappa": 1e2}
     many = Scene(topology=topology("chain", 100), parameters={**numbers, "sigma": 1.0}, **settings)
     ends = [run(s, reduce=False, show_progress=False).end.values for s in (many, Scene(parameters=numbers, **settings))]

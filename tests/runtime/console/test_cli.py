@@ -88,7 +88,8 @@ def loaded_after(words: str) -> set[str]:
     """Top-level modules in a fresh interpreter after a command."""
     code = (
         "import sys\nfrom synchain.runtime.cli import main\n"
-        f"code = main({words.split()!r})\nprint(*{{n.split('.')[0] for n in sys.modules}}, file=sys.stderr)\nsys.exit(code)"
+        f"code = main({words.split()!r})\n"
+        "print(*{n.split('.')[0] for n in sys.modules}, file=sys.stderr)\nsys.exit(code)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     return set(done.stderr.split())
@@ -268,7 +269,9 @@ def test_cells_that_fail_are_said_and_the_file_is_still_written(
 
 
 def interrupt_after(monkeypatch: pytest.MonkeyPatch, chunks: int) -> list[int]:
-    """Press Ctrl-C when so many chunks of cells have run; the list counts the cells that were driven."""
+    """Press Ctrl-C when so many chunks of cells have run; the list counts the cells that were
+    driven.
+    """
     real, driven = job.SweepJob.run, []
 
     def run(self: job.SweepJob, cells: np.ndarray, *more: Any) -> Any:
@@ -331,7 +334,9 @@ def test_resume_refuses_another_scene_and_a_missing_file(
 
 
 def fake_thresholds(found: list[dict[str, Any]]) -> Any:
-    """In place of minutes of simulation: ranges with open and closed ends, and a record of what was asked for."""
+    """In place of minutes of simulation: ranges with open and closed ends, and a record of what was
+    asked for.
+    """
 
     def thresholds(scene: Any, *, criterion: Any, **options: Any) -> threshold.Thresholds:
         found.append({"scene": scene, "criterion": criterion, **options})

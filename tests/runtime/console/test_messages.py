@@ -1,4 +1,6 @@
-"""Words for the user: lines while something compiles, hints, limits before memory is taken, names as formulas."""
+"""Words for the user: lines while something compiles, hints, limits before memory is taken, names
+as formulas.
+"""
 
 from __future__ import annotations
 
@@ -73,9 +75,11 @@ def test_names_have_one_subscript(name, written, indexed):
 
 @pytest.mark.parametrize(
     ("words", "expected"),
-    [("--symbolic --matrix {file} --value a", "--value: found 'a'; expected NAME=NUMBER, e.g. a=1/2"),
-     ("circulant 9 --option a", "--option: found 'a'; expected NAME=VALUE, e.g. offsets=1,3")],
-)  # fmt: skip
+    [
+        ("--symbolic --matrix {file} --value a", "--value: found 'a'; expected NAME=NUMBER, e.g. a=1/2"),
+        ("circulant 9 --option a", "--option: found 'a'; expected NAME=VALUE, e.g. offsets=1,3"),
+    ],
+)
 def test_a_hint_shows_the_option_that_was_used(words, expected, tmp_path, capsys):
     (tmp_path / "S.txt").write_text("a -a\n-b b\n")
     assert main(["spectrum", *words.format(file=tmp_path / "S.txt").split()]) == 2

@@ -1,4 +1,6 @@
-"""`synchain msf`: what it prints, writes and refuses; functions stand in for the integration except in the last tests."""
+"""`synchain msf`: what it prints, writes and refuses; functions stand in for the integration except
+in the last tests.
+"""
 
 from __future__ import annotations
 
@@ -79,7 +81,8 @@ def value(text: str, name: str) -> str:
     return next(row.strip()[len(name) :].strip() for row in text.splitlines() if row.strip().startswith(name))
 
 
-# -- a line of strengths -----------------------------------------------------------------------------------------
+# -- a line of strengths
+# -----------------------------------------------------------------------------------------
 
 
 def test_report_of_a_chain(asked: list[dict[str, Any]], capsys: pytest.CaptureFixture[str]) -> None:
@@ -116,11 +119,19 @@ def test_json_of_a_star_and_what_was_asked_for(asked: list[dict[str, Any]], caps
     assert (window["low"], window["high"]) == pytest.approx((0.1, 0.12))
     assert (window["low_mode"], window["high_mode"]) == ("-1", "-5")
     assert found["verdict"] == {
-        "answer": "yes", "ratio": "5", "ratio_value": 5.0, "allowed": pytest.approx(6.0), "slowest": "-1", "fastest": "-5"
-    }  # fmt: skip
+        "answer": "yes",
+        "ratio": "5",
+        "ratio_value": 5.0,
+        "allowed": pytest.approx(6.0),
+        "slowest": "-1",
+        "fastest": "-5",
+    }
     assert {k: asked[0][k] for k in ("precision", "periods", "starts", "workers")} == {
-        "precision": 0.01, "periods": 99.0, "starts": 2, "workers": 1
-    }  # fmt: skip
+        "precision": 0.01,
+        "periods": 99.0,
+        "starts": 2,
+        "workers": 1,
+    }
     assert asked[0]["scene"].parameters["omega"] == 1.4
 
 
@@ -155,7 +166,9 @@ def test_oscillator_and_network_are_those_asked_for(
 
 
 def own_drive(folder: Path, wave: str) -> Path:
-    """A scene file with a driven oscillator of its own, whose parameter omega is no frequency of the drive."""
+    """A scene file with a driven oscillator of its own, whose parameter omega is no frequency of
+    the drive.
+    """
     code = folder / "own.py"
     names = ("omega", "Omega") if "Omega" in wave else ("omega",)
     code.write_text(
@@ -214,17 +227,17 @@ def test_where_the_grid_ends_no_mode_is_lost_and_no_is_not_said() -> None:
     scene = Scene(topology=chain(4))
     cut = LineReport(function(scene, end=0.4), True)
     assert cut.verdict[0] == GRID_ENDS
-    assert cut.found.windows == ()
+    assert cut.function.windows == ()
     assert "0.1000 ± 0.0020 … 0.4..." in cut.text()
     pair = LineReport(function(Scene(topology=chain(2)), end=0.4), True)
     assert pair.verdict[0] == "yes"
-    (window,) = pair.found.windows
+    (window,) = pair.function.windows
     assert window.low_mode is not None
     assert window.high_mode is None
     assert "0.2000..." in pair.text()
     assert LineReport(function(scene), True).verdict[0] == "yes"
     assert LineReport(function(scene, high=0.3), True).verdict[0] == "no"
-    assert LineReport(function(scene, low=-0.1), True).found.windows[0].low == 0.0
+    assert LineReport(function(scene, low=-0.1), True).function.windows[0].low == 0.0
 
 
 def test_windows_in_python_are_those_of_the_command() -> None:
@@ -246,7 +259,7 @@ def test_a_ratio_within_the_error_is_undecided() -> None:
 
 def test_numbers_that_are_not_finite_are_null_in_json() -> None:
     report = LineReport(function(Scene(topology=chain(3)), error=math.inf), True)
-    report.found.fine.exponent[60] = -math.inf
+    report.function.fine.exponent[60] = -math.inf
     found = report.as_dict()
     assert found["exponent"][60] is None
     assert set(found["stderr"]) == {None}
@@ -275,7 +288,8 @@ def test_complex_eigenvalues_need_beta(
     assert "add --beta, e.g. --beta 0:0.69:61" in captured.err  # 1.2 / sqrt(3)
 
 
-# -- a plane of strengths ----------------------------------------------------------------------------------------
+# -- a plane of strengths
+# ----------------------------------------------------------------------------------------
 
 
 def test_report_of_a_plane(asked: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -325,7 +339,8 @@ def test_a_mode_that_leaves_the_plane_ends_the_search_and_not_the_window(tmp_pat
     assert (mirrored[0].low, mirrored[0].high) == pytest.approx((whole.low, whole.high), abs=1e-6)
 
 
-# -- files, errors, names ----------------------------------------------------------------------------------------
+# -- files, errors, names
+# ----------------------------------------------------------------------------------------
 
 
 def test_files_are_written_and_said(
@@ -419,7 +434,8 @@ def test_public_names_are_offered_and_go_before_modules_of_the_same_name() -> No
     for name in synchain.runtime.__all__:
         assert getattr(synchain.runtime, name).__name__ == name
     code = (
-        "import synchain.runtime.stability.msf, synchain.runtime.synchronisation.basin\nfrom synchain.runtime import basin, msf\n"
+        "import synchain.runtime.stability.msf, synchain.runtime.synchronisation.basin\n"
+        "from synchain.runtime import basin, msf\n"
         "print(type(msf).__name__, type(basin).__name__)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)

@@ -1,4 +1,6 @@
-"""`synchain spectrum` with options of families and files of edges, `synchain topologies` with the options."""
+"""`synchain spectrum` with options of families and files of edges, `synchain topologies` with the
+options.
+"""
 
 from __future__ import annotations
 

@@ -1,0 +1,71 @@
+"""README, CONTRIBUTING and docs: what they name exists, and the command lines can be read."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from mutants import TESTS
+
+from synchain.runtime.cli import parser
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+FILES = {path.stem for path in (ROOT / "tests").rglob("*.py")}
+pages = pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
+
+
+def exists(name: str) -> bool:
+    """Whether a dotted name is a module or something in one."""
+    parts = name.split(".")
+    for k in range(len(parts), 0, -1):
+        try:
+            value: object = importlib.import_module(".".join(parts[:k]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[k:]:
+            if not hasattr(value, part):
+                return False
+            value = getattr(value, part)
+        return True
+    return False
+
+
+def commands(text: str) -> Iterator[list[str]]:
+    """The words after `synchain` of every command line without placeholders."""
+    for line in re.findall(r"^    (?:\$ )?synchain (\w.*)$", text, re.MULTILINE):
+        words = re.split(r"  #| \| | > ", line)[0]
+        if not re.search(r"[\[…|]|\b[A-Z]{4,}\b|^\w+:| N ", words):
+            yield shlex.split(words)
+
+
+@pages
+def test_paths_exist(page: Path) -> None:
+    names = re.findall(
+        r"(?<![\w/.-])(?:models|codegen|runtime|tests|docs)/[\w./-]*\w", page.read_text(encoding="utf-8")
+    )
+    missing = [name for name in names if not ((ROOT / name).exists() or (ROOT / f"{name}.py").exists())]
+    assert not missing
+
+
+@pages
+def test_dotted_names_and_test_files_exist(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    dotted = {name.rstrip(".") for name in re.findall(r"synchain\.(?:models|codegen|runtime)[\w.]*", text)}
+    assert not [name for name in dotted if not exists(name)]
+    assert not [name for name in re.findall(r"\btest_[a-z_0-9]+", text) if name not in FILES]
+
+
+@pages
+def test_command_lines_can_be_read(page: Path) -> None:
+    for command, *words in commands(page.read_text(encoding="utf-8")):
+        parser(command).read(words)
+
+
+def test_mutants_name_modules_and_tests() -> None:
+    assert not [module for module in TESTS if not (ROOT / f"{module}.py").is_file()]
+    assert not [name for names in TESTS.values() for name in names.split() if f"test_{name}" not in FILES]
