@@ -18,6 +18,7 @@ from .arithmetic import constant
 __all__ = [
     "a_callable",
     "a_path",
+    "check_integer",
     "choice",
     "flag",
     "instance",
@@ -126,21 +127,11 @@ def number(what: str, value: object, low: float | None = None, high: float | Non
     if not math.isfinite(result):
         raise ValueError(f"{what}: found {shown(value)}; expected a finite number; correct the value")
     if (low is not None and result < low) or (high is not None and result > high):
-        raise ValueError(f"{what}: found {result!r}; expected {span(low, high)}; correct the value")
+        raise ValueError(f"{what}: found {result!r}; expected {_span(low, high)}; correct the value")
     return result
 
 
-def integer(what: str, value: object, low: int, high: int) -> int:
-    """Return an int within [low, high]; a float is refused even where it is whole."""
-    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-        raise TypeError(f"{what}: found {typed(value)}; expected a whole number, e.g. {low}")
-    result = operator.index(value)
-    if not low <= result <= high:
-        raise ValueError(f"{what}: found {shown(result)}; expected a whole number from {low} to {high}; correct it")
-    return result
-
-
-def span(low: float | None, high: float | None) -> str:
+def _span(low: float | None, high: float | None) -> str:
     """Return the words for a closed range with optional ends."""
     if high is None:
         return "a number" if low is None else f"a number of at least {low:g}"
@@ -176,24 +167,49 @@ def flag(what: str, value: object) -> bool:
     return instance(what, value, bool, "True or False")
 
 
-def whole(what: str, value: object, least: int, most: int | None = None) -> int:
-    """Return a whole number in its range; TypeError for another type, also a float that happens to be whole."""
+def check_integer(what: str, value: object, low: int, high: int | None = None) -> int:
+    """Return a whole number as an int; a float is refused even if it is whole.
+
+    Parameters
+    ----------
+    what : str
+        The thing that the number is for, the subject of the error.
+    value : object
+        What the user gave.
+    low, high : int, optional
+        The range, both ends in it.
+
+    Returns
+    -------
+    int
+        The number.
+
+    Raises
+    ------
+    TypeError
+        If the value is no whole number.
+    ValueError
+        If it is out of range.
+    """
     if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-        raise TypeError(f"{what} = {shown(value)}; expected a whole number, e.g. {max(least, 1)}")
-    found = operator.index(value)
-    if found < least:
-        raise ValueError(f"{what} = {found}; expected at least {least}")
-    if most is not None and found > most:
-        raise ValueError(f"{what} = {shown(found)}; expected at most {most}")
-    return found
+        raise TypeError(f"{what} = {shown(value)}; expected a whole number, e.g. {max(low, 1)}")
+    result = operator.index(value)
+    if result < low or (high is not None and result > high):
+        bound = f"at least {low}" if result < low else f"at most {high}"
+        both = "" if high is None else f", a whole number from {low} to {high}"
+        raise ValueError(f"{what} = {shown(result)}; expected {bound}{both}; correct it")
+    return result
 
 
-def positive(what: str, value: object, zero: bool = False) -> float:
-    """Return a finite number above 0, or with `zero` not below it."""
-    found = number(what, value, 0.0)
-    if found == 0.0 and not zero:
+integer = whole = check_integer
+
+
+def positive(what: str, value: object) -> float:
+    """Return a finite number above 0; raises as `number`."""
+    result = number(what, value, 0.0)
+    if result == 0.0:
         raise ValueError(f"{what}: found 0; expected a number above 0")
-    return found
+    return result
 
 
 def a_path(what: str, value: object) -> Path:

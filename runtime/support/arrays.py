@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from synchain.models.inputs.checks import positive, shown, whole
+from synchain.models.inputs.checks import number, positive, shown, whole
 
 __all__ = ["averaging", "numbers", "row"]
 
@@ -26,8 +26,8 @@ def numbers(what: str, values: Any, *, complex_too: bool = False) -> np.ndarray:
 def averaging(precision: Any, periods: Any, transient: Any, seed: Any) -> tuple[float, float, float, int]:
     """The four settings of an average along an orbit, checked: how sure, how long, after what, and the random seed."""
     return (
-        positive("precision", precision, zero=True), positive("periods", periods),
-        positive("transient", transient, zero=True), whole("seed", seed, 0),
+        number("precision", precision, 0.0), positive("periods", periods),
+        number("transient", transient, 0.0), whole("seed", seed, 0),
     )  # fmt: skip
 
 
