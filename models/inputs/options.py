@@ -1,4 +1,4 @@
-"""Options of families: their types, ranges and canonical form."""
+"""Options of graph families: their types and canonical form; a command line gives them as text."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _INTEGER = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 
 
 def as_options(given: Mapping[str, Any]) -> Options:
-    """Names and values as they are stored: sorted, lists as tuples."""
+    """Return options as a topology stores them: sorted by name, lists as tuples."""
     return tuple((key, tuple(v) if isinstance(v, list) else v) for key, v in sorted(given.items()))
 
 
