@@ -1,7 +1,7 @@
 """Checks of arguments, options and entries of files.
 
-Every check takes `what`, the subject of its error, and `value`, what the user gave; it returns the value in
-its final type.  Errors have one grammar: "thing: found X; expected Y; do Z".
+Every check takes `what`, the subject of its error, and `value`, what the user gave; it returns the
+value in its final type.  Errors have one grammar: "thing: found X; expected Y; do Z".
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u206
 def shown(value: object) -> str:
     """Return `repr` of any value on one line of at most 120 characters, for an error message.
 
-    A value whose `repr` fails is named by its type: a broken `__repr__`, or an integer beyond Python's limit of
-    digits, must not hide the message.
+    A value whose `repr` fails is named by its type: a broken `__repr__`, or an integer beyond
+    Python's limit of digits, must not hide the message.
     """
     short = reprlib.Repr()
     short.maxstring = short.maxother = 60
@@ -69,7 +69,7 @@ def suggestion(found: object, known: Iterable[str], other: Mapping[str, str] | N
     known : iterable of str
         The names to choose from.
     other : mapping of str to str, optional
-        Names used elsewhere and the known name of each: what is close to such a name means the known one.
+        Names used elsewhere and the known name of each, which is suggested for them.
 
     Returns
     -------

@@ -94,14 +94,14 @@ def whole_numbers(what: str, value: object, low: int) -> tuple[int, ...]:
 
 
 def probability(what: str, value: object) -> str:
-    """Return a rational number from 0 to 1 as text such as "1/10"; a float means its shortest decimal.
+    """Return a rational number from 0 to 1 as text such as "1/10".
 
     Parameters
     ----------
     what : str
         The thing that the probability is for, such as ``"p"``.
     value : object
-        A number or a text.
+        A number or a text; a float means its shortest decimal.
 
     Returns
     -------

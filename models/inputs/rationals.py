@@ -1,4 +1,4 @@
-"""Exact rational numbers, and square tables of them, from lists, arrays, SymPy matrices, text and files."""
+"""Exact rational numbers and square tables of them, from lists, matrices, text and files."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def rational(entry: Any, where: str) -> Fraction:
     Parameters
     ----------
     entry : int, float, Fraction, Decimal, str or SymPy number
-        A float means its shortest decimal; a text is a fraction or decimal such as ``"1/2"`` or ``"0.25"``.
+        A float means its shortest decimal; a text is such as ``"1/2"`` or ``"0.25"``.
     where : str
         The subject of the error.
 
@@ -140,7 +140,8 @@ def square(rows: Any, name: str) -> list[list[Any]]:
     ValueError
         If the table is empty, not square or too large.
     """
-    symbolic = hasattr(rows, "tolist") and not hasattr(rows, "dtype")  # SymPy lists a matrix entry by entry
+    # SymPy lists a matrix entry by entry
+    symbolic = hasattr(rows, "tolist") and not hasattr(rows, "dtype")
     listed = rows.tolist() if symbolic else rows
     if isinstance(listed, (str, bytes)) or not isinstance(listed, Iterable) or hasattr(rows, "tocoo"):
         hint = "; a sparse matrix is read by from_sparse" if hasattr(rows, "tocoo") else ""

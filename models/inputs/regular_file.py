@@ -16,7 +16,8 @@ def open_regular(
 ) -> FileIO:
     """Open a regular file without buffering.
 
-    The kind of the file is asked of what was opened, so that nothing put in its place meanwhile is read.
+    The kind of the file is asked of what was opened, so that nothing put in its place meanwhile is
+    read.
 
     Parameters
     ----------
