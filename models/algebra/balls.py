@@ -17,7 +17,7 @@ from .rationals import to_flint
 __all__ = ["Ball", "accurate", "decimals", "disjoint", "enclose", "nearest", "precision"]
 
 Ball: TypeAlias = Any
-"""flint.arb where the number is real, flint.acb where it is complex (flint has no types)."""
+"""flint.arb if the number is real, flint.acb if it is complex (flint has no types)."""
 
 _MOST = 2**20
 """Bits at which a number that still cannot be told from zero is given up."""
@@ -122,7 +122,7 @@ def _decimal(x: Ball, digits: int) -> sp.Float:
 
 
 def _part(part: arb, whole: acb, bits: int) -> arb:
-    """A real or imaginary part, or 0 where it is smaller than 2**-bits of the modulus."""
+    """A real or imaginary part, or 0 if it is smaller than 2**-bits of the modulus."""
     with precision(2 * bits):
         return arb(0) if abs(part).upper() * arb(2) ** (bits - 4) < abs(whole).lower() else part.mid()
 

@@ -1,6 +1,6 @@
 """Exact arithmetic of sums of cosines of rational angles with rational factors.
 
-Such sums lie in a cyclotomic field: two are equal where the cyclotomic polynomial divides the
+Such sums lie in a cyclotomic field: two are equal if the cyclotomic polynomial divides the
 difference, and the conjugates of one are had by multiplying all its angles (L. C. Washington,
 Introduction to Cyclotomic Fields, Springer, 1997, chapter 2).
 """
@@ -80,7 +80,7 @@ class AngleSum:
 
     @property
     def near(self) -> float:
-        """The value as a float, within rounding; infinite where it is too large for one."""
+        """The value as a float, within rounding; infinite if it is too large for one."""
         if abs(self.shift) > _HUGE:
             return inf if self.shift > 0 else -inf
         return float(self.shift) + sum(2 * float(b) * cos(2 * pi * float(t)) for t, b in self.terms)
@@ -143,7 +143,7 @@ def folded_sum(shift: Fraction, parts: Iterable[tuple[int, Fraction]], unit: int
 
 
 _RATIONAL = {1: 2, 2: -2, 3: -1, 4: 0, 6: 1}
-"""2 cos(2πt) by the denominator of t, where it is rational."""
+"""2 cos(2πt) by the denominator of t if it is rational."""
 
 
 def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]]:

@@ -190,7 +190,7 @@ def _fraction_of(value: int | float) -> Fraction:
 
 @dataclass(frozen=True, slots=True)
 class _Angle:
-    """a + b k, times pi where `of_pi`; k is the open letter."""
+    """a + b k, times pi if `of_pi`; k is the open letter."""
 
     a: Fraction
     b: Fraction = Fraction(0)

@@ -1,6 +1,6 @@
 """Numbers a + 2 b cos(2πk/m) and a + b exp(2πik/m) with rational a and b.
 
-Short real radicals where they exist (m = 1 … 6, 8, 10, 12, 16, 20, 24), otherwise the sine or
+Short real radicals if they exist (m = 1 … 6, 8, 10, 12, 16, 20, 24), otherwise the sine or
 cosine itself: the radicals of other angles are long or need complex cube roots (casus
 irreducibilis).
 """

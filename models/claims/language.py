@@ -70,7 +70,7 @@ class Claimed:
 
     @property
     def sum(self) -> AngleSum | None:
-        """The number as a sum of cosines; None where it is not read as one."""
+        """The number as a sum of cosines; None if it is not read as one."""
         if self.exact is not None and self.exact.is_Rational:
             return AngleSum.rational(to_fraction(self.exact))
         return self.angle

@@ -5,7 +5,7 @@ Example: chain 1000000: largest = -4*cos(pi/(2*n))**2.
 largest, slowest        the eigenvalues of largest modulus, and of smallest modulus other than 0
 ratio                   their quotient, of real eigenvalues
 distinct                how many different eigenvalues there are
-multiplicity(number)    how often a number is an eigenvalue, 0 where it is none
+multiplicity(number)    how often a number is an eigenvalue, 0 if it is none
 
 Each stands before =, <, >, <= or >= and an exact number.  An approximation such as ~-3.414 may
 stand behind =, a decimal, which is then exact, behind the others.  Each comparison is decided
@@ -320,7 +320,7 @@ def _same(e: Eigenvalue, number: Exact) -> bool:
 
 
 def _quotient(value: Value, unit: Value) -> str:
-    """value / unit by twelve digits, or as a whole number where it is one."""
+    """value / unit by twelve digits, or as a whole number if it is one."""
     if isinstance(value, AngleSum) and isinstance(unit, AngleSum) and not (value.terms or unit.terms):
         return str(value.shift / unit.shift)
     top, bottom = (Eigenvalue(_number(x), 1).enclosure(128) for x in (value, unit))
@@ -328,7 +328,7 @@ def _quotient(value: Value, unit: Value) -> str:
 
 
 def _value(number: Number) -> Value:
-    """An eigenvalue as a sum of cosines where it is one."""
+    """An eigenvalue as a sum of cosines if it is one."""
     found = None if isinstance(number, Root) else read(number)
     return number if found is None else found
 
