@@ -17,7 +17,7 @@ from .rationals import to_flint
 __all__ = ["Ball", "accurate", "decimals", "disjoint", "enclose", "nearest", "precision"]
 
 Ball: TypeAlias = Any
-"""flint.arb where the number is real, flint.acb where it is complex (flint has no types)."""
+"""flint.arb if the number is real, flint.acb if it is complex (flint has no types)."""
 
 _MOST = 2**20
 """Bits at which a number that still cannot be told from zero is given up."""
@@ -25,7 +25,7 @@ _MOST = 2**20
 
 @contextmanager
 def precision(bits: int) -> Iterator[None]:
-    """Run Arb with `bits` bits, then restore its precision."""
+    """Run Arb with a precision of `bits` bits, then restore its precision."""
     before = ctx.prec
     ctx.prec = bits
     try:
@@ -35,18 +35,38 @@ def precision(bits: int) -> Iterator[None]:
 
 
 def enclose(expression: sp.Expr, bits: int) -> Ball:
-    """A ball that holds the value of an expression of rationals, roots, pi, I, sin, cos and exp.
+    """Return a ball that holds the value of an expression; real arithmetic stays real.
 
-    Real arithmetic stays real.  Raises TypeError on any other function or symbol.
+    Parameters
+    ----------
+    expression : sympy.Expr
+        Made of rationals, roots, pi, I, sin, cos and exp.
+    bits : int
+        Precision of the arithmetic.
+
+    Raises
+    ------
+    TypeError
+        On any other function or symbol.
     """
     with precision(bits):
         return _ball(expression)
 
 
 def accurate(ball_at: Callable[[int], Ball], bits: int) -> Ball:
-    """A ball of radius below 2**-bits times the modulus, from a function that gives balls at any precision.
+    """Return a ball of radius below 2**-bits times its modulus.
 
-    Raises ValueError where the number cannot be told from zero at a million bits.
+    Parameters
+    ----------
+    ball_at : callable
+        Gives a ball around the number at any precision in bits.
+    bits : int
+        Relative accuracy.
+
+    Raises
+    ------
+    ValueError
+        If the number cannot be told from zero at a million bits.
     """
     working = bits + 16
     while working < _MOST:
@@ -60,7 +80,10 @@ def accurate(ball_at: Callable[[int], Ball], bits: int) -> Ball:
 
 
 def nearest(ball_at: Callable[[int], Ball]) -> float | complex:
-    """The value as a float, within 0.5001 units in the last place; complex: relative to its modulus."""
+    """Return the value as a float, within 0.5001 units in the last place.
+
+    A complex value is as near relative to its modulus.  Raises ValueError as `accurate`.
+    """
     ball = accurate(ball_at, 72)
     if isinstance(ball, arb):
         return float(ball.mid())
@@ -68,7 +91,10 @@ def nearest(ball_at: Callable[[int], Ball]) -> float | complex:
 
 
 def decimals(ball_at: Callable[[int], Ball], digits: int) -> sp.Expr:
-    """The value as a SymPy Float, within one unit of the last of `digits`; complex: real + imaginary * I."""
+    """Return the value as a SymPy Float, within one unit of the last of `digits`.
+
+    A complex value is real + imaginary * I.  Raises ValueError as `accurate`.
+    """
     bits = int(3.33 * digits) + 12
     ball = accurate(ball_at, bits)
     with precision(2 * bits):
@@ -79,7 +105,7 @@ def decimals(ball_at: Callable[[int], Ball], digits: int) -> sp.Expr:
 
 
 def disjoint(balls: Sequence[Ball]) -> bool:
-    """True if no two balls overlap; sorted by their left ends, so that each meets few others."""
+    """Return whether no two balls overlap: sorted by their left ends, each meets few others."""
     ordered = sorted((acb(ball) for ball in balls), key=lambda ball: ball.real.lower())
     for i, ball in enumerate(ordered):
         end = ball.real.upper()
@@ -96,7 +122,7 @@ def _decimal(x: Ball, digits: int) -> sp.Float:
 
 
 def _part(part: arb, whole: acb, bits: int) -> arb:
-    """A real or imaginary part, or 0 where it is smaller than 2**-bits of the modulus."""
+    """A real or imaginary part, or 0 if it is smaller than 2**-bits of the modulus."""
     with precision(2 * bits):
         return arb(0) if abs(part).upper() * arb(2) ** (bits - 4) < abs(whole).lower() else part.mid()
 

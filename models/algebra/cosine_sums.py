@@ -1,8 +1,8 @@
-"""Sums of cosines of rational angles with rational factors: added, multiplied, compared and written exactly.
+"""Exact arithmetic of sums of cosines of rational angles with rational factors.
 
-Such sums lie in a cyclotomic field: two are equal where the cyclotomic polynomial divides the difference, and the
-conjugates of one are had by multiplying all its angles (L. C. Washington, Introduction to Cyclotomic Fields, Springer,
-1997, chapter 2).
+Such sums lie in a cyclotomic field: two are equal if the cyclotomic polynomial divides the
+difference, and the conjugates of one are had by multiplying all its angles (L. C. Washington,
+Introduction to Cyclotomic Fields, Springer, 1997, chapter 2).
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class AngleSum:
 
     @property
     def folded(self) -> AngleSum:
-        """The number with all angles in the first quarter turn: one form for -cos x and cos(π - x)."""
+        """The number with all angles in the first quarter turn: one form for -cos x, cos(π - x)."""
         return self._turned(lambda t, b: 4 * t > 1)
 
     @property
@@ -80,7 +80,7 @@ class AngleSum:
 
     @property
     def near(self) -> float:
-        """The value as a float, within rounding; infinite where it is too large for one."""
+        """The value as a float, within rounding; infinite if it is too large for one."""
         if abs(self.shift) > _HUGE:
             return inf if self.shift > 0 else -inf
         return float(self.shift) + sum(2 * float(b) * cos(2 * pi * float(t)) for t, b in self.terms)
@@ -91,7 +91,10 @@ class AngleSum:
         return lcm(*(t.denominator for t, _ in self.terms))
 
     def sign(self) -> int:
-        """-1, 0 or 1, decided exactly: by certified balls, and where these hold 0 by the cyclotomic polynomial."""
+        """-1, 0 or 1, decided exactly.
+
+        Certified balls decide, and the cyclotomic polynomial if they hold 0.
+        """
         number = self.folded
         if not number.terms:
             return (number.shift > 0) - (number.shift < 0)
@@ -106,7 +109,7 @@ class AngleSum:
             bits *= 2
 
     def vanishes(self) -> bool:
-        """True where the number is 0, decided exactly."""
+        """Return whether the number is 0, decided exactly."""
         if not self.terms:
             return self.shift == 0
         m = self.modulus
@@ -121,7 +124,7 @@ class AngleSum:
 
 
 def _collected(shift: Fraction, parts: Iterable[tuple[Fraction, Fraction]]) -> AngleSum:
-    """Bring all angles into the first half turn, those with rational cosines into the shift, and add up."""
+    """Add up parts: angles in the first half turn, rational cosines in the shift."""
     turns = [(turn, b) for turn, b in parts]
     unit = lcm(*(turn.denominator for turn, _ in turns))
     return folded_sum(shift, [(int(turn * unit) % unit, b) for turn, b in turns], unit)
@@ -140,11 +143,14 @@ def folded_sum(shift: Fraction, parts: Iterable[tuple[int, Fraction]], unit: int
 
 
 _RATIONAL = {1: 2, 2: -2, 3: -1, 4: 0, 6: 1}
-"""2 cos(2πt) by the denominator of t, where it is rational."""
+"""2 cos(2πt) by the denominator of t if it is rational."""
 
 
 def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]]:
-    """Equal numbers once, their multiplicities added, descending; nearly equal ones are told apart exactly."""
+    """Return equal numbers once, descending, their multiplicities added.
+
+    Nearly equal numbers are told apart exactly.
+    """
     counts: dict[AngleSum, int] = {}
     for number, times in numbers:
         counts[number] = counts.get(number, 0) + times
@@ -166,10 +172,22 @@ def merged(numbers: Iterable[tuple[AngleSum, int]]) -> list[tuple[AngleSum, int]
 
 
 def box(sizes: Sequence[int], closed: Sequence[bool]) -> LazyEigenvalues[tuple[sp.Expr, int]]:
-    """The spectrum of the Cartesian product of chains, and of rings where `closed`: sums of -4 sin² of each.
+    """Return the spectrum of the Cartesian product of chains and rings: sums of -4 sin² of each.
 
-    Directions of one kind and size are taken in one order only.  Only what cosines cannot be told apart by floats is
-    compared exactly; expressions are made as they are asked for.
+    Directions of one kind and size are taken in one order only.  Only numbers whose floats are too
+    near to each other are compared exactly.
+
+    Parameters
+    ----------
+    sizes : sequence of int
+        Number of nodes in each direction.
+    closed : sequence of bool
+        Whether a direction is a ring.
+
+    Returns
+    -------
+    LazyEigenvalues
+        Pairs of an eigenvalue and its multiplicity, made when they are asked for.
     """
     kinds = Counter(zip(sizes, closed, strict=True))
     unit = lcm(*(size if ring else 2 * size for size, ring in kinds))
@@ -193,8 +211,8 @@ def box(sizes: Sequence[int], closed: Sequence[bool]) -> LazyEigenvalues[tuple[s
 
     found: list[tuple[tuple[int, ...], int]] = []
     start = 0
-    for end in range(1, len(places) + 1):
-        if end == len(places) or places[end - 1][0] - places[end][0] > 1e-12 * len(sizes):  # of cosines: within 2 each
+    for end in range(1, len(places) + 1):  # the sums of cosines in `near` are within 2 each
+        if end == len(places) or places[end - 1][0] - places[end][0] > 1e-12 * len(sizes):
             found += _told_apart([(number(key), key, counts[key]) for _, key in places[start:end]])
             start = end
     return LazyEigenvalues(len(found), prod(sizes), lambda k: (expression(number(found[k][0])), found[k][1]))
@@ -208,7 +226,7 @@ def _waves(size: int, ring: bool, unit: int) -> list[tuple[int, int]]:
 
 
 def _cancelled(turns: Sequence[int], unit: int) -> tuple[int, ...]:
-    """The turns, ascending, with pairs r and unit/2 - r, whose cosines add up to 0, all written alike."""
+    """The turns, ascending; pairs r, unit/2 - r, whose cosines add up to 0, are written alike."""
     left = sorted(turns)
     found = list[int]()
     while left:
@@ -222,7 +240,7 @@ def _cancelled(turns: Sequence[int], unit: int) -> tuple[int, ...]:
 
 
 def _told_apart(group: Sequence[tuple[AngleSum, tuple[int, ...], int]]) -> list[tuple[tuple[int, ...], int]]:
-    """Nearly equal numbers, descending, equal ones once with their multiplicities added; all decided exactly."""
+    """Nearly equal numbers, descending, equal ones once, multiplicities added; decided exactly."""
     if len(group) == 1:
         return [group[0][1:]]
     different: list[tuple[AngleSum, tuple[int, ...], int]] = []
@@ -241,7 +259,7 @@ def _told_apart(group: Sequence[tuple[AngleSum, tuple[int, ...], int]]) -> list[
 
 
 def expression(number: AngleSum) -> sp.Expr:
-    """The number with short radicals, and -4 b sin² for all other cosines."""
+    """Return the number with short radicals, and -4 b sin² for all other cosines."""
     shift, short, long = number.shift, [], []
     for t, b in number.terms:
         k, m = t.numerator, t.denominator
@@ -254,7 +272,10 @@ def expression(number: AngleSum) -> sp.Expr:
 
 
 def read(number: sp.Expr) -> AngleSum | None:
-    """A SymPy expression as such a sum; None where it is none, or has radicals other than those of `angles.cosine`."""
+    """Return a SymPy expression as such a sum.
+
+    None if it is none, or has radicals other than those of `cosines.cosine`.
+    """
     found = AngleSum.rational(0)
     for part in sp.Add.make_args(number):
         factor, core = part.as_coeff_Mul()
@@ -274,7 +295,10 @@ def read(number: sp.Expr) -> AngleSum | None:
 
 @lru_cache(maxsize=1)
 def _atoms() -> dict[sp.Expr, AngleSum]:
-    """1 and the radicals that `angles.cosine` writes; √5 = 1 + 4 cos(2π/5), √6 = 2 cos(π/12) + 2 cos(5π/12)."""
+    """1 and the radicals that `cosines.cosine` writes.
+
+    √5 = 1 + 4 cos(2π/5), √6 = 2 cos(π/12) + 2 cos(5π/12).
+    """
 
     def c(*turns: tuple[int, int]) -> AngleSum:
         return sum((AngleSum.cosine(0, 1, k, m) for k, m in turns), AngleSum.rational(0))
@@ -294,10 +318,11 @@ def _atoms() -> dict[sp.Expr, AngleSum]:
 
 
 def minimal_polynomial(number: AngleSum) -> fmpq_poly:
-    """The monic irreducible polynomial over the rationals of which the number is a root.
+    """Return the monic irreducible polynomial over the rationals of which the number is a root.
 
-    The product of (z - conjugate) over all multiples of the angles is a power of it; times a common denominator
-    the number is an algebraic integer, so that balls around the coefficients of that product give them exactly.
+    The product of (z - conjugate) over all multiples of the angles is a power of it.  Times a
+    common denominator the number is an algebraic integer, so balls around the coefficients of that
+    product give them exactly.
     """
     if not number.terms:
         return fmpq_poly([-to_flint(number.shift), 1])

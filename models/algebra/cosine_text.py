@@ -1,7 +1,7 @@
-"""Numbers such as -4*sin(k*pi/n)**2 read straight into sums of cosines: a hundred times faster than by SymPy.
+"""Numbers such as -4*sin(k*pi/n)**2 read as sums of cosines, a hundred times faster than by SymPy.
 
-A letter such as k may stay open: the text is then read once for all its values.  Everything that is not
-such a sum for certain, wrong texts too, is left to `number_text.exact_number`.
+A letter such as k may stay open: the text is then read once for all its values.  Everything that is
+not such a sum for certain, wrong texts too, is left to `number_text.exact_number`.
 """
 
 from __future__ import annotations
@@ -63,7 +63,10 @@ class Wave:
 
 
 def _even(a: Fraction, b: Fraction) -> Linear:
-    """One form for the angles of equal cosines, but for those of constants: whole turns off, k with a positive factor."""
+    """One form for the angles of equal cosines, but for those of constants.
+
+    Whole turns are taken off, and the factor of k is positive.
+    """
     return (-a % 1, -b) if b < 0 else (a % 1, b)
 
 
@@ -187,7 +190,7 @@ def _fraction_of(value: int | float) -> Fraction:
 
 @dataclass(frozen=True, slots=True)
 class _Angle:
-    """a + b k, times pi where `of_pi`; k is the open letter."""
+    """a + b k, times pi if `of_pi`; k is the open letter."""
 
     a: Fraction
     b: Fraction = Fraction(0)

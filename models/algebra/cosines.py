@@ -1,7 +1,8 @@
-"""Numbers a + 2 b cos(2πk/m) and a + b exp(2πik/m), a and b rational: form, recognition, polynomials.
+"""Numbers a + 2 b cos(2πk/m) and a + b exp(2πik/m) with rational a and b.
 
-Short real radicals where they exist (m = 1 … 6, 8, 10, 12, 16, 20, 24), otherwise the sine or cosine itself:
-the radicals of other angles are long or need complex cube roots (casus irreducibilis).
+Short real radicals if they exist (m = 1 … 6, 8, 10, 12, 16, 20, 24), otherwise the sine or
+cosine itself: the radicals of other angles are long or need complex cube roots (casus
+irreducibilis).
 """
 
 from __future__ import annotations
@@ -45,12 +46,12 @@ _SHORT = {
 
 
 def is_short(k: int, m: int) -> bool:
-    """True where cos(2πk/m), 0 <= k/m <= 1/2 in lowest terms, is written as a short real radical."""
+    """Return whether cos(2πk/m), 0 <= k/m <= 1/2 in lowest terms, is a short real radical."""
     return (k, m) in _SHORT
 
 
 def exponential(shift: int, k: int, m: int) -> sp.Expr:
-    """shift + exp(2πik/m), as radicals where m (in lowest terms) is at most 4, or 6."""
+    """Return shift + exp(2πik/m), as radicals if m (in lowest terms) is at most 4, or 6."""
     turn = Fraction(2 * k, m) % 2
     angle = sp.Rational(*(turn - 2 if turn > 1 else turn).as_integer_ratio()) * sp.pi
     if 2 * turn % 1 == 0 or 3 * turn % 1 == 0:
@@ -59,12 +60,12 @@ def exponential(shift: int, k: int, m: int) -> sp.Expr:
 
 
 def minus_four_sine_squared(k: int, m: int) -> sp.Expr:
-    """-4 sin²(kπ/m) = -2 + 2 cos(2πk/m), as radicals where they are short."""
+    """Return -4 sin²(kπ/m) = -2 + 2 cos(2πk/m), as radicals if they are short."""
     return cosine(Fraction(-2), Fraction(1), k, m)
 
 
 def cosine(a: Fraction, b: Fraction, k: int, m: int) -> sp.Expr:
-    """a + 2 b cos(2πk/m), as radicals where they are short, as a multiple of sin² where a = -2 b."""
+    """Return a + 2 b cos(2πk/m): radicals if they are short, a multiple of sin² if a = -2 b."""
     k = min(k % m, -k % m)
     k, m = k // gcd(k, m), m // gcd(k, m)
     shift, factor = to_sympy(a), to_sympy(b)
@@ -76,7 +77,10 @@ def cosine(a: Fraction, b: Fraction, k: int, m: int) -> sp.Expr:
 
 
 def linear_cosine(expression: sp.Expr) -> tuple[Fraction, Fraction, int, int] | None:
-    """The a, b, k, m of an expression a + 2 b cos(2πk/m), also with sin² or cos²; None for any other."""
+    """Return the a, b, k, m of an expression a + 2 b cos(2πk/m), also with sin² or cos².
+
+    None for any other expression.
+    """
     shift, rest = expression.as_coeff_Add()
     factor, core = rest.as_coeff_Mul()
     squared = isinstance(core, sp.Pow) and core.exp == 2
@@ -93,7 +97,7 @@ def linear_cosine(expression: sp.Expr) -> tuple[Fraction, Fraction, int, int] | 
 
 
 def linear_exponential(expression: sp.Expr) -> tuple[Fraction, Fraction, int, int] | None:
-    """The a, b, k, m of an expression written a + b exp(2πik/m); None for any other."""
+    """Return the a, b, k, m of an expression a + b exp(2πik/m); None for any other."""
     shift, rest = expression.as_coeff_Add()
     factor, core = rest.as_coeff_Mul()
     if not (shift.is_Rational and factor.is_Rational and isinstance(core, sp.exp)):
@@ -106,9 +110,16 @@ def linear_exponential(expression: sp.Expr) -> tuple[Fraction, Fraction, int, in
 
 
 def minimal_polynomial(a: Fraction, b: Fraction, m: int, conjugates: fmpz_poly | None = None) -> fmpq_poly:
-    """The monic polynomial whose roots are a + 2 b cos(2πk/m) for all k prime to m, each once; b not 0.
+    """Return the monic polynomial whose roots are a + 2 b cos(2πk/m) for all k prime to m.
 
-    With `conjugates`, the roots are a + b r for its roots r instead.
+    Parameters
+    ----------
+    a, b : Fraction
+        b is not 0.
+    m : int
+        The number of parts of a full turn.
+    conjugates : fmpz_poly, optional
+        With it, the roots are a + b r for its roots r instead.
     """
     psi = fmpq_poly(fmpz_poly.cos_minpoly(m) if conjugates is None else conjugates)
     scale = to_flint(b)
@@ -117,7 +128,10 @@ def minimal_polynomial(a: Fraction, b: Fraction, m: int, conjugates: fmpz_poly |
 
 
 def exponential_roots(polynomial: fmpq_poly) -> list[sp.Expr] | None:
-    """All roots of a monic irreducible polynomial of degree >= 2 if they are a + exp(2πik/m)."""
+    """Return all roots of a monic irreducible polynomial of degree >= 2.
+
+    None if they are not of the form a + exp(2πik/m).
+    """
     degree = polynomial.degree()
     for m in _moduli(degree):
         cyclotomic = fmpz_poly.cyclotomic(m)
@@ -130,9 +144,10 @@ def exponential_roots(polynomial: fmpq_poly) -> list[sp.Expr] | None:
 
 
 def cosine_roots(polynomial: fmpq_poly) -> list[sp.Expr] | None:
-    """All roots, descending, of a monic irreducible polynomial of degree >= 2 if they are a + 2 b cos(2πk/m).
+    """Return all roots, descending, of a monic irreducible polynomial of degree >= 2.
 
-    Mean and spread of the roots give a and b for each m of the right degree; an equal polynomial proves it.
+    None if they are not of the form a + 2 b cos(2πk/m).  Mean and spread of the roots give a and b
+    for each m of the right degree; an equal polynomial proves it.
     """
     degree = polynomial.degree()
     for m in _moduli(2 * degree):
@@ -154,7 +169,7 @@ def _moduli(value: int) -> Iterator[int]:
 
 
 def _fit(polynomial: fmpq_poly, psi: fmpq_poly) -> tuple[Fraction, Fraction] | None:
-    """The rational (a, b), b > 0, that map mean and spread of the roots of psi to those of the polynomial.
+    """The rational (a, b), b > 0, that map mean and spread of the roots of psi to the polynomial's.
 
     b < 0 is not needed: it is b > 0 with another m, since -2 cos x = 2 cos(π - x).
     """
@@ -168,7 +183,7 @@ def _fit(polynomial: fmpq_poly, psi: fmpq_poly) -> tuple[Fraction, Fraction] | N
 
 
 def _moments(polynomial: fmpq_poly) -> tuple[fmpq, fmpq]:
-    """Mean and mean square deviation of the roots of a monic polynomial, from its leading coefficients."""
+    """Mean and mean square deviation of the roots of a monic polynomial."""
     d = polynomial.degree()
     first, second = polynomial[d - 1], polynomial[d - 2]
     mean = -first / d
@@ -176,7 +191,7 @@ def _moments(polynomial: fmpq_poly) -> tuple[fmpq, fmpq]:
 
 
 def written(factor: fmpq_poly) -> list[sp.Expr] | None:
-    """The roots of an irreducible polynomial in closed form, where a short one is known."""
+    """Return the roots of an irreducible polynomial in closed form; None without a short one."""
     monic = factor / factor[factor.degree()]
     c = [to_sympy(x) for x in monic.coeffs()]
     if len(c) == 2:
@@ -189,7 +204,10 @@ def written(factor: fmpq_poly) -> list[sp.Expr] | None:
 
 
 def biquadratic(monic: fmpq_poly) -> list[sp.Expr] | None:
-    """Real nested roots a ± sqrt(b ± sqrt(c)), or a ± sqrt(b) ± sqrt(c), of a quartic that has them."""
+    """Return the real nested roots of a quartic; None if it has none.
+
+    They are a ± sqrt(b ± sqrt(c)), or a ± sqrt(b) ± sqrt(c).
+    """
     shift = monic[3] / 4
     even = monic(fmpq_poly([-shift, 1]))
     p, q, discriminant = even[2], even[0], even[2] ** 2 - 4 * even[0]

@@ -1,8 +1,10 @@
-"""Whether two algebraic numbers are equal, decided exactly by a bound on how near to zero a difference can be.
+"""Exact comparison of algebraic numbers, by a bound on how near to zero a difference can be.
 
-Every number is written as U/L with algebraic integers U and L; u and l bound all conjugates of U and L, and D bounds the
-degree of the field that holds them.  Where U is not 0 its norm is a whole number other than 0, so |U| >= u**(1 - D) and the
-number is at least 1/(l u**(D - 1)) in modulus.  One certified ball smaller than that decides.
+Every number is written as U/L with algebraic integers U and L; u and l bound all conjugates of U
+and L, and D bounds the degree of the field that holds them.  If U is not 0, its norm is a whole
+number other than 0, so |U| >= u**(1 - D) and the number is at least 1/(l u**(D - 1)) in modulus.
+One certified ball smaller than that decides.
+
 After Burnikel, Funke, Mehlhorn, Schirra & Schmitt, Algorithmica 55, 14 (2009).
 """
 
@@ -22,7 +24,7 @@ from .roots import Root
 __all__ = ["Number", "check_size", "equal", "sign"]
 
 Number: TypeAlias = sp.Expr | Root
-"""Rationals, roots, I, sin and cos of rational multiples of pi, exp of those of I*pi and what is made of them."""
+"""Rationals, roots, I, sin and cos of rational multiples of pi, exp of those of I*pi, combined."""
 
 MOST_BITS = 2**19
 """Numbers whose bound needs more bits than this are refused."""
@@ -30,7 +32,7 @@ MOST_BITS = 2**19
 
 @dataclass(slots=True)
 class _Field:
-    """What generates the field of some numbers: one root of unity, radicals (base, q), and roots of polynomials."""
+    """Generators of the field of some numbers: a root of unity, radicals (base, q), roots."""
 
     unity: int = 1
     radicals: set[tuple[sp.Expr, int]] = field(default_factory=set)
@@ -45,7 +47,12 @@ class _Field:
 def equal(a: Number, b: Number) -> bool:
     """Return whether two algebraic numbers are the same, without any tolerance.
 
-    Raises ValueError where the bound needs more than MOST_BITS bits, and TypeError on numbers of another kind.
+    Raises
+    ------
+    ValueError
+        If the bound needs more than MOST_BITS bits.
+    TypeError
+        On numbers of another kind.
     """
     if a is b or (isinstance(a, sp.Expr) and isinstance(b, sp.Expr) and a == b):
         return True
@@ -53,9 +60,22 @@ def equal(a: Number, b: Number) -> bool:
 
 
 def sign(a: tuple[Number, ...], b: tuple[Number, ...]) -> int:
-    """The sign of one product of real algebraic numbers less another: 0 where they are equal, without any tolerance.
+    """Return the sign of a difference of two products, without any tolerance.
 
-    Raises ValueError and TypeError as `equal`.
+    Parameters
+    ----------
+    a, b : tuple of Number
+        The factors of each product, real algebraic numbers.
+
+    Returns
+    -------
+    int
+        The sign of the product of `a` less that of `b`; 0 if they are equal.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `equal`.
     """
     gap = _compared(a, b)
     if isinstance(gap, acb) and not gap.imag.contains(0):
@@ -64,7 +84,7 @@ def sign(a: tuple[Number, ...], b: tuple[Number, ...]) -> int:
 
 
 def _compared(a: tuple[Number, ...], b: tuple[Number, ...]) -> Ball:
-    """A ball around the difference of two products that does not hold 0, or 0 where they are equal."""
+    """A ball around the difference of two products: without 0, or 0 if they are equal."""
     needed = _bits((a, b))
     bits = 64
     while True:
@@ -89,7 +109,15 @@ def _product_ball(factors: tuple[Number, ...], bits: int) -> acb:
 
 
 def check_size(number: sp.Expr) -> None:
-    """Raise ValueError where a number is too involved to be compared, TypeError where it is of another kind."""
+    """Check that a number is simple enough to be compared.
+
+    Raises
+    ------
+    ValueError
+        If its bound needs more than MOST_BITS bits.
+    TypeError
+        If it is of another kind.
+    """
     _bits(((number,),))
 
 

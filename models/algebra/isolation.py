@@ -1,9 +1,10 @@
-"""Isolation of all roots, real and complex, of an irreducible polynomial: Aberth's method finds, discs prove.
+"""Isolation of all roots, real and complex, of an irreducible polynomial.
 
-All roots are improved at once, each as if the others were divided out (O. Aberth, Math. Comp. 27, 339, 1973), from starts
-on the circles that the sizes of the coefficients suggest (D. A. Bini, Numer. Algorithms 13, 179, 1996), or on the real axis
-if Newton's inequalities allow that all roots are real.  Nothing of this is trusted: within d |f/f'| of any point lies a root
-of f, of degree d (D. A. Bini, G. Fiorentino, Numer. Algorithms 23, 127, 2000), and d discs that do not touch each other hold
+Aberth's method improves all roots at once, each as if the others were divided out (O. Aberth, Math.
+Comp. 27, 339, 1973).  It starts on the circles that the sizes of the coefficients suggest (D. A.
+Bini, Numer. Algorithms 13, 179, 1996), or on the real axis if Newton's inequalities allow that all
+roots are real.  Nothing of this is trusted: within d |f/f'| of any point lies a root of f, of degree
+d (D. A. Bini, G. Fiorentino, Numer. Algorithms 23, 127, 2000), and d discs that do not touch hold
 one root each.
 """
 
@@ -22,7 +23,7 @@ from .balls import Ball, disjoint, precision
 __all__ = ["Disc", "discs", "dyadic", "sharpened", "sign"]
 
 _IDLE = {arb: 30, acb: 200}
-"""Steps without a further root that settles, after which the iteration ends; up to 10 and 70 are taken."""
+"""Steps without another root that settles, after which the iteration ends; 10 and 70 suffice."""
 _DIGITS = 2.0**-44
 """Relative size of the step after which Newton's method takes over."""
 _SHARP = 160
@@ -50,11 +51,17 @@ class Disc:
 
 
 def discs(f: fmpz_poly) -> list[Disc] | None:
-    """One disc for each root of a polynomial without multiple roots, real ones first; None if this finds none.
+    """Return one disc for each root of a polynomial, real roots first; None if this finds none.
 
     No two discs touch, not even at four times their size.
+
+    Parameters
+    ----------
+    f : fmpz_poly
+        A polynomial without multiple roots.
     """
-    mean = -f[f.degree() - 1] // (f.degree() * f[f.degree()])  # values cancel least about the mean of the roots
+    # values of the polynomial cancel least about the mean of its roots
+    mean = -f[f.degree() - 1] // (f.degree() * f[f.degree()])
     shifted = [(middle, f(fmpz_poly([middle, 1]))) for middle in (mean, fmpz(0))]
     real = all(_newton_inequalities(g) for _, g in shifted)
     full = 2 * f.degree() + f.height_bits()
@@ -69,9 +76,23 @@ def discs(f: fmpz_poly) -> list[Disc] | None:
 
 
 def sharpened(f: fmpz_poly, disc: Disc, room: fmpq, bits: int) -> acb:
-    """A ball around the only root within `room` of a disc's centre, of radius below 2**-bits times its modulus.
+    """Return a ball around a root, of radius below 2**-bits times its modulus.
 
-    Raises ValueError if no such root is found: the disc was wrong.
+    Parameters
+    ----------
+    f : fmpz_poly
+        The polynomial.
+    disc : Disc
+        Its centre is near the root.
+    room : fmpq
+        Distance from the centre within which there is no other root.
+    bits : int
+        Relative accuracy.
+
+    Raises
+    ------
+    ValueError
+        If there is no root within `room`: the disc was wrong.
     """
     with precision(2 * f.degree() + f.height_bits() + 2 * bits + 64):
         start = acb(disc.x, disc.y)
@@ -82,7 +103,7 @@ def sharpened(f: fmpz_poly, disc: Disc, room: fmpq, bits: int) -> acb:
 
 
 def sign(f: fmpz_poly, x: fmpq) -> int:
-    """The sign of f(x): certified by a ball, or exact if the ball cannot tell."""
+    """Return the sign of f(x): certified by a ball, or exact if the ball cannot tell."""
     full = f.height_bits() + 2 * f.degree()
     for bits in sorted({min(_usual(f), full), full}):
         with precision(bits + 320):
@@ -94,18 +115,18 @@ def sign(f: fmpz_poly, x: fmpq) -> int:
 
 
 def dyadic(ball: arb) -> fmpq:
-    """The midpoint of a ball, exactly."""
+    """Return the midpoint of a ball, exactly."""
     mantissa, exponent = ball.mid().man_exp()
     return fmpq(mantissa) * fmpq(2) ** int(exponent)
 
 
 def _usual(f: fmpz_poly) -> int:
-    """Bits that usually cancel in a value of f between its roots: some per root, however large the roots are."""
+    """Bits that usually cancel in a value of f between its roots: a few for each root."""
     return 4 * int(f.degree()) + 64
 
 
 def _isolated(f: fmpz_poly, real: bool) -> list[Disc] | None:
-    """One proved disc for each root, from starts on the axis if all roots may be `real`, then from starts on circles."""
+    """One proved disc for each root, from starts on the axis (if `real`), then on circles."""
     radii = _radii(f)
     if radii is None:
         return None
@@ -114,7 +135,7 @@ def _isolated(f: fmpz_poly, real: bool) -> list[Disc] | None:
 
 
 def _proved(f: fmpz_poly, kind: type, starts: Sequence[complex]) -> list[Disc] | None:
-    """Discs that do not touch each other, from Aberth's method in real or complex balls; None if one is missing."""
+    """Discs that do not touch each other, by Aberth's method; None if one is missing."""
     value, slope = (arb_poly(p) if kind is arb else acb_poly(p) for p in (f, f.derivative()))
     found = []
     for z in _aberth(value, slope, kind, list(starts)) or ():
@@ -130,19 +151,26 @@ def _proved(f: fmpz_poly, kind: type, starts: Sequence[complex]) -> list[Disc] |
 def _on_its_side(disc: Disc) -> Disc:
     """The disc, its centre put on the real axis if it meets the axis: then its root is real.
 
-    The mirror image of the disc holds the mirror image of its root, and no other disc is near: the two are one root.
+    The mirror image of the disc holds the mirror image of its root, and no other disc is near: the
+    two are one root.
     """
     return disc if abs(disc.y) > disc.radius else Disc(disc.x, fmpq(0), disc.radius + abs(disc.y))
 
 
 def _newton_inequalities(f: fmpz_poly) -> bool:
-    """False if c_k² < c_(k-1) c_(k+1) (1 + 1/k) (1 + 1/(d - k)) for some k: then some roots are complex."""
+    """Whether all roots may be real.
+
+    Some are complex if c_k² < c_(k-1) c_(k+1) (1 + 1/k) (1 + 1/(d - k)) for some k.
+    """
     c, d = f.coeffs(), f.degree()
     return all(c[k] * c[k] * k * (d - k) >= c[k - 1] * c[k + 1] * (k + 1) * (d - k + 1) for k in range(1, d))
 
 
 def _aberth(value: Ball, slope: Ball, kind: type, z: list[complex]) -> list[complex] | None:
-    """All roots to about 2**-44 of themselves; None if the iteration does not settle or the precision is too low."""
+    """All roots to about 2**-44 of themselves.
+
+    None if the iteration does not settle, or the precision is too low.
+    """
     number = float if kind is arb else complex
     moving, idle = list(range(len(z))), 0
     while idle < _IDLE[kind]:
@@ -170,9 +198,9 @@ def _aberth(value: Ball, slope: Ball, kind: type, z: list[complex]) -> list[comp
 
 
 def _radii(f: fmpz_poly) -> list[float] | None:
-    """About the modulus of each root, ascending: slopes of the upper hull of log |coefficient| over its place.
+    """The approximate modulus of each root, ascending; None if one is beyond the range of floats.
 
-    None if one is beyond the range of floats.
+    They are slopes of the upper hull of log |coefficient| over its place.
     """
     points = [(k, _log2(int(c))) for k, c in enumerate(f.coeffs()) if c != 0]
     hull: list[tuple[int, float]] = []

@@ -1,4 +1,4 @@
-"""Sequences whose items are made when they are asked for: spectra of a million nodes cost nothing until then."""
+"""Sequences whose items are made when they are asked for, for spectra of a million nodes."""
 
 from __future__ import annotations
 
@@ -13,9 +13,18 @@ T = TypeVar("T", covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class LazyEigenvalues(Sequence[T]):
-    """`length` items, `make(0)`, `make(1)` …: the distinct real eigenvalues of `n` nodes, the largest (0) first.
+    """The distinct real eigenvalues of a graph, the largest first, each made when it is asked for.
 
     A slice is a list of its items.
+
+    Attributes
+    ----------
+    length : int
+        Number of items.
+    n : int
+        Number of nodes of the graph.
+    make : callable
+        Gives the item at a place, from 0.
     """
 
     length: int

@@ -1,6 +1,7 @@
-"""The polynomial of numbers a + 2 b cos(2πk/m) that come with all their conjugates, without looking at any of their values.
+"""Minimal polynomials of algebraic numbers, and products of (z - number) over sets of conjugates.
 
-Two such numbers with b > 0 and one a, b and m (k/m in lowest terms) are conjugate; all of them multiply to one polynomial.
+Two numbers a + 2 b cos(2πk/m) with b > 0 and one a, b and m (k/m in lowest terms) are conjugate:
+all of them multiply to one polynomial, which is known without their values.
 """
 
 from __future__ import annotations
@@ -23,9 +24,17 @@ _X = sp.Symbol("x")
 
 
 def multiplied(numbers: Iterable[tuple[AngleSum, int]]) -> fmpq_poly | None:
-    """The product of (z - number)^times; None where a number has several cosines or not all conjugates as often as itself.
+    """Return the product of (z - number)^times.
 
-    The same number may be listed several times.
+    Parameters
+    ----------
+    numbers : iterable of (AngleSum, int)
+        The same number may be listed several times.
+
+    Returns
+    -------
+    fmpq_poly or None
+        None if a number has several cosines, or not all conjugates as often as itself.
     """
     rationals: dict[Fraction, int] = {}
     classes: dict[tuple[Fraction, Fraction, int], dict[int, int]] = {}
@@ -62,7 +71,7 @@ def monic(coefficients: Sequence[int]) -> fmpq_poly:
 
 
 def minimal_polynomial(number: sp.Expr | Root) -> fmpq_poly:
-    """The monic irreducible polynomial over the rationals of which a number is a root."""
+    """Return the monic irreducible polynomial over the rationals of which a number is a root."""
     if isinstance(number, Root):
         return monic(number.polynomial)
     if number.is_Rational:

@@ -1,8 +1,8 @@
 """Exact numbers written as text, as SymPy expressions.
 
-Accepted: whole numbers, the letters that have values, ``pi`` and ``I``, ``+ - * / **``, parentheses,
-``sqrt``, and ``sin cos exp`` of rational multiples of pi (of I*pi for exp).  Decimals are refused: they
-are no exact numbers.
+Accepted: whole numbers, the letters that have values, ``pi`` and ``I``, ``+ - * / **``,
+parentheses, ``sqrt``, and ``sin cos exp`` of rational multiples of pi (of I*pi for exp).  Decimals
+are refused: they are no exact numbers.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ __all__ = ["GRAMMAR", "exact_number", "whole_number"]
 LENGTH, DEPTH, DIGITS, BITS = 300, 24, 30, 20_000
 GRAMMAR = "whole numbers, + - * / **, parentheses, sqrt, I, and sin cos exp of rational multiples of pi"
 _PI = sp.Dummy("pi", real=True)
-"""The letter that stands for pi in the argument of sin, cos or exp while its factor is not known."""
+"""Stands for pi in the argument of sin, cos or exp while its factor is not known."""
 _DECIMAL = re.compile(r"(?<![A-Za-z_])(?:[0-9]+\.[0-9]*|\.[0-9]+|[0-9]+(?=[eE][+-]?[0-9]))(?:[eE][+-]?[0-9]+)?")
 
 
@@ -46,8 +46,8 @@ def exact_number(text: str, values: Mapping[str, int] | None = None) -> sp.Expr:
     Raises
     ------
     ValueError
-        On anything outside GRAMMAR, decimals, a division by zero, more than LENGTH characters, DEPTH nested
-        operations or DIGITS digits, and on rationals beyond BITS bits.
+        On anything outside GRAMMAR, decimals, a division by zero, more than LENGTH characters,
+        DEPTH nested operations or DIGITS digits, and on rationals beyond BITS bits.
     """
     stripped = text.strip()
     if len(stripped) > LENGTH:
@@ -70,7 +70,18 @@ def exact_number(text: str, values: Mapping[str, int] | None = None) -> sp.Expr:
 
 
 def whole_number(text: str, values: Mapping[str, int] | None = None) -> int:
-    """Return a whole number such as "n-2"; raises ValueError as `exact_number`, and if the value is not whole."""
+    """Return the value of an expression such as ``"n-2"`` that is a whole number.
+
+    Parameters
+    ----------
+    text, values
+        As `exact_number` has them.
+
+    Raises
+    ------
+    ValueError
+        As `exact_number`, and if the value is not whole.
+    """
     number = exact_number(text, values)
     if not number.is_Integer:
         raise ValueError(f"{text.strip()!r} is {number}; expected a whole number")
@@ -79,7 +90,7 @@ def whole_number(text: str, values: Mapping[str, int] | None = None) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _ExactNumbers(Algebra[sp.Expr]):
-    """SymPy numbers without floats; as the argument of sin, cos or exp (`angle`) also multiples of pi."""
+    """SymPy numbers without floats; in an argument of sin, cos, exp (`angle`) pi times one too."""
 
     text: str
     values: Mapping[str, int]
@@ -165,7 +176,8 @@ class _ExactNumbers(Algebra[sp.Expr]):
         turn -= 2 * sp.floor(turn / 2)
         if function == "exp":
             return sp.exp(turn * sp.pi * sp.I)
-        short = turn.q in (1, 2, 3, 4, 6)  # SymPy writes others as nested radicals, which generate far larger fields
+        # SymPy writes other angles as nested radicals, which generate far larger fields
+        short = turn.q in (1, 2, 3, 4, 6)
         return (sp.sin if function == "sin" else sp.cos)(turn * sp.pi, evaluate=short)
 
     def _divisor(self, b: sp.Expr) -> sp.Expr:

@@ -1,9 +1,9 @@
-"""Real and complex algebraic numbers: an irreducible integer polynomial and what isolates one of its roots.
+"""Algebraic numbers: an irreducible integer polynomial and an enclosure of one of its roots.
 
-A real root is held between two rationals where the polynomial changes sign, a complex root in a disc that holds no
-other; both are refined to any accuracy.  `isolation.py` isolates the roots or, should that fail, Arb
-(F. Johansson, IEEE Trans. Comput. 66, 1281, 2017).  Real roots are refined exactly: secant guesses, proved by
-signs (J. Abbott, ACM Commun. Comput. Algebra 48, 3, 2014).
+A real root is held between two rationals where the polynomial changes sign, a complex root in a
+disc that holds no other; both are refined to any accuracy.  `isolation.py` isolates the roots or,
+should that fail, Arb (F. Johansson, IEEE Trans. Comput. 66, 1281, 2017).  Real roots are refined
+exactly: secant guesses, proved by signs (J. Abbott, ACM Commun. Comput. Algebra 48, 3, 2014).
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ class Root:
     polynomial : tuple of int
         Integer coefficients, constant first; primitive, the leading one positive.
     index : int
-        Place of the root among SymPy's CRootOf: real roots ascending, then complex ones.  It stands in the
-        text of the number, and so in tables and JSON: `complex_order` finds it without SymPy's isolation,
-        which takes minutes where Aberth's method takes a second.
+        Place of the root among SymPy's CRootOf: real roots ascending, then complex ones.  It
+        stands in the text of the number, and so in tables and JSON.  `complex_order` finds it
+        without SymPy's own isolation, which takes minutes where Aberth's method takes a second.
     """
 
     polynomial: Polynomial
@@ -106,7 +106,11 @@ class ComplexRoot(Root):
 
 @lru_cache(maxsize=64)
 def polynomial_text(polynomial: Polynomial) -> str:
-    """The polynomial in x as SymPy prints it; in words if Python refuses to write or read its coefficients."""
+    """Return the polynomial in x as SymPy prints it.
+
+    If Python refuses to write or read its coefficients, its degree and their size are named
+    instead.
+    """
     longest = max(abs(c).bit_length() for c in polynomial)
     if longest > _WRITTEN:
         return f"polynomial of degree {len(polynomial) - 1} with coefficients of up to {longest} bits"
@@ -114,7 +118,10 @@ def polynomial_text(polynomial: Polynomial) -> str:
 
 
 def coefficient_text(c: int) -> str:
-    """A whole number as text for `int(text, 0)`: in decimals, or in hexadecimals if Python refuses so many decimals."""
+    """Return a whole number as text for `int(text, 0)`.
+
+    It is hexadecimal if Python refuses to write so many decimals.
+    """
     return str(c) if abs(c).bit_length() <= _WRITTEN else hex(c)
 
 
@@ -159,9 +166,17 @@ def _by_arb(f: fmpz_poly) -> list[Disc]:
 
 
 def roots(polynomial: Polynomial) -> tuple[Root, ...]:
-    """All roots of an irreducible polynomial of degree >= 2, each isolated by a disc that is proved to hold it alone.
+    """Return all roots of a polynomial, each isolated by a disc that is proved to hold it alone.
 
-    Real ones come first, ascending; conjugates are neighbours.
+    Parameters
+    ----------
+    polynomial : tuple of int
+        Irreducible, of degree >= 2.
+
+    Returns
+    -------
+    tuple of Root
+        Real ones come first, ascending; conjugates are neighbours.
     """
     f = fmpz_poly(list(polynomial))
     isolated = discs(f) or _by_arb(f)
@@ -180,14 +195,14 @@ def roots(polynomial: Polynomial) -> tuple[Root, ...]:
 
 
 def _room(disc: Disc, others: list[Disc]) -> fmpq:
-    """A quarter of the distance to the next disc, or somewhat less: within it there is no root but the disc's own."""
+    """At least a quarter of the distance to the next disc, within which there is no other root."""
     gaps = (max(abs(disc.x - other.x), abs(disc.y - other.y)) for other in others if other is not disc)
     return max(min(gaps) / 4, disc.radius)
 
 
 @lru_cache(maxsize=4096)
 def _refined(root: RealRoot, bits: int) -> tuple[fmpq, fmpq]:
-    """Narrow the bracket to 2**-bits of its ends: guess by the secant, prove by signs, square the step."""
+    """Narrow the bracket to 2**-bits: guess by the secant, prove by signs, square the step."""
     f, low, high = fmpz_poly(list(root.polynomial)), to_flint(root.low), to_flint(root.high)
     if low * high > 0 and (high - low) * 2**bits <= min(abs(low), abs(high)):
         return low, high
@@ -215,11 +230,20 @@ def _refined(root: RealRoot, bits: int) -> tuple[fmpq, fmpq]:
 
 
 def complex_order(polynomial: tuple[int, ...], upper: Sequence[acb]) -> list[int]:
-    """The positions in `upper` (balls around the roots above the real axis) in SymPy's order."""
+    """Return the positions of the roots above the real axis in SymPy's order.
+
+    Parameters
+    ----------
+    polynomial : tuple of int
+        The polynomial.
+    upper : sequence of acb
+        Balls around its roots above the real axis.
+    """
     if len(upper) < 2:
         return list(range(len(upper)))
     given = sp.Poly(list(polynomial[::-1]), sp.Symbol("x"))
-    scale, inner = sp.CRootOf(given, 0).as_coeff_Mul()  # SymPy may count the roots of a rescaled polynomial
+    # SymPy may count the roots of a rescaled polynomial
+    scale, inner = sp.CRootOf(given, 0).as_coeff_Mul()
     coefficients = [abs(int(c)) for c in inner.poly.all_coeffs()]
     bound = 2 * max(Fraction(c, coefficients[0]) for c in coefficients)
     shrink = acb(to_flint(1 / scale))
@@ -232,7 +256,7 @@ def complex_order(polynomial: tuple[int, ...], upper: Sequence[acb]) -> list[int
 def _leaves(
     roots: dict[int, acb], box: tuple[Fraction, Fraction, Fraction, Fraction]
 ) -> list[tuple[tuple[Fraction, Fraction], int]] | None:
-    """The lower left corner of the box of each root; None where a root cannot be told from a border."""
+    """The lower left corner of the box of each root; None if a root may be on a border."""
     found, boxes = [], [(roots, box)]
     while boxes:
         inside, (left, low, right, top) = boxes.pop()
@@ -259,7 +283,7 @@ def _leaves(
 
 
 def _ask_sympy(polynomial: sp.Poly, upper: Sequence[acb]) -> list[int]:
-    """The same order from SymPy's own values: slow, but it knows on which side of a border a root counts."""
+    """The same order from SymPy's values: slow, but exact for roots on a border."""
     centres = [complex(float(ball.real.mid()), float(ball.imag.mid())) for ball in upper]
     first = polynomial.degree() - 2 * len(upper)
     values = [complex(sp.CRootOf(polynomial, first + 2 * i + 1).evalf(20)) for i in range(len(upper))]

@@ -1,13 +1,12 @@
-"""Claims about spectra, one a line of text, each compared exactly with the proved spectrum of its graph.
+"""The language of claims about spectra, one claim a line of text.
 
-chain 4: 0, -2+sqrt(2), -2, -2-sqrt(2)      # the whole spectrum, in any order
-star 6: 0, -1^4, -6                         # ^4: four times
-star n=3..12: 0, -1^(n-2), -n               # every n of a range
-torus 9 shape=3x3: 0, -3^4, -6^4            # options of the family: name=value, without blanks
-ring n=3..9: -4*sin(k*pi/n)**2 for k=0..n-1
-matrix G.txt: ~-3.414, -2, ~-0.586, 0       # ~: an approximation, right if it is the value rounded to its digits
-chain 1000000: largest = -4*cos(pi/(2*n))**2, distinct = n   # parts, of graphs of any size: see `parts`
-cartesian(chain(2), ring(5)): ratio < 10    # products and unions of families: see `graph_text`
+chain 4: 0, -2+sqrt(2), -2, -2-sqrt(2)      # the whole spectrum, in any order star 6: 0, -1^4, -6
+# ^4: four times star n=3..12: 0, -1^(n-2), -n               # every n of a range torus 9 shape=3x3:
+0, -3^4, -6^4            # options of the family: name=value, without blanks ring n=3..9:
+-4*sin(k*pi/n)**2 for k=0..n-1 matrix G.txt: ~-3.414, -2, ~-0.586, 0       # ~: an approximation,
+right if it is the value rounded to its digits chain 1000000: largest = -4*cos(pi/(2*n))**2,
+distinct = n   # parts, of graphs of any size: see `parts` cartesian(chain(2), ring(5)): ratio < 10
+# products and unions of families: see `graph_text`
 """
 
 from __future__ import annotations
@@ -42,7 +41,21 @@ _FORMS = "expected 'chain 4: …', 'star n=3..12: …', 'torus 9 shape=3x3: …'
 
 @dataclass(frozen=True, slots=True)
 class Claimed:
-    """A number as it was written and how often: `exact`, or `angle`, or an approximation, which has its `interval`."""
+    """A number as it was written.
+
+    Attributes
+    ----------
+    text : str
+        The number as it was written.
+    count : int
+        How often it is claimed.
+    exact : sympy.Expr, optional
+        The number, if it is neither a sum of cosines nor an approximation.
+    interval : pair of Fraction, optional
+        The numbers that round to an approximation.
+    angle : AngleSum, optional
+        The number, if it is a sum of cosines.
+    """
 
     text: str
     count: int
@@ -57,7 +70,7 @@ class Claimed:
 
     @property
     def sum(self) -> AngleSum | None:
-        """The number as a sum of cosines; None where it is not read as one."""
+        """The number as a sum of cosines; None if it is not read as one."""
         if self.exact is not None and self.exact.is_Rational:
             return AngleSum.rational(to_fraction(self.exact))
         return self.angle
@@ -77,7 +90,23 @@ class Claimed:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """The claimed spectrum of one graph, or parts of it; `n` is the size where the line has a range of sizes, else None."""
+    """The claimed spectrum of one graph, or parts of it.
+
+    Attributes
+    ----------
+    line : int
+        Number of the line in the file.
+    text : str
+        The line.
+    graph : Topology
+        The graph.
+    numbers : tuple of Claimed
+        The claimed eigenvalues; none if parts are claimed.
+    n : int, optional
+        The size, if the line has a range of sizes.
+    parts : tuple of Part
+        The claims about parts of the spectrum.
+    """
 
     line: int
     text: str
@@ -88,9 +117,24 @@ class Claim:
 
 
 def read_claims(path: str | Path) -> list[tuple[Claim, ...]]:
-    """Return the claims of a text file, those of one line together; matrix files are looked up beside it.
+    """Return the claims of a text file; nothing in the file is run.
 
-    Raises FileNotFoundError, and ValueError with the line's number on whatever cannot be read.  Nothing in the file is run.
+    Parameters
+    ----------
+    path : str or Path
+        The file; matrix files are looked up beside it.
+
+    Returns
+    -------
+    list of tuple of Claim
+        The claims of a line stand together: one for each size of a range.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        With the number of the line, on anything that cannot be read.
     """
     place = Path(path)
     if not place.exists():
@@ -213,7 +257,7 @@ def _entry(part: str, values: dict[str, int]) -> Iterator[Claimed]:
 
 
 def _each(body: str, values: dict[str, int], letter: str, places: range) -> Iterator[Claimed]:
-    """An entry for each value of a letter; sums of cosines without a multiplicity are read once for all."""
+    """An entry for each value of a letter; a sum of cosines is read once for all of them."""
     wave = angle_wave(body, values, letter) if places else None
     if wave is None:
         for k in places:

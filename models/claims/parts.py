@@ -1,12 +1,15 @@
-"""Claims about parts of a spectrum, for graphs of any size: chain 1000000: largest = -4*cos(pi/(2*n))**2.
+"""Claims about parts of a spectrum, for graphs of any size, read and decided.
+
+Example: chain 1000000: largest = -4*cos(pi/(2*n))**2.
 
 largest, slowest        the eigenvalues of largest modulus, and of smallest modulus other than 0
 ratio                   their quotient, of real eigenvalues
 distinct                how many different eigenvalues there are
-multiplicity(number)    how often a number is an eigenvalue, 0 where it is none
+multiplicity(number)    how often a number is an eigenvalue, 0 if it is none
 
-Each stands before =, <, >, <= or >= and an exact number.  An approximation such as ~-3.414 may stand behind =,
-a decimal, which is then exact, behind the others.  Each comparison is decided exactly.
+Each stands before =, <, >, <= or >= and an exact number.  An approximation such as ~-3.414 may
+stand behind =, a decimal, which is then exact, behind the others.  Each comparison is decided
+exactly.
 """
 
 from __future__ import annotations
@@ -54,7 +57,23 @@ _DECIMAL = re.compile(r"[+-]?[0-9]{1,40}\.[0-9]{1,60}")
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What is claimed of `word`, or of the multiplicity of `of`: a relation and a number, or a rounded one as interval."""
+    """The claim about one part of a spectrum.
+
+    Attributes
+    ----------
+    text : str
+        The claim as it was written.
+    word : str
+        One of WORDS.
+    relation : str
+        One of = < > <= >=.
+    number : AngleSum or sympy.Expr, optional
+        The number behind the relation.
+    interval : pair of Fraction, optional
+        The numbers that round to an approximation in its place.
+    of : AngleSum or sympy.Expr, optional
+        The number whose multiplicity is claimed.
+    """
 
     text: str
     word: str
@@ -65,12 +84,25 @@ class Part:
 
 
 def is_part(text: str) -> bool:
-    """True where a text begins with a word of WORDS."""
+    """Return whether a text begins with a word of WORDS."""
     return re.match(rf"({'|'.join(WORDS)})\b", text) is not None
 
 
 def read_part(text: str, values: Mapping[str, int]) -> Part:
-    """The claim in a text such as "ratio < 37.9"; ValueError on anything else."""
+    """Return the claim in a text such as "ratio < 37.9".
+
+    Parameters
+    ----------
+    text : str
+        The claim.
+    values : mapping of str to int
+        Whole numbers for letters such as n.
+
+    Raises
+    ------
+    ValueError
+        If the text is no such claim.
+    """
     found = _PART.fullmatch(text)
     if found is None:
         raise ValueError(f"found {text[:60]!r}; expected e.g. largest = -4, ratio < 37.9 or multiplicity(-2) = 3")
@@ -93,7 +125,7 @@ def read_part(text: str, values: Mapping[str, int]) -> Part:
 
 
 def exact(text: str, values: Mapping[str, int]) -> Exact:
-    """A number as a sum of cosines where it is one, else as a SymPy expression."""
+    """A number as a sum of cosines if it is one, else as a SymPy expression."""
     found = angle_number(text, values)
     if found is not None:
         return found
@@ -103,7 +135,13 @@ def exact(text: str, values: Mapping[str, int]) -> Exact:
 
 
 def interval(text: str) -> tuple[Fraction, Fraction]:
-    """The numbers that round to an approximation such as ~-3.414; ValueError where the text is none."""
+    """Return the ends of the interval of numbers that round to an approximation such as ~-3.414.
+
+    Raises
+    ------
+    ValueError
+        If the text is no approximation.
+    """
     rounded = _ROUNDED.fullmatch(text)
     if not rounded:
         raise ValueError(f"unreadable approximation {text[:60]!r}; expected ~ and a real decimal, e.g. ~-3.414")
@@ -119,8 +157,9 @@ _RELATIONS: dict[str, Callable[[int, int], bool]] = {"=": eq, "<": lt, ">": gt, 
 def verify_parts(graph: Topology, parts: Sequence[Part]) -> tuple[tuple[str, ...], bool, str]:
     """Compare claimed parts with the spectrum of a graph.
 
-    A chain, a ring, and grids, tori and Cartesian products of families need no list of their eigenvalues:
-    the extreme ones are sums of those of the factors.  Other closed forms are listed up to LISTED nodes.
+    A chain, a ring, and grids, tori and Cartesian products of families need no list of their
+    eigenvalues: the extreme ones are sums of those of the factors.  Other closed forms are listed
+    up to LISTED nodes.
 
     Returns
     -------
@@ -170,7 +209,7 @@ class _Known:
 
     @cached_property
     def axes(self) -> tuple[Topology, ...]:
-        """The chains, rings and others of which a large graph is the Cartesian product; else the graph itself."""
+        """The chains, rings and others whose Cartesian product a large graph is; else the graph."""
         return tuple(_axes(self.graph)) if self.graph.n > LARGEST else (self.graph,)
 
     @cached_property
@@ -182,7 +221,7 @@ class _Known:
 
     @cached_property
     def slowest(self) -> Value:
-        """The eigenvalue other than 0 of smallest modulus: of a product the one of a factor that is nearest to 0."""
+        """The eigenvalue other than 0 of smallest modulus, found among those of the factors."""
         if len(self.axes) == 1:
             return _value(self.spectrum.slowest)
         return reduce(lambda a, b: b if _order(b, a) > 0 else a, [_sum(axis.spectrum.slowest) for axis in self.axes])
@@ -195,7 +234,10 @@ class _Known:
 
 
 def _axes(graph: Topology) -> Iterator[Topology]:
-    """The factors of a Cartesian product with more than one node, where the spectrum of each is short and not above 0."""
+    """The factors of a Cartesian product with more than one node.
+
+    Products are taken apart if the spectrum of each factor is short and not above 0.
+    """
     pair = factors(graph)
     if graph.name in ("grid", "torus") and (sides := family(graph.name).sides):
         shape = dict(graph.options).get("shape")
@@ -208,7 +250,7 @@ def _axes(graph: Topology) -> Iterator[Topology]:
 
 
 def _short(graph: Topology) -> bool:
-    """True where a closed form has few different eigenvalues whatever the size, or makes them one by one."""
+    """Whether a closed form has few different eigenvalues, or makes them one by one."""
     return graph.name in ("chain", "ring", "complete", "complete_bipartite", "star", "hypercube", "feed_forward")
 
 
@@ -278,7 +320,7 @@ def _same(e: Eigenvalue, number: Exact) -> bool:
 
 
 def _quotient(value: Value, unit: Value) -> str:
-    """value / unit by twelve digits, or as a whole number where it is one."""
+    """value / unit by twelve digits, or as a whole number if it is one."""
     if isinstance(value, AngleSum) and isinstance(unit, AngleSum) and not (value.terms or unit.terms):
         return str(value.shift / unit.shift)
     top, bottom = (Eigenvalue(_number(x), 1).enclosure(128) for x in (value, unit))
@@ -286,7 +328,7 @@ def _quotient(value: Value, unit: Value) -> str:
 
 
 def _value(number: Number) -> Value:
-    """An eigenvalue as a sum of cosines where it is one."""
+    """An eigenvalue as a sum of cosines if it is one."""
     found = None if isinstance(number, Root) else read(number)
     return number if found is None else found
 

@@ -1,4 +1,4 @@
-"""The verdict on a claimed spectrum: every number compared exactly, what is wrong in sentences, and what is right."""
+"""The verdict on a claimed spectrum: every number compared exactly, errors named in sentences."""
 
 from __future__ import annotations
 
@@ -25,7 +25,19 @@ __all__ = ["Verdict", "verify"]
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What is wrong with a claim, in sentences; `proved` is False where a closed form was believed, not multiplied out."""
+    """The result of the comparison of a claim.
+
+    Attributes
+    ----------
+    claim : Claim
+        The claim.
+    problems : tuple of str
+        A sentence for each error.
+    proved : bool
+        Whether the spectrum was proved; False if a closed form was taken on trust.
+    parts : str
+        The claimed parts as they are, in words.
+    """
 
     claim: Claim
     problems: tuple[str, ...]
@@ -34,7 +46,7 @@ class Verdict:
 
     @property
     def right(self) -> bool:
-        """True where the claim is exactly the spectrum (to its digits where it is approximate)."""
+        """Whether the claim is exactly the spectrum (to its digits if it is approximate)."""
         return not self.problems
 
     @property
@@ -51,7 +63,22 @@ class Verdict:
 def verify(claim: Claim) -> Verdict:
     """Compare a claim with the proved spectrum of its graph.
 
-    Raises ValueError where a number is too involved to be compared, ProofError where the proof of the spectrum fails.
+    Parameters
+    ----------
+    claim : Claim
+        A claim of `read_claims`.
+
+    Returns
+    -------
+    Verdict
+        What is wrong with it.
+
+    Raises
+    ------
+    ValueError
+        If a number is too involved to be compared.
+    ProofError
+        If the proof of the spectrum fails.
     """
     if claim.parts:
         return Verdict(claim, *verify_parts(claim.graph, claim.parts))
@@ -61,7 +88,7 @@ def verify(claim: Claim) -> Verdict:
 
 
 def _multiplies_out(claim: Claim) -> bool:
-    """True where the claimed numbers themselves multiply to the characteristic polynomial; False where that is not seen."""
+    """Whether the claimed numbers are seen to multiply to the characteristic polynomial."""
     numbers = [(claimed.sum, claimed.count) for claimed in claim.numbers]
     if sum(count for _, count in numbers) != claim.graph.n:
         return False
@@ -97,13 +124,16 @@ def _compared(claim: Claim) -> tuple[str, ...]:
 
 
 def _angles(found: Sequence[Eigenvalue]) -> dict[AngleSum, int]:
-    """The places of the eigenvalues that are sums of cosines; equal sums are equal numbers, not the other way round."""
+    """The places of the eigenvalues that are sums of cosines.
+
+    Equal sums are equal numbers; different sums may be equal numbers too.
+    """
     forms = ((None if isinstance(e.number, Root) else read(e.number), i) for i, e in enumerate(found))
     return {form.folded: i for form, i in forms if form is not None}
 
 
 def _find(number: sp.Expr, found: Sequence[Eigenvalue], middles: Sequence[complex]) -> int | None:
-    """The place of the eigenvalue that is this number, None where there is none."""
+    """The place of the eigenvalue that is this number; None if there is none."""
     middle = _middle(number)
     for i, e in enumerate(found):
         if abs(middles[i] - middle) <= 1e-9 * max(1.0, abs(middle)) and equal(number, e.number):
@@ -130,9 +160,10 @@ def _nearest(middle: complex, middles: Sequence[complex]) -> int:
 
 
 def _assign(claims: Sequence[Claimed], found: Sequence[Eigenvalue], tally: list[int]) -> list[str]:
-    """Give each approximation an eigenvalue of its own where that is possible, and say where it is not.
+    """Give each approximation an eigenvalue of its own, and name those that have none.
 
-    Intervals by their upper end take the smallest free eigenvalue each: then as many as possible find one.
+    Intervals by their upper end take the smallest free eigenvalue each: so as many as possible find
+    one.
     """
     problems = []
     rising = sorted(

@@ -1,1 +1,1 @@
-"""Text, numbers and options that a user typed: how they are read and refused. Knows nothing of networks."""
+"""Text, numbers, expressions and options of users: read, checked, refused. Knows no networks."""

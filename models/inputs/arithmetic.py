@@ -1,6 +1,7 @@
 """Numbers written as text in a scene file: constant expressions in floating point.
 
-Accepted: decimal numbers, ``pi``, ``+ - * / **``, parentheses and ``sqrt exp log sin cos`` of one argument.
+Accepted: decimal numbers, ``pi``, ``+ - * / **``, parentheses and ``sqrt exp log sin cos`` of one
+argument.
 """
 
 from __future__ import annotations
@@ -43,8 +44,8 @@ def constant(text: str) -> float:
     Raises
     ------
     ValueError
-        On anything but a finite constant of GRAMMAR, on more than LENGTH characters or DEPTH nested operations,
-        and on an exponent beyond EXPONENT or an intermediate value beyond MAGNITUDE.
+        On anything but a finite constant of GRAMMAR, on more than LENGTH characters or DEPTH nested
+        operations, and on an exponent beyond EXPONENT or an intermediate value beyond MAGNITUDE.
     """
     if len(text) > LENGTH:
         raise ValueError(f"number written as {len(text)} characters; expected at most {LENGTH}; give its value")

@@ -1,4 +1,8 @@
-"""Checks of what a user wrote; errors name the thing, what was found, what was expected, what to do."""
+"""Checks of arguments, options and entries of files.
+
+Every check takes `what`, the subject of its error, and `value`, what the user gave; it returns the
+value in its final type.  Errors have one grammar: "thing: found X; expected Y; do Z".
+"""
 
 from __future__ import annotations
 
@@ -18,6 +22,7 @@ from .arithmetic import constant
 __all__ = [
     "a_callable",
     "a_path",
+    "check_integer",
     "choice",
     "flag",
     "instance",
@@ -35,25 +40,41 @@ __all__ = [
 ]
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
-"""Control characters, ends of lines, changes of direction, and halves of characters."""
+"""Control characters, ends of lines, changes of direction, and surrogates."""
 
 
 def shown(value: object) -> str:
-    """Return a short one-line text of any value, for an error message."""
+    """Return `repr` of any value on one line of at most 120 characters, for an error message.
+
+    A value whose `repr` fails is named by its type: a broken `__repr__`, or an integer beyond
+    Python's limit of digits, must not hide the message.
+    """
     short = reprlib.Repr()
     short.maxstring = short.maxother = 60
     short.maxlevel = 2
     try:
         words = " ".join(short.repr(value).split())
-    except Exception:  # a broken __repr__ or an integer beyond Python's limit of digits must not hide the message
+    except Exception:
         words = f"<{type(value).__name__}>"
     return words if len(words) <= 120 else words[:117] + "..."
 
 
 def suggestion(found: object, known: Iterable[str], other: Mapping[str, str] | None = None) -> str:
-    """Return "; did you mean 'x'?" where a known name is close to the one found, else nothing.
+    """Return the question whether a known name was meant.
 
-    `other` gives the known name for names that are used elsewhere: what is close to one of those means it.
+    Parameters
+    ----------
+    found : object
+        The unknown name; other types than str have no suggestion.
+    known : iterable of str
+        The names to choose from.
+    other : mapping of str to str, optional
+        Names used elsewhere and the known name of each, which is suggested for them.
+
+    Returns
+    -------
+    str
+        ``"; did you mean 'x'?"``, or "" if no name is close.
     """
     if not isinstance(found, str):
         return ""
@@ -64,7 +85,24 @@ def suggestion(found: object, known: Iterable[str], other: Mapping[str, str] | N
 
 
 def known_keys(what: str, given: Mapping[object, object], known: Iterable[str]) -> None:
-    """Raise where a mapping has a key that is not text or not known."""
+    """Check that all keys of a mapping are text, and known.
+
+    Parameters
+    ----------
+    what : str
+        The subject of the error.
+    given : mapping
+        The mapping of the user.
+    known : iterable of str
+        The keys that it may have.
+
+    Raises
+    ------
+    TypeError
+        If a key is no text.
+    ValueError
+        If a key is unknown; the error suggests a known one.
+    """
     known = tuple(known)
     for key in given:
         if not isinstance(key, str):
@@ -75,14 +113,31 @@ def known_keys(what: str, given: Mapping[object, object], known: Iterable[str]) 
 
 
 def table(what: str, value: object) -> Mapping[object, object]:
-    """Return the value where it is a mapping, else raise TypeError."""
+    """Return a value that is a mapping; raises TypeError on any other."""
     if not isinstance(value, Mapping):
         raise TypeError(f"{what}: found {typed(value)}; expected a table of names and values")
     return value
 
 
 def text(what: str, value: object, limit: int = 200) -> str:
-    """Return the value where it is text of at most `limit` characters, all of which can be printed on one line."""
+    """Return a value that is a short text without control characters.
+
+    Parameters
+    ----------
+    what : str
+        The subject of the error.
+    value : object
+        What the user gave.
+    limit : int, optional
+        Most characters.
+
+    Raises
+    ------
+    TypeError
+        If the value is no text.
+    ValueError
+        If it is too long, or has a control character.
+    """
     if not isinstance(value, str):
         raise TypeError(f"{what}: found {typed(value)}; expected text in quotation marks")
     if len(value) > limit:
@@ -91,7 +146,10 @@ def text(what: str, value: object, limit: int = 200) -> str:
 
 
 def printable(what: str, value: str) -> str:
-    """Return the text where it has no control character: a terminal obeys those, and a name may come from anywhere."""
+    """Return a text without control characters; raises ValueError if it has one.
+
+    A terminal obeys control characters, and a name may come from any file.
+    """
     found = _CONTROL.search(value)
     if found:
         raise ValueError(
@@ -102,7 +160,24 @@ def printable(what: str, value: str) -> str:
 
 
 def choice(what: str, value: object, known: tuple[str, ...]) -> str:
-    """Return the value where it is one of the known names."""
+    """Return a value that is one of the known names.
+
+    Parameters
+    ----------
+    what : str
+        The subject of the error.
+    value : object
+        What the user gave.
+    known : tuple of str
+        The names.
+
+    Raises
+    ------
+    TypeError
+        If the value is no text.
+    ValueError
+        If it is another text; the error suggests a known name.
+    """
     name = text(what, value)
     if name not in known:
         raise ValueError(f"unknown {what} {shown(name)}; known: {', '.join(known)}{suggestion(name, known)}")
@@ -110,7 +185,24 @@ def choice(what: str, value: object, known: tuple[str, ...]) -> str:
 
 
 def number(what: str, value: object, low: float | None = None, high: float | None = None) -> float:
-    """Return a finite float within [low, high] from a real number or the text of a constant expression."""
+    """Return a finite float.
+
+    Parameters
+    ----------
+    what : str
+        The subject of the error.
+    value : object
+        A real number, or the text of a constant expression such as ``"2*pi/1.15"``.
+    low, high : float, optional
+        The range, both ends in it.
+
+    Raises
+    ------
+    TypeError
+        If the value is neither a real number nor text.
+    ValueError
+        If it is not finite, out of range, or a text that is no constant.
+    """
     if isinstance(value, str):
         try:
             result = constant(value)
@@ -126,29 +218,19 @@ def number(what: str, value: object, low: float | None = None, high: float | Non
     if not math.isfinite(result):
         raise ValueError(f"{what}: found {shown(value)}; expected a finite number; correct the value")
     if (low is not None and result < low) or (high is not None and result > high):
-        raise ValueError(f"{what}: found {result!r}; expected {span(low, high)}; correct the value")
+        raise ValueError(f"{what}: found {result!r}; expected {_span(low, high)}; correct the value")
     return result
 
 
-def integer(what: str, value: object, low: int, high: int) -> int:
-    """Return an int within [low, high]; a float is refused even where it is whole."""
-    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-        raise TypeError(f"{what}: found {typed(value)}; expected a whole number, e.g. {low}")
-    result = operator.index(value)
-    if not low <= result <= high:
-        raise ValueError(f"{what}: found {shown(result)}; expected a whole number from {low} to {high}; correct it")
-    return result
-
-
-def span(low: float | None, high: float | None) -> str:
-    """Return the words for a closed range with optional ends."""
+def _span(low: float | None, high: float | None) -> str:
+    """The words for a closed range with optional ends."""
     if high is None:
         return "a number" if low is None else f"a number of at least {low:g}"
     return f"a number of at most {high:g}" if low is None else f"a number from {low:g} to {high:g}"
 
 
 def typed(value: object) -> str:
-    """Return a short text of any value with its type, for an error message."""
+    """Return the short `repr` of any value and its type, for an error message."""
     name = type(value).__name__
     words = shown(value)
     return words if name in words or value is None else f"{words} ({name})"
@@ -158,46 +240,103 @@ T = TypeVar("T")
 
 
 def instance(what: str, value: object, kind: type[T] | tuple[type[T], ...], expected: str) -> T:
-    """Return the value where it is of a kind, else raise TypeError that says what was expected."""
+    """Return a value that is of a type.
+
+    Parameters
+    ----------
+    what : str
+        The subject of the error.
+    value : object
+        What the user gave.
+    kind : type or tuple of types
+        The types that it may have.
+    expected : str
+        The types in words.
+
+    Raises
+    ------
+    TypeError
+        If the value is of another type.
+    """
     if not isinstance(value, kind):
         raise TypeError(f"{what}: found {typed(value)}; expected {expected}")
     return value
 
 
 def a_callable(what: str, value: object) -> Callable[..., object]:
-    """Return the value where it can be called, else raise TypeError."""
+    """Return a value that can be called; raises TypeError on any other."""
     if not callable(value):
         raise TypeError(f"{what}: found {typed(value)}; expected a function")
     return value
 
 
 def flag(what: str, value: object) -> bool:
-    """Return the value where it is True or False, else raise TypeError."""
+    """Return a value that is True or False; raises TypeError on any other."""
     return instance(what, value, bool, "True or False")
 
 
-def whole(what: str, value: object, least: int, most: int | None = None) -> int:
-    """Return a whole number in its range; TypeError for another type, also a float that happens to be whole."""
+def check_integer(what: str, value: object, low: int, high: int | None = None) -> int:
+    """Return a whole number as an int; a float is refused even if it is whole.
+
+    Parameters
+    ----------
+    what : str
+        The thing that the number is for, the subject of the error.
+    value : object
+        What the user gave.
+    low, high : int, optional
+        The range, both ends in it.
+
+    Returns
+    -------
+    int
+        The number.
+
+    Raises
+    ------
+    TypeError
+        If the value is no whole number.
+    ValueError
+        If it is out of range.
+    """
     if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-        raise TypeError(f"{what} = {shown(value)}; expected a whole number, e.g. {max(least, 1)}")
-    found = operator.index(value)
-    if found < least:
-        raise ValueError(f"{what} = {found}; expected at least {least}")
-    if most is not None and found > most:
-        raise ValueError(f"{what} = {shown(found)}; expected at most {most}")
-    return found
+        raise TypeError(f"{what} = {shown(value)}; expected a whole number, e.g. {max(low, 1)}")
+    result = operator.index(value)
+    if result < low or (high is not None and result > high):
+        bound = f"at least {low}" if result < low else f"at most {high}"
+        both = "" if high is None else f", a whole number from {low} to {high}"
+        raise ValueError(f"{what} = {shown(result)}; expected {bound}{both}; correct it")
+    return result
 
 
-def positive(what: str, value: object, zero: bool = False) -> float:
-    """Return a finite number above 0, or with `zero` not below it."""
-    found = number(what, value, 0.0)
-    if found == 0.0 and not zero:
+integer = whole = check_integer
+
+
+def positive(what: str, value: object) -> float:
+    """Return a finite number above 0; raises TypeError and ValueError as `number`."""
+    result = number(what, value, 0.0)
+    if result == 0.0:
         raise ValueError(f"{what}: found 0; expected a number above 0")
-    return found
+    return result
 
 
 def a_path(what: str, value: object) -> Path:
-    """Return a path of text or a path object; TypeError for anything else, ValueError for an empty one."""
+    """Return a path.
+
+    Parameters
+    ----------
+    what : str
+        The subject of the error.
+    value : object
+        Text, or an object that is a path.
+
+    Raises
+    ------
+    TypeError
+        If the value is no path.
+    ValueError
+        If the path is empty, or has a null character.
+    """
     if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
         raise TypeError(f"{what}: found {typed(value)}; expected a path, e.g. 'data/G.txt'")
     if not os.fspath(value).strip() or "\0" in os.fspath(value):

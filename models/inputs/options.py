@@ -1,12 +1,12 @@
-"""Options of families: their types, ranges and canonical form."""
+"""Options of graph families: their types and canonical form; a command line gives them as text."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from fractions import Fraction
-from typing import Any, TypeAlias
+from typing import Any, SupportsIndex, TypeAlias
 
+from .checks import check_integer, shown
 from .rationals import rational
 
 __all__ = ["Option", "Options", "as_options", "probability", "whole", "whole_numbers"]
@@ -18,43 +18,104 @@ Options: TypeAlias = tuple[tuple[str, Option], ...]
 
 _LIST = re.compile(r"[\s\d]+([,x][\s\d]+)+", re.ASCII)
 
-_WHOLE = re.compile(r"[+-]?\d{1,18}", re.ASCII)
+_INTEGER = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 
 
 def as_options(given: Mapping[str, Any]) -> Options:
-    """Names and values as they are stored: sorted, lists as tuples."""
+    """Return options as a topology stores them: sorted by name, lists as tuples."""
     return tuple((key, tuple(v) if isinstance(v, list) else v) for key, v in sorted(given.items()))
 
 
-def whole(what: str, value: Any, least: int) -> int:
-    """A whole number (text allowed) of at least `least`; ValueError or TypeError in the words of the caller."""
-    if isinstance(value, str) and _WHOLE.fullmatch(value.strip()):
+def whole(what: str, value: object, low: int) -> int:
+    """Return a whole number, given as such or as text.
+
+    Parameters
+    ----------
+    what : str
+        The thing that the number is for, such as ``"seed"``.
+    value : object
+        The value of the option; a command line gives text.
+    low : int
+        The smallest number that is allowed.
+
+    Returns
+    -------
+    int
+        The number.
+
+    Raises
+    ------
+    TypeError
+        If the value is no whole number.
+    ValueError
+        If it is below `low`.
+    """
+    if isinstance(value, str) and _INTEGER.fullmatch(value.strip()):
         value = int(value)
-    if isinstance(value, bool) or not hasattr(value, "__index__"):
-        raise TypeError(f"{what} = {value!r}; expected a whole number")
-    number = int(value.__index__())
-    if number < least:
-        raise ValueError(f"{what} = {number}; expected at least {least}")
-    return number
+    return check_integer(what, value, low)
 
 
-def whole_numbers(what: str, value: Any, least: int) -> tuple[int, ...]:
-    """Whole numbers of at least `least`: a list, one number, or a text such as "1,3" or "3x4"."""
+def whole_numbers(what: str, value: object, low: int) -> tuple[int, ...]:
+    """Return whole numbers from a list, one number, or a text such as "1,3" or "3x4".
+
+    Parameters
+    ----------
+    what : str
+        The thing that the numbers are for, such as ``"shape"``.
+    value : object
+        The value of the option.
+    low : int
+        The smallest number that is allowed.
+
+    Returns
+    -------
+    tuple of int
+        At least one number.
+
+    Raises
+    ------
+    TypeError
+        If the value is no list, or an entry no whole number.
+    ValueError
+        If the list is empty, or a number is below `low`.
+    """
     if isinstance(value, str):
-        value = re.split("[,x]", value) if _LIST.fullmatch(value) else [value]
-    elif hasattr(value, "__index__"):
-        value = [value]
-    if not isinstance(value, Iterable):
-        raise TypeError(f"{what} = {value!r}; expected a list of whole numbers, e.g. [1, 3]")
-    found = tuple(whole(what, entry, least) for entry in value)
-    if not found:
+        entries: Iterable[object] = re.split("[,x]", value) if _LIST.fullmatch(value) else [value]
+    elif isinstance(value, SupportsIndex):
+        entries = [value]
+    elif isinstance(value, Iterable):
+        entries = value
+    else:
+        raise TypeError(f"{what} = {shown(value)}; expected a list of whole numbers, e.g. [1, 3]")
+    numbers = tuple(whole(what, entry, low) for entry in entries)
+    if not numbers:
         raise ValueError(f"{what} is empty; expected at least one whole number")
-    return found
+    return numbers
 
 
-def probability(what: str, value: Any) -> str:
-    """A rational from 0 to 1 as text such as "1/10"; a float means its shortest decimal."""
-    found: Fraction = rational(value, what)
-    if not 0 <= found <= 1:
-        raise ValueError(f"{what} = {found}; expected a probability from 0 to 1")
-    return str(found)
+def probability(what: str, value: object) -> str:
+    """Return a rational number from 0 to 1 as text such as "1/10".
+
+    Parameters
+    ----------
+    what : str
+        The thing that the probability is for, such as ``"p"``.
+    value : object
+        A number or a text; a float means its shortest decimal.
+
+    Returns
+    -------
+    str
+        The number in lowest terms.
+
+    Raises
+    ------
+    TypeError
+        If the value is no number.
+    ValueError
+        If it is not rational, or not from 0 to 1.
+    """
+    chance = rational(value, what)
+    if not 0 <= chance <= 1:
+        raise ValueError(f"{what} = {chance}; expected a probability from 0 to 1")
+    return str(chance)

@@ -1,4 +1,4 @@
-"""Rows of exact rational numbers out of whatever a user has: lists, arrays, SymPy matrices, text."""
+"""Exact rational numbers and square tables of them, from lists, matrices, text and files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,27 @@ _EXPECTED = "expected a rational number such as 1/2, -3 or 0.25"
 
 
 def rational(entry: Any, where: str) -> Fraction:
-    """One exact number; ValueError where it is not finite, real and rational, TypeError for no number."""
+    """Return one exact number.
+
+    Parameters
+    ----------
+    entry : int, float, Fraction, Decimal, str or SymPy number
+        A float means its shortest decimal; a text is such as ``"1/2"`` or ``"0.25"``.
+    where : str
+        The subject of the error.
+
+    Returns
+    -------
+    Fraction
+        The number.
+
+    Raises
+    ------
+    TypeError
+        If the entry is no number.
+    ValueError
+        If it is not finite, real and rational.
+    """
     if isinstance(entry, bool):
         raise TypeError(f"{where} is {entry}, a bool; {_EXPECTED}")
     if isinstance(entry, str):
@@ -50,7 +70,7 @@ def rational(entry: Any, where: str) -> Fraction:
 
 @lru_cache(maxsize=4096)
 def _number(text: str) -> Fraction | None:
-    """The number that a text is; None where it is none."""
+    """The number of a text; None if the text is none."""
     return Fraction(text) if len(text) <= _LONGEST and _TEXT.fullmatch(text) else None
 
 
@@ -67,7 +87,27 @@ def _from_text(text: str, where: str) -> Fraction:
 
 
 def rational_rows(rows: Any, name: str) -> list[list[Fraction]]:
-    """A square table of fractions; ValueError where it is empty or not square, TypeError for no table."""
+    """Return a square table of exact numbers.
+
+    Parameters
+    ----------
+    rows : iterable of iterables, or matrix
+        Entries as in `rational`.
+    name : str
+        The subject of the error.
+
+    Returns
+    -------
+    list of list of Fraction
+        The rows.
+
+    Raises
+    ------
+    TypeError
+        If `rows` is no table, or an entry no number.
+    ValueError
+        If the table is empty or not square, or an entry is not rational.
+    """
     return [[_entry(entry, name, i, j) for j, entry in enumerate(line)] for i, line in enumerate(square(rows, name))]
 
 
@@ -77,15 +117,31 @@ def _entry(entry: Any, name: str, i: int, j: int) -> Fraction:
 
 
 def total(numbers: Iterable[Fraction]) -> Fraction:
-    """The sum of many fractions: their numerators over one denominator, reduced once."""
+    """Return the sum of many fractions: their numerators over one denominator, reduced once."""
     found = list(filter(None, numbers))
     below = lcm(*(x.denominator for x in found))
     return Fraction(sum(x.numerator * (below // x.denominator) for x in found), below)
 
 
 def square(rows: Any, name: str) -> list[list[Any]]:
-    """A table with as many columns as rows; ValueError where it is empty or not square, TypeError for no table."""
-    symbolic = hasattr(rows, "tolist") and not hasattr(rows, "dtype")  # SymPy lists a matrix entry by entry
+    """Return the rows of a square table, its entries as they are.
+
+    Parameters
+    ----------
+    rows : iterable of iterables, or matrix
+        At most ROWS rows; a sparse matrix is refused.
+    name : str
+        The subject of the error.
+
+    Raises
+    ------
+    TypeError
+        If `rows` is no table.
+    ValueError
+        If the table is empty, not square or too large.
+    """
+    # SymPy lists a matrix entry by entry
+    symbolic = hasattr(rows, "tolist") and not hasattr(rows, "dtype")
     listed = rows.tolist() if symbolic else rows
     if isinstance(listed, (str, bytes)) or not isinstance(listed, Iterable) or hasattr(rows, "tocoo"):
         hint = "; a sparse matrix is read by from_sparse" if hasattr(rows, "tocoo") else ""
@@ -116,7 +172,26 @@ def _too_large(name: str) -> ValueError:
 
 
 def file_text(path: str | Path, what: str, expected: str = "a text file") -> tuple[str, str]:
-    """The text of a file of at most FILE_LIMIT bytes, and its name; FileNotFoundError, TypeError or ValueError else."""
+    """Return the text of a small file, and the name of the file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file of at most FILE_LIMIT bytes in UTF-8.
+    what : str
+        The subject of the error.
+    expected : str, optional
+        The kind of file in words, for errors.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is none.
+    TypeError
+        If `path` is no path.
+    ValueError
+        If it is a folder or device, too large, or in another encoding.
+    """
     place = a_path(what, path)
     printable(what, place.name)
     if not place.exists():
@@ -135,9 +210,21 @@ def file_text(path: str | Path, what: str, expected: str = "a text file") -> tup
 
 
 def parse_rows(text: str, name: str) -> list[list[str]]:
-    """Split a matrix text into entries: blanks or commas between them, `#` comments, empty lines skipped.
+    """Return the entries of a matrix text, with blanks or commas between them.
 
-    Raises ValueError on an empty entry and on more than ROWS rows or columns.
+    Comments begin with `#`; empty lines are skipped.
+
+    Parameters
+    ----------
+    text : str
+        The text.
+    name : str
+        The subject of the error.
+
+    Raises
+    ------
+    ValueError
+        On an empty entry, and on more than ROWS rows or columns.
     """
     rows: list[list[str]] = []
     for number, line in enumerate(text.splitlines(), 1):

@@ -1,7 +1,8 @@
-"""The one reader of expressions written by a user: a whitelist over `ast`, so that nothing in a text is ever run.
+"""The one reader of expressions of users: a whitelist over `ast`, nothing in a text is ever run.
 
-`parse` turns a text into an `Expression`; `Expression.evaluate` walks its tree and leaves the meaning of every number,
-name and operation to an `Algebra`: floats, exact numbers, sums of cosines, symbolic weights and graphs are algebras.
+`parse` turns a text into an `Expression`; `Expression.evaluate` walks its tree and leaves the
+meaning of every number, name and operation to an `Algebra`: floats, exact numbers, sums of cosines,
+symbolic weights and graphs are algebras.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ _ARITHMETIC = re.compile(r"[0-9A-Za-z_.+\-*/() \t]*")
 
 
 class NoMeaning(Exception):
-    """An operation, a name or a call that the expressions of an algebra may not contain, and perhaps why."""
+    """An operation, name or call that the expressions of an algebra may not contain."""
 
     def __init__(self, reason: str = "") -> None:
         super().__init__(reason)
@@ -29,11 +30,12 @@ class NoMeaning(Exception):
 
 
 class Algebra(Generic[V]):
-    """The meaning of expressions: what a number, a name, an operation and a call give, and how a text is refused.
+    """The meaning of expressions: the values of numbers, names, operations and calls, and refusals.
 
-    Values are of any type V.  A subclass defines what its expressions may contain; every method that it leaves out
-    raises NotImplementedError, which the reader turns into `refuse` with the piece of the expression.  A method that
-    may take long or grow large checks the sizes of its operands first.
+    Values are of any type V.  A subclass defines what its expressions may contain; every method
+    that it leaves out raises NotImplementedError, which the reader turns into `refuse` with the
+    piece of the expression.  A method that may take long or grow large checks the sizes of its
+    operands first.
 
     Attributes
     ----------
@@ -44,7 +46,15 @@ class Algebra(Generic[V]):
     deepest: int
 
     def refuse(self, node: ast.expr, reason: str) -> NoReturn:
-        """Raise the error for a piece of the expression that has no meaning here; `reason` is that of NoMeaning."""
+        """Raise the error for a piece of the expression that has no meaning here.
+
+        Parameters
+        ----------
+        node : ast.expr
+            The piece.
+        reason : str
+            The reason that NoMeaning was raised with, "" for none.
+        """
         raise NoMeaning(reason)
 
     def refuse_depth(self) -> NoReturn:
@@ -92,7 +102,7 @@ class Algebra(Generic[V]):
         return self.power(base, self.number(exponent))
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[Any] | None]:
-        """The algebras that read the arguments of a call; the call is refused here, before they are read.
+        """The algebras that read the arguments of a call; a wrong call is refused here.
 
         Parameters
         ----------
@@ -106,7 +116,7 @@ class Algebra(Generic[V]):
         Returns
         -------
         sequence of Algebra or None
-            One for each argument without a name; None takes the argument as it is written, as a str.
+            One for each argument without a name; None takes the argument as it is written, a str.
         """
         raise NoMeaning
 
@@ -179,14 +189,25 @@ class Expression:
         return algebra.call(function, arguments, dict(zip(names, values, strict=True)))
 
     def _written(self, node: ast.expr) -> str:
-        """A piece as a command line has it: (3, 4) as 3,4; 1 / 10 as 1/10; digits stay as they are written."""
+        """A piece as a command line has it: (3, 4) as 3,4; 1 / 10 as 1/10; digits unchanged."""
         if isinstance(node, ast.Tuple):
             return ",".join(self._written(element) for element in node.elts)
         return (ast.get_source_segment(self.text, node) or "").replace(" ", "")
 
 
 def parse(text: str) -> Expression | None:
-    """Return a text as an expression, None if Python cannot read it; the caller bounds its length beforehand."""
+    """Return a text as an expression.
+
+    Parameters
+    ----------
+    text : str
+        The text; the caller bounds its length.
+
+    Returns
+    -------
+    Expression or None
+        None if the text is no expression of Python.
+    """
     stripped = text.strip()
     try:
         with warnings.catch_warnings():

@@ -1,4 +1,4 @@
-"""Opens files that may be anything: a pipe or a device is refused before it can keep the program waiting."""
+"""Opening of regular files alone: a pipe or a device is refused before it can block the program."""
 
 from __future__ import annotations
 
@@ -14,9 +14,26 @@ __all__ = ["open_regular"]
 def open_regular(
     path: str | os.PathLike[str], *, writing: bool = False, flags: int = 0, folder: int | None = None
 ) -> FileIO:
-    """Open a regular file to read it, with `writing` also to change it; a relative path counts from the open `folder`.
+    """Open a regular file without buffering.
 
-    The kind of file is asked of what was opened, so that nothing put in its place meanwhile is read.
+    The kind of the file is asked of what was opened, so that nothing put in its place meanwhile is
+    read.
+
+    Parameters
+    ----------
+    path : str or path object
+        The file.
+    writing : bool, optional
+        Whether to open it for changes too.
+    flags : int, optional
+        More flags of `os.open`.
+    folder : int, optional
+        Descriptor of the open folder from which a relative path counts.
+
+    Returns
+    -------
+    io.FileIO
+        The open file.
 
     Raises
     ------

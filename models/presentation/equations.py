@@ -1,7 +1,8 @@
-"""Equations for people and for other programs: LaTeX, plain text, and a dictionary fit for JSON.
+"""Equations as LaTeX, as plain text, and as a dictionary fit for JSON.
 
-Where an equation contains one of the friction laws, the law is written as f and defined once below, in the letters of
-Marszal et al., Eur. Phys. J. Special Topics (2016), eqs. 3-6: chi for the displacement and tau for the time.
+Where an equation contains one of the friction laws, the law is written as f and defined once below,
+in the letters of Marszal et al., Eur. Phys. J. Special Topics (2016), eqs. 3-6: chi for the
+displacement and tau for the time.
 """
 
 from __future__ import annotations
@@ -26,21 +27,44 @@ WEIGHT = sp.Symbol("G_ij", real=True)
 
 
 def latex(equations: Equations) -> str:
-    """Return the equations as a LaTeX align* environment; more than LARGEST nodes as one equation for node i."""
+    """Return the equations as LaTeX.
+
+    Parameters
+    ----------
+    equations : Equations
+        The equations of a network.
+
+    Returns
+    -------
+    str
+        An align* environment; more than LARGEST nodes give one equation for node i.
+    """
     lines = " \\\\\n".join(f"  & {line}" for line in _lines(equations, Latex()))
     return f"\\begin{{align*}}\n{lines}\n\\end{{align*}}"
 
 
 def text(equations: Equations) -> str:
-    """Return the equations as lines of plain text with Greek letters, in the form of `latex`."""
+    """Return the equations as plain text with Greek letters.
+
+    Parameters
+    ----------
+    equations : Equations
+        The equations of a network.
+
+    Returns
+    -------
+    str
+        One equation a line; more than LARGEST nodes give one for node i.
+    """
     return "\n".join(_lines(equations, Text()))
 
 
 def as_dict(equations: Equations) -> dict[str, object]:
     """Return names, right-hand sides and derivatives as text that SymPy reads, and the digest.
 
-    `jacobian` has the non-zero entries only, under keys such as "v_1,x_1" (row, column); time is called t.  Where links
-    have inertia `mass` has the entries of M in M d(state)/dt = rhs in the same way.
+    `jacobian` has the non-zero entries only, under keys such as "v_1,x_1" (row, column); time is
+    called t.  Where links have inertia `mass` has the entries of M in M d(state)/dt = rhs in the
+    same way.
     """
     state = equations.state
     entries, mass = equations.jacobian().items(), equations.mass()
@@ -57,7 +81,7 @@ def as_dict(equations: Equations) -> dict[str, object]:
 
 @dataclass(frozen=True, slots=True)
 class _Named:
-    """A node's right-hand side with its friction law as f(w), and the law itself; `law` is None where there is none."""
+    """A node's right-hand side with its friction law as f(w), and the law, None if it has none."""
 
     rhs: tuple[sp.Expr, ...]
     law: sp.Expr | None
@@ -73,7 +97,10 @@ def _name_law(node: Node) -> _Named:
 
 
 def _with_law(e: sp.Expr, law: sp.Expr, state: tuple[sp.Symbol, ...]) -> sp.Expr:
-    """The expression with (factor) law(w) written as (factor) f(w), for the first sum w of a state where that works."""
+    """The expression with (factor) law(w) written as (factor) f(w).
+
+    w is the first sum with a state for which that works.
+    """
     sums = sorted((s for s in e.atoms(sp.Add) if s != e and s.has(*state)), key=sp.default_sort_key)
     for w in sums:
         terms = sp.Add.make_args(e.xreplace({w: SLIDING}))
@@ -158,7 +185,10 @@ def _at_node(equations: Equations, named: tuple[_Named, ...], style: Style, i: i
 
 
 def _left(equations: Equations, writer: Writer, c: int, i: int) -> str:
-    """The left side: the rate of component c of node i, chi'' where it is the velocity of chi, times masses of links."""
+    """The left side: the rate of component c of node i, and the rates that links add.
+
+    The rate is written chi'' if the component is the velocity of chi.
+    """
     own = writer.write(equations.symbols(i)[c]) + "'"
     rates: dict[sp.Symbol, str] = {}
     terms: list[sp.Expr] = []
@@ -219,7 +249,10 @@ def _sum_over_links(edge: Edge, c: int, writer: Writer) -> str:
 
 
 def _summed(term: sp.Expr, inside: tuple[sp.Symbol, ...], writer: Writer) -> str:
-    """A sum over j with its sign in front; what does not depend on symbols `inside` stands before the sum sign."""
+    """A sum over j with its sign in front.
+
+    Factors that do not depend on symbols `inside` stand before the sum sign.
+    """
     term = sp.factor_terms(term) if term.is_Add else term
     negative = term.as_coeff_Mul()[0].is_negative
     outer, inner = (-term if negative else term).as_independent(*inside, as_Add=False)
@@ -229,7 +262,10 @@ def _summed(term: sp.Expr, inside: tuple[sp.Symbol, ...], writer: Writer) -> str
 
 
 def _pairs(equations: Equations, i: int = 0) -> dict[int, int]:
-    """Component -> component that is its velocity, of node i: its rate is that state alone, links add nothing."""
+    """Component -> component that is its velocity, of node i.
+
+    The rate of such a component is that state alone: links add nothing.
+    """
     node, kind = equations.node_at(i), equations.kind_of[i]
     edges = [edge for (target, _), edge in equations.edge_of if target == kind] if equations.links else []
     found: dict[int, int] = {}
@@ -241,7 +277,7 @@ def _pairs(equations: Equations, i: int = 0) -> dict[int, int]:
 
 
 def _shown(equations: Equations, i: int = 0) -> list[int]:
-    """The components whose rate gets an equation: all but coordinates, whose second derivative stands for them."""
+    """The components whose rate gets an equation: all but coordinates."""
     pairs = _pairs(equations, i)
     return [c for c in range(len(equations.node_at(i).state)) if c not in pairs]
 
@@ -249,7 +285,10 @@ def _shown(equations: Equations, i: int = 0) -> list[int]:
 def _letters(
     equations: Equations, named: _Named, style: Style, symbols: tuple[sp.Symbol, ...], index: str, i: int = 0
 ) -> dict[sp.Symbol, str]:
-    """How the states of a node and the time are written: chi and tau beside a friction law, velocities with a prime."""
+    """How the states of a node and the time are written.
+
+    They are chi and tau beside a friction law; velocities have a prime.
+    """
     node = equations.node_at(i)
     plain = named.law is None or {"chi", "tau"} & {s.name for s in (*node.state, *node.parameters)}
     speeds = {velocity: c for c, velocity in _pairs(equations, i).items()}
@@ -261,7 +300,7 @@ def _letters(
 
 
 def _ordered(e: sp.Expr, node: Node) -> list[sp.Expr]:
-    """The terms of a node's equation: springs, damping, constants, what depends on time, friction last."""
+    """The terms of an equation: springs, damping, constants, functions of time, friction last."""
 
     def place(term: sp.Expr) -> tuple[bool, bool, int, int, tuple[object, ...]]:
         last = max((c for c, s in enumerate(node.state) if term.has(s)), default=len(node.state))

@@ -1,7 +1,7 @@
-"""Expressions as a person writes them: one writer, two styles, LaTeX and plain Unicode text.
+"""Expressions in the order of textbooks: one writer, two styles, LaTeX and plain Unicode text.
 
-SymPy's own printers order sums and products alphabetically; here x_2 - x_1 stays in that order, numbers come before
-parameters, parameters before variables, and functions last.
+SymPy's own printers order sums and products alphabetically; here x_2 - x_1 stays in that order,
+numbers come before parameters, parameters before variables, and functions last.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Style(Protocol):
 
     @property
     def bars(self) -> bool:
-        """True where fractions have a bar, so that sums need no parentheses there."""
+        """Whether fractions have a bar, so that sums need no parentheses there."""
 
     @property
     def sum_over_j(self) -> str:
@@ -64,7 +64,7 @@ class Style(Protocol):
         """Factors side by side."""
 
     def fraction(self, top: str, bottom: str, single: bool) -> str:
-        """A fraction; `single` where the bottom is one factor."""
+        """A fraction; `single` if the bottom is one factor."""
 
     def beside(self, fraction: str) -> str:
         """A fraction as a factor in front of others."""
@@ -79,7 +79,7 @@ class Style(Protocol):
         """The name of a function."""
 
     def other(self, e: sp.Expr) -> str:
-        """Whatever has no rule here, by SymPy's own printer."""
+        """Anything without a rule here, by SymPy's own printer."""
 
 
 class Latex:
@@ -177,14 +177,24 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Writer:
-    """Writes expressions in one style; `letters` are the written forms of symbols, `variables` follow parameters."""
+    """Writes expressions in one style.
+
+    Attributes
+    ----------
+    style : Style
+        LaTeX or text.
+    letters : mapping of Symbol to str
+        The written forms of symbols; others have their names.
+    variables : frozenset of Symbol
+        The symbols that stand behind parameters in products.
+    """
 
     style: Style
     letters: Mapping[sp.Symbol, str]
     variables: frozenset[sp.Symbol]
 
     def total(self, terms: Iterable[sp.Expr]) -> str:
-        """A sum in the order given; 0 where it is empty."""
+        """Return a sum in the order given, 0 if it is empty."""
         text = ""
         for term in map(_turned, terms):
             negative = _negative(term)
@@ -193,7 +203,7 @@ class Writer:
         return text or "0"
 
     def write(self, e: sp.Expr) -> str:
-        """An expression."""
+        """Return an expression as text."""
         if isinstance(e, sp.Symbol):
             return self.letters.get(e, self.style.letter(e.name))
         if e is sp.pi:
@@ -214,7 +224,7 @@ class Writer:
         return self.style.other(e.xreplace({s: sp.Symbol(text) for s, text in self.letters.items()}))
 
     def factors(self, e: sp.Expr) -> list[str]:
-        """The factors of a product in order, sums in parentheses."""
+        """Return the factors of a product in order, sums in parentheses."""
         return [self._factor(f) for f in sorted(sp.Mul.make_args(e), key=self._rank)]
 
     def _product(self, e: sp.Expr) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from synchain.models.inputs.checks import positive, shown, whole
+from synchain.models.inputs.checks import number, positive, shown, whole
 
 __all__ = ["averaging", "numbers", "row"]
 
@@ -35,9 +35,9 @@ def averaging(precision: Any, periods: Any, transient: Any, seed: Any) -> tuple[
     and random seed.
     """
     return (
-        positive("precision", precision, zero=True),
+        number("precision", precision, 0.0),
         positive("periods", periods),
-        positive("transient", transient, zero=True),
+        number("transient", transient, 0.0),
         whole("seed", seed, 0),
     )
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
-from synchain.models.inputs.checks import instance, positive, whole
+from synchain.models.inputs.checks import instance, number, positive, whole
 from synchain.models.scenes.scene import Scene, a_scene
 from synchain.models.spectra.spectrum import Spectrum
 
@@ -76,7 +76,7 @@ class Criterion:
     def __post_init__(self) -> None:
         for name in ("tolerance", "transient", "window", "rtol"):
             object.__setattr__(self, name, positive(f"criterion: {name}", getattr(self, name)))
-        object.__setattr__(self, "reach", positive("criterion: reach", self.reach, zero=True))
+        object.__setattr__(self, "reach", number("criterion: reach", self.reach, 0.0))
         whole("criterion: starts", self.starts, 1)
         whole("criterion: seed", self.seed, 0)
 
