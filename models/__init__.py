@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from .graphs.readers import from_edges, from_graph, from_sparse, read_edges, read_graphml
     from .graphs.symbolic import from_symbols
     from .graphs.topology import Topology, from_matrix, read_matrix
-    from .inputs.options import probability, whole, whole_numbers
+    from .inputs.options import integer_option, integers_option, probability_option
     from .inputs.plugins import allow_code
     from .mechanics.parameter import Parameter
     from .presentation.equations import latex, text
@@ -59,7 +59,7 @@ _HOMES = {
     "kronecker": "graphs.products",
     "latex": "presentation.equations",
     "load_scene": "scenes.file",
-    "probability": "inputs.options",
+    "probability_option": "inputs.options",
     "read_edges": "graphs.readers",
     "read_graphml": "graphs.readers",
     "read_matrix": "graphs.topology",
@@ -68,8 +68,8 @@ _HOMES = {
     "topology": "graphs.families",
     "union": "graphs.products",
     "weighted": "graphs.products",
-    "whole": "inputs.options",
-    "whole_numbers": "inputs.options",
+    "integer_option": "inputs.options",
+    "integers_option": "inputs.options",
 }
 
 __all__ = [
@@ -87,10 +87,12 @@ __all__ = [
     "from_matrix",
     "from_sparse",
     "from_symbols",
+    "integer_option",
+    "integers_option",
     "kronecker",
     "latex",
     "load_scene",
-    "probability",
+    "probability_option",
     "read_edges",
     "read_graphml",
     "read_matrix",
@@ -99,8 +101,6 @@ __all__ = [
     "topology",
     "union",
     "weighted",
-    "whole",
-    "whole_numbers",
 ]
 
 

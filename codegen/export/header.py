@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.inputs.checks import number, shown, suggestion
+from synchain.models.inputs.checks import check_number, short_repr, suggestion
 
 __all__ = ["given_values", "header"]
 
@@ -50,10 +50,12 @@ def given_values(equations: Equations, values: Mapping[str, float] | None) -> di
     for name in values:
         if name not in equations.parameters:
             known = ", ".join(equations.parameters) or "none"
-            raise ValueError(f"unknown parameter {shown(name)}; known: {known}{suggestion(name, equations.parameters)}")
+            raise ValueError(
+                f"unknown parameter {short_repr(name)}; known: {known}{suggestion(name, equations.parameters)}"
+            )
     for name in equations.parameters:
         if name not in values:
             raise ValueError(
                 f"parameter {name!r} has no value; expected all of {', '.join(equations.parameters)} or none"
             )
-    return {name: number(name, values[name]) for name in equations.parameters}
+    return {name: check_number(name, values[name]) for name in equations.parameters}

@@ -26,7 +26,7 @@ from ..algebra.rationals import to_fraction
 from ..graphs.families import topology
 from ..graphs.graph_text import is_composed, read_graph
 from ..graphs.topology import Topology, read_matrix
-from ..inputs.checks import shown
+from ..inputs.checks import short_repr
 from .parts import LARGEST, WORDS, Part, interval, is_part, read_part
 
 __all__ = ["Claim", "Claimed", "read_claims"]
@@ -138,14 +138,16 @@ def read_claims(path: str | Path) -> list[tuple[Claim, ...]]:
     """
     place = Path(path)
     if not place.exists():
-        raise FileNotFoundError(f"claims {shown(str(place))}: no such file; expected a text file; check the path")
+        raise FileNotFoundError(f"claims {short_repr(str(place))}: no such file; expected a text file; check the path")
     if not place.is_file() or place.stat().st_size > BYTES:
-        raise ValueError(f"claims {shown(str(place))}: expected a text file of at most {BYTES} bytes; check the path")
+        raise ValueError(
+            f"claims {short_repr(str(place))}: expected a text file of at most {BYTES} bytes; check the path"
+        )
     try:
         lines = place.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError:
         raise ValueError(
-            f"claims {shown(str(place))}: not UTF-8; expected UTF-8 text; save it in that encoding"
+            f"claims {short_repr(str(place))}: not UTF-8; expected UTF-8 text; save it in that encoding"
         ) from None
     found = []
     for number, line in enumerate(lines, 1):
@@ -156,14 +158,14 @@ def read_claims(path: str | Path) -> list[tuple[Claim, ...]]:
             except (ValueError, TypeError, OSError) as error:
                 raise ValueError(f"{place.name}, line {number}: {' '.join(str(error).split())}") from None
     if not found:
-        raise ValueError(f"claims {shown(str(place))}: found no claim; {_FORMS}")
+        raise ValueError(f"claims {short_repr(str(place))}: found no claim; {_FORMS}")
     return found
 
 
 def _line(number: int, text: str, folder: Path) -> tuple[Claim, ...]:
     head, colon, listed = (part.strip() for part in text.rpartition(":"))
     if not colon or not head:
-        raise ValueError(f"found {shown(text)}; {_FORMS}")
+        raise ValueError(f"found {short_repr(text)}; {_FORMS}")
     one, many = _ONE.fullmatch(head), _RANGE.fullmatch(head)
     largest = None if is_part(listed) else LARGEST
     if many:
@@ -178,7 +180,7 @@ def _line(number: int, text: str, folder: Path) -> tuple[Claim, ...]:
     elif one:
         graph = _family(one[1], int(one[2]), one[3], largest)
     else:
-        raise ValueError(f"found {shown(head)} before the colon; {_FORMS}")
+        raise ValueError(f"found {short_repr(head)} before the colon; {_FORMS}")
     if largest is not None and graph.n > largest:
         raise ValueError(
             f"{graph.name} has {graph.n} nodes; expected at most {largest}; spectra are proved up to there"
@@ -236,22 +238,24 @@ def _entry(part: str, values: dict[str, int]) -> Iterator[Claimed]:
     if many:
         body, letter = many[1], many[2]
         if letter in (*values, "I"):
-            raise ValueError(f"{shown(part)}: the letter {letter!r} has a meaning already; expected another, e.g. k")
+            raise ValueError(
+                f"{short_repr(part)}: the letter {letter!r} has a meaning already; expected another, e.g. k"
+            )
         low, high = whole_number(many[3], values), whole_number(many[4], values)
         if high - low > LARGEST:
             raise ValueError(
-                f"{shown(part)}: found {high - low + 1} values of {letter}; expected at most {LARGEST + 1}"
+                f"{short_repr(part)}: found {high - low + 1} values of {letter}; expected at most {LARGEST + 1}"
             )
         yield from _each(body, values, letter, range(low, high + 1))
         return
     pieces = list(_split(part, "^"))
     if len(pieces) > 2:
         raise ValueError(
-            f"found {shown(part)} with {len(pieces) - 1} times ^; expected number^multiplicity, ** for powers"
+            f"found {short_repr(part)} with {len(pieces) - 1} times ^; expected number^multiplicity, ** for powers"
         )
     count = whole_number(pieces[1], values) if len(pieces) == 2 else 1
     if count < 0:
-        raise ValueError(f"{shown(part)}: multiplicity {count}{_where(values)}; expected at least 0")
+        raise ValueError(f"{short_repr(part)}: multiplicity {count}{_where(values)}; expected at least 0")
     if count:
         yield _number(pieces[0], count, values)
 

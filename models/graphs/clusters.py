@@ -20,7 +20,7 @@ from fractions import Fraction
 from flint import fmpq_mat, fmpq_poly
 
 from ..algebra.rationals import to_flint
-from ..inputs.checks import typed
+from ..inputs.checks import typed_repr
 from ..spectra.eigenvalue import ProofError
 from .partitions import class_links, join
 from .symmetry import automorphisms
@@ -141,7 +141,7 @@ def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
     """
     a_graph("clusters", graph)
     if not isinstance(classes, Collection) or isinstance(classes, Set | Mapping):
-        raise TypeError(f"partition: found {typed(classes)}; expected the cluster of each node, e.g. [0, 0, 1]")
+        raise TypeError(f"partition: found {typed_repr(classes)}; expected the cluster of each node, e.g. [0, 0, 1]")
     if len(classes) != graph.n:
         raise ValueError(f"partition: found {len(classes)} classes for {graph.n} nodes; expected one for each node")
     order: dict[int, int] = {}

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NoReturn
 
-from ..inputs.checks import shown
+from ..inputs.checks import short_repr
 from ..inputs.reader import Algebra, Expression, NoMeaning, parse
 from . import products
 from .families import topology
@@ -93,7 +93,9 @@ class _Graphs(Algebra[Topology]):
     def unreadable(self) -> ValueError:
         """The error for any text that names no graph."""
         known = ", ".join((*PAIRS, *SIZED))
-        return ValueError(f"unreadable graph {shown(self.text)}; expected {known}, e.g. cartesian(chain(4), ring(5))")
+        return ValueError(
+            f"unreadable graph {short_repr(self.text)}; expected {known}, e.g. cartesian(chain(4), ring(5))"
+        )
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[Topology] | None]:
         if function in PAIRS and count == 2 and not options:
@@ -151,7 +153,7 @@ class _Forms(Algebra["ClosedForm"]):
     def unreadable(self) -> ValueError:
         """The error for any text that names no closed form."""
         return ValueError(
-            f"unreadable closed form {shown(self.text)}; expected {', '.join(PAIRS)} of families without sizes, "
+            f"unreadable closed form {short_repr(self.text)}; expected {', '.join(PAIRS)} of families without sizes, "
             "e.g. cartesian(chain, torus(shape=(p, q)))"
         )
 
@@ -167,7 +169,7 @@ class _Forms(Algebra["ClosedForm"]):
             return ()
         if function in SIZED:
             raise ValueError(
-                f"{shown(self.text)}: {function} has no closed form without sizes; expected a graph with its size, "
+                f"{short_repr(self.text)}: {function} has no closed form without sizes; expected a graph with its size, "
                 "e.g. complement(chain(4))"
             )
         raise NoMeaning

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from ..inputs.checks import flag, printable, shown, typed, whole
+from ..inputs.checks import check_flag, check_integer, check_printable, short_repr, typed_repr
 from ..inputs.rationals import file_text, rational
 from .links import LINK_LIMIT
 from .topology import Topology
@@ -47,10 +47,10 @@ def from_edges(
         On nodes that are no whole numbers.
     """
     if isinstance(edges, str | bytes | Mapping) or not isinstance(edges, Iterable):
-        raise TypeError(f"{name}: found {typed(edges)}; expected a list of edges, e.g. [(0, 1), (1, 2, 0.5)]")
-    flag("directed", directed)
+        raise TypeError(f"{name}: found {typed_repr(edges)}; expected a list of edges, e.g. [(0, 1), (1, 2, 0.5)]")
+    check_flag("directed", directed)
     found = [_edge(edge, f"{name}: edge {k + 1}") for k, edge in enumerate(edges)]
-    size = 1 + max((max(i, j) for i, j, _ in found), default=-1) if n is None else whole(f"{name}: n", n, 1)
+    size = 1 + max((max(i, j) for i, j, _ in found), default=-1) if n is None else check_integer(f"{name}: n", n, 1)
     weights: Weights = {}
     called = _Names(name, range(size))
     for i, j, weight in found:
@@ -199,7 +199,7 @@ def read_graphml(path: str | Path, weight: str = "weight") -> Topology:
 def assembled(nodes: Sequence[Hashable], edges: Iterable[tuple[Hashable, Hashable, Any, bool]], name: str) -> Topology:
     """Return the graph of named nodes and edges (from, to, weight, one-way)."""
     for node in nodes:
-        printable(f"{name}: node name", str(node))
+        check_printable(f"{name}: node name", str(node))
     place = {node: k for k, node in enumerate(nodes)}
     weights, called = Weights(), _Names(name, nodes)
     for u, v, value, directed in edges:
@@ -243,8 +243,8 @@ def _put(
 def _edge(edge: Sequence[Any], where: str) -> tuple[int, int, Fraction]:
     unordered = isinstance(edge, str | bytes | Set | Mapping)
     if unordered or not hasattr(edge, "__len__") or len(edge) not in (2, 3):
-        raise ValueError(f"{where} is {shown(edge)}; expected (i, j) or (i, j, weight)")
-    i, j = (whole(f"{where}: node", node, 0) for node in edge[:2])
+        raise ValueError(f"{where} is {short_repr(edge)}; expected (i, j) or (i, j, weight)")
+    i, j = (check_integer(f"{where}: node", node, 0) for node in edge[:2])
     return i, j, rational(edge[2], where) if len(edge) == 3 else Fraction(1)
 
 

@@ -13,7 +13,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ..inputs.checks import instance, printable, shown, typed, whole
+from ..inputs.checks import check_instance, check_integer, check_printable, short_repr, typed_repr
 from ..inputs.options import Options
 from ..inputs.rationals import file_text, parse_rows, rational_rows, total
 from .partitions import join
@@ -264,14 +264,16 @@ def read_matrix(path: str | Path) -> Topology:
 def a_graph(what: str, value: object) -> Topology:
     """Return the value if it is a Topology, else raise TypeError."""
     if all(hasattr(value, need) for need in ("nodes", "edges", "is_directed")):
-        raise TypeError(f"{what}: found {typed(value)}; expected a graph such as chain(4); make it with from_graph")
-    return instance(what, value, Topology, "a graph, e.g. chain(4)")
+        raise TypeError(
+            f"{what}: found {typed_repr(value)}; expected a graph such as chain(4); make it with from_graph"
+        )
+    return check_instance(what, value, Topology, "a graph, e.g. chain(4)")
 
 
 def _check_size(name: object, n: object) -> None:
     """Raise TypeError or ValueError if a name or a number of nodes is wrong."""
-    what = f"topology {printable('topology name', instance('topology name', name, str, 'text'))}"
-    size = whole(f"{what}: n", n, -(10**18))
+    what = f"topology {check_printable('topology name', check_instance('topology name', name, str, 'text'))}"
+    size = check_integer(f"{what}: n", n, -(10**18))
     if size < 1:
         raise ValueError(f"{what}: n = {size}; expected at least one node")
 
@@ -279,11 +281,13 @@ def _check_size(name: object, n: object) -> None:
 def _check_links(name: str, n: int, links: object) -> None:
     """Raise TypeError or ValueError if the links of n nodes are not sorted and sound."""
     if not isinstance(links, tuple):
-        raise TypeError(f"topology {name}: links: found {typed(links)}; expected a tuple of (target, source, weight)")
+        raise TypeError(
+            f"topology {name}: links: found {typed_repr(links)}; expected a tuple of (target, source, weight)"
+        )
     before = (-1, -1)
     for link in links:
         if not isinstance(link, tuple) or len(link) != 3:
-            raise TypeError(f"topology {name}: found the link {shown(link)}; expected (target, source, weight)")
+            raise TypeError(f"topology {name}: found the link {short_repr(link)}; expected (target, source, weight)")
         target, source, weight = link
         sound = type(target) is int and type(source) is int and type(weight) is Fraction and weight
         if not (sound and 0 <= target < n and 0 <= source < n and target != source and before < (target, source)):
@@ -295,7 +299,7 @@ def _refuse(what: str, n: int, before: tuple[int, int], link: tuple[Any, Any, An
     """Raise TypeError or ValueError that says what is wrong with a link."""
     target, source, weight = link
     if not isinstance(target, int) or not isinstance(source, int):
-        raise TypeError(f"{what}: found the link {shown(link)}; expected (target, source, weight)")
+        raise TypeError(f"{what}: found the link {short_repr(link)}; expected (target, source, weight)")
     if not (0 <= target < n and 0 <= source < n) or target == source:
         raise ValueError(f"{what}: link {target} <- {source}; expected two different nodes of 0 … {n - 1}")
     if (target, source) <= before:

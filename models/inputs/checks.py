@@ -20,30 +20,28 @@ from typing import TypeVar
 from .arithmetic import constant
 
 __all__ = [
-    "a_callable",
-    "a_path",
+    "check_callable",
+    "check_choice",
+    "check_flag",
+    "check_instance",
     "check_integer",
-    "choice",
-    "flag",
-    "instance",
-    "integer",
-    "known_keys",
-    "number",
-    "positive",
-    "printable",
-    "shown",
+    "check_keys",
+    "check_number",
+    "check_path",
+    "check_positive",
+    "check_printable",
+    "check_table",
+    "check_text",
+    "short_repr",
     "suggestion",
-    "table",
-    "text",
-    "typed",
-    "whole",
+    "typed_repr",
 ]
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 """Control characters, ends of lines, changes of direction, and surrogates."""
 
 
-def shown(value: object) -> str:
+def short_repr(value: object) -> str:
     """Return `repr` of any value on one line of at most 120 characters, for an error message.
 
     A value whose `repr` fails is named by its type: a broken `__repr__`, or an integer beyond
@@ -84,7 +82,7 @@ def suggestion(found: object, known: Iterable[str], other: Mapping[str, str] | N
     return f"; did you mean {meant[close[0]]!r}?" if close else ""
 
 
-def known_keys(what: str, given: Mapping[object, object], known: Iterable[str]) -> None:
+def check_keys(what: str, given: Mapping[object, object], known: Iterable[str]) -> None:
     """Check that all keys of a mapping are text, and known.
 
     Parameters
@@ -106,20 +104,20 @@ def known_keys(what: str, given: Mapping[object, object], known: Iterable[str]) 
     known = tuple(known)
     for key in given:
         if not isinstance(key, str):
-            raise TypeError(f"{what}: key {shown(key)} is a {type(key).__name__}; expected text")
+            raise TypeError(f"{what}: key {short_repr(key)} is a {type(key).__name__}; expected text")
         if key not in known:
             close = suggestion(key, known)
-            raise ValueError(f"{what}: unknown key {shown(key)}; known: {', '.join(known) or 'none'}{close}")
+            raise ValueError(f"{what}: unknown key {short_repr(key)}; known: {', '.join(known) or 'none'}{close}")
 
 
-def table(what: str, value: object) -> Mapping[object, object]:
+def check_table(what: str, value: object) -> Mapping[object, object]:
     """Return a value that is a mapping; raises TypeError on any other."""
     if not isinstance(value, Mapping):
-        raise TypeError(f"{what}: found {typed(value)}; expected a table of names and values")
+        raise TypeError(f"{what}: found {typed_repr(value)}; expected a table of names and values")
     return value
 
 
-def text(what: str, value: object, limit: int = 200) -> str:
+def check_text(what: str, value: object, limit: int = 200) -> str:
     """Return a value that is a short text without control characters.
 
     Parameters
@@ -139,13 +137,13 @@ def text(what: str, value: object, limit: int = 200) -> str:
         If it is too long, or has a control character.
     """
     if not isinstance(value, str):
-        raise TypeError(f"{what}: found {typed(value)}; expected text in quotation marks")
+        raise TypeError(f"{what}: found {typed_repr(value)}; expected text in quotation marks")
     if len(value) > limit:
         raise ValueError(f"{what}: found {len(value)} characters; expected at most {limit}; shorten it")
-    return printable(what, str(value))
+    return check_printable(what, str(value))
 
 
-def printable(what: str, value: str) -> str:
+def check_printable(what: str, value: str) -> str:
     """Return a text without control characters; raises ValueError if it has one.
 
     A terminal obeys control characters, and a name may come from any file.
@@ -159,7 +157,7 @@ def printable(what: str, value: str) -> str:
     return value
 
 
-def choice(what: str, value: object, known: tuple[str, ...]) -> str:
+def check_choice(what: str, value: object, known: tuple[str, ...]) -> str:
     """Return a value that is one of the known names.
 
     Parameters
@@ -178,13 +176,13 @@ def choice(what: str, value: object, known: tuple[str, ...]) -> str:
     ValueError
         If it is another text; the error suggests a known name.
     """
-    name = text(what, value)
+    name = check_text(what, value)
     if name not in known:
-        raise ValueError(f"unknown {what} {shown(name)}; known: {', '.join(known)}{suggestion(name, known)}")
+        raise ValueError(f"unknown {what} {short_repr(name)}; known: {', '.join(known)}{suggestion(name, known)}")
     return name
 
 
-def number(what: str, value: object, low: float | None = None, high: float | None = None) -> float:
+def check_number(what: str, value: object, low: float | None = None, high: float | None = None) -> float:
     """Return a finite float.
 
     Parameters
@@ -209,14 +207,14 @@ def number(what: str, value: object, low: float | None = None, high: float | Non
         except ValueError as error:
             raise ValueError(f"{what}: {error}") from None
     elif isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise TypeError(f'{what}: found {typed(value)}; expected a number, e.g. 0.1 or "2*pi/1.15"')
+        raise TypeError(f'{what}: found {typed_repr(value)}; expected a number, e.g. 0.1 or "2*pi/1.15"')
     else:
         try:
             result = float(value)
         except OverflowError:
             result = math.inf
     if not math.isfinite(result):
-        raise ValueError(f"{what}: found {shown(value)}; expected a finite number; correct the value")
+        raise ValueError(f"{what}: found {short_repr(value)}; expected a finite number; correct the value")
     if (low is not None and result < low) or (high is not None and result > high):
         raise ValueError(f"{what}: found {result!r}; expected {_span(low, high)}; correct the value")
     return result
@@ -229,17 +227,17 @@ def _span(low: float | None, high: float | None) -> str:
     return f"a number of at most {high:g}" if low is None else f"a number from {low:g} to {high:g}"
 
 
-def typed(value: object) -> str:
+def typed_repr(value: object) -> str:
     """Return the short `repr` of any value and its type, for an error message."""
     name = type(value).__name__
-    words = shown(value)
+    words = short_repr(value)
     return words if name in words or value is None else f"{words} ({name})"
 
 
 T = TypeVar("T")
 
 
-def instance(what: str, value: object, kind: type[T] | tuple[type[T], ...], expected: str) -> T:
+def check_instance(what: str, value: object, kind: type[T] | tuple[type[T], ...], expected: str) -> T:
     """Return a value that is of a type.
 
     Parameters
@@ -259,20 +257,20 @@ def instance(what: str, value: object, kind: type[T] | tuple[type[T], ...], expe
         If the value is of another type.
     """
     if not isinstance(value, kind):
-        raise TypeError(f"{what}: found {typed(value)}; expected {expected}")
+        raise TypeError(f"{what}: found {typed_repr(value)}; expected {expected}")
     return value
 
 
-def a_callable(what: str, value: object) -> Callable[..., object]:
+def check_callable(what: str, value: object) -> Callable[..., object]:
     """Return a value that can be called; raises TypeError on any other."""
     if not callable(value):
-        raise TypeError(f"{what}: found {typed(value)}; expected a function")
+        raise TypeError(f"{what}: found {typed_repr(value)}; expected a function")
     return value
 
 
-def flag(what: str, value: object) -> bool:
+def check_flag(what: str, value: object) -> bool:
     """Return a value that is True or False; raises TypeError on any other."""
-    return instance(what, value, bool, "True or False")
+    return check_instance(what, value, bool, "True or False")
 
 
 def check_integer(what: str, value: object, low: int, high: int | None = None) -> int:
@@ -300,27 +298,24 @@ def check_integer(what: str, value: object, low: int, high: int | None = None) -
         If it is out of range.
     """
     if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-        raise TypeError(f"{what} = {shown(value)}; expected a whole number, e.g. {max(low, 1)}")
+        raise TypeError(f"{what} = {short_repr(value)}; expected a whole number, e.g. {max(low, 1)}")
     result = operator.index(value)
     if result < low or (high is not None and result > high):
         bound = f"at least {low}" if result < low else f"at most {high}"
         both = "" if high is None else f", a whole number from {low} to {high}"
-        raise ValueError(f"{what} = {shown(result)}; expected {bound}{both}; correct it")
+        raise ValueError(f"{what} = {short_repr(result)}; expected {bound}{both}; correct it")
     return result
 
 
-integer = whole = check_integer
-
-
-def positive(what: str, value: object) -> float:
+def check_positive(what: str, value: object) -> float:
     """Return a finite number above 0; raises TypeError and ValueError as `number`."""
-    result = number(what, value, 0.0)
+    result = check_number(what, value, 0.0)
     if result == 0.0:
         raise ValueError(f"{what}: found 0; expected a number above 0")
     return result
 
 
-def a_path(what: str, value: object) -> Path:
+def check_path(what: str, value: object) -> Path:
     """Return a path.
 
     Parameters
@@ -338,7 +333,7 @@ def a_path(what: str, value: object) -> Path:
         If the path is empty, or has a null character.
     """
     if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
-        raise TypeError(f"{what}: found {typed(value)}; expected a path, e.g. 'data/G.txt'")
+        raise TypeError(f"{what}: found {typed_repr(value)}; expected a path, e.g. 'data/G.txt'")
     if not os.fspath(value).strip() or "\0" in os.fspath(value):
-        raise ValueError(f"{what}: found {shown(os.fspath(value))}; expected the name of a file")
+        raise ValueError(f"{what}: found {short_repr(os.fspath(value))}; expected the name of a file")
     return Path(value)

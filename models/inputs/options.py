@@ -6,10 +6,10 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any, SupportsIndex, TypeAlias
 
-from .checks import check_integer, shown
+from .checks import check_integer, short_repr
 from .rationals import rational
 
-__all__ = ["Option", "Options", "as_options", "probability", "whole", "whole_numbers"]
+__all__ = ["Option", "Options", "as_options", "integer_option", "integers_option", "probability_option"]
 
 Option: TypeAlias = int | str | tuple[int, ...]
 
@@ -26,7 +26,7 @@ def as_options(given: Mapping[str, Any]) -> Options:
     return tuple((key, tuple(v) if isinstance(v, list) else v) for key, v in sorted(given.items()))
 
 
-def whole(what: str, value: object, low: int) -> int:
+def integer_option(what: str, value: object, low: int) -> int:
     """Return a whole number, given as such or as text.
 
     Parameters
@@ -55,7 +55,7 @@ def whole(what: str, value: object, low: int) -> int:
     return check_integer(what, value, low)
 
 
-def whole_numbers(what: str, value: object, low: int) -> tuple[int, ...]:
+def integers_option(what: str, value: object, low: int) -> tuple[int, ...]:
     """Return whole numbers from a list, one number, or a text such as "1,3" or "3x4".
 
     Parameters
@@ -86,14 +86,14 @@ def whole_numbers(what: str, value: object, low: int) -> tuple[int, ...]:
     elif isinstance(value, Iterable):
         entries = value
     else:
-        raise TypeError(f"{what} = {shown(value)}; expected a list of whole numbers, e.g. [1, 3]")
-    numbers = tuple(whole(what, entry, low) for entry in entries)
+        raise TypeError(f"{what} = {short_repr(value)}; expected a list of whole numbers, e.g. [1, 3]")
+    numbers = tuple(integer_option(what, entry, low) for entry in entries)
     if not numbers:
         raise ValueError(f"{what} is empty; expected at least one whole number")
     return numbers
 
 
-def probability(what: str, value: object) -> str:
+def probability_option(what: str, value: object) -> str:
     """Return a rational number from 0 to 1 as text such as "1/10".
 
     Parameters

@@ -25,7 +25,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, ParamSpec, TypeVar
 
-from .checks import shown, suggestion, text
+from .checks import check_text, short_repr, suggestion
 
 __all__ = [
     "Kind",
@@ -169,12 +169,12 @@ def load(kind: Kind, name: str) -> ModuleType:
         return _entry(kind, name)
     known = names(kind)
     hint = suggestion(name, known, kind.also)
-    raise ValueError(f"unknown {kind.name} {shown(name)}; known: {', '.join(known)}{kind.otherwise}{hint}")
+    raise ValueError(f"unknown {kind.name} {short_repr(name)}; known: {', '.join(known)}{kind.otherwise}{hint}")
 
 
 def part(what: str, value: object) -> str:
     """Return the name of a part of the model where it is text; it may be a long path to a file of code."""
-    words = text(what, value, 1000 if isinstance(value, str) and ".py" in value else 200)
+    words = check_text(what, value, 1000 if isinstance(value, str) and ".py" in value else 200)
     return value if isinstance(value, OwnFile) else words
 
 

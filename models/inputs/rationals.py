@@ -12,7 +12,7 @@ from numbers import Complex, Integral, Rational, Real
 from pathlib import Path
 from typing import Any
 
-from .checks import a_path, printable
+from .checks import check_path, check_printable
 
 __all__ = ["FILE_LIMIT", "ROWS", "file_text", "parse_rows", "rational", "rational_rows", "square", "total"]
 
@@ -192,8 +192,8 @@ def file_text(path: str | Path, what: str, expected: str = "a text file") -> tup
     ValueError
         If it is a folder or device, too large, or in another encoding.
     """
-    place = a_path(what, path)
-    printable(what, place.name)
+    place = check_path(what, path)
+    check_printable(what, place.name)
     if not place.exists():
         raise FileNotFoundError(f"{what} {str(place)!r} does not exist; expected {expected}: check the path")
     if not place.is_file():

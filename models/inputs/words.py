@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Self
 
-from .checks import choice
+from .checks import check_choice
 
 __all__ = ["Word"]
 
@@ -36,4 +36,4 @@ class Word(StrEnum):
         ValueError, TypeError
             If the value is another text, or no text.
         """
-        return cls(choice(what, value, tuple(cls)))
+        return cls(check_choice(what, value, tuple(cls)))

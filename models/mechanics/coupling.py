@@ -14,7 +14,7 @@ from fractions import Fraction
 
 import sympy as sp
 
-from ..inputs.checks import shown, suggestion, text
+from ..inputs.checks import check_text, short_repr, suggestion
 from ..inputs.frozen import Frozen
 from .parameter import Parameter
 
@@ -59,7 +59,7 @@ class MatrixCoupling:
         twice = next((pair for i, pair in enumerate(pairs) if pair in pairs[:i]), None)
         if twice is not None:
             raise ValueError(
-                f"coupling {shown(str(self))}: '{twice[0]}->{twice[1]}' occurs twice; "
+                f"coupling {short_repr(str(self))}: '{twice[0]}->{twice[1]}' occurs twice; "
                 "expected each entry once; add the factors"
             )
 
@@ -84,7 +84,7 @@ class MatrixCoupling:
         for name in (name for source, target, _ in self.entries for name in (source, target)):
             if name not in state:
                 raise ValueError(
-                    f"coupling {shown(str(self))}: unknown component {shown(name)}; known: {', '.join(state)}"
+                    f"coupling {short_repr(str(self))}: unknown component {short_repr(name)}; known: {', '.join(state)}"
                     f"{suggestion(name, state) or '; name states of the oscillator'}"
                 )
 
@@ -98,7 +98,7 @@ class MatrixCoupling:
         """
         self.check(state)
         ordered = MatrixCoupling(tuple(sorted(self.entries, key=lambda e: (state.index(e[1]), state.index(e[0])))))
-        text("coupling", str(ordered))
+        check_text("coupling", str(ordered))
         return ordered
 
     def __str__(self) -> str:
@@ -150,18 +150,18 @@ class LagrangianCoupling:
             return tuple(range(len(known)))
         if not known:
             raise ValueError(
-                f"coupling {shown(str(self))}: found oscillators without coordinates, which are vector fields; expected "
+                f"coupling {short_repr(str(self))}: found oscillators without coordinates, which are vector fields; expected "
                 "a coupling by components, e.g. 'x->x'"
             )
         for name in self.coordinates:
             if name not in known:
                 raise ValueError(
-                    f"coupling {shown(str(self))}: unknown coordinate {shown(name)}; known: {', '.join(known)}"
+                    f"coupling {short_repr(str(self))}: unknown coordinate {short_repr(name)}; known: {', '.join(known)}"
                     f"{suggestion(name, known) or '; name coordinates of the oscillator'}"
                 )
         if len(set(self.coordinates)) < len(self.coordinates):
             raise ValueError(
-                f"coupling {shown(str(self))}: found a coordinate twice; expected each once; leave one out"
+                f"coupling {short_repr(str(self))}: found a coordinate twice; expected each once; leave one out"
             )
         return tuple(k for k, name in enumerate(known) if name in self.coordinates)
 
@@ -200,15 +200,19 @@ def _read(coupling: str) -> Iterator[tuple[str, str, Fraction]]:
     for part in coupling.split(","):
         match = _ENTRY.fullmatch(part)
         if match is None:
-            raise ValueError(f"coupling {shown(coupling)}: cannot read {shown(part.strip())}; {_EXPECTED}; correct it")
+            raise ValueError(
+                f"coupling {short_repr(coupling)}: cannot read {short_repr(part.strip())}; {_EXPECTED}; correct it"
+            )
         sign, number, source, target = match.groups()
         try:
             factor = Fraction(number or 1) * (-1 if sign == "-" else 1)
         except ZeroDivisionError:
-            raise ValueError(f"coupling {shown(coupling)}: {number} divides by zero; {_EXPECTED}; correct it") from None
+            raise ValueError(
+                f"coupling {short_repr(coupling)}: {number} divides by zero; {_EXPECTED}; correct it"
+            ) from None
         if factor == 0:
             raise ValueError(
-                f"coupling {shown(coupling)}: the factor of '{source}->{target}' is 0; expected another; leave it out"
+                f"coupling {short_repr(coupling)}: the factor of '{source}->{target}' is 0; expected another; leave it out"
             )
         yield source, target, factor
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import islice
 
-from ..inputs.checks import integer, known_keys, number, shown, text
+from ..inputs.checks import check_integer, check_keys, check_number, check_text, short_repr
 
 __all__ = ["Axis", "known_length"]
 
@@ -27,15 +27,15 @@ class Axis:
     values: tuple[float, ...]
 
     def __init__(self, name: str, values: Iterable[float]) -> None:
-        object.__setattr__(self, "name", text("axis name", name))
+        object.__setattr__(self, "name", check_text("axis name", name))
         object.__setattr__(self, "values", _values(self.name, values))
 
     @classmethod
     def between(cls, name: str, first: float, last: float, count: int) -> Axis:
         """Return `count` equally spaced values, both ends included, each the float nearest to its decimal."""
         what = f"axis {name}"
-        ends = [Fraction(repr(number(f"{what}: {end}", value))) for end, value in (("from", first), ("to", last))]
-        size = integer(f"{what}: count", count, 1, LIMIT)
+        ends = [Fraction(repr(check_number(f"{what}: {end}", value))) for end, value in (("from", first), ("to", last))]
+        size = check_integer(f"{what}: count", count, 1, LIMIT)
         if size == 1 and ends[0] != ends[1]:
             raise ValueError(f"{what}: count = 1 with two different ends; expected at least 2 values; raise count")
         return cls(name, _spaced(ends[0], ends[1], size))
@@ -45,10 +45,10 @@ class Axis:
         """Return the axis of a scene file: a list of numbers or {from = …, to = …, count = …}."""
         if not isinstance(values, Mapping):
             return cls(name, values)  # type: ignore[arg-type]  # checked at birth
-        known_keys(f"axis {name}", values, ("from", "to", "count"))
+        check_keys(f"axis {name}", values, ("from", "to", "count"))
         missing = [key for key in ("from", "to", "count") if key not in values]
         if missing:
-            found = shown(dict(values))
+            found = short_repr(dict(values))
             raise ValueError(f"axis {name}: {missing[0]!r} is missing in {found}; expected {{from, to, count}}")
         return cls.between(name, values["from"], values["to"], values["count"])
 
@@ -81,10 +81,10 @@ def _values(name: str, values: object) -> tuple[float, ...]:
         raise ValueError(f"{what}: found an array of shape {shape}; expected one row of numbers, e.g. its ravel()")
     listed = values.tolist() if hasattr(values, "tolist") else values
     if isinstance(listed, (str, bytes, Mapping)) or not isinstance(listed, Iterable):
-        raise TypeError(f"{what}: found {shown(values)}; expected a list of numbers, e.g. [0.1, 0.2]")
+        raise TypeError(f"{what}: found {short_repr(values)}; expected a list of numbers, e.g. [0.1, 0.2]")
     if isinstance(listed, (set, frozenset)):
         raise TypeError(f"{what}: found a set, which has no order; expected a list of numbers")
-    floats = tuple(number(what, value) for value in islice(listed, LIMIT + 1))
+    floats = tuple(check_number(what, value) for value in islice(listed, LIMIT + 1))
     if len(floats) > LIMIT:
         raise ValueError(f"{what}: more than {LIMIT} values; expected at most {LIMIT}; split the sweep")
     if not floats:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..inputs.checks import choice, integer, number, shown, text
+from ..inputs.checks import check_choice, check_integer, check_number, check_text, short_repr
 from ..inputs.frozen import Frozen
 from ..inputs.words import Word
 from ..mechanics.friction import ContactModel, FrictionLaw
@@ -68,8 +68,8 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
         For anything that the model does not know or cannot be given.
     """
     values = dict(given)
-    values["title"] = text("title", given["title"])
-    values["seed"] = integer("seed", given["seed"], 0, SEED_LIMIT)
+    values["title"] = check_text("title", given["title"])
+    values["seed"] = check_integer("seed", given["seed"], 0, SEED_LIMIT)
     values |= _model(given)
     model: Model = values["model"]
     values["axes"] = axes = read_axes(given["axes"], given["zipped"])
@@ -79,7 +79,7 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     values["section"] = _section(model, given["section"])
     values |= _times(model, numbers, given)
     for name in ("transient", "window"):
-        values[name] = number(name, given[name], 0.0, TIME_LIMIT)
+        values[name] = check_number(name, given[name], 0.0, TIME_LIMIT)
     if values["record"] and values["window"] == 0.0:
         raise ValueError(f"window: found 0, in which {values['record'][0]!r} has nothing to record; give a window > 0")
     values |= _numerics(given, values["record"])
@@ -136,10 +136,10 @@ def _records(model: Model, given: object) -> tuple[Record, ...]:
     n, common = model.n, bool(model.unlinked.common)
     found = ((Record.SYNC_ERROR,) if n > 1 and common else ()) if given is None else given
     if not isinstance(found, (list, tuple)):
-        raise TypeError(f"record: found {shown(found)}; expected a list out of {', '.join(Record)}")
+        raise TypeError(f"record: found {short_repr(found)}; expected a list out of {', '.join(Record)}")
     names = [Record.parse("record", name) for name in found]
     if len(set(names)) < len(names):
-        raise ValueError(f"record: found {shown(names)}; expected each record once; remove the repetition")
+        raise ValueError(f"record: found {short_repr(names)}; expected each record once; remove the repetition")
     if n == 1 and Record.SYNC_ERROR in names:
         raise ValueError(
             "record: found 'sync_error' for one oscillator; expected at least two to compare; take it out of record"
@@ -175,15 +175,15 @@ def _times(model: Model, numbers: Mapping[str, float], given: Mapping[str, Any])
 
 def _numerics(given: Mapping[str, Any], records: Sequence[Record]) -> dict[str, Any]:
     """The integrator, its tolerances and limits."""
-    rtol = number("rtol", given["rtol"], 1e-15, 0.1)
-    atol = rtol / 10 if given["atol"] is None else number("atol", given["atol"], 0.0, 0.1)
-    integrator = choice("integrator", given["integrator"], ("auto", *integrators()))
+    rtol = check_number("rtol", given["rtol"], 1e-15, 0.1)
+    atol = rtol / 10 if given["atol"] is None else check_number("atol", given["atol"], 0.0, 0.1)
+    integrator = check_choice("integrator", given["integrator"], ("auto", *integrators()))
     if atol < 1e-300:
         raise ValueError(
             f"atol: found {atol!r}; expected a number above 0, since states pass through 0; take e.g. 1e-10"
         )
-    max_steps = integer("max_steps", given["max_steps"], 1, STEP_LIMIT)
-    samples = integer("samples", given["samples"], 0, SAMPLE_LIMIT)
+    max_steps = check_integer("max_steps", given["max_steps"], 1, STEP_LIMIT)
+    samples = check_integer("samples", given["samples"], 0, SAMPLE_LIMIT)
     if Record.TRAJECTORY in records and samples < 2:
         raise ValueError(
             f"samples: found {samples} for the trajectory; expected at least 2, "

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..graphs.families import family, names, topology
 from ..graphs.topology import Topology, from_matrix, read_matrix
-from ..inputs.checks import integer, known_keys, shown, table, text
+from ..inputs.checks import check_integer, check_keys, check_table, check_text, short_repr
 from ..inputs.plugins import part
 from ..mechanics.coupling import split
 from .parameters import collected
@@ -39,20 +39,20 @@ def arguments(values: object, keywords: Iterable[str], folder: Path | None = Non
     ValueError, TypeError
         For unknown names and values of a wrong form.
     """
-    found = table("scene", values)
-    known_keys("scene", found, ["sweep" if name == "axes" else name for name in keywords])
+    found = check_table("scene", values)
+    check_keys("scene", found, ["sweep" if name == "axes" else name for name in keywords])
     given: dict[str, Any] = {str(key): value for key, value in found.items()}
     if "topology" in given:
-        given["topology"] = _topology(table("topology", given["topology"]), folder)
+        given["topology"] = _topology(check_table("topology", given["topology"]), folder)
     if "sweep" in given:
-        sweep = dict(table("sweep", given.pop("sweep")))
+        sweep = dict(check_table("sweep", given.pop("sweep")))
         if "zipped" in sweep and "zipped" in given:
             raise ValueError("zipped is given twice, in [sweep] and above; expected it once; remove one")
         given["zipped"] = sweep.pop("zipped", given.get("zipped", False))
         given["axes"] = sweep
     for name in ("parameters", "initial"):
         if name in given:
-            table(name, given[name])
+            check_table(name, given[name])
     for name in ("oscillator", "friction", "coupling"):
         if name in given:
             given[name] = _placed(given[name], folder)
@@ -79,26 +79,26 @@ def _topology(given: Mapping[object, Any], folder: Path | None) -> Topology:
     name = _placed(given.get("name"), folder)
     known = isinstance(name, str) and "matrix" not in given and (name in names() or name.endswith(".py"))
     options = family(str(name)).options if known else {}
-    known_keys("topology", given, ("name", "n", *options, "matrix", "file"))
+    check_keys("topology", given, ("name", "n", *options, "matrix", "file"))
     if "file" in given:
         if len(given) > 1:
-            raise ValueError(f"topology: found {shown(dict(given))}; expected 'file' alone; remove the other keys")
-        path = Path(folder or ".", text("topology file", given["file"], 4096))
+            raise ValueError(f"topology: found {short_repr(dict(given))}; expected 'file' alone; remove the other keys")
+        path = Path(folder or ".", check_text("topology file", given["file"], 4096))
         try:
             return read_matrix(path)
         except OSError as error:
             raise ValueError(f"topology: {' '.join(str(error).split())}") from None
     if "matrix" in given:
-        graph = from_matrix(given["matrix"], name=text("topology name", given.get("name", "matrix")))
-        if "n" in given and integer("topology n", given["n"], 1, NODES) != graph.n:
+        graph = from_matrix(given["matrix"], name=check_text("topology name", given.get("name", "matrix")))
+        if "n" in given and check_integer("topology n", given["n"], 1, NODES) != graph.n:
             raise ValueError(f"topology: n = {given['n']} but the matrix has {graph.n} rows; remove n")
         return graph
     for key in ("name", "n"):
         if key not in given:
-            found = shown(dict(given))
+            found = short_repr(dict(given))
             raise ValueError(f"topology: {key!r} is missing in {found}; expected name and n, or matrix, or file")
     chosen = {key: given[key] for key in options if key in given}
-    return topology(part("topology name", name), integer("topology n", given["n"], 0, NODES), **chosen)
+    return topology(part("topology name", name), check_integer("topology n", given["n"], 0, NODES), **chosen)
 
 
 def as_dict(scene: Scene) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import tomllib
 from importlib import resources
 from pathlib import Path
 
-from ..inputs.checks import shown, suggestion
+from ..inputs.checks import short_repr, suggestion
 from .scene import Scene
 
 __all__ = ["load_scene", "scene_names"]
@@ -43,17 +43,19 @@ def load_scene(name_or_path: str | os.PathLike[str]) -> Scene:
     whatever `Scene` refuses.  Nothing in the file is run.
     """
     if not isinstance(name_or_path, (str, os.PathLike)):
-        raise TypeError(f"scene: found {shown(name_or_path)}; expected the name of a scene or a path to a .toml file")
+        raise TypeError(
+            f"scene: found {short_repr(name_or_path)}; expected the name of a scene or a path to a .toml file"
+        )
     name = os.fspath(name_or_path)
     if not isinstance(name, str):
-        raise TypeError(f"scene: found {shown(name)}; expected text, not bytes")
+        raise TypeError(f"scene: found {short_repr(name)}; expected text, not bytes")
     if name.endswith(".toml"):
         path = Path(name)
         return _scene(path.name, _read(path), path.parent)
     known = scene_names()
     if name not in known:
         raise ValueError(
-            f"unknown scene {shown(name)}; known: {', '.join(known)}, or a path to a .toml file"
+            f"unknown scene {short_repr(name)}; known: {', '.join(known)}, or a path to a .toml file"
             + suggestion(name, known)
         )
     source = resources.files(f"{__package__}.library").joinpath(f"{name}.toml")
@@ -63,20 +65,22 @@ def load_scene(name_or_path: str | os.PathLike[str]) -> Scene:
 def _read(path: Path) -> bytes:
     try:
         if path.is_dir():
-            raise ValueError(f"scene {shown(str(path))}: found a folder; expected a TOML file; name a file in it")
+            raise ValueError(f"scene {short_repr(str(path))}: found a folder; expected a TOML file; name a file in it")
         if not path.is_file():
             close = f"; {path.stem!r} without .toml names a shipped scene" if path.stem in scene_names() else ""
-            raise ValueError(f"scene {shown(str(path))}: no such file; expected a TOML file; check the path{close}")
+            raise ValueError(
+                f"scene {short_repr(str(path))}: no such file; expected a TOML file; check the path{close}"
+            )
         with path.open("rb") as file:
             content = file.read(BYTES + 1)
     except OSError as error:
         reason = error.strerror or type(error).__name__
         raise ValueError(
-            f"scene {shown(str(path))}: cannot be read ({reason}); check the path and its rights"
+            f"scene {short_repr(str(path))}: cannot be read ({reason}); check the path and its rights"
         ) from None
     if len(content) > BYTES:
         raise ValueError(
-            f"scene {shown(str(path))}: found more than {BYTES} bytes; expected a short text; check the path"
+            f"scene {short_repr(str(path))}: found more than {BYTES} bytes; expected a short text; check the path"
         )
     return content
 

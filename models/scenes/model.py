@@ -12,7 +12,7 @@ from ..dynamics import network
 from ..dynamics.equations import Equations
 from ..graphs.families import topology
 from ..graphs.topology import Topology
-from ..inputs.checks import integer, known_keys, number, shown, suggestion, table, text
+from ..inputs.checks import check_integer, check_keys, check_number, check_table, check_text, short_repr, suggestion
 from ..inputs.frozen import Frozen
 from ..mechanics.coupling import Coupling, LagrangianCoupling, MatrixCoupling
 from ..mechanics.friction import ContactModel, FrictionLaw
@@ -209,7 +209,7 @@ class Model:
                 f"{what} {name!r} couples oscillators, but {graph.name}({graph.n}) has no links: "
                 f"there is nothing to couple; leave it out or take at least two oscillators, e.g. chain(2)"
             )
-        return f"unknown {what} {shown(name)}; known: {', '.join(known)}{suggestion(name, known)}"
+        return f"unknown {what} {short_repr(name)}; known: {', '.join(known)}{suggestion(name, known)}"
 
     def check_state(self, name: str, what: str) -> None:
         """Raise ValueError if a name such as "v_2" is no state of the network; `what` says what the name is for."""
@@ -217,7 +217,7 @@ class Model:
         if parts is not None and parts.base in apart.components and parts.index in apart.holders(parts.base):
             return
         known = ", ".join(_states(c, apart.holders(c)) for c in apart.components)
-        raise ValueError(f"unknown {what} {shown(name)}; expected a state: {known}; correct the name")
+        raise ValueError(f"unknown {what} {short_repr(name)}; expected a state: {known}; correct the name")
 
 
 @lru_cache(maxsize=64)
@@ -269,7 +269,7 @@ def _states(component: str, holders: tuple[int, ...]) -> str:
 
 def in_range(name: str, value: object, parameter: Parameter) -> float:
     """Return the value of a parameter as a float in its range; ValueError or TypeError for any other value."""
-    return parameter.check(name, number(name, value))
+    return parameter.check(name, check_number(name, value))
 
 
 # -- from what a user gives to parts of a model ------------------------------------------------------------------
@@ -310,7 +310,9 @@ def as_topology(value: object) -> Topology:
     """Return a graph as it is, one node alone for None; TypeError for any other value."""
     graph = topology("chain", 1) if value is None else value
     if not isinstance(graph, Topology):
-        raise TypeError(f"topology: found {shown(graph)} ({type(graph).__name__}); expected a graph, e.g. chain(4)")
+        raise TypeError(
+            f"topology: found {short_repr(graph)} ({type(graph).__name__}); expected a graph, e.g. chain(4)"
+        )
     return graph
 
 
@@ -319,7 +321,9 @@ def as_groups(value: object, n: int) -> tuple[Group, ...]:
     if value is None:
         return ()
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
-        raise TypeError(f"nodes: found {shown(value)}; expected tables, e.g. [{{oscillator = 'duffing', at = [1, 3]}}]")
+        raise TypeError(
+            f"nodes: found {short_repr(value)}; expected tables, e.g. [{{oscillator = 'duffing', at = [1, 3]}}]"
+        )
     groups: list[Group] = []
     taken: set[int] = set()
     for k, entry in enumerate(islice(value, MOST)):
@@ -335,21 +339,21 @@ def as_groups(value: object, n: int) -> tuple[Group, ...]:
 
 
 def _group(what: str, value: object, n: int) -> Group:
-    entry = table(what, value)
-    known_keys(what, entry, ("oscillator", "friction", "at"))
+    entry = check_table(what, value)
+    check_keys(what, entry, ("oscillator", "friction", "at"))
     for key in ("oscillator", "at"):
         if key not in entry:
             raise ValueError(f"{what}: {key!r} is missing; expected an oscillator and the numbers of its nodes, at")
     oscillator = as_oscillator(entry["oscillator"], f"{what} oscillator")
     at = entry["at"]
     if isinstance(at, str | bytes | Mapping | set | frozenset) or not isinstance(at, Iterable):
-        raise TypeError(f"{what}: at is {shown(at)}; expected a list of nodes, e.g. [1, 3]")
-    numbers = tuple(sorted(integer(f"{what}: at", i, 1, n) for i in islice(at, n + 1)))
+        raise TypeError(f"{what}: at is {short_repr(at)}; expected a list of nodes, e.g. [1, 3]")
+    numbers = tuple(sorted(check_integer(f"{what}: at", i, 1, n) for i in islice(at, n + 1)))
     if not numbers or len(set(numbers)) < len(numbers):
-        raise ValueError(f"{what}: at is {shown(list(numbers))}; expected at least one node and each node once")
+        raise ValueError(f"{what}: at is {short_repr(list(numbers))}; expected at least one node and each node once")
     return Group(oscillator, as_law(entry.get("friction", "default"), oscillator), numbers)
 
 
 def _name(what: str, value: object) -> str:
     """The name of a part of the model as text; it may be a long path to a file of code."""
-    return text(what, value, PATH_LENGTH if isinstance(value, str) and ".py" in value else 200)
+    return check_text(what, value, PATH_LENGTH if isinstance(value, str) and ".py" in value else 200)

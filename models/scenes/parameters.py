@@ -7,7 +7,7 @@ from itertools import islice
 from typing import Any, TypeVar
 
 from ..dynamics.periodicity import Drive, drive_of
-from ..inputs.checks import shown, table
+from ..inputs.checks import check_table, short_repr
 from ..inputs.frozen import Frozen
 from ..mechanics.node_name import NodeName
 from .axis import Axis
@@ -39,9 +39,9 @@ def parameters(model: Model, given: object, axes: Sequence[Axis]) -> Frozen[floa
     shared = {name: float(known[name].default) for name in known}
     lists = {name: model.defaults(name) for name in known} if len(model.kinds) > 1 else {}
     single: dict[str, dict[int, float]] = {}
-    for name, value in table("parameters", {} if given is None else given).items():
+    for name, value in check_table("parameters", {} if given is None else given).items():
         if not isinstance(name, str):
-            raise TypeError(f"parameters: key {shown(name)} is a {type(name).__name__}; expected text")
+            raise TypeError(f"parameters: key {short_repr(name)} is a {type(name).__name__}; expected text")
         parts = model.node_parameter(name)
         if parts is not None:
             single.setdefault(parts.base, {})[parts.index] = in_range(name, value, known[parts.base])

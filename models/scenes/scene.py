@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..dynamics.equations import Equations
 from ..dynamics.periodicity import Drive, as_function, names_in, period_of
 from ..graphs.topology import Topology
-from ..inputs.checks import instance, suggestion, table, text
+from ..inputs.checks import check_instance, check_table, check_text, suggestion
 from ..inputs.frozen import Frozen
 from ..mechanics.coupling import Coupling
 from ..mechanics.friction import ContactModel, FrictionLaw
@@ -175,7 +175,7 @@ class Scene:
 
     def takes(self, name: str) -> bool:
         """True for the name of a parameter, "a", and for that of a parameter of one node, "a_2"."""
-        return self.model.parameter(text("name", name)) is not None
+        return self.model.parameter(check_text("name", name)) is not None
 
     def replace(self, **changes: Any) -> Scene:
         """Return a scene with some keywords changed, checked anew: replace(rtol=1e-6, sigma=0.2).
@@ -201,7 +201,7 @@ class Scene:
             )
         given = {**self.given, "initial": self._kept_start(changes), **changes}
         if given["parameters"] is not None or single:
-            numbers = table("parameters", {} if given["parameters"] is None else given["parameters"])
+            numbers = check_table("parameters", {} if given["parameters"] is None else given["parameters"])
             given["parameters"] = {**without(self.model, numbers, single), **single}
         if self.varied and "parameters" not in changes and getattr(given["topology"], "n", None) != self.n:
             raise ValueError(f"{self.varied[0]} has values for {self.n} nodes; give `parameters` for another number")
@@ -297,4 +297,4 @@ def _kept_parameters(given: Mapping[str, Any], model: Model, numbers: Mapping[st
 def a_scene(value: object) -> Scene:
     """Return the value where it is a Scene, else raise TypeError."""
 
-    return instance("scene", value, Scene, "a Scene, e.g. load_scene('figure_4a')")
+    return check_instance("scene", value, Scene, "a Scene, e.g. load_scene('figure_4a')")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..inputs.checks import number, text
+from ..inputs.checks import check_number, check_text
 from ..inputs.words import Word
 
 __all__ = ["Direction", "Section"]
@@ -30,22 +30,22 @@ class Section:
     level: float = 0.0
 
     def __post_init__(self) -> None:
-        text("section variable", self.variable)
+        check_text("section variable", self.variable)
         object.__setattr__(self, "direction", Direction.parse("section direction", self.direction))
-        object.__setattr__(self, "level", number("section level", self.level))
+        object.__setattr__(self, "level", check_number("section level", self.level))
 
     @classmethod
     def parse(cls, words: object) -> Section:
         """Return the section written as "v_1 falling" or "x_2 rising 0.1"; a Section passes unchanged."""
         if isinstance(words, Section):
             return words
-        parts = text("section", words).split(maxsplit=2)
+        parts = check_text("section", words).split(maxsplit=2)
         if len(parts) < 2:
             raise ValueError(f"section {words!r}: expected 'state direction [level]', e.g. 'v_1 falling'")
         return cls(
             parts[0],
             Direction.parse("section direction", parts[1]),
-            number("section level", parts[2]) if len(parts) > 2 else 0.0,
+            check_number("section level", parts[2]) if len(parts) > 2 else 0.0,
         )
 
     def __str__(self) -> str:

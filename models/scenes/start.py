@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from itertools import islice
 from typing import Any
 
-from ..inputs.checks import integer, known_keys, number, shown, table
+from ..inputs.checks import check_integer, check_keys, check_number, check_table, short_repr
 from ..inputs.frozen import Frozen
 
 __all__ = ["chosen_start", "default_start"]
@@ -26,8 +26,10 @@ def default_start(
     With a `centre` the same distances lie around that state.  Raises ValueError where it has an unknown component.
     """
     if centre is not None:
-        known_keys("INITIAL of the oscillator", centre, components)
-        middle = {name: number(f"INITIAL of the oscillator: {name}", centre.get(name, 0.0)) for name in components}
+        check_keys("INITIAL of the oscillator", centre, components)
+        middle = {
+            name: check_number(f"INITIAL of the oscillator: {name}", centre.get(name, 0.0)) for name in components
+        }
         return {name: tuple(x + d for d in _distances(n, k)) for k, (name, x) in enumerate(middle.items())}
     if n <= 4:
         first = tuple((30 - 2 * i) / 100 for i in range(n))
@@ -46,8 +48,8 @@ def _distances(n: int, k: int) -> tuple[float, ...]:
 
 def chosen_start(given: object, defaults: Mapping[str, tuple[float, ...]], seed: int) -> Frozen[tuple[float, ...]]:
     """Return {component: floats} from what the user gave for some or all components, the rest as in `defaults`."""
-    found = table("initial", {} if given is None else given)
-    known_keys("initial", found, tuple(defaults))
+    found = check_table("initial", {} if given is None else given)
+    check_keys("initial", found, tuple(defaults))
     states = dict(defaults)
     for name, values in defaults.items():
         if name in found:
@@ -60,26 +62,26 @@ def _component(what: str, value: object, name: str, n: int, seed: int) -> tuple[
         return _uniform(what, value, name, n, seed)
     listed = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(listed, str) or not isinstance(listed, Iterable):
-        return (number(what, listed),) * n
+        return (check_number(what, listed),) * n
     if isinstance(listed, (bytes, set, frozenset)):
-        raise TypeError(f"{what}: found {shown(listed)}; expected a number, {n} numbers or {{low, high, seed}}")
+        raise TypeError(f"{what}: found {short_repr(listed)}; expected a number, {n} numbers or {{low, high, seed}}")
     listed = tuple(islice(listed, n + 1))
     if len(listed) != n:
         count = f"more than {n}" if len(listed) > n else str(len(listed))
         raise ValueError(f"{what}: found {count} values for {n} oscillators; expected {n} values or one number for all")
-    return tuple(number(f"{what}_{i + 1}", entry) for i, entry in enumerate(listed))
+    return tuple(check_number(f"{what}_{i + 1}", entry) for i, entry in enumerate(listed))
 
 
 def _uniform(what: str, given: Mapping[object, object], name: str, n: int, seed: int) -> tuple[float, ...]:
-    known_keys(what, given, ("low", "high", "seed"))
+    check_keys(what, given, ("low", "high", "seed"))
     for key in ("low", "high"):
         if key not in given:
-            found = shown(dict(given))
+            found = short_repr(dict(given))
             raise ValueError(f"{what}: {key!r} is missing in {found}; expected {{low, high}} or {{low, high, seed}}")
-    low, high = number(f"{what}: low", given["low"]), number(f"{what}: high", given["high"])
+    low, high = check_number(f"{what}: low", given["low"]), check_number(f"{what}: high", given["high"])
     if low > high:
         raise ValueError(f"{what}: low = {low!r} is above high = {high!r}; expected low <= high; swap them")
-    own = integer(f"{what}: seed", given["seed"], 0, SEED_LIMIT) if "seed" in given else seed
+    own = check_integer(f"{what}: seed", given["seed"], 0, SEED_LIMIT) if "seed" in given else seed
     stream = random.Random(f"{own} {name}")  # its own stream: x and v of one seed are independent
     shares = (stream.random() for _ in range(n))
     return tuple((1.0 - share) * low + share * high for share in shares)

@@ -11,7 +11,7 @@ from typing import Any
 import sympy as sp
 
 from ..dynamics.periodicity import as_function, names_in
-from ..inputs.checks import shown
+from ..inputs.checks import short_repr
 from ..inputs.words import Word
 from ..mechanics.node_name import NodeName
 from .axis import LIMIT, Axis, known_length
@@ -54,7 +54,7 @@ def check_sweep(model: Model, values: Mapping[str, Any]) -> Continuation:
     """
     zipped, axes = values["zipped"], values["axes"]
     if not isinstance(zipped, bool):
-        raise TypeError(f"zipped: found {shown(zipped)}; expected true or false")
+        raise TypeError(f"zipped: found {short_repr(zipped)}; expected true or false")
     names = [axis.name for axis in axes]
     for i, axis in enumerate(axes):
         _axis(model, values["parameters"], axis)
@@ -114,11 +114,11 @@ def read_axes(given: object, zipped: object) -> tuple[Axis, ...]:
         _cells([known_length(values) for values in given.values()], zipped)
         return tuple(Axis.from_table(name, values) for name, values in given.items())
     if isinstance(given, (str, bytes)) or not isinstance(given, Iterable):
-        raise TypeError(f"axes: found {shown(given)}; expected Axis objects, e.g. [Axis('sigma', [0.1, 0.2])]")
+        raise TypeError(f"axes: found {short_repr(given)}; expected Axis objects, e.g. [Axis('sigma', [0.1, 0.2])]")
     axes = []
     for axis in given:
         if not isinstance(axis, Axis):
-            raise TypeError(f"axes: found {shown(axis)}; expected an Axis, e.g. Axis('sigma', [0.1, 0.2])")
+            raise TypeError(f"axes: found {short_repr(axis)}; expected an Axis, e.g. Axis('sigma', [0.1, 0.2])")
         axes.append(axis)
     return tuple(axes)
 

@@ -12,7 +12,7 @@ import sympy as sp
 from ..algebra.balls import precision
 from ..algebra.lazy import LazyEigenvalues
 from ..algebra.roots import Root, coefficient_text
-from ..inputs.checks import instance
+from ..inputs.checks import check_instance
 from .eigenvalue import Eigenvalue, decimal
 
 __all__ = ["Spectrum", "table"]
@@ -43,8 +43,10 @@ class Spectrum:
 
     def __post_init__(self) -> None:
         if not isinstance(self.eigenvalues, LazyEigenvalues):
-            for e in instance("spectrum", self.eigenvalues, (tuple, list), "Eigenvalues; take the spectrum of a graph"):
-                instance("spectrum", e, Eigenvalue, "an Eigenvalue; take the spectrum of a graph")
+            for e in check_instance(
+                "spectrum", self.eigenvalues, (tuple, list), "Eigenvalues; take the spectrum of a graph"
+            ):
+                check_instance("spectrum", e, Eigenvalue, "an Eigenvalue; take the spectrum of a graph")
         if not self.eigenvalues:
             raise ValueError("a spectrum without eigenvalues; expected at least one")
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from ..inputs.options import whole_numbers
+from ..inputs.options import integers_option
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -22,7 +22,7 @@ CONNECTED = False
 
 def settle(n: int, offsets: Any) -> dict[str, Any]:
     """Distances of 1 … n/2, each once; n - s is s."""
-    given = whole_numbers("offsets", offsets, 1)
+    given = integers_option("offsets", offsets, 1)
     for s in given:
         if s % n == 0:
             raise ValueError(f"offsets = {given}: {s} joins nodes of a ring of {n} to themselves; leave it out")

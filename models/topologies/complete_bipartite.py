@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from ..inputs.options import whole
+from ..inputs.options import integer_option
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -21,7 +21,7 @@ def settle(n: int, left: Any) -> dict[str, Any]:
     """1 … n - 1 nodes on the left."""
     if left is None:
         return {}
-    size = whole("left", left, 1)
+    size = integer_option("left", left, 1)
     if size >= n:
         raise ValueError(f"left = {size} of n = {n} nodes; expected at most {n - 1}, so that both groups have nodes")
     return {"left": size}

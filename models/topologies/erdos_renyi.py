@@ -8,7 +8,7 @@ from fractions import Fraction
 from math import log1p
 from typing import Any
 
-from ..inputs.options import probability, whole
+from ..inputs.options import integer_option, probability_option
 
 SUMMARY = "random graph: each pair joined with probability p (1/2), fixed by seed (0); it may fall into parts"
 MINIMUM = 1
@@ -22,7 +22,7 @@ CONNECTED = False
 
 def settle(n: int, p: Any, seed: Any) -> dict[str, Any]:
     """A probability and a whole number."""
-    return {"p": probability("p", p), "seed": whole("seed", seed, 0)}
+    return {"p": probability_option("p", p), "seed": integer_option("seed", seed, 0)}
 
 
 def expected(n: int, *, p: str = "1/2", seed: int = 0) -> int:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import combinations
 from typing import Any
 
-from ..inputs.options import whole
+from ..inputs.options import integer_option
 
 SUMMARY = "random graph with the same number of neighbours at each node (degree, 4), fixed by seed (0)"
 MINIMUM = 5
@@ -22,10 +22,10 @@ _Edges = set[tuple[int, int]]
 
 def settle(n: int, degree: Any, seed: Any) -> dict[str, Any]:
     """A degree below n, and n times the degree even."""
-    neighbours = whole("degree", degree, 1)
+    neighbours = integer_option("degree", degree, 1)
     if neighbours >= n or n * neighbours % 2:
         raise ValueError(f"degree = {neighbours} with n = {n}; expected less than n, and n times degree even")
-    return {"degree": neighbours, "seed": whole("seed", seed, 0)}
+    return {"degree": neighbours, "seed": integer_option("seed", seed, 0)}
 
 
 def edges(n: int, *, degree: int = 4, seed: int = 0) -> Iterator[tuple[int, int, int]]:

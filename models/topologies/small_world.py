@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any
 
-from ..inputs.options import probability, whole
+from ..inputs.options import integer_option, probability_option
 
 SUMMARY = "ring with several neighbours (4), each edge led elsewhere with probability p (1/10), fixed by seed (0)"
 MINIMUM = 5
@@ -20,17 +20,17 @@ _DRAWS = 10**7
 
 def settle(n: int, neighbours: Any, p: Any, seed: Any) -> dict[str, Any]:
     """An even number of neighbours below n, a probability, a whole number; few draws."""
-    count = whole("neighbours", neighbours, 2)
+    count = integer_option("neighbours", neighbours, 2)
     if count % 2 or count >= n:
         raise ValueError(f"neighbours = {count} with n = {n}; expected an even number below n")
-    chance = probability("p", p)
+    chance = probability_option("p", p)
     draws = int(Fraction(chance) * (n * count // 2) * (n - 1) / max(n - 1 - count, 1))
     if draws > _DRAWS:
         raise ValueError(
             f"neighbours = {count} with n = {n} and p = {chance} takes about {draws} random numbers; "
             f"expected at most {_DRAWS}: take fewer neighbours"
         )
-    return {"neighbours": count, "p": chance, "seed": whole("seed", seed, 0)}
+    return {"neighbours": count, "p": chance, "seed": integer_option("seed", seed, 0)}
 
 
 def edges(n: int, *, neighbours: int = 4, p: str = "1/10", seed: int = 0) -> Iterator[tuple[int, int, int]]:

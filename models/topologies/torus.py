@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from math import isqrt, prod
 from typing import TYPE_CHECKING, Any
 
-from ..inputs.options import whole_numbers
+from ..inputs.options import integers_option
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -24,7 +24,7 @@ def settle(n: int, shape: Any) -> dict[str, Any]:
     """Three or more nodes in each direction, n in all."""
     if shape is None:
         return {}
-    sizes = whole_numbers("shape", shape, 3)
+    sizes = integers_option("shape", shape, 3)
     if prod(sizes) != n:
         raise ValueError(f"shape = {sizes} has {prod(sizes)} nodes; expected n = {n}")
     return {"shape": sizes}

@@ -16,7 +16,7 @@ from numbers import Real
 
 import numpy as np
 
-from synchain.models.inputs.checks import instance, shown
+from synchain.models.inputs.checks import check_instance, short_repr
 from synchain.models.scenes.scene import Scene
 
 from .bifurcations import Bifurcation, bifurcations_at_end, bifurcations_between
@@ -100,7 +100,7 @@ def follow(scene: Scene, name: str, values: Sequence[float] | np.ndarray, first:
     ArithmeticError
         If there is no orbit near `first` at values[0].
     """
-    instance("first", first, PeriodicOrbit, "a PeriodicOrbit, such as periodic_orbit(scene) returns")
+    check_instance("first", first, PeriodicOrbit, "a PeriodicOrbit, such as periodic_orbit(scene) returns")
     wanted = checked_values(first.scene, name, values)
     tracer = BranchTracer(Arc(scene, name, first.periods))
     start = periodic_orbit(scene, first.periods, first.state, **{name: wanted[0]})
@@ -140,11 +140,13 @@ def checked_values(scene: Scene, name: str, values: Sequence[float] | np.ndarray
     if name not in scene.parameters:
         raise ValueError(f"unknown parameter {name!r}; known: {', '.join(scene.parameters)}")
     if not np.iterable(values) or not all(isinstance(value, Real) and math.isfinite(value) for value in values):
-        raise ValueError(f"values: found {shown(values)}; expected finite numbers for {name}")
+        raise ValueError(f"values: found {short_repr(values)}; expected finite numbers for {name}")
     wanted = [float(value) for value in values]
     steps = np.diff(wanted)
     if not wanted or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
-        raise ValueError(f"values: found {shown(wanted)}; expected at least one number, rising or falling all the way")
+        raise ValueError(
+            f"values: found {short_repr(wanted)}; expected at least one number, rising or falling all the way"
+        )
     return wanted
 
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from synchain.models.inputs.checks import shown
+from synchain.models.inputs.checks import short_repr
 from synchain.models.mechanics.stick_slip import SLIP
 from synchain.models.scenes.scene import Scene
 
@@ -178,7 +178,7 @@ def check_periods(periods: object) -> None:
         If it is no whole number between 1 and LONGEST.
     """
     if not isinstance(periods, Integral) or not 1 <= int(periods) <= LONGEST:
-        raise ValueError(f"periods = {shown(periods)}; expected a whole number, at least 1, at most {LONGEST}")
+        raise ValueError(f"periods = {short_repr(periods)}; expected a whole number, at least 1, at most {LONGEST}")
 
 
 def orbit_through(scene: Scene, periods: int, state: np.ndarray, **parameters: float) -> PeriodicOrbit:
@@ -258,7 +258,7 @@ def _state(scene: Scene, start: Sequence[float] | np.ndarray) -> np.ndarray:
     except (TypeError, ValueError):
         state = np.empty(0)
     if state.ndim != 1 or len(state) not in (len(names), len(scene.components)) or not np.all(np.isfinite(state)):
-        raise ValueError(f"start: found {shown(start)}; expected a number for each of {', '.join(names)}")
+        raise ValueError(f"start: found {short_repr(start)}; expected a number for each of {', '.join(names)}")
     return state[: len(names)]
 
 
@@ -293,7 +293,7 @@ def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
 
     for name, value in (("low", low), ("high", high)):
         if not isinstance(value, Real) or not math.isfinite(value):
-            raise ValueError(f"{name} = {shown(value)}; expected a finite strength alpha")
+            raise ValueError(f"{name} = {short_repr(value)}; expected a finite strength alpha")
 
     def growth(alpha: float) -> float:
         return float(np.log(abs(orbit.transversal_multipliers(alpha)[0])))

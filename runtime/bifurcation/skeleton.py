@@ -15,7 +15,7 @@ from numbers import Integral
 import numpy as np
 from tqdm import tqdm
 
-from synchain.models.inputs.checks import shown
+from synchain.models.inputs.checks import short_repr
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..stability.exponents import coupled_cell, initial_states
@@ -78,10 +78,10 @@ def skeleton(
     """
     grid = sorted(checked_values(a_scene(scene), name, values))
     if isinstance(periods, Integral | str) or len(periods) == 0:
-        raise ValueError(f"periods = {shown(periods)}; expected numbers of drive periods, e.g. (1, 2)")
+        raise ValueError(f"periods = {short_repr(periods)}; expected numbers of drive periods, e.g. (1, 2)")
     scene = coupled_cell(skeleton, scene, TOLERANCE, {})
     if not isinstance(looks, Integral) or looks < 1:
-        raise ValueError(f"looks = {shown(looks)}; expected a whole number, at least 1")
+        raise ValueError(f"looks = {short_repr(looks)}; expected a whole number, at least 1")
     for each in periods:
         check_periods(each)
     branches: list[Branch] = []

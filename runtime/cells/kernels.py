@@ -12,7 +12,7 @@ from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.sweep import AUTO, KernelSource, default_width, emit
 from synchain.codegen.simd.lane_types import WIDTHS
 from synchain.models.dynamics.equations import Equations
-from synchain.models.inputs.checks import whole
+from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
 from .reduce import Reduction, as_reduction
@@ -54,7 +54,7 @@ def write_kernel(reduction: Reduction, width: int | None = None) -> KernelSource
     """
     scene = reduction.scene
     width = 1 if width is None and scene.cells == 1 else width
-    if width is not None and whole("width", width, 1) not in WIDTHS:
+    if width is not None and check_integer("width", width, 1) not in WIDTHS:
         raise ValueError(f"width = {width}; expected one of {', '.join(map(str, WIDTHS))}")
     section = None
     if "section" in scene.record:

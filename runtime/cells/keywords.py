@@ -8,7 +8,7 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from synchain.models.inputs.checks import number, suggestion
+from synchain.models.inputs.checks import check_number, suggestion
 from synchain.models.scenes.scene import KEYWORDS, Scene, a_scene
 
 __all__ = ["check_keywords", "with_axes", "with_parameters"]
@@ -39,7 +39,7 @@ def with_axes(function: Callable[..., Any], scene: Scene, axes: Mapping[str, Any
             swept[name] = value
         elif _is_state(scene, name):
             component, node = name.rsplit("_", 1)
-            start[component][scene.equations.holders(component).index(int(node) - 1)] = number(name, value)
+            start[component][scene.equations.holders(component).index(int(node) - 1)] = check_number(name, value)
             swept.pop(name, None)
         else:
             fixed[name] = value

@@ -18,7 +18,7 @@ import numpy as np
 from synchain.codegen.driver.columns import Point, Sum
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.reduction import NoQuotient, quotient, substitute_constants
-from synchain.models.inputs.checks import flag
+from synchain.models.inputs.checks import check_flag
 from synchain.models.mechanics.node_name import NodeName
 from synchain.models.scenes.scene import Scene, a_scene
 
@@ -171,7 +171,7 @@ def as_reduction(scene: Scene, reduce: bool | Reduction) -> Reduction:
     """
     a_scene(scene)
     if not isinstance(reduce, Reduction):
-        return reduce_scene(scene, flag("reduce", reduce))
+        return reduce_scene(scene, check_flag("reduce", reduce))
     if reduce.scene != scene:
         raise ValueError("reduce: found the reductions of another scene; make them with reduce_scene(scene)")
     return reduce

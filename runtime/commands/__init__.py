@@ -23,7 +23,7 @@ def command(name: str) -> ModuleType:
     """The module of a command; ValueError on an unknown name."""
     known = names()
     if name not in known:
-        from synchain.models.inputs.checks import shown, suggestion
+        from synchain.models.inputs.checks import short_repr, suggestion
 
-        raise ValueError(f"unknown command {shown(name)}; known: {', '.join(known)}{suggestion(name, known)}")
+        raise ValueError(f"unknown command {short_repr(name)}; known: {', '.join(known)}{suggestion(name, known)}")
     return import_module(f".{name}", __name__)

@@ -7,7 +7,7 @@ from argparse import ArgumentParser, ArgumentTypeError
 from typing import Any
 
 from synchain.models.inputs.arithmetic import constant
-from synchain.models.inputs.checks import shown
+from synchain.models.inputs.checks import short_repr
 from synchain.models.scenes.axis import LIMIT as AXIS_LIMIT
 from synchain.models.scenes.axis import Axis
 
@@ -31,9 +31,9 @@ NODES = 100_000
 def whole(text: str, most: int = NODES) -> int:
     """A whole number of at most NODES, or of at most another limit."""
     if not re.fullmatch(r"[+-]?[0-9]+", text):
-        raise ArgumentTypeError(f"found {shown(text)}; expected a whole number")
+        raise ArgumentTypeError(f"found {short_repr(text)}; expected a whole number")
     if len(text) > 9 or int(text) > most:
-        raise ArgumentTypeError(f"found {shown(text)}; expected at most {most}")
+        raise ArgumentTypeError(f"found {short_repr(text)}; expected at most {most}")
     return int(text)
 
 
@@ -57,7 +57,7 @@ def number(text: str) -> float:
     try:
         return constant(text)
     except ValueError:
-        raise ArgumentTypeError(f"found {shown(text)}; expected a finite number, e.g. 1.15 or 2*pi/5") from None
+        raise ArgumentTypeError(f"found {short_repr(text)}; expected a finite number, e.g. 1.15 or 2*pi/5") from None
 
 
 def above_zero(text: str) -> float:
@@ -80,10 +80,10 @@ def span(text: str) -> dict[str, Any]:
     """LO:HI:N as the table from, to and count of an axis, none of whose values is built."""
     parts = text.split(":")
     if len(parts) != 3:
-        raise ArgumentTypeError(f"found {shown(text)}; expected LO:HI:N, e.g. 0:0.6:241")
+        raise ArgumentTypeError(f"found {short_repr(text)}; expected LO:HI:N, e.g. 0:0.6:241")
     low, high, count = number(parts[0]), number(parts[1]), positive(parts[2], AXIS_LIMIT)
     if count < 2 or not low < high:
-        raise ArgumentTypeError(f"found {shown(text)}; expected LO below HI and at least 2 values")
+        raise ArgumentTypeError(f"found {short_repr(text)}; expected LO below HI and at least 2 values")
     return {"from": low, "to": high, "count": count}
 
 
@@ -96,7 +96,7 @@ def grid(text: str) -> tuple[float, ...]:
     """LO:HI:N with nothing below 0: a grid of the coupling."""
     values = spaced(text)
     if values[0] < 0:
-        raise ArgumentTypeError(f"found {shown(text)}; expected LO of at least 0: negative coupling drives apart")
+        raise ArgumentTypeError(f"found {short_repr(text)}; expected LO of at least 0: negative coupling drives apart")
     return values
 
 
@@ -104,7 +104,9 @@ def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, Any]]
     """name=value, name=a,b,c or name=LO:HI:N."""
     name, equals, value = text.partition("=")
     if not (name.isidentifier() and equals and value):
-        raise ArgumentTypeError(f"found {shown(text)}; expected name=value, name=a,b,c or name=LO:HI:N, after SCENE")
+        raise ArgumentTypeError(
+            f"found {short_repr(text)}; expected name=value, name=a,b,c or name=LO:HI:N, after SCENE"
+        )
     if ":" in value:
         return name, span(value)
     if "," in value:

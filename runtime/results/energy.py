@@ -11,7 +11,7 @@ import sympy as sp
 from scipy.integrate import cumulative_simpson
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.inputs.checks import known_keys, number, table
+from synchain.models.inputs.checks import check_keys, check_number, check_table
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.energy import Energy, Share, energy
 from synchain.models.scenes.scene import Scene
@@ -86,8 +86,8 @@ class EnergyFunction:
     def _sum(self, power: bool, states: Array, t: Array | float, parameters: Values) -> Array:
         values = dict(self.scene.parameters)
         if parameters is not None:
-            known_keys("parameters", table("parameters", parameters), values)
-            values |= {name: number(name, value) for name, value in parameters.items()}
+            check_keys("parameters", check_table("parameters", parameters), values)
+            values |= {name: check_number(name, value) for name, value in parameters.items()}
         given, time, size = numbers("states", states), numbers("t", t)[..., None], len(self.scene.y0)
         if given.ndim < 1 or given.shape[-1] != size:
             raise ValueError(f"states: found an array of shape {given.shape}; expected rows of {size} numbers")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 
-from synchain.models.inputs.checks import a_path
+from synchain.models.inputs.checks import check_path
 
 from .block_log import is_block_log
 from .labels import changed
@@ -43,7 +43,7 @@ def open_result(path: str | os.PathLike[str]) -> Result:
         If the code of the model has changed since: the numbers are those of the former model, the
         scene names the present one.
     """
-    path = a_path("result", path)
+    path = check_path("result", path)
     result = read_partial(path) if is_block_log(path) else read_result(path)
     if changed(result.data.attrs, result.scene):
         warnings.warn(

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from synchain.models.inputs.checks import whole
+from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import IN_MEMORY, Buffers, numbers_of_a_cell
@@ -58,7 +58,7 @@ def layout_of(about: Mapping[str, Any], scene: Scene) -> Layout:
     ValueError
         If it does not have as many as its scene needs.
     """
-    layout = Layout.of(scene, whole("size", about["size"], 1))
+    layout = Layout.of(scene, check_integer("size", about["size"], 1))
     if layout.blocks != about["blocks"]:
         raise ValueError(f"found {about['blocks']} blocks; expected {layout.blocks} for the cells of its scene")
     return layout

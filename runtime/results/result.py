@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from synchain.codegen.kernels.processor import processor, told_apart
-from synchain.models.inputs.checks import instance
+from synchain.models.inputs.checks import check_instance
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.buffers import Buffers
@@ -50,7 +50,7 @@ class Result:
     scene: Scene
 
     def __post_init__(self) -> None:
-        instance("data", self.data, xr.Dataset, "an xarray.Dataset; open_result reads one from a file")
+        check_instance("data", self.data, xr.Dataset, "an xarray.Dataset; open_result reads one from a file")
         a_scene(self.scene)
 
     def __getattr__(self, name: str) -> xr.DataArray:

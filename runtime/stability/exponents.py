@@ -21,7 +21,7 @@ import numpy as np
 from tqdm import tqdm
 
 from synchain.models.graphs.families import topology
-from synchain.models.inputs.checks import whole
+from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import with_parameters
@@ -253,7 +253,7 @@ def initial_states(scene: Scene, starts: int, seed: int) -> np.ndarray:
     -------
     ndarray, shape (starts, components)
     """
-    starts = whole("starts", starts, 1)
+    starts = check_integer("starts", starts, 1)
     state = np.tile([values[0] for values in scene.initial.values()], (starts, 1))
     state[1:, 0] += np.random.default_rng(seed).uniform(-0.4, 0.4, starts - 1)
     return state

@@ -22,7 +22,7 @@ import numpy as np
 from tqdm import tqdm
 
 from synchain.models.dynamics.variational import PHASE, Variation, network_variation, phase_shifted, with_volume
-from synchain.models.inputs.checks import whole
+from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
 from ..cells.initial_modes import with_modes
@@ -198,7 +198,7 @@ def _counted(scene: Scene, count: int | None) -> int:
     dimension = scene.n * len(scene.equations.nodes[0].continuous)
     if count is None:
         return dimension
-    if not 1 <= whole("count", count, -dimension) <= dimension:
+    if not 1 <= check_integer("count", count, -dimension) <= dimension:
         raise ValueError(f"count = {count}; expected 1 … {dimension}, the components of the network's state")
     return count
 

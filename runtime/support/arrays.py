@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from synchain.models.inputs.checks import number, positive, shown, whole
+from synchain.models.inputs.checks import check_integer, check_number, check_positive, short_repr
 
 __all__ = ["averaging", "numbers", "row"]
 
@@ -27,7 +27,7 @@ def numbers(what: str, values: Any, *, complex_too: bool = False) -> np.ndarray:
         return found if found.dtype.kind == "c" else found.astype(float)
     except (TypeError, ValueError):
         kind = "numbers" if complex_too else "real numbers"
-        raise ValueError(f"{what}: found {shown(values)}; expected {kind}") from None
+        raise ValueError(f"{what}: found {short_repr(values)}; expected {kind}") from None
 
 
 def averaging(precision: Any, periods: Any, transient: Any, seed: Any) -> tuple[float, float, float, int]:
@@ -35,10 +35,10 @@ def averaging(precision: Any, periods: Any, transient: Any, seed: Any) -> tuple[
     and random seed.
     """
     return (
-        number("precision", precision, 0.0),
-        positive("periods", periods),
-        number("transient", transient, 0.0),
-        whole("seed", seed, 0),
+        check_number("precision", precision, 0.0),
+        check_positive("periods", periods),
+        check_number("transient", transient, 0.0),
+        check_integer("seed", seed, 0),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from synchain.models.inputs.checks import whole
+from synchain.models.inputs.checks import check_integer
 
 __all__ = ["worker_count"]
 
@@ -15,4 +15,4 @@ def worker_count(workers: int | None) -> int:
     """
     if workers is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return whole("workers", workers, 1)
+    return check_integer("workers", workers, 1)

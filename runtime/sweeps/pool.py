@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from synchain.models.inputs.checks import instance
+from synchain.models.inputs.checks import check_instance
 
 from ..cells.buffers import Buffers
 from ..support.threads import worker_count
@@ -130,7 +130,7 @@ def pool_size(executor: Executor | None, workers: int | None) -> int:
     all cores.
     """
     if executor is not None:
-        instance("executor", executor, Executor, "a concurrent.futures.Executor, e.g. ProcessPoolExecutor(2)")
+        check_instance("executor", executor, Executor, "a concurrent.futures.Executor, e.g. ProcessPoolExecutor(2)")
     if executor is None or workers is not None:
         return worker_count(workers)
     client = getattr(executor, "_client", None)  # of dask.distributed

@@ -11,7 +11,7 @@ from typing import Any
 
 from synchain.codegen.driver.columns import Control
 from synchain.codegen.kernels.compile import load
-from synchain.models.inputs.checks import flag
+from synchain.models.inputs.checks import check_flag
 from synchain.models.scenes.scene import Scene
 
 from ..cells.kernels import warn_of_chords, write_kernel
@@ -93,7 +93,7 @@ def prepare(
         Section points of a cell to make room for at first.
     """
     scene = reduction.scene
-    certify_now = not isinstance(certified, Certificate) and flag("certified", certified)
+    certify_now = not isinstance(certified, Certificate) and check_flag("certified", certified)
     source = write_kernel(reduction, width)
     warn_of_chords(source)
     count = pool_size(executor, workers)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from synchain.models.inputs.checks import a_callable, flag
+from synchain.models.inputs.checks import check_callable, check_flag
 
 from ..support.status import CODES, Status
 
@@ -92,9 +92,9 @@ def check_reporting(show: bool | None, hook: Hook | None) -> None:
     None.
     """
     if hook is not None:
-        a_callable("progress", hook)
+        check_callable("progress", hook)
     if show is not None:
-        flag("show_progress", show)
+        check_flag("show_progress", show)
 
 
 @dataclass(slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from concurrent.futures import Executor
 from typing import Any
 
-from synchain.models.inputs.checks import instance
+from synchain.models.inputs.checks import check_instance
 from synchain.models.scenes.scene import Scene
 
 from ..cells.keywords import with_axes
@@ -75,7 +75,7 @@ def run(
     """
     scene = with_axes(run, scene, axes)
     if resume is not None:
-        instance("resume", resume, Result, "an earlier Result, e.g. from open_result")
+        check_instance("resume", resume, Result, "an earlier Result, e.g. from open_result")
     reporter = Reporter(scene.cells, show_progress, progress)
     reduction = as_reduction(scene, reduce)
     reduction.check_memory()

@@ -15,7 +15,7 @@ import numpy as np
 
 from synchain.codegen.kernels.installation import InstallationError
 from synchain.codegen.kernels.processor import told_apart
-from synchain.models.inputs.checks import a_path, flag, shown
+from synchain.models.inputs.checks import check_flag, check_path, short_repr
 from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
@@ -159,8 +159,8 @@ def claim(
         If there is nothing to resume.
     """
     for name, value in (("resume", resume), ("overwrite", overwrite), ("certified", certified)):
-        flag(name, value)
-    target = a_path("path", path)
+        check_flag(name, value)
+    target = check_path("path", path)
     partial = partial_path(target)
     if target.suffix.lower() == partial.suffix:
         raise ValueError(
@@ -201,7 +201,7 @@ def _check_same(reduction: Reduction, certified: bool, path: Path, about: Mappin
     attributes = about["attributes"]
     again = "repeat the options of that run, choose another path (--out), or replace it with overwrite (--overwrite)"
     if not alike(scene_of(attributes), reduction.scene):
-        raise ValueError(f"{path} belongs to another scene ({shown(attributes['title'])}); {again}")
+        raise ValueError(f"{path} belongs to another scene ({short_repr(attributes['title'])}); {again}")
     if changed(attributes, reduction.scene):
         raise ValueError(
             f"{path} comes of another model: the code of its scene has changed since; "

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from synchain.models.inputs.checks import number, table, whole
+from synchain.models.inputs.checks import check_integer, check_number, check_table
 from synchain.models.mechanics.stick_slip import SLIP
 from synchain.models.scenes.scene import Scene, a_scene
 
@@ -170,11 +170,11 @@ def random_starts(scene: Scene, samples: int, ranges: Mapping[str, Range] | None
 def _check(scene: Scene, samples: Any, tolerance: Any, confidence: Any, seed: Any) -> None:
     if a_scene(scene).n < 2:
         raise ValueError(f"basin: found {scene.n} oscillator; expected at least two, which can synchronise")
-    whole("basin: samples", samples, 1, SAMPLE_LIMIT)
-    whole("basin: seed", seed, 0)
-    if not number("basin: tolerance", tolerance) > 0:
+    check_integer("basin: samples", samples, 1, SAMPLE_LIMIT)
+    check_integer("basin: seed", seed, 0)
+    if not check_number("basin: tolerance", tolerance) > 0:
         raise ValueError(f"basin: tolerance = {tolerance}; expected a positive number")
-    if not 0 < number("basin: confidence", confidence) < 1:
+    if not 0 < check_number("basin: confidence", confidence) < 1:
         raise ValueError(f"basin: confidence = {confidence}; expected a number between 0 and 1, e.g. 0.95")
 
 
@@ -185,7 +185,7 @@ def _box(scene: Scene, ranges: Mapping[str, Range] | None) -> dict[str, Range]:
     known = tuple(name for name in scene.components if name != SLIP.name)
     if ranges is None:
         return dict.fromkeys(known, (-1.0, 1.0))
-    unknown = [name for name in table("basin: ranges", ranges) if name not in known]
+    unknown = [name for name in check_table("basin: ranges", ranges) if name not in known]
     if unknown:
         raise ValueError(f"basin: unknown component {unknown[0]!r}; known: {', '.join(known)}")
     if not ranges:

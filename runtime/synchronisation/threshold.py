@@ -19,7 +19,7 @@ import numpy as np
 
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
-from synchain.models.inputs.checks import instance, number, positive, whole
+from synchain.models.inputs.checks import check_instance, check_integer, check_number, check_positive
 from synchain.models.scenes.scene import Scene, a_scene
 from synchain.models.spectra.spectrum import Spectrum
 
@@ -75,17 +75,17 @@ class Criterion:
 
     def __post_init__(self) -> None:
         for name in ("tolerance", "transient", "window", "rtol"):
-            object.__setattr__(self, name, positive(f"criterion: {name}", getattr(self, name)))
-        object.__setattr__(self, "reach", number("criterion: reach", self.reach, 0.0))
-        whole("criterion: starts", self.starts, 1)
-        whole("criterion: seed", self.seed, 0)
+            object.__setattr__(self, name, check_positive(f"criterion: {name}", getattr(self, name)))
+        object.__setattr__(self, "reach", check_number("criterion: reach", self.reach, 0.0))
+        check_integer("criterion: starts", self.starts, 1)
+        check_integer("criterion: seed", self.seed, 0)
 
 
 def checked(criterion: Criterion | None) -> Criterion:
     """Return the criterion, or the default one for None; TypeError for anything else."""
     if criterion is None:
         return Criterion()
-    return instance("criterion", criterion, Criterion, "a Criterion, e.g. Criterion(starts=4)")
+    return check_instance("criterion", criterion, Criterion, "a Criterion, e.g. Criterion(starts=4)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +180,7 @@ def thresholds(
     scene = scene.replace(record=("sync_error",))
     grid = default_grid(spectrum) if sigma is None else row("sigma", sigma, 2, rising=True)
     options: dict[str, Any] = {
-        "resolution": positive("resolution", resolution),
+        "resolution": check_positive("resolution", resolution),
         "criterion": criterion,
         "workers": workers,
         "executor": executor,
