@@ -19,11 +19,11 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import lru_cache, wraps
+from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Any, ParamSpec, TypeVar
+from typing import Any
 
 from .checks import shown, suggestion, text
 
@@ -39,11 +39,7 @@ __all__ = [
     "named",
     "names",
     "part",
-    "remembered",
 ]
-
-P = ParamSpec("P")
-T = TypeVar("T")
 
 PACKAGE = "synchain.models"
 """The package whose folders hold the plug-ins that are shipped."""
@@ -90,10 +86,6 @@ class OwnFile(str):
         made = super().__new__(cls, name)
         made.place, made.digest = place, digest
         return made
-
-    def spelt(self, name: str) -> OwnFile:
-        """The same file and text with another name: "law.py" of "law.py on x"."""
-        return OwnFile(name, self.place, self.digest)
 
     def _key(self) -> tuple[str, str, str]:
         return str(self), self.place, self.digest
@@ -173,29 +165,8 @@ def load(kind: Kind, name: str) -> ModuleType:
 
 
 def part(what: str, value: object) -> str:
-    """Return the name of a part of the model where it is text; it may be a long path to a file of code."""
-    words = text(what, value, 1000 if isinstance(value, str) and ".py" in value else 200)
-    return value if isinstance(value, OwnFile) else words
-
-
-def remembered(**parts: Callable[[str], str]) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Let a function keep its answers; `parts` says how its arguments that name plug-ins are `named`, so by their text."""
-
-    def decorate(function: Callable[P, T]) -> Callable[P, T]:
-        signature, answers = inspect.signature(function), lru_cache(maxsize=64)(function)
-
-        @wraps(function)
-        def answer(*positional: P.args, **keywords: P.kwargs) -> T:
-            given = signature.bind(*positional, **keywords)
-            given.apply_defaults()
-            for argument, naming in parts.items():
-                if given.arguments[argument] is not None:
-                    given.arguments[argument] = naming(given.arguments[argument])
-            return answers(*given.args)
-
-        return answer
-
-    return decorate
+    """Return the name of a part of the model as text; it may be a long path to a file of code."""
+    return text(what, value, 1000 if isinstance(value, str) and ".py" in value else 200)
 
 
 def call(function: Callable[..., Any], symbols: Mapping[str, Any]) -> Any:

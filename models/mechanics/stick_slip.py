@@ -57,7 +57,7 @@ class Contact:
     def jumps(self) -> bool:
         """True where the static coefficient exceeds that of slow slip, so that slip begins with a jump of
         acceleration."""
-        return sp.simplify(self.up - self.pushed) != 0 or sp.simplify(self.down - self.pulled) != 0
+        return bool(sp.simplify(self.up - self.pushed) != 0 or sp.simplify(self.down - self.pulled) != 0)
 
 
 def set_valued(

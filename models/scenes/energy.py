@@ -71,7 +71,7 @@ class Energy:
         """Return energy and power of the whole network in its state symbols (algebra grows with n: meant for small n)."""
         eq = self.equations
         placed = [(self.nodes[eq.kind(i)], eq.at_node(i)) for i in range(eq.n)]
-        shares: list[tuple[Share, dict]] = [
+        shares: list[tuple[Share, dict[sp.Symbol, sp.Expr]]] = [
             *placed,
             *((self.links[self.of_link(p)], eq.at_link(p)) for p in self.pairs),
         ]

@@ -12,8 +12,9 @@ from ..dynamics import network
 from ..dynamics.equations import Equations
 from ..graphs.families import topology
 from ..graphs.topology import Topology
-from ..inputs.checks import integer, known_keys, number, shown, suggestion, table, text
+from ..inputs.checks import integer, known_keys, number, shown, suggestion, table
 from ..inputs.frozen import Frozen
+from ..inputs.plugins import part
 from ..mechanics.coupling import Coupling, LagrangianCoupling, MatrixCoupling
 from ..mechanics.friction import ContactModel, FrictionLaw
 from ..mechanics.link import check_coupling
@@ -36,9 +37,6 @@ __all__ = [
 
 MOST = 100_000
 """Most nodes that groups may name."""
-
-PATH_LENGTH = 1000
-"""Longest text that names a part of a model by a path to a file of code."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,7 +275,7 @@ def in_range(name: str, value: object, parameter: Parameter) -> float:
 
 def as_oscillator(value: object, what: str = "oscillator") -> Oscillator:
     """Return an oscillator as it is, or load the one of a name; ValueError or TypeError for any other value."""
-    return value if isinstance(value, Oscillator) else load_oscillator(_name(what, value))
+    return value if isinstance(value, Oscillator) else load_oscillator(part(what, value))
 
 
 def as_law(value: object, oscillator: Oscillator) -> FrictionLaw | None:
@@ -294,7 +292,7 @@ def as_law(value: object, oscillator: Oscillator) -> FrictionLaw | None:
         return load_friction_law("exponential") if oscillator.takes_friction else None
     if value is None or isinstance(value, FrictionLaw):
         return value
-    name = _name("friction", value)
+    name = part("friction", value)
     return None if name == "none" else load_friction_law(name)
 
 
@@ -302,7 +300,7 @@ def as_coupling(value: object) -> Coupling | None:
     """Return a coupling as it is, or read the one of a text; None for None and "none"."""
     if value is None or isinstance(value, MatrixCoupling | LagrangianCoupling):
         return value
-    words = _name("coupling", value)
+    words = part("coupling", value)
     return None if words == "none" else read_coupling(words)
 
 
@@ -348,8 +346,3 @@ def _group(what: str, value: object, n: int) -> Group:
     if not numbers or len(set(numbers)) < len(numbers):
         raise ValueError(f"{what}: at is {shown(list(numbers))}; expected at least one node and each node once")
     return Group(oscillator, as_law(entry.get("friction", "default"), oscillator), numbers)
-
-
-def _name(what: str, value: object) -> str:
-    """The name of a part of the model as text; it may be a long path to a file of code."""
-    return text(what, value, PATH_LENGTH if isinstance(value, str) and ".py" in value else 200)

@@ -171,7 +171,8 @@ class Scene:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences about what is allowed but probably not meant."""
-        return warnings(self)
+        unit = self.period or 1.0 if self.time_unit == TimeUnit.PERIOD else 1.0
+        return warnings(self.model, self.varied, self._values(), (self.transient + self.window) * unit)
 
     def takes(self, name: str) -> bool:
         """True for the name of a parameter, "a", and for that of a parameter of one node, "a_2"."""
@@ -201,7 +202,7 @@ class Scene:
             )
         given = {**self.given, "initial": self._kept_start(changes), **changes}
         if given["parameters"] is not None or single:
-            numbers = table("parameters", {} if given["parameters"] is None else given["parameters"])
+            numbers = {} if given["parameters"] is None else table("parameters", given["parameters"])
             given["parameters"] = {**without(self.model, numbers, single), **single}
         if self.varied and "parameters" not in changes and getattr(given["topology"], "n", None) != self.n:
             raise ValueError(f"{self.varied[0]} has values for {self.n} nodes; give `parameters` for another number")
@@ -217,9 +218,13 @@ class Scene:
             return {name: at for name, at in start.items() if name != SLIP.name}  # modes follow from x and v
         return start
 
+    def _values(self) -> dict[str, Any]:
+        """The completed value of each keyword."""
+        return {name: getattr(self, name) for name in KEYWORDS}
+
     def as_dict(self) -> dict[str, Any]:
         """Return the whole scene in JSON types; `Scene.from_dict` makes an equal scene of it."""
-        return as_dict(self)
+        return as_dict(self._values(), self.varied)
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any], folder: Path | None = None) -> Scene:
