@@ -5,8 +5,8 @@ Besides the files of this package there are entry points of installed packages (
 ``.py``.  Such a file is run only after `allow_code` has been called for it, so that a scene, which is data, never runs code
 by itself.
 
-A file outside the package is known by its place and its text (`OwnFile`), so that an edited file is another model.  What
-such a file imports is not looked at: write a model in one file.
+A file outside the package is known by its text, so that an edited file is another model.  What such a file imports is
+not looked at: write a model in one file.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class Kind:
 class OwnFile(str):
     """The name of a plug-in file outside the package, as it was written, with the file and the text that it stands for.
 
-    Two of them are equal where name, place and text are equal; none is equal to a plain text.  So whatever is kept for a
+    Two of them are equal if name, place and text are equal; none is equal to a plain text.  So whatever is kept for a
     name is kept for one text of one file.
     """
 
@@ -83,9 +83,9 @@ class OwnFile(str):
     digest: str
 
     def __new__(cls, name: str, place: str, digest: str) -> OwnFile:
-        made = super().__new__(cls, name)
-        made.place, made.digest = place, digest
-        return made
+        file = super().__new__(cls, name)
+        file.place, file.digest = place, digest
+        return file
 
     def _key(self) -> tuple[str, str, str]:
         return str(self), self.place, self.digest
@@ -115,9 +115,19 @@ def names(kind: Kind) -> tuple[str, ...]:
 
 
 def allow_code(*paths: str | Path) -> None:
-    """Allow files outside the package to be run as plug-ins, from now on; ValueError where one is no .py file.
+    """Allow files outside the package to be run as plug-ins, from now on.
 
     Afterwards their paths are names: Scene(friction="./my_law.py").  Only allow what you have read.
+
+    Parameters
+    ----------
+    *paths : str or Path
+        The files.
+
+    Raises
+    ------
+    ValueError
+        If one is no file that ends in .py.
     """
     for path in paths:
         place = Path(path)
@@ -146,10 +156,21 @@ def named(kind: Kind, name: str) -> str:
 
 
 def load(kind: Kind, name: str) -> ModuleType:
-    """Return the plug-in module `name`; raises ValueError with the known names where there is none.
+    """Return the module of a plug-in.
 
-    A path that ends in ".py" is loaded where `allow_code` has allowed it, as its text is now; an error in that file names
-    its line.  An `OwnFile` gives the text that it was made of: ValueError where that is neither known nor in the file.
+    Parameters
+    ----------
+    kind : Kind
+        The kind of plug-in.
+    name : str
+        The name of a shipped file or of an entry point, or a path that ends in ".py" and was allowed by `allow_code`,
+        whose text is taken as it is now.  An `OwnFile` gives the text that it was made of.
+
+    Raises
+    ------
+    ValueError
+        If there is no such plug-in, with the known names; if a file is not what its kind must be, with the line; and if
+        the text of an `OwnFile` is neither known nor in the file.
     """
     if name in _own(kind):
         return import_module(f"{PACKAGE}.{kind.folder}.{name}")
@@ -172,8 +193,11 @@ def part(what: str, value: object) -> str:
 def call(function: Callable[..., Any], symbols: Mapping[str, Any]) -> Any:
     """Call a plug-in's function with those of `symbols` that its signature names.
 
-    Raises ValueError where it asks for a name that is not among them, and where a function from outside the package
-    fails, with its file and line.
+    Raises
+    ------
+    ValueError
+        If the function asks for a name that is not among them, and if a function from outside the package fails, with
+        its file and line.
     """
     wanted = inspect.signature(function).parameters
     for name in wanted:
@@ -253,7 +277,7 @@ def _check_installed(kind: Kind, module: ModuleType, where: str) -> None:
 
 
 def _text(kind: Kind, name: str, place: Path) -> bytes:
-    """What stands in a file that may be run; ValueError where it may not, or cannot be read."""
+    """What stands in a file that may be run; ValueError if it may not, or cannot be read."""
     if not place.is_file():
         raise ValueError(f"{kind.name} {name!r}: no such file: {place}; expected a .py file; check the path")
     if place not in _allowed:

@@ -58,7 +58,7 @@ class Energy:
 
     @property
     def conservative(self) -> bool:
-        """True where no power is fed in or lost, for all values of the parameters."""
+        """True if no power is fed in or lost, for all values of the parameters."""
         return all(share.power == 0 for share in (*self.nodes, *self.links))
 
     def of_link(self, link: Link) -> int:

@@ -274,7 +274,7 @@ def in_range(name: str, value: object, parameter: Parameter) -> float:
 
 
 def as_oscillator(value: object, what: str = "oscillator") -> Oscillator:
-    """Return an oscillator as it is, or load the one of a name; ValueError or TypeError for any other value."""
+    """Return an oscillator as it is, or load the one of a name; any other value raises ValueError or TypeError."""
     return value if isinstance(value, Oscillator) else load_oscillator(part(what, value))
 
 
@@ -313,7 +313,20 @@ def as_topology(value: object) -> Topology:
 
 
 def as_groups(value: object, n: int) -> tuple[Group, ...]:
-    """Return the groups of a list of tables with `oscillator`, `friction` and `at`; ValueError or TypeError else."""
+    """Return the groups of nodes of a list of tables.
+
+    Parameters
+    ----------
+    value : object
+        Groups, or tables with `oscillator`, `friction` and `at`; None for none.
+    n : int
+        The number of nodes.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an entry is no such table, names no node or one that another group names.
+    """
     if value is None:
         return ()
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
