@@ -235,7 +235,7 @@ def _parts(given: Scene) -> str:
     kinds = [(given.oscillator, given.friction), *((group.oscillator, group.friction) for group in given.nodes)]
     named = [("integrator", given.integrator), ("topology", given.topology.name), ("contact", given.contact)]
     named += [("oscillator", oscillator) for oscillator, _ in kinds] + [("friction", law) for _, law in kinds]
-    named += [("coupling", (given.coupling or "").partition(" on ")[0])] if given.topology.links else []
+    named += [("coupling", str(given.coupling or "").partition(" on ")[0])] if given.topology.links else []
     return ", ".join(f"{kind} {name}" for kind, name in dict.fromkeys(named) if name)
 
 

@@ -6,5 +6,5 @@ A coupling is a module with SUMMARY, SOURCE, PARAMETERS (its strength is always 
 Where exchanging i and j changes the energy, links have a direction and the weight 1 (`synchain.models.mechanics.orientation`).
 
 These join coordinates, all of them or those named as in "spring on x".  A coupling that is linear in any states of any
-node needs no file: a text such as "x->x, 1/2 y->z" is one (`synchain.models.mechanics.coupling_text`).
+node needs no file: a text such as "x->x, 1/2 y->z" is one (`synchain.models.mechanics.coupling`).
 """

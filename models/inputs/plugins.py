@@ -5,8 +5,8 @@ Besides the files of this package there are entry points of installed packages (
 ``.py``.  Such a file is run only after `allow_code` has been called for it, so that a scene, which is data, never runs code
 by itself.
 
-A file outside the package is known by its place and its text (`OwnFile`), so that an edited file is another model.  What
-such a file imports is not looked at: write a model in one file.
+A file outside the package is known by its text, so that an edited file is another model.  What such a file imports is
+not looked at: write a model in one file.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import lru_cache, wraps
+from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Any, ParamSpec, TypeVar
+from typing import Any
 
 from .checks import check_text, short_repr, suggestion
 
@@ -39,11 +39,7 @@ __all__ = [
     "named",
     "names",
     "part",
-    "remembered",
 ]
-
-P = ParamSpec("P")
-T = TypeVar("T")
 
 PACKAGE = "synchain.models"
 """The package whose folders hold the plug-ins that are shipped."""
@@ -78,7 +74,7 @@ class Kind:
 class OwnFile(str):
     """The name of a plug-in file outside the package, as it was written, with the file and the text that it stands for.
 
-    Two of them are equal where name, place and text are equal; none is equal to a plain text.  So whatever is kept for a
+    Two of them are equal if name, place and text are equal; none is equal to a plain text.  So whatever is kept for a
     name is kept for one text of one file.
     """
 
@@ -87,13 +83,9 @@ class OwnFile(str):
     digest: str
 
     def __new__(cls, name: str, place: str, digest: str) -> OwnFile:
-        made = super().__new__(cls, name)
-        made.place, made.digest = place, digest
-        return made
-
-    def spelt(self, name: str) -> OwnFile:
-        """The same file and text with another name: "law.py" of "law.py on x"."""
-        return OwnFile(name, self.place, self.digest)
+        file = super().__new__(cls, name)
+        file.place, file.digest = place, digest
+        return file
 
     def _key(self) -> tuple[str, str, str]:
         return str(self), self.place, self.digest
@@ -123,9 +115,19 @@ def names(kind: Kind) -> tuple[str, ...]:
 
 
 def allow_code(*paths: str | Path) -> None:
-    """Allow files outside the package to be run as plug-ins, from now on; ValueError where one is no .py file.
+    """Allow files outside the package to be run as plug-ins, from now on.
 
     Afterwards their paths are names: Scene(friction="./my_law.py").  Only allow what you have read.
+
+    Parameters
+    ----------
+    *paths : str or Path
+        The files.
+
+    Raises
+    ------
+    ValueError
+        If one is no file that ends in .py.
     """
     for path in paths:
         place = Path(path)
@@ -154,10 +156,21 @@ def named(kind: Kind, name: str) -> str:
 
 
 def load(kind: Kind, name: str) -> ModuleType:
-    """Return the plug-in module `name`; raises ValueError with the known names where there is none.
+    """Return the module of a plug-in.
 
-    A path that ends in ".py" is loaded where `allow_code` has allowed it, as its text is now; an error in that file names
-    its line.  An `OwnFile` gives the text that it was made of: ValueError where that is neither known nor in the file.
+    Parameters
+    ----------
+    kind : Kind
+        The kind of plug-in.
+    name : str
+        The name of a shipped file or of an entry point, or a path that ends in ".py" and was allowed by `allow_code`,
+        whose text is taken as it is now.  An `OwnFile` gives the text that it was made of.
+
+    Raises
+    ------
+    ValueError
+        If there is no such plug-in, with the known names; if a file is not what its kind must be, with the line; and if
+        the text of an `OwnFile` is neither known nor in the file.
     """
     if name in _own(kind):
         return import_module(f"{PACKAGE}.{kind.folder}.{name}")
@@ -173,36 +186,18 @@ def load(kind: Kind, name: str) -> ModuleType:
 
 
 def part(what: str, value: object) -> str:
-    """Return the name of a part of the model where it is text; it may be a long path to a file of code."""
-    words = check_text(what, value, 1000 if isinstance(value, str) and ".py" in value else 200)
-    return value if isinstance(value, OwnFile) else words
-
-
-def remembered(**parts: Callable[[str], str]) -> Callable[[Callable[P, T]], Callable[P, T]]:
-    """Let a function keep its answers; `parts` says how its arguments that name plug-ins are `named`, so by their text."""
-
-    def decorate(function: Callable[P, T]) -> Callable[P, T]:
-        signature, answers = inspect.signature(function), lru_cache(maxsize=64)(function)
-
-        @wraps(function)
-        def answer(*positional: P.args, **keywords: P.kwargs) -> T:
-            given = signature.bind(*positional, **keywords)
-            given.apply_defaults()
-            for argument, naming in parts.items():
-                if given.arguments[argument] is not None:
-                    given.arguments[argument] = naming(given.arguments[argument])
-            return answers(*given.args)
-
-        return answer
-
-    return decorate
+    """Return the name of a part of the model as text; it may be a long path to a file of code."""
+    return check_text(what, value, 1000 if isinstance(value, str) and ".py" in value else 200)
 
 
 def call(function: Callable[..., Any], symbols: Mapping[str, Any]) -> Any:
     """Call a plug-in's function with those of `symbols` that its signature names.
 
-    Raises ValueError where it asks for a name that is not among them, and where a function from outside the package
-    fails, with its file and line.
+    Raises
+    ------
+    ValueError
+        If the function asks for a name that is not among them, and if a function from outside the package fails, with
+        its file and line.
     """
     wanted = inspect.signature(function).parameters
     for name in wanted:
@@ -282,7 +277,7 @@ def _check_installed(kind: Kind, module: ModuleType, where: str) -> None:
 
 
 def _text(kind: Kind, name: str, place: Path) -> bytes:
-    """What stands in a file that may be run; ValueError where it may not, or cannot be read."""
+    """What stands in a file that may be run; ValueError if it may not, or cannot be read."""
     if not place.is_file():
         raise ValueError(f"{kind.name} {name!r}: no such file: {place}; expected a .py file; check the path")
     if place not in _allowed:

@@ -23,10 +23,24 @@ SLIDING = sp.Symbol("w", real=True)
 class Node:
     """One uncoupled oscillator: d(state)/dt = rhs(state, t; parameters).
 
-    Raises ValueError where the right-hand side uses a symbol that is not declared, contains a floating-point number
-    (numbers are parameters or rationals), has not one entry for each state symbol, or where two names are the same.
-    With set-valued friction (`contact`) the third state is the mode, which only events change.  `law` is the friction
-    coefficient as a function of `SLIDING`, None where the model has no friction law; it is for printing alone.
+    Parameters
+    ----------
+    state : tuple of Symbol
+        The states.  With set-valued friction the third state is the mode, which only events change.
+    rhs : tuple of Expr
+        The rate of each state.
+    parameters : tuple of Symbol
+        The parameters.
+    contact : Contact, optional
+        What decides between stick and slip.
+    law : Expr, optional
+        The friction coefficient as a function of `SLIDING`; it is for printing alone.
+
+    Raises
+    ------
+    ValueError
+        If a rate uses a symbol that is not declared or contains a floating-point number (numbers are parameters or
+        rationals), if there is not one rate for each state, and if two names are the same.
     """
 
     state: tuple[sp.Symbol, ...]
@@ -166,7 +180,7 @@ class Edge:
 
     @property
     def diffusive(self) -> bool:
-        """True where the link vanishes between equal states, so that synchronous motion solves the network."""
+        """True if the link vanishes between equal states, so that synchronous motion solves the network."""
         equal = dict(zip(self.there, self.here, strict=True))
         return all(sp.simplify(e.xreplace(equal)) == 0 for e in self.rhs)
 

@@ -27,7 +27,7 @@ Symbols = Sequence[sp.Symbol]
 class Mechanics:
     """A Lagrangian system: kinetic energy T(q, v, t), potential V(q, t) and one generalised force Q(q, v, t) for each q.
 
-    Raises ValueError where the numbers of coordinates, velocities and forces differ.
+    Raises ValueError if the numbers of coordinates, velocities and forces differ.
     """
 
     coordinates: tuple[sp.Symbol, ...]
@@ -64,9 +64,26 @@ def equations_of_motion(
 ) -> tuple[sp.Expr, ...]:
     """Solve d/dt dL/dv - dL/dq = Q with L = T - V for the accelerations dv/dt.
 
-    The mass matrix is solved by its structure (`synchain.models.mechanics.lagrangian`).  Raises ValueError where the numbers of
-    coordinates, velocities and forces differ, or where the mass matrix is singular: some velocity has no kinetic energy.
-    Source: Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. (Addison-Wesley, 2002), sect. 1.4.
+    Parameters
+    ----------
+    kinetic, potential : Expr
+        The energies T(q, v, t) and V(q, t).
+    forces : sequence of Expr
+        A generalised force Q for each coordinate.
+    q, v : sequence of Symbol
+        Coordinates and velocities.
+    time : Symbol
+        The time.
+
+    Raises
+    ------
+    ValueError
+        If the numbers of coordinates, velocities and forces differ, and if the mass matrix is singular: some velocity
+        has no kinetic energy.
+
+    References
+    ----------
+    Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. (Addison-Wesley, 2002), sect. 1.4.
     """
     rest, masses = balance(kinetic, potential, forces, q, v, time)
     return solve_masses(masses, rest, v)
@@ -77,7 +94,7 @@ def balance(
 ) -> tuple[list[sp.Expr], sp.Matrix]:
     """Return r and M of M dv/dt = r, the Euler-Lagrange equations before they are solved; M may be singular.
 
-    Raises ValueError where the numbers of coordinates, velocities and forces differ.
+    Raises ValueError if the numbers of coordinates, velocities and forces differ.
     """
     _one_each(q, v, forces)
     lagrangian = kinetic - potential
@@ -116,7 +133,7 @@ LARGEST_BY_MINORS = 3
 def solve_masses(masses: sp.Matrix, forces: Sequence[sp.Expr], velocities: Sequence[sp.Symbol]) -> tuple[sp.Expr, ...]:
     """Return a with masses * a = forces, for a symmetric mass matrix; `velocities` name its rows in errors.
 
-    Raises ValueError where the matrix is singular: some velocity then has no kinetic energy.
+    Raises ValueError if the matrix is singular: some velocity then has no kinetic energy.
     """
     size = len(forces)
     alone = [i for i in range(size) if all(masses[i, j] == 0 for j in range(size) if j != i)]
@@ -133,7 +150,7 @@ def solve_masses(masses: sp.Matrix, forces: Sequence[sp.Expr], velocities: Seque
 
 
 def _vanishes(e: sp.Expr) -> bool:
-    """True where an expression is zero everywhere; a value that differs from zero at one place proves the contrary."""
+    """True if an expression is zero everywhere; a value that differs from zero at one place proves the contrary."""
     symbols = sorted(e.free_symbols, key=str)
     for k in range(3):
         place = {s: sp.Rational(7 * i + 3 * k + 5, 11 + 2 * i) for i, s in enumerate(symbols)}

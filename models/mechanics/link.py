@@ -266,7 +266,7 @@ def _entry_rates(
 
 
 def _in_differences(e: sp.Expr, pairs: list[tuple[sp.Symbol, sp.Symbol]], here: Symbols) -> sp.Expr:
-    """The expression in terms of `there` - `here` where it depends on nothing else of both, unchanged otherwise."""
+    """The expression in terms of `there` - `here` if it depends on nothing else of both, unchanged otherwise."""
     gaps = [sp.Dummy(f"d{k}", real=True) for k in range(len(pairs))]
     shifted = sp.expand(e.xreplace({q: p + d for (p, q), d in zip(pairs, gaps, strict=True)}))
     if shifted.free_symbols & set(here):

@@ -171,7 +171,7 @@ def _real(name: str) -> sp.Symbol:
 
 
 def _cancel(expression: sp.Expr, what: str) -> sp.Expr:
-    """The expression with common factors taken out; ValueError where a unit has not cancelled."""
+    """The expression with common factors taken out; ValueError if a unit has not cancelled."""
     result = sp.factor_terms(sp.sympify(expression))
     left = {MASS: "kg", LENGTH: "m", DURATION: "s"}.items()
     found = [name for symbol, name in left if result.has(symbol)]

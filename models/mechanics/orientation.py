@@ -1,9 +1,9 @@
 """Links with a direction along which they are drawn: springs that are stiffer in tension than in compression.
 
-A coupling whose energy changes where its two ends are exchanged, V(q_i, q_j) other than V(q_j, q_i), needs to know at
-which end of a link node i is.  Its links carry that as the sign of their weight W, seen from the target: W = 1 where the
-link runs from the target to the source, W = -1 where it runs from the source to the target.  The energy of the link is
-then W^2 V_even + W V_odd, the parts of V that keep and that change their sign in the exchange.
+Some couplings have an energy that changes if their two ends are exchanged: V(q_i, q_j) is not V(q_j, q_i).  Their
+links say at which end node i is, by the sign of their weight W as seen from the target: W = 1 if the link runs from the
+target to the source, W = -1 if it runs from the source to the target.  The energy of the link is W^2 V_even + W V_odd,
+the parts of V that keep and that change their sign in the exchange.
 """
 
 from __future__ import annotations
@@ -42,6 +42,6 @@ def link_energy(energy: sp.Expr, ends: Mapping[sp.Symbol, sp.Symbol], weight: sp
 
 @lru_cache(maxsize=64)
 def is_oriented(edge: Edge) -> bool:
-    """Return True where the rates of a link do not just change their sign with its weight."""
+    """Return True if the rates of a link do not just change their sign with its weight."""
     turned = {edge.weight: -edge.weight}
     return any(sp.expand(e + e.xreplace(turned)) != 0 for e in edge.rhs)

@@ -12,12 +12,26 @@ __all__ = ["Dimension", "Parameter", "dimension"]
 class Parameter:
     """A number of the non-dimensional equations that gets its value at run time.
 
-    `default`, `minimum` and `maximum` are non-dimensional.  `unit` is the SI unit of the physical quantity behind
-    the number, and `scale` says, in the physical symbols of the oscillator, how much of that quantity the value 1
-    stands for: a belt speed theta_b = 0.1 with unit m/s and scale g*sqrt(m)/sqrt(k) is 0.1 g sqrt(m/k) metres per
-    second.  Both ends of the range are allowed values, except zero where `positive` is set.
+    Parameters
+    ----------
+    default : float
+        The non-dimensional value that it has unless another is given.
+    unit : str
+        The SI unit of the physical quantity behind the number, such as "N/m".
+    meaning : str
+        A phrase that says what it is.
+    minimum, maximum : float, optional
+        The range, both ends included.
+    positive : bool
+        True if zero and negative values are not allowed.
+    scale : str
+        How much of the quantity the value 1 stands for, in the physical symbols of the oscillator: a belt speed 0.1
+        with unit m/s and scale g*sqrt(m)/sqrt(k) is 0.1 g sqrt(m/k) metres per second.
 
-    Raises ValueError where the default is not finite or outside the range, or where the unit cannot be read.
+    Raises
+    ------
+    ValueError
+        If the default is not finite or outside the range, and if the unit cannot be read.
     """
 
     default: float

@@ -44,7 +44,7 @@ class Contact:
         return Contact(*(change(e) for e in self.expressions))
 
     def under(self, force: sp.Expr) -> Contact:
-        """The same where a further force acts on the body, unit mass."""
+        """The same if a further force acts on the body, unit mass."""
         pushes = (e + force for e in (self.up, self.down, self.pushed, self.pulled, self.shown))
         return Contact(self.speed, self.sliding, *pushes)
 
@@ -55,9 +55,9 @@ class Contact:
 
     @property
     def jumps(self) -> bool:
-        """True where the static coefficient exceeds that of slow slip, so that slip begins with a jump of
+        """True if the static coefficient exceeds that of slow slip, so that slip begins with a jump of
         acceleration."""
-        return sp.simplify(self.up - self.pushed) != 0 or sp.simplify(self.down - self.pulled) != 0
+        return bool(sp.simplify(self.up - self.pushed) != 0 or sp.simplify(self.down - self.pulled) != 0)
 
 
 def set_valued(
@@ -70,10 +70,26 @@ def set_valued(
 ) -> tuple[sp.Expr, Contact]:
     """Return the acceleration in all modes and the contact conditions.
 
-    `acceleration` holds the friction coefficient as `friction(w)`; `law` is that coefficient as an expression in
-    `argument` with sign and Abs; `static` the static coefficient (default: the limit of the law at 0+). Raises ValueError
-    where friction does not occur exactly once, acts nonlinearly, where the ground's velocity is not a constant, and for a
-    law without a jump at w = 0 or one that is not odd.
+    Parameters
+    ----------
+    acceleration : Expr
+        The acceleration, with the friction coefficient as `friction(w)`.
+    friction : Function
+        The coefficient as an unknown function.
+    law : Expr
+        That coefficient as an expression in `argument` with sign and Abs.
+    argument : Symbol
+        The sliding velocity in `law`.
+    static : Expr or None
+        The static coefficient; None for the limit of the law at 0+.
+    velocity : Symbol
+        The velocity of the body.
+
+    Raises
+    ------
+    ValueError
+        If friction does not occur exactly once or acts nonlinearly, if the ground's velocity is not a constant, and for
+        a law without a jump at w = 0 or one that is not odd.
     """
     applied = sorted(acceleration.atoms(friction), key=str)
     if len(applied) != 1:
@@ -100,7 +116,7 @@ def set_valued(
 
 
 def _ground(sliding: sp.Expr, velocity: sp.Symbol) -> sp.Expr:
-    """The velocity at which the sliding velocity is zero; ValueError where that is no constant, or it does not fall."""
+    """The velocity at which the sliding velocity is zero; ValueError if that is no constant, or it does not fall."""
     slope = sliding.diff(velocity)
     if not (slope.is_number and slope.is_negative):
         raise ValueError(f"set-valued contact: the sliding velocity {sliding} must fall with {velocity}, linearly")
@@ -111,7 +127,7 @@ def _ground(sliding: sp.Expr, velocity: sp.Symbol) -> sp.Expr:
 
 
 def _by_mode(law: sp.Expr, argument: sp.Symbol) -> sp.Expr:
-    """The law with the mode for the sign of its argument; ValueError where it has other kinks or is not odd."""
+    """The law with the mode for the sign of its argument; ValueError if it has other kinks or is not odd."""
     moving = law.replace(sp.Abs, lambda w: SLIP * w).replace(sp.sign, lambda w: SLIP)
     if moving.has(sp.Abs, sp.sign):
         raise ValueError(f"set-valued contact: the law {law} has another kink than that at w = 0")

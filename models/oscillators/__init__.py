@@ -1,9 +1,9 @@
 """Oscillators, one file each.
 
 Every file has SUMMARY, SOURCE, PARAMETERS (name -> Parameter, of the non-dimensional equations) and FRICTION (True
-where it takes a friction law).  The model itself is one of three kinds:
+if it takes a friction law).  The model itself is one of three kinds:
 
-* a physical Lagrangian: ``kinetic``, ``potential`` and, where there are non-conservative forces, ``force`` in physical
+* a physical Lagrangian: ``kinetic``, ``potential`` and, if there are non-conservative forces, ``force`` in physical
   quantities; PHYSICAL, which names the physical quantity behind each parameter; UNITS of the quantities that
   fix the scales; and ``scales``, the units of mass, length and time (keys kg, m, s) made of these.
   The non-dimensional equations are derived from it;

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..graphs.families import family, names, topology
 from ..graphs.topology import Topology, from_matrix, read_matrix
@@ -12,9 +12,6 @@ from ..inputs.checks import check_integer, check_keys, check_table, check_text, 
 from ..inputs.plugins import part
 from ..mechanics.coupling import split
 from .parameters import collected
-
-if TYPE_CHECKING:
-    from .scene import Scene
 
 __all__ = ["arguments", "as_dict"]
 
@@ -101,22 +98,28 @@ def _topology(given: Mapping[object, Any], folder: Path | None) -> Topology:
     return topology(part("topology name", name), check_integer("topology n", given["n"], 0, NODES), **chosen)
 
 
-def as_dict(scene: Scene) -> dict[str, Any]:
-    """Return the whole scene in JSON types, in the names of a scene file."""
-    made = {name: getattr(scene, name) for name in scene.given}
-    made["oscillator"] = scene.oscillator.name
-    for name in ("contact", "time_unit", "continuation"):
-        made[name] = str(made[name])
-    made["friction"] = "none" if scene.friction is None else scene.friction.name
-    made["coupling"] = "none" if scene.coupling is None else str(scene.coupling)
-    made["topology"] = _graph(scene.topology)
-    made["nodes"] = [group.as_dict() for group in scene.nodes]
-    made["parameters"] = collected(scene.parameters, scene.varied)
-    made["initial"] = {name: list(values) for name, values in scene.initial.items()}
-    made["record"] = [str(record) for record in scene.record]
-    made["section"] = str(scene.section)
-    made["sweep"] = {axis.name: list(axis.values) for axis in made.pop("axes")}
-    return made
+def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
+    """Return a whole scene in JSON types, in the names of a scene file.
+
+    Parameters
+    ----------
+    values : mapping
+        The completed values of a scene's keywords.
+    varied : iterable of str
+        The parameters that have a value for each node.
+    """
+    written = dict(values)
+    for name in ("oscillator", "contact", "time_unit", "continuation", "section"):
+        written[name] = str(values[name])
+    for name in ("friction", "coupling"):
+        written[name] = "none" if values[name] is None else str(values[name])
+    written["topology"] = _graph(values["topology"])
+    written["nodes"] = [group.as_dict() for group in values["nodes"]]
+    written["parameters"] = collected(values["parameters"], varied)
+    written["initial"] = {name: list(states) for name, states in values["initial"].items()}
+    written["record"] = [str(record) for record in values["record"]]
+    written["sweep"] = {axis.name: list(axis.values) for axis in written.pop("axes")}
+    return written
 
 
 def _graph(graph: Topology) -> dict[str, Any]:

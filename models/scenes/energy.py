@@ -58,7 +58,7 @@ class Energy:
 
     @property
     def conservative(self) -> bool:
-        """True where no power is fed in or lost, for all values of the parameters."""
+        """True if no power is fed in or lost, for all values of the parameters."""
         return all(share.power == 0 for share in (*self.nodes, *self.links))
 
     def of_link(self, link: Link) -> int:
@@ -70,7 +70,7 @@ class Energy:
         """Return energy and power of the whole network in its state symbols (algebra grows with n: meant for small n)."""
         eq = self.equations
         placed = [(self.nodes[eq.kind_of[i]], eq.at_node(i)) for i in range(eq.n)]
-        shares: list[tuple[Share, dict]] = [
+        shares: list[tuple[Share, dict[sp.Symbol, sp.Expr]]] = [
             *placed,
             *((self.links[self.of_link(p)], eq.at_link(p)) for p in self.pairs),
         ]

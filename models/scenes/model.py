@@ -12,8 +12,9 @@ from ..dynamics import network
 from ..dynamics.equations import Equations
 from ..graphs.families import topology
 from ..graphs.topology import Topology
-from ..inputs.checks import check_integer, check_keys, check_number, check_table, check_text, short_repr, suggestion
+from ..inputs.checks import check_integer, check_keys, check_number, check_table, short_repr, suggestion
 from ..inputs.frozen import Frozen
+from ..inputs.plugins import part
 from ..mechanics.coupling import Coupling, LagrangianCoupling, MatrixCoupling
 from ..mechanics.friction import ContactModel, FrictionLaw
 from ..mechanics.link import check_coupling
@@ -36,9 +37,6 @@ __all__ = [
 
 MOST = 100_000
 """Most nodes that groups may name."""
-
-PATH_LENGTH = 1000
-"""Longest text that names a part of a model by a path to a file of code."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,8 +274,8 @@ def in_range(name: str, value: object, parameter: Parameter) -> float:
 
 
 def as_oscillator(value: object, what: str = "oscillator") -> Oscillator:
-    """Return an oscillator as it is, or load the one of a name; ValueError or TypeError for any other value."""
-    return value if isinstance(value, Oscillator) else load_oscillator(_name(what, value))
+    """Return an oscillator as it is, or load the one of a name; any other value raises ValueError or TypeError."""
+    return value if isinstance(value, Oscillator) else load_oscillator(part(what, value))
 
 
 def as_law(value: object, oscillator: Oscillator) -> FrictionLaw | None:
@@ -294,7 +292,7 @@ def as_law(value: object, oscillator: Oscillator) -> FrictionLaw | None:
         return load_friction_law("exponential") if oscillator.takes_friction else None
     if value is None or isinstance(value, FrictionLaw):
         return value
-    name = _name("friction", value)
+    name = part("friction", value)
     return None if name == "none" else load_friction_law(name)
 
 
@@ -302,7 +300,7 @@ def as_coupling(value: object) -> Coupling | None:
     """Return a coupling as it is, or read the one of a text; None for None and "none"."""
     if value is None or isinstance(value, MatrixCoupling | LagrangianCoupling):
         return value
-    words = _name("coupling", value)
+    words = part("coupling", value)
     return None if words == "none" else read_coupling(words)
 
 
@@ -317,7 +315,20 @@ def as_topology(value: object) -> Topology:
 
 
 def as_groups(value: object, n: int) -> tuple[Group, ...]:
-    """Return the groups of a list of tables with `oscillator`, `friction` and `at`; ValueError or TypeError else."""
+    """Return the groups of nodes of a list of tables.
+
+    Parameters
+    ----------
+    value : object
+        Groups, or tables with `oscillator`, `friction` and `at`; None for none.
+    n : int
+        The number of nodes.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an entry is no such table, names no node or one that another group names.
+    """
     if value is None:
         return ()
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
@@ -352,8 +363,3 @@ def _group(what: str, value: object, n: int) -> Group:
     if not numbers or len(set(numbers)) < len(numbers):
         raise ValueError(f"{what}: at is {short_repr(list(numbers))}; expected at least one node and each node once")
     return Group(oscillator, as_law(entry.get("friction", "default"), oscillator), numbers)
-
-
-def _name(what: str, value: object) -> str:
-    """The name of a part of the model as text; it may be a long path to a file of code."""
-    return check_text(what, value, PATH_LENGTH if isinstance(value, str) and ".py" in value else 200)

@@ -122,13 +122,13 @@ def drive(model: Model, values: Mapping[str, float]) -> Drive:
     return drive_of(model.unlinked.nodes, varied(values, model.parameters))
 
 
-def without(model: Model, values: Mapping[Any, Any], names: Iterable[str]) -> dict[str, Any]:
+def without(model: Model, values: Mapping[Any, Any], names: Iterable[str]) -> dict[Any, Any]:
     """Return the values of parameters without those that single nodes have of some `names`."""
     gone = set(names)
     return {
         name: value
         for name, value in values.items()
-        if (parts := model.node_parameter(name)) is None or parts.base not in gone
+        if not isinstance(name, str) or (parts := model.node_parameter(name)) is None or parts.base not in gone
     }
 
 

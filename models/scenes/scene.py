@@ -39,10 +39,64 @@ class Scene:
     """A network of oscillators, its numbers, its start, what to record and what to sweep.
 
     Every keyword has a default; the same names are the keys of a scene file (see docs/scenes.md).  States,
-    parameters and times are non-dimensional; `transient` and `window` count periods of the drive if `time_unit`
-    is "period", the default if the equations repeat themselves in time.  `atol` is a tenth of `rtol` unless given.
-    `friction` "default" is "exponential" where the oscillator takes a friction law, else None.  Raises ValueError
-    or TypeError on anything that the model does not know or cannot be given.
+    parameters and times are non-dimensional.
+
+    Parameters
+    ----------
+    title : str
+        What the scene is called.
+    oscillator : Oscillator or str
+        The nodes, by value or by name.
+    friction : FrictionLaw or str, optional
+        Their friction law; "default" is "exponential" if the oscillator takes a law, else None.
+    contact : str
+        How the jump of a law at rest is treated: "atan", "sign" or "set-valued".
+    coupling : Coupling or str, optional
+        What joins the nodes: a name ("spring", "spring on x") or components ("x->x, 1/2 y->z").
+    nodes : iterable of Group or tables, optional
+        Nodes of other kinds.
+    topology : Topology, optional
+        The graph; one node alone if left out.
+    parameters : mapping, optional
+        Values of parameters: a number, or a list with one number for each node.
+    initial : mapping, optional
+        Initial states: a number, one number for each node, or {low, high, seed} for random ones.
+    record : iterable of str, optional
+        What each cell records: "sync_error", "section", "trajectory".
+    section : Section or str, optional
+        When section points are taken, such as "v_1 falling".
+    transient, window : float
+        Time before the records, and time of the records, in units of `time_unit`.
+    time_unit : str, optional
+        "period" (of the drive; the default if the equations repeat themselves in time) or "time".
+    samples : int
+        Points of a trajectory.
+    integrator : str
+        The method; "auto" chooses one.
+    rtol, atol : float
+        Tolerances; `atol` is a tenth of `rtol` unless given.
+    max_steps : int
+        Most steps of a cell.
+    axes : iterable of Axis or mapping
+        What is swept.
+    zipped : bool
+        True if the axes run together.
+    continuation : str
+        "up" or "down" if cells start from the end of their neighbours, else "none".
+    seed : int
+        Seed of random initial states.
+
+    Attributes
+    ----------
+    model : Model
+        What decides on the equations.
+    given : mapping
+        Each keyword as it was given; None (or "default") for those that follow others.
+
+    Raises
+    ------
+    ValueError, TypeError
+        For anything that the model does not know or cannot be given.
     """
 
     title: str
@@ -131,7 +185,7 @@ class Scene:
 
     @property
     def forced(self) -> bool:
-        """True where time occurs explicitly in the equations."""
+        """True if time occurs explicitly in the equations."""
         return any(node.forced for node in self.model.unlinked.nodes)
 
     @property
@@ -171,7 +225,8 @@ class Scene:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences about what is allowed but probably not meant."""
-        return warnings(self)
+        unit = self.period or 1.0 if self.time_unit == TimeUnit.PERIOD else 1.0
+        return warnings(self.model, self.varied, self._values(), (self.transient + self.window) * unit)
 
     def takes(self, name: str) -> bool:
         """True for the name of a parameter, "a", and for that of a parameter of one node, "a_2"."""
@@ -201,7 +256,7 @@ class Scene:
             )
         given = {**self.given, "initial": self._kept_start(changes), **changes}
         if given["parameters"] is not None or single:
-            numbers = check_table("parameters", {} if given["parameters"] is None else given["parameters"])
+            numbers = {} if given["parameters"] is None else check_table("parameters", given["parameters"])
             given["parameters"] = {**without(self.model, numbers, single), **single}
         if self.varied and "parameters" not in changes and getattr(given["topology"], "n", None) != self.n:
             raise ValueError(f"{self.varied[0]} has values for {self.n} nodes; give `parameters` for another number")
@@ -217,9 +272,13 @@ class Scene:
             return {name: at for name, at in start.items() if name != SLIP.name}  # modes follow from x and v
         return start
 
+    def _values(self) -> dict[str, Any]:
+        """The completed value of each keyword."""
+        return {name: getattr(self, name) for name in KEYWORDS}
+
     def as_dict(self) -> dict[str, Any]:
         """Return the whole scene in JSON types; `Scene.from_dict` makes an equal scene of it."""
-        return as_dict(self)
+        return as_dict(self._values(), self.varied)
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any], folder: Path | None = None) -> Scene:
@@ -295,6 +354,6 @@ def _kept_parameters(given: Mapping[str, Any], model: Model, numbers: Mapping[st
 
 
 def a_scene(value: object) -> Scene:
-    """Return the value where it is a Scene, else raise TypeError."""
+    """Return the value if it is a Scene, else raise TypeError."""
 
     return check_instance("scene", value, Scene, "a Scene, e.g. load_scene('figure_4a')")

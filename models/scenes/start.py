@@ -23,7 +23,7 @@ def default_start(
     Up to four oscillators start at 0.30, 0.28, 0.26, 0.24: the first two are those of the source paper
     (Marszal et al., Eur. Phys. J. Special Topics, 2016), the others continue them.  More are spread evenly
     over the same range, 0.30 … 0.24, so that the initial spread does not grow with the network.
-    With a `centre` the same distances lie around that state.  Raises ValueError where it has an unknown component.
+    With a `centre` the same distances lie around that state.  Raises ValueError if it has an unknown component.
     """
     if centre is not None:
         check_keys("INITIAL of the oscillator", centre, components)

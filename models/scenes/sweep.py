@@ -72,7 +72,7 @@ def check_sweep(model: Model, values: Mapping[str, Any]) -> Continuation:
 
 
 def _cells(lengths: Sequence[int], zipped: object) -> int:
-    """Return the number of cells of axes of these lengths; ValueError where they or the values are too many."""
+    """Return the number of cells of axes of these lengths; ValueError if they or the values are too many."""
     cells = max(lengths, default=1) if zipped is True else math.prod(lengths)
     if cells > CELL_LIMIT:
         raise ValueError(

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import Any
 
+from ..graphs.topology import Topology
 from ..mechanics.coupling import LagrangianCoupling
 from ..mechanics.node_name import NodeName
-
-if TYPE_CHECKING:
-    from ..graphs.topology import Topology
-    from .scene import Scene
+from .model import Model
 
 __all__ = ["warnings", "zero_multiplicity"]
 
@@ -36,69 +35,111 @@ def zero_multiplicity(graph: Topology) -> int:
     return next(k for k, c in enumerate(characteristic(graph).coeffs()) if c != 0)
 
 
-def _stiff_springs(scene: Scene) -> list[str]:
-    """A sentence where a mode of the springs swings so often that its phase error adds up to more than is asked for.
+def warnings(model: Model, varied: tuple[str, ...], values: Mapping[str, Any], duration: float) -> tuple[str, ...]:
+    """Return the sentences for one scene, none if all is well.
+
+    Parameters
+    ----------
+    model : Model
+        The model of the scene.
+    varied : tuple of str
+        The parameters that have a value for each node.
+    values : mapping
+        The scene's `parameters`, `axes`, `initial` and `record`.
+    duration : float
+        Non-dimensional time from the start to the end of the window.
+    """
+    graph = model.topology
+    vanishing = not graph.links or _vanishes(model, varied)
+    sentences = (
+        _in_parts(graph),
+        _negative_weights(graph),
+        _different_nodes(graph, varied),
+        "" if vanishing else _without_synchrony(model),
+        _stiff_springs(model, values, duration),
+        _equal_starts(values) if vanishing and not varied and len(model.kinds) == 1 else "",
+    )
+    return tuple(filter(None, sentences))
+
+
+def _in_parts(graph: Topology) -> str:
+    """A sentence if some nodes cannot reach one another."""
+    multiplicity = zero_multiplicity(graph)
+    if multiplicity <= 1:
+        return ""
+    parts = graph.components
+    reason = f"is not connected ({parts} parts)" if parts > 1 else "has nodes that cannot reach one another"
+    return (
+        f"topology {graph.name}({graph.n}) {reason}: zero is an eigenvalue of multiplicity "
+        f"{multiplicity}, so there is no complete synchronisation by coupling (a common drive may still lock the "
+        "parts); join them by links"
+    )
+
+
+def _negative_weights(graph: Topology) -> str:
+    """A sentence if a weight is negative."""
+    if all(weight > 0 for _, _, weight in graph.links):
+        return ""
+    return (
+        f"topology {graph.name}({graph.n}) has negative weights, which drive oscillators apart; if its matrix is a "
+        "Laplacian D - A, negate it: the connectivity matrix is A - D"
+    )
+
+
+def _different_nodes(graph: Topology, varied: tuple[str, ...]) -> str:
+    """A sentence if joined nodes differ in parameters."""
+    if not varied or not graph.links:
+        return ""
+    return (
+        f"the nodes differ in {', '.join(varied)}: equal states are no solution of this network, so there is no "
+        "complete synchronisation; the synchronisation error stays above 0"
+    )
+
+
+def _vanishes(model: Model, varied: tuple[str, ...]) -> bool:
+    """True unless the coupling acts between equal states."""
+    if not isinstance(model.coupling, LagrangianCoupling) or len(model.kinds) > 1:
+        return True
+    return all(edge.diffusive for edge in model.equations(varied).edges)
+
+
+def _without_synchrony(model: Model) -> str:
+    """The sentence for a coupling that acts between equal states."""
+    return (
+        f"coupling {str(model.coupling)!r} does not vanish between oscillators in equal states, so that equal motion of "
+        "all is no solution: there is no complete synchronisation; make it a function of differences"
+    )
+
+
+def _stiff_springs(model: Model, values: Mapping[str, Any], duration: float) -> str:
+    """A sentence if a mode of the springs swings so often that its phase error adds up to more than is asked for.
 
     The frequency of the fastest mode is at most sqrt(1 + 2 sigma d), d the largest weight at a node (Gershgorin).
     """
-    if str(scene.coupling) != "spring" or not scene.topology.links:
-        return []
-    sigma = max([scene.parameters["sigma"], *(v for axis in scene.axes if axis.name == "sigma" for v in axis.values)])
-    weights = [0.0] * scene.n
-    for target, _, weight in scene.topology.links:
+    if str(model.coupling) != "spring" or not model.topology.links:
+        return ""
+    swept = (value for axis in values["axes"] if axis.name == "sigma" for value in axis.values)
+    sigma = max([values["parameters"]["sigma"], *swept])
+    weights = [0.0] * model.n
+    for target, _, weight in model.topology.links:
         weights[target] += abs(float(weight))
     fastest = math.sqrt(1.0 + 2.0 * sigma * max(weights))
-    length = (scene.transient + scene.window) * (scene.period or 1.0 if scene.time_unit == "period" else 1.0)
-    swings = fastest * length / (2.0 * math.pi)
+    swings = fastest * duration / (2.0 * math.pi)
     if fastest < STIFF or swings < STIFF:
-        return []
-    return [
+        return ""
+    return (
         f"stiff springs: a mode of frequency {fastest:.3g} swings {swings:.3g} times, and the errors of its phase add up "
         "to more than rtol; tighten rtol until the result no longer changes"
-    ]
+    )
 
 
-def _vanishes(scene: Scene) -> bool:
-    if not isinstance(scene.coupling, LagrangianCoupling) or scene.equations.mixed:
-        return True
-    return all(edge.diffusive for edge in scene.equations.edges)
-
-
-def warnings(scene: Scene) -> tuple[str, ...]:
-    """Return the sentences for one scene, none where all is well."""
-    graph, found = scene.topology, []
-    multiplicity = zero_multiplicity(graph)
-    if multiplicity > 1:
-        parts = graph.components
-        reason = f"is not connected ({parts} parts)" if parts > 1 else "has nodes that cannot reach one another"
-        found.append(
-            f"topology {graph.name}({graph.n}) {reason}: zero is an eigenvalue of multiplicity "
-            f"{multiplicity}, so there is no complete synchronisation by coupling (a common drive may still lock the "
-            "parts); join them by links"
-        )
-    negative = [weight for _, _, weight in graph.links if weight < 0]
-    if negative:
-        found.append(
-            f"topology {graph.name}({graph.n}) has negative weights, which drive oscillators apart; if its matrix is a "
-            "Laplacian D - A, negate it: the connectivity matrix is A - D"
-        )
-    if scene.varied and graph.links:
-        found.append(
-            f"the nodes differ in {', '.join(scene.varied)}: equal states are no solution of this network, so there is no "
-            "complete synchronisation; the synchronisation error stays above 0"
-        )
-    vanishing = not graph.links or _vanishes(scene)
-    if not vanishing:
-        found.append(
-            f"coupling {str(scene.coupling)!r} does not vanish between oscillators in equal states, so that equal motion of all "
-            "is no solution: there is no complete synchronisation; make it a function of differences"
-        )
-    found += _stiff_springs(scene)
-    moved = {node.base for axis in scene.axes if (node := NodeName.parse(axis.name))} & set(scene.initial)
-    same = not moved and all(len(set(x)) == 1 for x in scene.initial.values())
-    if "sync_error" in scene.record and same and vanishing and not (scene.varied or scene.equations.mixed):
-        found.append(
-            "all oscillators start from the same state, so the synchronisation error stays 0 whatever the "
-            "coupling; give them different initial states"
-        )
-    return tuple(found)
+def _equal_starts(values: Mapping[str, Any]) -> str:
+    """A sentence if the synchronisation error is recorded of oscillators that start from one state."""
+    initial = values["initial"]
+    moved = {name.base for axis in values["axes"] if (name := NodeName.parse(axis.name))} & set(initial)
+    if "sync_error" not in values["record"] or moved or any(len(set(x)) > 1 for x in initial.values()):
+        return ""
+    return (
+        "all oscillators start from the same state, so the synchronisation error stays 0 whatever the "
+        "coupling; give them different initial states"
+    )
