@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 
 import mpmath
 import sympy as sp
+from parts import edge, node
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.network import network, node
+from synchain.models.dynamics.network import network
 from synchain.models.graphs.topology import Topology
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.link import edge
 
 DIGITS = 50
 TABLE = {

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from types import ModuleType
 
 import sympy as sp
+from parts import oscillator_of
 from sympy.physics import mechanics
 
 from synchain.models.graphs.topology import Topology
 from synchain.models.inputs.plugins import call, load
 from synchain.models.mechanics.components import TIME
+from synchain.models.mechanics.definition import COUPLING, OSCILLATOR
 from synchain.models.mechanics.nondimensional import magnitude, nondimensional
 
 T = mechanics.dynamicsymbols._t
@@ -54,8 +57,8 @@ class Whole:
 
 def whole(oscillator: str, coupling: str | None, graph: Topology, chosen: tuple[str, ...] | None = None) -> Whole:
     """Sum up nodes and links; a link of a coupling with a direction runs from the smaller to the larger number."""
-    module = load("oscillator", oscillator)
-    system = nondimensional(module)
+    module = load(OSCILLATOR, oscillator)
+    system = nondimensional(oscillator_of(module.__name__.rpartition(".")[2]))
     names = [s.name for s in system.coordinates]
     q = [[mechanics.dynamicsymbols(f"{name}_{i + 1}") for name in names] for i in range(graph.n)]
     rates = [[x.diff(T) for x in row] for row in q]
@@ -70,7 +73,7 @@ def whole(oscillator: str, coupling: str | None, graph: Topology, chosen: tuple[
     for i, j, weight in graph.links:
         if i > j or coupling is None:
             continue
-        law = load("coupling", coupling)
+        law = load(COUPLING, coupling)
         given = {**{p: sp.Symbol(p, real=True) for p in law.PARAMETERS}, "weight": sp.Rational(str(weight))}
         for k in range(len(names)):
             if chosen is not None and names[k] not in chosen:
@@ -84,9 +87,9 @@ def whole(oscillator: str, coupling: str | None, graph: Topology, chosen: tuple[
     return Whole(tuple(x for row in q for x in row), tuple(flat), kinetic, potential, tuple(forces), masses)
 
 
-def particles(module: object, values: dict) -> Iterable[tuple[sp.Expr, ...]]:
+def particles(module: ModuleType, values: dict) -> Iterable[tuple[sp.Expr, ...]]:
     """(mass, across, upward) of the masses of one node, non-dimensional: its own, or one on a line for each coordinate."""
-    system = nondimensional(module)
+    system = nondimensional(oscillator_of(module.__name__.rpartition(".")[2]))
     if not hasattr(module, "particles"):
         for x, v in zip(system.coordinates, system.velocities, strict=True):
             mass = system.kinetic.diff(v, 2)

@@ -66,7 +66,9 @@ from synchain.codegen.export.numba import to_numba
 from synchain.codegen.export.python import to_python
 
 from synchain.models.inputs.plugins import load  # isort: skip
+from synchain.models.graphs.family_file import TOPOLOGY
 from synchain.models.inputs.plugins import names
+from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 
 from synchain.models.presentation.equations import latex  # isort: skip
 from synchain.models.presentation.equations import text
@@ -724,7 +726,7 @@ FAMILIES: dict[str, dict[str, Any]] = {
 @scene("spectra of all families")
 def _() -> Quantities:
     seen: Quantities = {}
-    for name in names("topology"):
+    for name in names(TOPOLOGY):
         make = getattr(models, name)
         seen |= {f"{name} {n}": exact(make(n)) for n in (5, 8, 12)}
         if name in FAMILIES:
@@ -794,7 +796,7 @@ def _() -> Quantities:
 @scene("equations of every oscillator")
 def _() -> Quantities:
     seen: Quantities = {}
-    for name in names("oscillator"):
+    for name in names(OSCILLATOR):
         seen |= {f"{name} {key}": value for key, value in written(Scene(oscillator=name)).items()}
     return seen
 
@@ -802,7 +804,7 @@ def _() -> Quantities:
 @scene("equations of every friction law and contact")
 def _() -> Quantities:
     seen: Quantities = {}
-    for law in names("friction"):
+    for law in names(FRICTION_LAW):
         for contact in ("atan", "sign", "set-valued"):
             try:
                 given = Scene(friction=law, contact=contact, topology=chain(2))
@@ -816,8 +818,8 @@ def _() -> Quantities:
 @scene("equations of every coupling")
 def _() -> Quantities:
     seen: Quantities = {}
-    for name in names("coupling"):
-        graph = star(3) if hasattr(load("coupling", name), "BETWEEN") else chain(3)
+    for name in names(COUPLING):
+        graph = star(3) if hasattr(load(COUPLING, name), "BETWEEN") else chain(3)
         beam = [{"oscillator": "beam", "at": [1]}] if graph.name == "star" else None
         own = "clock" if beam else "duffing"
         given = Scene(oscillator=own, nodes=beam, coupling=name, topology=graph)
@@ -830,7 +832,7 @@ def _() -> Quantities:
 @scene("equations on every topology")
 def _() -> Quantities:
     seen: Quantities = {}
-    for name in names("topology"):
+    for name in names(TOPOLOGY):
         for n in (6, 12):
             given = Scene(oscillator="harmonic", topology=getattr(models, name)(n))
             seen |= {f"{name} {n} {key}": value for key, value in written(given).items()}

@@ -107,16 +107,12 @@ def allowed(room: str) -> set[str]:
     return names | {other for other in KNOWN if other.partition(".")[0] in whole} | {room}
 
 
-DEBTS = {"models.inputs": {"models.mechanics"}, "models.mechanics": {"models.graphs"}}
-"""Arrows that are still to be cut: the loader of plug-ins asks the rooms of their kinds what a file must hold."""
-
-
 def wrong_imports(path: Path, text: str) -> list[str]:
     room = ".".join(path.relative_to(ROOT).parts[:-1])
     found = []
     for line, name in imported(path, ast.parse(text)):
         top = name.partition(".")[0]
-        if top == "synchain" and room not in FRONT and room_of(name) not in allowed(room) | DEBTS.get(room, set()):
+        if top == "synchain" and room not in FRONT and room_of(name) not in allowed(room):
             found.append(f"{path.relative_to(ROOT)}:{line} imports {name} of {room_of(name) or 'synchain'}")
         if room.startswith("models") and top not in sys.stdlib_module_names | {"synchain", "sympy", "flint"}:
             found.append(f"{path.relative_to(ROOT)}:{line} imports {name}")

@@ -8,12 +8,13 @@ from pathlib import Path
 import pytest
 
 from synchain.models.inputs.arithmetic import constant
-from synchain.models.inputs.plugins import load, names
-from synchain.models.mechanics.coupling_text import PARAMETERS
+from synchain.models.inputs.plugins import Kind, load, names
+from synchain.models.mechanics.coupling import STRENGTH
+from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.mechanics.friction import KAPPA
 
 MANUAL = (Path(__file__).parent.parent / "docs" / "scenes.md").read_text("utf-8")
-TABLES = {"oscillator": "Oscillators", "friction": "Friction laws", "coupling": "Couplings"}
+TABLES = {OSCILLATOR: "Oscillators", FRICTION_LAW: "Friction laws", COUPLING: "Couplings"}
 
 Row = tuple[str, float, str]
 
@@ -33,10 +34,10 @@ def table(title: str) -> dict[str, list[Row]]:
 
 
 @pytest.mark.parametrize("kind", TABLES)
-def test_the_tables_are_those_of_the_modules(kind: str) -> None:
+def test_the_tables_are_those_of_the_modules(kind: Kind) -> None:
     expected = {name: load(kind, name).PARAMETERS for name in names(kind)}
-    if kind == "coupling":
-        expected["components"] = PARAMETERS
+    if kind is COUPLING:
+        expected["components"] = STRENGTH
     assert table(TABLES[kind]) == {
         name: [(p, value.default, value.meaning) for p, value in known.items()] for name, known in expected.items()
     }

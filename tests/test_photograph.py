@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from photograph import SCENES, Picture, camera, compare, names, take
+from photograph import COUPLING, FRICTION_LAW, OSCILLATOR, SCENES, TOPOLOGY, Picture, camera, compare, names, take
 
 from synchain.codegen.integrators import names as integrators
 
@@ -91,11 +91,11 @@ def test_every_part_runs_in_a_scene_and_every_integrator_in_two(request: pytest.
         pytest.skip("the golden file is being written")
     pictures = json.loads(GOLDEN.read_text(encoding="utf-8"))["scenes"].values()
     run = Counter(part for picture in pictures if "parts" in picture for part in picture["parts"].split(", "))
-    parts = {f"{kind} {name}" for kind in ("oscillator", "friction", "coupling") for name in names(kind)}
+    parts = {f"{kind.name} {name}" for kind in (OSCILLATOR, FRICTION_LAW, COUPLING) for name in names(kind)}
     assert parts - set(run) == set()
     assert {name for name in integrators() if run[f"integrator {name}"] < 2} == set()
     exact = {quantity.split()[0] for quantity in json.loads(GOLDEN.read_text())["scenes"]["spectra of all families"]}
-    assert set(names("topology")) - exact == set()
+    assert set(names(TOPOLOGY)) - exact == set()
 
 
 def _numbers(*values: float) -> dict[str, dict[str, str]]:

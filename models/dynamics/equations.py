@@ -1,7 +1,7 @@
 """Equations of motion of a network: templates of its nodes and links, and the list of its links.
 
-Printing, code generation, spectra and variational equations read these values and nothing else.  The templates do not
-depend on the size of the network, so a large network costs no algebra.
+Printing, code generation, spectra and variational equations read these values and nothing else.
+The templates do not depend on the size of the network, so a large network costs no algebra.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from functools import cached_property
 import sympy as sp
 
 from ..graphs.links import Link
-from ..mechanics.components import SLIDING, TIME, Edge, Node
+from ..mechanics.components import Edge, Node
 from ..mechanics.stick_slip import Contact
 
-__all__ = ["SLIDING", "TIME", "Edge", "Ends", "Equations", "Link", "Node", "check"]
+__all__ = ["Ends", "Equations", "check"]
 
 Ends = tuple[int, int]
 """The kinds of a link's target and source."""
@@ -33,9 +33,10 @@ class _Cached:
 
 @dataclass(frozen=True, slots=True)
 class Equations(_Cached):
-    """The equations of motion of a network, M d(state)/dt = rhs; M is the identity unless links have inertia.
+    """The equations of motion of a network, M d(state)/dt = rhs.
 
-    The state is ordered by components: x_1 … x_n, v_1 … v_n; components that all kinds of nodes have come first.
+    M is the identity unless links have inertia.  The state is ordered by components, x_1 … x_n,
+    v_1 … v_n; components that all kinds of nodes have come first.
 
     Parameters
     ----------
@@ -53,8 +54,8 @@ class Equations(_Cached):
     Raises
     ------
     ValueError
-        If a link is repeated, has no template, joins a node to itself or leaves the network, if templates and kinds do
-        not fit together, or if one name stands for two things.
+        If a link is repeated, has no template, joins a node to itself or leaves the network, if
+        templates and kinds do not fit together, or if one name stands for two things.
     """
 
     nodes: tuple[Node, ...]
@@ -104,7 +105,7 @@ class Equations(_Cached):
 
     @property
     def edge(self) -> Edge | None:
-        """The template of the links between equal nodes, None without any; ValueError for nodes of several kinds."""
+        """The template of the links between equal nodes, None without any; else ValueError."""
         if self.mixed:
             raise ValueError("the template of all links: found nodes of several kinds; expected equal nodes")
         return self.edge_of[0][1] if self.edge_of else None
@@ -212,7 +213,7 @@ class Equations(_Cached):
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
-        """Names of all parameters, those of nodes first, in a fixed order; a parameter in `varied` is a_1 … a_n."""
+        """Names of all parameters, nodes first; a parameter in `varied` is a_1 … a_n."""
         names: list[str] = []
         for name in dict.fromkeys(s.name for node in self.nodes for s in node.parameters):
             names += [f"{name}_{i + 1}" for i in self.holders(name)] if name in self.varied else [name]
@@ -249,7 +250,7 @@ class Equations(_Cached):
 
     @cached_property
     def places(self) -> tuple[tuple[int, ...], ...]:
-        """For each node the places of its states in the state of the network, in the order of its template."""
+        """For each node the places of its states in the state of the network."""
         places: list[dict[str, int]] = [{} for _ in self.kind_of]
         slots = ((i, name) for name in self.components for i in self.holders(name))
         for place, (i, name) in enumerate(slots):
@@ -276,7 +277,7 @@ class Equations(_Cached):
         return {**here, **there, **own, edge.weight: sp.Rational(weight.numerator, weight.denominator)}
 
     def contact_at(self, i: int) -> Contact | None:
-        """The conditions of stick and slip of node `i`, with the forces of its links; None without a contact."""
+        """The conditions of stick and slip of node `i` under the forces of its links, if it has a contact."""
         contact = self.node_at(i).contact
         if contact is None:
             return None
@@ -287,7 +288,7 @@ class Equations(_Cached):
         return own.under(force.xreplace({mode: sp.S.One, velocity: own.speed}))
 
     def rhs(self) -> tuple[sp.Expr, ...]:
-        """The right-hand side of M d(state)/dt = rhs, in state order (algebra grows with n: meant for small n)."""
+        """The right-hand side in state order.  The algebra grows with n: meant for small n."""
         rates = [sp.S.Zero] * self.dimension
         for i, places in enumerate(self.places):
             for k, e in zip(places, self.node_at(i).rhs, strict=True):
@@ -299,7 +300,7 @@ class Equations(_Cached):
         return tuple(rates)
 
     def mass(self) -> dict[tuple[int, int], sp.Expr]:
-        """The non-zero entries (row, column) of M in M d(state)/dt = rhs; empty if M is the identity."""
+        """The non-zero entries of M by (row, column); empty if M is the identity."""
         if not self.inertial:
             return {}
         places = self.places
@@ -312,7 +313,7 @@ class Equations(_Cached):
         return {key: entries[key] for key in sorted(entries) if entries[key] != 0}
 
     def jacobian(self) -> dict[tuple[int, int], sp.Expr]:
-        """The non-zero entries (row, column) of d(rhs)/d(state), rows and columns in state order."""
+        """The non-zero entries of d(rhs)/d(state) by (row, column), in state order."""
         entries: dict[tuple[int, int], sp.Expr] = {}
         blocks = [node.jacobian() for node in self.nodes]
         for i, places in enumerate(self.places):
@@ -322,7 +323,7 @@ class Equations(_Cached):
         return {key: entries[key] for key in sorted(entries) if entries[key] != 0}
 
     def link_jacobian(self) -> Iterator[Entry]:
-        """Yield ((row, column), entry) for each link's share of the Jacobian; keys repeat if links share an end."""
+        """Yield ((row, column), entry) for what each link adds to the Jacobian; keys repeat."""
         places = self.places
         blocks = {edge: (edge.jacobian_here(), edge.jacobian_there()) for edge in self.edges}
         for link in self.links:

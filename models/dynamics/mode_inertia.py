@@ -1,8 +1,9 @@
-"""Transversal modes of links that have inertia: one strength carries their stiffness and their inertia.
+"""Transversal modes of links with inertia: one strength for their stiffness and their inertia.
 
-A mode of strength alpha = -sigma gamma obeys (1 + alpha B) d' = (J - alpha H) d, B the inertia of a link over sigma at equal
-states.  Where B B = b B and B H = b H, b a number (the link moves some coordinates by forces and by inertia alike), this is
-d' = (J - tau (H + B J)) d with tau = alpha/(1 + b alpha): linear in one strength again.
+A mode of strength alpha = -sigma gamma obeys (1 + alpha B) d' = (J - alpha H) d; B is the inertia of
+a link over sigma at equal states.  If B B = b B and B H = b H with a number b (the forces and the
+inertia of a link act on the same coordinates), this is d' = (J - tau (H + B J)) d with
+tau = alpha/(1 + b alpha), which is linear in one strength again.
 """
 
 from __future__ import annotations
@@ -15,10 +16,25 @@ __all__ = ["effective_slope", "inertia_of_modes"]
 
 
 def inertia_of_modes(equations: Equations) -> tuple[sp.Matrix, sp.Expr]:
-    """Return B and b of links with inertia, zero without any.
+    """Return the inertia of links as modes feel it.
 
-    Raises ValueError where modes have no single strength: the inertia does not vanish between nodes that move alike, is not
-    proportional to sigma, or joins coordinates by different masses.
+    Parameters
+    ----------
+    equations : Equations
+        Equations of a network of equal nodes.
+
+    Returns
+    -------
+    inertia : Matrix
+        B, a square matrix over the components of a node; zero without inertia.
+    share : Expr
+        The number b with B B = b B; zero without inertia.
+
+    Raises
+    ------
+    ValueError
+        If modes have no single strength: the inertia does not vanish between nodes that move alike,
+        is not proportional to sigma, or joins coordinates by different masses.
     """
     node, edge = equations.node, equations.edge
     size = len(node.state)
@@ -51,9 +67,24 @@ def inertia_of_modes(equations: Equations) -> tuple[sp.Matrix, sp.Expr]:
 
 
 def effective_slope(equations: Equations, slope: sp.Matrix) -> sp.Matrix:
-    """Return H + B J, what multiplies the strength tau of a mode; H itself without inertia.
+    """Return the matrix that multiplies the strength of a mode.
 
-    Raises ValueError as `inertia_of_modes` does, and where a link pushes coordinates that its inertia does not move.
+    Parameters
+    ----------
+    equations : Equations
+        Equations of a network of equal nodes.
+    slope : Matrix
+        The derivative H of a link over sigma at equal states.
+
+    Returns
+    -------
+    Matrix
+        H + B J, which multiplies tau; H itself without inertia.
+
+    Raises
+    ------
+    ValueError
+        As `inertia_of_modes`, and if a link pushes coordinates that its inertia does not move.
     """
     b_matrix, share = inertia_of_modes(equations)
     if share == 0:

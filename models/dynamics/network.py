@@ -1,7 +1,8 @@
-"""Networks from one node and one edge: the template derivation that holds for any number of oscillators.
+"""Equations of networks from the oscillator, friction law and coupling that plug-ins define.
 
-The Lagrangian of a network is a sum over nodes and edges, T = sum T_i and V = sum V_i + sum V_edge, so the Euler-Lagrange
-equations of a node are those of the single oscillator plus one force for each edge that meets it.
+The Lagrangian of a network is a sum over nodes and edges, T = sum T_i and V = sum V_i + sum V_edge,
+so the Euler-Lagrange equations of a node are those of the single oscillator plus one force for each
+edge that meets it.
 """
 
 from __future__ import annotations
@@ -9,87 +10,97 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from functools import partial
-from types import ModuleType
+from functools import lru_cache
 
 import sympy as sp
 
 from ..graphs.links import Link
 from ..graphs.topology import Topology
-from ..inputs.plugins import call, load, named, names, remembered
-from ..mechanics import coupling_text
+from ..inputs.plugins import names
 from ..mechanics.calculus import cancelled
-from ..mechanics.components import SLIDING, TIME, Edge, Node
-from ..mechanics.coupling_text import split
-from ..mechanics.friction import CONTACTS, KAPPA
+from ..mechanics.components import SLIDING, Edge, Node
+from ..mechanics.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling
+from ..mechanics.definition import FRICTION_LAW
+from ..mechanics.friction import KAPPA, ContactModel, FrictionLaw
 from ..mechanics.lagrangian import Mechanics
 from ..mechanics.link import check_coupling, edge
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
 from ..mechanics.orientation import is_oriented
+from ..mechanics.oscillator import Field, Oscillator
 from ..mechanics.parameter import Parameter
 from ..mechanics.stick_slip import SLIP, set_valued
 from .equations import Equations
 
-__all__ = ["check_coupling", "edge", "mixed_network", "network", "node", "oriented_links", "parameters"]
+__all__ = ["check_coupling", "connectivity", "edge", "mixed_network", "network", "node", "oriented_links", "parameters"]
 
 
 def parameters(
-    oscillator: str, friction: str | None = None, contact: str = "atan", coupling: str | None = None
+    oscillator: Oscillator,
+    friction: FrictionLaw | None = None,
+    contact: str = ContactModel.ATAN,
+    coupling: Coupling | None = None,
 ) -> dict[str, Parameter]:
     """Return every parameter with default, unit, meaning and range, in the order of Equations.parameters.
 
-    Raises ValueError for an unknown oscillator, law, contact or coupling, where the oscillator takes no friction law but
-    is given one, or takes one but is given none, and where two of them have a parameter of the same name.
+    Parameters
+    ----------
+    oscillator : Oscillator
+        The node.
+    friction : FrictionLaw, optional
+        Its friction law.
+    contact : str
+        How a jump of the law at rest is treated, a `ContactModel`.
+    coupling : Coupling, optional
+        What joins the nodes.
+
+    Raises
+    ------
+    ValueError
+        For an unknown contact, if the oscillator takes no friction law but is given one, or takes one but is given
+        none, and if two of them have a parameter of the same name.
     """
-    model, law = _model(oscillator, friction, contact)
-    table: dict[str, Parameter] = dict(model.PARAMETERS)
-    if law is not None:
-        _join(table, law.PARAMETERS, f"friction law {friction!r}")
-        if contact == "atan" and friction_coefficient(law, "sign")(sp.Symbol("w", real=True)).has(sp.sign):
-            _join(table, {"kappa": KAPPA}, f"contact {contact!r}")
+    _check_parts(oscillator, friction, contact)
+    table: dict[str, Parameter] = dict(oscillator.parameters)
+    if friction is not None:
+        _join(table, friction.parameters, f"friction law {friction.name!r}")
+        if contact == ContactModel.ATAN and friction.force.has(sp.sign):
+            _join(table, {"kappa": KAPPA}, f"contact {str(contact)!r}")
     if coupling is not None:
-        own = coupling_text if coupling_text.is_matrix(coupling) else load("coupling", split(coupling)[0])
-        _join(table, own.PARAMETERS, f"coupling {coupling!r}")
-    return {name: replace(p, scale=str(scale(model, p.unit))) for name, p in table.items()}
+        _join(table, coupling.parameters, f"coupling {str(coupling)!r}")
+    return {name: replace(p, scale=str(scale(oscillator, p.unit))) for name, p in table.items()}
 
 
-@remembered(oscillator=partial(named, "oscillator"), friction=partial(named, "friction"))
-def node(oscillator: str, friction: str | None = None, contact: str = "atan") -> Node:
+@lru_cache(maxsize=64)
+def node(oscillator: Oscillator, friction: FrictionLaw | None = None, contact: str = ContactModel.ATAN) -> Node:
     """Derive the equations of one oscillator: for a Lagrangian x' = v and v' from the Euler-Lagrange equations.
 
     Raises ValueError as `parameters` does.
     """
-    model, law = _model(oscillator, friction, contact)
-    symbols = {name: sp.Symbol(name, real=True) for name in parameters(oscillator, friction, contact)}
-    if hasattr(model, "field"):
-        own = {name: sp.Symbol(name, real=True) for name in model.STATE}
-        rates = call(model.field, {**symbols, **own, "t": TIME})
-        return Node(tuple(own.values()), tuple(map(sp.sympify, rates)), tuple(symbols.values()))
-    system = nondimensional(model)
+    symbols = tuple(sp.Symbol(name, real=True) for name in parameters(oscillator, friction, contact))
+    if isinstance(oscillator.model, Field):
+        return Node(
+            tuple(sp.Symbol(name, real=True) for name in oscillator.model.state), oscillator.model.rates, symbols
+        )
+    system = nondimensional(oscillator)
     found = cancelled(system.accelerations())
     state = (*system.coordinates, *system.velocities)
-    if law is None:
-        return Node(state, (*system.velocities, *found), tuple(symbols.values()))
-    if contact == "set-valued" and _jumps(law):
-        return _sticking(system, found, law, tuple(symbols.values()))
-    coefficient = friction_coefficient(law, contact)
+    if friction is None:
+        return Node(state, (*system.velocities, *found), symbols)
+    if contact == ContactModel.SET_VALUED and friction.jumps:
+        return _sticking(system, found, friction, symbols)
+    coefficient = friction_coefficient(friction, contact)
     rates = (e.replace(FRICTION, coefficient) for e in found)
-    return Node(state, (*system.velocities, *rates), tuple(symbols.values()), law=coefficient(SLIDING))
-
-
-def _jumps(law: ModuleType) -> bool:
-    """True where friction has a jump at rest; without one nothing sticks and the equations are smooth as they are."""
-    return hasattr(law, "static") or friction_coefficient(law, "sign")(sp.Symbol("w", real=True)).has(sp.sign)
+    return Node(state, (*system.velocities, *rates), symbols, law=coefficient(SLIDING))
 
 
 def _sticking(
-    system: Mechanics, found: tuple[sp.Expr, ...], law: ModuleType, parameters: tuple[sp.Symbol, ...]
+    system: Mechanics, found: tuple[sp.Expr, ...], law: FrictionLaw, parameters: tuple[sp.Symbol, ...]
 ) -> Node:
     """The node that sticks and slips: states x, v and the mode."""
     if len(found) != 1:
         raise ValueError(f"set-valued contact: the oscillator has {len(found)} coordinates; expected one")
     w = sp.Dummy("w", real=True)
-    coefficient = friction_coefficient(law, "set-valued")
+    coefficient = friction_coefficient(law, ContactModel.SET_VALUED)
     (velocity,) = system.velocities
     rate, contact = set_valued(found[0], FRICTION, coefficient(w), w, static_coefficient(law), velocity)
     rates = (velocity, SLIP**2 * rate, sp.S.Zero)
@@ -104,28 +115,35 @@ def _join(table: dict[str, Parameter], more: Mapping[str, Parameter], what: str)
         table[name] = parameter
 
 
-def _model(oscillator: str, friction: str | None, contact: str) -> tuple[ModuleType, ModuleType | None]:
-    """The modules of an oscillator and its friction law, None where it takes none."""
-    model = load("oscillator", oscillator)
-    if contact not in CONTACTS:
-        raise ValueError(f"unknown contact {contact!r}; known: {', '.join(CONTACTS)}")
-    if friction is None:
-        if model.FRICTION:
-            raise ValueError(
-                f"oscillator {oscillator!r} has no friction law; known: {', '.join(names('friction'))}; name one"
-            )
-        return model, None
-    law = load("friction", friction)
-    if not model.FRICTION:
-        raise ValueError(f"oscillator {oscillator!r} takes no friction law, found {friction!r}; leave it out")
-    return model, law
+def _check_parts(oscillator: Oscillator, friction: FrictionLaw | None, contact: str) -> None:
+    """Raise ValueError for an unknown contact, and if an oscillator lacks a friction law or takes none."""
+    ContactModel.parse("contact", contact)
+    if friction is None and oscillator.takes_friction:
+        raise ValueError(
+            f"oscillator {oscillator.name!r} has no friction law; known: {', '.join(names(FRICTION_LAW))}; name one"
+        )
+    if friction is not None and not oscillator.takes_friction:
+        raise ValueError(f"oscillator {oscillator.name!r} takes no friction law, found {friction.name!r}; leave it out")
 
 
 def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str, ...] = ()) -> Equations:
-    """Join copies of a node by the links of a graph; without an edge the nodes stay uncoupled.
+    """Return the equations of equal nodes that the links of a graph join.
 
-    The node's parameters named in `varied` get a value for each node.
-    Where a link tells its ends apart, its weight becomes the sign of its direction (`synchain.models.mechanics.orientation`).
+    Parameters
+    ----------
+    single : Node
+        The template of the nodes.
+    link : Edge or None
+        The template of the links; None leaves the nodes uncoupled.
+    graph : Topology
+        The graph.
+    varied : tuple of str
+        Parameters of nodes that have one value for each node.
+
+    Notes
+    -----
+    If a link tells its ends apart, its weight becomes the sign of its direction
+    (`synchain.models.mechanics.orientation`).
     """
     if link is None:
         return Equations.of_equal_nodes(single, None, graph.n, (), varied)
@@ -135,16 +153,35 @@ def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str,
 
 
 def mixed_network(
-    oscillators: Sequence[str],
+    oscillators: Sequence[Oscillator],
     singles: Sequence[Node],
     kinds: Sequence[int],
-    coupling: str | None,
+    coupling: Coupling | None,
     graph: Topology,
     varied: tuple[str, ...] = (),
 ) -> Equations:
-    """Join nodes of several kinds by the links of a graph: `kinds` says of which oscillator each node is.
+    """Return the equations of nodes of several kinds that the links of a graph join.
 
-    Every pair of kinds that a link joins gets its own edge.  Raises ValueError where a coupling does not fit a pair.
+    Parameters
+    ----------
+    oscillators : sequence of str
+        Names of the oscillators, by kind.
+    singles : sequence of Node
+        Their templates.
+    kinds : sequence of int
+        The kind of each node.
+    coupling : str or None
+        The coupling, from which every pair of kinds that a link joins gets its own edge; None leaves
+        the nodes uncoupled.
+    graph : Topology
+        The graph.
+    varied : tuple of str
+        Parameters of nodes that have one value for each node.
+
+    Raises
+    ------
+    ValueError
+        If the coupling does not fit a pair of kinds.
     """
     apart = Equations(tuple(singles), tuple(kinds), (), (), varied)
     if coupling is None:
@@ -152,16 +189,62 @@ def mixed_network(
     pairs = sorted({apart.ends(link) for link in graph.links})
     edges = tuple(((a, b), edge(coupling, singles[a], oscillators[a], singles[b], oscillators[b])) for a, b in pairs)
     if any(a == b and is_oriented(link) for (a, b), link in edges):
-        raise ValueError(f"coupling {coupling!r} tells the ends of a link apart; expected nodes of one kind")
+        raise ValueError(f"coupling {str(coupling)!r} tells the ends of a link apart; expected nodes of one kind")
     return replace(apart, links=graph.links, edge_of=edges)
+
+
+def connectivity(coupling: Coupling, graph: Topology) -> tuple[tuple[Fraction, ...], ...]:
+    """Read G off the coupling: minus the Hessian of its whole potential over sigma, n rows of n fractions.
+
+    The Hessian of one edge is derived once and added up over the links, so that a thousand nodes take no algebra.  For a
+    damper the Rayleigh function takes the potential's place; for a one-way link the row is read off the force on its target.
+    Of entries such as "1/2 x->y" the factor belongs to H, so that G holds the weights alone.
+    Raises ValueError for a coupling whose Hessian between equal states is not sigma times weight times a number: it has no
+    matrix G.
+    """
+    if isinstance(coupling, MatrixCoupling):
+        diagonal, aside = Fraction(-1), Fraction(1)
+    else:
+        diagonal, aside = _hessian(coupling)
+    rows = [[Fraction(0)] * graph.n for _ in range(graph.n)]
+    for target, source, factor in graph.links:
+        rows[target][target] += factor * diagonal
+        rows[target][source] += factor * aside
+    return tuple(map(tuple, rows))
+
+
+def _hessian(coupling: LagrangianCoupling) -> tuple[Fraction, Fraction]:
+    """Minus the second derivatives of one edge's energy over sigma and weight: twice by one end, and by both.
+
+    Of a non-linear coupling they are taken between equal states, where its links are those of its linear part.
+    """
+    q_i, q_j, v_i, v_j, sigma = sp.symbols("q_i q_j v_i v_j sigma", real=True)
+    if coupling.between is not None:
+        raise ValueError(
+            f"coupling {str(coupling)!r} joins {' and '.join(coupling.between)}; it has no matrix of one coordinate"
+        )
+    functions = (coupling.potential, coupling.dissipation, coupling.kinetic)
+    energy = next((e for e in functions if e != 0), sp.S.Zero).xreplace({v_i: q_i, v_j: q_j})
+    slopes = (-energy.diff(q_i, q).xreplace({q_j: q_i}) for q in (q_i, q_j))
+    own, other = (sp.simplify(slope / (sigma * WEIGHT)) for slope in slopes)
+    if not (own.is_Rational and other.is_Rational) or own == 0:
+        raise ValueError(
+            f"coupling {str(coupling)!r}: Hessian over sigma and weight is {own}, {other}; expected numbers other than 0"
+        )
+    return Fraction(int(own.p), int(own.q)), Fraction(int(other.p), int(other.q))
 
 
 def oriented_links(graph: Topology) -> tuple[Link, ...]:
     """Return the links of a graph with the sign of their direction as weight.
 
-    A link runs from the smaller to the larger number; on a graph that looks alike from every node (a ring) it runs the
-    shorter way round, so that the last link runs from the last node to the first.
-    Raises ValueError for one-way links and for weights other than 1: strength and direction share one number.
+    A link runs from the smaller to the larger number.  On a graph that looks alike from every node,
+    such as a ring, it runs the shorter way round, so the last link runs from the last node to the
+    first.
+
+    Raises
+    ------
+    ValueError
+        For one-way links and for weights other than 1: strength and direction share one number.
     """
     if not graph.symmetric or any(weight != 1 for _, _, weight in graph.links):
         raise ValueError(

@@ -1,4 +1,4 @@
-"""How time enters the equations of a network: at which frequencies, and after which time they repeat themselves."""
+"""Frequencies of the drive in the equations of a network, and their common period."""
 
 from __future__ import annotations
 
@@ -19,9 +19,15 @@ __all__ = ["Drive", "angular_frequency", "as_function", "drive_of", "names_in", 
 class Drive:
     """The drive of a network, derived from its equations.
 
-    waves: the angular frequencies of the sines and cosines of time, expressions of the parameters; frequency: the largest
-    of which all waves are whole multiples, so that the right-hand side has the period 2 pi over its absolute value.  It is
-    None if there is no such frequency, and `problem` says why, as a predicate of the oscillator.
+    Attributes
+    ----------
+    waves : tuple of Expr
+        Angular frequencies of the sines and cosines of time, expressions of the parameters.
+    frequency : Expr or None
+        The largest angular frequency of which all waves are whole multiples, so that the right-hand
+        side has the period 2 pi over its absolute value; None if there is no such frequency.
+    problem : str
+        Why there is none, as a predicate of the oscillator.
     """
 
     waves: tuple[sp.Expr, ...] = ()
@@ -30,13 +36,21 @@ class Drive:
 
 
 def angular_frequency(equations: Equations) -> sp.Expr | None:
-    """The angular frequency of the drive, an expression of parameters; None if no period is known (see `Drive`)."""
+    """Return the angular frequency of the drive, None if no period is known (see `Drive`)."""
     return drive_of(equations.nodes, equations.varied).frequency
 
 
 @lru_cache(maxsize=64)
 def drive_of(nodes: tuple[Node, ...], varied: tuple[str, ...] = ()) -> Drive:
-    """The drive of a network of these nodes, whose parameters in `varied` differ from node to node; links have no time."""
+    """Return the drive of a network; links do not depend on time.
+
+    Parameters
+    ----------
+    nodes : tuple of Node
+        The templates of the nodes.
+    varied : tuple of str
+        Names of parameters that differ from node to node.
+    """
     if not any(node.forced for node in nodes):
         return Drive(problem="is not driven")
     waves: set[sp.Expr] = set()
@@ -56,7 +70,7 @@ def drive_of(nodes: tuple[Node, ...], varied: tuple[str, ...] = ()) -> Drive:
 
 
 def _without_waves(e: sp.Expr, node: Node, found: set[sp.Expr]) -> sp.Expr:
-    """The expression with a symbol for each sine and cosine of a t + b; the frequencies a are collected."""
+    """Replace each sine and cosine of a t + b by a symbol; collect the frequencies a."""
     states = set(node.state)
 
     def note(wave: sp.Expr) -> sp.Expr:
@@ -72,7 +86,7 @@ def _without_waves(e: sp.Expr, node: Node, found: set[sp.Expr]) -> sp.Expr:
 
 @lru_cache(maxsize=64)
 def as_function(frequency: sp.Expr) -> Callable[..., float]:
-    """A frequency as a function of numbers, in the order of the names of its parameters; nan if it has no value there."""
+    """Return a frequency as a function of numbers in the order of `names_in`; nan if undefined."""
     written = sp.lambdify([sp.Symbol(name, real=True) for name in names_in(frequency)], frequency, "math")
 
     def value(*numbers: float) -> float:
@@ -90,7 +104,7 @@ def names_in(frequency: sp.Expr) -> tuple[str, ...]:
 
 
 def period_of(frequency: float) -> float | None:
-    """The period 2 pi over the absolute value of an angular frequency; None if there is none, as at the frequency 0."""
+    """Return the period of an angular frequency; None if there is none, as at the frequency 0."""
     if not frequency:
         return None
     found = 2 * math.pi / abs(frequency)

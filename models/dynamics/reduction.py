@@ -1,12 +1,15 @@
-"""Exact reductions of a network: parameters that are numbers go into the equations, nodes that move as one become one node.
+"""Exact reductions of a network: constants in place of parameters, one node in place of equal ones.
 
-Nodes that start equal stay equal where the links treat them alike: where a partition of the nodes is balanced, that is
-where all nodes of a class feel every other class with the same total weight.  The quotient network has one node for each
-class and the same solutions.  Links inside a class drop out, because they are zero between equal states; such partitions
-are also called external equitable partitions.
+Nodes that start equal stay equal if they belong to one class of a balanced partition: a partition in
+which all nodes of a class feel every other class with the same total weight.  The quotient network
+has one node for each class and the same solutions.  Links inside a class drop out, because they are
+zero between equal states; such partitions are also called external equitable partitions.
 
-Sources: Golubitsky & Stewart, Bull. Amer. Math. Soc. 43, 305 (2006): balanced partitions and quotients; Schaub, O'Clery,
-Billeh, Delvenne, Lambiotte & Barahona, Chaos 26, 094821 (2016): those of difference couplings.
+References
+----------
+Golubitsky & Stewart, Bull. Amer. Math. Soc. 43, 305 (2006): balanced partitions and quotients.
+Schaub, O'Clery, Billeh, Delvenne, Lambiotte & Barahona, Chaos 26, 094821 (2016): partitions of
+difference couplings.
 """
 
 from __future__ import annotations
@@ -42,15 +45,15 @@ def substitute_constants(equations: Equations, values: Mapping[str, int | Fracti
     Returns
     -------
     Equations
-        Parameters that occur no more are left out as well, and so are links that have no effect any more.
+        Parameters that occur no more are left out, and so are links that have no effect.
 
     Raises
     ------
     TypeError
         If a number is not exact.
     ValueError
-        If a parameter is unknown or differs from node to node, nodes are of several kinds, or an expression is undefined
-        at the numbers.
+        If a parameter is unknown or differs from node to node, nodes are of several kinds, or an
+        expression is undefined at the numbers.
     """
     _check_constants(equations, values)
     if not values:
@@ -85,21 +88,56 @@ def _check_constants(equations: Equations, values: Mapping[str, int | Fraction])
 
 
 def quotient(equations: Equations, colours: Sequence[Hashable]) -> tuple[Equations, tuple[int, ...]]:
-    """Return the smallest network that moves like this one where nodes of equal colour start equal, and each node's class.
+    """Return the smallest network with the same motion if nodes of equal colour start equal.
 
-    `colours` has one entry for each node, its initial state; classes are numbered by their first nodes, so node 0 belongs to
-    class 0.  Raises NoQuotient where the coupling does not vanish between equal states or is not proportional to the weight
-    of a link (then no exact quotient is known), ValueError where there is not one colour for each node.
+    Parameters
+    ----------
+    equations : Equations
+        The network.
+    colours : sequence of hashable
+        One entry for each node, such as its initial state.
+
+    Returns
+    -------
+    equations : Equations
+        The quotient network.
+    classes : tuple of int
+        The class of each node; classes are numbered by their first nodes.
+
+    Raises
+    ------
+    NoQuotient
+        If the coupling does not vanish between equal states or is not proportional to the weight of
+        a link; then no exact quotient is known.
+    ValueError
+        If there is not one colour for each node.
     """
     classes = coarsest_balanced(equations.n, equations.links, colours)
     return collapse(equations, classes), classes
 
 
 def collapse(equations: Equations, classes: Sequence[int]) -> Equations:
-    """Return the network with one node for each class, its links those of any node of the class to the other classes.
+    """Return the network with one node for each class.
 
-    Raises ValueError where the classes are not 0 … k-1, where two nodes of a class feel another class with different total
-    weights, NoQuotient for a coupling that `quotient` refuses.
+    Parameters
+    ----------
+    equations : Equations
+        The network.
+    classes : sequence of int
+        The class of each node, out of 0 … k-1.
+
+    Returns
+    -------
+    Equations
+        The quotient network; its links are those of any node of a class to the other classes.
+
+    Raises
+    ------
+    NoQuotient
+        For a coupling that `quotient` refuses.
+    ValueError
+        If the classes are not 0 … k-1, or if two nodes of a class feel another class with different
+        total weights.
     """
     if len(classes) != equations.n:
         raise ValueError(f"partition: found {len(classes)} classes for {equations.n} nodes; expected one for each node")

@@ -1,12 +1,16 @@
 """What the events of set-valued friction do to small deviations from an orbit.
 
-At an event h = 0 a deviation d is multiplied by S = I + (F+ - F-) n / (n F- + dh/dt), n the gradient of h.  Landing in
-stick makes the velocity zero and a turn without stick multiplies it by the ratio of the accelerations.  Where slip begins
-F+ = F- for laws without a jump at rest, and S = I; where static friction drops at once to a smaller value, the velocity
-begins with the jump of the acceleration times the time by which slip begins earlier.  All of this changes velocities only,
-by positions only, so the maps of contacts that change at the same instant commute.
+At an event h = 0 a deviation d is multiplied by S = I + (F+ - F-) n / (n F- + dh/dt), n the gradient
+of h.  Landing in stick makes the velocity zero, and a turn without stick multiplies it by the ratio
+of the accelerations.  When slip begins, F+ = F- and S = I for laws without a jump at rest; if static
+friction drops at once to a smaller value, the velocity begins with the jump of the acceleration
+times the time by which slip begins earlier.  The maps change velocities only, by positions only, so
+those of contacts that change at the same instant commute.
 
-Source: Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer, 2004), chapter 7.
+References
+----------
+Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer, 2004),
+chapter 7.
 """
 
 from __future__ import annotations
@@ -35,8 +39,13 @@ Entry = tuple[tuple[int, int], sp.Expr]
 class Events:
     """The rows of a deviation that are velocities, and what the start of slip makes of them.
 
-    owners (size,): the contact that each row is a velocity of, -1 for a position.  exits: for each contact what becomes of
-    its rows where slip begins with w > 0 and where it begins with w < 0; empty where friction sets in without a jump.
+    Attributes
+    ----------
+    owners : tuple of int, one for each row
+        The contact that the row is a velocity of, -1 for a position.
+    exits : tuple of pairs
+        For each contact the entries of the matrix that the start of slip with w > 0, and with
+        w < 0, multiplies its rows by; empty if friction sets in without a jump.
     """
 
     owners: tuple[int, ...]
@@ -57,8 +66,14 @@ class Events:
 class Release:
     """The start of slip of one contact in one direction, in the symbols of a network.
 
-    gradient: derivatives of the event function by the positions (n,); own: that without the links; lead: by how much the
-    velocity changes for each unit that the event function is ahead.
+    Attributes
+    ----------
+    gradient : tuple of Expr, (n,)
+        Derivatives of the event function by the positions.
+    own : Expr
+        Its derivative by the position of the contact without the links.
+    lead : Expr
+        Change of the velocity for each unit that the event function is ahead.
     """
 
     gradient: tuple[sp.Expr, ...]
@@ -67,7 +82,7 @@ class Release:
 
 
 def _releases(orbit: Equations) -> tuple[tuple[Release, Release], ...]:
-    """Slip with w > 0 and with w < 0 for each contact of a network; empty where slip begins without a jump.
+    """Return slip with w > 0 and with w < 0 for each contact; empty if slip begins without a jump.
 
     Raises ValueError for links that act on velocities.
     """
@@ -96,7 +111,8 @@ def _release(orbit: Equations, i: int, speed: sp.Expr, event: sp.Expr, jump: sp.
 def _check_release(edges: Iterable[Edge]) -> None:
     """Raise ValueError for links that act on velocities.
 
-    Bodies that let go at the same instant then hasten each other, and what becomes of a deviation depends on which is first.
+    Bodies that let go at the same instant then hasten each other, and the order of their releases
+    decides what becomes of a deviation.
     """
     if any(edge.rhs[1].has(ends[1]) for edge in edges for ends in (edge.here, edge.there)):
         raise ValueError(
@@ -106,14 +122,14 @@ def _check_release(edges: Iterable[Edge]) -> None:
 
 
 def _force_slope(slope: sp.Matrix) -> sp.Expr:
-    """How the force of a link on a body that slips depends on a position, of the matrix H of `coupling_slope`."""
+    """The derivative of the force of a link by a position in slip, of H of `coupling_slope`."""
     return slope[1, 0].xreplace({SLIP: sp.S.One})
 
 
 def of_mode(
     equations: Equations, orbit: Equations, slope: sp.Matrix, strength: tuple[sp.Symbol, sp.Symbol], plane: bool
 ) -> Events | None:
-    """Events of a mode: link forces vanish on the synchronous orbit and deviate like those of one oscillator."""
+    """Return the events of a mode; on the synchronous orbit the forces of links vanish."""
     if not orbit.sticks:
         return None
     found = _releases(orbit)
@@ -131,7 +147,7 @@ def of_mode(
 
 
 def of_network(equations: Equations) -> Events | None:
-    """Events of all contacts of a network: row n + i is the velocity of oscillator i."""
+    """Return the events of all contacts of a network: row n + i is the velocity of node i."""
     n = equations.n
     if not equations.sticks:
         return None
@@ -146,7 +162,7 @@ def of_network(equations: Equations) -> Events | None:
 def of_blocks(
     equations: Equations, blocks: Sequence[Block], orbit: Equations, slope: sp.Matrix, strength: sp.Symbol
 ) -> Events | None:
-    """Events of the clusters' contacts, which also change the differences within the clusters."""
+    """Return the events of the clusters' contacts, which change differences within clusters too."""
     own = of_network(orbit)
     if own is None:
         return None

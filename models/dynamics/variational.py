@@ -1,7 +1,7 @@
-"""Tangent dynamics: what a small deviation does, along the orbit it deviates from.
+"""Variational equations: the linear equations of small deviations along an orbit.
 
-`mode`, `network_variation` and `clustered` part the orbit from the linear equation of the deviations, so that one orbit carries any
-number of them.
+`mode`, `network_variation` and `clustered` keep the orbit apart from the linear equation of the
+deviations, so that one orbit carries any number of them.
 """
 
 from __future__ import annotations
@@ -51,12 +51,26 @@ LOG_VOLUME = sp.Symbol("log_volume", real=True)
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """A linear system d' = A d along an orbit: what small deviations from it do.
+    """A linear system d' = A d of small deviations along an orbit.
 
-    `matrix` holds the non-zero entries ((row, column), expression) of A, in the symbols of the whole orbit (x_1 …), its
-    parameters, t, and `parameters`, numbers that differ from mode to mode and enter A linearly.  `events` say what stick and
-    slip do to a deviation; modes of contacts themselves do not deviate.
-    Raises ValueError for an entry outside the matrix or with an unknown symbol, or one that is not linear in `parameters`.
+    Parameters
+    ----------
+    orbit : Equations
+        The equations of the orbit.
+    size : int
+        The number of deviations; slip states of contacts do not deviate.
+    matrix : tuple of ((int, int), Expr)
+        The non-zero entries of A by (row, column), in the symbols of the orbit (x_1 …), its
+        parameters, t and `parameters`.
+    parameters : tuple of Symbol
+        Numbers that differ from mode to mode; A is linear in them.
+    events : Events or None
+        What stick and slip do to a deviation; None for smooth equations.
+
+    Raises
+    ------
+    ValueError
+        For an entry outside the matrix, with an unknown symbol, or not linear in `parameters`.
     """
 
     orbit: Equations
@@ -84,11 +98,33 @@ class Variation:
 
 
 def mode(equations: Equations, plane: bool = False) -> Variation:
-    """Return the variational equation of one transversal mode along the synchronous orbit, d' = (J - alpha H) d.
+    """Return the variational equation of one transversal mode along the synchronous orbit.
 
-    With `plane` the strength is complex, alpha + i beta, and the deviation has its real parts first, then its imaginary
-    parts.  J and H as in `transversal`, which raises the same errors.  Where links have inertia H stands for H + B J, and
-    the strength for tau = alpha/(1 + b alpha) (`synchain.models.dynamics.mode_inertia`).
+    If links vanish between equal states, a deviation along an eigenvector of G with eigenvalue gamma
+    obeys d' = (J - alpha H) d, alpha = -sigma gamma; J is the Jacobian of one node and H is
+    `coupling_slope`.  For links with inertia the strength is tau = alpha/(1 + b alpha)
+    (`synchain.models.dynamics.mode_inertia`).
+
+    Parameters
+    ----------
+    equations : Equations
+        Equations of a network of equal nodes.
+    plane : bool
+        Let the strength be complex, alpha + i beta; the deviation has its real parts first.
+
+    Returns
+    -------
+    Variation
+        The variational equation, its orbit one node.
+
+    Raises
+    ------
+    ValueError
+        As `coupling_slope`.
+
+    References
+    ----------
+    Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998).
     """
     slope = coupling_slope(equations)
     node = equations.node
@@ -106,9 +142,22 @@ def mode(equations: Equations, plane: bool = False) -> Variation:
 
 
 def network_variation(equations: Equations) -> Variation:
-    """Return the variational equation of the whole network, d' = J d, in state order (without the modes of contacts).
+    """Return the variational equation of the whole network, d' = J d.
 
-    Raises ValueError for nodes of several kinds and for links with inertia.
+    Parameters
+    ----------
+    equations : Equations
+        Equations of a network of nodes of one kind.
+
+    Returns
+    -------
+    Variation
+        Deviations in state order, without the slip states of contacts.
+
+    Raises
+    ------
+    ValueError
+        For nodes of several kinds and for links with inertia.
     """
     equations.expect_alike("variational equation of the whole network", varied_too=True)
     size = equations.n * len(equations.node.continuous)
@@ -117,14 +166,33 @@ def network_variation(equations: Equations) -> Variation:
 
 
 def clustered(equations: Equations, found: Clusters) -> Variation:
-    """Return the variational equation of a cluster state: first that of the clusters' own motion, then its blocks in turn.
+    """Return the variational equation of a cluster state.
 
-    The orbit is that of the quotient network.  Coordinate k of a block lives on the orbit of its cluster c and obeys
-    d_k' = J(s_c) d_k + sigma sum_l B_kl H d_l, B the block's matrix and `STRENGTH` the place of sigma; a block of b
-    coordinates has b rows for each component (Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014)).
+    The orbit is that of the quotient network.  Coordinate k of a block lives on the orbit of its
+    cluster c and obeys d_k' = J(s_c) d_k + sigma sum_l B_kl H d_l; B is the matrix of the block.
 
-    Raises ValueError as `transversal` does, for a link whose derivative depends on the state, and for a partition that is
-    not balanced.
+    Parameters
+    ----------
+    equations : Equations
+        Equations of a network of equal nodes.
+    found : Clusters
+        The clusters and the blocks of their variational equation.
+
+    Returns
+    -------
+    Variation
+        First the motion of the clusters, then the blocks in turn, b rows for each component of a
+        block of b coordinates; `STRENGTH` stands for sigma.
+
+    Raises
+    ------
+    ValueError
+        As `coupling_slope`, for a link whose derivative depends on the state, and for a partition
+        that is not balanced.
+
+    References
+    ----------
+    Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014).
     """
     equations.expect_alike("cluster states")
     slope = _constant_slope(equations)
@@ -174,7 +242,7 @@ def _constant_slope(equations: Equations) -> sp.Matrix:
 
 
 def phase_shifted(variation: Variation) -> Variation:
-    """Return the same equations with a clock that is set to 0 at the time `PHASE`, a new parameter."""
+    """Return the same equations with a clock that shows 0 at the time `PHASE`, a new parameter."""
 
     def later(e: sp.Expr) -> sp.Expr:
         return e.xreplace({TIME: TIME + PHASE})
@@ -190,10 +258,16 @@ def phase_shifted(variation: Variation) -> Variation:
 
 
 def with_volume(equations: Equations) -> Equations:
-    """Return the equations with one more state of each oscillator, `LOG_VOLUME`, its share of the divergence summed up.
+    """Return the equations with one more state of each node, the integral of its divergence.
 
-    The sum over the oscillators is the logarithm of a volume of states carried along (Liouville's formula).
-    Raises ValueError for set-valued friction, under which volumes vanish in stick.
+    The sum of `LOG_VOLUME` over the nodes is the logarithm of a volume of states that moves with the
+    flow (Liouville's formula).
+
+    Raises
+    ------
+    ValueError
+        For set-valued friction, under which volumes vanish in stick, for nodes of several kinds and
+        for links with inertia.
     """
     if equations.sticks:
         raise ValueError("volumes of states: found set-valued friction, whose stick makes them zero")
@@ -220,9 +294,23 @@ def _entries(matrix: sp.Matrix) -> tuple[Entry, ...]:
 
 
 def coupling_slope(equations: Equations) -> sp.Matrix:
-    """Return H: the derivative of a link of weight 1 with respect to the state at its source, over sigma, at equal states.
+    """Return H, the derivative of a link of weight 1 by the state at its source, over sigma.
 
-    Of links with inertia it is H + B J.  Raises ValueError as `transversal` does.
+    Parameters
+    ----------
+    equations : Equations
+        Equations of a network of equal nodes.
+
+    Returns
+    -------
+    Matrix
+        H at equal states, (components, components); H + B J for links with inertia.
+
+    Raises
+    ------
+    ValueError
+        If nodes differ, there is no coupling, a link does not vanish between equal states, so that
+        the synchronous state is no solution, or links are not proportional to sigma.
     """
     equations.expect_alike("transversal modes of complete synchronisation", inertia_too=True)
     edge = equations.edge

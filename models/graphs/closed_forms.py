@@ -1,7 +1,7 @@
-"""Spectra of whole families in closed form, with the number of nodes as a symbol, and eigenvectors where they are simple.
+"""Spectra of whole families in closed form, with symbols for the sizes, and simple eigenvectors.
 
-A family's file may have `formula()`, which returns a ClosedForm made of the symbols below.  The tests prove each one for
-all sizes up to 30 against the exact characteristic polynomial.
+A family's file may have `formula()`, which returns a ClosedForm of the symbols below.  The tests
+prove each one for all sizes up to 30 against the exact characteristic polynomial.
 """
 
 from __future__ import annotations
@@ -22,20 +22,33 @@ from .topology import Topology
 __all__ = ["NODE", "ClosedForm", "D", "J", "K", "M", "N", "P", "Q", "Term", "closed_form", "entries", "formulas"]
 
 N, K, J, P, Q, D, M, NODE = sp.symbols("n k j p q d m i", integer=True, nonnegative=True)
-"""Nodes; indices of eigenvalues; sizes of directions or groups; dimension; number of an eigenvector; of a node, from 0."""
+"""n: nodes; k, j: indices of eigenvalues; p, q: sizes of directions or groups; d: dimension;
+m: number of an eigenvector; i: number of a node, from 0."""
 
 Index = tuple[sp.Symbol, sp.Expr, sp.Expr]
 
 _ENTRY = re.compile(r"[0-9]{1,9}|[a-hj-wyz][0-9]?")
-"""A whole number or a letter: not i, the node, and not x, which stands between the sizes of directions."""
+"""A whole number or a letter other than i, the node, and x, which stands between sizes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """Eigenvalues `value`, each `times` times, for every value low … high of the `indices` (symbol, low, high).
+    """Eigenvalues of one form.
 
-    `vector` is entry NODE of an eigenvector of each, where one is given; where an eigenvalue occurs several times the
-    values of `numbered`, (symbol, low, high), for which `where` holds give as many independent ones.
+    Parameters
+    ----------
+    value : SymPy expression
+        The eigenvalue.
+    times : SymPy expression, optional
+        Its multiplicity.
+    indices : tuple of (symbol, low, high), optional
+        There is an eigenvalue for every value low … high of these indices.
+    vector : SymPy expression, optional
+        Entry NODE of an eigenvector.
+    numbered : tuple of (symbol, low, high), optional
+        Numbers of the eigenvectors of a multiple eigenvalue.
+    where : SymPy condition, optional
+        The numbers that give independent eigenvectors obey it.
     """
 
     value: sp.Expr
@@ -52,7 +65,7 @@ class Term:
         return f"{sp.sstr(self.value)}{often}{_ranges(self.indices)}"
 
     def vector_text(self, size: sp.Expr) -> str:
-        """The eigenvectors in words, of a graph with `size` nodes."""
+        """Return the eigenvectors of a graph with `size` nodes in words."""
         on = "" if self.where == sp.true else f", {sp.sstr(self.where)}"
         return f"{sp.sstr(self.vector)} at node i = 0 … {sp.sstr(size - 1)}{_ranges(self.numbered)}{on}"
 
@@ -68,22 +81,22 @@ class Term:
         return set().union(*(sp.S(part).free_symbols for part in parts))
 
     def at(self, numbers: Mapping[sp.Symbol, int]) -> Iterator[tuple[sp.Expr, int, dict[sp.Symbol, int]]]:
-        """(eigenvalue, multiplicity, all numbers) for numbers in place of the sizes; nothing for multiplicity 0."""
+        """Yield (eigenvalue, multiplicity > 0, all numbers) for numbers in place of the sizes."""
         text = sp.sstr(self.value)
-        for chosen in _chosen(self.indices, dict(numbers)):
-            count = int(self.times.subs(chosen))
+        for all_numbers in _with_indices(self.indices, dict(numbers)):
+            count = int(self.times.subs(all_numbers))
             if count:
-                yield exact_number(text, {str(s): k for s, k in chosen.items()}), count, chosen
+                yield exact_number(text, {str(s): k for s, k in all_numbers.items()}), count, all_numbers
 
-    def vectors(self, chosen: Mapping[sp.Symbol, int]) -> Iterator[sp.Expr]:
-        """The eigenvectors of one eigenvalue as expressions in NODE, for all numbers as `at` gives them."""
+    def vectors(self, numbers: Mapping[sp.Symbol, int]) -> Iterator[sp.Expr]:
+        """Yield the eigenvectors of an eigenvalue as expressions in NODE; `numbers` as of `at`."""
         if self.vector is not None:
-            for all_numbers in _chosen(self.numbered, dict(chosen)):
+            for all_numbers in _with_indices(self.numbered, dict(numbers)):
                 if self.where.subs(all_numbers).doit() == sp.true:
                     yield self.vector.subs(all_numbers).doit()
 
     def replaced(self, new: Mapping[sp.Symbol, sp.Expr]) -> Term:
-        """The term with other symbols or expressions for some of its symbols, all at once."""
+        """Return the term with other expressions for some of its symbols, all at once."""
 
         def put(part: Any) -> Any:
             return sp.S(part).xreplace(dict(new))
@@ -100,20 +113,41 @@ def _ranges(indices: tuple[Index, ...]) -> str:
     return f" for {many}" if many else ""
 
 
-def _chosen(indices: tuple[Index, ...], given: dict[sp.Symbol, int]) -> Iterator[dict[sp.Symbol, int]]:
-    """The numbers with every choice of the indices."""
-    ends = [[int(end.subs(given)) for end in index[1:]] for index in indices]
+def _with_indices(indices: tuple[Index, ...], numbers: dict[sp.Symbol, int]) -> Iterator[dict[sp.Symbol, int]]:
+    """The numbers with all values of the indices."""
+    ends = [[int(end.subs(numbers)) for end in index[1:]] for index in indices]
     for place in product(*(range(low, high + 1) for low, high in ends)):
-        yield given | {index[0]: k for index, k in zip(indices, place, strict=True)}
+        yield numbers | {index[0]: k for index, k in zip(indices, place, strict=True)}
 
 
 @dataclass(frozen=True, slots=True)
 class ClosedForm:
-    """The spectrum of a family or product: its terms and the number of nodes `size` in its symbols.
+    """The spectrum of a family or product in symbols.
 
-    `blocks` says which Jordan blocks are larger than 1; it does not hold for products.
-    `options` are those of the family, in these symbols; `least` is the smallest number for each symbol that is not in
-    `lowest`, and `where` what they must obey; `degree` is the in-degree of every node where it is one for all.
+    Parameters
+    ----------
+    terms : tuple of Term
+        The eigenvalues.
+    size : SymPy expression, optional
+        The number of nodes.
+    options : mapping, optional
+        Options of the family, in the symbols.
+    least : int, optional
+        Smallest number for each symbol that is not in `lowest`.
+    note : str, optional
+        What else a reader must know.
+    blocks : str, optional
+        The Jordan blocks that are larger than 1; it does not hold for products.
+    degree : SymPy expression, optional
+        The in-degree of every node; None if it is not one for all.
+    where : SymPy condition, optional
+        What the numbers must obey.
+    lowest : mapping of symbol to int, optional
+        Smallest numbers of single symbols.
+    name : str, optional
+        Name of the family with its options.
+    build : callable, optional
+        Makes the graph for numbers by symbols.
     """
 
     terms: tuple[Term, ...]
@@ -130,38 +164,43 @@ class ClosedForm:
 
     @property
     def symbols(self) -> tuple[sp.Symbol, ...]:
-        """The symbols for which numbers are to be put, sorted by name."""
+        """The symbols that take numbers, sorted by name."""
         return tuple(sorted(self.size.free_symbols | self.where.free_symbols, key=str))
 
     def least_of(self, symbol: sp.Symbol) -> int:
-        """The smallest number for a symbol."""
+        """Return the smallest number for a symbol."""
         return self.lowest.get(symbol, self.least)
 
     def at(self, **numbers: int) -> list[tuple[sp.Expr, int]]:
-        """Eigenvalues and multiplicities for numbers such as n=5 or p=3, q=4; equal ones are not merged.
+        """Return eigenvalues and multiplicities for numbers such as n=5 or p=3, q=4.
 
-        Raises ValueError where a number is missing, not known or too small.
+        Equal eigenvalues are not merged.
+
+        Raises
+        ------
+        ValueError
+            If a number is missing, not known or too small.
         """
-        given = self.given(numbers)
-        return [(value, count) for term in self.terms for value, count, _ in term.at(given)]
+        by_symbol = self.by_symbol(numbers)
+        return [(value, count) for term in self.terms for value, count, _ in term.at(by_symbol)]
 
     def graph(self, **numbers: int) -> Topology:
-        """The graph for the same numbers."""
-        return self.made(self.given(numbers))
+        """Return the graph for numbers as of `at`."""
+        return self.graph_of(self.by_symbol(numbers))
 
-    def made(self, given: Mapping[sp.Symbol, int]) -> Topology:
-        """The graph for numbers by symbols."""
+    def graph_of(self, numbers: Mapping[sp.Symbol, int]) -> Topology:
+        """Return the graph for numbers by symbols."""
         if self.build is None:
             raise ValueError("this closed form has no graph; expected one made by closed_form or a product of such")
-        return self.build(given)
+        return self.build(numbers)
 
     def as_dict(self) -> dict[str, Any]:
-        """What `synchain spectrum FAMILY --symbolic --json` prints."""
+        """Return what `synchain spectrum FAMILY --symbolic --json` prints."""
         return {"n": sp.sstr(self.size), "terms": [_term_dict(term) for term in self.terms], "note": self.words}
 
     @property
     def words(self) -> str:
-        """The note and what is known of Jordan blocks."""
+        """The note and the Jordan blocks."""
         return "; ".join(filter(None, (self.note, self.blocks)))
 
     @property
@@ -174,18 +213,18 @@ class ClosedForm:
                 rows.append(f"    eigenvector{'s' * bool(term.numbered)}: {term.vector_text(self.size)}")
         return "\n".join([*rows, *([f"  {self.words}"] if self.words else [])])
 
-    def given(self, numbers: Mapping[str, int]) -> dict[sp.Symbol, int]:
-        """The numbers by symbols; ValueError as `at`."""
+    def by_symbol(self, numbers: Mapping[str, int]) -> dict[sp.Symbol, int]:
+        """Return numbers by symbols instead of names; ValueError as `at`."""
         known = {str(symbol): symbol for symbol in self.symbols}
         if set(numbers) != set(known):
             raise ValueError(f"found numbers for {sorted(numbers)}; expected them for {sorted(known)}")
         for key, value in numbers.items():
             if value < self.least_of(known[key]):
                 raise ValueError(f"found {key} = {value}; expected at least {self.least_of(known[key])}")
-        found = {known[key]: value for key, value in numbers.items()}
-        if self.where.subs(found) != sp.true:
+        by_symbol = {known[key]: value for key, value in numbers.items()}
+        if self.where.subs(by_symbol) != sp.true:
             raise ValueError(f"found {numbers}; expected {sp.sstr(self.where)}")
-        return found
+        return by_symbol
 
 
 def _term_dict(term: Term) -> dict[str, Any]:
@@ -202,15 +241,15 @@ def _term_dict(term: Term) -> dict[str, Any]:
     }
 
 
-def _filled(value: Any, given: Mapping[sp.Symbol, int]) -> Any:
-    return tuple(_filled(part, given) for part in value) if isinstance(value, tuple) else int(sp.S(value).subs(given))
+def _filled(value: Any, numbers: Mapping[sp.Symbol, int]) -> Any:
+    """An option with numbers in place of symbols."""
+    if isinstance(value, tuple):
+        return tuple(_filled(part, numbers) for part in value)
+    return int(sp.S(value).subs(numbers))
 
 
 def entries(what: str, given: Any) -> tuple[sp.Expr, ...]:
-    """Whole numbers and letters: a list or a text such as "pxq" or "1,3,s"; letters become symbols.
-
-    Raises ValueError on anything else.
-    """
+    """Return the whole numbers and symbols of a list or a text such as "pxq"; else ValueError."""
     parts = re.split("[,x]", given.replace(" ", "")) if isinstance(given, str) else list(given)
     wrong = next((part for part in parts if not _ENTRY.fullmatch(str(part))), None)
     if wrong is not None or not parts:
@@ -222,14 +261,24 @@ def entries(what: str, given: Any) -> tuple[sp.Expr, ...]:
 
 
 def formulas() -> tuple[str, ...]:
-    """The families that have a closed form with symbols."""
+    """Return the names of the families that have a closed form with symbols."""
     return tuple(name for name in names() if family(name).formula is not None)
 
 
 def closed_form(name: str, **options: Any) -> ClosedForm:
-    """The spectrum of a family with symbols for its size; options as numbers or letters, e.g. shape="pxqxr".
+    """Return the spectrum of a family with symbols for its size.
 
-    Raises ValueError where the family has none, or not with these options.
+    Parameters
+    ----------
+    name : str
+        Name of the family.
+    **options
+        Options of the family as numbers or letters, e.g. ``shape="pxqxr"``.
+
+    Raises
+    ------
+    ValueError
+        If the family has no closed form with symbols, or not with these options.
     """
     formula = family(name).formula
     if formula is None:
@@ -239,17 +288,18 @@ def closed_form(name: str, **options: Any) -> ClosedForm:
     if unknown:
         raise ValueError(f"topology {name}: option {unknown[0]!r} with symbols; known: {', '.join(known) or 'none'}")
     try:
-        found = formula(**options)
+        form = formula(**options)
     except ValueError as error:
         raise ValueError(f"topology {name}: {error}") from None
-    more = ", ".join(f"{key}={_shown(value)}" for key, value in found.options.items() if key in options)
+    more = ", ".join(f"{key}={_shown(value)}" for key, value in form.options.items() if key in options)
 
-    def build(given: Mapping[sp.Symbol, int]) -> Topology:
-        filled = {key: _filled(value, given) for key, value in found.options.items()}
-        return topology(name, int(found.size.subs(given)), **filled)
+    def build(numbers: Mapping[sp.Symbol, int]) -> Topology:
+        filled = {key: _filled(value, numbers) for key, value in form.options.items()}
+        return topology(name, int(form.size.subs(numbers)), **filled)
 
-    return replace(found, name=f"{name}({more})" if more else name, build=build)
+    return replace(form, name=f"{name}({more})" if more else name, build=build)
 
 
 def _shown(value: Any) -> str:
+    """An option as text."""
     return f"({', '.join(map(str, value))})" if isinstance(value, tuple) else str(value)

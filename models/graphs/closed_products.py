@@ -1,6 +1,7 @@
-"""Closed forms of products and unions of families, with symbols for all sizes: sums and products of eigenvalues.
+"""Closed forms of products and unions of families, with symbols for all sizes.
 
-The rules are those of `products.py`; eigenvectors are products of those of the factors, in its numbering of the nodes.
+The rules are those of `products.py`; eigenvectors are products of those of the factors, in its
+numbering of the nodes.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ Joined = Callable[[Topology, Topology], Topology]
 
 
 def cartesian(first: ClosedForm, second: ClosedForm) -> ClosedForm:
-    """All sums of an eigenvalue of each; symbols of the second that the first has get a number behind them."""
+    """Return all sums of an eigenvalue of each; common symbols get a number in the second form."""
     both = None if first.degree is None else second.degree
     first, second = _apart(first, second)
     degree = None if both is None or second.degree is None else first.degree + second.degree
@@ -31,7 +32,13 @@ def cartesian(first: ClosedForm, second: ClosedForm) -> ClosedForm:
 
 
 def kronecker(first: ClosedForm, second: ClosedForm) -> ClosedForm:
-    """(a + d)(b + e) - d e for eigenvalues a, b; ValueError where nodes of a graph differ in their in-degrees, d and e."""
+    """Return (a + d)(b + e) - d e for eigenvalues a, b and in-degrees d, e.
+
+    Raises
+    ------
+    ValueError
+        If nodes of a graph differ in their in-degrees.
+    """
     first, second = _apart(first, second)
     d, e = first.degree, second.degree
     if d is None or e is None:
@@ -42,7 +49,7 @@ def kronecker(first: ClosedForm, second: ClosedForm) -> ClosedForm:
 
 
 def union(first: ClosedForm, second: ClosedForm) -> ClosedForm:
-    """The eigenvalues of both; eigenvectors are zero on the nodes of the other graph."""
+    """Return the eigenvalues of both; eigenvectors are zero on the nodes of the other graph."""
     first, second = _apart(first, second)
     n = first.size
     terms = [
@@ -55,7 +62,17 @@ def union(first: ClosedForm, second: ClosedForm) -> ClosedForm:
 
 
 def box(part: ClosedForm, sizes: Sequence[sp.Expr], indices: Sequence[sp.Symbol]) -> ClosedForm:
-    """The Cartesian product of chains or rings of these sizes; node i is in place i mod the last size of that direction."""
+    """Return the Cartesian product of chains or rings of these sizes.
+
+    Parameters
+    ----------
+    part : ClosedForm
+        The chain or the ring.
+    sizes : sequence of SymPy expressions
+        Nodes in each direction; node i is in place i mod the last size of the last direction.
+    indices : sequence of SymPy symbols
+        The index of the eigenvalues of each direction.
+    """
     (n,) = part.symbols
     ((old, _, _),) = part.terms[0].indices
     parts = [renamed(part, {n: size, old: k}) for size, k in zip(sizes, indices, strict=True)]
@@ -63,7 +80,7 @@ def box(part: ClosedForm, sizes: Sequence[sp.Expr], indices: Sequence[sp.Symbol]
 
 
 def counters(sizes: Sequence[sp.Expr]) -> tuple[sp.Symbol, ...]:
-    """A letter for the index of each direction: j and k of two, else k, k1 … none of which is a size."""
+    """Return an index for each direction: j and k of two, else k, k1 …; none is a size."""
     taken = {str(size) for size in sizes}
     letters = ["j", "k"] if len(sizes) == 2 else ["k", *(f"k{i}" for i in range(1, 2 * len(sizes)))]
     free = [letter for letter in [*letters, "l", "m", "k0"] if letter not in taken]
@@ -71,13 +88,13 @@ def counters(sizes: Sequence[sp.Expr]) -> tuple[sp.Symbol, ...]:
 
 
 def renamed(form: ClosedForm, new: Mapping[sp.Symbol, sp.Expr]) -> ClosedForm:
-    """The form with other symbols, or numbers, for some of its symbols."""
+    """Return the form with other symbols, or numbers, for some of its symbols."""
 
     def put(part: sp.Expr | None) -> sp.Expr | None:
         return None if part is None else sp.S(part).xreplace(dict(new))
 
-    def build(given: Mapping[sp.Symbol, int]) -> Topology:
-        return form.made({old: int(new.get(old, old).subs(given)) for old in form.symbols})
+    def build(numbers: Mapping[sp.Symbol, int]) -> Topology:
+        return form.graph_of({old: int(new.get(old, old).subs(numbers)) for old in form.symbols})
 
     small = next(
         (f"{old} = {value}" for old, value in new.items() if value.is_Integer and value < form.least_of(old)), ""
@@ -86,13 +103,18 @@ def renamed(form: ClosedForm, new: Mapping[sp.Symbol, sp.Expr]) -> ClosedForm:
         raise ValueError(f"{form.name}: found {small}; expected a larger number")
     lowest = {new.get(old, old): form.least_of(old) for old in form.symbols if not new.get(old, old).is_Integer}
     return replace(
-        form, terms=tuple(term.replaced(new) for term in form.terms), size=put(form.size), degree=put(form.degree),
-        where=put(form.where), lowest=lowest, build=build,
-    )  # fmt: skip
+        form,
+        terms=tuple(term.replaced(new) for term in form.terms),
+        size=put(form.size),
+        degree=put(form.degree),
+        where=put(form.where),
+        lowest=lowest,
+        build=build,
+    )
 
 
 def _apart(first: ClosedForm, second: ClosedForm) -> tuple[ClosedForm, ClosedForm]:
-    """Both, the second with other letters where it has one of the first."""
+    """Both forms; the second with other letters for those of the first."""
     taken = {str(s) for s in _letters(first)} | {str(NODE)}
     new = {}
     for symbol in sorted(_letters(second), key=str):
@@ -112,7 +134,7 @@ def _letters(form: ClosedForm) -> set[sp.Symbol]:
 
 
 def _pairs(first: ClosedForm, second: ClosedForm, combine: Callable[[sp.Expr, sp.Expr], sp.Expr]) -> tuple[Term, ...]:
-    """A term for each pair; node i is number i // n of the first graph and i mod n of the second, of n nodes."""
+    """A term for each pair; node i is i // n of the first graph and i mod n of the second."""
     n, found = second.size, []
     for a, b in product(first.terms, second.terms):
         vector = None
@@ -126,10 +148,12 @@ def _pairs(first: ClosedForm, second: ClosedForm, combine: Callable[[sp.Expr, sp
 
 
 def _at(term: Term, node: sp.Expr) -> sp.Expr:
+    """Another entry of the eigenvector of a term."""
     return sp.S(term.vector).xreplace({NODE: node})
 
 
 def _held(term: Term, vector: sp.Expr) -> Term:
+    """The term with another eigenvector, if it has one."""
     return replace(term, vector=None if term.vector is None else vector)
 
 
@@ -147,5 +171,5 @@ def _joined(
         where=sp.And(first.where, second.where),
         lowest=lowest,
         name=f"{name}({first.name}, {second.name})",
-        build=lambda given: operation(first.made(given), second.made(given)),
+        build=lambda numbers: operation(first.graph_of(numbers), second.graph_of(numbers)),
     )

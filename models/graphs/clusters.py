@@ -1,12 +1,14 @@
-"""Cluster states of a small graph: which oscillators can move as one, and the exact equations of their differences.
+"""Cluster states of a small graph: what can move as one, and equations of differences.
 
-A symmetry of the graph maps solutions to solutions, so the nodes of an orbit of any group of symmetries may stay equal.
-The differences within the clusters obey a linear equation of their own: with x_i - x_first(cluster) as coordinates it is
-rational, and it falls into blocks, one for each set of clusters that are intertwined.  The row sums of G are zero, so the
-partitions that G leaves invariant are the external equitable ones.
+A symmetry of the graph maps solutions to solutions: the nodes of an orbit of a group of symmetries
+may stay equal.  The differences within the clusters obey a linear equation of their own.  With
+x_i - x_first(cluster) as coordinates it is rational, and it falls into blocks, one for each set of
+intertwined clusters.  The row sums of G are zero, so the partitions that G leaves invariant are the
+external equitable ones.
 
-Sources: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014): clusters from symmetries, blocks,
-isolated desynchronisation; Golubitsky & Stewart, Bull. Amer. Math. Soc. 43, 305 (2006): balanced partitions.
+Sources: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014): clusters from
+symmetries, blocks, isolated desynchronisation; Golubitsky & Stewart, Bull. Amer. Math. Soc. 43, 305
+(2006): balanced partitions.
 """
 
 from __future__ import annotations
@@ -24,10 +26,10 @@ from .partitions import class_links, join
 from .symmetry import automorphisms
 from .topology import Topology, a_graph
 
-__all__ = ["Block", "Clusters", "clusters", "orbital_partitions"]
+__all__ = ["Block", "Clusters", "check", "clusters", "orbital_partitions"]
 
 NODE_LIMIT = 64
-"""Largest graph whose symmetries are looked for."""
+"""Largest graph with a search for symmetries."""
 
 PARTITION_LIMIT = 5000
 """Most partitions that are listed."""
@@ -39,8 +41,16 @@ Rows = tuple[tuple[Fraction, ...], ...]
 class Block:
     """Differences that influence each other and no others.
 
-    `clusters` are the intertwined ones; coordinate k is x_i - x_j for pairs[k] = (i, j) and lives on the orbit of cluster
-    nodes[k]; `matrix` (b x b) takes the place of G in its variational equation.
+    Parameters
+    ----------
+    clusters : tuple of int
+        The intertwined clusters.
+    nodes : tuple of int
+        The cluster on whose orbit each of the b coordinates lives.
+    pairs : tuple of (int, int)
+        Coordinate k is x_i - x_j for ``pairs[k] = (i, j)``.
+    matrix : tuple of tuple of Fraction
+        b x b; takes the place of G in the variational equation.
     """
 
     clusters: tuple[int, ...]
@@ -51,9 +61,16 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Clusters:
-    """A balanced partition: the cluster of each node, the network of the clusters, and the blocks of the differences.
+    """A balanced partition.  The eigenvalues of quotient and blocks are together those of G.
 
-    Clusters are numbered by their first nodes.  The eigenvalues of the quotient and of the blocks are together those of G.
+    Parameters
+    ----------
+    classes : tuple of int
+        The cluster of each node; clusters are numbered by their first nodes.
+    quotient : Topology
+        The network of the clusters.
+    blocks : tuple of Block
+        The differences within clusters.
     """
 
     classes: tuple[int, ...]
@@ -66,11 +83,27 @@ class Clusters:
         return tuple(tuple(i for i, k in enumerate(self.classes) if k == c) for c in range(self.quotient.n))
 
 
-def orbital_partitions(graph: Topology, limit: int = 20_000) -> tuple[Clusters, ...]:
-    """All partitions into orbits of a group of symmetries, from single nodes to the coarsest.
+def orbital_partitions(
+    graph: Topology, limit: int = 20_000, partition_limit: int = PARTITION_LIMIT
+) -> tuple[Clusters, ...]:
+    """Return all partitions into orbits of groups of symmetries, from single nodes upwards.
 
-    The orbits of one symmetry are its cycles; the orbits of a group are the join of those of its elements.
-    Raises ValueError for more than NODE_LIMIT nodes, `limit` automorphisms or PARTITION_LIMIT partitions.
+    The orbits of one symmetry are its cycles; those of a group are the join of the orbits of its
+    elements.
+
+    Parameters
+    ----------
+    graph : Topology
+        The graph.
+    limit : int, optional
+        Greatest number of automorphisms.
+    partition_limit : int, optional
+        Greatest number of partitions.
+
+    Raises
+    ------
+    ValueError
+        On more than NODE_LIMIT nodes, `limit` automorphisms or `partition_limit` partitions.
     """
     if a_graph("orbital_partitions", graph).n > NODE_LIMIT:
         raise ValueError(
@@ -82,9 +115,9 @@ def orbital_partitions(graph: Topology, limit: int = 20_000) -> tuple[Clusters, 
     for partition in sorted(cycles, key=_fine_first):
         if partition not in closed:  # else a join of finer ones
             closed |= {join(graph.n, [*_stars(partition), *_stars(other)]) for other in closed}
-        if len(closed) > PARTITION_LIMIT:
+        if len(closed) > partition_limit:
             raise ValueError(
-                f"{graph.name}({graph.n}) has more than {PARTITION_LIMIT} orbital partitions; describe single ones with "
+                f"{graph.name}({graph.n}) has more than {partition_limit} orbital partitions; describe single ones with "
                 "`clusters`"
             )
     characteristic = _polynomial(graph.rows)
@@ -92,9 +125,19 @@ def orbital_partitions(graph: Topology, limit: int = 20_000) -> tuple[Clusters, 
 
 
 def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
-    """The cluster state of any balanced partition, with or without symmetry; `classes` has the cluster of each node.
+    """Return the cluster state of any balanced partition, with or without symmetry.
 
-    Raises ValueError where the partition is not balanced, or has not one class for each node.
+    Parameters
+    ----------
+    graph : Topology
+        The graph.
+    classes : sequence
+        The cluster of each node.
+
+    Raises
+    ------
+    ValueError
+        If the partition is not balanced, or has not one class for each node.
     """
     a_graph("clusters", graph)
     if not isinstance(classes, Collection) or isinstance(classes, Set | Mapping):
@@ -107,22 +150,27 @@ def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
 
 
 def _described(graph: Topology, classes: tuple[int, ...], characteristic: fmpq_poly) -> Clusters:
-    """Quotient and blocks, proved by characteristic polynomials."""
+    """Quotient and blocks of a balanced partition, proved."""
     quotient = Topology(f"{graph.name} quotient", max(classes) + 1, class_links(graph.n, graph.links, classes))
-    made = Clusters(classes, quotient, _blocks(graph, classes))
-    product = _polynomial(quotient.rows)
-    for block in made.blocks:
+    state = Clusters(classes, quotient, _blocks(graph, classes))
+    check(state, graph, characteristic)
+    return state
+
+
+def check(state: Clusters, graph: Topology, characteristic: fmpq_poly) -> None:
+    """Raise ProofError if quotient and blocks do not multiply out to the polynomial of G."""
+    product = _polynomial(state.quotient.rows)
+    for block in state.blocks:
         product *= _polynomial(block.matrix)
     if product != characteristic:
         raise ProofError(
-            f"clusters {classes} of {graph.name}({graph.n}): quotient and blocks multiply out to {product}; expected the "
-            f"characteristic polynomial {characteristic}"
+            f"clusters {state.classes} of {graph.name}({graph.n}): quotient and blocks multiply out to {product}; "
+            f"expected the characteristic polynomial {characteristic}"
         )
-    return made
 
 
 def _blocks(graph: Topology, classes: tuple[int, ...]) -> tuple[Block, ...]:
-    """T G L of the differences from the first node of each cluster, split where no entry joins two clusters."""
+    """T G L of differences from the first nodes of clusters, in blocks of joined clusters."""
     first = {k: i for i, k in reversed(list(enumerate(classes)))}
     pairs = [(i, first[k]) for i, k in enumerate(classes) if i != first[k]]
     rows = graph.rows
@@ -130,18 +178,18 @@ def _blocks(graph: Topology, classes: tuple[int, ...]) -> tuple[Block, ...]:
     on = [classes[i] for i, _ in pairs]
     met = [(on[a], on[b]) for a, row in enumerate(matrix) for b, entry in enumerate(row) if entry]
     group = join(max(classes) + 1, met)
-    found = []
+    blocks = []
     for part in sorted({group[k] for k in on}):
-        chosen = [a for a, k in enumerate(on) if group[k] == part]
-        found.append(
+        places = [a for a, k in enumerate(on) if group[k] == part]
+        blocks.append(
             Block(
-                tuple(sorted({on[a] for a in chosen})),
-                tuple(on[a] for a in chosen),
-                tuple(pairs[a] for a in chosen),
-                tuple(tuple(matrix[a][b] for b in chosen) for a in chosen),
+                tuple(sorted({on[a] for a in places})),
+                tuple(on[a] for a in places),
+                tuple(pairs[a] for a in places),
+                tuple(tuple(matrix[a][b] for b in places) for a in places),
             )
         )
-    return tuple(found)
+    return tuple(blocks)
 
 
 def _stars(classes: tuple[int, ...]) -> list[tuple[int, int]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ..inputs import plugins
 from ..inputs.options import Options, as_options
+from .family_file import TOPOLOGY, defaults
 from .links import LINK_LIMIT
 from .topology import Topology
 
@@ -124,7 +124,7 @@ class Family:
             )
 
     def _size(self, n: Any) -> int:
-        """Return the number of nodes; TypeError if it is no integer, ValueError if it is too small."""
+        """The number of nodes; TypeError if it is no integer, ValueError if it is too small."""
         if isinstance(n, bool) or not hasattr(n, "__index__"):
             raise TypeError(f"topology {self.name}: n = {n!r} is a {type(n).__name__}; expected an integer")
         size = operator.index(n)
@@ -133,7 +133,7 @@ class Family:
         return size
 
     def _settled(self, n: int, options: Mapping[str, Any]) -> Options:
-        """Return all options as they are stored, checked by the family's `settle`."""
+        """All options as they are stored, checked by the family's `settle`."""
         for key in options:
             if key not in self.options:
                 words = f"known: {', '.join(self.options)}" if self.options else "this family has none: remove it"
@@ -223,8 +223,8 @@ def topology(name: str, n: int, **options: Any) -> Topology:
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all families: shipped files and entry points of installed packages, sorted."""
-    return plugins.names("topology")
+    """Return the names of all families, sorted: shipped files and entry points."""
+    return plugins.names(TOPOLOGY)
 
 
 def family(name: str) -> Family:
@@ -239,8 +239,8 @@ def family(name: str) -> Family:
     """
     if not isinstance(name, str):
         raise TypeError(f"topology name {name!r} is no text; expected one of {', '.join(names())}")
-    known = plugins.named("topology", name)
-    return _of_module(known, plugins.load("topology", known))
+    known = plugins.named(TOPOLOGY, name)
+    return _of_module(known, plugins.load(TOPOLOGY, known))
 
 
 _ATTRIBUTES = {
@@ -258,7 +258,7 @@ _ATTRIBUTES = {
 
 
 def _of_module(name: str, module: ModuleType) -> Family:
-    """Return the family of a module; errors of functions from outside the package name their file and line."""
+    """The family of a module; errors of functions from outside the package name file and line."""
     parts = {attribute: getattr(module, key) for key, attribute in _ATTRIBUTES.items() if hasattr(module, key)}
     outside = not module.__name__.startswith(f"{plugins.PACKAGE}.")
     for key in ("count", "expected", "spectrum"):
@@ -269,12 +269,6 @@ def _of_module(name: str, module: ModuleType) -> Family:
         parts["spectrum"] = _checked(parts["spectrum"], name.place)
     edges = _blamed_edges(module.edges) if outside else module.edges
     return Family(name=name, edges=edges, options=defaults(module), **parts)
-
-
-def defaults(module: ModuleType) -> dict[str, Any]:
-    """Return the options of a file with their defaults: the keyword-only parameters of its `edges`."""
-    parameters = inspect.signature(module.edges).parameters.values()
-    return {p.name: p.default for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY}
 
 
 def _blamed_edges(edges: Edges) -> Edges:

@@ -1,4 +1,4 @@
-"""Balanced partitions of a graph: nodes of one class receive equal sums of weights from every class."""
+"""Balanced partitions: nodes of one class receive equal sums of weights from every class."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["class_links", "coarsest_balanced", "join"]
 
 
 def join(n: int, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
-    """Return the class of each node in the finest partition in which the two nodes of every pair are together.
+    """Return the class of each node in the finest partition with every pair in one class.
 
     Parameters
     ----------
@@ -47,7 +47,27 @@ def join(n: int, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
 
 
 def class_links(n: int, links: Iterable[Link], classes: Sequence[int]) -> tuple[Link, ...]:
-    """Return the links between the classes of n nodes; ValueError if nodes of a class receive different weights."""
+    """Return the links between the classes of a balanced partition.
+
+    Parameters
+    ----------
+    n : int
+        Number of nodes.
+    links : iterable of (int, int, Fraction)
+        Target, source and weight of each link.
+    classes : sequence of int
+        The class of each node.
+
+    Returns
+    -------
+    tuple of (int, int, Fraction)
+        Target class, source class and the weight that each node of the target receives; sorted.
+
+    Raises
+    ------
+    ValueError
+        If nodes of a class receive different weights.
+    """
     felt: list[dict[int, Fraction]] = [{} for _ in range(n)]
     for target, source, weight in links:
         k = classes[source]
@@ -67,12 +87,36 @@ def class_links(n: int, links: Iterable[Link], classes: Sequence[int]) -> tuple[
 
 
 def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]) -> tuple[int, ...]:
-    """Return the class of each node in the coarsest balanced partition in which classes are of one colour.
+    """Return the class of each node in the coarsest balanced partition with classes of one colour.
 
-    Colour refinement on the links and the diagonal that makes every row sum to zero (for this matrix a partition is
-    equitable exactly where it is balanced), in O(m log n) additions of whole numbers for m links: of the parts of a class,
-    the largest need not be looked at again (Hopcroft, in: Theory of Machines and Computations, Academic Press, 1971,
-    p. 189).
+    Parameters
+    ----------
+    n : int
+        Number of nodes.
+    links : iterable of (int, int, Fraction)
+        Target, source and weight of each link.
+    colours : sequence of hashable
+        The colour of each node.
+
+    Returns
+    -------
+    tuple of int
+        The class of each node, numbered by the first members.
+
+    Raises
+    ------
+    ValueError
+        If there is not one colour for each node.
+
+    Notes
+    -----
+    Colour refinement on the links and the diagonal that makes every row sum to zero: for this
+    matrix a partition is equitable exactly if it is balanced.  It takes O(m log n) additions of
+    whole numbers for m links, because the largest part of a class need not be looked at again.
+
+    References
+    ----------
+    J. E. Hopcroft, in: Theory of Machines and Computations (Academic Press, 1971), p. 189.
     """
     if len(colours) != n:
         raise ValueError(f"colours: found {len(colours)} for {n} nodes; expected one for each node")
@@ -95,7 +139,7 @@ def coarsest_balanced(n: int, links: Iterable[Link], colours: Sequence[Hashable]
 
 
 def _columns(n: int, links: tuple[Link, ...]) -> list[list[tuple[int, int]]]:
-    """For each source its targets with whole-number weights, the diagonal minus the sum of the row."""
+    """For each source its targets with whole weights; the diagonal is minus the sum of the row."""
     scale = math.lcm(*(weight.denominator for _, _, weight in links))
     columns: list[list[tuple[int, int]]] = [[] for _ in range(n)]
     rows = [0] * n
@@ -122,7 +166,7 @@ def _felt(sources: set[int], columns: list[list[tuple[int, int]]], of: list[int]
 
 
 def _split(members: list[set[int]], k: int, parts: list[set[int]]) -> list[set[int]]:
-    """Split class k into these parts and the rest; the largest keeps the number k, the others are returned."""
+    """Split class k into parts and the rest; return all but the largest, which stays k."""
     left = len(members[k]) - sum(map(len, parts))
     parts.sort(key=len)
     if left == 0 and len(parts) == 1:

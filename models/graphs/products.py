@@ -1,8 +1,9 @@
-"""Graphs from graphs: products, unions, complements and scaled weights, with their spectra in closed form where known.
+"""Graphs from graphs: products, unions, complements and scaled weights, with closed spectra.
 
-The rules: A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), sections 1.3.6 (union), 1.3.8 (complement),
-1.4.6 (Cartesian product) and 1.4.7 (Kronecker product).  Sums and products of eigenvalues are merged exactly where all of
-them are rational, cosines or their short radicals; other spectra come from the matrix itself.
+The rules: A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), sections 1.3.6 (union),
+1.3.8 (complement), 1.4.6 (Cartesian product) and 1.4.7 (Kronecker product).  Sums and products of
+eigenvalues are merged exactly if all of them are rational, cosines or their short radicals; other
+spectra come from the matrix itself.
 """
 
 from __future__ import annotations
@@ -29,9 +30,15 @@ Closed: TypeAlias = "list[tuple[sp.Expr, int]] | None"
 
 
 def cartesian(first: Topology, second: Topology) -> Topology:
-    """The Cartesian product: node (i, k) is number i n + k of second's n; links change one of the two as in its graph.
+    """Return the Cartesian product: every eigenvalue is a sum of one of each graph.
 
-    Every eigenvalue is a sum of one of each graph.  Raises ValueError on more than LINK_LIMIT links.
+    Node (i, k) is number i n + k, n the nodes of `second`; a link changes one of the two as in its
+    graph.
+
+    Raises
+    ------
+    ValueError
+        On more than LINK_LIMIT links.
     """
     a_graph("cartesian: first", first)
     a_graph("cartesian: second", second)
@@ -39,10 +46,15 @@ def cartesian(first: Topology, second: Topology) -> Topology:
 
 
 def kronecker(first: Topology, second: Topology) -> Topology:
-    """The tensor product of the adjacency matrices: (i, k) feels (j, m) where i feels j and k feels m; weights multiply.
+    """Return the tensor product of the adjacency matrices.
 
-    Where all nodes of each graph have one in-degree, d and e, the eigenvalues are (a + d)(b + e) - d e.  Raises
-    ValueError on more than LINK_LIMIT links.
+    Node (i, k) feels (j, m) if i feels j and k feels m; weights multiply.  If all nodes of each
+    graph have one in-degree, d and e, the eigenvalues are (a + d)(b + e) - d e.
+
+    Raises
+    ------
+    ValueError
+        On more than LINK_LIMIT links.
     """
     a_graph("kronecker: first", first)
     a_graph("kronecker: second", second)
@@ -50,9 +62,12 @@ def kronecker(first: Topology, second: Topology) -> Topology:
 
 
 def union(first: Topology, second: Topology) -> Topology:
-    """Both graphs side by side, without links between them: the eigenvalues of both.
+    """Return both graphs side by side, without links between them: the eigenvalues of both.
 
-    Raises ValueError on more than LINK_LIMIT links.
+    Raises
+    ------
+    ValueError
+        On more than LINK_LIMIT links.
     """
     a_graph("union: first", first)
     a_graph("union: second", second)
@@ -60,9 +75,12 @@ def union(first: Topology, second: Topology) -> Topology:
 
 
 def complement(graph: Topology) -> Topology:
-    """The graph that joins exactly the pairs which this one does not: eigenvalues 0 and -(n + γ).
+    """Return the graph that joins exactly the pairs that this one does not: 0 and -(n + γ).
 
-    Raises ValueError where a link is one-way or has a weight other than 1, or on more than LINK_LIMIT links.
+    Raises
+    ------
+    ValueError
+        If a link is one-way or has a weight other than 1, or on more than LINK_LIMIT links.
     """
     a_graph("complement", graph)
     name, rule = f"complement({_named(graph)})", Complement(graph)
@@ -75,7 +93,13 @@ def complement(graph: Topology) -> Topology:
 
 
 def weighted(graph: Topology, factor: Any) -> Topology:
-    """The graph with all weights times a rational number other than 0 (a float means its shortest decimal)."""
+    """Return the graph with all weights times a rational number; a float is its shortest decimal.
+
+    Raises
+    ------
+    ValueError
+        If the factor is 0.
+    """
     a_graph("weighted", graph)
     by = rational(factor, "factor")
     if not by:
@@ -84,14 +108,14 @@ def weighted(graph: Topology, factor: Any) -> Topology:
 
 
 def factors(graph: Topology) -> tuple[Topology, Topology] | None:
-    """The two graphs of which `cartesian` made a graph; None for any other."""
+    """Return the two graphs of which `cartesian` made a graph; None for any other."""
     rule = graph.rule
     return (rule.first, rule.second) if isinstance(rule, Cartesian) else None
 
 
 @dataclass(frozen=True, slots=True)
 class _OfTwo:
-    """What the rules of graphs from two graphs have in common."""
+    """The common part of the rules of graphs from two graphs."""
 
     first: Topology
     second: Topology
@@ -177,7 +201,7 @@ class Union(_OfTwo):
 
 @dataclass(frozen=True, slots=True)
 class Complement:
-    """The rule of the graph that joins what another does not: of 0 one stays, all others become -(n + γ)."""
+    """The rule of a complement: one eigenvalue 0 stays, all others become -(n + γ)."""
 
     graph: Topology
 
@@ -253,7 +277,7 @@ def _made(name: str, n: int, rule: Rule) -> Topology:
 
 
 def _degree(graph: Topology) -> Fraction | None:
-    """The sum of weights that every node feels, where it is one for all; else None."""
+    """The sum of weights that every node feels; None if it is not one for all."""
     sums = [Fraction(0)] * graph.n
     for target, _, weight in graph.links:
         sums[target] += weight
@@ -261,7 +285,7 @@ def _degree(graph: Topology) -> Fraction | None:
 
 
 def _listed(graph: Topology) -> Listed | None:
-    """The closed spectrum of a graph, or that of a small matrix, as sums of cosines; None where it is not of them."""
+    """The closed spectrum of a graph, or that of a small matrix, as sums of cosines; else None."""
     from ..algebra.cosine_sums import read
 
     rule = graph.closed_form()

@@ -1,7 +1,7 @@
-"""Graphs out of what users have: lists of edges, networkx graphs, sparse matrices, edge lists and GraphML files.
+"""Graphs from lists of edges, networkx graphs, sparse matrices, edge lists and GraphML files.
 
-Everything is taken by what it can do, so that none of those packages is needed here.  An edge from u to v means that v
-feels u: it becomes the link v <- u.
+Objects are known by their methods, so that none of those packages is needed here.  An edge from u
+to v means that v feels u: it becomes the link v <- u.
 """
 
 from __future__ import annotations
@@ -26,10 +26,25 @@ Weights = dict[tuple[int, int], Fraction]
 def from_edges(
     edges: Iterable[Sequence[Any]], n: int | None = None, directed: bool = False, name: str = "edges"
 ) -> Topology:
-    """The graph of edges (i, j) or (i, j, weight), nodes 0 … n - 1; `directed`: j feels i, not the other way round.
+    """Return the graph of a list of edges.
 
-    Without `n` the largest node is the last.  Raises ValueError on a wrong node, a loop, a repeated edge, a weight that
-    is not rational or 0, and TypeError on nodes that are no whole numbers.
+    Parameters
+    ----------
+    edges : iterable of (i, j) or (i, j, weight)
+        Nodes are 0 … n - 1; the weight is 1 without.
+    n : int, optional
+        Number of nodes; without, the largest node is the last.
+    directed : bool, optional
+        True if j feels i, but i does not feel j.
+    name : str, optional
+        What the graph is called.
+
+    Raises
+    ------
+    ValueError
+        On a wrong node, a loop, a repeated edge, a weight that is not rational or 0.
+    TypeError
+        On nodes that are no whole numbers.
     """
     if isinstance(edges, str | bytes | Mapping) or not isinstance(edges, Iterable):
         raise TypeError(f"{name}: found {typed(edges)}; expected a list of edges, e.g. [(0, 1), (1, 2, 0.5)]")
@@ -44,10 +59,26 @@ def from_edges(
 
 
 def from_graph(graph: Any, weight: str = "weight", name: str = "graph") -> Topology:
-    """The graph of a networkx graph, nodes in its order; weights by their decimal text, 1 where there is none.
+    """Return the graph of a networkx graph, nodes in its order.
 
-    Edges of a directed graph act from their first node on their second; parallel edges of a multigraph add up.
-    Raises TypeError on another object, ValueError on loops and on weights that are not rational.
+    Edges of a directed graph act from their first node on their second; parallel edges of a
+    multigraph add up.
+
+    Parameters
+    ----------
+    graph : networkx graph
+        Any object with nodes, edges and is_directed.
+    weight : str, optional
+        The edge attribute that holds the weight, read through its decimal text; 1 without.
+    name : str, optional
+        What the graph is called.
+
+    Raises
+    ------
+    TypeError
+        On another object.
+    ValueError
+        On loops and on weights that are not rational.
     """
     if not all(hasattr(graph, need) for need in ("nodes", "edges", "is_directed")):
         raise TypeError(f"{name} is a {type(graph).__name__}; expected a networkx graph (nodes, edges, is_directed)")
@@ -62,10 +93,24 @@ def from_graph(graph: Any, weight: str = "weight", name: str = "graph") -> Topol
 
 
 def from_sparse(matrix: Any, adjacency: bool = False, name: str = "matrix") -> Topology:
-    """The graph of a SciPy sparse connectivity matrix G with row sums of zero, or with `adjacency` of weights A_ij, j on i.
+    """Return the graph of a SciPy sparse matrix.
 
-    Raises TypeError where there is no `tocoo`, ValueError where it is not square, a row sum is not zero (beyond 1e-12
-    of its entries) or an adjacency matrix has a diagonal.
+    Parameters
+    ----------
+    matrix : SciPy sparse matrix
+        The connectivity matrix G with row sums of zero.
+    adjacency : bool, optional
+        True if the matrix holds the weights with which j acts on i instead.
+    name : str, optional
+        What the graph is called.
+
+    Raises
+    ------
+    TypeError
+        If the matrix has no `tocoo`.
+    ValueError
+        If it is not square, a row sum is not zero (beyond 1e-12 of its entries), or an adjacency
+        matrix has a diagonal.
     """
     if not hasattr(matrix, "tocoo"):
         raise TypeError(f"{name} is a {type(matrix).__name__}; expected a SciPy sparse matrix (one that has tocoo)")
@@ -95,10 +140,17 @@ def from_sparse(matrix: Any, adjacency: bool = False, name: str = "matrix") -> T
 
 
 def read_edges(path: str | Path, directed: bool = False) -> Topology:
-    """The graph of a text file with an edge a line: two nodes and, if wanted, a weight; `#` starts a comment.
+    """Return the graph of a text file with an edge a line: two nodes and perhaps a weight.
 
-    Nodes are any words; whole numbers are put in ascending order, other names in that of their first mention.  A line
-    with one word is a node without edges.  Raises FileNotFoundError, and ValueError on what `from_edges` refuses.
+    Nodes are any words; whole numbers are put in ascending order, other names in that of their
+    first mention.  A line with one word is a node without edges; `#` starts a comment.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        On what `from_edges` refuses.
     """
     text, name = file_text(path, "edge file")
     one, most = Fraction(1), LINK_LIMIT if directed else LINK_LIMIT // 2
@@ -119,19 +171,33 @@ def read_edges(path: str | Path, directed: bool = False) -> Topology:
 
 
 def read_graphml(path: str | Path, weight: str = "weight") -> Topology:
-    """The graph of a GraphML file, nodes in its order; the weight of an edge is its data of that name, 1 without.
+    """Return the graph of a GraphML file, nodes in its order.
 
-    Raises FileNotFoundError, and ValueError on a document type, on nested graphs, hyperedges, unknown nodes and
-    whatever `from_edges` refuses.  (U. Brandes et al., Graph Drawing 2001, LNCS 2265, 501.)
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    weight : str, optional
+        The name of the edge data that holds the weight; 1 without.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        On a document type, nested graphs, hyperedges, unknown nodes and what `from_edges` refuses.
+
+    References
+    ----------
+    U. Brandes et al., Graph Drawing 2001, LNCS 2265, 501.
     """
-
     text, name = file_text(path, "GraphML file")
     nodes, edges = parsed(text, name, weight)
     return assembled(nodes, edges, name)
 
 
 def assembled(nodes: Sequence[Hashable], edges: Iterable[tuple[Hashable, Hashable, Any, bool]], name: str) -> Topology:
-    """The graph of named nodes and edges (from, to, weight, one-way)."""
+    """Return the graph of named nodes and edges (from, to, weight, one-way)."""
     for node in nodes:
         printable(f"{name}: node name", str(node))
     place = {node: k for k, node in enumerate(nodes)}
@@ -144,7 +210,7 @@ def assembled(nodes: Sequence[Hashable], edges: Iterable[tuple[Hashable, Hashabl
 
 @dataclass(frozen=True, slots=True)
 class _Names:
-    """What a graph and its nodes are called, for messages."""
+    """The names of a graph and its nodes, for messages."""
 
     graph: str
     nodes: Sequence[Hashable]
@@ -156,7 +222,7 @@ class _Names:
 def _put(
     weights: Weights, target: int, source: int, value: Fraction, directed: bool, called: _Names, many: bool = False
 ) -> None:
-    """Add an edge; ValueError where it is a loop, has no weight or is there already."""
+    """Add an edge; ValueError if it is a loop, has no weight or is there already."""
     if target == source:
         raise ValueError(
             f"{called.edge(source, target)} joins a node to itself; it has no effect on a difference: leave it out"
@@ -192,7 +258,7 @@ Edge = tuple[str, str, Any, bool]
 
 
 def parsed(text: str, name: str, weight: str) -> tuple[list[str], list[Edge]]:
-    """The node names in order, and edges (from, to, weight as text, one-way); ValueError on anything else."""
+    """Return node names, and edges (from, to, weight as text, one-way); else ValueError."""
     if "<!DOCTYPE" in text or "<!ENTITY" in text:  # anywhere: what looks like a comment may be none
         raise ValueError(f"{name} declares a document type or entities; expected plain GraphML: remove <!DOCTYPE …>")
     try:
@@ -227,7 +293,7 @@ def _edges(graph: ElementTree.Element, nodes: set[str], keys: set[str], default:
 
 
 def _keys(root: ElementTree.Element, weight: str) -> tuple[set[str], str]:
-    """The ids under which edges hold their weight (one for each type of number), and its default."""
+    """The ids of the weight of edges (one for each type of number), and its default."""
     ids, default = set[str](), "1"
     for element in root:
         if (

@@ -13,47 +13,64 @@ __all__ = ["Permutation", "automorphisms"]
 Permutation = tuple[int, ...]
 """The image of each node."""
 
-TRY_LIMIT = 2_000_000
-"""Images tried before the search is given up."""
+STEP_LIMIT = 2_000_000
+"""Images tried before the search ends."""
 
 
-def automorphisms(graph: Topology, limit: int = 20_000) -> tuple[Permutation, ...]:
-    """All automorphisms of a graph with weights and directions, the identity first.
+def automorphisms(graph: Topology, limit: int = 20_000, step_limit: int = STEP_LIMIT) -> tuple[Permutation, ...]:
+    """Return all automorphisms of a graph with weights and directions, the identity first.
 
-    Raises ValueError where there are more than `limit`, or where the search takes more than TRY_LIMIT steps.
+    Parameters
+    ----------
+    graph : Topology
+        The graph.
+    limit : int, optional
+        Greatest number of automorphisms.
+    step_limit : int, optional
+        Greatest number of steps of the search.
+
+    Returns
+    -------
+    tuple of tuple of int
+        The image of each node under each automorphism, sorted.
+
+    Raises
+    ------
+    ValueError
+        If there are more than `limit`, or the search takes more than `step_limit` steps.
     """
-    found: list[Permutation] = []
-    for permutation in _search(graph):
-        if len(found) == limit:
+    permutations: list[Permutation] = []
+    for permutation in _search(graph, step_limit):
+        if len(permutations) == limit:
             raise ValueError(
                 f"{graph.name}({graph.n}) has more than {limit} automorphisms; expected at most {limit}: raise "
                 "the limit, or describe single partitions with `clusters`"
             )
-        found.append(permutation)
-    return tuple(sorted(found))
+        permutations.append(permutation)
+    return tuple(sorted(permutations))
 
 
-def _search(graph: Topology) -> Iterator[Permutation]:
-    """Assign images node by node along the links, so that each image is next to one that is already fixed."""
+def _search(graph: Topology, step_limit: int) -> Iterator[Permutation]:
+    """Assign images along the links: each image is next to one that is already fixed."""
     weights = graph.rows
     colour = coarsest_balanced(graph.n, graph.links, [row[i] for i, row in enumerate(weights)])
     order, anchor = _order(graph, colour)
     near = _neighbours(graph)
     image: dict[int, int] = {}
     used: set[int] = set()
-    tries = 0
+    steps = 0
 
     def extend(place: int) -> Iterator[Permutation]:
-        nonlocal tries
+        nonlocal steps
         if place == graph.n:
             yield tuple(image[i] for i in range(graph.n))
             return
         i = order[place]
         for j in near[image[anchor[i]]] if i in anchor else range(graph.n):
-            tries += 1
-            if tries > TRY_LIMIT:
+            steps += 1
+            if steps > step_limit:
                 raise ValueError(
-                    f"{graph.name}({graph.n}): automorphisms not found in {TRY_LIMIT} steps; describe "
+                    f"{graph.name}({graph.n}): automorphisms not found in {step_limit} steps; describe "
                     "single partitions with `clusters`"
                 )
             if j in used or colour[i] != colour[j]:
@@ -68,7 +85,7 @@ def _search(graph: Topology) -> Iterator[Permutation]:
 
 
 def _order(graph: Topology, colour: tuple[int, ...]) -> tuple[list[int], dict[int, int]]:
-    """All nodes, part by part, breadth first from a rare colour; and for each that has one an earlier neighbour."""
+    """All nodes, part by part, breadth first from a rare colour; and earlier neighbours."""
     near = _neighbours(graph)
     rare = sorted(range(graph.n), key=lambda i: (colour.count(colour[i]), i))
     order: list[int] = []

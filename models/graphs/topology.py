@@ -1,8 +1,8 @@
 """Who feels whom: a graph with exact weights, by name, from a matrix or from a file.
 
-The connectivity matrix is G = weighted adjacency minus in-degree, so that every row sums to zero and the
-coupling term is sigma * G * x.  Building a graph costs no algebra: only `matrix` and `spectrum` load SymPy; and a
-family that counts its edges builds them when they are first asked for.
+The connectivity matrix is G = weighted adjacency minus in-degree: every row sums to zero, and the
+coupling term is sigma * G * x.  Building a graph costs no algebra: only `matrix` and `spectrum`
+load SymPy.  A graph with a rule builds its links when they are first asked for.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ __all__ = ["Rule", "Topology", "a_graph", "from_matrix", "read_matrix"]
 
 
 class Rule(Protocol):
-    """How a graph came about: what is known of it without its links, and the links when they are asked for.
+    """How a graph came about: what is known without its links, and the links themselves.
 
     Equal rules make equal graphs.
     """
@@ -45,7 +45,7 @@ class Rule(Protocol):
         """Build the sorted links."""
 
     def eigenvalues(self) -> Sequence[tuple[sp.Expr, int]] | None:
-        """List the eigenvalues of G with multiplicities, without repetition; None if there is no closed form."""
+        """List the eigenvalues of G with multiplicities, each once; None without a closed form."""
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -59,7 +59,8 @@ class Topology:
     n : int
         Number of nodes.
     links : tuple of (int, int, Fraction), optional
-        Target, source and weight of each link, sorted.  A graph with a `rule` builds them when they are first asked for.
+        Target, source and weight of each link, sorted.  A graph with a `rule` builds them when they
+        are first asked for.
     options : tuple of (str, value)
         Keywords with which its family made the graph.
     rule : Rule, optional
@@ -68,7 +69,8 @@ class Topology:
     Raises
     ------
     ValueError, TypeError
-        If a link is outside the nodes, joins a node to itself, is repeated, out of order or without weight.
+        If a link is outside the nodes, joins a node to itself, is repeated, out of order or without
+        weight.
     """
 
     name: str
@@ -103,7 +105,7 @@ class Topology:
 
     @property
     def links(self) -> tuple[Link, ...]:
-        """The links (target, source, weight), sorted; those of a rule are built when they are first asked for."""
+        """The links (target, source, weight), sorted; a rule builds them on first use."""
         if self._links is None and self.rule is not None:
             links = self.rule.links()
             _check_links(self.name, self.n, links)
@@ -122,26 +124,27 @@ class Topology:
         return self.symmetric if self.rule is None else self.rule.undirected
 
     def closed_form(self) -> Sequence[tuple[sp.Expr, int]] | None:
-        """List the eigenvalues of G with multiplicities, without repetition; None if no closed form is known."""
+        """List the eigenvalues of G with multiplicities, each once; None without a closed form."""
         return None if self.rule is None else self.rule.eigenvalues()
 
     @property
     def symmetric(self) -> bool:
-        """True where every link has its mirror image of equal weight, so that G = transpose(G)."""
+        """True if every link has its mirror image of equal weight, so that G = transpose(G)."""
         known = {(target, source): weight for target, source, weight in self.links}
         return all(known.get((source, target)) == weight for (target, source), weight in known.items())
 
     @property
     def components(self) -> int:
-        """Number of weakly connected parts; where it is not 1 complete synchronisation is impossible."""
+        """Number of weakly connected parts; above 1, complete synchronisation is impossible."""
         return 1 + max(join(self.n, ((target, source) for target, source, _ in self.links)))
 
     @property
     def leading_groups(self) -> int:
-        """Number of groups of nodes that reach one another and that no other node acts on; at least 1.
+        """Number of groups of nodes that reach one another and feel no other node; at least 1.
 
-        The starts of a search along the links cover all nodes; no start is reached from an earlier one.  Searched again
-        from the last start backwards, those that are not reached yet are in groups of their own.
+        A search along the links starts at nodes from which all nodes are reached, no start from an
+        earlier one.  A second search takes these starts backwards: each start that is not reached
+        yet is in a group of its own.
         """
         followers: list[list[int]] = [[] for _ in range(self.n)]
         for target, source, _ in self.links:
@@ -193,15 +196,33 @@ class Topology:
 
 
 def from_matrix(rows: Iterable[Iterable[Any]] | sp.MatrixBase, name: str = "matrix") -> Topology:
-    """The graph of a connectivity matrix G: square, rational, every row sum zero; one-way links are allowed.
+    """Return the graph of a connectivity matrix G; one-way links are allowed.
 
-    Entries are integers, fractions, decimals, floats (read through their shortest decimal text: 0.1 is 1/10),
-    texts such as "1/2", or SymPy rationals.  A row with floats whose sum is zero but for rounding (1e-12 of its
-    entries) gets the diagonal entry that makes it exactly zero.  Raises ValueError on a wrong shape, a wrong number
-    or a row sum other than zero, and TypeError on anything that is no number.
+    Parameters
+    ----------
+    rows : iterable of rows, or SymPy matrix
+        Square, rational, every row sum zero.  Entries are integers, fractions, decimals, floats
+        (read through their shortest decimal text: 0.1 is 1/10), texts such as "1/2", or SymPy
+        rationals.  A row with floats whose sum is zero but for rounding (1e-12 of its entries) gets
+        the diagonal entry that makes it exactly zero.
+    name : str, optional
+        What the graph is called.
+
+    Returns
+    -------
+    Topology
+        The graph.
+
+    Raises
+    ------
+    ValueError
+        On a wrong shape, a wrong number or a row sum other than zero.
+    TypeError
+        On an entry that is no number.
     """
     table = [list(row) for row in rational_rows(rows, name)]
-    given = rows.tolist() if hasattr(rows, "tolist") else rows  # an iterator is used up by now: its numbers are exact
+    # The numbers of an iterator, which is used up, are taken to be exact.
+    given = rows.tolist() if hasattr(rows, "tolist") else rows
     for i, row in enumerate(table):
         excess = total(row)
         if not excess:
@@ -218,16 +239,23 @@ def from_matrix(rows: Iterable[Iterable[Any]] | sp.MatrixBase, name: str = "matr
 
 
 def _rounded(entry: Any) -> bool:
-    """True for a float, or a text that may be one: its decimals can be those of a rounded number."""
+    """True for a float, and for a text with decimals: they can be those of a rounded number."""
     return isinstance(entry, float) or (isinstance(entry, str) and not set(entry).isdisjoint(".eE"))
 
 
 def read_matrix(path: str | Path) -> Topology:
-    """The graph of a connectivity matrix in a text file: one row a line, entries as 1/2, -3 or 0.25.
+    """Return the graph of a connectivity matrix in a text file, one row a line.
 
-    Entries are separated by blanks or commas; `#` starts a comment; empty lines are skipped.  Nothing in the
-    file is evaluated.  Raises FileNotFoundError, and ValueError on a folder, on more than FILE_LIMIT bytes,
-    on text that is no number and on whatever `from_matrix` refuses.
+    Entries such as 1/2, -3 or 0.25 are separated by blanks or commas; `#` starts a comment; empty
+    lines are skipped.  Nothing in the file is evaluated.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        On a folder, on more than FILE_LIMIT bytes, on text that is no number and on what
+        `from_matrix` refuses.
     """
     text, name = file_text(path, "matrix file", "a text file of rows")
     return from_matrix(parse_rows(text, name), name)
@@ -249,7 +277,7 @@ def _check_size(name: object, n: object) -> None:
 
 
 def _check_links(name: str, n: int, links: object) -> None:
-    """Raise TypeError or ValueError if links (target, source, weight) of n nodes are not sorted and sound."""
+    """Raise TypeError or ValueError if the links of n nodes are not sorted and sound."""
     if not isinstance(links, tuple):
         raise TypeError(f"topology {name}: links: found {typed(links)}; expected a tuple of (target, source, weight)")
     before = (-1, -1)

@@ -14,9 +14,11 @@ from __future__ import annotations
 import hashlib
 import inspect
 import pkgutil
+import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from functools import lru_cache, wraps
 from importlib import import_module
 from pathlib import Path
@@ -26,6 +28,7 @@ from typing import Any, ParamSpec, TypeVar
 from .checks import shown, suggestion, text
 
 __all__ = [
+    "Kind",
     "OwnFile",
     "allow_code",
     "allowed_code",
@@ -45,8 +48,31 @@ T = TypeVar("T")
 PACKAGE = "synchain.models"
 """The package whose folders hold the plug-ins that are shipped."""
 
-OTHERWISE = {"coupling": ", or components such as 'x->x'"}
-"""What a kind can be besides the name of a file, for the message that refuses a name."""
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of plug-in, defined by the room that knows what such a file must hold.
+
+    Parameters
+    ----------
+    name : str
+        What a file of the kind is called in messages: "oscillator".
+    folder : str
+        The folder of `synchain.models` that holds the shipped files; it names the group of entry points too.
+    check : callable
+        Called with the module of a file from outside, its name in messages and its text; raises ValueError if the
+        module is not what the kind must be.
+    also : mapping of str to str
+        Other names of the field for shipped files; they serve suggestions only.
+    otherwise : str
+        What a name can be besides that of a file, for the message that refuses a name.
+    """
+
+    name: str
+    folder: str
+    check: Callable[[ModuleType, str, bytes], None] = field(compare=False, repr=False)
+    also: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
+    otherwise: str = field(default="", compare=False, repr=False)
 
 
 class OwnFile(str):
@@ -88,33 +114,11 @@ class OwnFile(str):
 _modules: dict[tuple[str, str, str], ModuleType] = {}
 """Kind, place and digest of the text -> what came of it; scenes keep the model that they were made with."""
 
-ALSO = {
-    "topology": {
-        "all_to_all": "complete",
-        "biclique": "complete_bipartite",
-        "clique": "complete",
-        "cubic": "random_cubic",
-        "cycle": "ring",
-        "gilbert": "erdos_renyi",
-        "gnp": "erdos_renyi",
-        "hamming": "hypercube",
-        "lattice": "grid",
-        "line": "chain",
-        "newman_watts": "small_world",
-        "open_chain": "chain",
-        "path": "chain",
-        "watts_strogatz": "small_world",
-    },
-    "oscillator": {"roessler": "rossler", "vdp": "van_der_pol"},
-    "coupling": {"dashpot": "damper"},
-}
-"""Other names of the field for what is here: they serve suggestions only."""
-
 _allowed: set[Path] = set()
 
 
-def names(kind: str) -> tuple[str, ...]:
-    """Return the names of all plug-ins of a kind (``oscillator``, ``friction``, ``coupling``, ``topology``), sorted."""
+def names(kind: Kind) -> tuple[str, ...]:
+    """Return the sorted names of all plug-ins of a kind."""
     return tuple(sorted({*_own(kind), *_entry_points(kind)}))
 
 
@@ -135,7 +139,7 @@ def allowed_code() -> tuple[str, ...]:
     return tuple(sorted(map(str, _allowed)))
 
 
-def named(kind: str, name: str) -> str:
+def named(kind: Kind, name: str) -> str:
     """Return the name of a plug-in as it is; that of a file outside the package as an `OwnFile` of its present text.
 
     What is an `OwnFile` already stays what it is, whatever has become of its file.
@@ -149,14 +153,14 @@ def named(kind: str, name: str) -> str:
     return own
 
 
-def load(kind: str, name: str) -> ModuleType:
+def load(kind: Kind, name: str) -> ModuleType:
     """Return the plug-in module `name`; raises ValueError with the known names where there is none.
 
     A path that ends in ".py" is loaded where `allow_code` has allowed it, as its text is now; an error in that file names
     its line.  An `OwnFile` gives the text that it was made of: ValueError where that is neither known nor in the file.
     """
     if name in _own(kind):
-        return import_module(f"{PACKAGE}.{_home(kind)}.{name}")
+        return import_module(f"{PACKAGE}.{kind.folder}.{name}")
     own = named(kind, name)
     if isinstance(own, OwnFile):
         return _module(kind, own)
@@ -164,8 +168,8 @@ def load(kind: str, name: str) -> ModuleType:
     if name in entries:
         return _entry(kind, name)
     known = names(kind)
-    hint = suggestion(name, known, ALSO.get(kind))
-    raise ValueError(f"unknown {kind} {shown(name)}; known: {', '.join(known)}{OTHERWISE.get(kind, '')}{hint}")
+    hint = suggestion(name, known, kind.also)
+    raise ValueError(f"unknown {kind.name} {shown(name)}; known: {', '.join(known)}{kind.otherwise}{hint}")
 
 
 def part(what: str, value: object) -> str:
@@ -229,11 +233,6 @@ def _instead(name: str, known: Iterable[str]) -> str:
     return "; correct the name or declare it as a parameter"
 
 
-def _home(kind: str) -> str:
-    """The folder of a kind, which also names its entry points."""
-    return "topologies" if kind == "topology" else f"{kind}s"
-
-
 def located(error: Exception, function: Callable[..., Any]) -> Exception:
     """The error of a plug-in's function: as it is from this package, else a ValueError with file and line."""
     if str(function.__module__).startswith(f"{PACKAGE}."):
@@ -241,85 +240,85 @@ def located(error: Exception, function: Callable[..., Any]) -> Exception:
     return _located(error, inspect.getsourcefile(function) or function.__module__)
 
 
-def _own(kind: str) -> tuple[str, ...]:
-    package = import_module(f"{PACKAGE}.{_home(kind)}")
+def _own(kind: Kind) -> tuple[str, ...]:
+    package = import_module(f"{PACKAGE}.{kind.folder}")
     return tuple(m.name for m in pkgutil.iter_modules(package.__path__) if not m.name.startswith("_"))
 
 
-@lru_cache(maxsize=8)
-def _entry_points(kind: str) -> Mapping[str, Any]:
+def _entry_points(kind: Kind) -> Mapping[str, Any]:
     """The plug-ins that installed packages announce; none is loaded for this."""
+    return _announced(f"synchain.{kind.folder}", tuple(sys.path))
+
+
+@lru_cache(maxsize=8)
+def _announced(group: str, places: tuple[str, ...]) -> Mapping[str, Any]:
+    """The entry points of a group in the packages at these places, by name."""
     from importlib.metadata import entry_points
 
-    return {entry.name: entry for entry in entry_points(group=f"synchain.{_home(kind)}")}
+    return {entry.name: entry for entry in entry_points(group=group)}
 
 
-def _entry(kind: str, name: str) -> ModuleType:
+def _entry(kind: Kind, name: str) -> ModuleType:
     entry = _entry_points(kind)[name]
-    where = f"{kind} {name!r} of the entry point {entry.value!r}"
+    where = f"{kind.name} {name!r} of the entry point {entry.value!r}"
     try:
         module = entry.load()
     except Exception as error:
         raise _located(error, "", where) from error
     if not isinstance(module, ModuleType):
-        raise ValueError(f"{where}: found no module; expected a {kind} file; see: synchain new {kind} NAME")
+        raise ValueError(f"{where}: found no module; expected a {kind.name} file; see: synchain new {kind.name} NAME")
     _check_installed(kind, module, where)
     return module
 
 
 @lru_cache(maxsize=64)
-def _check_installed(kind: str, module: ModuleType, where: str) -> None:
+def _check_installed(kind: Kind, module: ModuleType, where: str) -> None:
     """Check a module of an installed package, once."""
     try:
         text = inspect.getsource(module).encode()
     except (OSError, TypeError):  # it has no source, and so no names that could be looked at
         text = b""
-    _check(kind, module, where, text)
+    kind.check(module, where, text)
 
 
-def _text(kind: str, name: str, place: Path) -> bytes:
+def _text(kind: Kind, name: str, place: Path) -> bytes:
     """What stands in a file that may be run; ValueError where it may not, or cannot be read."""
     if not place.is_file():
-        raise ValueError(f"{kind} {name!r}: no such file: {place}; expected a .py file; check the path")
+        raise ValueError(f"{kind.name} {name!r}: no such file: {place}; expected a .py file; check the path")
     if place not in _allowed:
         raise ValueError(
-            f"{kind} {name!r} is a file of code, which is not run unasked; read it, then allow it: "
+            f"{kind.name} {name!r} is a file of code, which is not run unasked; read it, then allow it: "
             f"synchain.models.inputs.plugins.allow_code({name!r}), or --allow-code where a command has it"
         )
     try:
         return place.read_bytes()
     except OSError as error:
-        raise ValueError(f"{kind} {name!r}: cannot be read ({error.strerror}); check the rights of {place}") from None
+        raise ValueError(
+            f"{kind.name} {name!r}: cannot be read ({error.strerror}); check the rights of {place}"
+        ) from None
 
 
-def _module(kind: str, own: OwnFile, text: bytes | None = None) -> ModuleType:
+def _module(kind: Kind, own: OwnFile, text: bytes | None = None) -> ModuleType:
     """What the text of a file of code defines, run once for each text."""
-    key = (kind, own.place, own.digest)
+    key = (kind.name, own.place, own.digest)
     if key in _modules:
         return _modules[key]
     if text is None:
         text = _text(kind, own, Path(own.place))
         if hashlib.sha256(text).hexdigest() != own.digest:
             raise ValueError(
-                f"{kind} {str(own)!r}: found another text in {own.place} than when its scene was made; "
+                f"{kind.name} {str(own)!r}: found another text in {own.place} than when its scene was made; "
                 "expected the same text; make the scene anew, or restore the file"
             )
-    module = ModuleType(f"synchain_{kind}_{Path(own.place).stem}")
+    module = ModuleType(f"synchain_{kind.name}_{Path(own.place).stem}")
     module.__file__ = own.place
     try:
         exec(compile(text, own.place, "exec", dont_inherit=True), module.__dict__)
     except Exception as error:
         raise _located(error, own.place) from error
-    _check(kind, module, own.place, text)
+    kind.check(module, own.place, text)
     _modules[key] = module
     return module
-
-
-def _check(kind: str, module: ModuleType, where: str, text: bytes) -> None:
-    """Raise ValueError where a module from outside is not what its kind must be."""
-    from ..mechanics.definition import check
-
-    check(kind, module, where, text)
 
 
 def _located(error: Exception, file: str, what: str = "") -> ValueError:

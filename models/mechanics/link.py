@@ -2,66 +2,100 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import partial
-from types import ModuleType
+from collections.abc import Sequence
+from functools import lru_cache
 
 import sympy as sp
 
-from ..inputs.plugins import call, load, named, remembered
-from . import coupling_text
 from .components import TIME, Edge, Node
-from .coupling_text import coordinates_of, split
-from .coupling_text import named as named_coupling
+from .coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling
 from .lagrangian import balance, mass_matrix, solve_masses
 from .nondimensional import nondimensional
 from .orientation import link_energy
+from .oscillator import Field, Oscillator
 from .stick_slip import SLIP
 
 __all__ = ["check_coupling", "edge", "link_energies"]
 
 Symbols = tuple[sp.Symbol, ...]
 
+_POSITIONS = sp.symbols("q_i q_j", real=True)
+"""The coordinates of the two ends in the energies of a coupling."""
 
-def check_coupling(coupling: str, single: Node, other: Node | None = None) -> None:
-    """Raise ValueError where a coupling cannot join nodes: an unknown name or component, a spring without velocities."""
+_SPEEDS = sp.symbols("v_i v_j", real=True)
+"""Their velocities."""
+
+
+def check_coupling(coupling: Coupling, single: Node, other: Node | None = None) -> None:
+    """Raise ValueError if a coupling cannot join nodes: an unknown component, or a spring without velocities.
+
+    Parameters
+    ----------
+    coupling : Coupling
+        What is to join the nodes.
+    single : Node
+        The target of a link, and its source if there is no `other`.
+    other : Node, optional
+        The source of a link between nodes of two kinds.
+    """
+    if isinstance(coupling, MatrixCoupling):
+        if other is None:
+            coupling.check(_names(single))
+        return
     for node in (single,) if other is None else (single, other):
-        if coupling_text.is_matrix(coupling):
-            if other is None:
-                coupling_text.entries(coupling, _names(single))
-            continue
-        model, half = load("coupling", split(coupling)[0]), len(node.state) // 2
-        if hasattr(model, "BETWEEN") and other is None:
-            raise ValueError(f"coupling {coupling!r} joins {' and '.join(model.BETWEEN)}; found nodes of one kind")
+        half = len(node.state) // 2
+        if coupling.between is not None and other is None:
+            raise ValueError(
+                f"coupling {str(coupling)!r} joins {' and '.join(coupling.between)}; found nodes of one kind"
+            )
         if node.contact is None and node.rhs[:half] != node.state[half:]:
             name = node.state[0].name
             raise ValueError(
-                f"coupling {coupling!r} joins coordinates with velocities; found a node of {node.state} without them; "
-                f"name the components that a link joins, e.g. coupling = '{name}->{name}'"
+                f"coupling {str(coupling)!r} joins coordinates with velocities; found a node of {node.state} without "
+                f"them; name the components that a link joins, e.g. coupling = '{name}->{name}'"
             )
         if other is None:
-            coordinates_of(coupling, _names(node)[: max(half, 1)])
+            coupling.places(_names(node)[: max(half, 1)])
 
 
-@remembered(coupling=named_coupling, oscillator=partial(named, "oscillator"), partner=partial(named, "oscillator"))
+@lru_cache(maxsize=64)
 def edge(
-    coupling: str, single: Node, oscillator: str | None = None, other: Node | None = None, partner: str | None = None
+    coupling: Coupling,
+    single: Node,
+    oscillator: Oscillator | None = None,
+    other: Node | None = None,
+    partner: Oscillator | None = None,
 ) -> Edge:
     """Derive what one link adds to the rates of its target.
 
-    A text of entries such as "x->x, 1/2 y->z" adds sigma w factor (a_j - a_i) to the rate of its second component, whatever
-    the node is.  Other couplings act on coordinates followed by their velocities, by the Euler-Lagrange equations of a
-    pair with that link alone, on all coordinates or, as in "spring on x", on those it names.  `oscillator` names the model
-    whose mass matrix, at the target, turns forces into accelerations; without it the masses are 1, as they are in the units
-    of every oscillator with one mass.  A coupling with kinetic energy adds inertia.
-    The force is kept as a function of differences, sigma w (x_j - x_i), so that equal states feel exactly nothing.
+    Entries such as "x->x, 1/2 y->z" add sigma w factor (a_j - a_i) to the rate of their second component, whatever the
+    node is.  Other couplings act on coordinates followed by their velocities, by the Euler-Lagrange equations of a
+    pair with that link alone, on all coordinates or, as in "spring on x", on those it names.  A coupling with kinetic
+    energy adds inertia.  The force is kept as a function of differences, sigma w (x_j - x_i), so that equal states feel
+    exactly nothing.
 
-    An undirected edge is two links, and the template is symmetric, so the two forces are those of the potential.  A one-way
-    link has no potential: the force that the template gives its target acts there, and nothing acts back on the source.
+    An undirected edge is two links, and the template is symmetric, so the two forces are those of the potential.  A
+    one-way link has no potential: the force that the template gives its target acts there, and nothing acts back on
+    the source.  Set-valued friction takes up the force of a link while its target sticks.
 
-    Where the source is of another kind, it is `other`, an oscillator `partner`: components of equal names are joined.
-    Set-valued friction takes up the force of a link while its target sticks.
-    Raises ValueError as `check_coupling` does, and where nothing is joined.
+    Parameters
+    ----------
+    coupling : Coupling
+        What joins the nodes.
+    single : Node
+        The target, and the source if there is no `other`.
+    oscillator : Oscillator, optional
+        The model of the target, whose mass matrix turns forces into accelerations; without it the masses are 1, as
+        they are in the units of every oscillator with one mass.
+    other : Node, optional
+        A source of another kind: components of equal names are joined.
+    partner : Oscillator, optional
+        The model of that source.
+
+    Raises
+    ------
+    ValueError
+        As `check_coupling` does, and if nothing is joined.
     """
     if single.contact is not None:
         plain = Node(single.state[:2], (single.state[1], sp.S.Zero), single.parameters)
@@ -69,22 +103,21 @@ def edge(
     check_coupling(coupling, single, other)
     here = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in single.state)
     there = tuple(sp.Symbol(f"{s.name}_j", real=True) for s in (other or single).state)
-    weight = sp.Symbol("weight", real=True)
-    if coupling_text.is_matrix(coupling):
+    if isinstance(coupling, MatrixCoupling):
         sigma = sp.Symbol("sigma", real=True)
-        rates = _entry_rates(coupling, (single, other or single), sigma * weight, here, there)
-        return Edge(here, there, weight, rates, (sigma,))
-    model, half = load("coupling", split(coupling)[0]), len(single.state) // 2
-    strengths = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
+        rates = _entry_rates(coupling, (single, other or single), sigma * WEIGHT, here, there)
+        return Edge(here, there, WEIGHT, rates, (sigma,))
+    half = len(single.state) // 2
+    strengths = tuple(sp.Symbol(name, real=True) for name in coupling.parameters)
     ends = _Ends(single, other or single, oscillator, partner or oscillator, here, there)
-    rates, inertia = _by_lagrange(ends, ends.energies(coupling, model, {"weight": weight, **strengths}), oscillator)
+    rates, inertia = _by_lagrange(ends, ends.energies(coupling, WEIGHT), oscillator)
     used = (*rates, *(e for block in inertia for row in block for e in row))
-    symbols = tuple(s for s in single.parameters if s not in strengths.values() and any(e.has(s) for e in used))
-    return Edge(here, there, weight, (*[sp.S.Zero] * half, *rates), (*strengths.values(), *symbols), inertia)
+    symbols = tuple(s for s in single.parameters if s not in strengths and any(e.has(s) for e in used))
+    return Edge(here, there, WEIGHT, (*[sp.S.Zero] * half, *rates), (*strengths, *symbols), inertia)
 
 
 def _by_lagrange(
-    ends: _Ends, energies: tuple[sp.Expr, sp.Expr, sp.Expr], oscillator: str | None
+    ends: _Ends, energies: tuple[sp.Expr, sp.Expr, sp.Expr], oscillator: Oscillator | None
 ) -> tuple[tuple[sp.Expr, ...], tuple[tuple[tuple[sp.Expr, ...], ...], ...]]:
     """Accelerations of the target by the energies of a link alone, and the blocks of its inertia, empty without one."""
     kinetic, potential, dissipation = energies
@@ -103,7 +136,13 @@ class _Ends:
     """The two ends of a link between Lagrangian nodes."""
 
     def __init__(
-        self, single: Node, other: Node, oscillator: str | None, partner: str | None, here: Symbols, there: Symbols
+        self,
+        single: Node,
+        other: Node,
+        oscillator: Oscillator | None,
+        partner: Oscillator | None,
+        here: Symbols,
+        there: Symbols,
     ) -> None:
         self.nodes, self.oscillators, self.here, self.there = (single, other), (oscillator, partner), here, there
         self.halves = (len(here) // 2, len(there) // 2)
@@ -112,35 +151,32 @@ class _Ends:
         names = dict(zip(_names(other), there, strict=True))
         self.pairs = [(p, names[name]) for name, p in zip(_names(single), here, strict=True) if name in names]
 
-    def energies(
-        self, coupling: str, model: ModuleType, given: dict[str, sp.Symbol]
-    ) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    def energies(self, coupling: LagrangianCoupling, weight: sp.Symbol) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
         """The kinetic energy, the potential and the Rayleigh function of a link."""
-        if hasattr(model, "BETWEEN"):
-            return self._between(coupling, model, given)
+        if coupling.between is not None:
+            return self._between(coupling, coupling.between, weight)
         half = self.halves[0]
         known = [str(p)[:-2] for p, _ in self.pairs if p in self.here[:half]]
         if not known:
             raise ValueError(
-                f"coupling {coupling!r}: {self._described()} have no coordinate of one name; nothing is joined"
+                f"coupling {str(coupling)!r}: {self._described()} have no coordinate of one name; nothing is joined"
             )
-        joined = [known[k] for k in coordinates_of(coupling, tuple(known))]
+        joined = [known[k] for k in coupling.places(tuple(known))]
         places = [(_names(self.nodes[0]).index(name), _names(self.nodes[1]).index(name)) for name in joined]
-        strengths = {name: s for name, s in given.items() if name != "weight"}
-        return _energies(model, self.here, self.there, given["weight"], strengths, places)
+        return _energies(coupling, self.here, self.there, weight, places)
 
     def _between(
-        self, coupling: str, model: ModuleType, given: dict[str, sp.Symbol]
+        self, coupling: LagrangianCoupling, kinds: tuple[str, str], weight: sp.Symbol
     ) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
         """The energies of a coupling that joins two named kinds of oscillator, in the names of their states."""
-        if set(map(str, self.oscillators)) != set(model.BETWEEN):
-            wanted = " and ".join(model.BETWEEN)
-            raise ValueError(f"coupling {coupling!r} joins {wanted}; found a link between {self._described()}")
-        names = dict(zip(_names(self.nodes[0]), self.here, strict=True))
-        names |= dict(zip(_names(self.nodes[1]), self.there, strict=True))
+        if set(map(str, self.oscillators)) != set(kinds):
+            wanted = " and ".join(kinds)
+            raise ValueError(f"coupling {str(coupling)!r} joins {wanted}; found a link between {self._described()}")
+        symbols = dict(zip(self.nodes[0].state, self.here, strict=True))
+        symbols |= dict(zip(self.nodes[1].state, self.there, strict=True))
+        symbols[WEIGHT] = weight
         kinetic, potential, dissipation = (
-            call(getattr(model, name), {**names, **given}) if hasattr(model, name) else sp.S.Zero
-            for name in ("kinetic", "potential", "dissipation")
+            energy.xreplace(symbols) for energy in (coupling.kinetic, coupling.potential, coupling.dissipation)
         )
         return kinetic, potential, dissipation
 
@@ -159,38 +195,38 @@ class _Ends:
 
 
 def _energies(
-    model: ModuleType,
+    coupling: LagrangianCoupling,
     here: Symbols,
     there: Symbols,
     weight: sp.Symbol,
-    given: Mapping[str, sp.Symbol],
     places: Sequence[tuple[int, int]],
 ) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
     """The kinetic energy, the potential and the Rayleigh function, summed over pairs of coordinates by number."""
     kinetic = potential = dissipation = sp.S.Zero
     for a, b in places:
-        coordinates = {"q_i": here[a], "q_j": there[b]}
-        speeds = {"v_i": here[len(here) // 2 + a], "v_j": there[len(there) // 2 + b]}
-        if hasattr(model, "kinetic"):
-            kinetic += link_energy(model.kinetic, speeds, weight, given)
-        if hasattr(model, "potential"):
-            potential += link_energy(model.potential, coordinates, weight, given)
-        if hasattr(model, "dissipation"):
-            dissipation += link_energy(model.dissipation, speeds, weight, given)
+        coordinates = dict(zip(_POSITIONS, (here[a], there[b]), strict=True))
+        speeds = dict(zip(_SPEEDS, (here[len(here) // 2 + a], there[len(there) // 2 + b]), strict=True))
+        kinetic += link_energy(coupling.kinetic, speeds, weight)
+        potential += link_energy(coupling.potential, coordinates, weight)
+        dissipation += link_energy(coupling.dissipation, speeds, weight)
     return kinetic, potential, dissipation
 
 
 def link_energies(
-    coupling: str, joint: Edge, nodes: tuple[Node, Node], oscillators: tuple[str, str]
+    coupling: LagrangianCoupling, joint: Edge, nodes: tuple[Node, Node], oscillators: tuple[Oscillator, Oscillator]
 ) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
     """Return the kinetic energy, the potential and the Rayleigh function of a link, in the symbols of its edge.
 
-    `nodes` and `oscillators` are those of its target and its source.
+    Parameters
+    ----------
+    coupling : LagrangianCoupling
+        What joins the nodes.
+    joint : Edge
+        What the link adds to the rates of its target.
+    nodes, oscillators : pair of Node, pair of Oscillator
+        Those of its target and its source.
     """
-    model = load("coupling", split(coupling)[0])
-    strengths = {name: sp.Symbol(name, real=True) for name in model.PARAMETERS}
-    ends = _Ends(*nodes, *oscillators, joint.here, joint.there)
-    return ends.energies(coupling, model, {"weight": joint.weight, **strengths})
+    return _Ends(*nodes, *oscillators, joint.here, joint.there).energies(coupling, joint.weight)
 
 
 def _names(node: Node) -> tuple[str, ...]:
@@ -209,7 +245,7 @@ def _on_sliding(plain: Edge) -> Edge:
 
 
 def _entry_rates(
-    coupling: str, nodes: tuple[Node, Node], strength: sp.Expr, here: Symbols, there: Symbols
+    coupling: MatrixCoupling, nodes: tuple[Node, Node], strength: sp.Expr, here: Symbols, there: Symbols
 ) -> tuple[sp.Expr, ...]:
     """strength H (there - here), each difference a factor of its own: a sum over all of them would feel round-off.
 
@@ -217,13 +253,12 @@ def _entry_rates(
     """
     own, others = (_names(node) for node in nodes)
     rates = [sp.S.Zero] * len(own)
-    found = coupling_text.entries(coupling)
-    fitting = {pair: factor for pair, factor in found.items() if set(pair) <= set(own) and pair[0] in others}
+    fitting = [(a, b, factor) for a, b, factor in coupling.entries if {a, b} <= set(own) and a in others]
     if not fitting:
         raise ValueError(
-            f"coupling {coupling!r} joins nothing between nodes of {', '.join(own)} and {', '.join(others)}"
+            f"coupling {str(coupling)!r} joins nothing between nodes of {', '.join(own)} and {', '.join(others)}"
         )
-    for (source, target), factor in fitting.items():
+    for source, target, factor in fitting:
         share = sp.Rational(factor.numerator, factor.denominator)
         gap = there[others.index(source)] - here[own.index(source)]
         rates[own.index(target)] += sp.Mul(share, *strength.args, gap)
@@ -239,15 +274,14 @@ def _in_differences(e: sp.Expr, pairs: list[tuple[sp.Symbol, sp.Symbol]], here: 
     return sp.factor_terms(shifted).xreplace({d: q - p for (p, q), d in zip(pairs, gaps, strict=True)})
 
 
-def _masses(oscillator: str | None, single: Node, here: Symbols) -> sp.Matrix:
+def _masses(oscillator: Oscillator | None, single: Node, here: Symbols) -> sp.Matrix:
     """The mass matrix of the target by itself, in the symbols of a link's target."""
-    half = len(here) // 2
-    if oscillator is None or hasattr(load("oscillator", oscillator), "field"):
-        return sp.eye(half)
-    system = nondimensional(load("oscillator", oscillator))
+    if oscillator is None or isinstance(oscillator.model, Field):
+        return sp.eye(len(here) // 2)
+    system = nondimensional(oscillator)
     masses = mass_matrix(system.kinetic, system.velocities)
     if masses.has(TIME):
         raise ValueError(
-            f"oscillator {oscillator!r}: a coupling needs masses that do not depend on time, found {masses}"
+            f"oscillator {oscillator.name!r}: a coupling needs masses that do not depend on time, found {masses}"
         )
     return masses.xreplace(dict(zip(single.state, here, strict=True)))

@@ -7,31 +7,24 @@ the oscillator's own units of mass, length and time.  Put into the energies and 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from types import ModuleType
-from typing import Any
 
 import sympy as sp
 
-from ..inputs.plugins import call
 from .calculus import derivative
-from .components import TIME
-from .friction import CONTACTS, regularise
+from .components import SLIDING, TIME
+from .friction import ContactModel, FrictionLaw, regularise
 from .lagrangian import Mechanics
-from .parameter import dimension
+from .oscillator import FRICTION, Lagrangian, Oscillator
+from .parameter import Parameter, dimension
 
 __all__ = [
     "FRICTION",
     "friction_coefficient",
-    "mechanics",
     "nondimensional",
     "physical",
-    "physical_symbols",
     "scale",
     "static_coefficient",
 ]
-
-FRICTION = sp.Function("f", real=True)
-"""The friction coefficient as an unknown function of the sliding velocity; a law takes its place at the end."""
 
 MASS, LENGTH, DURATION = sp.symbols("M L T", positive=True)
 
@@ -42,128 +35,139 @@ def magnitude(unit: str) -> sp.Expr:
     return MASS**mass * LENGTH**length * DURATION**duration
 
 
-def scale(model: ModuleType, unit: str) -> sp.Expr:
-    """Return that amount in the physical symbols of an oscillator, such as g*m/k for the unit m.
+def scale(oscillator: Oscillator, unit: str) -> sp.Expr:
+    """Return the amount of a quantity that the value 1 stands for, in the physical symbols of an oscillator.
 
-    It is 1 where the oscillator is non-dimensional from the start.  Raises ValueError where the oscillator's scales do not
-    turn each quantity of its UNITS into 1.
+    Parameters
+    ----------
+    oscillator : Oscillator
+        The oscillator that fixes the scales.
+    unit : str
+        The unit of the quantity, such as "m".
+
+    Returns
+    -------
+    Expr
+        The amount, such as g*m/k; 1 if the oscillator is non-dimensional from the start.
+
+    Raises
+    ------
+    ValueError
+        If the oscillator's scales do not turn each quantity of its units into 1.
     """
-    if not hasattr(model, "scales"):
+    scaling = oscillator.model.scaling if isinstance(oscillator.model, Lagrangian) else None
+    if scaling is None:
         return sp.S.One
-    symbols = {name: sp.Symbol(name, positive=True) for name in model.UNITS}
-    units = call(model.scales, symbols)
-    values = {MASS: units["kg"], LENGTH: units["m"], DURATION: units["s"]}
-    for name, own in model.UNITS.items():
-        value = sp.powdenest(symbols[name] / magnitude(own).xreplace(values), force=True)
+    values = {MASS: scaling.scales["kg"], LENGTH: scaling.scales["m"], DURATION: scaling.scales["s"]}
+    for name, own in scaling.units.items():
+        value = sp.powdenest(sp.Symbol(name, positive=True) / magnitude(own).xreplace(values), force=True)
         if value != 1:
-            raise ValueError(f"{_name(model)}.scales: {name} becomes {value}; expected 1: correct the scales or UNITS")
+            raise ValueError(f"{oscillator}.scales: {name} becomes {value}; expected 1: correct the scales or UNITS")
     return sp.powdenest(magnitude(unit).xreplace(values), force=True)
 
 
-def physical(model: ModuleType) -> Mechanics:
-    """Return the Lagrangian system of an oscillator in physical symbols (eq. 2), with `FRICTION` for its friction law."""
-    return mechanics(model, physical_symbols(model))
+def physical(oscillator: Oscillator) -> Mechanics:
+    """Return the Lagrangian system of an oscillator in physical symbols (eq. 2), with `FRICTION` for its friction law.
+
+    Raises
+    ------
+    ValueError
+        If the oscillator is a vector field, and if it has not one force for each coordinate.
+    """
+    model = oscillator.model
+    if not isinstance(model, Lagrangian):
+        raise ValueError(f"oscillator {oscillator.name!r} is a vector field; expected one with a Lagrangian")
+    speeds = [_real(c.velocity) for c in model.coordinates]
+    lost = [derivative(model.dissipation, speed) for speed in speeds] if model.dissipation != 0 else []
+    return Mechanics(
+        tuple(_real(c.name) for c in model.coordinates),
+        tuple(speeds),
+        model.kinetic,
+        model.potential,
+        tuple(force - rate for force, rate in zip(model.forces, lost, strict=True)) if lost else model.forces,
+    )
 
 
-def physical_symbols(model: ModuleType) -> dict[str, Any]:
-    """Return what the functions of an oscillator may ask for by name, in physical symbols."""
-    names = {name: sp.Symbol(name, positive=True) for name in getattr(model, "UNITS", {})}
-    terms = getattr(model, "PHYSICAL", {})
-    for name in model.PARAMETERS:
-        names[terms.get(name, name)] = sp.Symbol(terms.get(name, name), real=True)
-    return {**names, **_state(model), "t": TIME, "friction": FRICTION}
-
-
-def nondimensional(model: ModuleType) -> Mechanics:
+def nondimensional(oscillator: Oscillator) -> Mechanics:
     """Return the Lagrangian system in non-dimensional symbols (eq. 3), with `FRICTION` for its friction law.
 
-    Raises ValueError where units do not cancel.
+    Raises
+    ------
+    ValueError
+        As `physical` does, and if units do not cancel.
     """
-    if not hasattr(model, "scales"):
-        return physical(model)
-    scale(model, "1")  # the scales must turn every quantity of UNITS into 1
-    given: dict[str, Any] = {name: magnitude(unit) for name, unit in model.UNITS.items()}
-    for name, parameter in model.PARAMETERS.items():
-        given[model.PHYSICAL[name]] = sp.Symbol(name, real=True) * magnitude(parameter.unit)
-    units = coordinates(model)
-    symbols = _state(model)
-    for name, (speed, unit) in units.items():
-        given[name] = symbols[name] * magnitude(unit)
-        given[speed] = symbols[speed] * magnitude(unit) / DURATION
-    given["t"] = TIME * DURATION
-    given["friction"] = lambda w: FRICTION(_cancel(w / magnitude("m/s"), f"{_name(model)}: sliding velocity"))
-    found = mechanics(model, given)
+    system, model = physical(oscillator), oscillator.model
+    if not isinstance(model, Lagrangian) or model.scaling is None:
+        return system
+    scale(oscillator, "1")  # the scales must turn every quantity of UNITS into 1
+    amounts = {sp.Symbol(name, positive=True): magnitude(unit) for name, unit in model.scaling.units.items()}
+    for name, parameter in oscillator.parameters.items():
+        amounts[_real(model.scaling.physical[name])] = _real(name) * magnitude(parameter.unit)
+    for c in model.coordinates:
+        amounts[_real(c.name)] = _real(c.name) * magnitude(c.unit)
+        amounts[_real(c.velocity)] = _real(c.velocity) * magnitude(c.unit) / DURATION
+    amounts[TIME] = TIME * DURATION
     energy = magnitude("N*m")
+
+    def put(expression: sp.Expr, over: sp.Expr, what: str) -> sp.Expr:
+        scaled = expression.xreplace(amounts).replace(
+            FRICTION, lambda w: FRICTION(_cancel(w / magnitude("m/s"), f"{oscillator}: sliding velocity"))
+        )
+        return _cancel(scaled / over, f"{oscillator}: {what}")
+
     return Mechanics(
-        tuple(symbols[name] for name in units),
-        tuple(symbols[speed] for speed, _ in units.values()),
-        _cancel(found.kinetic / energy, f"{_name(model)}: kinetic energy"),
-        _cancel(found.potential / energy, f"{_name(model)}: potential energy"),
+        system.coordinates,
+        system.velocities,
+        put(system.kinetic, energy, "kinetic energy"),
+        put(system.potential, energy, "potential energy"),
         tuple(
-            _cancel(force * magnitude(unit) / energy, f"{_name(model)}: force on {name}")
-            for force, (name, (_, unit)) in zip(found.forces, units.items(), strict=True)
+            put(force, energy / magnitude(c.unit), f"force on {c.name}")
+            for force, c in zip(system.forces, model.coordinates, strict=True)
         ),
     )
 
 
-def mechanics(model: ModuleType, given: Mapping[str, Any]) -> Mechanics:
-    """Return the energies and forces of an oscillator with `given` expressions put in for the names that it uses."""
-    units = coordinates(model)
-    force = call(model.force, given) if hasattr(model, "force") else (sp.S.Zero,) * len(units)
-    forces = tuple(force) if isinstance(force, tuple | list) else (force,)
-    if hasattr(model, "dissipation"):
-        lost = _damping(model, given, [speed for speed, _ in units.values()])
-        forces = tuple(sp.sympify(own) - rate for own, rate in zip(forces, lost, strict=True))
-    return Mechanics(
-        tuple(given[name] for name in units),
-        tuple(given[speed] for speed, _ in units.values()),
-        call(model.kinetic, given),
-        call(model.potential, given),
-        forces,
-    )
-
-
-def _damping(model: ModuleType, given: Mapping[str, Any], speeds: list[str]) -> tuple[sp.Expr, ...]:
-    """The derivatives of Rayleigh's function by the velocities, whatever expressions stand for these."""
-    moving = {name: sp.Dummy(name, real=True) for name in speeds}
-    function = sp.sympify(call(model.dissipation, {**given, **moving}))
-    values = {moving[name]: given[name] for name in speeds}
-    return tuple(derivative(function, symbol).xreplace(values) for symbol in moving.values())
-
-
-def friction_coefficient(law: ModuleType, contact: str) -> Callable[[sp.Expr], sp.Expr]:
+def friction_coefficient(law: FrictionLaw, contact: str) -> Callable[[sp.Expr], sp.Expr]:
     """Return f(w), the friction coefficient as a function of the non-dimensional sliding velocity.
 
-    The parameters of a law have units too, so they scale with the rest: a rate of decay a = 2.5 of unit s/m decays with
-    2.5 |w| only when w is measured in L/T.  Raises ValueError where the units of a law do not cancel, and for an unknown
-    contact.
+    The parameters of a law have units too, so they scale with the rest: a rate of decay a = 2.5 of unit s/m decays
+    with 2.5 |w| only when w is measured in L/T.
+
+    Parameters
+    ----------
+    law : FrictionLaw
+        The law.
+    contact : str
+        How its jump at rest is treated, a `ContactModel`.
+
+    Raises
+    ------
+    ValueError
+        If the units of a law do not cancel, and for an unknown contact.
     """
-    if contact not in CONTACTS:
-        raise ValueError(f"unknown contact {contact!r}; known: {', '.join(CONTACTS)}")
+    treatment = ContactModel.parse("contact", contact)
     w = sp.Dummy("w", real=True)
-    given = {name: sp.Symbol(name, real=True) * magnitude(p.unit) for name, p in law.PARAMETERS.items()}
-    value = _cancel(call(law.force, {**given, "w": w * magnitude("m/s")}), f"friction law {_name(law)}")
-    if contact == "atan":
+    amounts = {SLIDING: w * magnitude("m/s"), **_amounts(law.parameters)}
+    value = _cancel(law.force.xreplace(amounts), f"friction law {law}")
+    if treatment == ContactModel.ATAN:
         value = regularise(value, sp.Symbol("kappa", real=True))
     return lambda argument: value.xreplace({w: argument})
 
 
-def static_coefficient(law: ModuleType) -> sp.Expr | None:
-    """Return the static friction coefficient of a law that has one of its own."""
-    if not hasattr(law, "static"):
+def static_coefficient(law: FrictionLaw) -> sp.Expr | None:
+    """Return the static friction coefficient of a law that has one of its own, None of any other."""
+    if law.static is None:
         return None
-    given = {name: sp.Symbol(name, real=True) * magnitude(p.unit) for name, p in law.PARAMETERS.items()}
-    return _cancel(call(law.static, given), f"friction law {_name(law)}: static")
+    return _cancel(law.static.xreplace(_amounts(law.parameters)), f"friction law {law}: static")
 
 
-def coordinates(model: ModuleType) -> Mapping[str, tuple[str, str]]:
-    """Return coordinate -> (velocity, unit) of an oscillator."""
-    return getattr(model, "COORDINATES", {"x": ("v", "m")})
+def _amounts(parameters: Mapping[str, Parameter]) -> dict[sp.Symbol, sp.Expr]:
+    """Each parameter as its non-dimensional value times its magnitude."""
+    return {_real(name): _real(name) * magnitude(parameter.unit) for name, parameter in parameters.items()}
 
 
-def _state(model: ModuleType) -> dict[str, sp.Symbol]:
-    names = [name for pair in coordinates(model).items() for name in (pair[0], pair[1][0])]
-    return {name: sp.Symbol(name, real=True) for name in names}
+def _real(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)
 
 
 def _cancel(expression: sp.Expr, what: str) -> sp.Expr:
@@ -174,7 +178,3 @@ def _cancel(expression: sp.Expr, what: str) -> sp.Expr:
     if found:
         raise ValueError(f"{what}: the unit {found[0]} does not cancel in {result}; check the units of the parameters")
     return result
-
-
-def _name(model: ModuleType) -> str:
-    return model.__name__.rpartition(".")[2]

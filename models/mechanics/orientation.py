@@ -8,26 +8,32 @@ then W^2 V_even + W V_odd, the parts of V that keep and that change their sign i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any
 
 import sympy as sp
 
-from ..inputs.plugins import call
 from .components import Edge
+from .coupling import WEIGHT
 
 __all__ = ["is_oriented", "link_energy"]
 
 
-def link_energy(
-    function: Callable[..., Any], ends: Mapping[str, sp.Symbol], weight: sp.Symbol, given: Mapping[str, sp.Symbol]
-) -> sp.Expr:
-    """Return the energy (or Rayleigh function) of one link; `ends` names its two ends, target first."""
+def link_energy(energy: sp.Expr, ends: Mapping[sp.Symbol, sp.Symbol], weight: sp.Symbol) -> sp.Expr:
+    """Return the energy (or Rayleigh function) of one link.
+
+    Parameters
+    ----------
+    energy : Expr
+        The function as a coupling has it, in the symbols of its two ends and `WEIGHT`.
+    ends : mapping of Symbol to Symbol
+        The symbols that take the place of those two, target first.
+    weight : Symbol
+        The symbol that takes the place of `WEIGHT`.
+    """
     first, second = ends
     back = {first: ends[second], second: ends[first]}
-    here = sp.sympify(call(function, {**ends, **given, "weight": weight}))
-    there = sp.sympify(call(function, {**back, **given, "weight": weight}))
+    here, there = (energy.xreplace({**pair, WEIGHT: weight}) for pair in (ends, back))
     if sp.expand(here - there) == 0:
         return here
     here, there = (e.xreplace({weight: sp.S.One}) for e in (here, there))

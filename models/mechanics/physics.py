@@ -7,9 +7,10 @@ from functools import lru_cache
 
 import sympy as sp
 
-from ..inputs.plugins import load
+from .friction import ContactModel, FrictionLaw
 from .lagrangian import mass_matrix
 from .nondimensional import friction_coefficient, nondimensional
+from .oscillator import Field, Oscillator
 
 __all__ = ["check_masses", "check_power"]
 
@@ -17,12 +18,17 @@ SPEEDS = tuple(side * 10.0 ** (k / 4) for k in range(-24, 9) for side in (1.0, -
 """Sliding velocities at which a law is looked at, from 1e-6 to 100 and both ways."""
 
 
-def check_power(law: str, values: Mapping[str, float]) -> None:
-    """Raise ValueError where friction pushes against the ground's motion, w f(w) < 0, and so feeds energy.
+def check_power(law: FrictionLaw, values: Mapping[str, float]) -> None:
+    """Raise ValueError if friction pushes against the ground's motion, w f(w) < 0, and so feeds energy.
 
-    A law that is meant to do so has SELF_EXCITING = True.
+    Parameters
+    ----------
+    law : FrictionLaw
+        The law; one that is self-exciting is meant to feed energy.
+    values : mapping of str to float
+        The values of its parameters.
     """
-    if getattr(load("friction", law), "SELF_EXCITING", False):
+    if law.self_exciting:
         return
     coefficient, names = _coefficient(law)
     given = [values[name] for name in names]
@@ -33,26 +39,33 @@ def check_power(law: str, values: Mapping[str, float]) -> None:
             continue
         if w * f < 0.0:
             raise ValueError(
-                f"friction law {law!r}: f({w:.3g}) = {f:.3g} has the sign against the sliding velocity and feeds energy; "
+                f"friction law {law.name!r}: f({w:.3g}) = {f:.3g} has the sign against the sliding velocity and feeds energy; "
                 "expected w f(w) >= 0; turn the sign of `force`, correct the parameters, or declare SELF_EXCITING = True"
             )
 
 
 @lru_cache(maxsize=64)
-def _coefficient(law: str) -> tuple[Callable[..., float], tuple[str, ...]]:
+def _coefficient(law: FrictionLaw) -> tuple[Callable[..., float], tuple[str, ...]]:
     """f(w, …) as a plain function, and the names of its parameters."""
-    names = tuple(load("friction", law).PARAMETERS)
+    names = tuple(law.parameters)
     w = sp.Symbol("w", real=True)
-    value = friction_coefficient(load("friction", law), "sign")(w)
+    value = friction_coefficient(law, ContactModel.SIGN)(w)
     symbols = [w, *(sp.Symbol(name, real=True) for name in names)]
     sign = {"sign": lambda x: (x > 0) - (x < 0)}
     return sp.lambdify(symbols, value, [sign, "math"]), names
 
 
-def check_masses(oscillator: str, values: Mapping[str, float]) -> None:
-    """Raise ValueError where the kinetic energy of an oscillator is not positive for every velocity (Sylvester).
+def check_masses(oscillator: Oscillator, values: Mapping[str, float]) -> None:
+    """Raise ValueError if the kinetic energy of an oscillator is not positive for every velocity (Sylvester).
 
     A mass that depends on the state is not looked at.
+
+    Parameters
+    ----------
+    oscillator : Oscillator
+        The oscillator; a vector field has no masses.
+    values : mapping of str to float
+        The values of its parameters.
     """
     found = _masses(oscillator)
     if found is None:
@@ -62,7 +75,7 @@ def check_masses(oscillator: str, values: Mapping[str, float]) -> None:
 
 
 @lru_cache(maxsize=1024)
-def _check_masses(oscillator: str, values: tuple[tuple[str, float], ...]) -> None:
+def _check_masses(oscillator: Oscillator, values: tuple[tuple[str, float], ...]) -> None:
     """The check in the parameters that the masses depend on: nodes that differ in others need none of their own."""
     found = _masses(oscillator)
     if found is None:
@@ -74,16 +87,15 @@ def _check_masses(oscillator: str, values: tuple[tuple[str, float], ...]) -> Non
     for k, velocity in enumerate(velocities):
         if not numbers[: k + 1, : k + 1].det() > 0:
             raise ValueError(
-                f"oscillator {oscillator!r}: the mass of the velocity {velocity} is {numbers[k, k]}, and its kinetic energy "
+                f"oscillator {oscillator.name!r}: the mass of the velocity {velocity} is {numbers[k, k]}, and its kinetic energy "
                 "not positive; expected T > 0 for every motion; correct `kinetic` or the parameters"
             )
 
 
 @lru_cache(maxsize=64)
-def _masses(oscillator: str) -> tuple[sp.Matrix, tuple[sp.Symbol, ...]] | None:
+def _masses(oscillator: Oscillator) -> tuple[sp.Matrix, tuple[sp.Symbol, ...]] | None:
     """The mass matrix in the parameters, None for a vector field."""
-    model = load("oscillator", oscillator)
-    if hasattr(model, "field"):
+    if isinstance(oscillator.model, Field):
         return None
-    system = nondimensional(model)
+    system = nondimensional(oscillator)
     return mass_matrix(system.kinetic, system.velocities), system.velocities

@@ -3,29 +3,40 @@
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..graphs.families import topology
-from ..graphs.topology import Topology
 from ..inputs.checks import choice, integer, number, shown, text
 from ..inputs.frozen import Frozen
-from ..inputs.plugins import load, named, part
-from ..mechanics.coupling_text import canonical, is_matrix, split
-from ..mechanics.coupling_text import canonical_coordinates as chosen_coordinates
-from ..mechanics.coupling_text import named as named_coupling
-from .model import bare, by_kind, check_links, check_state, components, coordinate_names, default_friction, groups
+from ..inputs.words import Word
+from ..mechanics.friction import ContactModel, FrictionLaw
+from ..mechanics.oscillator import Field
+from ..mechanics.physics import check_masses, check_power
+from .axis import Axis
+from .model import Model, NodeKind, as_coupling, as_groups, as_law, as_oscillator, as_topology
 from .parameters import at_nodes, drive, parameters
 from .section import Section
-from .start import SEED_LIMIT, chosen_start, default_start, start
+from .start import SEED_LIMIT, chosen_start, default_start
 from .sweep import check_sweep, read_axes
 
-__all__ = ["check_friction", "complete", "integrators"]
+__all__ = ["Record", "TimeUnit", "complete", "integrators"]
 
-RECORDS = ("sync_error", "section", "trajectory")
 
-TIME_UNITS = ("period", "time")
+class Record(Word):
+    """What a cell of a sweep records."""
+
+    SYNC_ERROR = "sync_error"
+    SECTION = "section"
+    TRAJECTORY = "trajectory"
+
+
+class TimeUnit(Word):
+    """What `transient` and `window` count."""
+
+    PERIOD = "period"
+    TIME = "time"
+
 
 METHODS = Path(__file__).parents[2] / "codegen" / "integrators"
 """The folder of the integrators, one file each; it is listed here, and read by the code generator alone."""
@@ -34,157 +45,171 @@ TIME_LIMIT, STEP_LIMIT, SAMPLE_LIMIT = 1e9, 10**12, 10**8
 
 
 def integrators() -> tuple[str, ...]:
-    """Names of all integrators."""
+    """Return the names of all integrators."""
     return tuple(sorted(m.name for m in pkgutil.iter_modules([str(METHODS)]) if not m.name.startswith("_")))
 
 
 def complete(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the same names with defaults filled in and values checked; ValueError or TypeError else."""
-    made = dict(given)
-    made["title"] = text("title", made["title"])
-    made["seed"] = integer("seed", made["seed"], 0, SEED_LIMIT)
-    _model(made)
-    made["axes"] = read_axes(made["axes"], made["zipped"])
-    made["parameters"] = parameters(made)
-    made["initial"] = _start(made)
-    _records(made)
-    _times(made)
-    _numerics(made)
-    check_sweep(made)
-    check_friction(made)
-    _physics(made)
-    return made
+    """Return the values of a scene's keywords, and its model.
+
+    Parameters
+    ----------
+    given : mapping
+        Every keyword of `Scene` with what a user gave, or its default.
+
+    Returns
+    -------
+    dict
+        The same names with defaults filled in and values checked, and "model".
+
+    Raises
+    ------
+    ValueError, TypeError
+        For anything that the model does not know or cannot be given.
+    """
+    values = dict(given)
+    values["title"] = text("title", given["title"])
+    values["seed"] = integer("seed", given["seed"], 0, SEED_LIMIT)
+    values |= _model(given)
+    model: Model = values["model"]
+    values["axes"] = axes = read_axes(given["axes"], given["zipped"])
+    values["parameters"] = numbers = parameters(model, given["parameters"], axes)
+    values["initial"] = _start(model, given["initial"], values["seed"])
+    values["record"] = _records(model, given["record"])
+    values["section"] = _section(model, given["section"])
+    values |= _times(model, numbers, given)
+    for name in ("transient", "window"):
+        values[name] = number(name, given[name], 0.0, TIME_LIMIT)
+    if values["record"] and values["window"] == 0.0:
+        raise ValueError(f"window: found 0, in which {values['record'][0]!r} has nothing to record; give a window > 0")
+    values |= _numerics(given, values["record"])
+    values["continuation"] = check_sweep(model, values)
+    _check_friction(model, numbers, axes, values["zipped"])
+    _check_physics(model, numbers, axes)
+    return values
 
 
-def _physics(made: Mapping[str, Any]) -> None:
+def _model(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The parts of the model, and the model."""
+    oscillator = as_oscillator(given["oscillator"])
+    contact = ContactModel.parse("contact", given["contact"])
+    graph = as_topology(given["topology"])
+    friction = as_law(given["friction"], oscillator)
+    groups = as_groups(given["nodes"], graph.n)
+    coupling = as_coupling(given["coupling"])
+    model = Model.of(NodeKind(oscillator, friction), groups, contact, coupling, graph)
+    return {
+        "oscillator": oscillator,
+        "contact": contact,
+        "topology": graph,
+        "friction": friction,
+        "nodes": groups,
+        "coupling": model.coupling,
+        "model": model,
+    }
+
+
+def _check_physics(model: Model, numbers: Mapping[str, float], axes: Sequence[Axis]) -> None:
     """Refuse wrong physics at the scene's parameters and at the ends of its axes."""
-    from ..mechanics.physics import check_masses, check_power
-
     for ends in (min, max):
-        swept = {axis.name: ends(axis.values) for axis in made["axes"]}
-        values = {name: swept.get(name, value) for name, value in made["parameters"].items()}
-        for oscillator, friction, own in at_nodes(made, values):
-            check_masses(oscillator, own)
-            if friction is not None:
-                check_power(friction, own)
+        swept = {axis.name: ends(axis.values) for axis in axes}
+        values = {name: swept.get(name, value) for name, value in numbers.items()}
+        for kind, own in at_nodes(model, values):
+            check_masses(kind.oscillator, own)
+            if kind.friction is not None:
+                check_power(kind.friction, own)
 
 
-def _model(made: dict[str, Any]) -> None:
-    made["oscillator"] = named("oscillator", part("oscillator", made["oscillator"]))
-    made["contact"] = text("contact", made["contact"])
-    graph = made["topology"] = topology("chain", 1) if made["topology"] is None else made["topology"]
-    if not isinstance(graph, Topology):
-        raise TypeError(f"topology: found {shown(graph)} ({type(graph).__name__}); expected a graph, e.g. chain(4)")
-    made["friction"] = default_friction(made["oscillator"], made["friction"])
-    made["nodes"] = groups(made["nodes"], graph.n)
-    if made["coupling"] is not None:
-        coupling = part("coupling", made["coupling"])
-        made["coupling"] = None if coupling == "none" else named_coupling(coupling)
-    if made["coupling"] is not None and not is_matrix(made["coupling"]):
-        load("coupling", split(made["coupling"])[0])  # an unknown name is refused even where nothing uses it
-    if made["coupling"] is not None and is_matrix(made["coupling"]):
-        made["coupling"] = canonical(made["coupling"], components(made))
-    elif made["coupling"] is not None and split(made["coupling"])[1] is not None:
-        made["coupling"] = chosen_coordinates(made["coupling"], coordinate_names(made))
-    if graph.links and made["coupling"] is None:
-        raise ValueError(
-            f"coupling: found none for {graph.name}({graph.n}), which has links; "
-            "expected the name of a coupling, e.g. 'spring'"
-        )
-    check_links(made)
-
-
-def _start(made: Mapping[str, Any]) -> Frozen[tuple[float, ...]]:
+def _start(model: Model, given: object, seed: int) -> Frozen[tuple[float, ...]]:
     """The initial states, component by component, those of each kind of node around its own centre."""
-    graph, names = made["topology"], components(made)
-    templates, kinds = by_kind(made["oscillator"], made["friction"], made["nodes"], graph.n)
-    centres = [getattr(load("oscillator", oscillator), "INITIAL", None) for oscillator, _ in templates]
-    if not kinds:
-        return start(made["initial"], names, graph.n, made["seed"], centres[0])
-    nodes = bare(made)
+    apart = model.unlinked
     own = [
-        default_start(tuple(s.name for s in one.state), graph.n, c) for one, c in zip(nodes.nodes, centres, strict=True)
+        default_start(tuple(s.name for s in node.state), model.n, kind.oscillator.initial)
+        for node, kind in zip(apart.nodes, model.kinds, strict=True)
     ]
-    defaults = {name: tuple(own[kinds[i]][name][i] for i in nodes.holders(name)) for name in names}
-    return chosen_start(made["initial"], defaults, made["seed"])
+    defaults = {name: tuple(own[model.kind_of[i]][name][i] for i in apart.holders(name)) for name in model.components}
+    return chosen_start(given, defaults, seed)
 
 
-def _records(made: dict[str, Any]) -> None:
-    n = made["topology"].n
-    found = made["record"]
-    if found is None:
-        found = ("sync_error",) if n > 1 and bare(made).common else ()
+def _records(model: Model, given: object) -> tuple[Record, ...]:
+    """What is recorded, in the order of the words."""
+    n, common = model.n, bool(model.unlinked.common)
+    found = ((Record.SYNC_ERROR,) if n > 1 and common else ()) if given is None else given
     if not isinstance(found, (list, tuple)):
-        raise TypeError(f"record: found {shown(found)}; expected a list out of {', '.join(RECORDS)}")
-    names = [choice("record", name, RECORDS) for name in found]
+        raise TypeError(f"record: found {shown(found)}; expected a list out of {', '.join(Record)}")
+    names = [Record.parse("record", name) for name in found]
     if len(set(names)) < len(names):
         raise ValueError(f"record: found {shown(names)}; expected each record once; remove the repetition")
-    if n == 1 and "sync_error" in names:
+    if n == 1 and Record.SYNC_ERROR in names:
         raise ValueError(
             "record: found 'sync_error' for one oscillator; expected at least two to compare; take it out of record"
         )
-    made["record"] = tuple(name for name in RECORDS if name in names)
-    if "sync_error" in names and not bare(made).common:
+    if Record.SYNC_ERROR in names and not common:
         raise ValueError("record: found 'sync_error', but these oscillators have no states of one name to compare")
-    templates, kinds = by_kind(made["oscillator"], made["friction"], made["nodes"], n)
-    own = tuple(s.name for s in bare(made).node_at(0).state)
-    crossed = own[0] if hasattr(load("oscillator", templates[kinds[0] if kinds else 0][0]), "field") else own[-1]
+    return tuple(name for name in Record if name in names)
+
+
+def _section(model: Model, given: object) -> Section:
+    """The section: unless it is given, a velocity of the first node falls through 0, or the state of a vector field."""
+    own = tuple(s.name for s in model.unlinked.node_at(0).state)
+    crossed = own[0] if isinstance(model.kinds[model.kind_of[0]].oscillator.model, Field) else own[-1]
     default = f"{'v' if 'v' in own else crossed}_1 falling"
-    made["section"] = Section.parse(default if made["section"] is None else made["section"])
-    check_state(made, made["section"].variable, "section variable")
+    section = Section.parse(default if given is None else given)
+    model.check_state(section.variable, "section variable")
+    return section
 
 
-def _times(made: dict[str, Any]) -> None:
-    found = drive(made)
-    if made["time_unit"] is None:
-        made["time_unit"] = "time" if found.frequency is None else "period"
-    made["time_unit"] = choice("time_unit", made["time_unit"], TIME_UNITS)
-    if made["time_unit"] == "period" and found.frequency is None:
-        templates, _ = by_kind(made["oscillator"], made["friction"], made["nodes"], made["topology"].n)
-        names = " and ".join(dict.fromkeys(repr(oscillator) for oscillator, _ in templates))
-        whole = names if len(templates) == 1 else f"the network of {names}"
+def _times(model: Model, numbers: Mapping[str, float], given: Mapping[str, Any]) -> dict[str, Any]:
+    """The unit of time: the period of the drive if there is one."""
+    motion = drive(model, numbers)
+    default = TimeUnit.TIME if motion.frequency is None else TimeUnit.PERIOD
+    unit = default if given["time_unit"] is None else TimeUnit.parse("time_unit", given["time_unit"])
+    if unit == TimeUnit.PERIOD and motion.frequency is None:
+        names = " and ".join(dict.fromkeys(repr(kind.oscillator.name) for kind in model.kinds))
+        whole = names if len(model.kinds) == 1 else f"the network of {names}"
         raise ValueError(
-            f"time_unit: found 'period', but {whole} {found.problem}; expected 'time'; change it or leave it out"
+            f"time_unit: found 'period', but {whole} {motion.problem}; expected 'time'; change it or leave it out"
         )
-    for name in ("transient", "window"):
-        made[name] = number(name, made[name], 0.0, TIME_LIMIT)
-    if made["record"] and made["window"] == 0.0:
-        raise ValueError(f"window: found 0, in which {made['record'][0]!r} has nothing to record; give a window > 0")
+    return {"time_unit": unit}
 
 
-def _numerics(made: dict[str, Any]) -> None:
-    made["integrator"] = choice("integrator", made["integrator"], ("auto", *integrators()))
-    made["rtol"] = number("rtol", made["rtol"], 1e-15, 0.1)
-    made["atol"] = made["rtol"] / 10 if made["atol"] is None else number("atol", made["atol"], 0.0, 0.1)
-    if made["atol"] < 1e-300:
+def _numerics(given: Mapping[str, Any], records: Sequence[Record]) -> dict[str, Any]:
+    """The integrator, its tolerances and limits."""
+    rtol = number("rtol", given["rtol"], 1e-15, 0.1)
+    atol = rtol / 10 if given["atol"] is None else number("atol", given["atol"], 0.0, 0.1)
+    integrator = choice("integrator", given["integrator"], ("auto", *integrators()))
+    if atol < 1e-300:
         raise ValueError(
-            f"atol: found {made['atol']!r}; expected a number above 0, since states pass through 0; take e.g. 1e-10"
+            f"atol: found {atol!r}; expected a number above 0, since states pass through 0; take e.g. 1e-10"
         )
-    made["max_steps"] = integer("max_steps", made["max_steps"], 1, STEP_LIMIT)
-    made["samples"] = integer("samples", made["samples"], 0, SAMPLE_LIMIT)
-    if "trajectory" in made["record"] and made["samples"] < 2:
+    max_steps = integer("max_steps", given["max_steps"], 1, STEP_LIMIT)
+    samples = integer("samples", given["samples"], 0, SAMPLE_LIMIT)
+    if Record.TRAJECTORY in records and samples < 2:
         raise ValueError(
-            f"samples: found {made['samples']} for the trajectory; expected at least 2, "
+            f"samples: found {samples} for the trajectory; expected at least 2, "
             "since both ends of the window are included; raise samples"
         )
+    return {"integrator": integrator, "rtol": rtol, "atol": atol, "max_steps": max_steps, "samples": samples}
 
 
-def check_friction(made: Mapping[str, Any]) -> None:
-    """Raise ValueError for set-valued friction with a static coefficient below that of slip, which can neither hold nor
-    slip: a law names such pairs in ORDER, the smaller parameter first."""
-    if made["contact"] != "set-valued":
+def _check_friction(model: Model, numbers: Mapping[str, float], axes: Sequence[Axis], zipped: bool) -> None:
+    """Refuse set-valued friction whose static coefficient is below that of slip, which can neither hold nor slip."""
+    if model.contact != ContactModel.SET_VALUED:
         return
-    for _, friction, own in at_nodes(made, {name: name for name in made["parameters"]}):
-        if friction is not None:
-            for low, high in getattr(load("friction", friction), "ORDER", ()):
-                _check_order(made, friction, own[low], own[high])
+    for kind, own in at_nodes(model, {name: name for name in numbers}):
+        if kind.friction is not None:
+            for low, high in kind.friction.order:
+                _check_order(kind.friction, (own[low], own[high]), numbers, axes, zipped)
 
 
-def _check_order(made: Mapping[str, Any], friction: str, low: str, high: str) -> None:
-    """Compare two parameters in all cells."""
-    axes = {axis.name: axis.values for axis in made["axes"]}
-    lows, highs = (axes.get(name, (made["parameters"][name],)) for name in (low, high))
-    together = made["zipped"] and low in axes and high in axes
+def _check_order(
+    friction: FrictionLaw, pair: tuple[str, str], numbers: Mapping[str, float], axes: Sequence[Axis], zipped: bool
+) -> None:
+    """Compare two parameters in all cells, the smaller one first."""
+    low, high = pair
+    swept = {axis.name: axis.values for axis in axes}
+    lows, highs = (swept.get(name, (numbers[name],)) for name in pair)
+    together = zipped and low in swept and high in swept
     for a, b in zip(lows, highs, strict=True) if together else ((max(lows), min(highs)),):
         if b < a:
             raise ValueError(f"friction {friction}: found {high} = {b!r} below {low} = {a!r}; expected {low} <= {high}")

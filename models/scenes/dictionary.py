@@ -2,30 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..graphs.families import family, names, topology
 from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import integer, known_keys, shown, table, text
 from ..inputs.plugins import part
-from ..mechanics.coupling_text import split
+from ..mechanics.coupling import split
 from .parameters import collected
-from .scene import Scene
 
-__all__ = ["as_dict", "from_dict"]
+if TYPE_CHECKING:
+    from .scene import Scene
+
+__all__ = ["arguments", "as_dict"]
 
 NODES = 100_000
 """Largest number of oscillators that a scene file may ask for."""
 
 
-def from_dict(values: Mapping[str, Any], folder: Path | None = None) -> Scene:
-    """Return the scene of names and values as in a scene file; paths in it start in `folder`."""
+def arguments(values: object, keywords: Iterable[str], folder: Path | None = None) -> dict[str, Any]:
+    """Return the keywords of a scene from names and values as in a scene file.
+
+    Parameters
+    ----------
+    values : object
+        The table of a scene file.
+    keywords : iterable of str
+        The keywords that a scene takes.
+    folder : Path, optional
+        Where relative paths in the table start.
+
+    Raises
+    ------
+    ValueError, TypeError
+        For unknown names and values of a wrong form.
+    """
     found = table("scene", values)
-    keys = ["sweep" if field.name == "axes" else field.name for field in fields(Scene)]
-    known_keys("scene", found, keys)
+    known_keys("scene", found, ["sweep" if name == "axes" else name for name in keywords])
     given: dict[str, Any] = {str(key): value for key, value in found.items()}
     if "topology" in given:
         given["topology"] = _topology(table("topology", given["topology"]), folder)
@@ -43,7 +58,7 @@ def from_dict(values: Mapping[str, Any], folder: Path | None = None) -> Scene:
             given[name] = _placed(given[name], folder)
     if isinstance(given.get("nodes"), list):
         given["nodes"] = [_placed_group(group, folder) for group in given["nodes"]]
-    return Scene(**given)
+    return given
 
 
 def _placed(name: object, folder: Path | None) -> object:
@@ -88,15 +103,17 @@ def _topology(given: Mapping[object, Any], folder: Path | None) -> Topology:
 
 def as_dict(scene: Scene) -> dict[str, Any]:
     """Return the whole scene in JSON types, in the names of a scene file."""
-    made = {field.name: getattr(scene, field.name) for field in fields(scene)}
-    made["oscillator"] = str(scene.oscillator)
-    made["friction"] = "none" if scene.friction is None else str(scene.friction)
+    made = {name: getattr(scene, name) for name in scene.given}
+    made["oscillator"] = scene.oscillator.name
+    for name in ("contact", "time_unit", "continuation"):
+        made[name] = str(made[name])
+    made["friction"] = "none" if scene.friction is None else scene.friction.name
     made["coupling"] = "none" if scene.coupling is None else str(scene.coupling)
     made["topology"] = _graph(scene.topology)
     made["nodes"] = [group.as_dict() for group in scene.nodes]
     made["parameters"] = collected(scene.parameters, scene.varied)
     made["initial"] = {name: list(values) for name, values in scene.initial.items()}
-    made["record"] = list(scene.record)
+    made["record"] = [str(record) for record in scene.record]
     made["section"] = str(scene.section)
     made["sweep"] = {axis.name: list(axis.values) for axis in made.pop("axes")}
     return made

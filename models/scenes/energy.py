@@ -15,12 +15,14 @@ import sympy as sp
 
 from ..dynamics.equations import Equations
 from ..graphs.links import Link
-from ..inputs.plugins import load
 from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Edge
-from ..mechanics.coupling_text import is_matrix
+from ..mechanics.coupling import MatrixCoupling
+from ..mechanics.friction import ContactModel
 from ..mechanics.link import link_energies
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
+from ..mechanics.oscillator import Field, Oscillator
+from .model import NodeKind
 from .scene import a_scene
 
 if TYPE_CHECKING:
@@ -82,35 +84,38 @@ def energy(scene: Scene) -> Energy:
     Raises ValueError for a vector field or a coupling by components, which have no energy, for one-way links, which have no
     potential, and for set-valued friction, whose force in stick is no function of the state.
     """
-    templates = a_scene(scene).templates
-    for oscillator, _ in templates:
-        if hasattr(load("oscillator", oscillator), "field"):
-            raise ValueError(f"energy: oscillator {oscillator!r} is a vector field; expected one with a Lagrangian")
+    kinds = a_scene(scene).model.kinds
+    for kind in kinds:
+        if isinstance(kind.oscillator.model, Field):
+            name = kind.oscillator.name
+            raise ValueError(f"energy: oscillator {name!r} is a vector field; expected one with a Lagrangian")
     equations = scene.equations
     if equations.sticks:
         raise ValueError("energy: set-valued friction does work that is no function of the state; use contact 'atan'")
-    nodes = tuple(_of_node(oscillator, friction, scene.contact) for oscillator, friction in templates)
-    return Energy(equations, nodes, _of_links(scene, [oscillator for oscillator, _ in templates]))
+    nodes = tuple(_of_node(kind, scene.contact) for kind in kinds)
+    return Energy(equations, nodes, _of_links(scene, [kind.oscillator for kind in kinds]))
 
 
-def _of_node(oscillator: str, friction: str | None, contact: str) -> Share:
+def _of_node(kind: NodeKind, contact: ContactModel) -> Share:
     """Energy and power of one oscillator by itself."""
-    system = nondimensional(load("oscillator", oscillator))
+    system = nondimensional(kind.oscillator)
     lagrangian = system.kinetic - system.potential
     power = sp.Add(*(v * f for v, f in zip(system.velocities, system.forces, strict=True)))
     power -= derivative(lagrangian, TIME)
-    if friction is not None:
-        power = power.replace(FRICTION, friction_coefficient(load("friction", friction), contact))
+    if kind.friction is not None:
+        power = power.replace(FRICTION, friction_coefficient(kind.friction, contact))
     return Share(_of_lagrangian(lagrangian, system.velocities), power)
 
 
-def _of_links(scene: Scene, oscillators: Sequence[str]) -> tuple[Share, ...]:
+def _of_links(scene: Scene, oscillators: Sequence[Oscillator]) -> tuple[Share, ...]:
     """Energy and power of one link of each edge."""
     equations = scene.equations
     if not equations.edges or scene.coupling is None:
         return ()
-    if is_matrix(scene.coupling):
-        raise ValueError(f"energy: the coupling {scene.coupling!r} has none; expected a spring or damper by its name")
+    if isinstance(scene.coupling, MatrixCoupling):
+        raise ValueError(
+            f"energy: the coupling {str(scene.coupling)!r} has none; expected a spring or damper by its name"
+        )
     if not scene.topology.symmetric:
         raise ValueError(f"energy: {scene.topology.name}({scene.n}) has one-way links; expected links both ways")
     found = []

@@ -7,12 +7,9 @@ import re
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..inputs.checks import shown, suggestion
-
-if TYPE_CHECKING:
-    from .scene import Scene
+from .scene import Scene
 
 __all__ = ["load_scene", "scene_names"]
 
@@ -85,7 +82,6 @@ def _read(path: Path) -> bytes:
 
 
 def _scene(name: str, content: bytes, folder: Path | None) -> Scene:
-    from .dictionary import from_dict  # the names of the scenes are wanted without the weight of `Scene`
 
     try:
         words = content.decode("utf-8-sig")
@@ -100,7 +96,7 @@ def _scene(name: str, content: bytes, folder: Path | None) -> Scene:
         reason = str(error) if isinstance(error, tomllib.TOMLDecodeError) else "too deep or too long a value"
         raise ValueError(f"{name}: not TOML: {' '.join(reason.split())[:300]}; correct the file there") from None
     try:
-        return from_dict(values, folder)
+        return Scene.from_dict(values, folder)
     except (ValueError, TypeError) as error:
         raise type(error)(f"{name}: {error}") from None
 

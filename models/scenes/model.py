@@ -1,184 +1,60 @@
-"""What a scene's model knows: its equations, its parameters and the names of its states."""
+"""What a scene's equations are made of: oscillators by kind, their friction laws, a coupling and a graph."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ..dynamics import network
+from ..dynamics.equations import Equations
+from ..graphs.families import topology
 from ..graphs.topology import Topology
-from ..inputs.checks import integer, known_keys, number, shown, suggestion, table
+from ..inputs.checks import integer, known_keys, number, shown, suggestion, table, text
 from ..inputs.frozen import Frozen
-from ..inputs.plugins import load, named, part
-
-if TYPE_CHECKING:
-    from ..dynamics.equations import Equations
-    from ..mechanics.components import Node
-    from ..mechanics.parameter import Parameter
+from ..mechanics.coupling import Coupling, LagrangianCoupling, MatrixCoupling
+from ..mechanics.friction import ContactModel, FrictionLaw
+from ..mechanics.link import check_coupling
+from ..mechanics.loader import load_friction_law, load_oscillator, read_coupling
+from ..mechanics.node_name import NodeName
+from ..mechanics.oscillator import Oscillator
+from ..mechanics.parameter import Parameter
 
 __all__ = [
     "Group",
-    "bare",
-    "by_kind",
-    "check_links",
-    "check_state",
-    "components",
-    "coordinate_names",
-    "default_friction",
-    "derived",
-    "groups",
+    "Model",
+    "NodeKind",
+    "as_coupling",
+    "as_groups",
+    "as_law",
+    "as_oscillator",
+    "as_topology",
     "in_range",
-    "known_parameters",
-    "model_parameters",
-    "node",
-    "unknown",
 ]
-
-
-@lru_cache(maxsize=64)
-def known_parameters(oscillator: str, friction: str | None, contact: str, coupling: str | None) -> Frozen[Parameter]:
-    """Return every parameter of a model with its default, unit and range."""
-    from ..dynamics.network import parameters
-
-    return Frozen(parameters(oscillator, friction, contact, coupling))
-
-
-def node(oscillator: str, friction: str | None, contact: str) -> Node:
-    """Return the equations of one oscillator."""
-    from ..dynamics import network
-
-    return network.node(oscillator, friction, contact)
-
-
-@lru_cache(maxsize=64)
-def derived(
-    templates: tuple[tuple[str, str | None], ...],
-    kinds: tuple[int, ...],
-    contact: str,
-    coupling: str | None,
-    graph: Topology,
-    varied: tuple[str, ...] = (),
-) -> Equations:
-    """Return the equations of the whole network: oscillators and laws by kind, and the kind of each node.
-
-    One kind needs no `kinds`; the parameters of `varied` have a value for each node.
-    """
-    from ..dynamics import network
-
-    singles = [node(oscillator, friction, contact) for oscillator, friction in templates]
-    coupling = coupling if graph.links else None
-    if kinds:
-        names = [oscillator for oscillator, _ in templates]
-        return network.mixed_network(names, singles, kinds, coupling, graph, varied)
-    edge = network.edge(coupling, singles[0], templates[0][0]) if coupling is not None else None
-    return network.network(singles[0], edge, graph, varied)
-
-
-def bare(made: Mapping[str, Any]) -> Equations:
-    """Return the equations of a scene's nodes without their links."""
-    templates, kinds = by_kind(made["oscillator"], made["friction"], made["nodes"], made["topology"].n)
-    return derived(templates, kinds, made["contact"], None, made["topology"])
-
-
-def check_links(made: Mapping[str, Any]) -> None:
-    """Raise ValueError where the coupling cannot join the oscillators of a scene with links."""
-    from ..mechanics.link import check_coupling
-
-    if not made["topology"].links or made["coupling"] is None:
-        return
-    templates, kinds = by_kind(made["oscillator"], made["friction"], made["nodes"], made["topology"].n)
-    if kinds:
-        derived(templates, kinds, made["contact"], made["coupling"], made["topology"])
-    else:
-        check_coupling(made["coupling"], node(*templates[0], made["contact"]))
-
-
-def components(made: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the names of the state components of the oscillators, such as ("x", "v")."""
-    return bare(made).components
-
-
-def coordinate_names(made: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the names of the coordinates of a scene's oscillators, those components that have a velocity."""
-    from ..inputs.plugins import load
-    from ..mechanics.nondimensional import coordinates
-
-    templates, _ = by_kind(made["oscillator"], made["friction"], made["nodes"], made["topology"].n)
-    models = [load("oscillator", oscillator) for oscillator, _ in templates]
-    return tuple(dict.fromkeys(name for model in models if not hasattr(model, "field") for name in coordinates(model)))
-
-
-def model_parameters(made: Mapping[str, Any]) -> Frozen[Parameter]:
-    """Return the parameters that a scene has: those of its coupling only where its graph has links."""
-    coupling = made["coupling"] if made["topology"].links else None
-    templates, _ = by_kind(made["oscillator"], made["friction"], made["nodes"], made["topology"].n)
-    return _all_parameters(templates, made["contact"], coupling)
-
-
-@lru_cache(maxsize=64)
-def _all_parameters(
-    templates: tuple[tuple[str, str | None], ...], contact: str, coupling: str | None
-) -> Frozen[Parameter]:
-    """The parameters of all kinds, each with the default of the first kind that has it, then those of the coupling."""
-    found: dict[str, Parameter] = {}
-    for oscillator, friction in templates:
-        for name, parameter in known_parameters(oscillator, friction, contact, None).items():
-            found.setdefault(name, parameter)
-    for oscillator, friction in templates:
-        for name, parameter in known_parameters(oscillator, friction, contact, coupling).items():
-            found.setdefault(name, parameter)
-    return Frozen(found)
-
-
-def unknown(made: Mapping[str, Any], name: str, what: str, known: Iterable[str]) -> str:
-    """Return the sentence that refuses a name; a coupling parameter without links has its own."""
-    graph, known = made["topology"], tuple(known)
-    if not graph.links and made["coupling"] is not None:
-        templates, _ = by_kind(made["oscillator"], made["friction"], made["nodes"], graph.n)
-        coupled = _all_parameters(templates, made["contact"], made["coupling"])
-        if name in coupled:
-            return (
-                f"{what} {name!r} couples oscillators, but {graph.name}({graph.n}) has no links: "
-                f"there is nothing to couple; leave it out or take at least two oscillators, e.g. chain(2)"
-            )
-    return f"unknown {what} {shown(name)}; known: {', '.join(known)}{suggestion(name, known)}"
-
-
-def in_range(name: str, value: object, parameter: Parameter) -> float:
-    """Return the value of a parameter as a float in its range."""
-    return parameter.check(name, number(name, value))
-
-
-def check_state(made: Mapping[str, Any], name: str, what: str) -> None:
-    """Raise ValueError where a name such as "v_2" is no state of a scene's network."""
-    network = bare(made)
-    component, _, index = name.rpartition("_")
-    holders = network.holders(component) if component in network.components else ()
-    if index.isascii() and index.isdecimal() and len(index) < 10 and index[0] != "0" and int(index) - 1 in holders:
-        return
-    known = ", ".join(_states(c, network.holders(c)) for c in network.components)
-    raise ValueError(f"unknown {what} {shown(name)}; expected a state: {known}; correct the name")
-
-
-def _states(component: str, holders: tuple[int, ...]) -> str:
-    """The states of one component: x_1 … x_4, or of some nodes only theta_2, theta_3."""
-    if len(holders) > 1 and holders == tuple(range(len(holders))):
-        return f"{component}_1 … {component}_{len(holders)}"
-    return ", ".join(f"{component}_{i + 1}" for i in holders)
-
 
 MOST = 100_000
 """Most nodes that groups may name."""
+
+PATH_LENGTH = 1000
+"""Longest text that names a part of a model by a path to a file of code."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeKind:
+    """An oscillator with its friction law, None if it takes none."""
+
+    oscillator: Oscillator
+    friction: FrictionLaw | None
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
     """Nodes `at` (numbers from 1) of an oscillator with its friction law."""
 
-    oscillator: str
-    friction: str | None
+    oscillator: Oscillator
+    friction: FrictionLaw | None
     at: tuple[int, ...]
 
     def as_dict(self) -> dict[str, Any]:
@@ -186,26 +62,267 @@ class Group:
         return {"oscillator": str(self.oscillator), "friction": str(self.friction or "none"), "at": list(self.at)}
 
 
-def default_friction(oscillator: str, friction: object) -> str | None:
-    """Return the name of a friction law: of "default" the one that an oscillator starts with, of "none" None."""
-    if friction == "default":
-        return "exponential" if load("oscillator", oscillator).FRICTION else None
-    if friction is None or part("friction", friction) == "none":
-        return None
-    law = named("friction", part("friction", friction))
-    load("friction", law)  # an unknown name is refused even where nothing uses it
-    return law
+@dataclass(frozen=True, slots=True)
+class Model:
+    """What decides on the equations of a network.
+
+    Parameters
+    ----------
+    kinds : tuple of NodeKind
+        The kinds of nodes that there are, in the order of their first nodes.
+    kind_of : tuple of int
+        The kind of each node.
+    contact : ContactModel
+        How the jump of a friction law at rest is treated.
+    coupling : Coupling, optional
+        What joins the nodes.
+    topology : Topology
+        The graph.
+
+    Attributes
+    ----------
+    unlinked : Equations
+        The equations of the nodes without their links.
+    parameters : mapping of str to Parameter
+        The parameters of all kinds, and those of the coupling if the graph has links; a name has the default of the
+        first kind that has it.
+
+    Raises
+    ------
+    ValueError
+        If an oscillator lacks a friction law or takes none, and if two parts have a parameter of the same name.
+    """
+
+    kinds: tuple[NodeKind, ...]
+    kind_of: tuple[int, ...]
+    contact: ContactModel
+    coupling: Coupling | None
+    topology: Topology
+    unlinked: Equations = field(init=False, repr=False, compare=False)
+    parameters: Frozen[Parameter] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        apart = _unlinked(self.kinds, self.kind_of, self.contact, self.topology)
+        object.__setattr__(self, "unlinked", apart)
+        coupling = self.coupling if self.topology.links else None
+        object.__setattr__(self, "parameters", _parameters(self.kinds, self.contact, coupling))
+
+    def __reduce__(self) -> tuple[type[Model], tuple[object, ...]]:
+        return Model, (self.kinds, self.kind_of, self.contact, self.coupling, self.topology)
+
+    @classmethod
+    def of(
+        cls,
+        kind: NodeKind,
+        groups: tuple[Group, ...],
+        contact: ContactModel,
+        coupling: Coupling | None,
+        graph: Topology,
+    ) -> Model:
+        """Return the model of nodes of one kind, apart from those of some groups, with its coupling in one spelling.
+
+        Parameters
+        ----------
+        kind : NodeKind
+            The kind of all nodes that no group names.
+        groups : tuple of Group
+            Nodes of other kinds.
+        contact, coupling, graph
+            As in `Model`.
+
+        Raises
+        ------
+        ValueError
+            As `Model` does, and if the coupling is missing or cannot join the nodes.
+        """
+        nodes = [kind] * graph.n
+        for group in groups:
+            for i in group.at:
+                nodes[i - 1] = NodeKind(group.oscillator, group.friction)
+        kinds = tuple(dict.fromkeys(nodes))
+        numbers = {own: k for k, own in enumerate(kinds)}
+        model = cls(kinds, tuple(numbers[own] for own in nodes), contact, None, graph)
+        if coupling is not None:
+            model = replace(model, coupling=coupling.canonical(model.components, model.coordinates))
+        elif graph.links:
+            raise ValueError(
+                f"coupling: found none for {graph.name}({graph.n}), which has links; "
+                "expected the name of a coupling, e.g. 'spring'"
+            )
+        model.check_links()
+        return model
+
+    @property
+    def n(self) -> int:
+        """Number of oscillators."""
+        return self.topology.n
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the state components of the oscillators, such as ("x", "v")."""
+        return self.unlinked.components
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates of the oscillators: those components that have a velocity."""
+        return tuple(dict.fromkeys(name for kind in self.kinds for name in kind.oscillator.coordinates))
+
+    def equations(self, varied: tuple[str, ...] = ()) -> Equations:
+        """Return the equations of the network; the parameters of `varied` have a value for each node."""
+        return _equations(self, varied)
+
+    def check_links(self) -> None:
+        """Raise ValueError if the coupling cannot join the oscillators of a graph with links."""
+        if not self.topology.links or self.coupling is None:
+            return
+        if len(self.kinds) > 1:
+            self.equations()
+        else:
+            check_coupling(self.coupling, self.unlinked.node)
+
+    def holders(self, name: str) -> tuple[int, ...]:
+        """Return the nodes (counted from 0) that have a parameter, none for one of the links."""
+        apart = self.unlinked
+        return apart.holders(name) if any(s.name == name for node in apart.nodes for s in node.parameters) else ()
+
+    def defaults(self, name: str) -> list[float]:
+        """Return the default of a parameter at each node that has it, in that node's kind."""
+        tables = [_kind_parameters(kind, self.contact, None) for kind in self.kinds]
+        return [float(tables[self.kind_of[i]][name].default) for i in self.holders(name)]
+
+    def node_parameter(self, name: str) -> NodeName | None:
+        """Return the parts of the name of a parameter of one node, "a_2"; None for any other name."""
+        parts = None if name in self.parameters else NodeName.parse(name)
+        return parts if parts is not None and parts.index in self.holders(parts.base) else None
+
+    def parameter(self, name: str) -> Parameter | None:
+        """Return the parameter that a name such as "a" or "a_2" means, None if it means none."""
+        parts = self.node_parameter(name)
+        return self.parameters.get(name if parts is None else parts.base)
+
+    def unknown(self, name: str, what: str, known: Iterable[str]) -> str:
+        """Return the sentence that refuses a name; a parameter of the coupling without links has its own."""
+        graph, known = self.topology, tuple(known)
+        idle = () if graph.links or self.coupling is None else _parameters(self.kinds, self.contact, self.coupling)
+        if name in idle:
+            return (
+                f"{what} {name!r} couples oscillators, but {graph.name}({graph.n}) has no links: "
+                f"there is nothing to couple; leave it out or take at least two oscillators, e.g. chain(2)"
+            )
+        return f"unknown {what} {shown(name)}; known: {', '.join(known)}{suggestion(name, known)}"
+
+    def check_state(self, name: str, what: str) -> None:
+        """Raise ValueError if a name such as "v_2" is no state of the network; `what` says what the name is for."""
+        apart, parts = self.unlinked, NodeName.parse(name)
+        if parts is not None and parts.base in apart.components and parts.index in apart.holders(parts.base):
+            return
+        known = ", ".join(_states(c, apart.holders(c)) for c in apart.components)
+        raise ValueError(f"unknown {what} {shown(name)}; expected a state: {known}; correct the name")
 
 
-def groups(given: object, n: int) -> tuple[Group, ...]:
+@lru_cache(maxsize=64)
+def _unlinked(
+    kinds: tuple[NodeKind, ...], kind_of: tuple[int, ...], contact: ContactModel, graph: Topology
+) -> Equations:
+    """The equations of nodes without links."""
+    nodes = [network.node(kind.oscillator, kind.friction, contact) for kind in kinds]
+    if len(kinds) > 1:
+        return network.mixed_network([kind.oscillator for kind in kinds], nodes, kind_of, None, graph)
+    return network.network(nodes[0], None, graph)
+
+
+@lru_cache(maxsize=64)
+def _equations(model: Model, varied: tuple[str, ...]) -> Equations:
+    """The equations of a whole network."""
+    graph, nodes = model.topology, model.unlinked.nodes
+    coupling = model.coupling if graph.links else None
+    oscillators = [kind.oscillator for kind in model.kinds]
+    if len(nodes) > 1:
+        return network.mixed_network(oscillators, nodes, model.kind_of, coupling, graph, varied)
+    edge = None if coupling is None else network.edge(coupling, nodes[0], oscillators[0])
+    return network.network(nodes[0], edge, graph, varied)
+
+
+@lru_cache(maxsize=64)
+def _kind_parameters(kind: NodeKind, contact: ContactModel, coupling: Coupling | None) -> Frozen[Parameter]:
+    """Every parameter of nodes of one kind with its default, unit and range."""
+    return Frozen(network.parameters(kind.oscillator, kind.friction, contact, coupling))
+
+
+@lru_cache(maxsize=64)
+def _parameters(kinds: tuple[NodeKind, ...], contact: ContactModel, coupling: Coupling | None) -> Frozen[Parameter]:
+    """The parameters of all kinds, each with the default of the first kind that has it, then those of the coupling."""
+    known: dict[str, Parameter] = {}
+    for joined in (None, coupling):
+        for kind in kinds:
+            for name, parameter in _kind_parameters(kind, contact, joined).items():
+                known.setdefault(name, parameter)
+    return Frozen(known)
+
+
+def _states(component: str, holders: tuple[int, ...]) -> str:
+    """The states of one component: x_1 … x_4, or of some nodes only theta_2, theta_3."""
+    if len(holders) > 1 and holders == tuple(range(len(holders))):
+        return f"{component}_1 … {component}_{len(holders)}"
+    return ", ".join(str(NodeName(component, i)) for i in holders)
+
+
+def in_range(name: str, value: object, parameter: Parameter) -> float:
+    """Return the value of a parameter as a float in its range; ValueError or TypeError for any other value."""
+    return parameter.check(name, number(name, value))
+
+
+# -- from what a user gives to parts of a model ------------------------------------------------------------------
+
+
+def as_oscillator(value: object, what: str = "oscillator") -> Oscillator:
+    """Return an oscillator as it is, or load the one of a name; ValueError or TypeError for any other value."""
+    return value if isinstance(value, Oscillator) else load_oscillator(_name(what, value))
+
+
+def as_law(value: object, oscillator: Oscillator) -> FrictionLaw | None:
+    """Return a friction law as it is, or load the one of a name.
+
+    Parameters
+    ----------
+    value : object
+        A law, a name, "default" (the one that an oscillator starts with), "none" or None.
+    oscillator : Oscillator
+        The oscillator that "default" is meant for.
+    """
+    if value == "default":
+        return load_friction_law("exponential") if oscillator.takes_friction else None
+    if value is None or isinstance(value, FrictionLaw):
+        return value
+    name = _name("friction", value)
+    return None if name == "none" else load_friction_law(name)
+
+
+def as_coupling(value: object) -> Coupling | None:
+    """Return a coupling as it is, or read the one of a text; None for None and "none"."""
+    if value is None or isinstance(value, MatrixCoupling | LagrangianCoupling):
+        return value
+    words = _name("coupling", value)
+    return None if words == "none" else read_coupling(words)
+
+
+def as_topology(value: object) -> Topology:
+    """Return a graph as it is, one node alone for None; TypeError for any other value."""
+    graph = topology("chain", 1) if value is None else value
+    if not isinstance(graph, Topology):
+        raise TypeError(f"topology: found {shown(graph)} ({type(graph).__name__}); expected a graph, e.g. chain(4)")
+    return graph
+
+
+def as_groups(value: object, n: int) -> tuple[Group, ...]:
     """Return the groups of a list of tables with `oscillator`, `friction` and `at`; ValueError or TypeError else."""
-    if given is None:
+    if value is None:
         return ()
-    if isinstance(given, str | bytes | Mapping) or not isinstance(given, Iterable):
-        raise TypeError(f"nodes: found {shown(given)}; expected tables, e.g. [{{oscillator = 'duffing', at = [1, 3]}}]")
-    found: list[Group] = []
+    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
+        raise TypeError(f"nodes: found {shown(value)}; expected tables, e.g. [{{oscillator = 'duffing', at = [1, 3]}}]")
+    groups: list[Group] = []
     taken: set[int] = set()
-    for k, entry in enumerate(islice(given, MOST)):
+    for k, entry in enumerate(islice(value, MOST)):
         group = entry if isinstance(entry, Group) else _group(f"nodes {k + 1}", entry, n)
         twice = sorted(taken & set(group.at))
         if twice:
@@ -213,37 +330,26 @@ def groups(given: object, n: int) -> tuple[Group, ...]:
         if max(group.at) > n:
             raise ValueError(f"nodes {k + 1}: found node {max(group.at)}; expected nodes 1 to {n}")
         taken.update(group.at)
-        found.append(group)
-    return tuple(found)
+        groups.append(group)
+    return tuple(groups)
 
 
-def _group(what: str, given: object, n: int) -> Group:
-    entry = table(what, given)
+def _group(what: str, value: object, n: int) -> Group:
+    entry = table(what, value)
     known_keys(what, entry, ("oscillator", "friction", "at"))
     for key in ("oscillator", "at"):
         if key not in entry:
             raise ValueError(f"{what}: {key!r} is missing; expected an oscillator and the numbers of its nodes, at")
-    oscillator = named("oscillator", part(f"{what} oscillator", entry["oscillator"]))
+    oscillator = as_oscillator(entry["oscillator"], f"{what} oscillator")
     at = entry["at"]
     if isinstance(at, str | bytes | Mapping | set | frozenset) or not isinstance(at, Iterable):
         raise TypeError(f"{what}: at is {shown(at)}; expected a list of nodes, e.g. [1, 3]")
     numbers = tuple(sorted(integer(f"{what}: at", i, 1, n) for i in islice(at, n + 1)))
     if not numbers or len(set(numbers)) < len(numbers):
         raise ValueError(f"{what}: at is {shown(list(numbers))}; expected at least one node and each node once")
-    return Group(oscillator, default_friction(oscillator, entry.get("friction", "default")), numbers)
+    return Group(oscillator, as_law(entry.get("friction", "default"), oscillator), numbers)
 
 
-@lru_cache(maxsize=64)
-def by_kind(
-    oscillator: str, friction: str | None, nodes: tuple[Group, ...], n: int
-) -> tuple[tuple[tuple[str, str | None], ...], tuple[int, ...]]:
-    """Return (oscillator, friction law) of each kind, in the order of their first nodes, and the kind of each node.
-
-    Where all nodes are of one kind the second is empty.
-    """
-    of: list[tuple[str, str | None]] = [(oscillator, friction)] * n
-    for group in nodes:
-        for i in group.at:
-            of[i - 1] = (group.oscillator, group.friction)
-    templates = tuple(dict.fromkeys(of))
-    return templates, tuple(templates.index(pair) for pair in of) if len(templates) > 1 else ()
+def _name(what: str, value: object) -> str:
+    """The name of a part of the model as text; it may be a long path to a file of code."""
+    return text(what, value, PATH_LENGTH if isinstance(value, str) and ".py" in value else 200)

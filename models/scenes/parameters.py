@@ -2,94 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
+from ..dynamics.periodicity import Drive, drive_of
 from ..inputs.checks import shown, table
 from ..inputs.frozen import Frozen
-from ..mechanics.parameter import Parameter
-from .model import bare, by_kind, in_range, known_parameters, model_parameters, unknown
+from ..mechanics.node_name import NodeName
+from .axis import Axis
+from .model import Model, NodeKind, in_range
 
-if TYPE_CHECKING:
-    from ..dynamics.periodicity import Drive
-
-__all__ = ["at_nodes", "collected", "drive", "known_name", "node_parameter", "parameters", "varied", "without"]
+__all__ = ["at_nodes", "collected", "drive", "parameters", "varied", "without"]
 
 T = TypeVar("T")
 
 
-def node_parameter(made: Mapping[str, Any], name: str) -> tuple[str, int] | None:
-    """Return ("a", 1) for the name "a_2" of a parameter of the second node, None for any other name."""
-    base, _, index = name.rpartition("_")
-    if name in model_parameters(made) or not (index.isascii() and index.isdecimal() and index[0] != "0"):
-        return None
-    holders = _holders(made, base)
-    if len(index) > 9 or int(index) - 1 not in holders:
-        return None
-    return base, int(index) - 1
+def parameters(model: Model, given: object, axes: Sequence[Axis]) -> Frozen[float]:
+    """Return every parameter with its value; those that differ from node to node, or are swept at one, as a_1 … a_n.
 
+    Parameters
+    ----------
+    model : Model
+        The model that has the parameters.
+    given : object
+        A table of names and values: a number, one for each node, or the parameter of one node ("a_2"); None for none.
+    axes : sequence of Axis
+        The axes of the sweep.
 
-def _holders(made: Mapping[str, Any], name: str) -> tuple[int, ...]:
-    """The nodes (0-based) that have a parameter, none for one of the links."""
-    nodes = bare(made)
-    return nodes.holders(name) if any(s.name == name for one in nodes.nodes for s in one.parameters) else ()
-
-
-def _defaults(made: Mapping[str, Any], name: str) -> list[float]:
-    """What a parameter is at each node that has it: its default in that node's kind."""
-    templates, kinds = by_kind(made["oscillator"], made["friction"], made["nodes"], made["topology"].n)
-    tables = [known_parameters(oscillator, friction, made["contact"], None) for oscillator, friction in templates]
-    return [float(tables[kinds[i] if kinds else 0][name].default) for i in _holders(made, name)]
-
-
-def known_name(made: Mapping[str, Any], name: str) -> Parameter | None:
-    """Return the parameter that a name such as "a" or "a_2" means, None where it means none."""
-    known, found = model_parameters(made), node_parameter(made, name)
-    return known.get(name) if found is None else known[found[0]]
-
-
-def parameters(made: Mapping[str, Any]) -> Frozen[float]:
-    """Return every parameter with its value; those that differ from node to node, or are swept at one, as a_1 … a_n."""
-    known = model_parameters(made)
-    given = table("parameters", {} if made["parameters"] is None else made["parameters"])
+    Raises
+    ------
+    ValueError, TypeError
+        For unknown names, values out of range, and lists of another length.
+    """
+    known = model.parameters
     shared = {name: float(known[name].default) for name in known}
-    lists: dict[str, list[float]] = {name: _defaults(made, name) for name in known} if made["nodes"] else {}
+    lists = {name: model.defaults(name) for name in known} if len(model.kinds) > 1 else {}
     single: dict[str, dict[int, float]] = {}
-    for name, value in given.items():
+    for name, value in table("parameters", {} if given is None else given).items():
         if not isinstance(name, str):
             raise TypeError(f"parameters: key {shown(name)} is a {type(name).__name__}; expected text")
-        found = node_parameter(made, name)
-        if found is not None:
-            single.setdefault(found[0], {})[found[1]] = in_range(name, value, known[found[0]])
+        parts = model.node_parameter(name)
+        if parts is not None:
+            single.setdefault(parts.base, {})[parts.index] = in_range(name, value, known[parts.base])
         elif name not in known:
-            raise ValueError(unknown(made, name, "parameter", known))
+            raise ValueError(model.unknown(name, "parameter", known))
         elif _listed(value):
-            lists[name] = _for_each_node(made, name, value)
+            lists[name] = _for_each_node(model, name, value)
         else:
             shared[name] = in_range(name, value, known[name])
             lists.pop(name, None)
-    for base in {found[0] for axis in made["axes"] if (found := node_parameter(made, axis.name)) is not None}:
-        single.setdefault(base, {})
-    return Frozen(_flat(made, shared, lists, single))
-
-
-def _flat(
-    made: Mapping[str, Any],
-    shared: dict[str, float],
-    lists: dict[str, list[float]],
-    single: dict[str, dict[int, float]],
-) -> dict[str, float]:
-    swept = {found[0] for axis in made["axes"] if (found := node_parameter(made, axis.name)) is not None}
-    made_of: dict[str, float] = {}
+    swept = {parts.base for axis in axes if (parts := model.node_parameter(axis.name)) is not None}
+    values: dict[str, float] = {}
     for name, value in shared.items():
-        holders = _holders(made, name)
-        values = dict(zip(holders, lists.get(name) or [value] * len(holders), strict=True)) | single.get(name, {})
-        if name in swept or len(set(values.values())) > 1:
-            made_of |= {f"{name}_{i + 1}": own for i, own in values.items()}
+        holders = model.holders(name)
+        own = dict(zip(holders, lists.get(name) or [value] * len(holders), strict=True)) | single.get(name, {})
+        if name in swept or len(set(own.values())) > 1:
+            values |= {str(NodeName(name, i)): number for i, number in own.items()}
         else:
-            made_of[name] = next(iter(values.values()), value)
-    return made_of
+            values[name] = next(iter(own.values()), value)
+    return Frozen(values)
 
 
 def _listed(value: object) -> bool:
@@ -98,9 +70,9 @@ def _listed(value: object) -> bool:
     )
 
 
-def _for_each_node(made: Mapping[str, Any], name: str, value: Any) -> list[float]:
+def _for_each_node(model: Model, name: str, value: Any) -> list[float]:
     """The values of a list, one for each node that has the parameter; ValueError for another number or for links."""
-    parameter, holders = model_parameters(made)[name], _holders(made, name)
+    parameter, holders = model.parameters[name], model.holders(name)
     n = len(holders)
     if not holders:
         raise ValueError(
@@ -114,7 +86,7 @@ def _for_each_node(made: Mapping[str, Any], name: str, value: Any) -> list[float
         raise ValueError(
             f"parameter {name!r}: found {count} values for {n} oscillators; expected {n} values or one number for all"
         )
-    return [in_range(f"{name}_{i + 1}", entry, parameter) for i, entry in zip(holders, listed, strict=True)]
+    return [in_range(str(NodeName(name, i)), entry, parameter) for i, entry in zip(holders, listed, strict=True)]
 
 
 def varied(values: Mapping[str, float], known: Iterable[str]) -> tuple[str, ...]:
@@ -122,44 +94,53 @@ def varied(values: Mapping[str, float], known: Iterable[str]) -> tuple[str, ...]
     return tuple(name for name in known if name not in values)
 
 
-def at_nodes(made: Mapping[str, Any], values: Mapping[str, T]) -> Iterator[tuple[str, str | None, dict[str, T]]]:
-    """Yield (oscillator, friction law, parameters) of every node that differs from those before.
+def at_nodes(model: Model, values: Mapping[str, T]) -> Iterator[tuple[NodeKind, dict[str, T]]]:
+    """Yield the kind and the parameters of every node that differs from those before.
 
-    The keys of `values` are the parameters of the scene (a, or a_1 … a_n), those of what is yielded the node's own (a).
+    Parameters
+    ----------
+    model : Model
+        The model of the scene.
+    values : mapping of str
+        What each parameter of the scene is (a, or a_1 … a_n); what is yielded has the node's own names (a).
     """
-    templates, kinds = by_kind(made["oscillator"], made["friction"], made["nodes"], made["topology"].n)
-    known = model_parameters(made)
-    own = {name: dict.fromkeys(_holders(made, name)) for name in known if name not in values}
+    known = model.parameters
+    own = {name: dict.fromkeys(model.holders(name)) for name in known if name not in values}
     seen = set()
-    for i in range(made["topology"].n if kinds or own else 1):
-        mine = {name: values[f"{name}_{i + 1}" if name in own else name] for name in known if i in own.get(name, (i,))}
-        pair = templates[kinds[i] if kinds else 0]
-        key = (pair, *mine.items())
+    for i in range(model.n if len(model.kinds) > 1 or own else 1):
+        mine = {
+            name: values[str(NodeName(name, i)) if name in own else name] for name in known if i in own.get(name, (i,))
+        }
+        key = (model.kind_of[i], *mine.items())
         if key not in seen:
             seen.add(key)
-            yield *pair, mine
+            yield model.kinds[model.kind_of[i]], mine
 
 
-def drive(made: Mapping[str, Any]) -> Drive:
-    """Return at which frequencies time enters the equations of a scene whose parameters are complete."""
-    from ..dynamics.periodicity import drive_of
-
-    return drive_of(bare(made).nodes, varied(made["parameters"], model_parameters(made)))
+def drive(model: Model, values: Mapping[str, float]) -> Drive:
+    """Return at which frequencies time enters the equations of a model whose parameters have these values."""
+    return drive_of(model.unlinked.nodes, varied(values, model.parameters))
 
 
-def without(values: Mapping[str, Any], names: Iterable[str], varied: Iterable[str]) -> dict[str, Any]:
-    """Return the values without those that nodes have of some `names` in `varied`."""
-    gone = set(names) & set(varied)
-    return {name: value for name, value in values.items() if name in varied or name.rpartition("_")[0] not in gone}
+def without(model: Model, values: Mapping[Any, Any], names: Iterable[str]) -> dict[str, Any]:
+    """Return the values of parameters without those that single nodes have of some `names`."""
+    gone = set(names)
+    return {
+        name: value
+        for name, value in values.items()
+        if (parts := model.node_parameter(name)) is None or parts.base not in gone
+    }
 
 
 def collected(values: Mapping[str, float], varied: Iterable[str]) -> dict[str, float | list[float]]:
     """Return the parameters as a scene file has them: those of `varied` as lists."""
-    found: dict[str, float | list[float]] = {}
+    lists: dict[str, list[float]] = {name: [] for name in varied}
+    table: dict[str, float | list[float]] = {}
     for name, value in values.items():
-        base = name.rpartition("_")[0]
-        if base in varied:
-            found.setdefault(base, []).append(value)  # type: ignore[union-attr]
+        parts = NodeName.parse(name)
+        if parts is not None and parts.base in lists:
+            lists[parts.base].append(value)
+            table.setdefault(parts.base, lists[parts.base])
         else:
-            found[name] = value
-    return found
+            table[name] = value
+    return table

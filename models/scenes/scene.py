@@ -4,28 +4,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..dynamics.equations import Equations
+from ..dynamics.periodicity import Drive, as_function, names_in, period_of
 from ..graphs.topology import Topology
 from ..inputs.checks import instance, suggestion, table, text
 from ..inputs.frozen import Frozen
+from ..mechanics.coupling import Coupling
+from ..mechanics.friction import ContactModel, FrictionLaw
+from ..mechanics.node_name import NodeName
+from ..mechanics.oscillator import Oscillator
+from ..mechanics.stick_slip import SLIP
 from .axis import Axis
-from .complete import complete
-from .model import Group, bare, by_kind, derived, model_parameters
-from .parameters import drive, known_name, varied, without
+from .complete import Record, TimeUnit, complete
+from .dictionary import arguments, as_dict
+from .model import Group, Model, as_oscillator
+from .parameters import drive, varied, without
 from .section import Section
+from .sweep import Continuation
+from .warnings import warnings
 
 if TYPE_CHECKING:
-    from ..dynamics.equations import Equations
-    from ..dynamics.periodicity import Drive
-    from ..graphs.topology import Topology
     from ..spectra.spectrum import Spectrum
 
-__all__ = ["Axis", "Scene", "Section", "a_scene"]
-
-_MODEL = ("oscillator", "friction", "contact", "coupling", "nodes")
+__all__ = ["KEYWORDS", "Axis", "Scene", "Section", "a_scene"]
 
 
 @dataclass(frozen=True, slots=True, init=False, repr=False)
@@ -40,19 +46,19 @@ class Scene:
     """
 
     title: str
-    oscillator: str
-    friction: str | None
-    contact: str
-    coupling: str | None
+    oscillator: Oscillator
+    friction: FrictionLaw | None
+    contact: ContactModel
+    coupling: Coupling | None
     nodes: tuple[Group, ...]
     topology: Topology
     parameters: Frozen[float]
     initial: Frozen[tuple[float, ...]]
-    record: tuple[str, ...]
+    record: tuple[Record, ...]
     section: Section
     transient: float
     window: float
-    time_unit: str
+    time_unit: TimeUnit
     samples: int
     integrator: str
     rtol: float
@@ -60,17 +66,19 @@ class Scene:
     max_steps: int
     axes: tuple[Axis, ...]
     zipped: bool
-    continuation: str
+    continuation: Continuation
     seed: int
+    model: Model = field(compare=False)
+    given: Frozen[Any] = field(compare=False)
 
     def __init__(
         self,
         *,
         title: str = "",
-        oscillator: str = "friction",
-        friction: str | None = "default",
+        oscillator: Oscillator | str = "friction",
+        friction: FrictionLaw | str | None = "default",
         contact: str = "atan",
-        coupling: str | None = "spring",
+        coupling: Coupling | str | None = "spring",
         nodes: Iterable[Group | Mapping[str, Any]] | None = None,
         topology: Topology | None = None,
         parameters: Mapping[str, Any] | None = None,
@@ -90,10 +98,11 @@ class Scene:
         continuation: str = "none",
         seed: int = 0,
     ) -> None:
-        given = dict(locals())
-        del given["self"]
-        for name, value in complete(given).items():
+        given = {name: value for name, value in locals().items() if name != "self"}
+        values = complete(given)
+        for name, value in values.items():
             object.__setattr__(self, name, value)
+        object.__setattr__(self, "given", _kept(given, values))
 
     @property
     def n(self) -> int:
@@ -108,18 +117,12 @@ class Scene:
     @property
     def equations(self) -> Equations:
         """The derived equations of motion of the network."""
-        templates, kinds = by_kind(self.oscillator, self.friction, self.nodes, self.n)
-        return derived(templates, kinds, self.contact, self.coupling, self.topology, self.varied)
-
-    @property
-    def templates(self) -> tuple[tuple[str, str | None], ...]:
-        """(oscillator, friction law) of each kind of node that there is, in the order of their first nodes."""
-        return by_kind(self.oscillator, self.friction, self.nodes, self.n)[0]
+        return self.model.equations(self.varied)
 
     @property
     def varied(self) -> tuple[str, ...]:
         """Names of the parameters that have a value for each node: `parameters` has them as a_1 … a_n."""
-        return varied(self.parameters, model_parameters(self.model()))
+        return varied(self.parameters, self.model.parameters)
 
     @property
     def spectrum(self) -> Spectrum:
@@ -129,18 +132,16 @@ class Scene:
     @property
     def forced(self) -> bool:
         """True where time occurs explicitly in the equations."""
-        return any(node.forced for node in bare(self.model()).nodes)
+        return any(node.forced for node in self.model.unlinked.nodes)
 
     @property
     def drive(self) -> Drive:
         """At which frequencies time enters the equations: expressions of the parameters, derived from the equations."""
-        return drive({**self.model(), "parameters": self.parameters})
+        return drive(self.model, self.parameters)
 
     @property
     def angular_frequency(self) -> float | None:
         """Angular frequency of the drive (an axis may sweep it), None if the equations do not repeat themselves."""
-        from ..dynamics.periodicity import as_function, names_in
-
         frequency = self.drive.frequency
         if frequency is None:
             return None
@@ -149,8 +150,6 @@ class Scene:
     @property
     def period(self) -> float | None:
         """Period of the drive in non-dimensional time, None if there is no drive or its frequency is 0."""
-        from ..dynamics.periodicity import period_of
-
         return period_of(self.angular_frequency or 0.0)
 
     @property
@@ -172,72 +171,78 @@ class Scene:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences about what is allowed but probably not meant."""
-        from .warnings import warnings
-
         return warnings(self)
 
     def takes(self, name: str) -> bool:
         """True for the name of a parameter, "a", and for that of a parameter of one node, "a_2"."""
-        return known_name(self.model(), text("name", name)) is not None
+        return self.model.parameter(text("name", name)) is not None
 
     def replace(self, **changes: Any) -> Scene:
         """Return a scene with some keywords changed, checked anew: replace(rtol=1e-6, sigma=0.2).
 
-        `parameters` replaces them all, a parameter's own name (sigma above) that one alone.  What stood at
-        its default goes to the new default; another number or kind of oscillators starts from the default
-        initial states unless `initial` is given.
+        Parameters
+        ----------
+        **changes
+            Keywords of `Scene`, or names of parameters (sigma above), which change that one alone; `parameters`
+            replaces them all.  What was not given follows its default.  Another number or kind of oscillators starts
+            from the default initial states unless `initial` is given.
+
+        Raises
+        ------
+        ValueError, TypeError
+            For unknown names, and for whatever `Scene` refuses.
         """
-        given = {field.name: getattr(self, field.name) for field in fields(self)}
-        given.update(_defaulted(self))
-        taken = [name for name in tuple(changes) if name not in given and self.takes(name)]
-        strange = next((name for name in changes if name not in given and name not in taken), None)
+        single = {name: changes.pop(name) for name in tuple(changes) if name not in self.given and self.takes(name)}
+        strange = next((name for name in changes if name not in self.given), None)
         if strange is not None:
-            names = (*self.parameters, *given)
+            names = (*self.parameters, *self.given)
             raise TypeError(
                 f"unknown parameter or keyword {strange!r}; known: {', '.join(names)}{suggestion(strange, names)}"
             )
-        if changes.get("parameters") is not None:
-            table("parameters", changes["parameters"])
-        single = {name: changes.pop(name) for name in taken}
-        given.update(changes)
+        given = {**self.given, "initial": self._kept_start(changes), **changes}
+        if given["parameters"] is not None or single:
+            numbers = table("parameters", {} if given["parameters"] is None else given["parameters"])
+            given["parameters"] = {**without(self.model, numbers, single), **single}
         if self.varied and "parameters" not in changes and getattr(given["topology"], "n", None) != self.n:
             raise ValueError(f"{self.varied[0]} has values for {self.n} nodes; give `parameters` for another number")
-        given["parameters"] = {**without(given["parameters"] or {}, single, self.varied), **single}
-        if "initial" not in changes and (
-            given["oscillator"] != self.oscillator
-            or "nodes" in changes
-            or getattr(given["topology"], "n", None) != self.n
-        ):
-            given["initial"] = None
-        elif "initial" not in changes and given["initial"] and ("contact" in changes or "friction" in changes):
-            from ..mechanics.stick_slip import SLIP
-
-            own = {name: at for name, at in given["initial"].items() if name != SLIP.name}  # modes follow from x and v
-            given["initial"] = own
         return Scene(**given)
 
-    def model(self) -> dict[str, Any]:
-        """What decides on the equations, by the names of the keywords."""
-        return {name: getattr(self, name) for name in (*_MODEL, "topology")}
+    def _kept_start(self, changes: Mapping[str, Any]) -> Mapping[str, Any] | None:
+        """The initial states that were given, if they fit a scene with other keywords."""
+        other = "oscillator" in changes and as_oscillator(changes["oscillator"]) != self.oscillator
+        if other or "nodes" in changes or getattr(changes.get("topology", self.topology), "n", None) != self.n:
+            return None
+        start: Mapping[str, Any] | None = self.given["initial"]
+        if start and ("contact" in changes or "friction" in changes):
+            return {name: at for name, at in start.items() if name != SLIP.name}  # modes follow from x and v
+        return start
 
     def as_dict(self) -> dict[str, Any]:
         """Return the whole scene in JSON types; `Scene.from_dict` makes an equal scene of it."""
-        from .dictionary import as_dict
-
         return as_dict(self)
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> Scene:
-        """Return the scene of a scene file's names and values; ValueError or TypeError on anything else."""
-        from .dictionary import from_dict
+    def from_dict(cls, values: Mapping[str, Any], folder: Path | None = None) -> Scene:
+        """Return the scene of a scene file's names and values.
 
-        return from_dict(values)
+        Parameters
+        ----------
+        values : mapping
+            Names and values in JSON types, as `as_dict` returns them.
+        folder : Path, optional
+            Where relative paths in them start; the working folder if left out.
+
+        Raises
+        ------
+        ValueError, TypeError
+            For unknown names, and for whatever `Scene` refuses.
+        """
+        return cls(**arguments(values, KEYWORDS, folder))
 
     def __repr__(self) -> str:
-        oscillators, laws = (
-            " and ".join(dict.fromkeys(filter(None, own))) for own in zip(*self.templates, strict=True)
-        )
-        names = [oscillators, laws, self.coupling if self.topology.links else None]
+        oscillators = " and ".join(dict.fromkeys(kind.oscillator.name for kind in self.model.kinds))
+        laws = " and ".join(dict.fromkeys(kind.friction.name for kind in self.model.kinds if kind.friction))
+        names = [oscillators, laws, str(self.coupling) if self.topology.links and self.coupling else None]
         words = [repr(self.title)] if self.title else []
         words += [
             "/".join(name for name in names if name),
@@ -252,16 +257,41 @@ def _spectrum(graph: Topology) -> Spectrum:
     return graph.spectrum
 
 
-def _defaulted(scene: Scene) -> dict[str, Any]:
-    default = Scene(**scene.model())
-    values = {name: v for name, v in scene.parameters.items() if v != default.parameters.get(name)}
-    changed: dict[str, Any] = {"parameters": values}
-    if scene.atol == scene.rtol / 10:
-        changed["atol"] = None
-    for name in ("record", "section", "time_unit"):
-        if getattr(scene, name) == getattr(default, name):
-            changed[name] = None
-    return changed
+KEYWORDS = tuple(own.name for own in fields(Scene) if own.compare)
+"""The keywords of a scene, which are the keys of a scene file."""
+
+_FOLLOWING = {"friction": "default", "record": None, "section": None, "time_unit": None, "atol": None}
+"""Keywords whose default depends on other keywords, with the value that stands for it."""
+
+
+def _kept(given: Mapping[str, Any], values: Mapping[str, Any]) -> Frozen[Any]:
+    """What was given, in values that do not change: defaults that follow other keywords stay open."""
+    kept = {name: values[name] for name in KEYWORDS}
+    for name, following in _FOLLOWING.items():
+        if isinstance(given[name], str | None) and given[name] == following:
+            kept[name] = following
+    for name in ("parameters", "initial"):
+        if given[name] is None:
+            kept[name] = None
+    if given["initial"] is not None:
+        kept["initial"] = Frozen({name: values["initial"][name] for name in given["initial"]})
+    if given["parameters"] is not None:
+        kept["parameters"] = Frozen(_kept_parameters(given["parameters"], values["model"], values["parameters"]))
+    return Frozen(kept)
+
+
+def _kept_parameters(given: Mapping[str, Any], model: Model, numbers: Mapping[str, float]) -> dict[str, Any]:
+    """The parameters that were given: a number, or a tuple with one for each node."""
+    kept: dict[str, Any] = {}
+    for name in given:
+        if name in numbers:
+            kept[name] = numbers[name]
+        elif name in model.parameters:
+            kept[name] = tuple(numbers[str(NodeName(name, i))] for i in model.holders(name))
+        else:
+            parts = model.node_parameter(name)
+            kept[name] = numbers[parts.base] if parts else given[name]
+    return kept
 
 
 def a_scene(value: object) -> Scene:

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..inputs.checks import choice, number, text
+from ..inputs.checks import number, text
+from ..inputs.words import Word
 
-__all__ = ["DIRECTIONS", "Section"]
+__all__ = ["Direction", "Section"]
 
-DIRECTIONS = ("falling", "rising", "both")
+
+class Direction(Word):
+    """In which direction a state crosses a level."""
+
+    FALLING = "falling"
+    RISING = "rising"
+    BOTH = "both"
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,12 +26,12 @@ class Section:
     """
 
     variable: str
-    direction: str = "falling"
+    direction: Direction = Direction.FALLING
     level: float = 0.0
 
     def __post_init__(self) -> None:
         text("section variable", self.variable)
-        choice("section direction", self.direction, DIRECTIONS)
+        object.__setattr__(self, "direction", Direction.parse("section direction", self.direction))
         object.__setattr__(self, "level", number("section level", self.level))
 
     @classmethod
@@ -35,7 +42,11 @@ class Section:
         parts = text("section", words).split(maxsplit=2)
         if len(parts) < 2:
             raise ValueError(f"section {words!r}: expected 'state direction [level]', e.g. 'v_1 falling'")
-        return cls(parts[0], parts[1], number("section level", parts[2]) if len(parts) > 2 else 0.0)
+        return cls(
+            parts[0],
+            Direction.parse("section direction", parts[1]),
+            number("section level", parts[2]) if len(parts) > 2 else 0.0,
+        )
 
     def __str__(self) -> str:
         return f"{self.variable} {self.direction}" + (f" {self.level!r}" if self.level else "")

@@ -10,7 +10,7 @@ from typing import Any
 from ..inputs.checks import integer, known_keys, number, shown, table
 from ..inputs.frozen import Frozen
 
-__all__ = ["chosen_start", "default_start", "start"]
+__all__ = ["chosen_start", "default_start"]
 
 SEED_LIMIT = 2**63 - 1
 
@@ -42,13 +42,6 @@ def _distances(n: int, k: int) -> tuple[float, ...]:
         return (0.0,) * n
     width = min(2 * (n - 1), 6)
     return tuple(width * (n - 1 - 2 * i) / (200 * (n - 1)) for i in range(n))
-
-
-def start(
-    given: object, components: tuple[str, ...], n: int, seed: int, centre: Mapping[Any, float] | None = None
-) -> Frozen[tuple[float, ...]]:
-    """Return {component: n floats} from what the user gave for some or all components; `centre` as in `default_start`."""
-    return chosen_start(given, default_start(components, n, centre), seed)
 
 
 def chosen_start(given: object, defaults: Mapping[str, tuple[float, ...]], seed: int) -> Frozen[tuple[float, ...]]:

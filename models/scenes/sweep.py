@@ -11,14 +11,23 @@ from typing import Any
 import sympy as sp
 
 from ..dynamics.periodicity import as_function, names_in
-from ..inputs.checks import choice, shown
+from ..inputs.checks import shown
+from ..inputs.words import Word
+from ..mechanics.node_name import NodeName
 from .axis import LIMIT, Axis, known_length
-from .model import bare, check_state, components, in_range, model_parameters, unknown
-from .parameters import drive, known_name
+from .model import Model, in_range
+from .parameters import drive
 
-__all__ = ["check_sweep", "read_axes", "rest_in_sweep"]
+__all__ = ["Continuation", "check_sweep", "read_axes", "rest_in_sweep"]
 
-CONTINUATIONS = ("none", "up", "down")
+
+class Continuation(Word):
+    """In which direction along the last axis cells start from the end of their neighbours."""
+
+    NONE = "none"
+    UP = "up"
+    DOWN = "down"
+
 
 CELL_LIMIT = 10**9
 """Most cells of a sweep; results of as many go to a file, block by block (`synchain.runtime.stream`)."""
@@ -27,23 +36,39 @@ SAMPLE_LIMIT = 10**9
 """Most numbers in the trajectories of all cells, 8 GB."""
 
 
-def check_sweep(made: dict[str, Any]) -> None:
-    """Check `axes` (a tuple), `zipped` and `continuation`."""
-    if not isinstance(made["zipped"], bool):
-        raise TypeError(f"zipped: found {shown(made['zipped'])}; expected true or false")
-    axes = made["axes"]
+def check_sweep(model: Model, values: Mapping[str, Any]) -> Continuation:
+    """Check the axes of a scene and return its continuation.
+
+    Parameters
+    ----------
+    model : Model
+        The model of the scene.
+    values : mapping
+        The completed values of `axes`, `zipped`, `parameters`, `time_unit`, `record` and `samples`, and the
+        `continuation` that was given.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an axis is unknown, repeated or out of range, and for sweeps that are too large or cannot be continued.
+    """
+    zipped, axes = values["zipped"], values["axes"]
+    if not isinstance(zipped, bool):
+        raise TypeError(f"zipped: found {shown(zipped)}; expected true or false")
     names = [axis.name for axis in axes]
     for i, axis in enumerate(axes):
-        _axis(made, axis)
+        _axis(model, values["parameters"], axis)
         if axis.name in names[:i]:
             raise ValueError(f"axis {axis.name!r} occurs twice; expected each axis once; merge their values")
-    if made["zipped"] and len({len(axis) for axis in axes}) > 1:
+    if zipped and len({len(axis) for axis in axes}) > 1:
         lengths = ", ".join(f"{axis.name}: {len(axis)}" for axis in axes)
         raise ValueError(f"zipped axes have different lengths ({lengths}); expected one length for all")
-    cells = _cells([len(axis) for axis in axes], made["zipped"])
-    _period(made)
-    _samples(made, cells)
-    _continuation(made)
+    cells = _cells([len(axis) for axis in axes], zipped)
+    if values["time_unit"] == "period":
+        _period(model, values["parameters"], axes, zipped)
+    if "trajectory" in values["record"]:
+        _samples(model, values["samples"], cells)
+    return _continuation(model, axes, zipped, values["continuation"])
 
 
 def _cells(lengths: Sequence[int], zipped: object) -> int:
@@ -61,12 +86,11 @@ def _cells(lengths: Sequence[int], zipped: object) -> int:
     return cells
 
 
-def _period(made: Mapping[str, Any]) -> None:
+def _period(model: Model, parameters: Mapping[str, float], axes: Sequence[Axis], zipped: bool) -> None:
     """Refuse a drive that stands still in a cell whose times count its periods."""
-
-    if not made["axes"] or made["time_unit"] != "period":
+    if not axes:
         return
-    found = rest_in_sweep(drive(made).frequency, made["parameters"], made["axes"], made["zipped"])
+    found = rest_in_sweep(drive(model, parameters).frequency, parameters, axes, zipped)
     if found is not None:
         raise ValueError(
             f"axis {found[0]}: found {found[1]:g}, at which the drive has no period; "
@@ -74,14 +98,12 @@ def _period(made: Mapping[str, Any]) -> None:
         )
 
 
-def _samples(made: Mapping[str, Any], cells: int) -> None:
+def _samples(model: Model, samples: int, cells: int) -> None:
     """Refuse trajectories that fit into no memory."""
-    if "trajectory" not in made["record"]:
-        return
-    numbers = cells * made["samples"] * bare(made).dimension
+    numbers = cells * samples * model.unlinked.dimension
     if numbers > SAMPLE_LIMIT:
         raise ValueError(
-            f"trajectory: found {numbers} numbers in {cells} cells of {made['samples']} samples; expected at most "
+            f"trajectory: found {numbers} numbers in {cells} cells of {samples} samples; expected at most "
             f"{SAMPLE_LIMIT}, the results must fit into memory; take fewer samples or cells"
         )
 
@@ -101,42 +123,43 @@ def read_axes(given: object, zipped: object) -> tuple[Axis, ...]:
     return tuple(axes)
 
 
-def _axis(made: Mapping[str, Any], axis: Axis) -> None:
-    known, parameter = model_parameters(made), known_name(made, axis.name)
+def _axis(model: Model, parameters: Mapping[str, float], axis: Axis) -> None:
+    """Refuse an axis that is neither a parameter in its range nor an initial state."""
+    parameter = model.parameter(axis.name)
     if parameter is not None:
         for value in (min(axis.values), max(axis.values)):
             in_range(f"axis {axis.name}", value, parameter)
-        if axis.name not in made["parameters"]:
+        if axis.name not in parameters:
             raise ValueError(
                 f"axis {axis.name!r}: the nodes have different values of it; expected the parameter of one node, e.g. "
-                f"{axis.name}_1"
+                f"{NodeName(axis.name, 0)}"
             )
-    else:
-        own = components(made)
-        if axis.name.rpartition("_")[0] not in own:
-            states = tuple(f"{c}_1" for c in own)
-            raise ValueError(unknown(made, axis.name, "axis", (*known, *states)))
-        check_state(made, axis.name, "axis")
-
-
-def _continuation(made: dict[str, Any]) -> None:
-    made["continuation"] = choice("continuation", made["continuation"], CONTINUATIONS)
-    if made["continuation"] == "none":
         return
-    axes = made["axes"]
+    parts = NodeName.parse(axis.name)
+    if parts is None or parts.base not in model.components:
+        states = tuple(str(NodeName(c, 0)) for c in model.components)
+        raise ValueError(model.unknown(axis.name, "axis", (*model.parameters, *states)))
+    model.check_state(axis.name, "axis")
+
+
+def _continuation(model: Model, axes: Sequence[Axis], zipped: bool, given: object) -> Continuation:
+    """The continuation; ValueError if the axes do not allow it."""
+    continuation = Continuation.parse("continuation", given)
+    if continuation == Continuation.NONE:
+        return continuation
     if not axes:
-        raise ValueError(f"continuation: found {made['continuation']!r} without axes; expected a sweep; add an axis")
-    for axis in axes if made["zipped"] else axes[-1:]:
-        if known_name(made, axis.name) is None:
+        raise ValueError(f"continuation: found {continuation!r} without axes; expected a sweep; add an axis")
+    for axis in axes if zipped else axes[-1:]:
+        if model.parameter(axis.name) is None:
             raise ValueError(
                 f"continuation along the initial state {axis.name!r}: a continued cell starts where its "
                 "neighbour ended; expected a parameter as the last axis; reorder the axes"
             )
-    values = axes[-1].values
-    if any(b <= a for a, b in pairwise(values)):
+    if any(b <= a for a, b in pairwise(axes[-1].values)):
         raise ValueError(
             f"continuation along axis {axes[-1].name!r}: its values do not rise; expected rising values; sort them"
         )
+    return continuation
 
 
 def rest_in_sweep(

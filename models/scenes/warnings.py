@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from ..mechanics.coupling import LagrangianCoupling
+from ..mechanics.node_name import NodeName
+
 if TYPE_CHECKING:
     from ..graphs.topology import Topology
     from .scene import Scene
@@ -38,7 +41,7 @@ def _stiff_springs(scene: Scene) -> list[str]:
 
     The frequency of the fastest mode is at most sqrt(1 + 2 sigma d), d the largest weight at a node (Gershgorin).
     """
-    if scene.coupling != "spring" or not scene.topology.links:
+    if str(scene.coupling) != "spring" or not scene.topology.links:
         return []
     sigma = max([scene.parameters["sigma"], *(v for axis in scene.axes if axis.name == "sigma" for v in axis.values)])
     weights = [0.0] * scene.n
@@ -56,9 +59,7 @@ def _stiff_springs(scene: Scene) -> list[str]:
 
 
 def _vanishes(scene: Scene) -> bool:
-    from ..mechanics.coupling_text import is_matrix
-
-    if scene.coupling is None or is_matrix(scene.coupling) or scene.equations.mixed:
+    if not isinstance(scene.coupling, LagrangianCoupling) or scene.equations.mixed:
         return True
     return all(edge.diffusive for edge in scene.equations.edges)
 
@@ -89,11 +90,11 @@ def warnings(scene: Scene) -> tuple[str, ...]:
     vanishing = not graph.links or _vanishes(scene)
     if not vanishing:
         found.append(
-            f"coupling {scene.coupling!r} does not vanish between oscillators in equal states, so that equal motion of all "
+            f"coupling {str(scene.coupling)!r} does not vanish between oscillators in equal states, so that equal motion of all "
             "is no solution: there is no complete synchronisation; make it a function of differences"
         )
     found += _stiff_springs(scene)
-    moved = {axis.name.rpartition("_")[0] for axis in scene.axes} & set(scene.initial)
+    moved = {node.base for axis in scene.axes if (node := NodeName.parse(axis.name))} & set(scene.initial)
     same = not moved and all(len(set(x)) == 1 for x in scene.initial.values())
     if "sync_error" in scene.record and same and vanishing and not (scene.varied or scene.equations.mixed):
         found.append(

@@ -1,1 +1,1 @@
-"""Exact eigenvalues, multiplicities and Jordan blocks of a matrix, with their proof. Knows no family of graphs."""
+"""Exact spectra of matrices: eigenvalues, Jordan blocks, proofs. Knows no family of graphs."""

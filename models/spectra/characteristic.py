@@ -1,11 +1,11 @@
-"""Characteristic polynomials: of chains, rings and forests without a dense matrix, of others by python-flint.
+"""Characteristic polynomials; those of chains, rings and forests need no dense matrix.
 
 det(z - G) of a tridiagonal matrix obeys K_j = (z - a_j) K_(j-1) - b_(j-1) c_(j-1) K_(j-2); with
 entries in the two corners it is the trace of the product of the transfer matrices less two products
 (F. R. Gantmacher, M. G. Krein, Oscillation Matrices and Kernels, AMS Chelsea, 2002, chapter II;
 L. G. Molinari, Linear Algebra Appl. 429, 2221, 2008).  Leaves of a forest are eliminated one by one
-(D. P. Jacobs, V. Trevisan, Linear Algebra Appl. 434, 81, 2011).  Factors are multiplied in pairs, so
-that n = 500 takes milliseconds; the dense matrix takes a second.
+(D. P. Jacobs, V. Trevisan, Linear Algebra Appl. 434, 81, 2011).  Factors are multiplied in pairs:
+n = 500 takes milliseconds, the dense matrix of python-flint a second.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Transfer: TypeAlias = tuple[Polynomial, Polynomial, Polynomial, Polynomial]
 """A 2 x 2 matrix of polynomials, row by row."""
 
 Branch: TypeAlias = tuple[Polynomial, Polynomial]
-"""Of some branches of a node: the product of their polynomials, and what their links to the node take from its own."""
+"""Of some branches of a node: Π P_k, and Σ_k b_k Q_k Π_(j != k) P_j; see `forest`."""
 
 
 def characteristic(graph: Matrix) -> fmpq_poly:
@@ -51,7 +51,7 @@ def characteristic(graph: Matrix) -> fmpq_poly:
 
 
 def sparse(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomial]) -> Polynomial | None:
-    """Return the characteristic polynomial of a matrix whose pattern needs no dense one; None for any other.
+    """Return the characteristic polynomial of a band or a forest, None of any other matrix.
 
     Parameters
     ----------
@@ -88,10 +88,11 @@ def cyclic(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomia
 
 
 def forest(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomial] = fmpz_poly) -> Polynomial | None:
-    """Return the characteristic polynomial of a matrix whose links form a forest, else None; arguments as of `sparse`.
+    """Return the characteristic polynomial of a matrix whose links form a forest, else None.
 
-    The polynomial of a branch is (z - a) Π P_k - Σ_k b_k Q_k Π_(j != k) P_j over the branches k of its
-    root, P_k their polynomials, Q_k those without their roots and b_k the product of both entries of the link.
+    Arguments are those of `sparse`.  The polynomial of a branch is (z - a) Π P_k - Σ_k b_k Q_k
+    Π_(j != k) P_j over the branches k of its root, P_k their polynomials, Q_k those without their
+    roots and b_k the product of both entries of the link.
     """
     order = _parents_first(n, entries)
     if order is None:
@@ -107,7 +108,7 @@ def forest(n: int, entries: Entries, polynomial: Callable[[list[int]], Polynomia
 
 
 def _parents_first(n: int, entries: Entries) -> list[tuple[int, int]] | None:
-    """The nodes of a forest with their parents (-1 for a root), parents first; None if there is a cycle."""
+    """The nodes of a forest with their parents (-1 of a root), parents first; None of a cycle."""
     near: list[set[int]] = [set() for _ in range(n)]
     for i, j in entries:
         if i != j:
@@ -137,7 +138,7 @@ def _times(x: Transfer, y: Transfer) -> Transfer:
 
 
 def pairwise_product(factors: Sequence[T], times: Callable[[T, T], T]) -> T:
-    """Return the product of factors in their order, neighbours first, so that long factors meet near the end only."""
+    """Return the product of factors in their order; long factors meet near the end only."""
     while len(factors) > 1:
         odd = factors[-1:] if len(factors) % 2 else []
         factors = [*(times(a, b) for a, b in zip(factors[::2], factors[1::2], strict=False)), *odd]

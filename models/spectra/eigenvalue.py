@@ -1,4 +1,4 @@
-"""One exact eigenvalue: a SymPy expression or an algebraic number, its multiplicity, its float and any digits of it."""
+"""One exact eigenvalue: its number, its multiplicity, its float and any digits of it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ Blocks: TypeAlias = tuple[tuple[int, int], ...]
 
 
 class ProofError(RuntimeError):
-    """A claimed spectrum is wrong: a mistake in the program or in a topology file, not the user's."""
+    """A claimed spectrum is wrong: a mistake of the program or of a topology file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,8 @@ class Eigenvalue:
     multiplicity : int
         Algebraic multiplicity, at least 1.
     blocks : tuple of (int, int), optional
-        Sizes of Jordan blocks with their numbers, the largest size first; None if they are not known.
+        Sizes of Jordan blocks with their numbers, the largest size first; None if they are not
+        known.
 
     Attributes
     ----------
@@ -91,7 +92,7 @@ class Eigenvalue:
 
     @property
     def geometric(self) -> int | None:
-        """Number of independent eigenvectors, one for each Jordan block; None if the blocks are not known."""
+        """Number of independent eigenvectors (one for each Jordan block); None if not known."""
         return None if self.blocks is None else sum(times for _, times in self.blocks)
 
     @property
@@ -100,11 +101,11 @@ class Eigenvalue:
         return self.blocks is not None and self.blocks[0][0] > 1
 
     def enclosure(self, bits: int) -> Ball:
-        """Return a certified ball (flint.arb or flint.acb) of radius below 2**-bits times the modulus."""
+        """Return a certified ball (flint.arb or acb) of radius below 2**-bits times the modulus."""
         return accurate(self._ball, bits)
 
     def evaluate(self, digits: int) -> sp.Expr:
-        """Return the value as a SymPy Float, within one unit of the last of `digits` significant digits."""
+        """Return a SymPy Float, within one unit of the last of `digits` significant digits."""
         if isinstance(digits, bool) or not isinstance(digits, int) or digits < 1:
             raise ValueError(f"digits = {digits!r}; expected a positive integer")
         return decimals(self._ball, digits)
@@ -122,7 +123,7 @@ class Eigenvalue:
 
 
 def distinct(claims: Sequence[Eigenvalue]) -> bool:
-    """Return True once brackets or balls around all eigenvalues are disjoint, False if two agree to 4000 bits."""
+    """Return True if all eigenvalues are proved distinct, False if two agree to 4000 bits."""
     numbers = [claim.number for claim in claims]
     brackets = sorted((number.low, number.high) for number in numbers if isinstance(number, RealRoot))
     if len(brackets) == len(numbers) and all(first[1] <= second[0] for first, second in pairwise(brackets)):
@@ -155,7 +156,7 @@ def ordered(claims: Sequence[Eigenvalue]) -> tuple[Eigenvalue, ...]:
 
 
 def _complex_order(a: Eigenvalue, b: Eigenvalue) -> int:
-    """Below 0 if `a` comes first: by real part, downwards, then by |imaginary part|, then the lower conjugate.
+    """Below 0 if `a` comes first: by real part, downwards, |imaginary part|, lower conjugate.
 
     Parts that agree to 1024 bits of the moduli are taken to be equal.
     """
@@ -193,7 +194,7 @@ def decimal(value: float | complex) -> str:
 
 
 def entry(e: Eigenvalue) -> str:
-    """Return an eigenvalue in the words of a claims file; decimals if no short exact form is known."""
+    """Return an eigenvalue in the words of a claims file; decimals without a short exact form."""
     text = e.text
     if isinstance(e.number, RealRoot):
         text = f"~{rounded(e)}"

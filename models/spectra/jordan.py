@@ -2,8 +2,8 @@
 
 The nullity of p(G)**k, over the degree of p, is the sum of min(size, k) over the blocks of an
 eigenvalue with the minimal polynomial p (F. R. Gantmacher, The Theory of Matrices 1, Chelsea,
-New York, 1959, chapter VI).  A mode in a block of size s grows or decays as t**(s - 1) exp(λt), λ its
-exponent (T. Nishikawa, A. E. Motter, Phys. Rev. E 73, 065106, 2006).
+New York, 1959, chapter VI).  A mode in a block of size s goes as t**(s - 1) exp(λt), λ its exponent
+(T. Nishikawa, A. E. Motter, Phys. Rev. E 73, 065106, 2006).
 """
 
 from __future__ import annotations
@@ -87,8 +87,7 @@ def _value(graph: Matrix, polynomial: fmpq_poly) -> fmpz_mat:
 def geometric_multiplicity(graph: Matrix, eigenvalue: Eigenvalue) -> int:
     """Return the number of independent eigenvectors of an eigenvalue of a graph, by an exact rank.
 
-    All roots of the minimal polynomial p share that number: it is the nullity of p(G) over the degree
-    of p.
+    All roots of the minimal polynomial p share it: the nullity of p(G) over the degree of p.
     """
     if eigenvalue.multiplicity == 1 or graph.undirected:
         return eigenvalue.multiplicity

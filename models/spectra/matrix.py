@@ -44,4 +44,4 @@ class Matrix(Hashable, Protocol):
         """True if G is known to be symmetric."""
 
     def closed_form(self) -> Sequence[tuple[sp.Expr, int]] | None:
-        """List the eigenvalues with multiplicities, without repetition; None if no closed form is known."""
+        """List the eigenvalues with multiplicities, each once; None without a closed form."""

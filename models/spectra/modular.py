@@ -1,4 +1,4 @@
-"""The check of large graphs: a closed form against the characteristic polynomial modulo large primes.
+"""The check of large graphs: a closed form modulo large primes.
 
 Modulo a prime p = 1 mod m there is a root of unity ζ of order m among the whole numbers.  There
 2 cos(2πk/m) is ζ^k + ζ^-k, so that the check needs no cyclotomic algebra.  A polynomial over the
@@ -37,7 +37,9 @@ Powers = tuple[Fraction, tuple[tuple[Fraction, Fraction], ...]]
 
 
 def check_modulo(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]]) -> float | None:
-    """Compare a closed form with the characteristic polynomial modulo primes that a hash of the claim picks.
+    """Compare a closed form with the characteristic polynomial modulo PRIMES primes.
+
+    A hash of the closed form picks the primes.
 
     Parameters
     ----------
@@ -146,7 +148,7 @@ def _characteristic(graph: Matrix, p: int) -> nmod_poly:
 
 
 def _error_probability(graph: Matrix, numbers: Sequence[tuple[Powers, int]], m: int) -> float:
-    """About the largest share of the primes that can divide the norm of a coefficient of the difference."""
+    """About the largest share of primes that divide the norm of a coefficient of the difference."""
     parts = [x for (a, terms), _ in numbers for x in (a, *(b for _, b in terms))]
     scale = lcm(*{x.denominator for x in (*parts, *(w for _, _, w in graph.links))})
     rows = [0.0] * graph.n
@@ -155,4 +157,5 @@ def _error_probability(graph: Matrix, numbers: Sequence[tuple[Powers, int]], m: 
     largest = max(*rows, *(float(abs(a) + sum(abs(b) for _, b in c)) for (a, c), _ in numbers))
     units = int(fmpz(m).euler_phi())
     bad = units * (graph.n * log2(1 + scale * largest) + 1) / BITS
-    return bad * units * (BITS + 1) * log(2.0) / 2.0**BITS  # of the primes, about 2**BITS / (units * log of one)
+    # There are about 2**BITS / (units * log of one) primes.
+    return bad * units * (BITS + 1) * log(2.0) / 2.0**BITS

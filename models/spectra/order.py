@@ -1,7 +1,7 @@
 """Exact comparison of the coupling strengths at which modes of a network are lost.
 
-A mode with the real eigenvalue gamma reaches the strength alpha at sigma = alpha / |gamma|.  Certified
-balls tell two such values apart; minimal polynomials prove that two are equal.
+A mode with the real eigenvalue gamma reaches the strength alpha at sigma = alpha / |gamma|.
+Certified balls tell two such values apart; minimal polynomials prove that two are equal.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def _one_polynomial(gamma: Eigenvalue, other: Eigenvalue, factor: Fraction) -> f
 
 
 def _one_root(polynomial: fmpq_poly, ball: Ball, bits: int) -> bool:
-    """True if the polynomial is proved monotone on the ball, so that it has at most one root there."""
+    """True if the polynomial is proved monotone on the ball: it has at most one root there."""
     with precision(2 * bits + 64):
         slope = arb_poly(polynomial.derivative())(ball)
         return bool(slope > 0 or slope < 0)

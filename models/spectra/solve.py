@@ -1,9 +1,9 @@
-"""Exact eigenvalues of a connectivity matrix with multiplicities, proved by its characteristic polynomial.
+"""Exact eigenvalues of a connectivity matrix, proved by its characteristic polynomial.
 
-The closed form is used if the family or operation that made the graph has one.  The eigenvalues of any
-other rational matrix are the roots of the irreducible factors of its exact characteristic polynomial
-(python-flint), written as rationals, short real radicals, cosines of rational angles, or real and
-complex algebraic numbers.
+The closed form is used if the family or operation that made the graph has one.  The eigenvalues of
+any other rational matrix are the roots of the irreducible factors of its exact characteristic
+polynomial (python-flint), written as rationals, short real radicals, cosines of rational angles, or
+real and complex algebraic numbers.
 
 The proof multiplies the product of (z - eigenvalue) out.  Each claimed number has an exact minimal
 polynomial.  If the claims that share one are as many distinct numbers as its degree, with one
@@ -48,7 +48,7 @@ class Proof(StrEnum):
 
     @classmethod
     def of_size(cls, n: int, exact: int = 200, modular: int = 400) -> Proof:
-        """Return the proof of a graph of n nodes: EXACT and MODULAR up to these sizes, which take about a second."""
+        """Return the proof for n nodes: EXACT and MODULAR up to these sizes, else NONE."""
         return cls.EXACT if n <= exact else cls.MODULAR if n <= modular else cls.NONE
 
 
@@ -61,8 +61,8 @@ def spectrum(graph: Matrix, proof: Proof | None = None) -> Spectrum:
     graph : Matrix
         A `Topology`, or any other rational matrix with zero row sums.
     proof : Proof, optional
-        How a closed form is proved; ``Proof.of_size(n)`` without.  Eigenvalues without a closed form
-        are always proved over the rationals.
+        How a closed form is proved; ``Proof.of_size(n)`` without, which takes about a second at
+        most.  Eigenvalues without a closed form are always proved over the rationals.
 
     Returns
     -------
@@ -72,8 +72,8 @@ def spectrum(graph: Matrix, proof: Proof | None = None) -> Spectrum:
     Raises
     ------
     ValueError
-        On more than DENSE_LIMIT nodes without a closed form, and if the closed form of a file outside
-        the package is wrong.
+        On more than DENSE_LIMIT nodes without a closed form, and if the closed form of a file
+        outside the package is wrong.
     ProofError
         If another proof fails.
     """
@@ -138,7 +138,7 @@ def _with_blocks(graph: Matrix, pair: tuple[sp.Expr, int]) -> Eigenvalue:
 
 
 def _proved(graph: Matrix, claims: Sequence[Eigenvalue], polynomial: fmpq_poly) -> Spectrum:
-    """The spectrum of eigenvalues that multiply out to the characteristic polynomial; else ProofError."""
+    """The spectrum of eigenvalues that multiply out to the polynomial; else ProofError."""
     check(claims, polynomial, f"{graph.name} {graph.n}")
     return Spectrum(ordered(claims), verified=True)
 

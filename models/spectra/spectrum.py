@@ -30,8 +30,8 @@ class Spectrum:
     eigenvalues : sequence of Eigenvalue
         A tuple; of large chains and rings a lazy sequence that makes its items one by one.
     verified : bool, optional
-        True if the product of (z - γ)^multiplicity was multiplied out and is the exact characteristic
-        polynomial; False for the closed form of a large graph.
+        True if the product of (z - γ)^multiplicity was multiplied out and is the exact
+        characteristic polynomial; False for the closed form of a large graph.
     error_probability : float, optional
         Set if the two polynomials are equal modulo large primes: about the probability that this
         misses a difference.
@@ -80,7 +80,7 @@ class Spectrum:
 
     @property
     def multiplicities(self) -> tuple[int, ...]:
-        """How often each distinct eigenvalue occurs (algebraic multiplicity)."""
+        """The algebraic multiplicity of each distinct eigenvalue."""
         return tuple(e.multiplicity for e in self.eigenvalues)
 
     @property
@@ -91,15 +91,16 @@ class Spectrum:
     @property
     def defective(self) -> tuple[Eigenvalue, ...]:
         """The eigenvalues that are known to have fewer eigenvectors than their multiplicity."""
-        return (
-            () if isinstance(self.eigenvalues, LazyEigenvalues) else tuple(e for e in self.eigenvalues if e.defective)
-        )
+        if isinstance(self.eigenvalues, LazyEigenvalues):
+            return ()
+        return tuple(e for e in self.eigenvalues if e.defective)
 
     @property
     def zeros(self) -> int:
-        """How often 0 is an eigenvalue."""
-        if isinstance(self.eigenvalues, LazyEigenvalues):  # 0 is the first
-            return self.eigenvalues[0].multiplicity
+        """The multiplicity of 0."""
+        if isinstance(self.eigenvalues, LazyEigenvalues):
+            first: Eigenvalue = self.eigenvalues[0]  # 0 is the first
+            return first.multiplicity
         return sum(e.multiplicity for e in self.eigenvalues if e.number is sp.S.Zero)
 
     @property
@@ -111,7 +112,7 @@ class Spectrum:
 
     @property
     def slowest(self) -> sp.Expr:
-        """The eigenvalue other than 0 of smallest modulus, the first of several; ValueError if all are 0."""
+        """The eigenvalue other than 0 of smallest modulus, the first of several; or ValueError."""
         lazy = isinstance(self.eigenvalues, LazyEigenvalues)
         others = self.eigenvalues[1:2] if lazy else self.nonzero
         if not others:
@@ -119,7 +120,7 @@ class Spectrum:
         return others[0].exact if lazy else _farthest(others, -1)
 
     def evaluate(self, digits: int) -> tuple[sp.Expr, ...]:
-        """Return the distinct eigenvalues as SymPy Floats, each within one unit of the last of `digits` digits."""
+        """Return SymPy Floats, each within one unit of the last of `digits` digits."""
         return tuple(e.evaluate(digits) for e in self.eigenvalues)
 
     def as_dict(self) -> dict[str, Any]:
@@ -154,18 +155,22 @@ class Spectrum:
             "chance": self.error_probability,
         }
 
-    def __repr__(self) -> str:
-        many = len(self) > SHOWN
-        shown = [f"{e}: {e.multiplicity}" for e in (self.eigenvalues[: SHOWN - 1] if many else self.eigenvalues)]
-        last = [f"… ({len(self) - SHOWN} more)", f"{self[-1]}: {self[-1].multiplicity}"] if many else []
+    def text(self, limit: int) -> str:
+        """Return text such as {0: 1, -2: 3}, without the middle of more than `limit` eigenvalues."""
+        many = len(self) > limit
+        shown = [f"{e}: {e.multiplicity}" for e in (self.eigenvalues[: limit - 1] if many else self.eigenvalues)]
+        last = [f"… ({len(self) - limit} more)", f"{self[-1]}: {self[-1].multiplicity}"] if many else []
         return "{" + ", ".join(shown + last) + "}"
+
+    def __repr__(self) -> str:
+        return self.text(SHOWN)
 
 
 def _farthest(eigenvalues: Sequence[Eigenvalue], way: int) -> sp.Expr:
-    """The eigenvalue of largest modulus, or of smallest if `way` is -1; the first of those that agree to 1024 bits."""
+    """The first eigenvalue of largest modulus to 1024 bits; of smallest if `way` is -1."""
     top = max(way * abs(e.value) for e in eigenvalues)
     bound = top - 1e-12 * abs(top)
-    best, bits = [e for e in eigenvalues if not way * abs(e.value) < bound], 64  # of infinite floats, all
+    best, bits = [e for e in eigenvalues if not way * abs(e.value) < bound], 64  # all if infinite
     while len(best) > 1 and bits <= 1024:
         with precision(bits + 64):
             sizes = [way * abs(e.enclosure(bits)) for e in best]
@@ -176,7 +181,7 @@ def _farthest(eigenvalues: Sequence[Eigenvalue], way: int) -> sp.Expr:
 
 
 def table(spectrum: Spectrum, limit: int | None = None) -> str:
-    """Return a spectrum as a table of text: exact, decimal, multiplicity; long polynomials are cut short.
+    """Return a spectrum as a table of text; long polynomials are cut short.
 
     Parameters
     ----------

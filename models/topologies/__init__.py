@@ -1,1 +1,1 @@
-"""Families of graphs, one file each: what a file holds says `synchain.models.graphs.families.family`."""
+"""Families of graphs, one file each; `synchain.models.graphs.families.Family` lists the parts."""

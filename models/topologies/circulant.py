@@ -73,7 +73,11 @@ def formula(offsets: Any = (1, 2)) -> ClosedForm:
     note = f"for the distances {', '.join(map(str, chosen))}, {shown}; a distance n/2 adds half of its -4 sin²"
     least = max([1, *(int(s) for s in chosen if s.is_Integer)]) * 2 + 1
     return ClosedForm(
-        (Term(value, S.One, ((K, S.Zero, N - 1),), wave),), options={"offsets": chosen}, least=1 if letters else least,
-        note=note, degree=Integer(2 * len(chosen)), where=And(*limits) if letters else true,
+        (Term(value, S.One, ((K, S.Zero, N - 1),), wave),),
+        options={"offsets": chosen},
+        least=1 if letters else least,
+        note=note,
+        degree=Integer(2 * len(chosen)),
+        where=And(*limits) if letters else true,
         lowest={N: least},
-    )  # fmt: skip
+    )

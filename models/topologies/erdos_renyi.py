@@ -31,7 +31,7 @@ def expected(n: int, *, p: str = "1/2", seed: int = 0) -> int:
 
 
 def edges(n: int, *, p: str = "1/2", seed: int = 0) -> Iterator[tuple[int, int, int]]:
-    """Each pair with probability p: one draw for each edge, which tells how many pairs are left out before it."""
+    """Each pair with probability p: a draw for each edge gives the pairs left out before it."""
     stream = random.Random(seed)
     top, _, bottom = p.partition("/")
     chance = int(top) / int(bottom or 1)

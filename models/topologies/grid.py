@@ -1,4 +1,4 @@
-"""Grid: rows and columns of nodes, or more directions, each node joined to its neighbours in all of them."""
+"""Grid: nodes in rows and columns, or more directions, joined to all neighbours."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> Sequence[tuple[
 
 
 def formula(shape: Any = ("p", "q")) -> ClosedForm:
-    """Sums of -4 sin² of each direction, of sizes that are letters or whole numbers; the last direction varies fastest."""
+    """Sums of -4 sin² of each direction, sizes as letters or numbers; the last varies fastest."""
     from dataclasses import replace
 
     from ..graphs.closed_forms import entries

@@ -1,4 +1,4 @@
-"""Hypercube: nodes are joined where their places differ in one digit."""
+"""Hypercube: nodes are joined if their places differ in one digit."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def count(n: int) -> int:
 
 
 def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
-    """-2 k, C(d, k) times, for n = 2**d; for each prime factor p of n a sum of 0 (once) and -p (p - 1 times)."""
+    """-2 k, C(d, k) times, for n = 2**d; else sums of 0 or -p over the prime factors p of n."""
     from sympy import Integer
 
     bases = _radices(n)
@@ -63,7 +63,7 @@ def spectrum(n: int) -> list[tuple[sp.Expr, int]]:
 
 
 def formula() -> ClosedForm:
-    """-2 k, C(d, k) times, and the Walsh functions (J. L. Walsh, Am. J. Math. 45, 5, 1923) as eigenvectors."""
+    """-2 k, C(d, k) times, with the Walsh functions (J. L. Walsh, Am. J. Math. 45, 5, 1923)."""
     from sympy import Eq, Mod, Product, S, Sum, binomial, floor
 
     from ..graphs.closed_forms import NODE, ClosedForm, D, J, K, M, Term

@@ -1,4 +1,4 @@
-"""Random cubic graph: a ring whose nodes are also joined in random pairs, so that each has three neighbours."""
+"""Random cubic graph: a ring whose nodes are also joined in random pairs."""
 
 from __future__ import annotations
 
@@ -24,12 +24,13 @@ def edges(n: int) -> Iterator[tuple[int, int, int]]:
 def _pairs(n: int) -> list[tuple[int, int]]:
     """A random perfect matching (n odd: of all but one node) without edges of the ring.
 
-    Pairs that are neighbours in the ring swap their second nodes with those of random pairs until none is left.
+    Pairs that are neighbours in the ring swap their second nodes with those of random pairs until
+    none is left.
     """
     stream = random.Random(_SEED)
 
     def below(count: int) -> int:
-        return int(stream.random() * count)  # the one method whose numbers Python promises never to change
+        return int(stream.random() * count)  # Python never changes the numbers of this method
 
     nodes = list(range(n))
     for i in range(n - 1, 0, -1):

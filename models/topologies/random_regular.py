@@ -15,7 +15,7 @@ SOURCE = "A. Steger, N. C. Wormald, Comb. Probab. Comput. 8, 377 (1999)"
 
 CONNECTED = False
 _ATTEMPTS = 1000
-"""Attempts at a pairing; at the highest degree that is drawn, half of the nodes, one in five succeeds."""
+"""Attempts at a pairing; at the highest degree drawn, half of the nodes, one in five succeeds."""
 
 _Edges = set[tuple[int, int]]
 
@@ -29,7 +29,7 @@ def settle(n: int, degree: Any, seed: Any) -> dict[str, Any]:
 
 
 def edges(n: int, *, degree: int = 4, seed: int = 0) -> Iterator[tuple[int, int, int]]:
-    """Pair free ends at random until none is left; from the start again where the rest cannot be paired.
+    """Pair free ends at random until none is left; start again if the rest cannot be paired.
 
     Of a degree above n/2 the pairs that are not joined are drawn in place of those that are.
     """
@@ -58,7 +58,7 @@ def _drawn(n: int, degree: int, stream: random.Random) -> _Edges:
 
 
 def _paired(n: int, degree: int, stream: random.Random) -> _Edges | None:
-    """The edges of one attempt; None where the ends that are left have no pair to form."""
+    """The edges of one attempt; None if the ends that are left form no pair."""
     ends = [i for i in range(n) for _ in range(degree)]
     found: _Edges = set()
     while ends:
@@ -79,6 +79,6 @@ def _paired(n: int, degree: int, stream: random.Random) -> _Edges | None:
 
 
 def _possible(ends: list[int], found: _Edges) -> bool:
-    """True where two of the free ends can still be joined."""
+    """True if two of the free ends can still be joined."""
     nodes = sorted(set(ends))
     return any((a, b) not in found for k, a in enumerate(nodes) for b in nodes[k + 1 :])

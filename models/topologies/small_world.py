@@ -1,4 +1,4 @@
-"""Small world: a ring with several neighbours on either side, some edges of which lead elsewhere."""
+"""Small world: a ring with several neighbours on either side, some edges led elsewhere."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SOURCE = "D. J. Watts, S. H. Strogatz, Nature 393, 440 (1998)"
 
 CONNECTED = False
 _DRAWS = 10**7
-"""Most random numbers that a graph may take: a node that is joined to nearly all others finds a new one late."""
+"""Most random numbers of a graph: a node that is joined to nearly all others takes many."""
 
 
 def settle(n: int, neighbours: Any, p: Any, seed: Any) -> dict[str, Any]:
@@ -34,7 +34,7 @@ def settle(n: int, neighbours: Any, p: Any, seed: Any) -> dict[str, Any]:
 
 
 def edges(n: int, *, neighbours: int = 4, p: str = "1/10", seed: int = 0) -> Iterator[tuple[int, int, int]]:
-    """Lap by lap, nearest first: each edge keeps its first node and, by chance, gets another second one."""
+    """Lap by lap, nearest first: each edge keeps its first node and may get another second one."""
     stream = random.Random(seed)
     top, _, bottom = p.partition("/")
     chance = int(top) / int(bottom or 1)

@@ -31,7 +31,7 @@ def settle(n: int, shape: Any) -> dict[str, Any]:
 
 
 def sides(n: int) -> tuple[int, ...]:
-    """The two factors of n, 3 or more, that are closest to each other; n alone, a ring, where there are none."""
+    """The two closest factors of n that are 3 or more; n alone, a ring, if there are none."""
     rows = next((r for r in range(isqrt(n), 2, -1) if n % r == 0), None)
     return (n,) if rows is None else (rows, n // rows)
 
@@ -61,7 +61,7 @@ def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> Sequence[tuple[
 
 
 def formula(shape: Any = ("p", "q")) -> ClosedForm:
-    """Sums of -4 sin² of each direction, of sizes that are letters or whole numbers; the last direction varies fastest."""
+    """Sums of -4 sin² of each direction, sizes as letters or numbers; the last varies fastest."""
     from dataclasses import replace
 
     from ..graphs.closed_forms import entries

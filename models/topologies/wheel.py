@@ -30,7 +30,7 @@ def count(n: int) -> int:
 
 
 def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
-    """0, -1 - 4 sin²(kπ/(n - 1)) for k = 1 … n - 2, -n; that of the hub is one of the rim's up to 5 nodes."""
+    """0, -1 - 4 sin²(kπ/(n - 1)) for k = 1 … n - 2, and -n, which the rim has too up to 5 nodes."""
     from sympy import Integer
 
     from ..algebra.cosine_sums import AngleSum, expression

@@ -1,12 +1,14 @@
 """Bifurcations of periodic orbits between two neighbours on a branch, and at its end.
 
-A real multiplier m passes -1 or 1 where det(M + 1) or det(M - 1) of the monodromy matrix M changes its sign.  Stick is lost
-where the load at a landing passes the limit of static friction, a number of either sign.  Grazing can be approached from
-the side of fewer phases alone, where the gap that closes is known: each orbit on the way has a sixteenth of the gap of the
-one before, and Newton's method starts from a polynomial through those, so it does not leave the side it comes from.
+A real multiplier m passes -1 or 1 if det(M + 1) or det(M - 1) of the monodromy matrix M changes
+sign. Stick is lost if the load at a landing passes the limit of static friction, a number of either
+sign. Grazing can be approached only from the side of fewer phases, where the closing gap is known:
+each orbit on the way has a sixteenth of the gap of the one before, and Newton's method starts from
+a polynomial through those, so that it does not leave this side.
 
-Sources: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapters 5 and 7; di Bernardo, Budd,
-Champneys & Kowalczyk, Piecewise-smooth Dynamical Systems (Springer, 2008), chapters 7-8.
+Sources: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapters 5
+and 7; di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth Dynamical Systems (Springer,
+2008), chapters 7-8.
 """
 
 from __future__ import annotations
@@ -26,20 +28,19 @@ from .phases import Phases
 __all__ = ["Bifurcation", "BifurcationKind", "bifurcations_at_end", "bifurcations_between"]
 
 CLOSED = 1e-6
-"""A gap this small has closed: the branch ends by grazing."""
+"""Largest gap that counts as closed: the branch ends by grazing."""
 
 SHUT = 1e-13
-"""A gap as small as the error of the integration: it cannot be closed further."""
+"""Gap as small as the error of the integration, which cannot be closed further."""
 
 SHARE = 1.0 / 16.0
-"""What each step towards a graze leaves of the gap."""
+"""Part of the gap that remains after each step towards a graze."""
 
 MOST_STEPS = 80
-"""Steps towards a graze; halving alone exhausts the digits of the parameter in 53."""
-
+"""Most steps towards a graze; halving alone exhausts the digits of the parameter in 53."""
 
 LEAST_REACH = 1e-4
-"""Where Newton's method finds nothing this close to the last orbit, relative to the other end, it is given up."""
+"""Shortest step towards a graze, relative to the distance to the other end."""
 
 
 class BifurcationKind(StrEnum):
@@ -53,8 +54,19 @@ class BifurcationKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Bifurcation:
-    """A bifurcation: the value of the parameter, its kind in words, how far its test function is from zero, and the nearest
-    orbit that was found."""
+    """A bifurcation on a branch of periodic orbits.
+
+    Parameters
+    ----------
+    value : float
+        Value of the parameter.
+    kind : BifurcationKind
+        Kind of the bifurcation.
+    residual : float
+        Distance of the multiplier from -1 or 1, or from the other phase, at `orbit`.
+    orbit : PeriodicOrbit
+        Nearest orbit that was found.
+    """
 
     value: float
     kind: BifurcationKind
@@ -63,24 +75,55 @@ class Bifurcation:
 
 
 def bifurcations_between(arc: Arc, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> list[Bifurcation]:
-    """The bifurcations between the last orbit of an arc and the next one on the branch, in the order of the parameter."""
+    """Locate the bifurcations between the last orbit of an arc and the next one on the branch.
+
+    Parameters
+    ----------
+    arc : Arc
+        Arc up to the last orbit.
+    value : float
+        Value of the parameter at the next orbit.
+    orbit : PeriodicOrbit
+        Next orbit.
+    phases : Phases or None
+        Phases of the next orbit.
+
+    Returns
+    -------
+    list of Bifurcation
+        In the order of the parameter.
+    """
     before = arc.phases[-1]
     if before is None or phases is None or before.slip_states == phases.slip_states:
         last, there = arc.orbits[-1], (arc.values[-1], value)
-        return _crossings(_copy(arc).take(value, orbit, phases), there, (last, orbit))
+        return _crossings(arc.copy().take(value, orbit, phases), there, (last, orbit))
     ahead = len(before.slip_states) <= len(phases.slip_states)
-    known = _copy(arc) if ahead else arc.empty().take(value, orbit, phases)
+    known = arc.copy() if ahead else arc.empty().take(value, orbit, phases)
     far = value if ahead else arc.values[-1]
     change = _stick_loss(arc, value, orbit, before, phases) if _same_slips(before, phases) else None
     change = change or _graze(known, far)
     start = (known.values[0], known.orbits[0]) if not ahead else (arc.values[-1], arc.orbits[-1])
     beside = _crossings(known, (start[0], change.value), (start[1], change.orbit))
-    return sorted([change, *beside], key=lambda found: found.value)
+    return sorted([change, *beside], key=lambda bifurcation: bifurcation.value)
 
 
 def bifurcations_at_end(arc: Arc, beyond: float) -> list[Bifurcation]:
-    """How a branch ends before `beyond`, where Newton's method finds no orbit of its own: where it was born of one
-    of half as many periods, at a fold, or at a graze; nothing where it is none of them."""
+    """Locate the bifurcation at which a branch ends.
+
+    The branch may be born of one of half as many periods, or end at a fold or at a graze.
+
+    Parameters
+    ----------
+    arc : Arc
+        Arc up to the last orbit.
+    beyond : float
+        Value of the parameter at which Newton's method finds no orbit of the branch.
+
+    Returns
+    -------
+    list of Bifurcation
+        One bifurcation, or none.
+    """
     birth = _birth(arc, beyond)
     if birth is not None:
         return [birth]
@@ -90,12 +133,12 @@ def bifurcations_at_end(arc: Arc, beyond: float) -> list[Bifurcation]:
         return [Bifurcation(at, BifurcationKind.FOLD, float(np.abs(orbit.multipliers - 1.0).min()), orbit)]
     if arc.phases[-1] is None:
         return []
-    last = _graze(_copy(arc), beyond)
+    last = _graze(arc.copy(), beyond)
     return [last] if last.residual < CLOSED else []
 
 
 def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
-    """The period doubling of the orbit of half as many periods that runs between the halves of an arc's last orbit."""
+    """Period doubling of an orbit of half the periods, between the halves of the last orbit."""
     half, last = arc.periods // 2, arc.orbits[-1]
     if arc.periods % 2:
         return None
@@ -103,22 +146,18 @@ def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
         middle = 0.5 * (last.state + strobe(last.scene, last.state, half)[0])
         single = Arc(arc.scene, arc.name, half)
         for value in (arc.values[-1], beyond):
-            own = periodic_orbit(arc.scene, half, middle, **{arc.name: value})
-            middle = own.state
-            single.take(value, own, own.phases)
-        made = _crossings(single, (single.values[0], beyond), (single.orbits[0], single.orbits[1]))
+            orbit = periodic_orbit(arc.scene, half, middle, **{arc.name: value})
+            middle = orbit.state
+            single.take(value, orbit, orbit.phases)
+        crossings = _crossings(single, (single.values[0], beyond), (single.orbits[0], single.orbits[1]))
     except ArithmeticError:
         return None
-    return next((each for each in made if each.kind is BifurcationKind.PERIOD_DOUBLING), None)
-
-
-def _copy(arc: Arc) -> Arc:
-    return Arc(arc.scene, arc.name, arc.periods, [*arc.values], [*arc.orbits], [*arc.phases])
+    return next((each for each in crossings if each.kind is BifurcationKind.PERIOD_DOUBLING), None)
 
 
 def _crossings(arc: Arc, ends: tuple[float, float], orbits: tuple[PeriodicOrbit, PeriodicOrbit]) -> list[Bifurcation]:
-    """The crossings of a real multiplier through -1 or 1 between two orbits of the same phases."""
-    found = []
+    """Crossings of a real multiplier through -1 or 1 between two orbits of the same phases."""
+    crossings = []
     for point, kind in ((-1.0, BifurcationKind.PERIOD_DOUBLING), (1.0, BifurcationKind.FOLD)):
         if not _beyond(orbits[0], point) * _beyond(orbits[1], point) < 0.0:
             continue
@@ -127,13 +166,15 @@ def _crossings(arc: Arc, ends: tuple[float, float], orbits: tuple[PeriodicOrbit,
             return _beyond(orbits[ends.index(value)] if value in ends else arc.at(value), point)
 
         value, orbit = _root(distance, arc, ends)
-        found.append(Bifurcation(value, kind, float(np.abs(orbit.multipliers - point).min()), orbit))
-    return found
+        crossings.append(Bifurcation(value, kind, float(np.abs(orbit.multipliers - point).min()), orbit))
+    return crossings
 
 
 def _root(test: Callable[[float], float], arc: Arc, ends: tuple[float, float]) -> tuple[float, PeriodicOrbit]:
-    """Where a test function of the orbit is zero, and the orbit; the end that is nearer to zero where Newton's method loses
-    the orbit on the way."""
+    """Zero of a test function of the orbit, and the orbit there.
+
+    If Newton's method loses the orbit on the way, the end nearer to zero is returned.
+    """
     try:
         value = float(brentq(test, *ends, xtol=1e-14, rtol=1e-14))
         return value, arc.at(value)
@@ -143,19 +184,18 @@ def _root(test: Callable[[float], float], arc: Arc, ends: tuple[float, float]) -
 
 
 def _beyond(orbit: PeriodicOrbit, point: float) -> float:
-    """The product of the distances of all multipliers from a real number, det(M - point)."""
+    """Product of the distances of all multipliers from a real number, det(M - point)."""
     return float(np.prod(orbit.multipliers - point).real)
 
 
 def _same_slips(before: Phases, after: Phases) -> bool:
-    """True where stick alone comes or goes."""
+    """True if only stick phases come or go."""
     slips = [sorted(mode for mode in phases.slip_states if mode != 0) for phases in (before, after)]
     return slips[0] == slips[1] and before.slip_states.count(0) != after.slip_states.count(0)
 
 
 def _stick_loss(arc: Arc, value: float, orbit: PeriodicOrbit, before: Phases, after: Phases) -> Bifurcation | None:
-    """Where the load at the landing is the limit of static friction, between the last orbit of an arc and the next; None
-    where it does not pass the limit."""
+    """Stick loss between the last orbit of an arc and the next, None if there is none."""
     if not before.landing * after.landing < 0.0:
         return None
     ends = {arc.values[-1]: before.landing, value: after.landing}
@@ -164,11 +204,11 @@ def _stick_loss(arc: Arc, value: float, orbit: PeriodicOrbit, before: Phases, af
     def landing(at: float) -> float:
         if at in ends:
             return ends[at]
-        own = both.at(at)
-        phases = own.phases
+        crossed = both.at(at)
+        phases = crossed.phases
         if phases is None:
             raise ArithmeticError("an orbit without phases")
-        both.take(at, own, phases)
+        both.take(at, crossed, phases)
         return phases.landing
 
     at, last = _root(landing, both, (arc.values[-1], value))
@@ -176,8 +216,8 @@ def _stick_loss(arc: Arc, value: float, orbit: PeriodicOrbit, before: Phases, af
 
 
 def _graze(arc: Arc, beyond: float) -> Bifurcation:
-    """Where the gap of an arc's last orbit closes on the way to `beyond`, which lies past it."""
-    modes = _known(arc).slip_states
+    """Grazing at which the gap of an arc's last orbit closes before `beyond`."""
+    slip_states = _known(arc).slip_states
     share, reach = SHARE, 0.5
     for _ in range(MOST_STEPS):
         low, gap = arc.values[-1], _known(arc).gap
@@ -186,14 +226,13 @@ def _graze(arc: Arc, beyond: float) -> Bifurcation:
         value = _where(arc, share * gap)
         guided = share < 0.99 and min(low, beyond) < value < max(low, beyond)
         value = value if guided else low + reach * (beyond - low)
-        own = _orbit(arc, value)
-        phases = None if own is None else own.phases
-        if (
-            own is not None and phases is not None and phases.slip_states == modes and phases.gap > -SHUT
-        ):  # no phase unseen
-            arc.take(value, own, phases)
+        orbit = _orbit(arc, value)
+        phases = None if orbit is None else orbit.phases
+        # A gap below zero belongs to a phase too short for the samples.
+        if orbit is not None and phases is not None and phases.slip_states == slip_states and phases.gap > -SHUT:
+            arc.take(value, orbit, phases)
             share, reach = SHARE, 0.5
-        elif own is not None:
+        elif orbit is not None:
             beyond = value
         elif guided:
             share = math.sqrt(share)  # a shorter step, on which more is known of the orbit
@@ -206,6 +245,7 @@ def _graze(arc: Arc, beyond: float) -> Bifurcation:
 
 
 def _known(arc: Arc) -> Phases:
+    """Phases of the last orbit of an arc."""
     phases = arc.phases[-1]
     if phases is None:
         raise RuntimeError("friction without phases has no gaps")
@@ -213,6 +253,7 @@ def _known(arc: Arc) -> Phases:
 
 
 def _orbit(arc: Arc, value: float) -> PeriodicOrbit | None:
+    """Orbit at a value, None if Newton's method does not find it."""
     try:
         return arc.at(value)
     except ArithmeticError:
@@ -220,7 +261,7 @@ def _orbit(arc: Arc, value: float) -> PeriodicOrbit | None:
 
 
 def _where(arc: Arc, gap: float) -> float:
-    """The value at which a gap is expected, by the line through the last two; nan where there is none."""
+    """Value at which a gap is expected by linear extrapolation; nan if there is none."""
     if len(arc.values) < 2:
         return float("nan")
     (a, b), (one, two) = arc.values[-2:], arc.phases[-2:]

@@ -1,9 +1,10 @@
 """Branches of periodic orbits along a parameter, and the bifurcations on them.
 
-A smooth bifurcation is a real multiplier that passes -1 or 1.  One of friction is a change of the phases of stick and slip:
-grazing, where a phase begins in the middle of another one as its distance from it becomes zero, and stick loss, where a
-body that landed in stick turns at once, as the load at the landing passes the limit of static friction.  How they are
-located is said in `synchain.runtime.bifurcation.bifurcations`.
+A smooth bifurcation is a real multiplier that passes -1 or 1. A bifurcation of friction is a change
+of the phases of stick and slip. In grazing, a phase begins in the middle of another one, as its
+distance from it becomes zero. In stick loss, a body that landed in stick turns at once, as the load
+at the landing passes the limit of static friction.
+`synchain.runtime.bifurcation.bifurcations` locates them.
 """
 
 from __future__ import annotations
@@ -26,27 +27,43 @@ from .phases import Phases
 __all__ = ["Branch", "checked_values", "follow"]
 
 SHORTEST = 1.0 / 32.0
-"""Into pieces this short a step is cut, where Newton's method fails or leads far from what was expected, before the branch
-ends."""
+"""Shortest piece of a step, relative to the step, before the branch ends.
+
+A step is cut if Newton's method fails or leads far from the expected state.
+"""
 
 APART = 1.0 / 16.0
-"""To pieces of this part of a step changes of phases are brought before they are located: two in one piece count as one."""
+"""Length of the pieces, relative to the step, in which a change of phases is located.
+
+Two changes in one piece count as one.
+"""
 
 FAR = 0.3
-"""An orbit farther from the expected state than this part of the step leads to another branch, perhaps."""
+"""Largest distance from the expected state, relative to the step, of an orbit on the same branch.
+"""
 
 KINK = 1e-2
-"""This far from the expected state an orbit may be in any case: a branch has a kink where its phases change."""
+"""Distance from the expected state that is always allowed: changes of phases are kinks."""
 
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """Periodic orbits along a parameter: values (k,), an orbit for each, and the bifurcations between them.
+    """Periodic orbits along a parameter.
 
-    bifurcations: (value of the parameter, "period doubling", "fold", "grazing" or "stick loss"); residuals: how far the
-    multiplier is from -1 or 1 there, or the distance from the other phase, at the nearest orbit that was found; at: those
-    orbits; phases: of each orbit on the branch, empty for friction that is not set-valued.  The branch ends where there is
-    no orbit to be found, at a fold or a graze as a rule.
+    The branch ends if no further orbit can be found, usually at a fold or a graze.
+
+    Parameters
+    ----------
+    name : str
+        Name of the parameter.
+    values : ndarray, shape (k,)
+        Values of the parameter.
+    orbits : tuple of PeriodicOrbit
+        Orbit at each value.
+    bifurcations : tuple of Bifurcation
+        Bifurcations between the orbits and at the end.
+    phases : tuple of Phases
+        Phases of each orbit; empty for friction that is not set-valued.
     """
 
     name: str
@@ -57,10 +74,31 @@ class Branch:
 
 
 def follow(scene: Scene, name: str, values: Sequence[float] | np.ndarray, first: PeriodicOrbit) -> Branch:
-    """Follow a periodic orbit along a parameter, from `first` at values[0] on, and locate its bifurcations.
+    """Follow a periodic orbit along a parameter and locate its bifurcations.
 
-    Raises ValueError for an unknown parameter and for values that do not rise, or fall, all the way, TypeError for a first
-    orbit that is none, ArithmeticError where there is no orbit near `first` at values[0].
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the orbit.
+    name : str
+        Name of the parameter.
+    values : array_like, shape (k,)
+        Monotonic values of the parameter.
+    first : PeriodicOrbit
+        Orbit at or near values[0].
+
+    Returns
+    -------
+    Branch
+
+    Raises
+    ------
+    ValueError
+        If the parameter is unknown, or if the values are not monotonic.
+    TypeError
+        If `first` is no PeriodicOrbit.
+    ArithmeticError
+        If there is no orbit near `first` at values[0].
     """
     instance("first", first, PeriodicOrbit, "a PeriodicOrbit, such as periodic_orbit(scene) returns")
     wanted = checked_values(first.scene, name, values)
@@ -83,7 +121,22 @@ def follow(scene: Scene, name: str, values: Sequence[float] | np.ndarray, first:
 
 
 def checked_values(scene: Scene, name: str, values: Sequence[float] | np.ndarray) -> list[float]:
-    """Values of a parameter as numbers; ValueError in words for what they cannot be."""
+    """Convert the values of a parameter to floats.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the parameter.
+    name : str
+        Name of the parameter.
+    values : array_like, shape (k,)
+        Monotonic values.
+
+    Raises
+    ------
+    ValueError
+        If the parameter is unknown, or if the values are not finite and monotonic.
+    """
     if name not in scene.parameters:
         raise ValueError(f"unknown parameter {name!r}; known: {', '.join(scene.parameters)}")
     if not np.iterable(values) or not all(isinstance(value, Real) and math.isfinite(value) for value in values):
@@ -96,7 +149,13 @@ def checked_values(scene: Scene, name: str, values: Sequence[float] | np.ndarray
 
 
 class BranchTracer:
-    """A branch on which orbits are found one after the other, with the piece of it that is smooth up to the last one."""
+    """Traces a branch orbit by orbit.
+
+    Parameters
+    ----------
+    arc : Arc
+        Smooth arc of the branch up to its last orbit.
+    """
 
     def __init__(self, arc: Arc) -> None:
         self.arc = arc
@@ -105,7 +164,7 @@ class BranchTracer:
         self.least: int | None = None
 
     def take(self, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> PeriodicOrbit:
-        """Add an orbit, after the bifurcations on the way to it."""
+        """Append an orbit, after the bifurcations on the way to it."""
         self.phases[value] = phases
         self.least = self.least or orbit.least
         if self.arc.values:
@@ -121,7 +180,13 @@ class BranchTracer:
         return orbit
 
     def on(self, value: float) -> PeriodicOrbit | None:
-        """The orbit at the next value, through others between where the step is long; None where the branch ends."""
+        """Find the orbit at the next value, with intermediate orbits on a long step.
+
+        Returns
+        -------
+        PeriodicOrbit or None
+            None if the branch ends.
+        """
         step = abs(value - self.arc.values[-1])
         ahead = [value]
         while ahead:
@@ -138,12 +203,12 @@ class BranchTracer:
         return self.arc.orbits[-1]
 
     def _changes(self, phases: Phases | None) -> bool:
-        """True where phases are others than those of the last orbit."""
+        """True if phases differ from those of the last orbit."""
         last = self.arc.phases[-1]
         return phases is not None and last is not None and phases.slip_states != last.slip_states
 
     def _orbit(self, value: float) -> PeriodicOrbit | None:
-        """The orbit at a value, if Newton's method finds one close to where it is expected."""
+        """Orbit at a value if Newton's method finds one close to the expected state, else None."""
         try:
             orbit = self.arc.at(value)
         except ArithmeticError:

@@ -1,7 +1,16 @@
-"""A smooth piece of a branch of periodic orbits, along which all pass through the same phases of stick and slip.
+"""Continuation of periodic orbits along a smooth arc of their branch, and through a fold.
 
-Newton's method starts from a polynomial through the nearest orbits that are known, so that it stays on the piece where
-the branch beside it has a kink, as it has where a phase comes or goes.
+All orbits of an arc pass through the same phases of stick and slip. Newton's method starts from a
+polynomial through the nearest known orbits, so that it stays on the arc if the branch has a kink,
+as it has at a change of phases.
+
+At a fold the branch turns back in its parameter and a multiplier is 1, so that the parameter alone
+does not lead on. Pseudo-arclength continuation passes through it: state and parameter are unknowns
+together, and the length along the arc is prescribed.
+
+Sources: Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems, in Rabinowitz
+(ed.), Applications of Bifurcation Theory (Academic Press, 1977), pages 359-384; Seydel, Practical
+Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapter 4.
 """
 
 from __future__ import annotations
@@ -20,23 +29,39 @@ from .phases import Phases
 __all__ = ["Arc", "find_fold"]
 
 NEAR = 3
-"""Orbits that the polynomial goes through."""
+"""Number of orbits that the polynomial passes through."""
 
 
 MOST_STEPS = 24
-"""Steps along the arc on the way to a fold, each at most twice as long as the one before."""
+"""Most steps along the arc towards a fold, each at most twice as long as the one before."""
 
 SHORTEST = 1e-7
-"""Where the way must be cut into pieces shorter than this, relative to the first, the arc ends otherwise."""
+"""Shortest step, relative to the first; if a step must be shorter, the arc does not end at a fold.
+"""
 
 DIFFERENCE = 1e-6
-"""Step of the difference for the derivative by the parameter, relative to it."""
+"""Relative step of the difference quotient for the derivative by the parameter."""
 
 
 @dataclass(slots=True)
 class Arc:
-    """Orbits of `periods` drive periods at values of the parameter `name`, in the order in which they were found, with
-    their phases (None for friction that is not set-valued)."""
+    """Orbits along a parameter, in the order in which they were found.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene of the orbits.
+    name : str
+        Name of the parameter.
+    periods : int
+        Drive periods of each orbit.
+    values : list of float
+        Values of the parameter.
+    orbits : list of PeriodicOrbit
+        Orbit at each value.
+    phases : list of Phases or None
+        Phases of each orbit; None for friction that is not set-valued.
+    """
 
     scene: Scene
     name: str
@@ -46,42 +71,75 @@ class Arc:
     phases: list[Phases | None] = field(default_factory=list)
 
     def take(self, value: float, orbit: PeriodicOrbit, phases: Phases | None) -> Arc:
-        """Add an orbit at the end, and return the arc."""
+        """Append an orbit and return the arc.
+
+        Parameters
+        ----------
+        value : float
+            Value of the parameter.
+        orbit : PeriodicOrbit
+            Orbit at the value.
+        phases : Phases or None
+            Phases of the orbit.
+        """
         self.values.append(value)
         self.orbits.append(orbit)
         self.phases.append(phases)
         return self
 
     def empty(self) -> Arc:
-        """An arc of the same scene without orbits."""
+        """Return an arc of the same scene without orbits."""
         return Arc(self.scene, self.name, self.periods)
 
+    def copy(self) -> Arc:
+        """Return an arc with the same orbits that can be extended by itself."""
+        return Arc(self.scene, self.name, self.periods, [*self.values], [*self.orbits], [*self.phases])
+
     def guess(self, value: float) -> np.ndarray:
-        """The state (components,) that the nearest orbits let expect at a value."""
+        """Extrapolate the state of the orbit, shape (components,), at a value of the parameter."""
         order = np.argsort(np.abs(np.array(self.values) - value), kind="stable")[:NEAR].tolist()
-        made = np.zeros_like(self.orbits[-1].state)
+        state = np.zeros_like(self.orbits[-1].state)
         for k in order:
             share = math.prod((value - self.values[j]) / (self.values[k] - self.values[j]) for j in order if j != k)
-            made += share * self.orbits[k].state
-        return made
+            state += share * self.orbits[k].state
+        return state
 
     def at(self, value: float) -> PeriodicOrbit:
-        """The orbit at a value; ArithmeticError where Newton's method does not find it."""
+        """Find the orbit at a value of the parameter.
+
+        Raises
+        ------
+        ArithmeticError
+            If Newton's method does not find it.
+        """
         return periodic_orbit(self.scene, self.periods, self.guess(value), **{self.name: value})
 
 
 def find_fold(arc: Arc, beyond: float) -> tuple[float, PeriodicOrbit] | None:
-    """The value of the parameter and the orbit where the arc turns back before `beyond`; None where it does not."""
+    """Find the fold at which an arc turns back before a value of its parameter.
+
+    Parameters
+    ----------
+    arc : Arc
+        Arc with at least two orbits.
+    beyond : float
+        Value of the parameter past the fold.
+
+    Returns
+    -------
+    tuple of (float, PeriodicOrbit) or None
+        Value of the parameter and orbit at the fold; None if the arc does not turn back.
+    """
     if len(arc.values) < 2:
         return None
-    modes = None if arc.phases[-1] is None else arc.phases[-1].slip_states
+    slip_states = None if arc.phases[-1] is None else arc.phases[-1].slip_states
     here, before = (np.append(arc.orbits[k].state, arc.values[k]) for k in (-1, -2))
     way = ArclengthStep(arc, here, here - before)
     length, side = float(np.linalg.norm(here - before)), way.side(here)
     shortest = SHORTEST * length
     for _ in range(MOST_STEPS):
         there = way.point(length)
-        if there is None or _modes(way.orbit(there)) != modes:
+        if there is None or _slip_states(way.orbit(there)) != slip_states:
             length *= 0.25
             if length < shortest:
                 return None
@@ -95,29 +153,51 @@ def find_fold(arc: Arc, beyond: float) -> tuple[float, PeriodicOrbit] | None:
     return None
 
 
-def _modes(orbit: PeriodicOrbit) -> tuple[int, ...] | None:
+def _slip_states(orbit: PeriodicOrbit) -> tuple[int, ...] | None:
+    """Slip states of an orbit's phases, None for friction that is not set-valued."""
     phases = orbit.phases
     return None if phases is None else phases.slip_states
 
 
 @dataclass(slots=True)
 class ArclengthStep:
-    """From a point (state, parameter) of an arc on along a direction."""
+    """A step from a point (state, parameter) of an arc along a direction.
+
+    Parameters
+    ----------
+    arc : Arc
+        Arc that is continued.
+    start : ndarray, shape (components + 1,)
+        State and parameter at the start.
+    along : ndarray, shape (components + 1,)
+        Direction, of any length.
+    """
 
     arc: Arc
     start: np.ndarray
     along: np.ndarray
 
     def orbit(self, point: np.ndarray) -> PeriodicOrbit:
-        """The periodic orbit at a point."""
+        """Return the periodic orbit at a point."""
         return orbit_through(self.arc.scene, self.arc.periods, point[:-1], **{self.arc.name: float(point[-1])})
 
     def side(self, point: np.ndarray) -> float:
-        """det(M - 1) at a point: zero at the fold."""
+        """Return det(M - 1) of the monodromy matrix M at a point: zero at a fold."""
         return float(np.prod(self.orbit(point).multipliers - 1.0).real)
 
     def point(self, length: float) -> np.ndarray | None:
-        """The point of the arc at a length from the start, measured along the direction; None where there is none."""
+        """Find the point of the arc at a length from the start, measured along the direction.
+
+        Parameters
+        ----------
+        length : float
+            Length.
+
+        Returns
+        -------
+        ndarray, shape (components + 1,), or None
+            State and parameter; None if Newton's method does not converge.
+        """
         unit = self.along / np.linalg.norm(self.along)
         guess = self.start + length * unit
         slope = self._slope(guess)
@@ -137,7 +217,7 @@ class ArclengthStep:
         return kept if best < 1e-11 else None
 
     def root(self, length: float) -> tuple[float, PeriodicOrbit] | None:
-        """The fold between the start and a length."""
+        """Locate the fold between the start and a length."""
 
         def side(at: float) -> float:
             point = self.start if at == 0.0 else self.point(at)
@@ -150,11 +230,12 @@ class ArclengthStep:
         return None if point is None else (float(point[-1]), self.orbit(point))
 
     def _image(self, state: np.ndarray, value: float) -> tuple[np.ndarray, np.ndarray]:
+        """The state some periods later, and its derivative by the state."""
         image, matrix = strobe(self.arc.scene, state, self.arc.periods, **{self.arc.name: value})
         return image[: len(state)], matrix
 
     def _slope(self, point: np.ndarray) -> np.ndarray:
-        """The derivative of the state some periods later by the parameter."""
+        """Derivative of the state some periods later by the parameter."""
         step = DIFFERENCE * max(1.0, abs(point[-1]))
         ends = [self._image(point[:-1], float(point[-1]) + sign * step)[0] for sign in (1.0, -1.0)]
         return np.asarray((ends[0] - ends[1]) / (2.0 * step))

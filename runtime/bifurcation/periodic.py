@@ -1,10 +1,12 @@
-"""Periodic orbits of one driven oscillator by Newton's method on its stroboscopic map, and their stability.
+"""Periodic orbits of a driven oscillator by Newton's method on its stroboscopic map.
 
-The derivative of the map is the propagator of a deviation along the orbit (`synchain.runtime.stability.orbits`), through stick and
-slip where friction is set-valued, so Newton's method converges quadratically for both forms of the law.
+The derivative of the map is the propagator of a deviation along the orbit
+(`synchain.runtime.stability.orbits`), through stick and slip if friction is set-valued. Newton's
+method therefore converges quadratically for both forms of the law.
 
-Sources: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapter 7; for orbits with stick:
-Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems (Springer, 2004), chapters 7-8.
+Sources: Seydel, Practical Bifurcation and Stability Analysis, 3rd ed. (Springer, 2010), chapter 7;
+for orbits with stick, Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems
+(Springer, 2004), chapters 7-8.
 """
 
 from __future__ import annotations
@@ -33,22 +35,34 @@ TOLERANCE = 1e-12
 """Relative tolerance of the integration."""
 
 SAME = 1e-7
-"""Orbits this close to each other are one."""
+"""Largest distance of two orbits that count as one."""
 
 ROUNDING = 1e-12
-"""A sliding speed this small, of an orbit that sticks, is one of rounding."""
+"""Largest sliding speed that counts as a rounding error for an orbit that sticks."""
 
 MOST_STEPS = 30
 LONGEST = 10_000
-"""Most drive periods that an orbit is looked for over; far shorter unstable ones lose all their digits."""
+"""Most drive periods of an orbit; unstable ones far shorter already lose all their digits."""
 
 
 @dataclass(frozen=True, slots=True)
 class PeriodicOrbit:
-    """A motion that repeats itself after `periods` periods of the drive.
+    """A motion that repeats itself after some periods of the drive.
 
-    state (components,): at the beginning of a period of the drive; multipliers: the Floquet multipliers of the oscillator
-    by itself, the largest first; residual: largest distance of the state from its image; steps: those of Newton's method.
+    Parameters
+    ----------
+    scene : Scene
+        Oscillator with its parameters.
+    periods : int
+        Number of drive periods.
+    state : ndarray, shape (components,)
+        State at the beginning of a period of the drive.
+    multipliers : ndarray, shape (components,)
+        Floquet multipliers of the oscillator alone, the largest first.
+    residual : float
+        Largest distance of the state from its image.
+    steps : int
+        Steps of Newton's method.
     """
 
     scene: Scene = field(repr=False)
@@ -60,41 +74,72 @@ class PeriodicOrbit:
 
     @property
     def stable(self) -> bool:
-        """True where every multiplier lies inside the unit circle."""
+        """True if every multiplier lies inside the unit circle."""
         return bool(abs(self.multipliers[0]) < 1.0)
 
     @property
     def phases(self) -> Phases | None:
-        """The phases of stick and slip of one cycle (`synchain.runtime.bifurcation.phases`), None for friction without them."""
+        """Phases of stick and slip of one cycle; None for friction that is not set-valued."""
         return phases_of(self.scene, self.state, self.periods)
 
     @property
     def points(self) -> np.ndarray:
         """The states (periods, components) at the beginning of each period of the drive."""
-        found = [self.state]
+        points = [self.state]
         for _ in range(self.periods - 1):
-            found.append(_strobe(self.scene, found[-1], 1, 0.0)[0][: len(self.state)])
-        return np.array(found)
+            points.append(_strobe(self.scene, points[-1], 1, 0.0)[0][: len(self.state)])
+        return np.array(points)
 
     @property
     def least(self) -> int:
-        """The least number of drive periods after which the motion repeats itself, to SAME."""
+        """Least number of drive periods after which the motion repeats itself, to within SAME."""
         points = self.points
         divisors = (k for k in range(1, self.periods) if self.periods % k == 0)
         return next((k for k in divisors if np.abs(points[k] - points[0]).max() < SAME), self.periods)
 
     def transversal_multipliers(self, alpha: float) -> np.ndarray:
-        """The multipliers of a transversal mode of strength alpha along the orbit, the largest first."""
+        """Compute the multipliers of a transversal mode along the orbit.
+
+        Parameters
+        ----------
+        alpha : float
+            Strength of the mode.
+
+        Returns
+        -------
+        ndarray, shape (components,)
+            The largest first.
+        """
         return _sorted(_strobe(self.scene, self.state, self.periods, alpha)[1])
 
 
 def periodic_orbit(
     scene: Scene, periods: int = 1, start: Sequence[float] | np.ndarray | None = None, **parameters: float
 ) -> PeriodicOrbit:
-    """Find a periodic orbit of a scene's oscillator near `start` (default: the scene's, after its transient).
+    """Find a periodic orbit of a scene's oscillator.
 
-    Raises ValueError for an oscillator that is not driven, periods out of range, an unknown parameter or a start that is not
-    a state, ArithmeticError where Newton's method does not converge.
+    Parameters
+    ----------
+    scene : Scene
+        Source of the driven oscillator.
+    periods : int
+        Number of drive periods after which the orbit repeats itself.
+    start : array_like, shape (components,), optional
+        Start of Newton's method; by default the scene's initial state after its transient.
+    **parameters : float
+        Parameters of the scene to set.
+
+    Returns
+    -------
+    PeriodicOrbit
+
+    Raises
+    ------
+    ValueError
+        If the oscillator has no drive, `periods` is out of range, a parameter is unknown, or
+        `start` is no state.
+    ArithmeticError
+        If Newton's method does not converge.
     """
     scene = _driven(periodic_orbit, scene, parameters)
     check_periods(periods)
@@ -109,42 +154,84 @@ def periodic_orbit(
         residual = float(np.abs(gap).max())
         if not residual < best:
             break
-        best, kept, found = residual, state, matrix
+        best, kept, monodromy = residual, state, matrix
         if residual == 0.0:
             break
         state = state + _correction(matrix, gap)
         steps += 1
     if not best < 1e-9 * max(1.0, float(np.abs(kept).max())):
         raise ArithmeticError(f"no orbit of {periods} drive periods near the start: the best residual was {best:.1e}")
-    return PeriodicOrbit(scene, int(periods), kept, _sorted(found), best, steps)
+    return PeriodicOrbit(scene, int(periods), kept, _sorted(monodromy), best, steps)
 
 
 def _nearly_sticks(image: np.ndarray, gap: np.ndarray) -> bool:
-    """True where a state's image sticks and the state itself slips at a speed of rounding errors, as if it landed there."""
+    """True if a state slips at a speed of rounding errors and its image sticks."""
     return len(image) > len(gap) and image[-1] == 0.0 and 0.0 < abs(gap[1]) < ROUNDING
 
 
 def check_periods(periods: object) -> None:
-    """Refuse what is not a number of drive periods."""
+    """Check a number of drive periods.
+
+    Raises
+    ------
+    ValueError
+        If it is no whole number between 1 and LONGEST.
+    """
     if not isinstance(periods, Integral) or not 1 <= int(periods) <= LONGEST:
         raise ValueError(f"periods = {shown(periods)}; expected a whole number, at least 1, at most {LONGEST}")
 
 
 def orbit_through(scene: Scene, periods: int, state: np.ndarray, **parameters: float) -> PeriodicOrbit:
-    """The orbit through a state (components,) that is known to return to itself; its residual says how well."""
+    """Return the orbit through a state that is known to return to itself.
+
+    Parameters
+    ----------
+    scene : Scene
+        Source of the driven oscillator.
+    periods : int
+        Number of drive periods.
+    state : ndarray, shape (components,)
+        State at the beginning of a period of the drive.
+    **parameters : float
+        Parameters of the scene to set.
+
+    Returns
+    -------
+    PeriodicOrbit
+        Its residual says how well the state returns.
+    """
     scene = _driven(orbit_through, scene, parameters)
     image, matrix = _strobe(scene, state, periods, 0.0)
     return PeriodicOrbit(scene, periods, state, _sorted(matrix), float(np.abs(image[: len(state)] - state).max()), 0)
 
 
 def strobe(scene: Scene, state: np.ndarray, periods: int, **parameters: float) -> tuple[np.ndarray, np.ndarray]:
-    """The state (components,) some drive periods later, and its derivative (components, components) by the first one."""
+    """Evaluate the stroboscopic map and its derivative.
+
+    Parameters
+    ----------
+    scene : Scene
+        Source of the driven oscillator.
+    state : ndarray, shape (components,)
+        State at the beginning of a period of the drive.
+    periods : int
+        Number of drive periods.
+    **parameters : float
+        Parameters of the scene to set.
+
+    Returns
+    -------
+    image : ndarray, shape (components,)
+        State after the drive periods.
+    matrix : ndarray, shape (components, components)
+        Derivative of `image` by `state`.
+    """
     image, matrix = _strobe(_driven(strobe, scene, parameters), state, periods, 0.0)
     return image[: len(state)], matrix
 
 
 def _driven(function: Callable[..., Any], scene: Scene, parameters: dict[str, float]) -> Scene:
-    """The scene with its parameters, to the tolerance of orbits; ValueError where it is not driven."""
+    """Scene with its parameters at the tolerance of orbits; ValueError if it has no drive."""
     scene = single_cell(function, scene, TOLERANCE, parameters)
     unit_of_time(scene)
     if not scene.period:
@@ -155,16 +242,16 @@ def _driven(function: Callable[..., Any], scene: Scene, parameters: dict[str, fl
 
 
 def _settled(scene: Scene) -> np.ndarray:
-    """The state (components,) after the scene's transient, from its initial one."""
+    """State (components,) after the scene's transient from its initial one."""
     state = np.zeros(len(scene.initial))
     state[:] = [values[0] for values in scene.initial.values()]
     orbits = Orbits.make(scene, np.zeros(1), state[None], 1)
     orbits.settle(scene.transient)
-    return orbits.state[0][: orbits.components]
+    return np.asarray(orbits.state[0][: orbits.components])
 
 
 def _state(scene: Scene, start: Sequence[float] | np.ndarray) -> np.ndarray:
-    """A start given by the caller, as the state (components,) of one oscillator."""
+    """Check a start as the state (components,) of one oscillator."""
     names = tuple(name for name in scene.components if name != SLIP.name)
     try:
         state = np.array(start, dtype=float)
@@ -176,7 +263,7 @@ def _state(scene: Scene, start: Sequence[float] | np.ndarray) -> np.ndarray:
 
 
 def _correction(matrix: np.ndarray, gap: np.ndarray) -> np.ndarray:
-    """The step of Newton's method; ArithmeticError where the orbit is not isolated."""
+    """Step of Newton's method; ArithmeticError if the orbit is not isolated."""
     try:
         return np.asarray(np.linalg.solve(np.eye(len(gap)) - matrix, gap))
     except np.linalg.LinAlgError:
@@ -184,9 +271,24 @@ def _correction(matrix: np.ndarray, gap: np.ndarray) -> np.ndarray:
 
 
 def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
-    """The strength alpha between `low` and `high` at which the largest transversal multiplier has modulus 1, to rounding.
+    """Find the strength at which the largest transversal multiplier has modulus 1, to rounding.
 
-    Raises ValueError for ends that are not finite numbers, and where the modulus is on the same side of 1 at both ends.
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+        Synchronous orbit.
+    low, high : float
+        Strengths alpha on different sides of the end.
+
+    Returns
+    -------
+    float
+        Strength alpha.
+
+    Raises
+    ------
+    ValueError
+        If `low` or `high` is no finite number, or if the modulus is on the same side of 1 at both.
     """
 
     for name, value in (("low", low), ("high", high)):
@@ -202,7 +304,7 @@ def stability_end(orbit: PeriodicOrbit, low: float, high: float) -> float:
 
 
 def _strobe(scene: Scene, state: np.ndarray, periods: int, alpha: float) -> tuple[np.ndarray, np.ndarray]:
-    """The state some periods later, and the propagator of a deviation of strength alpha."""
+    """State some periods later, and the propagator of a deviation of strength alpha."""
     start = np.zeros(len(scene.initial))
     start[: len(state)] = state
     orbits = Orbits.make(scene, np.array([alpha]), start[None], 1)
@@ -211,5 +313,6 @@ def _strobe(scene: Scene, state: np.ndarray, periods: int, alpha: float) -> tupl
 
 
 def _sorted(matrix: np.ndarray) -> np.ndarray:
-    found = np.linalg.eigvals(matrix)
-    return np.asarray(found[np.argsort(-np.abs(found), kind="stable")])
+    """Eigenvalues of a matrix, the largest first."""
+    multipliers = np.linalg.eigvals(matrix)
+    return np.asarray(multipliers[np.argsort(-np.abs(multipliers), kind="stable")])

@@ -1,10 +1,11 @@
-"""The phases of stick and slip that a periodic orbit passes through, and how far it is from having others.
+"""Phases of stick and slip of a periodic orbit, and its distance from orbits with other phases.
 
-Phases are read off samples of one cycle, and distances between them from polynomials through neighbouring samples, whose
-error is far below that of the orbit.  A stick shorter than the distance of two samples is known by the load where it begins;
-a slip as short as that is not seen.
+Phases are read from samples of one cycle, and distances between them from polynomials through
+neighbouring samples, whose error is far below that of the orbit. A stick shorter than the distance
+of two samples is known by the load at its beginning; a slip as short as that is not seen.
 
-Source: di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth Dynamical Systems (Springer, 2008), chapters 7-8.
+Source: di Bernardo, Budd, Champneys & Kowalczyk, Piecewise-smooth Dynamical Systems (Springer,
+2008), chapters 7-8.
 """
 
 from __future__ import annotations
@@ -29,19 +30,27 @@ from ..sweeps.run import run
 __all__ = ["Phases", "phases_of"]
 
 SAMPLES = 2000
-"""Samples for each period of the drive."""
+"""Samples in each period of the drive."""
 
 REACH = 3
-"""Samples to each side of the one in the middle of a polynomial."""
+"""Samples on each side of the middle one of a polynomial."""
 
 
 @dataclass(frozen=True, slots=True)
 class Phases:
-    """The slip_states of one cycle in their order, 0 for stick, +1 and -1 for slip, from the one that makes the list smallest.
+    """Phases of one cycle.
 
-    gap: the least minimum, inside a phase, of the sliding speed in slip and of the distance of the load from the limits of
-    static friction in stick; inf where there is none.  landing: how far the load is from those limits where slip ends, at
-    the landing that is nearest to them, positive where it sticks; inf where slip never ends.
+    Parameters
+    ----------
+    slip_states : tuple of int
+        0 for stick, +1 and -1 for slip, in the order of time. The rotation that comes first in
+        lexicographic order is used.
+    gap : float
+        Least minimum, inside a phase, of the sliding speed in slip and of the distance of the load
+        from the limits of static friction in stick; inf if there is none.
+    landing : float
+        Distance of the load from those limits at the end of slip, at the landing nearest to them,
+        positive if it sticks; inf if slip never ends.
     """
 
     slip_states: tuple[int, ...]
@@ -50,21 +59,41 @@ class Phases:
 
     @property
     def words(self) -> str:
-        """In words, for example "stick, slip +"."""
+        """The phases in words, for example "stick, slip +"."""
         return ", ".join({0: "stick", 1: "slip +", -1: "slip -"}[mode] for mode in self.slip_states)
 
 
 def phases_of(scene: Scene, state: np.ndarray, periods: int) -> Phases | None:
-    """The phases of the orbit of a scene's oscillator from `state` (components,) over `periods` of the drive; None for
-    friction that is not set-valued."""
+    """Determine the phases of a periodic orbit.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the oscillator.
+    state : ndarray, shape (components,)
+        State at the beginning of a period of the drive.
+    periods : int
+        Drive periods of the orbit.
+
+    Returns
+    -------
+    Phases or None
+        None for friction that is not set-valued.
+    """
     contact = scene.equations.node.contact
     if contact is None:
         return None
-    one = scene.replace(
-        topology=topology("chain", 1), record=("trajectory",), samples=SAMPLES * periods + 1, transient=0.0, axes=(),
-        window=float(periods), time_unit="period", initial={"x": [float(state[0])], "v": [float(state[1])]},
-    )  # fmt: skip
-    once = np.asarray(run(one, show_progress=False, workers=1).trajectory.values, dtype=float)[:-1]
+    single = scene.replace(
+        topology=topology("chain", 1),
+        record=("trajectory",),
+        samples=SAMPLES * periods + 1,
+        transient=0.0,
+        axes=(),
+        window=float(periods),
+        time_unit="period",
+        initial={"x": [float(state[0])], "v": [float(state[1])]},
+    )
+    once = np.asarray(run(single, show_progress=False, workers=1).trajectory.values, dtype=float)[:-1]
     path = np.concatenate([once, once])  # two cycles, so that each phase is seen whole
     t, slip = np.arange(len(path)) * ((scene.period or 0.0) / SAMPLES), np.round(path[:, 2]).astype(int)
     held, slides = _margins(scene, contact)
@@ -86,10 +115,11 @@ def phases_of(scene: Scene, state: np.ndarray, periods: int) -> Phases | None:
 
 
 Function = Callable[..., np.ndarray]
+"""A function of arrays."""
 
 
 def _margins(scene: Scene, contact: Contact) -> tuple[Function, Function]:
-    """How far the load at a position and time is from the limits of static friction; the sliding velocity."""
+    """Functions for the distance of the load from the limits of friction, and the speed."""
     up, down, sliding = _functions(contact, tuple(scene.equations.node.state), tuple(scene.parameters))
     numbers = list(scene.parameters.values())
     return (
@@ -100,26 +130,26 @@ def _margins(scene: Scene, contact: Contact) -> tuple[Function, Function]:
 
 @lru_cache(maxsize=16)
 def _functions(contact: Contact, state: tuple[sp.Symbol, ...], names: tuple[str, ...]) -> tuple[Function, ...]:
-    """Both limits and the sliding velocity as functions of position, velocity, time and parameters."""
+    """Both limits and the sliding velocity as functions of state, time and parameters."""
     symbols = [*state[:2], TIME, *(sp.Symbol(name, real=True) for name in names)]
     return tuple(sp.lambdify(symbols, e, "numpy") for e in (contact.up, contact.down, contact.sliding))
 
 
 def _least(values: np.ndarray) -> float:
-    """The least of the minima inside a row of equally spaced values, each from a polynomial through its neighbours."""
+    """Least of the minima inside a row of equally spaced values, each from a local polynomial."""
     inner = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] < values[2:])) + 1
-    found = math.inf
+    least = math.inf
     for k in map(int, inner):
         a = min(max(k - REACH, 0), max(len(values) - 2 * REACH - 1, 0))
         near = values[a : a + 2 * REACH + 1]
         bent = Polynomial.fit(np.arange(len(near)) - float(k - a), near, len(near) - 1)
         turns = [r.real for r in bent.deriv().roots() if abs(r.imag) < 1e-9 and abs(r.real) <= 1.0]
-        found = min([found, *(float(bent(turn)) for turn in turns)])
-    return found
+        least = min([least, *(float(bent(turn)) for turn in turns)])
+    return least
 
 
 def _landing(piece: slice, t: np.ndarray, path: np.ndarray, slides: Function, held: Function) -> float:
-    """The margin of the load where a phase of slip ends: both are continued from its last samples."""
+    """Margin of the load at the end of a slip, extrapolated from its last samples."""
     first = max(piece.stop - 2 * REACH, piece.start)
     steps = np.arange(first, piece.stop) - (piece.stop - 1.0)
     sliding = Polynomial.fit(steps, slides(path[first : piece.stop, 1]), len(steps) - 1)
@@ -131,5 +161,5 @@ def _landing(piece: slice, t: np.ndarray, path: np.ndarray, slides: Function, he
 
 
 def _canonical(slip_states: list[int]) -> tuple[int, ...]:
-    """The rotation of a cycle that comes first in order."""
+    """Rotation of a cycle that comes first in lexicographic order."""
     return min(tuple(slip_states[k:] + slip_states[:k]) for k in range(len(slip_states)))

@@ -1,7 +1,8 @@
-"""The skeleton of a bifurcation diagram: the periodic orbits of few periods, stable or not, and their branches.
+"""The skeleton of a bifurcation diagram: branches of periodic orbits of few periods, stable or not.
 
-A chaotic motion comes close to every periodic orbit on its attractor again and again, and a transient to those beside it.
-States that nearly return after some periods of the drive are therefore good starts for Newton's method.
+A chaotic motion comes close to every periodic orbit on its attractor again and again, and a
+transient to those beside it. States that nearly return after some periods of the drive are
+therefore good starts for Newton's method.
 
 Source: Auerbach, Cvitanovic, Eckmann, Gunaratne & Procaccia, Phys. Rev. Lett. 58, 2387 (1987).
 """
@@ -12,6 +13,7 @@ from collections.abc import Sequence
 from numbers import Integral
 
 import numpy as np
+from tqdm import tqdm
 
 from synchain.models.inputs.checks import shown
 from synchain.models.scenes.scene import Scene, a_scene
@@ -25,24 +27,54 @@ from .periodic import SAME, TOLERANCE, PeriodicOrbit, check_periods, periodic_or
 __all__ = ["near_returns", "skeleton"]
 
 STARTS, LENGTH, DROPPED = 16, 200, 20
-"""Motions that are looked through for returns, their length in periods of the drive, and what is dropped before it."""
+"""Motions that are searched for returns, their length and their transient in drive periods."""
 
 NEARER = 4
-"""The other sheet at a fold is entered at 4^-NEARER of the distance from the fold to the last orbit before it."""
+"""The other sheet at a fold is entered at 4^-NEARER of the distance between fold and last orbit."""
 
 CLOSE, APART, TRIES = 0.05, 0.02, 12
-"""Returns as close as this are tried, the closest first, those apart from each other by so much, and so many at most."""
+"""Largest distance of a return, least distance between starts, most starts for one period."""
 
 
 def skeleton(
-    scene: Scene, name: str, values: Sequence[float] | np.ndarray, periods: Sequence[int] = (1, 2), looks: int = 8
+    scene: Scene,
+    name: str,
+    values: Sequence[float] | np.ndarray,
+    periods: Sequence[int] = (1, 2),
+    looks: int = 8,
+    *,
+    show_progress: bool | None = False,
 ) -> tuple[Branch, ...]:
-    """The skeleton of a bifurcation diagram over `values`: the branches of all orbits of these numbers of drive periods that
-    are found from near returns at `looks` of the values, followed up and down from there.
+    """Find the skeleton of a bifurcation diagram.
 
-    The branches rise in the parameter, and are sorted by the number of periods and the first value.  An orbit that is one of
-    fewer periods is left out, and so is one that a branch passes through already.
-    Raises ValueError for an unknown parameter, values that do not rise or fall all the way, and fewer looks than one.
+    Orbits are found from near returns at some of the values and followed up and down from there. An
+    orbit that repeats itself after fewer periods is left out, and so is one that a branch passes
+    through already.
+
+    Parameters
+    ----------
+    scene : Scene
+        Source of the driven oscillator.
+    name : str
+        Name of the parameter.
+    values : array_like, shape (k,)
+        Monotonic values of the parameter.
+    periods : sequence of int
+        Numbers of drive periods of the orbits.
+    looks : int
+        Number of values at which orbits are searched.
+    show_progress : bool or None
+        Whether to show a progress bar; None shows it on terminals only.
+
+    Returns
+    -------
+    tuple of Branch
+        Each rises in the parameter; sorted by the number of periods and the first value.
+
+    Raises
+    ------
+    ValueError
+        If the parameter is unknown, the values are not monotonic, or `looks` is less than one.
     """
     grid = sorted(checked_values(a_scene(scene), name, values))
     if isinstance(periods, Integral | str) or len(periods) == 0:
@@ -52,38 +84,55 @@ def skeleton(
         raise ValueError(f"looks = {shown(looks)}; expected a whole number, at least 1")
     for each in periods:
         check_periods(each)
-    made: list[Branch] = []
+    branches: list[Branch] = []
 
     def take(k: int, orbit: PeriodicOrbit) -> None:
         """Follow an orbit at grid[k] that is new, and what its branch turns into at its folds."""
-        if any(_passes(branch, grid[k], orbit) for branch in made):
+        if any(_passes(branch, grid[k], orbit) for branch in branches):
             return
-        made.append(_both_ways(scene, name, grid, k, orbit))
-        for end, other in _other_sheets(scene, made[-1]):
+        branches.append(_both_ways(scene, name, grid, k, orbit))
+        for end, other in _other_sheets(scene, branches[-1]):
             take(grid.index(end), other)
 
     count = min(looks, len(grid))
-    for k in sorted({int((2 * j + 1) * len(grid) / (2 * count)) for j in range(count)}):
+    places = sorted({int((2 * j + 1) * len(grid) / (2 * count)) for j in range(count)})
+    hidden = None if show_progress is None else not show_progress
+    for k in tqdm(places, unit="value", disable=hidden):
         for orbit in near_returns(scene, periods, **{name: grid[k]}):
             take(k, orbit)
-    return tuple(sorted(made, key=lambda branch: (branch.orbits[0].periods, branch.values[0])))
+    return tuple(sorted(branches, key=lambda branch: (branch.orbits[0].periods, branch.values[0])))
 
 
 def near_returns(scene: Scene, periods: Sequence[int], **parameters: float) -> list[PeriodicOrbit]:
-    """The periodic orbits of these numbers of drive periods that motions from several starts nearly return to, each once."""
+    """Find the periodic orbits to which motions from several starts nearly return.
+
+    Parameters
+    ----------
+    scene : Scene
+        Source of the driven oscillator.
+    periods : sequence of int
+        Numbers of drive periods of the orbits.
+    **parameters : float
+        Parameters of the scene to set.
+
+    Returns
+    -------
+    list of PeriodicOrbit
+        Each orbit once.
+    """
     scene = coupled_cell(near_returns, scene, TOLERANCE, parameters)
     path = _path(scene)
-    found: list[PeriodicOrbit] = []
+    orbits: list[PeriodicOrbit] = []
     for count in periods:
         for start in _returning(path, count):
             try:
                 orbit = periodic_orbit(scene, count, start)
             except ArithmeticError:
                 continue
-            own = [other for other in found if other.periods == count]
-            if orbit.least == count and not any(_same(orbit, other) for other in own):
-                found.append(orbit)
-    return found
+            alike = [other for other in orbits if other.periods == count]
+            if orbit.least == count and not any(_same(orbit, other) for other in alike):
+                orbits.append(orbit)
+    return orbits
 
 
 def _path(scene: Scene) -> np.ndarray:
@@ -100,32 +149,32 @@ def _path(scene: Scene) -> np.ndarray:
 
 
 def _returning(path: np.ndarray, periods: int) -> list[np.ndarray]:
-    """The states of a path that come back closest after some periods, and are apart from each other."""
+    """States of a path with the closest returns after some periods, apart from each other."""
     gap = np.abs(path[periods:] - path[:-periods]).max(axis=2)
-    chosen: list[np.ndarray] = []
+    starts: list[np.ndarray] = []
     for flat in np.argsort(gap, axis=None, kind="stable"):
         k, row = np.unravel_index(flat, gap.shape)
-        if gap[k, row] > CLOSE or len(chosen) == TRIES:
+        if gap[k, row] > CLOSE or len(starts) == TRIES:
             break
-        if all(np.abs(path[k, row] - other).max() > APART for other in chosen):
-            chosen.append(path[k, row])
-    return chosen
+        if all(np.abs(path[k, row] - other).max() > APART for other in starts):
+            starts.append(path[k, row])
+    return starts
 
 
 def _same(orbit: PeriodicOrbit, other: PeriodicOrbit) -> bool:
-    """True where two orbits of as many periods are one, perhaps some periods of the drive later."""
+    """True if two orbits of as many periods are one, perhaps shifted by drive periods."""
     return bool(np.abs(orbit.points - other.state).max(axis=1).min() < SAME)
 
 
 def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
-    """True where a branch passes through an orbit."""
+    """True if a branch passes through an orbit."""
     (places,) = np.nonzero(branch.values == value)
-    own = branch.orbits[0].periods == orbit.periods
-    return own and any(_same(orbit, branch.orbits[k]) for k in places)
+    alike = branch.orbits[0].periods == orbit.periods
+    return alike and any(_same(orbit, branch.orbits[k]) for k in places)
 
 
 def _both_ways(scene: Scene, name: str, grid: list[float], k: int, orbit: PeriodicOrbit) -> Branch:
-    """The branch through an orbit at grid[k], in one piece."""
+    """Branch through an orbit at grid[k], in one piece."""
     up, down = (follow(scene, name, part, orbit) for part in (grid[k:], grid[k::-1]))
     return Branch(
         name,
@@ -137,11 +186,12 @@ def _both_ways(scene: Scene, name: str, grid: list[float], k: int, orbit: Period
 
 
 def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrbit]]:
-    """What a branch turns into at its folds: the value of its last orbit there, and the orbit of the other sheet at it.
+    """Values of a branch's ends at folds, with the orbits of the other sheets there.
 
-    Near a fold the sheets lie on both sides of it, at distances like the square root of that of the parameter.
+    Near a fold the sheets lie on both sides of it, at distances proportional to the square root of
+    that of the parameter.
     """
-    found = []
+    sheets = []
     for turn in branch.bifurcations:
         if turn.kind is not BifurcationKind.FOLD:
             continue
@@ -157,5 +207,5 @@ def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrb
                 sheet = follow(scene, branch.name, way, first)
             except ArithmeticError:
                 continue
-            found += [(end, sheet.orbits[-1])] if len(sheet.orbits) == len(way) else []
-    return found
+            sheets += [(end, sheet.orbits[-1])] if len(sheet.orbits) == len(way) else []
+    return sheets

@@ -6,11 +6,10 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import fields
 from typing import Any
 
 from synchain.models.inputs.checks import number, suggestion
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import KEYWORDS, Scene, a_scene
 
 __all__ = ["check_keywords", "with_axes", "with_parameters"]
 
@@ -79,7 +78,7 @@ def check_keywords(
     The function's own keywords are among the known names, since one of them may be what was meant;
     settings that are `taken` are not.
     """
-    settings = [field.name for field in fields(Scene) if field.name not in taken]
+    settings = [name for name in KEYWORDS if name not in taken]
     strange = next(
         (n for n in names if not (scene.takes(n) or n in settings or (states and _is_state(scene, n)))), None
     )

@@ -13,6 +13,7 @@ import sympy as sp
 from synchain.codegen.driver.columns import Control, Span
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import as_function, drive_of, names_in
+from synchain.models.mechanics.node_name import NodeName
 from synchain.models.scenes.scene import Scene
 
 from .initial_modes import local_clock, with_modes
@@ -207,7 +208,7 @@ def parameter_names(scene: Scene, name: str) -> tuple[str, ...]:
     """
     if name not in scene.varied:
         return (name,) if name in scene.parameters else ()
-    return tuple(found for found in scene.parameters if found.rpartition("_")[0] == name)
+    return tuple(own for own in scene.parameters if (parts := NodeName.parse(own)) and parts.base == name)
 
 
 def _windows(scene: Scene, period: np.ndarray) -> np.ndarray:

@@ -19,6 +19,7 @@ from synchain.codegen.driver.columns import Point, Sum
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.reduction import NoQuotient, quotient, substitute_constants
 from synchain.models.inputs.checks import flag
+from synchain.models.mechanics.node_name import NodeName
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..support.status import Status
@@ -228,11 +229,9 @@ def _node_merge(whole: Equations, reduced: Equations, classes: tuple[int, ...], 
 
 
 def _column(name: str, equations: Equations, first: list[int]) -> str:
-    """The name in the whole network of a parameter of the reduced one, whose node k stands for node
-    first[k].
-    """
-    base, _, number = name.rpartition("_")
-    return f"{base}_{first[int(number) - 1] + 1}" if base in equations.varied else name
+    """The name in the whole network of a parameter of a reduced one; node k stands for first[k]."""
+    parts = NodeName.parse(name)
+    return str(NodeName(parts.base, first[parts.index])) if parts and parts.base in equations.varied else name
 
 
 def _fixed(scene: Scene) -> dict[str, float]:

@@ -55,9 +55,11 @@ def _check(kind: str, name: str) -> None:
             f"name {name!r}; expected small letters, digits and underscores, a letter first, at most {LENGTH}, no word "
             "of Python, and neither 'default' nor 'none': e.g. my_law"
         )
+    from synchain.models.graphs.family_file import TOPOLOGY
     from synchain.models.inputs import plugins
+    from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 
-    known = plugins.names(kind)
+    known = plugins.names({own.name: own for own in (TOPOLOGY, OSCILLATOR, FRICTION_LAW, COUPLING)}[kind])
     if name in known:
         raise WrongUse(f"{kind} {name!r} exists already; choose another name; known: {', '.join(known)}")
 

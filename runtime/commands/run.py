@@ -138,18 +138,18 @@ def changed_scene(arguments: Namespace) -> Scene:
 
 def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[str, Any]) -> Any:
     """The value of a setting as the scene wants it."""
-    from synchain.models.scenes.model import check_state, unknown
+    from synchain.models.mechanics.node_name import NodeName
 
     if scene.takes(name) or name in scene.equations.state:
         return value
     if name == "rtol":
         raise WrongUse("--set cannot change rtol; use --rtol")
-    if name.rpartition("_")[0] in scene.components:
-        check_state(scene.model(), name, "initial state")
+    if (parts := NodeName.parse(name)) is not None and parts.base in scene.components:
+        scene.model.check_state(name, "initial state")
     if name not in SETTINGS:
-        made = scene.model()
-        states = {name.rpartition("_")[0]: name for name in reversed(scene.equations.state)}.values()
-        raise WrongUse(f"--set: {unknown(made, name, 'parameter', (*scene.parameters, *states, *SETTINGS))}")
+        equations = scene.model.unlinked
+        states = [str(NodeName(c, equations.holders(c)[0])) for c in equations.components]
+        raise WrongUse(f"--set: {scene.model.unknown(name, 'parameter', (*scene.parameters, *states, *SETTINGS))}")
     if isinstance(value, tuple | dict):
         count = value["count"] if isinstance(value, dict) else len(value)
         raise WrongUse(f"--set {name}: found {count} values; only parameters and initial states can be swept")
@@ -266,7 +266,7 @@ def _draw(target: Path) -> Path:
     with xr.open_dataset(target, engine="scipy") as data:
         axes = draw_result(Result(data, scene_of(data.attrs)))
         with whole_file(path) as temporary:
-            axes.figure.savefig(temporary, dpi=150)
+            axes.figure.figure.savefig(temporary, dpi=150)
     return path
 
 

@@ -34,7 +34,7 @@ __all__ = [
 def headline(scene: Scene) -> str:
     """What oscillates, and what is computed."""
     coupling = f", {scene.coupling} coupling" if scene.coupling else ""
-    oscillators = " and ".join(dict.fromkeys(oscillator for oscillator, _ in scene.templates))
+    oscillators = " and ".join(dict.fromkeys(kind.oscillator.name for kind in scene.model.kinds))
     return f"{oscillators} oscillator{coupling}{drive_words(scene)}: exponents per unit of time"
 
 

@@ -2,13 +2,13 @@
 
 A figure is a module of this folder with
 
-* NAMES: the figures that it makes, and perhaps EXTRA: more of them, made only when asked for by name,
+* NAMES: the figures that it makes, and optionally EXTRA: figures made only if asked for by name,
 * SIZE: width and height in inches,
-* ``compute(name, runs) -> data``: the numbers, through the runs that a `FigureRuns` shares between figures,
-* ``table(data) -> Table``: the same numbers as columns; perhaps ``ranges(data) -> Table``, ``document(data) -> str``
-  (Markdown) beside it,
+* ``compute(name, runs) -> data``: the numbers, through the `FigureRuns` that figures share,
+* ``table(data) -> Table``: the same numbers as columns, and optionally ``ranges(data) -> Table``
+  and ``document(data) -> str`` (Markdown),
 * ``draw(axes, data) -> axes``: takes and returns matplotlib axes and never shows anything,
-* perhaps ``layout(figure) -> axes`` where it needs more than one pair of axes.
+* optionally ``layout(figure) -> axes`` if it needs more than one pair of axes.
 
 Discovery is a listing of the folder: a new figure is one new file.
 """
@@ -25,6 +25,8 @@ from typing import TYPE_CHECKING, Any
 from synchain.models.inputs.checks import suggestion
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from .figure_runs import FigureRuns
     from .tables import Table
 
@@ -33,7 +35,15 @@ __all__ = ["Drawing", "load", "names"]
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """One figure: a name and the module that makes it."""
+    """A figure and the module that makes it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the figure.
+    module : module
+        Module of this folder.
+    """
 
     name: str
     module: ModuleType
@@ -41,19 +51,31 @@ class Drawing:
     @property
     def size(self) -> tuple[float, float]:
         """Width and height in inches."""
-        return self.module.SIZE
+        width, height = self.module.SIZE
+        return float(width), float(height)
 
     def compute(self, runs: FigureRuns) -> Any:
-        """Return the numbers of the figure, simulated where the study has not got them yet."""
+        """Compute the data of the figure, through runs that other figures may have made already."""
         return self.module.compute(self.name, runs)
 
     def table(self, data: Any) -> Table:
         """Return the numbers as columns for `<name>.csv`."""
-        return self.module.table(data)
+        table: Table = self.module.table(data)
+        return table
 
-    def layout(self, figure: Any) -> Any:
-        """Put the axes that `draw` needs into a matplotlib figure and return them."""
+    def layout(self, figure: Figure) -> Any:
+        """Add the axes that `draw` needs to a matplotlib figure and return them."""
         return self.module.layout(figure) if hasattr(self.module, "layout") else figure.add_subplot()
+
+    def ranges(self, data: Any) -> Table | None:
+        """Return the ranges as columns for `<name>_ranges.csv`, or None if the figure has none."""
+        table: Table | None = self.module.ranges(data) if hasattr(self.module, "ranges") else None
+        return table
+
+    def document(self, data: Any) -> str | None:
+        """Return the text of `<name>.md`, or None if the figure has none."""
+        text: str | None = self.module.document(data) if hasattr(self.module, "document") else None
+        return text
 
     def draw(self, axes: Any, data: Any) -> Any:
         """Draw into axes from `layout` and return them."""
@@ -61,12 +83,29 @@ class Drawing:
 
 
 def names(extra: bool = False) -> tuple[str, ...]:
-    """Return the names of all figures, sorted; with `extra` also those that are made only when asked for."""
+    """List the names of the figures.
+
+    Parameters
+    ----------
+    extra : bool
+        Include those that are made only if asked for by name.
+
+    Returns
+    -------
+    tuple of str
+        In alphabetical order.
+    """
     return tuple(sorted(name for name, (_, wanted) in _listing().items() if wanted or extra))
 
 
 def load(name: str) -> Drawing:
-    """Return the figure `name`; ValueError with the known names where there is none."""
+    """Return a figure by its name.
+
+    Raises
+    ------
+    ValueError
+        If the name is unknown.
+    """
     known = _listing()
     if name not in known:
         raise ValueError(f"unknown figure {name!r}; known: {', '.join(names(extra=True))}{suggestion(name, known)}")
@@ -75,12 +114,12 @@ def load(name: str) -> Drawing:
 
 @cache
 def _listing() -> dict[str, tuple[ModuleType, bool]]:
-    """Module of each name, and whether it is made without being asked for."""
-    found: dict[str, tuple[ModuleType, bool]] = {}
+    """Module of each name, and whether the figure is made by default."""
+    figures: dict[str, tuple[ModuleType, bool]] = {}
     for entry in pkgutil.iter_modules(__path__):
         if entry.name.startswith("_"):
             continue
         module = import_module(f".{entry.name}", __name__)
-        found.update({name: (module, True) for name in getattr(module, "NAMES", ())})
-        found.update({name: (module, False) for name in getattr(module, "EXTRA", ())})
-    return found
+        figures.update({name: (module, True) for name in getattr(module, "NAMES", ())})
+        figures.update({name: (module, False) for name in getattr(module, "EXTRA", ())})
+    return figures

@@ -1,7 +1,8 @@
-"""Figures 3 and 4d-f: bifurcation diagrams, the position at the section against the frequency or the coupling.
+"""Figures 3 and 4d-f: bifurcation diagrams, the position at the section over frequency or coupling.
 
-Every cell starts from the state that the scene states.  Names that end in _up and _down are the same diagrams with each
-cell continued from its neighbour; what differs between them shows coexisting attractors.
+Every cell starts from the initial state of the scene. Names that end in _up and _down are the same
+diagrams with each cell continued from its neighbour; differences between them show coexisting
+attractors.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from synchain.models.scenes.file import load_scene
 
@@ -31,7 +33,17 @@ LABELS = {"omega": r"drive frequency $\omega$", "sigma": r"coupling $\sigma$"}
 
 @dataclass(frozen=True, slots=True)
 class Diagram:
-    """A swept result with section points and the range of the swept parameter that the paper calls synchronous."""
+    """A swept result with section points.
+
+    Parameters
+    ----------
+    result : Result
+        Result with one axis.
+    axis : str
+        Name of the axis.
+    published : tuple of Interval
+        Ranges of the axis that the paper calls synchronous.
+    """
 
     result: Result
     axis: str
@@ -39,7 +51,7 @@ class Diagram:
 
 
 def compute(name: str, runs: FigureRuns) -> Diagram:
-    """Run the scene of a figure; one with several oscillators also records its synchronisation error."""
+    """Run the scene of a figure; several oscillators also record their synchronisation error."""
     plain, _, direction = name.removeprefix("figure_").partition("_")
     scene = load_scene(f"figure_{plain}")
     if scene.n > 1:
@@ -51,7 +63,20 @@ def compute(name: str, runs: FigureRuns) -> Diagram:
 
 
 def points(data: Diagram) -> tuple[np.ndarray, np.ndarray]:
-    """The section points (k, 2) as axis value and x_1, and the cell (k,) each comes from; unfinished cells have none."""
+    """Collect the section points of all finished cells.
+
+    Parameters
+    ----------
+    data : Diagram
+        Diagram.
+
+    Returns
+    -------
+    points : ndarray, shape (k, 2)
+        Value of the axis, and x_1 at the section.
+    cell : ndarray of int, shape (k,)
+        Cell of each point.
+    """
     result = data.result
     values = result.data[data.axis].values
     x = result.section.sel(state="x_1").values
@@ -61,7 +86,7 @@ def points(data: Diagram) -> tuple[np.ndarray, np.ndarray]:
 
 
 def table(data: Diagram) -> Table:
-    """One row for each section point; a cell without any has one row with its status."""
+    """Return one row for each section point; a cell without any has one row with its status."""
     result = data.result
     states = [str(name) for name in result.data.state.values]
     rows: list[tuple[Any, ...]] = []
@@ -75,14 +100,22 @@ def table(data: Diagram) -> Table:
     return Table((data.axis, "time", *states, "status"), tuple(rows))
 
 
-def draw(axes: Any, data: Diagram) -> Any:
-    """Section points as dots; grey where the oscillators are synchronous, and the published range as a thin bar."""
+def draw(axes: Axes, data: Diagram) -> Axes:
+    """Draw section points as dots, synchronous ranges in grey, the published range as a bar."""
     found, _ = points(data)
     values = data.result.data[data.axis].values
     if "sync_error" in data.result.data:
         bands(axes, synchronous(data.result))
-    axes.plot(found[:, 0], found[:, 1], linestyle="none", marker=".", markersize=_size(len(values)), color=BLACK,
-              markeredgewidth=0.0, rasterized=True)  # fmt: skip
+    axes.plot(
+        found[:, 0],
+        found[:, 1],
+        linestyle="none",
+        marker=".",
+        markersize=_size(len(values)),
+        color=BLACK,
+        markeredgewidth=0.0,
+        rasterized=True,
+    )
     axes.set(
         xlim=(values.min(), values.max()), xlabel=LABELS.get(data.axis, data.axis), ylabel=r"$\chi_1$ at the section"
     )
@@ -96,5 +129,5 @@ def draw(axes: Any, data: Diagram) -> Any:
 
 
 def _size(cells: int) -> float:
-    """Marker size in points: larger where there are few columns of dots."""
+    """Marker size in points: larger for few columns of dots."""
     return float(np.clip(700.0 / max(cells, 1), 0.9, 2.2))

@@ -1,6 +1,6 @@
-"""The exponents of a network's modes against their strength: the master stability function of the friction oscillator.
+"""The master stability function of the friction oscillator at the paper's frequencies.
 
-One panel for each frequency of the paper; grey where a mode dies out, beside the published ranges of two oscillators.
+Stable ranges are grey; the published ranges of two oscillators are drawn beside them.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
@@ -43,7 +45,19 @@ _KEPT: WeakKeyDictionary[FigureRuns, dict[Scene, MSF]] = WeakKeyDictionary()
 
 
 def curve(scene: Scene, runs: FigureRuns) -> MSF:
-    """The function of a scene's oscillator on 0 … HIGHEST; figures that share a study share it."""
+    """Return the master stability function of a scene's oscillator on 0 … HIGHEST.
+
+    Parameters
+    ----------
+    scene : Scene
+        Source of the oscillator and its parameters.
+    runs : FigureRuns
+        Figures with the same runs share the function.
+
+    Returns
+    -------
+    MSF
+    """
     pair = scene.replace(topology=topology("chain", 2), initial=None, axes=(), record=None, title="", sigma=0.0)
     kept = _KEPT.setdefault(runs, {})
     if pair not in kept:
@@ -53,21 +67,25 @@ def curve(scene: Scene, runs: FigureRuns) -> MSF:
 
 
 def effort(runs: FigureRuns) -> dict[str, Any]:
-    """Options of `exponents` that fit the quality of a runs."""
+    """Options of `exponents` that fit the quality of the runs."""
     quality = runs.quality
     return {
-        "precision": 2.0 * quality.resolution, "periods": 5.0 * quality.criterion.transient, "transient": 200.0,
-        "starts": min(quality.criterion.starts, 4), "workers": runs.workers, "show_progress": runs.show_progress,
-    }  # fmt: skip
+        "precision": 2.0 * quality.resolution,
+        "periods": 5.0 * quality.criterion.transient,
+        "transient": 200.0,
+        "starts": min(quality.criterion.starts, 4),
+        "workers": runs.workers,
+        "show_progress": runs.show_progress,
+    }
 
 
 def compute(name: str, runs: FigureRuns) -> tuple[MSF, ...]:
-    """The function at each of the paper's frequencies."""
+    """Return the function at each of the paper's frequencies."""
     return tuple(curve(Scene(topology=topology("chain", 2), parameters={"omega": omega}), runs) for omega in PAIRS)
 
 
 def table(data: tuple[MSF, ...]) -> Table:
-    """Exponent and standard error, per unit of time, for each frequency and strength."""
+    """Return exponent and standard error, per unit of time, for each frequency and strength."""
     rows = [
         (found.scene.parameters["omega"], alpha, exponent, error)
         for found in data
@@ -77,7 +95,7 @@ def table(data: tuple[MSF, ...]) -> Table:
 
 
 def ranges(data: tuple[MSF, ...]) -> Table:
-    """Ranges of alpha with a negative exponent, the uncertainties of their ends, and the kind of motion."""
+    """Return ranges of alpha with a negative exponent, errors of their ends, kind of motion."""
     rows = [
         (found.scene.parameters["omega"], low, high, *errors, found.attractors[0])
         for found in data
@@ -86,13 +104,13 @@ def ranges(data: tuple[MSF, ...]) -> Table:
     return Table(("omega", "low", "high", "low_error", "high_error", "motion"), tuple(rows))
 
 
-def layout(figure: Any) -> list[Any]:
-    """One pair of axes for each frequency, one above the other."""
+def layout(figure: Figure) -> list[Axes]:
+    """Add one pair of axes for each frequency, one above the other."""
     return list(figure.subplots(len(PAIRS), 1, sharex=True))
 
 
-def draw(axes: list[Any], data: tuple[MSF, ...]) -> list[Any]:
-    """One curve in each panel, with the published range of two oscillators as a thin bar."""
+def draw(axes: list[Axes], data: tuple[MSF, ...]) -> list[Axes]:
+    """Draw one curve in each panel, with the published range of two oscillators as a thin bar."""
     for panel, found in zip(axes, data, strict=True):
         draw_exponent(panel, found)
         row = published(2, found.scene.parameters["omega"])
@@ -109,22 +127,40 @@ def draw(axes: list[Any], data: tuple[MSF, ...]) -> list[Any]:
     return axes
 
 
-def draw_exponent(axes: Any, found: MSF) -> Any:
-    """The exponent with a band of two standard errors either side, grey where it is negative, and a line at zero."""
+def draw_exponent(axes: Axes, found: MSF) -> Axes:
+    """Draw exponents over their strengths.
+
+    A band shows two standard errors on either side, grey bands the ranges with a negative exponent.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes to draw into.
+    found : MSF
+        Master stability function.
+
+    Returns
+    -------
+    Axes
+    """
     value, error = finite(found.exponent), finite(found.stderr)
     bands(axes, found.intervals)
     axes.axhline(0.0, color="0.35", linewidth=0.6, zorder=1)
     axes.fill_between(found.alpha, value - 2 * error, value + 2 * error, color=BLUE, alpha=0.3, linewidth=0.0, zorder=2)
     axes.plot(found.alpha, value, color=BLUE, linewidth=0.9, zorder=3)
-    axes.set(xlim=(found.alpha[0], found.alpha[-1]), xlabel=r"strength of a mode $\alpha=\sigma\,|\gamma|$",
-             ylabel=r"exponent $\Lambda$ per unit of $\tau$")  # fmt: skip
+    axes.set(
+        xlim=(found.alpha[0], found.alpha[-1]),
+        xlabel=r"strength of a mode $\alpha=\sigma\,|\gamma|$",
+        ylabel=r"exponent $\Lambda$ per unit of $\tau$",
+    )
     return axes
 
 
 def finite(values: np.ndarray) -> np.ndarray:
-    """The values with NaN in place of infinities, which are not drawn."""
+    """Replace infinities, which are not drawn, by NaN."""
     return np.where(np.isfinite(values), values, np.nan)
 
 
 def _inside(found: list[Interval], limits: tuple[float, float]) -> list[Interval]:
+    """Intervals cut at the limits of an axis."""
     return [(max(a, limits[0]), min(b, limits[1])) for a, b in found if a < limits[1] and b > limits[0]]

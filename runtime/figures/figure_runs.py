@@ -1,4 +1,4 @@
-"""The runs behind the figures: how finely they are made, and a store that shares them between figures and table."""
+"""The runs behind the figures: their quality, and a store that shares them between figures."""
 
 from __future__ import annotations
 
@@ -22,11 +22,20 @@ __all__ = ["FULL", "QUICK", "FigureRuns", "Quality", "thin"]
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """How finely the figures are computed.
+    """Resolution of the figures.
 
-    points: most values kept of a scene's axis where every value is run once; grid: where synchronous ranges are looked for
-    (None: all of them); criterion and resolution (in sigma): those of the synchronous ranges; networks: sizes above the
-    paper's for which no synchronisation is expected.
+    Parameters
+    ----------
+    points : int, optional
+        Most values of a scene's axis if every value is run once; None for all.
+    grid : int, optional
+        Number of values on which synchronous ranges are searched; None for all.
+    criterion : Criterion
+        Criterion of synchronisation.
+    resolution : float
+        Width in sigma to which the ends of synchronous ranges are refined.
+    networks : tuple of int
+        Sizes above the paper's for which no synchronisation is expected.
     """
 
     points: int | None = None
@@ -49,9 +58,16 @@ QUICK = Quality(241, 121, Criterion(starts=5, transient=400.0, window=50.0), 2e-
 
 
 class FigureRuns:
-    """Runs each scene once and keeps what came out, for all figures that want it.
+    """Runs each scene once and keeps the result for all figures.
 
-    `workers` is the number of threads; a bar for each run is shown where `show_progress` says so.
+    Parameters
+    ----------
+    quality : Quality
+        Resolution of the figures.
+    workers : int, optional
+        Number of threads; all cores by default.
+    show_progress : bool or None
+        Whether to show a progress bar for each run; None shows it on terminals only.
     """
 
     def __init__(
@@ -71,7 +87,7 @@ class FigureRuns:
         return self._runs[scene]
 
     def pair(self, scene: Scene) -> Sweep:
-        """The two-oscillator probe of a scene's oscillator over alpha, on the grid of sigma 0 … 0.6."""
+        """Run the two-oscillator probe of a scene's oscillator over alpha from 0 to 1.2."""
         pair = scene.replace(topology=topology("chain", 2), initial=None, axes=(), title="", sigma=0.0)
         if pair not in self._sweeps:
             alpha = 2.0 * np.array(thin(_swept(pair, 0.6, 601), self.quality.grid).axes[0].values)
@@ -79,7 +95,7 @@ class FigureRuns:
         return self._sweeps[pair]
 
     def network(self, scene: Scene) -> Sweep:
-        """Ranges and errors of a scene's network on its own grid of sigma, by direct simulation."""
+        """Simulate a scene's network on its own grid of sigma to find its synchronous ranges."""
         if scene.topology == topology("chain", 2):
             found = self.pair(scene)
             return Sweep(0.5 * found.x, found.error, found.share, tuple(scale(found.intervals, 0.5)))
@@ -90,30 +106,59 @@ class FigureRuns:
         return self._sweeps[scene]
 
     def after(self, scene: Scene, sigma: np.ndarray, transient: float) -> Sweep:
-        """Errors and shares at these values of sigma after a transient of another length; ends are not refined."""
+        """Simulate a scene's network after a transient of another length.
+
+        Parameters
+        ----------
+        scene : Scene
+            Network.
+        sigma : ndarray, shape (k,)
+            Values of the coupling; the ends of ranges between them are not refined.
+        transient : float
+            Length of the transient in drive periods.
+
+        Returns
+        -------
+        Sweep
+        """
         criterion = replace(self.quality.criterion, transient=transient)
         options = {**self._options(1.0), "criterion": criterion, "resolution": math.inf}
         return simulate(scene.replace(axes=(), record=("sync_error",)), sigma, **options)
 
     def predicted(self, scene: Scene) -> list[Interval]:
-        """What the probe's ranges leave of a scene's values of sigma, through its exact spectrum."""
+        """Project the ranges of the probe onto a scene's values of sigma by its exact spectrum."""
         return project(self.pair(scene).intervals, scene.spectrum, max(scene.axes[0].values))
 
     def chain(self, n: int, omega: float) -> Scene:
-        """A chain whose largest |sigma gamma| goes as far as the probe (alpha = 1.2)."""
+        """Return a chain whose largest |sigma gamma| is that of the probe (alpha = 1.2)."""
         scene = Scene(topology=topology("chain", n), parameters={"omega": omega})
         largest = max(abs(value) for value in scene.spectrum.values)
         return _swept(scene, round(1.2 / largest, 3), 301)
 
     def _options(self, factor: float) -> dict[str, Any]:
+        """Options of probes and simulations; `factor` converts sigma to their own variable."""
         return {
-            "resolution": factor * self.quality.resolution, "criterion": self.quality.criterion,
-            "workers": self.workers, "show_progress": self.show_progress,
-        }  # fmt: skip
+            "resolution": factor * self.quality.resolution,
+            "criterion": self.quality.criterion,
+            "workers": self.workers,
+            "show_progress": self.show_progress,
+        }
 
 
 def thin(scene: Scene, points: int | None) -> Scene:
-    """The scene with at most `points` values on each axis: both ends and evenly chosen ones between them."""
+    """Reduce the axes of a scene to a number of values.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with axes.
+    points : int or None
+        Most values of each axis, both ends among them; None keeps all.
+
+    Returns
+    -------
+    Scene
+    """
     if points is None:
         return scene
     axes = []
@@ -125,4 +170,5 @@ def thin(scene: Scene, points: int | None) -> Scene:
 
 
 def _swept(scene: Scene, highest: float, count: int) -> Scene:
+    """Scene with an axis of the coupling from 0."""
     return scene.replace(axes=(Axis.between("sigma", 0.0, highest, count),))

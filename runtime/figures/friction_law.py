@@ -1,4 +1,4 @@
-"""Figure 1b: the friction force against the relative velocity, as the law says it and as it is integrated."""
+"""Figure 1b: friction force over relative velocity, set-valued and smoothed."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from matplotlib.axes import Axes
 
-from synchain.models.inputs.plugins import load as plugin
+from synchain.models.mechanics.components import SLIDING
 from synchain.models.mechanics.friction import regularise
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
@@ -25,7 +26,19 @@ SIZE = (COLUMN, 2.5)
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """Friction coefficient at relative velocities w: set-valued law (NaN at the jump) and smoothed; kappa of the latter."""
+    """Friction coefficient at relative velocities.
+
+    Parameters
+    ----------
+    w : ndarray, shape (k,)
+        Relative velocities.
+    sharp : ndarray, shape (k,)
+        Set-valued law, NaN at the jump.
+    smooth : ndarray, shape (k,)
+        Smoothed law.
+    kappa : float
+        Steepness of the smoothed law.
+    """
 
     w: np.ndarray
     sharp: np.ndarray
@@ -44,35 +57,42 @@ def compute(name: str, runs: FigureRuns) -> Law:
 
 
 def forces(scene: Scene) -> tuple[Any, Any]:
-    """The friction coefficient as functions of an array of relative velocities: the law itself, and smoothed."""
-    law = plugin("friction", str(scene.templates[0][1]))
-    w, kappa = sp.Symbol("w", real=True), sp.Symbol("kappa", real=True)
-    symbols = {key: sp.Symbol(key, real=True) for key in law.PARAMETERS}
-    sharp = law.force(w, **symbols)
+    """Return the friction coefficient by relative velocity, set-valued and smoothed."""
+    law = scene.model.kinds[0].friction
+    if law is None:
+        raise ValueError(f"oscillator {scene.oscillator.name!r} takes no friction law; expected a scene with one")
+    kappa = sp.Symbol("kappa", real=True)
+    symbols = {key: sp.Symbol(key, real=True) for key in law.parameters}
+    sharp = law.force
     numbers = {symbol: scene.parameters[key] for key, symbol in symbols.items()}
     numbers[kappa] = scene.parameters["kappa"]
     smooth = regularise(sharp, kappa)
-    return sp.lambdify(w, sharp.subs(numbers), "numpy"), sp.lambdify(w, smooth.subs(numbers), "numpy")
+    return sp.lambdify(SLIDING, sharp.subs(numbers), "numpy"), sp.lambdify(SLIDING, smooth.subs(numbers), "numpy")
 
 
 def table(data: Law) -> Table:
-    """Relative velocity, set-valued law, smoothed law."""
+    """Return relative velocity, set-valued law and smoothed law."""
     return Table.of(theta_r=data.w, f=data.sharp, f_smoothed=data.smooth)
 
 
-def draw(axes: Any, data: Law) -> Any:
-    """The law over the whole range, and its jump magnified in an inset."""
+def draw(axes: Axes, data: Law) -> Axes:
+    """Draw the law over the whole range, and its jump magnified in an inset."""
     axes.axhline(0.0, color="0.75", linewidth=0.6, zorder=0)
     axes.axvline(0.0, color="0.75", linewidth=0.6, zorder=0)
     axes.plot(data.w, data.smooth, color=BLUE)
-    axes.set(xlim=(-1, 1), ylim=(-0.36, 0.36), xticks=[-1, -0.5, 0, 0.5, 1], xlabel=r"relative velocity $\vartheta_r$",
-             ylabel=r"friction $f(\vartheta_r)$")  # fmt: skip
+    axes.set(
+        xlim=(-1, 1),
+        ylim=(-0.36, 0.36),
+        xticks=[-1, -0.5, 0, 0.5, 1],
+        xlabel=r"relative velocity $\vartheta_r$",
+        ylabel=r"friction $f(\vartheta_r)$",
+    )
     _magnify(axes.inset_axes((0.62, 0.17, 0.35, 0.31)), data)
     return axes
 
 
-def _magnify(inset: Any, data: Law) -> None:
-    """The jump against kappa theta_r: the law jumps, what is integrated rises smoothly."""
+def _magnify(inset: Axes, data: Law) -> None:
+    """Draw the jump over kappa theta_r: the law jumps, the smoothed law rises smoothly."""
     near = np.abs(data.w) <= 12.0 / data.kappa
     inset.plot(data.w[near] * data.kappa, data.sharp[near], color=ORANGE, linestyle="--", linewidth=0.9)
     inset.plot(data.w[near] * data.kappa, data.smooth[near], color=BLUE)

@@ -1,4 +1,4 @@
-"""Makes figures and tables into a folder."""
+"""Writing figures and tables into a folder."""
 
 from __future__ import annotations
 
@@ -25,13 +25,35 @@ def make(
     workers: int | None = None,
     show_progress: bool | None = None,
 ) -> list[Path]:
-    """Compute and draw figures (all of them where `names` is None or empty) and return the files written.
+    """Compute and draw figures.
 
-    Each figure gives `<name>.png`, `<name>.svg` and `<name>.csv`, some also `<name>_ranges.csv` or `<name>.md`.  `quick`
-    takes coarse grids and a short transient; `workers` is the number of threads (default: all cores).  A bar is shown on
-    terminals, always or never with `show_progress` None, True or False.
+    Each figure gives `<name>.png`, `<name>.svg` and `<name>.csv`, some also `<name>_ranges.csv` or
+    `<name>.md`.
 
-    Raises ValueError for an unknown name, OSError for a folder that cannot be written to; both before anything is computed.
+    Parameters
+    ----------
+    names : iterable of str or None
+        Names of the figures; all if None or empty.
+    out : path-like
+        Folder for the files.
+    quick : bool
+        Use coarse grids and a short transient.
+    workers : int, optional
+        Number of threads; all cores by default.
+    show_progress : bool or None
+        Whether to show a progress bar; None shows it on terminals only.
+
+    Returns
+    -------
+    list of Path
+        Files written.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown. Checked before any computation.
+    OSError
+        If the folder cannot be written to. Checked before any computation.
     """
     wanted = [load(name) for name in dict.fromkeys(names or all_names())]
     folder = output_folder(out)
@@ -45,13 +67,14 @@ def make(
 
 
 def produce(drawing: Drawing, runs: FigureRuns, folder: Path) -> list[Path]:
-    """Compute one figure and write its files: the numbers first, then what they look like."""
+    """Compute one figure and write its files: first the numbers, then the drawing."""
     data = drawing.compute(runs)
     texts = {f"{drawing.name}.csv": as_csv(drawing.table(data))}
-    if hasattr(drawing.module, "ranges"):
-        texts[f"{drawing.name}_ranges.csv"] = as_csv(drawing.module.ranges(data))
-    if hasattr(drawing.module, "document"):
-        texts[f"{drawing.name}.md"] = drawing.module.document(data)
+    ranges, document = drawing.ranges(data), drawing.document(data)
+    if ranges is not None:
+        texts[f"{drawing.name}_ranges.csv"] = as_csv(ranges)
+    if document is not None:
+        texts[f"{drawing.name}.md"] = document
     for name, text in texts.items():
         write_text(folder / name, text)
     with context():

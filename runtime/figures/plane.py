@@ -1,7 +1,8 @@
-"""The master stability function over complex strengths, and where a network's modes lie on it.
+"""The master stability function over complex strengths, and the modes of a network on it.
 
-A mode with a complex eigenvalue gamma has the strength alpha + i beta = -sigma gamma: with sigma it moves along a ray from
-the origin.  The network is stable where all its modes lie inside the zero contour.
+A mode with a complex eigenvalue gamma has the strength alpha + i beta = -sigma gamma: with sigma it
+moves along a ray from the origin. The network is stable if all its modes lie inside the zero
+contour.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import TwoSlopeNorm
 
 from synchain.models.graphs.topology import Topology
@@ -31,28 +33,55 @@ OMEGA, SIGMA, NODES = 1.40, 0.13, 4
 TOP = 0.6
 """Largest imaginary part."""
 FAR = 100.0
-"""Up to this coupling rays are drawn: beyond every plane of interest."""
+"""Largest coupling of the rays, beyond every plane of interest."""
 RAY: dict[str, Any] = {"color": BLACK, "linestyle": "--", "linewidth": 0.8}
-DOT: dict[str, Any] = {"color": BLACK, "linestyle": "none", "marker": "o", "markersize": 4.0, "markerfacecolor": "white",
-                       "clip_on": False, "zorder": 5}  # fmt: skip
+DOT: dict[str, Any] = {
+    "color": BLACK,
+    "linestyle": "none",
+    "marker": "o",
+    "markersize": 4.0,
+    "markerfacecolor": "white",
+    "clip_on": False,
+    "zorder": 5,
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Rays:
-    """The function over the plane and the coupling sigma at which the modes of its scene's network are marked."""
+    """A function over the plane with the modes of its scene's network.
+
+    Parameters
+    ----------
+    found : Plane
+        Master stability function.
+    sigma : float
+        Coupling at which the modes are marked.
+    """
 
     found: Plane
     sigma: float
 
 
 def uneven_ring(n: int, back: Fraction = Fraction(1, 2)) -> Topology:
-    """A ring with links of weight 1 in one direction and of weight `back` in the other, n >= 3 nodes."""
+    """Return a ring with weight 1 in one direction and another weight in the other.
+
+    Parameters
+    ----------
+    n : int
+        Number of nodes, at least 3.
+    back : Fraction
+        Weight in the other direction.
+
+    Returns
+    -------
+    Topology
+    """
     links = [(i, (i + 1) % n, Fraction(1)) for i in range(n)] + [(i, (i - 1) % n, back) for i in range(n)]
     return Topology("uneven ring", n, tuple(sorted(links)))
 
 
 def compute(name: str, runs: FigureRuns) -> Rays:
-    """The function at one frequency, for the upper half of the plane; the lower one mirrors it."""
+    """Compute the function at one frequency; the lower half of the plane mirrors the upper."""
     scene = Scene(topology=uneven_ring(NODES), parameters={"omega": OMEGA})
     count = min(runs.quality.grid or 161, 161)
     alpha, beta = np.linspace(0.0, HIGHEST, count), np.linspace(0.0, TOP, count // 2 + 1)
@@ -60,7 +89,7 @@ def compute(name: str, runs: FigureRuns) -> Rays:
 
 
 def table(data: Rays | Plane) -> Table:
-    """Exponent and standard error, per unit of time, at every point of the grid."""
+    """Return exponent and standard error, per unit of time, at every point of the grid."""
     found = data.found if isinstance(data, Rays) else data
     rows = [
         (a, b, found.exponent[i, j], found.stderr[i, j])
@@ -71,19 +100,31 @@ def table(data: Rays | Plane) -> Table:
 
 
 def ranges(data: Rays) -> Table:
-    """The zero contour, line by line."""
+    """Return the zero contour, line by line."""
     rows = [(k, a, b) for k, line in enumerate(data.found.contours) for a, b in line]
     return Table(("line", "alpha", "beta"), tuple(rows))
 
 
-def draw(axes: Any, data: Rays) -> Any:
-    """The plane with the rays of its scene's network."""
+def draw(axes: Axes, data: Rays) -> Axes:
+    """Draw the plane with the rays of its scene's network."""
     draw_plane(axes, data.found)
     return draw_rays(axes, data.found, data.sigma)
 
 
-def draw_plane(axes: Any, found: Plane) -> Any:
-    """Colours for the exponent, blue where it is negative, and a line where it is zero."""
+def draw_plane(axes: Axes, found: Plane) -> Axes:
+    """Draw exponents in colours, blue if negative, with a line at zero.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes to draw into.
+    found : Plane
+        Master stability function.
+
+    Returns
+    -------
+    Axes
+    """
     value = finite(found.exponent)
     norm = TwoSlopeNorm(0.0, *_reach(value))
     painted = axes.pcolormesh(
@@ -91,8 +132,12 @@ def draw_plane(axes: Any, found: Plane) -> Any:
     )
     for k, line in enumerate(found.contours):
         axes.plot(line[:, 0], line[:, 1], color=BLACK, linewidth=1.1, label="" if k else r"$\Lambda=0$")
-    axes.set(xlim=(found.alpha[0], found.alpha[-1]), ylim=(found.beta[0], found.beta[-1]),
-             xlabel=r"$\alpha=-\sigma\,\mathrm{Re}\,\gamma$", ylabel=r"$\beta=-\sigma\,\mathrm{Im}\,\gamma$")  # fmt: skip
+    axes.set(
+        xlim=(found.alpha[0], found.alpha[-1]),
+        ylim=(found.beta[0], found.beta[-1]),
+        xlabel=r"$\alpha=-\sigma\,\mathrm{Re}\,\gamma$",
+        ylabel=r"$\beta=-\sigma\,\mathrm{Im}\,\gamma$",
+    )
     bar = axes.figure.colorbar(painted, ax=axes, aspect=30, pad=0.02)
     bar.set_label(r"exponent $\Lambda$ per unit of $\tau$")
     bar.ax.tick_params(labelsize=7)
@@ -100,15 +145,28 @@ def draw_plane(axes: Any, found: Plane) -> Any:
 
 
 def _reach(value: np.ndarray) -> tuple[float, float]:
-    """Ends of the colours, the same distance either side of zero."""
+    """Ends of the colours, symmetric about zero."""
     size = float(np.nanmax(np.abs(value), initial=0.0)) or 1.0
     return -size, size
 
 
-def draw_rays(axes: Any, found: Plane, sigma: float | None = None) -> Any:
-    """The way of every mode of the scene's network through the part of the plane that is drawn, with dots at `sigma`.
+def draw_rays(axes: Axes, found: Plane, sigma: float | None = None) -> Axes:
+    """Draw the ray of every mode of the scene's network.
 
-    Only those that enter it are seen: of conjugate modes that with beta >= 0 where the plane ends at beta = 0.
+    Of conjugate modes only the one with beta >= 0 is seen if the plane ends at beta = 0.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes of the plane.
+    found : Plane
+        Master stability function.
+    sigma : float, optional
+        Coupling at which the modes are marked by dots.
+
+    Returns
+    -------
+    Axes
     """
     graph = found.scene.topology
     still: dict[str, Any] = {"scalex": False, "scaley": False}
@@ -120,11 +178,19 @@ def draw_rays(axes: Any, found: Plane, sigma: float | None = None) -> Any:
             (dot,) = axes.plot(sigma * unit.real, sigma * unit.imag, **DOT, **still)
             dot.set_label(rf"$\sigma={sigma:.3g}$")
     handles = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
-    axes.figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=3, handlelength=1.8,
-                       columnspacing=1.4, borderpad=0.1)  # fmt: skip
+    axes.figure.legend(
+        handles.values(),
+        handles.keys(),
+        loc="outside upper center",
+        ncols=3,
+        handlelength=1.8,
+        columnspacing=1.4,
+        borderpad=0.1,
+    )
     return axes
 
 
 def _within(found: Plane, point: complex) -> bool:
+    """True if a point lies in the drawn part of the plane."""
     across, up = (row[0] <= value <= row[-1] for row, value in ((found.alpha, point.real), (found.beta, point.imag)))
     return bool(across and up)

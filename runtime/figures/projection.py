@@ -1,9 +1,9 @@
-"""Figures 5-8: the two-oscillator probe, projected through the eigenvalues of a network onto its own error curve.
+"""Figures 5-8: the two-oscillator probe, projected through the eigenvalues of a network.
 
-Top left the probe e_II(alpha), drawn vertically, and the exponent of a mode with an axis of its own, whose changes of sign
-are marked; top right the lines alpha = sigma |gamma_k|; below the network's error.
-Grey bands carry the probe's synchronous ranges to the lines; where all lines are inside, a darker band drops from there:
-the predicted range of sigma.
+Top left: the probe e_II(alpha), drawn vertically, and the exponent of a mode with an axis of its
+own, whose changes of sign are marked. Top right: the lines alpha = sigma |gamma_k|. Below: the
+error of the network. Grey bands carry the probe's synchronous ranges to the lines. If all lines are
+inside, a darker band leads down from there: the predicted range of sigma.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
@@ -39,7 +41,21 @@ DARK = "#bdbdbd"
 
 @dataclass(frozen=True, slots=True)
 class Projection:
-    """Probe and exponent in alpha, network in sigma, the ranges predicted from the probe and published for the network."""
+    """Probe, network and ranges of one figure.
+
+    Parameters
+    ----------
+    scene : Scene
+        Network.
+    probe : Sweep
+        Two-oscillator probe in alpha.
+    network : Sweep
+        Network in sigma.
+    predicted, published : tuple of Interval
+        Ranges of sigma predicted from the probe, and published.
+    exponent : MSF
+        Master stability function.
+    """
 
     scene: Scene
     probe: Sweep
@@ -50,17 +66,21 @@ class Projection:
 
 
 def compute(name: str, runs: FigureRuns) -> Projection:
-    """Sweep the probe and the network of a figure's scene, and take the exponent from its tangent equations."""
+    """Sweep the probe and the network of a figure's scene, and compute the exponents."""
     scene = load_scene(name)
     row = published(scene.n, scene.parameters["omega"])
     return Projection(
-        scene, runs.pair(scene), runs.network(scene), tuple(runs.predicted(scene)), row.intervals if row else (),
+        scene,
+        runs.pair(scene),
+        runs.network(scene),
+        tuple(runs.predicted(scene)),
+        row.intervals if row else (),
         curve(scene, runs),
-    )  # fmt: skip
+    )
 
 
 def table(data: Projection) -> Table:
-    """Errors (median over the starts), share of the starts that synchronised, how they ended; exponents and their errors."""
+    """Return errors (median over the starts), shares and status; exponents and their errors."""
     rows: list[tuple[Any, ...]] = []
     for what, sweep in (("probe", data.probe), ("network", data.network)):
         for x, error, share in zip(sweep.x, sweep.error, sweep.share, strict=True):
@@ -73,18 +93,20 @@ def table(data: Projection) -> Table:
 
 
 def ranges(data: Projection) -> Table:
-    """Ranges: synchronous by the probe and stable by the exponent in alpha; predicted, measured and published in sigma."""
+    """Return the synchronous ranges of probe and exponent in alpha, of the network in sigma."""
     groups = (
-        ("probe", "alpha", data.probe.intervals), ("exponent", "alpha", data.exponent.intervals),
-        ("predicted", "sigma", data.predicted), ("measured", "sigma", data.network.intervals),
+        ("probe", "alpha", data.probe.intervals),
+        ("exponent", "alpha", data.exponent.intervals),
+        ("predicted", "sigma", data.predicted),
+        ("measured", "sigma", data.network.intervals),
         ("published", "sigma", data.published),
-    )  # fmt: skip
+    )
     rows = [(what, variable, low, high) for what, variable, found in groups for low, high in found]
     return Table(("range", "variable", "low", "high"), tuple(rows))
 
 
-def layout(figure: Any) -> tuple[Any, Any, Any]:
-    """Axes of the probe (top left), of the lines (top right) and of the network (below the lines)."""
+def layout(figure: Figure) -> tuple[Axes, Axes, Axes]:
+    """Add axes for the probe (top left), lines (top right) and the network (below the lines)."""
     figure.set_layout_engine("none")  # the panels stand so close that the bands run through
     left, middle, right = (0.12, 0.345), 0.375, 0.885
     rays = figure.add_axes((middle, 0.40, right - middle, 0.51))
@@ -93,7 +115,7 @@ def layout(figure: Any) -> tuple[Any, Any, Any]:
     return probe, rays, network
 
 
-def draw(axes: tuple[Any, Any, Any], data: Projection) -> tuple[Any, Any, Any]:
+def draw(axes: tuple[Axes, Axes, Axes], data: Projection) -> tuple[Axes, Axes, Axes]:
     """Draw probe, lines and network into the three axes of `layout`."""
     probe, rays, network = axes
     _draw_probe(probe, data)
@@ -106,7 +128,7 @@ def draw(axes: tuple[Any, Any, Any], data: Projection) -> tuple[Any, Any, Any]:
     return axes
 
 
-def _draw_probe(axes: Any, data: Projection) -> None:
+def _draw_probe(axes: Axes, data: Projection) -> None:
     bands(axes, data.probe.intervals, horizontal=True)
     error = _finite(data.probe.error)
     axes.plot(error, data.probe.x, color=BLACK, linewidth=0.8)
@@ -118,7 +140,7 @@ def _draw_probe(axes: Any, data: Projection) -> None:
     axes.tick_params(axis="x", labeltop=True, labelbottom=False)
 
 
-def _draw_exponent(axes: Any, data: Projection) -> None:
+def _draw_exponent(axes: Axes, data: Projection) -> None:
     """The exponent against its own axis below the panel, with a dot where it changes its sign."""
     found, value = data.exponent, finite(data.exponent.exponent)
     own = axes.twiny()
@@ -126,8 +148,16 @@ def _draw_exponent(axes: Any, data: Projection) -> None:
     own.axvline(0.0, color=BLUE, linewidth=0.5, linestyle=":")
     own.plot(value, found.alpha, color=BLUE, linewidth=0.7)
     ends = [end for interval in found.intervals for end in interval if found.alpha[0] < end < found.alpha[-1]]
-    own.plot([0.0] * len(ends), ends, linestyle="none", marker="o", markersize=2.6, color=BLUE, markerfacecolor="white",
-             markeredgewidth=0.8)  # fmt: skip
+    own.plot(
+        [0.0] * len(ends),
+        ends,
+        linestyle="none",
+        marker="o",
+        markersize=2.6,
+        color=BLUE,
+        markerfacecolor="white",
+        markeredgewidth=0.8,
+    )
     low, high = float(np.nanmin(value, initial=0.0)), float(np.nanmax(value, initial=0.0))
     room = 0.08 * (high - low) or 1.0
     own.set_xlim(high + room, low - room)
@@ -138,7 +168,7 @@ def _draw_exponent(axes: Any, data: Projection) -> None:
     own.tick_params(axis="x", colors=BLUE, labelsize=6.5)
 
 
-def _draw_rays(axes: Any, data: Projection) -> None:
+def _draw_rays(axes: Axes, data: Projection) -> None:
     low, high = 0.0, max(data.scene.axes[0].values)
     ceiling = float(data.probe.x[-1])
     bands(axes, data.probe.intervals, horizontal=True)
@@ -150,16 +180,25 @@ def _draw_rays(axes: Any, data: Projection) -> None:
         axes.plot([low, high], [0.0, high * size], color=color, linestyle=dashes, linewidth=0.7)
         for a, b in intersect(scale(data.probe.intervals, 1.0 / size), [(low, high)]):
             axes.plot([a, b], [a * size, b * size], color=color, linewidth=1.8, solid_capstyle="butt")
-        axes.annotate(f"${sp.latex(-mode.exact, order='rev-lex')}$", (high, min(high * size, ceiling)), xytext=(3, 0),
-                      textcoords="offset points", fontsize=6.5, color=color, va="center", annotation_clip=False)  # fmt: skip
+        axes.annotate(
+            f"${sp.latex(-mode.exact, order='rev-lex')}$",
+            (high, min(high * size, ceiling)),
+            xytext=(3, 0),
+            textcoords="offset points",
+            fontsize=6.5,
+            color=color,
+            va="center",
+            annotation_clip=False,
+        )
     axes.set(xlim=(low, high), ylim=(0.0, ceiling))
-    axes.annotate(r"$|\gamma_k|$", (1.0, 1.0), xycoords="axes fraction", xytext=(3, 8), textcoords="offset points",
-                  fontsize=7.0)  # fmt: skip
+    axes.annotate(
+        r"$|\gamma_k|$", (1.0, 1.0), xycoords="axes fraction", xytext=(3, 8), textcoords="offset points", fontsize=7.0
+    )
     axes.set_title(r"$|\alpha| = \sigma\,|\gamma_k|$", fontsize=8.0, pad=5)
     axes.tick_params(labelleft=False, labelbottom=False)
 
 
-def _draw_network(axes: Any, data: Projection) -> None:
+def _draw_network(axes: Axes, data: Projection) -> None:
     bands(axes, data.predicted, color=DARK)
     error = _finite(data.network.error)
     axes.plot(data.network.x, error, color=BLACK, linewidth=0.8)
@@ -170,14 +209,26 @@ def _draw_network(axes: Any, data: Projection) -> None:
     bracket(axes, data.published, 0.80, ORANGE)
 
 
-def _explain(axes: Any, data: Projection) -> None:
-    """The legend, in the empty corner below the probe."""
-    bars = [Line2D([], [], color=color, marker="|", markersize=4, label=what)
-            for what, color in (("measured", BLUE), ("published", ORANGE))]  # fmt: skip
+def _explain(axes: Axes, data: Projection) -> None:
+    """Draw the legend in the empty corner below the probe."""
+    bars = [
+        Line2D([], [], color=color, marker="|", markersize=4, label=what)
+        for what, color in (("measured", BLUE), ("published", ORANGE))
+    ]
     grey = [Patch(color=GREY, label="probe"), Patch(color=DARK, label="predicted")]
     title = f"$n={data.scene.n}$\n$\\omega={data.scene.parameters['omega']:.2f}$\nsynchronous:"
-    legend = axes.legend(handles=[*grey, *bars], title=title, fontsize=6.5, title_fontsize=7, handlelength=1.3, borderpad=0,
-                         loc="upper left", bbox_to_anchor=(-0.45, -0.22), labelspacing=0.5, alignment="left")  # fmt: skip
+    legend = axes.legend(
+        handles=[*grey, *bars],
+        title=title,
+        fontsize=6.5,
+        title_fontsize=7,
+        handlelength=1.3,
+        borderpad=0,
+        loc="upper left",
+        bbox_to_anchor=(-0.45, -0.22),
+        labelspacing=0.5,
+        alignment="left",
+    )
     legend.set_in_layout(False)
 
 

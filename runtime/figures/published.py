@@ -1,7 +1,7 @@
-"""What the paper publishes, as data: measured values are compared with it, and it is never fed into a computation.
+"""Published results of the paper, as data for comparison; no computation uses them.
 
-Source: Marszal, Saha, Jankowski & Stefański, Synchronization in arrays of coupled self-induced friction oscillators,
-Eur. Phys. J. Special Topics (2016).
+Source: Marszal, Saha, Jankowski & Stefański, Synchronization in arrays of coupled self-induced
+friction oscillators, Eur. Phys. J. Special Topics (2016).
 """
 
 from __future__ import annotations
@@ -15,7 +15,19 @@ __all__ = ["NOT_PERIODIC", "PAIRS", "PUBLISHED", "Published", "published"]
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """The synchronous ranges of sigma that are printed for a chain of n oscillators at one omega."""
+    """Published synchronous ranges of a chain.
+
+    Parameters
+    ----------
+    n : int
+        Number of oscillators.
+    omega : float
+        Drive frequency.
+    intervals : tuple of Interval
+        Synchronous ranges of sigma.
+    remark : str
+        Remark of the paper.
+    """
 
     n: int
     omega: float
@@ -48,7 +60,7 @@ NOT_PERIODIC = (1.40, 1.55)
 
 
 def published(n: int, omega: float) -> Published | None:
-    """The printed row for n oscillators at omega, None where the paper has none."""
+    """Return the published row for n oscillators at omega, or None if the paper has none."""
     for row in PUBLISHED:
         if row.n == n and row.omega == omega:
             return row

@@ -1,4 +1,4 @@
-"""A sensible picture of any result: error curve, bifurcation diagram, map or phase portrait."""
+"""Default plot of a result: error curve, bifurcation diagram, map or phase portrait."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 
 from ..results.result import Result
 from ..support.status import Status
@@ -18,22 +19,39 @@ KINDS = ("error", "section", "map", "phase", "end")
 CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
 SIZE = (4.8, 3.4)
 FINEST = 1000
-"""Values of each axis of a map that are drawn; a figure has fewer points than that."""
+"""Most values of each axis of a map that are drawn; a figure has fewer points than that."""
 ROUNDING = 1e-9
-"""Synchronisation errors below this are drawn as zero."""
+"""Synchronisation errors below this value are drawn as zero."""
 MARKED = 60
-"""Up to so many cells are marked by a dot each."""
+"""Most cells that are each marked by a dot."""
 
 
-def draw_result(result: Result, axes: Any = None, kind: str | None = None) -> Any:
-    """Draw a result and return the axes; a new figure is made where none are given.
+def draw_result(result: Result, axes: Axes | None = None, kind: str | None = None) -> Axes:
+    """Draw a result.
 
-    `kind` is "error" (synchronisation error against one axis), "section" (section points against one axis, or each
-    against the next), "map" (colours over two axes), "phase" (trajectories) or "end" (final states); by default the first
-    of these that the result's axes and records allow.  Of more axes than a plot has, the leading ones are kept at their
-    first value; a phase portrait shows the first cell.  Cells that did not finish are left out and counted above the axes.
+    Axes in excess of those of the plot are kept at their first value, the leading ones first. A
+    phase portrait shows the first cell. Cells that did not finish are omitted and counted above the
+    axes.
 
-    Raises ValueError for an unknown kind or one that this result has no numbers for.
+    Parameters
+    ----------
+    result : Result
+        Result to draw.
+    axes : Axes, optional
+        Axes to draw into; by default those of a new figure.
+    kind : {"error", "section", "map", "phase", "end"}, optional
+        Synchronisation error over one axis, section points over one axis or each over the one
+        before, colours over two axes, trajectories, or final states. By default the most specific
+        kind that the axes and records of the result allow.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ValueError
+        If the kind is unknown, or if the result has no numbers for it.
     """
     if kind is not None and kind not in KINDS:
         raise ValueError(f"unknown kind of plot {kind!r}; known: {', '.join(KINDS)}")
@@ -54,7 +72,7 @@ def draw_result(result: Result, axes: Any = None, kind: str | None = None) -> An
 
 
 def _possible(result: Result) -> tuple[str, ...]:
-    """The kinds that a result has numbers for, the most telling first."""
+    """Kinds of plot that a result has numbers for, the most specific first."""
     count, data = result.data.status.ndim, result.data
     kinds = []
     if count >= 2:
@@ -71,7 +89,7 @@ def _possible(result: Result) -> tuple[str, ...]:
 
 
 def _cut(result: Result, keep: int) -> tuple[xr.Dataset, str]:
-    """The last `keep` axes of a result with the others at their first value, unfinished cells set to NaN."""
+    """Select the last `keep` axes of a result; cells that did not finish become NaN."""
     data = result.data
     leading = data.status.dims[: max(data.status.ndim - keep, 0)]
     words = ", ".join(f"{symbol(str(name))} = {float(data[name][0]):.4g}" for name in leading)
@@ -86,12 +104,13 @@ def _cut(result: Result, keep: int) -> tuple[xr.Dataset, str]:
 
 
 def _along(data: xr.Dataset, result: Result) -> tuple[np.ndarray, str]:
-    """Values and name of what a one-dimensional result runs over."""
+    """Values and name of the axis of a one-dimensional result."""
     name = result.scene.axes[0].name if result.scene.zipped else str(data.status.dims[0])
     return data[name].values, name
 
 
-def _error(axes: Any, data: xr.Dataset, result: Result) -> Any:
+def _error(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
+    """Synchronisation error over the axis."""
     x, name = _along(data, result)
     order = np.argsort(x, kind="stable")
     marker = "." if len(x) <= MARKED else None
@@ -102,13 +121,19 @@ def _error(axes: Any, data: xr.Dataset, result: Result) -> Any:
     return axes
 
 
-def _section(axes: Any, data: xr.Dataset, result: Result) -> Any:
-    """The first state other than the section's: against the axis where there is one, else against its next value."""
+def _section(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
+    """First state other than the section's, over the axis if there is one, else its return map."""
     state = next(
         (s for s in map(str, data.state.values) if s != result.scene.section.variable), str(data.state.values[0])
     )
     y = data.section.sel(state=state).values
-    dots = {"linestyle": "none", "marker": ".", "markeredgewidth": 0.0, "color": BLACK, "rasterized": True}
+    dots: dict[str, Any] = {
+        "linestyle": "none",
+        "marker": ".",
+        "markeredgewidth": 0.0,
+        "color": BLACK,
+        "rasterized": True,
+    }
     if data.status.ndim == 0:
         axes.plot(y[:-1], y[1:], markersize=3.0, **dots)
         axes.set(xlabel=f"{symbol(state)} at {_section_words(result)}", ylabel=f"{symbol(state)} the next time")
@@ -120,13 +145,13 @@ def _section(axes: Any, data: xr.Dataset, result: Result) -> Any:
 
 
 def _section_words(result: Result) -> str:
-    """The section as the axis labels have it: its state as a formula, the direction and a level other than 0."""
+    """The section for an axis label: state as a formula, direction and a level other than 0."""
     section = result.scene.section
     return f"{symbol(section.variable)}{str(section).removeprefix(section.variable)}"
 
 
-def _map(axes: Any, data: xr.Dataset, result: Result) -> Any:
-    """Colours over the last two axes: error, else number of section points, else the first state at the end."""
+def _map(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
+    """Colours over the last two axes: error, else number of section points, else final state."""
     if "sync_error" in data:
         values, label = data.sync_error, "average synchronisation error"
     elif "section_count" in data:
@@ -141,15 +166,16 @@ def _map(axes: Any, data: xr.Dataset, result: Result) -> Any:
     return axes
 
 
-def _phase(axes: Any, data: xr.Dataset, result: Result) -> Any:
-    """Velocity against position of every oscillator, in the first cell; of many the first state over time, in colours."""
+def _phase(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
+    """Velocity over position in the first cell; for many oscillators colours over time."""
     data = data.isel({name: 0 for name in data.status.dims})
     own = [_own(data, i) for i in range(1, result.scene.n + 1)]
     if len(own) > len(CYCLE):
         values = data.trajectory.sel(state=[names[0] for names in own])
         time = data.trajectory_time.values
-        painted = axes.pcolormesh(time, np.arange(1, len(own) + 1), values.T, shading="nearest", cmap="cividis",
-                                  rasterized=True)  # fmt: skip
+        painted = axes.pcolormesh(
+            time, np.arange(1, len(own) + 1), values.T, shading="nearest", cmap="cividis", rasterized=True
+        )
         axes.set(xlabel="time", ylabel="oscillator")
         axes.figure.colorbar(painted, ax=axes, label=_common(names[0] for names in own))
         return axes
@@ -161,18 +187,18 @@ def _phase(axes: Any, data: xr.Dataset, result: Result) -> Any:
 
 
 def _own(data: xr.Dataset, i: int) -> tuple[str, str]:
-    """The first two states of oscillator `i` (from 1); the first one twice where it has no other."""
+    """First two states of oscillator `i` (from 1); the first one twice if there is no other."""
     names = [str(name) for name in data.state.values if str(name).rpartition("_")[2] == str(i)]
     return names[0], names[min(1, len(names) - 1)]
 
 
 def _common(states: Iterable[str]) -> str:
-    """What states of several oscillators are called without their numbers: one name, or several with commas."""
+    """Name of states of several oscillators without their numbers; several names with commas."""
     return ", ".join(dict.fromkeys(symbol(name.rpartition("_")[0]) for name in states))
 
 
-def _end(axes: Any, data: xr.Dataset, result: Result) -> Any:
-    """Final state: of every oscillator against the axis, or against one another."""
+def _end(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
+    """Final states of every oscillator, over the axis if there is one."""
     own = [_own(data, i) for i in range(1, result.scene.n + 1)]
     first, second = (_common(names[k] for names in own) for k in (0, 1))
     along = _along(data, result) if data.status.ndim else None
@@ -189,16 +215,22 @@ def _end(axes: Any, data: xr.Dataset, result: Result) -> Any:
     return _legend(_widen(axes), result)
 
 
-def _legend(axes: Any, result: Result) -> Any:
-    """Which oscillator has which colour, above the axes; nothing for one oscillator or more than there are colours."""
+def _legend(axes: Axes, result: Result) -> Axes:
+    """Colours of the oscillators above the axes, if there are several but no more than colours."""
     if 1 < result.scene.n <= len(CYCLE):
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(CYCLE), handlelength=1.0, columnspacing=1.0,
-                    borderpad=0.2)  # fmt: skip
+        axes.legend(
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=len(CYCLE),
+            handlelength=1.0,
+            columnspacing=1.0,
+            borderpad=0.2,
+        )
     return axes
 
 
-def _widen(axes: Any) -> Any:
-    """Limits at least a hundredth of the size of the numbers apart, so that round-off is not blown up to a pattern."""
+def _widen(axes: Axes) -> Axes:
+    """Widen the limits to a hundredth of the numbers, so that rounding errors show no pattern."""
     for low, high, put in ((*axes.get_xlim(), axes.set_xlim), (*axes.get_ylim(), axes.set_ylim)):
         least = 0.01 * max(abs(low), abs(high), 1e-3)
         if high - low < least:

@@ -1,7 +1,8 @@
-"""The skeleton of the bifurcation diagram of figure 3: periodic orbits and their bifurcations over the motion itself.
+"""The skeleton of the bifurcation diagram of figure 3: periodic orbits and their bifurcations.
 
-Cloud and orbits are those of set-valued friction, over a range of frequencies that starts before that of the paper, where
-the motion is periodic.  Each orbit is drawn where it crosses the section of figure 3.
+Motion and orbits are those of set-valued friction, over a range of frequencies that starts below
+that of the paper, where the motion is periodic. Each orbit is drawn at its crossings of the section
+of figure 3.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from synchain.models.scenes.axis import Axis
@@ -37,7 +39,7 @@ PERIODS = (1, 2, 4)
 COLOURS = {1: PURPLE, 2: ORANGE, 4: BLUE}
 CLOUD = "#b4b4b4"
 CROWDED, INSET = ((1.443, 1.484), (0.585, 0.611)), (0.11, 0.08, 0.36, 0.35)
-"""The part that is drawn larger, and where."""
+"""Magnified part of the diagram, and the position of its inset."""
 MARKERS = {
     BifurcationKind.PERIOD_DOUBLING: "o",
     BifurcationKind.FOLD: "s",
@@ -46,18 +48,38 @@ MARKERS = {
 }
 STABLE: dict[str, Any] = {"linestyle": "-", "linewidth": 1.2}
 UNSTABLE: dict[str, Any] = {"linestyle": "--", "dashes": (2.5, 1.2), "linewidth": 0.8}
-MARK: dict[str, Any] = {"linestyle": "none", "markersize": 3.6, "markerfacecolor": "white", "markeredgewidth": 0.9,
-                        "zorder": 5}  # fmt: skip
+MARK: dict[str, Any] = {
+    "linestyle": "none",
+    "markersize": 3.6,
+    "markerfacecolor": "white",
+    "markeredgewidth": 0.9,
+    "zorder": 5,
+}
 SAME = 1e-9
-"""Bifurcations of one kind as close as this are one, seen from both branches that meet there."""
+"""Largest distance of two bifurcations of one kind that are one, seen from both branches."""
 FULL = (901, 121, 16)
-"""Values of omega of the cloud, those at which orbits are followed, and at how many of these they are looked for."""
+"""Number of values of omega for the motion, for following orbits and for their search."""
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """An orbit of a branch at a value of the parameter, where it crosses the section (k,), and its phases in words; at a
-    bifurcation its kind and residual."""
+    """An orbit of a branch.
+
+    Parameters
+    ----------
+    value : float
+        Value of the parameter.
+    orbit : PeriodicOrbit
+        Orbit.
+    x : ndarray, shape (k,)
+        Positions at the section.
+    phases : str
+        Phases of stick and slip in words.
+    kind : BifurcationKind, optional
+        Kind of a bifurcation at this orbit.
+    residual : float
+        Residual of the bifurcation.
+    """
 
     value: float
     orbit: PeriodicOrbit
@@ -69,14 +91,22 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Skeleton:
-    """The diagram, and for each branch its orbits in the order of the parameter."""
+    """Bifurcation diagram with the branches of orbits.
+
+    Parameters
+    ----------
+    diagram : Diagram
+        Motion.
+    branches : tuple of tuple of Place
+        Orbits of each branch in the order of the parameter.
+    """
 
     diagram: Diagram
     branches: tuple[tuple[Place, ...], ...]
 
 
 def compute(name: str, runs: FigureRuns) -> Skeleton:
-    """Run the scene of figure 3 with set-valued friction, and find its orbits of one, two and four drive periods."""
+    """Run the scene of figure 3 with set-valued friction and find its skeleton."""
     scene = load_scene("figure_3").replace(contact="set-valued")
     cloud, values, looks = FULL
     grid = runs.quality.grid
@@ -87,7 +117,7 @@ def compute(name: str, runs: FigureRuns) -> Skeleton:
 
 
 def _placed(scene: Scene, branch: Branch) -> tuple[Place, ...]:
-    """The orbits of a branch and those at its bifurcations, with their points at the section."""
+    """Orbits of a branch and at its bifurcations, with their points at the section."""
     found = [
         Place(float(value), orbit, np.empty(0), phases.words)
         for value, orbit, phases in zip(branch.values, branch.orbits, branch.phases, strict=True)
@@ -99,29 +129,33 @@ def _placed(scene: Scene, branch: Branch) -> tuple[Place, ...]:
 
 
 def _crossings(scene: Scene, name: str, orbits: list[PeriodicOrbit]) -> list[np.ndarray]:
-    """The positions at which orbits cross the scene's section, in the order of time, all over the longest of their cycles.
+    """Positions at which orbits cross the scene's section, in the order of time.
 
-    Two cycles are run and the first half of the crossings is kept, so that one at the start is counted once.
+    Two of the longest cycles are run, and the first half of the crossings is kept, so that a
+    crossing at the start is counted once.
     """
     state = np.array([orbit.state for orbit in orbits])
     values = [orbit.scene.parameters[name] for orbit in orbits]
     axes = {name: values, "x_1": state[:, 0].tolist(), "v_1": state[:, 1].tolist()}
     twice = scene.replace(
-        axes=tuple(Axis(key, value) for key, value in axes.items()), zipped=True, transient=0.0,
-        window=2.0 * max(orbit.periods for orbit in orbits), rtol=1e-11,
-    )  # fmt: skip
+        axes=tuple(Axis(key, value) for key, value in axes.items()),
+        zipped=True,
+        transient=0.0,
+        window=2.0 * max(orbit.periods for orbit in orbits),
+        rtol=1e-11,
+    )
     found = run(twice, show_progress=False)
     each = found.section.sel(state="x_1").values
     return [x[: (int(count) + 1) // 2] for x, count in zip(each, found.section_count.values, strict=True)]
 
 
 def _periods(branch: tuple[Place, ...]) -> int:
-    """Drive periods of a branch's orbits: that it was born of has fewer."""
+    """Drive periods of a branch's orbits; the orbit from which the branch is born has fewer."""
     return max(place.orbit.periods for place in branch)
 
 
 def table(data: Skeleton) -> Table:
-    """One row for each orbit and crossing of the section."""
+    """Return one row for each orbit and crossing of the section."""
     rows = []
     for number, branch in enumerate(data.branches):
         for place in branch:
@@ -133,7 +167,7 @@ def table(data: Skeleton) -> Table:
 
 
 def ranges(data: Skeleton) -> Table:
-    """One row for each bifurcation of each branch, at the lowest of its points at the section."""
+    """Return one row for each bifurcation of each branch, at its lowest point at the section."""
     rows = [
         (number, place.orbit.periods, place.kind, place.value, place.residual, min(place.x, default=math.nan))
         for number, branch in enumerate(data.branches)
@@ -144,7 +178,7 @@ def ranges(data: Skeleton) -> Table:
 
 
 def document(data: Skeleton) -> str:
-    """The bifurcations as a table in Markdown, in the order of the parameter; one that two branches share stands once."""
+    """Return the bifurcations as a table in Markdown; a shared one is listed once."""
     lines = ["| ω | drive periods | kind | residual |", "|---|---|---|---|"]
     last: tuple[Any, ...] = (None, math.nan)
     for _, periods, kind, value, residual, _ in sorted(ranges(data).rows, key=lambda row: row[3]):
@@ -154,9 +188,8 @@ def document(data: Skeleton) -> str:
     return "\n".join(lines) + "\n"
 
 
-def draw(axes: Any, data: Skeleton) -> Any:
-    """The motion as grey dots, stable orbits as lines, unstable ones dashed, bifurcations by their kind, and where they are
-    many the same once more, larger."""
+def draw(axes: Axes, data: Skeleton) -> Axes:
+    """Draw the motion as grey dots, stable orbits as lines, unstable ones dashed."""
     _diagram(axes, data, 0.9)
     axes.set(xlim=(LOW, HIGH), xlabel=r"drive frequency $\omega$", ylabel=r"$\chi_1$ at the section")
     if CROWDED[0][0] > LOW and CROWDED[0][1] < HIGH:
@@ -166,16 +199,26 @@ def draw(axes: Any, data: Skeleton) -> Any:
         inset.tick_params(labelsize=5.5, pad=2)
         inset.locator_params(nbins=3)
         axes.indicate_inset_zoom(inset, edgecolor=BLACK, linewidth=0.5)
-    axes.figure.legend(handles=_key(data), loc="outside upper center", ncols=3, handlelength=1.8, columnspacing=1.2,
-                       borderpad=0.1)  # fmt: skip
+    axes.figure.legend(
+        handles=_key(data), loc="outside upper center", ncols=3, handlelength=1.8, columnspacing=1.2, borderpad=0.1
+    )
     return axes
 
 
-def _diagram(axes: Any, data: Skeleton, size: float) -> None:
-    """The motion in dots of a size in points, the branches over it, and their bifurcations."""
+def _diagram(axes: Axes, data: Skeleton, size: float) -> None:
+    """Draw motion, branches and bifurcations."""
     cloud, _ = points(data.diagram)
-    axes.plot(cloud[:, 0], cloud[:, 1], linestyle="none", marker=".", markersize=size, color=CLOUD,
-              markeredgewidth=0.0, rasterized=True, zorder=1)  # fmt: skip
+    axes.plot(
+        cloud[:, 0],
+        cloud[:, 1],
+        linestyle="none",
+        marker=".",
+        markersize=size,
+        color=CLOUD,
+        markeredgewidth=0.0,
+        rasterized=True,
+        zorder=1,
+    )
     for branch in data.branches:
         colour = COLOURS.get(_periods(branch), BLACK)
         for stable, line in curves(branch):
@@ -187,7 +230,18 @@ def _diagram(axes: Any, data: Skeleton, size: float) -> None:
 
 
 def curves(branch: tuple[Place, ...]) -> list[tuple[bool, list[tuple[float, float]]]]:
-    """The curves of a branch at the section, cut where its stability or the number of crossings changes."""
+    """Cut a branch into curves at the section if its stability or the number of crossings changes.
+
+    Parameters
+    ----------
+    branch : tuple of Place
+        Orbits in the order of the parameter.
+
+    Returns
+    -------
+    list of (bool, list of (float, float))
+        Stability, and points (value, position), of each curve.
+    """
     made: list[tuple[bool, list[tuple[float, float]]]] = []
     order, style = branch[0].x, None
     for before, after in pairwise(branch):
@@ -205,19 +259,20 @@ def curves(branch: tuple[Place, ...]) -> list[tuple[bool, list[tuple[float, floa
 
 
 def _stable(before: Place, after: Place) -> bool:
-    """True where the orbits between two places are stable, as that which is not at a bifurcation says."""
+    """True if the orbits between two places are stable, by the one that is not at a bifurcation."""
     own = next((place for place in (before, after) if place.kind is None), None)
     return own.orbit.stable if own else max(abs(place.orbit.multipliers[0]) for place in (before, after)) < 1.0 + SAME
 
 
 def _key(data: Skeleton) -> list[Line2D]:
-    """What colours, lines and marks stand for, those that occur."""
+    """Legend of the colours, lines and marks that occur."""
     counts = sorted({_periods(branch) for branch in data.branches})
     found = {place.kind for branch in data.branches for place in branch}
     kinds = [kind for kind in MARKERS if kind in found]
     return [
         *(Line2D([], [], color=COLOURS.get(n, BLACK), label=f"{n} drive period{'s' if n > 1 else ''}") for n in counts),
-        Line2D([], [], color=BLACK, label="stable", **STABLE), Line2D([], [], color=BLACK, label="unstable", **UNSTABLE),
+        Line2D([], [], color=BLACK, label="stable", **STABLE),
+        Line2D([], [], color=BLACK, label="unstable", **UNSTABLE),
         Line2D([], [], color=CLOUD, marker=".", linestyle="none", label="motion"),
         *(Line2D([], [], markeredgecolor=BLACK, marker=MARKERS[kind], label=kind, **MARK) for kind in kinds),
-    ]  # fmt: skip
+    ]

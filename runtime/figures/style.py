@@ -1,9 +1,10 @@
-"""How figures look and how they are written.
+"""Appearance of the figures, and writing their files.
 
-Every figure has an opaque white ground, so that it reads the same on paper, on a light and on a dark screen.  Colours are
-those of Okabe & Ito (https://jfly.uni-koeln.de/color/), which stay distinct for colour-blind readers; what they tell is
-told by line style or place as well.  Widths fit one column of a journal (88 mm) without scaling, with text of 7 to 8 points.
-Files depend on the numbers alone: no dates, fixed ids.  Text in SVG files stays text.
+Every figure has an opaque white ground, so that it reads the same on paper, on a light and on a
+dark screen. Colours are those of Okabe & Ito (https://jfly.uni-koeln.de/color/), which stay
+distinct for colour-blind readers; line style or position repeats their meaning. Widths fit one
+column of a journal (88 mm) without scaling, with text of 7 to 8 points. Files depend on the numbers
+alone: no dates, fixed ids. Text in SVG files stays text.
 """
 
 from __future__ import annotations
@@ -47,21 +48,47 @@ COLUMN = 3.46
 DPI = 300
 
 SETTINGS: dict[Any, Any] = {
-    "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "Helvetica", "sans-serif"],
-    "font.size": 8.0, "axes.labelsize": 8.5, "axes.titlesize": 8.5, "legend.fontsize": 7.0,
-    "xtick.labelsize": 7.5, "ytick.labelsize": 7.5, "mathtext.fontset": "dejavusans",
-    "axes.linewidth": 0.7, "xtick.major.width": 0.7, "ytick.major.width": 0.7, "xtick.direction": "in",
-    "ytick.direction": "in", "xtick.top": True, "ytick.right": True, "lines.linewidth": 1.0, "lines.markersize": 3.0,
-    "figure.facecolor": "white", "axes.facecolor": "white", "savefig.facecolor": "white", "savefig.transparent": False,
-    "text.color": BLACK, "axes.edgecolor": BLACK, "axes.labelcolor": BLACK, "xtick.color": BLACK, "ytick.color": BLACK,
-    "legend.frameon": False, "axes.axisbelow": False, "svg.fonttype": "none", "svg.hashsalt": "synchain",
-    "figure.dpi": DPI, "savefig.dpi": DPI, "path.simplify": True, "image.composite_image": True,
-}  # fmt: skip
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "Helvetica", "sans-serif"],
+    "font.size": 8.0,
+    "axes.labelsize": 8.5,
+    "axes.titlesize": 8.5,
+    "legend.fontsize": 7.0,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "mathtext.fontset": "dejavusans",
+    "axes.linewidth": 0.7,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.top": True,
+    "ytick.right": True,
+    "lines.linewidth": 1.0,
+    "lines.markersize": 3.0,
+    "figure.facecolor": "white",
+    "axes.facecolor": "white",
+    "savefig.facecolor": "white",
+    "savefig.transparent": False,
+    "text.color": BLACK,
+    "axes.edgecolor": BLACK,
+    "axes.labelcolor": BLACK,
+    "xtick.color": BLACK,
+    "ytick.color": BLACK,
+    "legend.frameon": False,
+    "axes.axisbelow": False,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "synchain",
+    "figure.dpi": DPI,
+    "savefig.dpi": DPI,
+    "path.simplify": True,
+    "image.composite_image": True,
+}
 
 
 @contextmanager
 def context() -> Iterator[None]:
-    """Matplotlib with this style, whatever the user's own settings; theirs come back at the end of the with block."""
+    """Use matplotlib with this style, whatever the user's settings, which return afterwards."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(SETTINGS)
@@ -69,19 +96,44 @@ def context() -> Iterator[None]:
 
 
 def symbol(name: str) -> str:
-    """A parameter or a state as a formula: sigma as the Greek letter, x_1 with its subscript."""
+    """Return a parameter or a state as a formula."""
     return f"${Latex().letter(name)}$"
 
 
 def new_figure(size: tuple[float, float]) -> Figure:
-    """An empty figure of a size in inches that no window belongs to; use inside `context`."""
+    """Return an empty figure without a window; use inside `context`.
+
+    Parameters
+    ----------
+    size : (float, float)
+        Width and height in inches.
+
+    Returns
+    -------
+    Figure
+    """
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write `<name>.png` and `<name>.svg`, each whole or not at all; use inside `context`."""
+    """Write `<name>.png` and `<name>.svg`, each completely or not at all; use inside `context`.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure.
+    folder : Path
+        Folder of the files.
+    name : str
+        Name of the files without their endings.
+
+    Returns
+    -------
+    list of Path
+        Files written.
+    """
     written = []
     for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None, "Creator": None})):
         path = folder / f"{name}.{kind}"
@@ -92,34 +144,86 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
 
 
 def bands(axes: Axes, intervals: Sequence[Interval], *, horizontal: bool = False, **options: Any) -> None:
-    """Grey bands over intervals of the x axis, or of the y axis where `horizontal`."""
+    """Draw grey bands over intervals.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes.
+    intervals : sequence of Interval
+        Intervals of the x axis, or of the y axis if `horizontal`.
+    horizontal : bool
+        Whether the bands are horizontal.
+    **options
+        Properties of the patches.
+    """
     span = axes.axhspan if horizontal else axes.axvspan
     for low, high in intervals:
         span(low, high, **{"color": GREY, "linewidth": 0.0, "zorder": 0.0, **options})
 
 
 def bracket(axes: Axes, intervals: Sequence[Interval], height: float, color: str, text: str = "") -> None:
-    """Thin bars with end strokes over intervals of x at a height in parts of the axes; set the limits of x before."""
+    """Draw thin bars with end strokes over intervals; the limits of x must be set before.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes.
+    intervals : sequence of Interval
+        Intervals of x.
+    height : float
+        Height as a part of the axes.
+    color : str
+        Colour.
+    text : str
+        Text at the last bar.
+    """
     place = axes.get_xaxis_transform()
     first, last = axes.get_xlim()
     for low, high in intervals:
         stroke = 1.0 if high - low > 0.01 * (last - first) else 0.4  # ragged ends are a fringe of thin strokes
         axes.plot(
-            [low, high], [height, height], color=color, linewidth=1.0, transform=place, zorder=4, marker="|",
-            markersize=4.0, markeredgewidth=stroke, clip_on=False,
-        )  # fmt: skip
+            [low, high],
+            [height, height],
+            color=color,
+            linewidth=1.0,
+            transform=place,
+            zorder=4,
+            marker="|",
+            markersize=4.0,
+            markeredgewidth=stroke,
+            clip_on=False,
+        )
     if text and intervals:
-        axes.annotate(text, (intervals[-1][1], height), xycoords=place, xytext=(4, 0), textcoords="offset points",
-                      color=color, fontsize=6.5, va="center", ha="left")  # fmt: skip
+        axes.annotate(
+            text,
+            (intervals[-1][1], height),
+            xycoords=place,
+            xytext=(4, 0),
+            textcoords="offset points",
+            color=color,
+            fontsize=6.5,
+            va="center",
+            ha="left",
+        )
 
 
 def note(axes: Axes, text: str) -> None:
-    """A remark above the axes at the right; nothing where there is no text."""
+    """Write a remark above the axes at the right, if there is any."""
     if text:
-        axes.annotate(text, (1.0, 1.0), xycoords="axes fraction", xytext=(0, 2), textcoords="offset points",
-                      fontsize=6.5, color=ORANGE, ha="right", va="bottom")  # fmt: skip
+        axes.annotate(
+            text,
+            (1.0, 1.0),
+            xycoords="axes fraction",
+            xytext=(0, 2),
+            textcoords="offset points",
+            fontsize=6.5,
+            color=ORANGE,
+            ha="right",
+            va="bottom",
+        )
 
 
 def failures(failed: int, cells: int) -> str:
-    """The remark on cells that did not finish; empty where all did."""
+    """Return the remark on cells that did not finish; empty if all did."""
     return f"{failed} of {cells} cells failed and are left out" if failed else ""

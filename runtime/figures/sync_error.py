@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from synchain.models.scenes.file import load_scene
 
@@ -26,21 +26,34 @@ SIZE = (COLUMN, 2.2)
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """A result swept over sigma and the published synchronous ranges."""
+    """A result swept over sigma, and the published synchronous ranges."""
 
     result: Result
     published: tuple[Interval, ...]
 
 
 def compute(name: str, runs: FigureRuns) -> Errors:
-    """Run the scene of a figure; the section is recorded too, so that figures 4d-f share the runs."""
+    """Run the scene of a figure, with its section so that figures 4d-f share the runs."""
     scene = load_scene(name)
     row = published(scene.n, scene.parameters["omega"])
     return Errors(runs.run(scene.replace(record=("sync_error", "section"))), row.intervals if row else ())
 
 
 def synchronous(result: Result, tolerance: float = Criterion().tolerance) -> list[Interval]:
-    """Ranges of the first axis where the average error stays below `tolerance`, half a grid step wider on both sides."""
+    """Find the ranges of the first axis with an average error below a tolerance.
+
+    Parameters
+    ----------
+    result : Result
+        Result with one axis and synchronisation errors.
+    tolerance : float
+        Largest error.
+
+    Returns
+    -------
+    list of Interval
+        Half a grid step wider on both sides.
+    """
     x = result.data[result.scene.axes[0].name].values
     good = (result.status.values == Status.FINISHED) & (result.sync_error.values < tolerance)
     middles = 0.5 * (x[1:] + x[:-1])
@@ -50,24 +63,31 @@ def synchronous(result: Result, tolerance: float = Criterion().tolerance) -> lis
 
 
 def table(data: Errors) -> Table:
-    """Coupling, errors averaged over the window, largest and at its end, and how the cell ended."""
+    """Return coupling, errors (average, largest, at the end of the window) and status."""
     result = data.result
     return Table.of(
-        sigma=result.data["sigma"].values, e_avg=result.sync_error.values, e_max=result.sync_error_max.values,
-        e_end=result.sync_error_end.values, status=status_names(result.status),
-    )  # fmt: skip
+        sigma=result.data["sigma"].values,
+        e_avg=result.sync_error.values,
+        e_max=result.sync_error_max.values,
+        e_end=result.sync_error_end.values,
+        status=status_names(result.status),
+    )
 
 
-def draw(axes: Any, data: Errors) -> Any:
-    """The error as a line, grey where it vanishes, and the published range as a thin bar."""
+def draw(axes: Axes, data: Errors) -> Axes:
+    """Draw the error as a line, synchronous ranges in grey, the published range as a bar."""
     result = data.result
     sigma, good = result.data["sigma"].values, result.status.values == Status.FINISHED
     error = np.where(good, result.sync_error.values, np.nan)
     bands(axes, synchronous(result))
     axes.plot(sigma, error, color=BLUE, linewidth=0.8)
     top = float(np.nanmax(error)) if good.any() else 1.0
-    axes.set(xlim=(sigma.min(), sigma.max()), ylim=(-0.03 * top, 1.22 * top or 1.0), xlabel=r"coupling $\sigma$",
-             ylabel=r"$e_{\mathrm{avg}}$")  # fmt: skip
+    axes.set(
+        xlim=(sigma.min(), sigma.max()),
+        ylim=(-0.03 * top, 1.22 * top or 1.0),
+        xlabel=r"coupling $\sigma$",
+        ylabel=r"$e_{\mathrm{avg}}$",
+    )
     bracket(axes, data.published, 0.93, ORANGE, "published")
     note(axes, failures(int((~good).sum()), len(sigma)))
     return axes

@@ -1,16 +1,20 @@
-"""For which drive frequency and coupling networks synchronise: the largest exponent of their modes, one panel each.
+"""Drive frequencies and couplings at which networks synchronise: largest exponent of their modes.
 
-The function of one oscillator on a line of strengths serves all networks: the mode of the eigenvalue gamma has the exponent
-Lambda(sigma |gamma|) (Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998)).  Where the starts lead to different motions a
-network counts as stable if it is so for most of them, as in `synchain.runtime.synchronisation.threshold`.
+The function of one oscillator on a line of strengths serves all networks: the mode of the
+eigenvalue gamma has the exponent Lambda(sigma |gamma|). If the starts lead to different motions, a
+network counts as stable if it is stable for most of them, as in
+`synchain.runtime.synchronisation.threshold`.
+
+Source: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
@@ -35,9 +39,20 @@ LOW, HIGH, SIGMA = 1.0, 1.8, 0.6
 
 @dataclass(frozen=True, slots=True)
 class Map:
-    """The function of one oscillator: exponent (omegas, starts, strengths) at omega and alpha; sigma for the panels.
+    """The function of one oscillator at several frequencies.
 
-    attractors: the kinds of motion that the starts led to, at each frequency.
+    Parameters
+    ----------
+    omega : ndarray, shape (omegas,)
+        Frequencies.
+    alpha : ndarray, shape (strengths,)
+        Strengths.
+    sigma : ndarray, shape (sigmas,)
+        Couplings of the panels.
+    exponent : ndarray, shape (omegas, starts, strengths)
+        Exponents per unit of time.
+    attractors : tuple of str
+        Kinds of motion of the starts at each frequency.
     """
 
     omega: np.ndarray
@@ -48,7 +63,7 @@ class Map:
 
 
 def compute(name: str, runs: FigureRuns) -> Map:
-    """One run over all strengths for each frequency."""
+    """Compute the exponents of all strengths at each frequency."""
     grid = runs.quality.grid or 241
     omega = np.linspace(LOW, HIGH, grid // 2 + 1 if runs.quality.grid else 161)
     sigma = np.linspace(0.0, SIGMA, grid)
@@ -67,35 +82,48 @@ def _graphs() -> list[Topology]:
 
 
 def largest_exponent(data: Map, graph: Topology) -> np.ndarray:
-    """The largest exponent (omegas, sigmas) of a network's modes, interpolated between strengths: the starts' median."""
+    """Return the largest exponent of a network's modes, the median over the starts.
+
+    Parameters
+    ----------
+    data : Map
+        Function of one oscillator, interpolated between strengths.
+    graph : Topology
+        Network.
+
+    Returns
+    -------
+    ndarray, shape (omegas, sigmas)
+    """
     strengths = [data.sigma * mode.size for mode in transversal_modes(graph)]
     worst = [[[np.interp(x, data.alpha, row) for x in strengths] for row in starts] for starts in data.exponent]
     return np.asarray(np.median(np.max(worst, axis=2), axis=1))
 
 
 def table(data: Map) -> Table:
-    """The largest exponent, per unit of time, at every frequency and coupling, a column for each network."""
+    """Return the largest exponent, per unit of time, of each network at every point."""
     columns = {f"{graph.name}_{graph.n}": largest_exponent(data, graph).reshape(-1) for graph in _graphs()}
     omega, sigma = (part.reshape(-1) for part in np.meshgrid(data.omega, data.sigma, indexing="ij"))
     motion = np.repeat(np.array(data.attractors, dtype=object), len(data.sigma))
     return Table.of(omega=omega, sigma=sigma, **columns, motion=motion)
 
 
-def layout(figure: Any) -> list[Any]:
-    """One pair of axes for each network, two beside each other."""
+def layout(figure: Figure) -> list[Axes]:
+    """Add one pair of axes for each network, two side by side."""
     return list(figure.subplots(3, 2, sharex=True, sharey=True).flat)
 
 
-def draw(axes: list[Any], data: Map) -> list[Any]:
-    """Colours where every mode dies out, white elsewhere; the published ranges of the chains as upright bars."""
+def draw(axes: list[Axes], data: Map) -> list[Axes]:
+    """Draw stable points in colours, others white, published ranges of chains as bars."""
     graphs = _graphs()
     values = [largest_exponent(data, graph) for graph in graphs]
     stable = np.concatenate([-v[(v < 0) & np.isfinite(v)] for v in values])
     top = float(np.quantile(stable, 0.99)) if stable.size else 1.0
     for panel, graph, value in zip(axes, graphs, values, strict=True):
         speed = np.where(value < 0, np.minimum(-value, top), np.nan)
-        painted = panel.pcolormesh(data.omega, data.sigma, speed.T, shading="nearest", cmap="cividis_r", vmin=0.0,
-                                   vmax=top, rasterized=True)  # fmt: skip
+        painted = panel.pcolormesh(
+            data.omega, data.sigma, speed.T, shading="nearest", cmap="cividis_r", vmin=0.0, vmax=top, rasterized=True
+        )
         panel.set_title(f"{graph.name}({graph.n})", fontsize=7.5, pad=3)
         panel.set(xlim=(data.omega[0], data.omega[-1]), ylim=(0.0, data.sigma[-1]))
         panel.tick_params(labelsize=7)
@@ -109,8 +137,8 @@ def draw(axes: list[Any], data: Map) -> list[Any]:
     return axes
 
 
-def _published(panel: Any, graph: Topology) -> None:
-    """The published ranges of a chain as bars at their frequency."""
+def _published(panel: Axes, graph: Topology) -> None:
+    """Draw the published ranges of a chain as bars at their frequency."""
     if graph.name != "chain":
         return
     for omega in PAIRS:

@@ -1,4 +1,4 @@
-"""Numbers as columns, and as CSV text."""
+"""Tables of numbers, and their CSV text."""
 
 from __future__ import annotations
 
@@ -19,7 +19,20 @@ __all__ = ["Table", "as_csv", "status_names"]
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Names of the columns and the rows; every row is as long as there are columns."""
+    """Columns of equal length.
+
+    Parameters
+    ----------
+    columns : tuple of str
+        Names of the columns.
+    rows : tuple of tuple
+        Rows with one entry for each column.
+
+    Raises
+    ------
+    ValueError
+        If a row has another length.
+    """
 
     columns: tuple[str, ...]
     rows: tuple[tuple[Any, ...], ...]
@@ -33,17 +46,17 @@ class Table:
 
     @classmethod
     def of(cls, **columns: Iterable[Any]) -> Table:
-        """A table from columns of equal length."""
+        """Build a table from columns of equal length."""
         return cls(tuple(columns), tuple(zip(*columns.values(), strict=True)))
 
     def column(self, name: str) -> tuple[Any, ...]:
-        """The entries of one column."""
+        """Return the entries of one column."""
         k = self.columns.index(name)
         return tuple(row[k] for row in self.rows)
 
 
 def as_csv(table: Table) -> str:
-    """CSV text with a header; numbers with 12 digits, an empty cell for what is missing or not a number."""
+    """Return CSV text with a header and 12 digits; missing and non-finite numbers are empty."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(table.columns)
@@ -52,11 +65,12 @@ def as_csv(table: Table) -> str:
 
 
 def status_names(status: xr.DataArray) -> list[str]:
-    """How each cell ended, in lower case words, in C order."""
+    """Return the status of each cell in lower case, in C order."""
     return [Status(int(code)).name.lower() for code in np.ravel(status.values)]
 
 
 def _cell(value: Any) -> str:
+    """Text of one entry."""
     if value is None:
         return ""
     if isinstance(value, (float, np.floating)):

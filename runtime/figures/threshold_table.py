@@ -1,11 +1,11 @@
-"""The table of synchronous ranges: measured by direct simulation and predicted from the probe, beside the published ones."""
+"""The table of synchronous ranges: measured by simulation, predicted from the probe, published."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
@@ -23,12 +23,26 @@ NAMES = ("thresholds",)
 SIZE = (COLUMN, 4.1)
 KINDS = (("measured", BLUE, 0.26), ("predicted", GREEN, 0.0), ("published", ORANGE, -0.26))
 GAP = 0.001
-"""Gaps of up to this width in sigma are bridged before the ends are compared: ends of chaotic ranges are ragged."""
+"""Largest gap in sigma that is bridged, since the ends of chaotic ranges are ragged."""
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """Ranges of sigma of one chain at one omega; `failed` of `cells` values of sigma have no error."""
+    """Synchronous ranges of one chain at one frequency.
+
+    Parameters
+    ----------
+    n : int
+        Number of oscillators.
+    omega : float
+        Drive frequency.
+    measured, predicted : tuple of Interval
+        Ranges of sigma.
+    published : Published or None
+        Published ranges.
+    failed, cells : int
+        Number of values of sigma without an error measure, and of all.
+    """
 
     n: int
     omega: float
@@ -45,7 +59,7 @@ class Row:
 
     @property
     def remark(self) -> str:
-        """What the paper says and what was found besides."""
+        """Remark of the paper, and remarks on the ranges."""
         words = [self.published.remark] if self.published else []
         if self.n == 2:
             words.append("the probe itself")
@@ -64,14 +78,14 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All rows and how they were made."""
+    """All rows and the quality of their runs."""
 
     rows: tuple[Row, ...]
     quality: Quality
 
 
 def compute(name: str, runs: FigureRuns) -> Comparison:
-    """Measure the published rows and longer chains where the motion is not periodic."""
+    """Measure the published rows, and longer chains at frequencies without periodic motion."""
     cases = [(row.n, row.omega) for row in PUBLISHED]
     cases += [(n, omega) for n in runs.quality.networks for omega in NOT_PERIODIC]
     return Comparison(tuple(_row(n, omega, runs) for n, omega in cases), runs.quality)
@@ -86,7 +100,7 @@ def _row(n: int, omega: float, runs: FigureRuns) -> Row:
 
 
 def scene_of(n: int, omega: float, runs: FigureRuns) -> Scene:
-    """The scene of the figure that shows this chain, so that both share their runs, or one made for it."""
+    """Return the scene of the figure that shows this chain to share its runs, or a new one."""
     for scene in map(load_scene, projection.NAMES):
         if (scene.n, scene.parameters["omega"]) == (n, omega):
             return scene
@@ -94,7 +108,7 @@ def scene_of(n: int, omega: float, runs: FigureRuns) -> Scene:
 
 
 def joined(found: tuple[Interval, ...], gap: float = GAP) -> tuple[Interval, ...]:
-    """The ranges with gaps of up to `gap` between neighbours bridged."""
+    """Bridge gaps of up to `gap` between neighbouring ranges."""
     kept: list[Interval] = []
     for low, high in found:
         start = kept.pop()[0] if kept and low - kept[-1][1] <= gap else low
@@ -103,7 +117,7 @@ def joined(found: tuple[Interval, ...], gap: float = GAP) -> tuple[Interval, ...
 
 
 def nearest(found: tuple[Interval, ...], printed: tuple[Interval, ...]) -> Interval | None:
-    """The range that shares most with the published ones, else the widest; None where there is none."""
+    """Return the range with the largest overlap with published ones, else the widest."""
 
     def merit(interval: Interval) -> tuple[float, float]:
         shared = sum(b - a for a, b in intersect([interval], printed))
@@ -113,7 +127,7 @@ def nearest(found: tuple[Interval, ...], printed: tuple[Interval, ...]) -> Inter
 
 
 def table(data: Comparison) -> Table:
-    """One row for each chain: ends of the ranges nearest to the published one, differences, all ranges, the criterion."""
+    """Return one row for each chain: nearest ranges, differences, all ranges, the criterion."""
     columns = ["n", "omega"]
     columns += [f"{kind}_{end}" for kind, _, _ in KINDS for end in ("low", "high")]
     columns += [f"{kind}_minus_published_{end}" for kind in ("measured", "predicted") for end in ("low", "high")]
@@ -127,8 +141,22 @@ def table(data: Comparison) -> Table:
             _difference(a, b) for found in (measured, predicted) for a, b in zip(found, printed, strict=True)
         ]
         status = f"{row.failed} of {row.cells} failed" if row.failed else "finished"
-        rows.append((row.n, row.omega, *measured, *predicted, *printed, *differences, _listed(row.measured, 6),
-                     _listed(row.predicted, 6), status, row.remark, data.quality.resolution, *criterion))  # fmt: skip
+        rows.append(
+            (
+                row.n,
+                row.omega,
+                *measured,
+                *predicted,
+                *printed,
+                *differences,
+                _listed(row.measured, 6),
+                _listed(row.predicted, 6),
+                status,
+                row.remark,
+                data.quality.resolution,
+                *criterion,
+            )
+        )
     return Table(tuple(columns), tuple(rows))
 
 
@@ -148,12 +176,13 @@ def _listed(intervals: tuple[Interval, ...], digits: int) -> str:
 
 
 def document(data: Comparison) -> str:
-    """The table in Markdown, with the criterion that was used."""
+    """Return the table in Markdown, with the criterion."""
     lines = [
-        "# Synchronous ranges of the coupling sigma in chains of n friction oscillators", "",
+        "# Synchronous ranges of the coupling sigma in chains of n friction oscillators",
+        "",
         "| n | omega | measured | predicted | published | measured - published | predicted - published | remark |",
         "|---|---|---|---|---|---|---|---|",
-    ]  # fmt: skip
+    ]
     for row in data.rows:
         measured, predicted, printed = _ends(row)
         cells = [str(row.n), f"{row.omega:.2f}", _shown(measured), _shown(predicted), _shown(printed)]
@@ -181,16 +210,24 @@ def _how(quality: Quality) -> str:
     )
 
 
-def draw(axes: Any, data: Comparison) -> Any:
-    """Bars over sigma, three for each chain: measured, predicted, published."""
+def draw(axes: Axes, data: Comparison) -> Axes:
+    """Draw bars over sigma, three for each chain: measured, predicted, published."""
     rows = data.rows
     for k, row in enumerate(rows):
         for kind, color, shift in KINDS:
             height = len(rows) - k + shift
             found = row.printed if kind == "published" else getattr(row, kind)
             for low, high in found:
-                axes.plot([low, high], [height, height], color=color, linewidth=3.0, solid_capstyle="butt",
-                          marker="|", markersize=3.6, markeredgewidth=0.8)  # fmt: skip
+                axes.plot(
+                    [low, high],
+                    [height, height],
+                    color=color,
+                    linewidth=3.0,
+                    solid_capstyle="butt",
+                    marker="|",
+                    markersize=3.6,
+                    markeredgewidth=0.8,
+                )
         if not (row.measured or row.predicted or row.printed):
             axes.annotate("none measured, predicted or published", (0.004, len(rows) - k), fontsize=6.5, va="center")
     for kind, color, _ in KINDS:

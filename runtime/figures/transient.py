@@ -1,14 +1,16 @@
-"""How the measured synchronous ranges move with the length of the transient, beside the published ends.
+"""Measured synchronous ranges over the length of the transient, beside the published ends.
 
-Near an end the error dies out over thousands of periods, so that a longer transient finds a wider range.
+Near an end the error decays over thousands of periods, so that a longer transient finds a wider
+range.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ..prediction.intervals import Interval
@@ -25,12 +27,22 @@ EXTRA = ("transient",)
 SIZE = (COLUMN, 3.6)
 ROWS = tuple(row for row in PUBLISHED if row.omega in NOT_PERIODIC)
 LENGTHS = (1.0, 0.3, 0.1, 3.0)
-"""Transients in units of the quality's own, the longest last: it takes the longest."""
+"""Transients in units of that of the quality."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One published row: sweeps over the same values of sigma after transients of different length (drive periods)."""
+    """Sweeps over the same values of sigma after transients of different length.
+
+    Parameters
+    ----------
+    row : Published
+        Published row.
+    transients : tuple of float
+        Lengths in drive periods.
+    sweeps : tuple of Sweep
+        One sweep for each length.
+    """
 
     row: Published
     transients: tuple[float, ...]
@@ -38,7 +50,7 @@ class Trial:
 
 
 def compute(name: str, runs: FigureRuns) -> tuple[Trial, ...]:
-    """Sweep sigma round the published ends of the rows without periodic motion."""
+    """Sweep sigma around the published ends of the rows without periodic motion."""
     transients = tuple(sorted(factor * runs.quality.criterion.transient for factor in LENGTHS))
     trials = []
     for row in ROWS:
@@ -55,7 +67,7 @@ def _grid(interval: Interval, runs: FigureRuns) -> np.ndarray:
 
 
 def table(data: tuple[Trial, ...]) -> Table:
-    """Error (median over the starts) and share of synchronised starts for each row, transient and sigma."""
+    """Return error (median over the starts) and share of synchronised starts for every point."""
     rows = []
     for trial in data:
         for transient, sweep in zip(trial.transients, trial.sweeps, strict=True):
@@ -65,13 +77,13 @@ def table(data: tuple[Trial, ...]) -> Table:
     return Table(("n", "omega", "transient", "sigma", "e_avg", "share", "status"), tuple(rows))
 
 
-def layout(figure: Any) -> list[Any]:
-    """One pair of axes for each row."""
+def layout(figure: Figure) -> list[Axes]:
+    """Add one pair of axes for each row."""
     return list(figure.subplots(2, 2, sharey=True).flat)
 
 
-def draw(axes: list[Any], data: tuple[Trial, ...]) -> list[Any]:
-    """The share of synchronised starts in grey over sigma and transient, the published ends as lines."""
+def draw(axes: list[Axes], data: tuple[Trial, ...]) -> list[Axes]:
+    """Draw the share of synchronised starts over sigma and transient, published ends as lines."""
     for panel, trial in zip(axes, data, strict=True):
         share = np.array([sweep.share for sweep in trial.sweeps])
         heights = np.arange(len(trial.transients))

@@ -1,10 +1,12 @@
-"""The largest network of a family that can synchronise, from its eigenratio: how many nodes one stable range carries.
+"""The largest network of a family that can synchronise, from its eigenratio.
 
-Eigenratios (largest over smallest non-zero |gamma|) that grow with the size of the network, in closed form:
-chain cot²(π/2n); ring 1/sin²(π/n) for even n, 1/(4 sin²(π/2n)) for odd n; star n; hypercube its dimension; complete 1.
-They follow from the spectra in Brouwer & Haemers, Spectra of Graphs (Springer, 2012), section 1.4.  Those with an angle are
-rational only where cos(π/n), for the even ring cos(2π/n), is 0, ±1/2 or ±1 (I. Niven, Irrational Numbers, Carus Math.
-Monographs 11, 1956, corollary 3.12), so that balls reduce_scene every other comparison.
+Eigenratios (largest over smallest non-zero |gamma|) that grow with the size of the network, in
+closed form: chain cot²(π/2n); ring 1/sin²(π/n) for even n, 1/(4 sin²(π/2n)) for odd n; star n;
+hypercube its dimension; complete 1. Those with an angle are rational only if cos(π/n), for the even
+ring cos(2π/n), is 0, ±1/2 or ±1, so that balls decide every other comparison.
+
+Sources: spectra, Brouwer & Haemers, Spectra of Graphs (Springer, 2012), section 1.4; rational
+values, I. Niven, Irrational Numbers, Carus Math. Monographs 11 (1956), corollary 3.12.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from fractions import Fraction
 from flint import arb, fmpq
 
 from synchain.models.algebra.balls import Ball, precision
-from synchain.models.graphs.families import family as plugin
+from synchain.models.graphs.families import family as family_plugin
 from synchain.models.graphs.families import topology
 
 from .stable_ranges import StableRange, exact_ranges, widen
@@ -34,7 +36,12 @@ class SizeUnit(StrEnum):
 
 
 class Method(StrEnum):
-    """How the largest network was found."""
+    """How the largest network was determined.
+
+    CLOSED_FORM: no larger network can synchronise. OPEN_RANGE: a range that starts at alpha = 0 or
+    has no end admits every connected network. SEARCH: larger networks than the limit were not
+    tried.
+    """
 
     CLOSED_FORM = "closed form"
     OPEN_RANGE = "open range"
@@ -45,10 +52,24 @@ class Method(StrEnum):
 class LargestNetwork:
     """The largest network of a family that can synchronise for some sigma > 0.
 
-    `n` holds for the ranges as stated, `certain` for all and `possible` for at least one within their errors: None where
-    every size can, 0 where none of two nodes or more.  `counts` says what is counted, "nodes" or "dimension"; `how` is
-    "closed form" (no larger network can), "open range" (one that starts at alpha = 0 or has no end carries every connected
-    network) or "search", which ended at `limit` and says nothing about larger ones.
+    A size is None if every size can synchronise, and 0 if no network of two nodes or more can.
+
+    Parameters
+    ----------
+    family : str
+        Name of the family.
+    n : int or None
+        Largest size for the ranges as stated.
+    certain : int or None
+        Largest size for all ranges within their errors.
+    possible : int or None
+        Largest size for at least one choice of ranges within their errors.
+    counts : SizeUnit
+        What the size counts.
+    how : Method
+        How the size was determined.
+    limit : int, optional
+        Largest number of nodes that the search tried.
     """
 
     family: str
@@ -66,33 +87,53 @@ def largest_network(
     errors: Sequence[tuple[float, float]] | None = None,
     limit: int = 64,
 ) -> LargestNetwork:
-    """The largest n (hypercubes: dimension) for which a family of graphs can synchronise, decided exactly.
+    """Find the largest network of a family that can synchronise, decided exactly.
 
-    `ranges` and `errors` as of `windows`.  One range and a closed form of the eigenratio (see CLOSED), or a range that
-    starts at 0 or has no end, give an answer for all n; otherwise every network of up to `limit` nodes is tried.
-    Raises ValueError for an unknown family, wrong ranges, or a limit below 2.
+    A single range with a closed form of the eigenratio (see CLOSED), or a range that starts at 0 or
+    has no end, give a result for all sizes. Otherwise every network up to the limit is tried.
+
+    Parameters
+    ----------
+    family : str
+        Name of a family of graphs.
+    ranges : sequence of (float, float)
+        Stable ranges of alpha, see `windows`.
+    errors : sequence of (float, float), optional
+        Uncertainties of the ends of the ranges.
+    limit : int
+        Largest number of nodes that a search tries.
+
+    Returns
+    -------
+    LargestNetwork
+
+    Raises
+    ------
+    ValueError
+        If the family is unknown, the ranges are invalid, or the limit is below 2.
     """
     if limit < 2:
         raise ValueError(f"limit = {limit}; expected at least 2 nodes")
-    directed = plugin(family).directed
-    given = exact_ranges(ranges, errors)
-    sets = [given, widen(given, -1), widen(given, 1)]
+    directed = family_plugin(family).directed
+    stated = exact_ranges(ranges, errors)
+    sets = [stated, widen(stated, -1), widen(stated, 1)]
     counts = SizeUnit.DIMENSION if family == "hypercube" else SizeUnit.NODES
-    if not directed and all(_open(found) for found in sets):
+    if not directed and all(_open(stable) for stable in sets):
         return LargestNetwork(family, None, None, None, counts, Method.OPEN_RANGE)
-    if family in CLOSED and all(_open(found) or len(found) <= 1 for found in sets):
-        n, certain, most = (_by_ratio(family, found) for found in sets)
+    if family in CLOSED and all(_open(stable) or len(stable) <= 1 for stable in sets):
+        n, certain, most = (_by_ratio(family, stable) for stable in sets)
         return LargestNetwork(family, n, certain, most, counts, Method.CLOSED_FORM)
-    n, certain, most = (_by_search(family, found, limit) for found in sets)
+    n, certain, most = (_by_search(family, stable, limit) for stable in sets)
     return LargestNetwork(family, n, certain, most, counts, Method.SEARCH, limit)
 
 
 def _open(ranges: Sequence[StableRange]) -> bool:
-    """True where one range holds every eigenratio: some alpha > 0, from 0 or without end."""
+    """True if one range admits every eigenratio: some alpha > 0, from 0 or without end."""
     return any(r.high is None or (r.low == 0 and r.high > 0) for r in ranges)
 
 
 def _by_ratio(family: str, ranges: Sequence[StableRange]) -> int | None:
+    """Largest size by the closed form of the eigenratio."""
     if _open(ranges):
         return None
     if not ranges or ranges[0].high is None or ranges[0].high == 0:
@@ -113,7 +154,7 @@ def _by_ratio(family: str, ranges: Sequence[StableRange]) -> int | None:
 
 
 def _fits(ratio: Callable[[int], Ball], n: int, allowed: Fraction) -> bool:
-    """True where the ratio at n is at most the one allowed; balls are refined until they tell."""
+    """True if the ratio at n is at most the allowed one; balls are refined until they decide."""
     bound, bits = fmpq(allowed.numerator, allowed.denominator), 64
     while True:
         with precision(bits + 4 * n.bit_length()):
@@ -131,17 +172,19 @@ def _chain(n: int) -> Ball:
 
 
 def _cotangent(turn: fmpq) -> arb:
+    """Cotangent of an angle in units of π."""
     return arb.cos_pi_fmpq(turn) / arb.sin_pi_fmpq(turn)
 
 
 def _ring(n: int) -> Ball:
-    """4 / (4 sin²(π/n)) for even n; for odd n the largest is 4 cos²(π/2n)."""
+    """4 / (4 sin²(π/n)) for even n; for odd n the numerator is 4 cos²(π/2n)."""
     if n in (3, 4, 6):
         return {3: 1, 4: 2, 6: 4}[n]
     return 1 / (arb.sin_pi_fmpq(fmpq(1, n)) ** 2 if n % 2 == 0 else 4 * arb.sin_pi_fmpq(fmpq(1, 2 * n)) ** 2)
 
 
 def _itself(n: int) -> Ball:
+    """The size."""
     return n
 
 
@@ -152,13 +195,28 @@ CLOSED: dict[str, tuple[int, Callable[[int], Ball] | None]] = {
     "ring": (3, _ring),
     "star": (2, _itself),
 }
-"""Families whose eigenratio grows with the size: the smallest size, and the ratio by size (None: always 1)."""
+"""Smallest size and eigenratio by size (None: always 1) of the families with a closed form."""
 
 
 def eigenratio(family: str, n: int) -> Ball:
-    """The eigenratio of a family in CLOSED at size n >= 3 (hypercubes: dimension n >= 1): an int, or a flint.arb ball.
+    """Evaluate the eigenratio of a family in CLOSED.
 
-    Raises ValueError for a family without a closed form and for a smaller size.
+    Parameters
+    ----------
+    family : str
+        Name of the family.
+    n : int
+        Size, at least 3; for hypercubes the dimension, at least 1.
+
+    Returns
+    -------
+    int or flint.arb
+        Exact number or ball.
+
+    Raises
+    ------
+    ValueError
+        If the family has no closed form, or if the size is too small.
     """
     if family not in CLOSED:
         raise ValueError(f"eigenratio of {family!r} has no closed form; known: {', '.join(CLOSED)}")
@@ -170,9 +228,10 @@ def eigenratio(family: str, n: int) -> Ball:
 
 
 def _by_search(family: str, ranges: Sequence[StableRange], limit: int) -> int | None:
-    if _open(ranges) and not plugin(family).directed:
+    """Largest size up to a limit, by trial of every network."""
+    if _open(ranges) and not family_plugin(family).directed:
         return None
     cube = family == "hypercube"
-    sizes = range(1, limit.bit_length()) if cube else range(max(2, plugin(family).minimum), limit + 1)
-    found = [size for size in sizes if possible(ranges, topology(family, 2**size if cube else size))]
-    return max(found, default=0)
+    sizes = range(1, limit.bit_length()) if cube else range(max(2, family_plugin(family).minimum), limit + 1)
+    possible_sizes = [size for size in sizes if possible(ranges, topology(family, 2**size if cube else size))]
+    return max(possible_sizes, default=0)

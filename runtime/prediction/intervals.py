@@ -9,27 +9,63 @@ import numpy as np
 __all__ = ["Interval", "find", "grid_intervals", "intersect", "refine", "scale"]
 
 Interval = tuple[float, float]
+"""Closed interval (low, high)."""
 Predicate = Callable[[np.ndarray], np.ndarray]
+"""Maps an array of points to an array of truth values."""
 
 
 def grid_intervals(x: np.ndarray, good: np.ndarray) -> list[Interval]:
-    """The maximal runs of good points of an increasing grid, as intervals from their first to their last point."""
-    found: list[Interval] = []
+    """Find the maximal runs of good points of an increasing grid.
+
+    Parameters
+    ----------
+    x : ndarray, shape (k,)
+        Grid.
+    good : ndarray of bool, shape (k,)
+        Property of each point.
+
+    Returns
+    -------
+    list of Interval
+        From the first to the last point of each run.
+    """
+    intervals: list[Interval] = []
     for i in range(len(x)):
         if good[i]:
-            start = found.pop()[0] if i > 0 and good[i - 1] else float(x[i])
-            found.append((start, float(x[i])))
-    return found
+            start = intervals.pop()[0] if i > 0 and good[i - 1] else float(x[i])
+            intervals.append((start, float(x[i])))
+    return intervals
 
 
 def find(judge: Predicate, x: np.ndarray, resolution: float, fan: int = 7) -> tuple[list[Interval], np.ndarray]:
-    """Return the intervals where `judge` holds, ends refined to `resolution`, and its verdict on the grid `x`.
+    """Find the intervals on which a predicate holds.
 
-    `judge` maps an array of points to an array of truth values.  Between neighbours of the grid that differ, `fan` equally
-    spaced points are judged and the bracket narrows to the change next to the good end, until it is narrower than
-    `resolution`; the end reported is its middle.  Intervals that fit between two grid points are not seen.
+    Between neighbours of the grid that differ, `fan` equally spaced points are evaluated, and the
+    bracket narrows to the change next to the good end, until it is narrower than `resolution`. The
+    reported end is its middle. Intervals that fit between two grid points are not found.
 
-    Raises ValueError for a grid that does not increase, or a resolution that is not positive.
+    Parameters
+    ----------
+    judge : Predicate
+        Property of a point.
+    x : array_like, shape (k,)
+        Increasing grid.
+    resolution : float
+        Largest width of a bracket.
+    fan : int
+        Points in each bracket and round.
+
+    Returns
+    -------
+    intervals : list of Interval
+        Intervals on which the predicate holds.
+    verdict : ndarray of bool, shape (k,)
+        The predicate on the grid.
+
+    Raises
+    ------
+    ValueError
+        If the grid does not increase, or if the resolution is not positive.
     """
     x = np.asarray(x, dtype=float)
     if x.ndim != 1 or len(x) < 1 or np.any(np.diff(x) <= 0):
@@ -58,7 +94,7 @@ def refine(
 
 
 def _narrow(judge: Predicate, good: np.ndarray, bad: np.ndarray, fan: int) -> tuple[np.ndarray, np.ndarray]:
-    """Predicate `fan` points in every bracket and keep the part between the last good point and the first bad one."""
+    """Evaluate points in every bracket and keep the part at the first change from good to bad."""
     parts = np.arange(1, fan + 1) / (fan + 1)
     points = good[:, None] + (bad - good)[:, None] * parts
     verdict = np.asarray(judge(points.reshape(-1)), dtype=bool).reshape(points.shape)
@@ -69,18 +105,46 @@ def _narrow(judge: Predicate, good: np.ndarray, bad: np.ndarray, fan: int) -> tu
 
 
 def scale(intervals: Sequence[Interval], factor: float) -> list[Interval]:
-    """Every interval times a positive factor."""
+    """Multiply every interval by a positive factor.
+
+    Parameters
+    ----------
+    intervals : sequence of Interval
+        Intervals.
+    factor : float
+        Positive factor.
+
+    Returns
+    -------
+    list of Interval
+
+    Raises
+    ------
+    ValueError
+        If the factor is not positive.
+    """
     if not factor > 0:
         raise ValueError(f"factor = {factor}; expected a positive number")
     return [(a * factor, b * factor) for a, b in intervals]
 
 
 def intersect(left: Sequence[Interval], right: Sequence[Interval]) -> list[Interval]:
-    """The points that lie in both sets; a single point counts only where one of the sets has it as an interval."""
-    found = []
+    """Intersect two sets.
+
+    Parameters
+    ----------
+    left, right : sequence of Interval
+        Disjoint intervals of each set.
+
+    Returns
+    -------
+    list of Interval
+        A single point counts only if one of the sets has it as an interval.
+    """
+    intervals = []
     for a, b in left:
         for c, d in right:
             low, high = max(a, c), min(b, d)
             if low < high or (low == high and (a == b or c == d)):
-                found.append((low, high))
-    return sorted(found)
+                intervals.append((low, high))
+    return sorted(intervals)

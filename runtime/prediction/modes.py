@@ -1,4 +1,4 @@
-"""The transversal modes of a network: eigenvalue, multiplicity, and how far each oscillator takes part."""
+"""The transversal modes of a network: eigenvalues, multiplicities and eigenvectors."""
 
 from __future__ import annotations
 
@@ -13,14 +13,21 @@ from synchain.models.spectra.jordan import geometric_multiplicity
 __all__ = ["NetworkMode", "has_loose_parts", "transversal_modes"]
 
 VECTOR_LIMIT = 2000
-"""Most nodes for which an eigenvector is computed: the matrix is dense."""
+"""Most nodes for which an eigenvector is computed, since the matrix is dense."""
 
 
 @dataclass(frozen=True, slots=True)
 class NetworkMode:
-    """One distinct non-zero eigenvalue of a network.
+    """A distinct non-zero eigenvalue of a network.
 
-    `number` is its place in the spectrum, 0 the synchronous motion, every eigenvalue counted as often as it occurs.
+    Parameters
+    ----------
+    graph : Topology
+        Network.
+    number : int
+        Position in the spectrum, counted with multiplicities; 0 is the synchronous motion.
+    eigenvalue : Eigenvalue
+        Eigenvalue gamma.
     """
 
     graph: Topology = field(repr=False)
@@ -34,20 +41,25 @@ class NetworkMode:
 
     @property
     def multiplicity(self) -> int:
-        """How often the eigenvalue occurs (algebraic multiplicity)."""
+        """Algebraic multiplicity."""
         return self.eigenvalue.multiplicity
 
     @property
     def defective(self) -> bool:
-        """True where there are fewer independent eigenvectors than the multiplicity says, by an exact rank."""
+        """True if there are fewer independent eigenvectors than the multiplicity (exact rank)."""
         return geometric_multiplicity(self.graph, self.eigenvalue) < self.multiplicity
 
     @property
     def vector(self) -> np.ndarray:
-        """An eigenvector (n,) of unit length whose largest entry is positive; complex where the eigenvalue is.
+        """Unit eigenvector (n,) whose largest entry is positive; complex if the eigenvalue is.
 
-        Of a multiple eigenvalue it is the one that stands out most at a single oscillator (the first of equals).
-        Raises ValueError for more than VECTOR_LIMIT nodes.
+        Of a multiple eigenvalue, the vector most localised at a single oscillator, at the first of
+        equals.
+
+        Raises
+        ------
+        ValueError
+            If the network has more than VECTOR_LIMIT nodes.
         """
         n = self.graph.n
         if n > VECTOR_LIMIT:
@@ -61,15 +73,26 @@ class NetworkMode:
 
 
 def transversal_modes(graph: Topology) -> tuple[NetworkMode, ...]:
-    """The modes of a network other than 0, in the order of its spectrum."""
-    found, number = [], 0
+    """Return the modes of a network with an eigenvalue other than 0.
+
+    Parameters
+    ----------
+    graph : Topology
+        Network.
+
+    Returns
+    -------
+    tuple of NetworkMode
+        In the order of the spectrum.
+    """
+    modes, number = [], 0
     for eigenvalue in graph.spectrum.eigenvalues:
         if eigenvalue.value != 0:
-            found.append(NetworkMode(graph, number, eigenvalue))
+            modes.append(NetworkMode(graph, number, eigenvalue))
         number += eigenvalue.multiplicity
-    return tuple(found)
+    return tuple(modes)
 
 
 def has_loose_parts(graph: Topology) -> bool:
-    """True where 0 is a multiple eigenvalue: parts of the network that nothing couples to each other."""
+    """True if 0 is a multiple eigenvalue: no coupling connects some parts of the network."""
     return graph.spectrum.zeros > 1

@@ -1,4 +1,4 @@
-"""Stable ranges of alpha with uncertain ends, as exact rationals: stated, narrowed and widened by their errors."""
+"""Stable ranges of alpha with uncertain ends, as exact rationals."""
 
 from __future__ import annotations
 
@@ -12,7 +12,17 @@ __all__ = ["StableRange", "exact_ranges", "widen"]
 
 @dataclass(frozen=True, slots=True)
 class StableRange:
-    """Stable alpha from `low` >= 0 to `high` (None: without end), both included, and the uncertainties of the ends."""
+    """A closed range of stable alpha.
+
+    Parameters
+    ----------
+    low : Fraction
+        Lower end, at least 0.
+    high : Fraction or None
+        Upper end; None if there is none.
+    errors : (float, float)
+        Uncertainties of the ends.
+    """
 
     low: Fraction
     high: Fraction | None
@@ -20,7 +30,10 @@ class StableRange:
 
     @property
     def ratio(self) -> float:
-        """high / low, the largest eigenratio that fits: infinite from 0 or without end, 0 for alpha = 0 alone."""
+        """high / low, the largest eigenratio that fits.
+
+        It is infinite from 0 or without end, and 0 for alpha = 0 alone.
+        """
         if self.high is None:
             return math.inf
         if self.low == 0:
@@ -31,13 +44,29 @@ class StableRange:
 def exact_ranges(
     ranges: Sequence[tuple[float, float]], errors: Sequence[tuple[float, float]] | None = None
 ) -> list[StableRange]:
-    """The ranges as given, cut at alpha = 0; an end that is cut, and one at infinity, has no error.
+    """Convert ranges of floats to exact ones, cut at alpha = 0.
 
-    Raises ValueError where they are not ascending and disjoint, or an error is negative, infinite or missing.
+    Parameters
+    ----------
+    ranges : sequence of (float, float)
+        Disjoint and ascending ranges; the last may end at infinity.
+    errors : sequence of (float, float), optional
+        Uncertainties of the ends.
+
+    Returns
+    -------
+    list of StableRange
+        An end that is cut, and one at infinity, has no error.
+
+    Raises
+    ------
+    ValueError
+        If the ranges are not ascending and disjoint, or if an error is negative, infinite or
+        missing.
     """
     if errors is not None and len(errors) != len(ranges):
         raise ValueError(f"errors: found {len(errors)} pairs for {len(ranges)} ranges; expected one for each range")
-    found, last = [], -math.inf
+    exact, last = [], -math.inf
     for i, (low, high) in enumerate(ranges):
         if not (-math.inf < low <= high and low > last):
             before = f" after {last}" if i else ""
@@ -51,28 +80,41 @@ def exact_ranges(
             raise ValueError(f"errors of range {i + 1}: found ({below}, {above}); expected two finite numbers >= 0")
         if high >= 0:
             end = None if high == math.inf else _exact(high)
-            kept = (float(below) if low > 0 else 0.0, float(above) if end is not None else 0.0)
-            found.append(StableRange(max(_exact(low), Fraction(0)), end, kept))
-    return found
+            uncertainties = (float(below) if low > 0 else 0.0, float(above) if end is not None else 0.0)
+            exact.append(StableRange(max(_exact(low), Fraction(0)), end, uncertainties))
+    return exact
 
 
 def _exact(x: float) -> Fraction:
-    """The rational that a number is; those of NumPy by way of a float."""
+    """The rational that a number is; numbers of NumPy are converted to float first."""
     return Fraction(x) if isinstance(x, (int, float, Fraction)) else Fraction(float(x))
 
 
 def widen(ranges: Sequence[StableRange], sign: int) -> list[StableRange]:
-    """The largest ranges (sign 1) or the smallest (sign -1) that the errors allow; those that meet are joined."""
-    found: list[StableRange] = []
+    """Widen or narrow ranges by their errors.
+
+    Parameters
+    ----------
+    ranges : sequence of StableRange
+        Ranges.
+    sign : {1, -1}
+        1 for the largest ranges that the errors allow, -1 for the smallest.
+
+    Returns
+    -------
+    list of StableRange
+        Ranges that meet are joined.
+    """
+    widened: list[StableRange] = []
     for r in ranges:
         below, above = (sign * Fraction(e) for e in r.errors)
         low, high = max(r.low - below, Fraction(0)), None if r.high is None else r.high + above
         if high is not None and high < low:
             continue
-        last = found[-1] if found else None
+        last = widened[-1] if widened else None
         if last is not None and (last.high is None or low <= last.high):
             high = None if high is None or last.high is None else max(high, last.high)
-            found[-1] = StableRange(last.low, high)
+            widened[-1] = StableRange(last.low, high)
         else:
-            found.append(StableRange(low, high))
-    return found
+            widened.append(StableRange(low, high))
+    return widened

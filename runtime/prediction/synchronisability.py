@@ -1,12 +1,19 @@
-"""Whether and where a network synchronises, from the stable ranges of a master stability function, decided exactly.
+"""Synchronisability of networks from the stable ranges of a master stability function.
 
-A transversal mode with the eigenvalue gamma < 0 sees alpha = sigma |gamma|.  The network is stable at sigma where every mode
-lies in a stable range.  For one range from a to b that is possible where the eigenratio, largest over smallest non-zero
-|gamma|, is at most b / a.  Ranges are closed here: a ratio that is exactly b / a leaves a single sigma.  Ends count as the
-exact binary numbers that the floats are, eigenvalues are exact algebraic numbers; only the reported sigma are rounded.
+A transversal mode with the eigenvalue gamma < 0 has the strength alpha = sigma |gamma|. The network
+is stable at sigma if every mode lies in a stable range. For one range from a to b that is possible
+if the eigenratio, largest over smallest non-zero |gamma|, is at most b / a. Ranges are closed here:
+a ratio that is exactly b / a leaves a single sigma. Ends count as the exact binary numbers that the
+floats are, and eigenvalues are exact algebraic numbers; only the reported sigma are rounded.
 
-Sources: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); Barahona & Pecora, Phys. Rev. Lett. 89, 054101 (2002): the
-eigenratio; Stefański, Perlikowski & Kapitaniak, Phys. Rev. E 75, 016210 (2007): several ranges.
+Complex eigenvalues give complex alpha = -sigma gamma, against a stable region of the complex plane.
+If eigenvectors are missing (a feed-forward chain), the equations of the modes do not decouple, but
+the condition on the eigenvalues stays.
+
+Sources: Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998): real and complex alpha; Barahona &
+Pecora, Phys. Rev. Lett. 89, 054101 (2002): the eigenratio; Stefański, Perlikowski & Kapitaniak,
+Phys. Rev. E 75, 016210 (2007): several ranges; Nishikawa & Motter, Phys. Rev. E 73, 065106 (2006):
+missing eigenvectors.
 """
 
 from __future__ import annotations
@@ -42,17 +49,24 @@ Region = Callable[[np.ndarray], np.ndarray]
 """Maps complex alpha (m,) with an imaginary part >= 0 to truth values (m,)."""
 
 LONGEST = 60
-"""An exact ratio with more letters than this is not written out."""
+"""Most letters of an exact ratio that is written out."""
 
 _EVERYTHING = StableRange(Fraction(0), None)
 
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """One interval of sigma on which every transversal mode is stable.
+    """An interval of sigma on which every transversal mode is stable.
 
-    `low_mode` and `high_mode` are lost first beyond the ends, None where an end is 0, infinite, or the end of a grid;
-    `low_error` and `high_error` are the uncertainties of the ends, in sigma.
+    Parameters
+    ----------
+    low, high : float
+        Ends of the interval.
+    low_error, high_error : float
+        Uncertainties of the ends, in sigma.
+    low_mode, high_mode : NetworkMode or None
+        First mode that is lost beyond the end; None if the end is 0, infinite, or the end of a
+        grid.
     """
 
     low: float
@@ -67,9 +81,20 @@ class Window:
 class Verdict:
     """Whether a network can synchronise for some sigma > 0, and why.
 
-    `answer` is an Answer; `ratio` is the exact eigenratio where it is short, `ratio_value` its float (nan without
-    coupled modes), `allowed` the largest ratio of the ends of a range; `slowest` and `fastest` are the modes of smallest and
-    largest |gamma|; `windows` hold for the ranges as stated.
+    Parameters
+    ----------
+    answer : Answer
+        The decision.
+    ratio : sympy.Expr or None
+        Exact eigenratio if it is short.
+    ratio_value : float
+        Eigenratio; nan without coupled modes.
+    allowed : float
+        Largest ratio of the ends of a range.
+    slowest, fastest : NetworkMode or None
+        Modes of smallest and largest |gamma|.
+    windows : tuple of Window
+        Windows for the ranges as stated.
     """
 
     answer: Answer
@@ -83,7 +108,15 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class OneWay:
-    """Windows of sigma, and the modes that lack eigenvectors: there errors may grow at first, but die out in the end."""
+    """Windows of a network with complex eigenvalues.
+
+    Parameters
+    ----------
+    windows : tuple of Window
+        Windows of sigma.
+    defective : tuple of NetworkMode
+        Modes that lack eigenvectors: their errors may grow at first, but vanish in the end.
+    """
 
     windows: tuple[Window, ...]
     defective: tuple[NetworkMode, ...]
@@ -91,7 +124,10 @@ class OneWay:
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """sigma = alpha / |gamma| of a mode at an end of a range; without a mode it is 0, or infinite for an open range."""
+    """sigma = alpha / |gamma| of a mode at an end of a range.
+
+    Without a mode it is 0, or infinite for an open range.
+    """
 
     range: StableRange
     upper: bool
@@ -112,12 +148,27 @@ class _End:
 def windows(
     ranges: Sequence[tuple[float, float]], graph: Topology, errors: Sequence[tuple[float, float]] | None = None
 ) -> tuple[Window, ...]:
-    """The intervals of sigma >= 0, ascending, on which every transversal mode lies in one of the stable ranges of alpha.
+    """Find the intervals of sigma >= 0 on which every transversal mode lies in a stable range.
 
-    `ranges` are disjoint and ascending, the last may end at math.inf; `errors` are the uncertainties of their ends, which
-    those of sigma follow to first order.  A part of the network that nothing couples to the rest asks that alpha = 0 be
-    stable.  Raises ValueError for ranges or errors that are no such intervals, and for eigenvalues that are complex or
-    positive.
+    Parameters
+    ----------
+    ranges : sequence of (float, float)
+        Disjoint and ascending stable ranges of alpha; the last may end at math.inf.
+    graph : Topology
+        Network with real eigenvalues. If a part of it is not connected to the rest, alpha = 0 must
+        be stable.
+    errors : sequence of (float, float), optional
+        Uncertainties of the ends of the ranges, which those of sigma follow to first order.
+
+    Returns
+    -------
+    tuple of Window
+        In ascending order.
+
+    Raises
+    ------
+    ValueError
+        If the ranges or errors are invalid, or if an eigenvalue is complex or positive.
     """
     return tuple(_window(low, high) for low, high in _intersection(exact_ranges(ranges, errors), graph))
 
@@ -125,11 +176,31 @@ def windows(
 def windows_complex(
     stable: Region, graph: Topology, sigma_grid: Sequence[float] | np.ndarray, resolution: float
 ) -> OneWay:
-    """The intervals of sigma on which every transversal mode is stable, found on a grid and refined by bisection.
+    """Find the intervals of sigma on which every mode lies in a stable region of the complex plane.
 
-    `stable` maps complex alpha (m,) with imaginary part >= 0 to truth values (m,): conjugate modes share their stability.
-    Windows that fit between two points of the grid are not seen.  Raises ValueError for a grid that does not increase, a
-    resolution that is not positive, and a `stable` that does not answer every point.
+    They are found on a grid and refined by bisection.
+
+    Parameters
+    ----------
+    stable : callable
+        Maps complex alpha (m,) with an imaginary part >= 0 to truth values (m,); conjugate modes
+        share their stability.
+    graph : Topology
+        Network.
+    sigma_grid : array_like, shape (k,)
+        Increasing grid of sigma. Windows that fit between two points are not found.
+    resolution : float
+        Width to which the ends are refined.
+
+    Returns
+    -------
+    OneWay
+
+    Raises
+    ------
+    ValueError
+        If the grid does not increase, the resolution is not positive, or `stable` does not return
+        one truth value for each point.
     """
     modes = tuple(mode for mode in transversal_modes(graph) if complex(mode.eigenvalue.value).imag <= 0)
     values = np.array([mode.eigenvalue.value for mode in modes] + [0.0] * has_loose_parts(graph), dtype=complex)
@@ -169,19 +240,32 @@ def windows_complex(
 def verdict(
     ranges: Sequence[tuple[float, float]], graph: Topology, errors: Sequence[tuple[float, float]] | None = None
 ) -> Verdict:
-    """Whether a network can synchronise for some sigma > 0, decided exactly; arguments and errors as of `windows`.
+    """Decide exactly whether a network can synchronise for some sigma > 0.
 
-    "yes" holds for all, "no" for none of the ranges within the errors, otherwise it is "undecided within the error".
+    Parameters
+    ----------
+    ranges, graph, errors
+        See `windows`.
+
+    Returns
+    -------
+    Verdict
+        The answer is YES if it holds for all ranges within the errors, NO if it holds for none.
+
+    Raises
+    ------
+    ValueError
+        As in `windows`.
     """
-    given = exact_ranges(ranges, errors)
+    stated = exact_ranges(ranges, errors)
     modes = sorted(_real_modes(graph), key=lambda mode: mode.size)
     slowest, fastest = (modes[0], modes[-1]) if modes else (None, None)
-    certain, maybe = (possible(widen(given, sign), graph) for sign in (-1, 1))
+    certain, maybe = (possible(widen(stated, sign), graph) for sign in (-1, 1))
     return Verdict(
         (Answer.NO, Answer.UNDECIDED, Answer.YES)[certain + maybe],
         _exact_ratio(slowest, fastest),
         fastest.size / slowest.size if slowest and fastest else math.nan,
-        max((r.ratio for r in given), default=math.nan),
+        max((r.ratio for r in stated), default=math.nan),
         slowest,
         fastest,
         windows(ranges, graph, errors),
@@ -189,17 +273,29 @@ def verdict(
 
 
 def possible(ranges: Sequence[StableRange], graph: Topology) -> bool:
-    """True where some sigma > 0 puts every mode of a graph into one of the exact ranges."""
+    """Decide whether some sigma > 0 puts every mode of a graph into one of the exact ranges.
+
+    Parameters
+    ----------
+    ranges : sequence of StableRange
+        Stable ranges of alpha.
+    graph : Topology
+        Network.
+
+    Returns
+    -------
+    bool
+    """
     return any(_follows(high) for _, high in _intersection(ranges, graph))
 
 
 def _follows(high: _End) -> bool:
-    """True where an upper end lies above sigma = 0."""
+    """True if an upper end lies above sigma = 0."""
     return high.range.high is None or (high.mode is not None and high.range.high > 0)
 
 
 def _intersection(ranges: Sequence[StableRange], graph: Topology) -> list[tuple[_End, _End]]:
-    """The windows by their exact ends."""
+    """The windows as pairs of exact ends."""
     modes = _real_modes(graph)
     if has_loose_parts(graph) and not any(r.low == 0 for r in ranges):
         return []
@@ -212,15 +308,17 @@ def _intersection(ranges: Sequence[StableRange], graph: Topology) -> list[tuple[
 
 
 def _later(x: _End, y: _End) -> _End:
+    """The end with the larger sigma."""
     return y if _order(y, x) > 0 else x
 
 
 def _earlier(x: _End, y: _End) -> _End:
+    """The end with the smaller sigma."""
     return y if _order(y, x) < 0 else x
 
 
 def _order(x: _End, y: _End) -> int:
-    """The sign of the sigma of one end minus that of another, exactly."""
+    """Sign of the difference of the sigma of two ends, exactly."""
     alphas = [end.range.high if end.upper else end.range.low for end in (x, y)]
     if alphas[0] is None or alphas[1] is None:
         return (alphas[0] is None) - (alphas[1] is None)
@@ -230,11 +328,12 @@ def _order(x: _End, y: _End) -> int:
 
 
 def _window(low: _End, high: _End) -> Window:
+    """Round the exact ends of a window."""
     return Window(low.sigma, high.sigma, low.error, high.error, low.mode, high.mode)
 
 
 def _real_modes(graph: Topology) -> tuple[NetworkMode, ...]:
-    """The transversal modes; ValueError where one is complex or positive."""
+    """The transversal modes; ValueError if an eigenvalue is complex or positive."""
     modes = transversal_modes(graph)
     for mode in modes:
         gamma = mode.eigenvalue.value

@@ -22,9 +22,7 @@ LONGEST = 32
 """Longest cycle that is looked for, in periods of the drive."""
 
 RETURN = 1e-9
-"""Largest distance of a closed cycle, relative to the size of the state; 0.1 rtol if that is
-larger.
-"""
+"""Largest distance of a closed cycle, relative to the size of the state; at least 0.1 rtol."""
 
 
 class Motion(StrEnum):
@@ -82,11 +80,11 @@ class Attractor:
             raise ValueError(f"{self.kind} motion has no eigenvalues to take exponents from")
         values = np.linalg.eigvals(self.propagators)
         if self.cycle == 0.0:
-            found = values.real.max(axis=-1)
+            exponents = values.real.max(axis=-1)
         else:
             with np.errstate(divide="ignore"):
-                found = np.log(np.abs(values).max(axis=-1)) / self.cycle
-        return found[1], np.abs(found[1] - found[0])
+                exponents = np.log(np.abs(values).max(axis=-1)) / self.cycle
+        return exponents[1], np.abs(exponents[1] - exponents[0])
 
 
 def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
@@ -106,27 +104,27 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
     -------
     Attractor
     """
-    own = orbits.part([row])
-    if not any(e.has(sp.Symbol("t", real=True), *_states(own.variation)) for _, e in own.variation.matrix):
-        return _steady(own, Motion.LINEAR)
-    if not own.scene.forced:
-        return _fixed_point(own)
-    integrator = own.integrator_of(own.strengths[:1])
-    closed = max(RETURN, 0.1 * own.scene.rtol)
+    orbit = orbits.part([row])
+    if not any(e.has(sp.Symbol("t", real=True), *_states(orbit.variation)) for _, e in orbit.variation.matrix):
+        return _steady(orbit, Motion.LINEAR)
+    if not orbit.scene.forced:
+        return _fixed_point(orbit)
+    integrator = orbit.integrator_of(orbit.strengths[:1])
+    closed = max(RETURN, 0.1 * orbit.scene.rtol)
     for _ in range(3):
         states = [integrator.state[0]]
         for _ in range(LONGEST):
-            integrator.advance(own.unit)
+            integrator.advance(orbit.unit)
             states.append(integrator.state[0])
         gaps = [_distance(state, states[-1]) for state in states[-2::-1]]
         cycle = next((k + 1 for k, gap in enumerate(gaps) if gap < closed), 0)
-        orbits.state[row] = own.state[0] = states[-1]
+        orbits.state[row] = orbit.state[0] = states[-1]
         if cycle:
-            found = np.concatenate([cycle_propagators(own, cycle) for _ in range(2)])
-            return Attractor(Motion.PERIODIC, cycle * own.unit, found, cycle)
+            propagators = np.concatenate([cycle_propagators(orbit, cycle) for _ in range(2)])
+            return Attractor(Motion.PERIODIC, cycle * orbit.unit, propagators, cycle)
         if min(gaps) > 1e-3:
             break
-        integrator.advance(max(1, round(patience)) * own.unit)
+        integrator.advance(max(1, round(patience)) * orbit.unit)
     return Attractor(Motion.APERIODIC, 0.0)
 
 
@@ -135,12 +133,12 @@ def _distance(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.abs(a - b).max() / max(1e-3, np.abs(b).max()))
 
 
-def cycle_propagators(own: Orbits, cycle: int) -> np.ndarray:
+def cycle_propagators(orbit: Orbits, cycle: int) -> np.ndarray:
     """Integrate the propagators of all modes over one cycle, from the current state.
 
     Parameters
     ----------
-    own : Orbits
+    orbit : Orbits
         A single orbit; its state is advanced by the cycle.
     cycle : int
         Number of drive periods.
@@ -150,12 +148,12 @@ def cycle_propagators(own: Orbits, cycle: int) -> np.ndarray:
     ndarray, shape (1, m, p, p)
         Propagators of the m modes with p components each.
     """
-    own.interpolation, own.block = exact_interpolation(own.strengths), 1.0
-    own.integrator = own.integrator_of(own.strengths)
-    total = own.propagators()
+    orbit.interpolation, orbit.block = exact_interpolation(orbit.strengths), 1.0
+    orbit.integrator = orbit.integrator_of(orbit.strengths)
+    total = orbit.propagators()
     for _ in range(cycle - 1):
-        total = own.propagators() @ total
-    own.state = own.integrator.state
+        total = orbit.propagators() @ total
+    orbit.state = orbit.integrator.state
     return total
 
 
@@ -164,19 +162,17 @@ def _states(variation: Variation) -> list[sp.Symbol]:
     return [sp.Symbol(name, real=True) for name in variation.orbit.state]
 
 
-def _fixed_point(own: Orbits) -> Attractor:
-    """Return a fixed point with its variational matrices if the orbit rests, else aperiodic
-    motion.
-    """
-    rates = sp.lambdify(_symbols(own.variation), list(own.variation.orbit.rhs()), "numpy")(*_values(own))
-    if not np.abs(rates).max() < RETURN * max(1.0, np.abs(own.state).max()):
+def _fixed_point(orbit: Orbits) -> Attractor:
+    """Return a fixed point if the orbit rests, else aperiodic motion."""
+    rates = sp.lambdify(_symbols(orbit.variation), list(orbit.variation.orbit.rhs()), "numpy")(*_values(orbit))
+    if not np.abs(rates).max() < RETURN * max(1.0, np.abs(orbit.state).max()):
         return Attractor(Motion.APERIODIC, 0.0)
-    return _steady(own, Motion.FIXED_POINT)
+    return _steady(orbit, Motion.FIXED_POINT)
 
 
-def _steady(own: Orbits, motion: Motion) -> Attractor:
+def _steady(orbit: Orbits, motion: Motion) -> Attractor:
     """Return motion along which the variational equation is constant."""
-    matrix = _matrix(own.variation, _symbols(own.variation), _values(own), own.strengths)
+    matrix = _matrix(orbit.variation, _symbols(orbit.variation), _values(orbit), orbit.strengths)
     return Attractor(motion, 0.0, np.stack([matrix, matrix]))
 
 
@@ -186,18 +182,18 @@ def _symbols(variation: Variation) -> list[sp.Symbol]:
     return [sp.Symbol(name, real=True) for name in names]
 
 
-def _values(own: Orbits) -> list[float]:
+def _values(orbit: Orbits) -> list[float]:
     """Values of `_symbols` at the orbit's state."""
-    return [*own.state[0], *(own.scene.parameters[name] for name in own.variation.orbit.parameters), 0.0]
+    return [*orbit.state[0], *(orbit.scene.parameters[name] for name in orbit.variation.orbit.parameters), 0.0]
 
 
 def _matrix(variation: Variation, symbols: list[sp.Symbol], values: list[float], strengths: np.ndarray) -> np.ndarray:
     """Evaluate the matrices (m, p, p) of the variational equation at a state, for each strength."""
     p = variation.size // len(variation.parameters)
-    made = np.zeros((len(strengths), p, p), dtype=strengths.dtype)
+    matrices = np.zeros((len(strengths), p, p), dtype=strengths.dtype)
     for (r, c), e in variation.matrix:
         if r < p and c < p:
             at = sp.lambdify([*symbols, *MODE[:1]], e, "numpy")
             base, slope = at(*values, 0.0), at(*values, 1.0) - at(*values, 0.0)
-            made[:, r, c] = base + slope * strengths
-    return made
+            matrices[:, r, c] = base + slope * strengths
+    return matrices

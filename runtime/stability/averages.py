@@ -74,15 +74,15 @@ class Batches:
             there is a single batch.
         """
         rates = np.array(self.sums[: self.blocks // self.per_batch]) / (self.per_batch * self.length)
-        found = []
+        estimates = []
         for join in (1, 2, 4):
             count = len(rates) // join
             if count >= 8 or join == 1:
                 means = rates[: count * join].reshape(count, join, *rates.shape[1:]).mean(axis=1)
-                found.append(
+                estimates.append(
                     means.std(axis=0, ddof=1) / math.sqrt(count) if count > 1 else np.full(means[0].shape, np.inf)
                 )
-        return np.asarray(np.max(found, axis=0))
+        return np.asarray(np.max(estimates, axis=0))
 
     def error(self) -> np.ndarray:
         """Return the standard error of the mean over the starts, an ndarray of shape (m,)."""

@@ -84,15 +84,20 @@ class ClusterExponents:
 
     @property
     def merged(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of clusters that never were more than 1e-9 apart, so that the motion is a coarser
-        partition's.
+        """Pairs of clusters that never were more than 1e-9 apart; the motion is that of fewer
+        clusters.
         """
         first, second = np.nonzero(np.triu(self.separation < 1e-9, 1))
         return tuple((int(a), int(b)) for a, b in zip(first, second, strict=True))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return classes, blocks (clusters, nodes, exponent, stderr, verdict), motion, merged, time
-        for JSON.
+        """Return the exponents for JSON.
+
+        Returns
+        -------
+        dict
+            classes, blocks (clusters, nodes, exponent, stderr, verdict), motion, motion_stderr,
+            merged, time.
         """
         rows = zip(self.state.blocks, self.exponent, self.stderr, self.verdicts, strict=True)
         return {
@@ -165,46 +170,45 @@ def cluster_exponents(
     """
     precision, periods, transient, seed = averaging(precision, periods, transient, seed)
     scene = single_cell(cluster_exponents, scene, rtol, parameters)
-    found = _of_graph(scene, state)
-    variation, unit = clustered(scene.equations, found), unit_of_time(scene)
-    integrator = _integrator(scene, found, variation, seed)
+    partition = _of_graph(scene, state)
+    variation, unit = clustered(scene.equations, partition), unit_of_time(scene)
+    integrator = _integrator(scene, partition, variation, seed)
     for _ in range(round(transient)):
         integrator.advance(unit)
-    batches, apart = Batches(unit), np.zeros((found.quotient.n,) * 2)
+    batches, apart = Batches(unit), np.zeros((partition.quotient.n,) * 2)
     with tqdm(total=math.ceil(periods), unit="period", disable=not show_progress and show_progress is not None) as bar:
         while batches.blocks < periods:
             batches.add(integrator.advance(unit))
-            apart = np.maximum(apart, _differences(integrator.state[0], found.quotient.n, _deviating(variation)))
+            apart = np.maximum(apart, _differences(integrator.state[0], partition.quotient.n, _deviating(variation)))
             bar.update(1)
             if batches.due and np.all(batches.error() <= precision):
                 break
     mean, error, time = batches.mean()[0], batches.error_by_start()[0], batches.blocks * unit
-    return ClusterExponents(found, mean[1:], error[1:], float(mean[0]), float(error[0]), apart, time)
+    return ClusterExponents(partition, mean[1:], error[1:], float(mean[0]), float(error[0]), apart, time)
 
 
 def _of_graph(scene: Scene, state: Clusters | Sequence[int]) -> Clusters:
     """Compute the blocks of a partition and check that it belongs to the scene's graph."""
     classes = state.classes if isinstance(state, Clusters) else state
-    found = clusters(scene.topology, classes)
-    if isinstance(state, Clusters) and (found.quotient.links, found.blocks) != (state.quotient.links, state.blocks):
+    partition = clusters(scene.topology, classes)
+    content = (partition.quotient.links, partition.blocks)
+    if isinstance(state, Clusters) and content != (state.quotient.links, state.blocks):
         graph = scene.topology
         raise ValueError(
             f"cluster state {classes} belongs to another graph than {graph.name}({graph.n}); make it with clusters(graph, "
             "classes)"
         )
-    return found
+    return partition
 
 
-def _integrator(scene: Scene, found: Clusters, variation: Variation, seed: int) -> VariationalIntegrator:
-    """Set up the quotient's orbit with one deviation along it and one in each block, which stay
-    there.
-    """
-    firsts = [members[0] for members in found.members]
+def _integrator(scene: Scene, partition: Clusters, variation: Variation, seed: int) -> VariationalIntegrator:
+    """Set up the quotient's orbit with one deviation along it and one in each block."""
+    firsts = [members[0] for members in partition.members]
     state = np.array([[values[i] for values in scene.initial.values() for i in firsts]])
     numbers = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])
     state = with_modes(variation.orbit, state, numbers)
     components = _deviating(variation)
-    parts = list(_parts(found, components))
+    parts = list(_parts(partition, components))
     integrator = VariationalIntegrator.make(
         scene, variation, state, numbers, np.full((1, len(parts)), scene.parameters["sigma"]), 1
     )
@@ -221,11 +225,11 @@ def _deviating(variation: Variation) -> int:
     return len(variation.orbit.node.continuous)
 
 
-def _parts(found: Clusters, components: int) -> Iterator[slice]:
+def _parts(partition: Clusters, components: int) -> Iterator[slice]:
     """Yield the slices of the clusters' motion and of each block in the variational equation."""
-    first, last = 0, found.quotient.n * components
+    first, last = 0, partition.quotient.n * components
     yield slice(first, last)
-    for block in found.blocks:
+    for block in partition.blocks:
         first, last = last, last + len(block.nodes) * components
         yield slice(first, last)
 

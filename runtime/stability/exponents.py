@@ -81,9 +81,7 @@ class Exponents:
 
     @property
     def intervals(self) -> tuple[Interval, ...]:
-        """Intervals of real strengths with a negative exponent, interpolated linearly between grid
-        points.
-        """
+        """Intervals of real strengths with a negative exponent; ends by linear interpolation."""
         return tuple((low, high) for (low, _), (high, _) in self.ranges)
 
     @property
@@ -173,8 +171,8 @@ def exponents(
     orbits.settle(transient)
     attractors = tuple(find_attractor(orbits, row, transient) for row in range(starts))
     by_start, error, length = _by_start(orbits, attractors, precision, periods, show_progress)
-    chosen = max(group_by_attractor(attractors, by_start), key=len)
-    mean, spread = by_start[chosen].mean(axis=0), np.sqrt((error[chosen] ** 2).sum(axis=0)) / len(chosen)
+    largest = max(group_by_attractor(attractors, by_start), key=len)
+    mean, spread = by_start[largest].mean(axis=0), np.sqrt((error[largest] ** 2).sum(axis=0)) / len(largest)
     return Exponents(strengths, mean, spread, length, starts, by_start, attractors)
 
 
@@ -182,16 +180,16 @@ def _by_start(
     orbits: Orbits, attractors: Sequence[Attractor], precision: float, periods: float, show_progress: bool | None
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Exponents and errors (starts, m) from eigenvalues or averages, and the time averaged over."""
-    found = np.empty((len(attractors), len(orbits.strengths)))
-    error = np.empty_like(found)
+    exponent = np.empty((len(attractors), len(orbits.strengths)))
+    error = np.empty_like(exponent)
     rest = [row for row, attractor in enumerate(attractors) if attractor.propagators is None]
     for row, attractor in enumerate(attractors):
         if attractor.propagators is not None:
-            found[row], error[row] = attractor.exponents()
+            exponent[row], error[row] = attractor.exponents()
     length = max(attractor.cycle for attractor in attractors)
     if rest:
-        found[rest], error[rest], length = _average(orbits.part(rest), precision, periods, show_progress)
-    return found, error, length
+        exponent[rest], error[rest], length = _average(orbits.part(rest), precision, periods, show_progress)
+    return exponent, error, length
 
 
 def coupled_cell(function: Callable[..., Any], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
@@ -279,9 +277,9 @@ def group_by_attractor(attractors: Sequence[Attractor], by_start: np.ndarray) ->
     list of list of int
         Indices of the starts on each attractor.
     """
-    found: list[list[int]] = []
+    groups: list[list[int]] = []
     for row, attractor in enumerate(attractors):
-        for others in found:
+        for others in groups:
             alike = attractors[others[0]].kind == attractor.kind
             if alike and attractor.propagators is not None:
                 alike = np.allclose(by_start[others[0]], by_start[row], rtol=1e-3, atol=1e-4)
@@ -289,8 +287,8 @@ def group_by_attractor(attractors: Sequence[Attractor], by_start: np.ndarray) ->
                 others.append(row)
                 break
         else:
-            found.append([row])
-    return found
+            groups.append([row])
+    return groups
 
 
 def _average(

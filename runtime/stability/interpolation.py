@@ -83,9 +83,9 @@ class Interpolation:
         """
         if len(self.checked) == 0:
             return 0.0
-        own = propagators[:, self.checked]
-        sizes = np.maximum(np.abs(own).max(axis=(2, 3)), 1e-300)
-        return float((np.abs(combine(self.checks, propagators) - own).max(axis=(2, 3)) / sizes).max())
+        integrated = propagators[:, self.checked]
+        sizes = np.maximum(np.abs(integrated).max(axis=(2, 3)), 1e-300)
+        return float((np.abs(combine(self.checks, propagators) - integrated).max(axis=(2, 3)) / sizes).max())
 
     @property
     def is_exact(self) -> bool:
@@ -124,22 +124,22 @@ def strength_interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) ->
     if len(strengths) == 0:
         raise ValueError("found no strength of a mode; expected at least one")
     panels = list((_squares if np.iscomplexobj(strengths) else _pieces)(strengths, parts, nodes))
-    total = sum(len(own) + len(extra) for _, own, _, extra in panels)
+    total = sum(len(points) + len(extra) for _, points, _, extra in panels)
     if total >= len(strengths):
         return exact_interpolation(strengths)
     weights = np.zeros((len(strengths), total), dtype=strengths.dtype)
-    found, checked, checks = [], [], []
+    integrated, checked, checks = [], [], []
     first = 0
-    for rows, own, signs, extra in panels:
-        last = first + len(own)
-        weights[rows, first:last] = _barycentric(strengths[rows], own, signs)
-        for k, row in enumerate(_barycentric(extra, own, signs)):
+    for rows, points, signs, extra in panels:
+        last = first + len(points)
+        weights[rows, first:last] = _barycentric(strengths[rows], points, signs)
+        for k, row in enumerate(_barycentric(extra, points, signs)):
             checks.append(np.zeros(total, dtype=strengths.dtype))
             checks[-1][first:last] = row
             checked.append(last + k)
-        found += [own, extra]
+        integrated += [points, extra]
         first = last + len(extra)
-    return Interpolation(strengths, np.concatenate(found), weights, np.array(checked), np.array(checks))
+    return Interpolation(strengths, np.concatenate(integrated), weights, np.array(checked), np.array(checks))
 
 
 def _pieces(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
@@ -204,5 +204,5 @@ def combine(weights: np.ndarray, propagators: np.ndarray, largest: int = SINGLE)
     cells, count, p, _ = propagators.shape
     table = propagators.transpose(1, 0, 2, 3).reshape(count, -1)
     rows = max(1, largest // table.size)
-    made = np.concatenate([weights[i : i + rows] @ table for i in range(0, max(len(weights), 1), rows)])
-    return np.asarray(made.reshape(len(weights), cells, p, p).transpose(1, 0, 2, 3))
+    products = np.concatenate([weights[i : i + rows] @ table for i in range(0, max(len(weights), 1), rows)])
+    return np.asarray(products.reshape(len(weights), cells, p, p).transpose(1, 0, 2, 3))

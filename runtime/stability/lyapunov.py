@@ -41,8 +41,9 @@ TRIAL = 4
 """Periods of each trial, and periods that are dropped after the choice."""
 
 CLEAR, LOST = 1e4, 10.0
-"""Length of a direction after a block, in tolerances, from which it is clear of the error, and
-below which it is lost.
+"""Lengths of a direction after a block, in tolerances.
+
+From the first on it is clear of the error, below the second it is lost.
 """
 
 
@@ -175,14 +176,14 @@ def _report(frame: TangentFrame, batches: Batches, lost: np.ndarray) -> Lyapunov
     """Means and errors; exponents after a lost direction are lost as well."""
     resolved = ~np.logical_or.accumulate(lost)
     mean, error = batches.mean()[0], batches.error_by_start()[0]
-    found, spread = np.where(resolved, mean[:-1], -np.inf), np.where(resolved, error[:-1], 0.0)
-    order = np.argsort(-found, kind="stable")
+    exponent, spread = np.where(resolved, mean[:-1], -np.inf), np.where(resolved, error[:-1], 0.0)
+    order = np.argsort(-exponent, kind="stable")
     time, volume = batches.blocks * batches.length, (float(mean[-1]), float(error[-1]))
     if frame.variation.events is not None:
-        known = len(found) == frame.variation.size
-        volume = (float(found.sum()), float(np.hypot.reduce(spread))) if known else (math.nan, math.nan)
+        known = len(exponent) == frame.variation.size
+        volume = (float(exponent.sum()), float(np.hypot.reduce(spread))) if known else (math.nan, math.nan)
     return Lyapunov(
-        found[order],
+        exponent[order],
         spread[order],
         resolved[order],
         *volume,
@@ -251,16 +252,16 @@ class TangentFrame:
             If time enters without a known period.
         """
         unit = unit_of_time(scene)
-        own = network_variation(scene.equations)
-        sticks = own.events is not None
-        variation = own if sticks else Variation(with_volume(own.orbit), own.size, own.matrix)
+        network = network_variation(scene.equations)
+        sticks = network.events is not None
+        variation = network if sticks else Variation(with_volume(network.orbit), network.size, network.matrix)
         variation = phase_shifted(variation) if scene.forced else variation
         values = {**scene.parameters, PHASE.name: 0.0}
         numbers = np.array([[values[name] for name in variation.orbit.parameters]])
         state = np.array([[*scene.y0, *(0.0 for _ in range(0 if sticks else scene.n))]])
         state = with_modes(variation.orbit, state, numbers)
         integrator = VariationalIntegrator.make(scene, variation, state, numbers, np.zeros((0, count)), 1)
-        basis = np.linalg.qr(np.random.default_rng(seed).normal(size=(own.size, count)))[0]
+        basis = np.linalg.qr(np.random.default_rng(seed).normal(size=(network.size, count)))[0]
         return cls(scene, variation, integrator, basis, unit)
 
     @property
@@ -292,27 +293,27 @@ class TangentFrame:
         self.integrator.set_deviations(self.basis[None])
         whole_growth = self.integrator.advance(self.unit / self.parts)[0]
         self.basis, triangle = np.linalg.qr(self.integrator.deviations[0])
-        own = np.abs(np.diagonal(triangle))
+        lengths = np.abs(np.diagonal(triangle))
         volume = np.nan
         if self.variation.events is None:
             shares = self.integrator.state[:, -self.scene.n :]
             volume = float(shares.sum())
             shares[:] = 0.0
         with np.errstate(divide="ignore"):
-            return whole_growth + np.log(own), own * np.exp(np.minimum(whole_growth, 0.0)), volume
+            return whole_growth + np.log(lengths), lengths * np.exp(np.minimum(whole_growth, 0.0)), volume
 
     def choose_block(self) -> None:
         """Choose the fewest blocks in a period that keep most directions clear of the error."""
         best = -1
-        chosen = 1
+        fewest = 1
         for parts in PARTS:
             self.parts, self.phase = parts, 0
             shares = np.array([self.advance()[1] for _ in range(TRIAL * parts)])
             clear = np.logical_and.accumulate(shares.min(axis=0) > CLEAR * self.rtol)
             if clear.sum() > best:
-                best, chosen = int(clear.sum()), parts
+                best, fewest = int(clear.sum()), parts
             if best == self.count:
                 break
-        self.parts, self.phase = chosen, 0
-        for _ in range(TRIAL * chosen):
+        self.parts, self.phase = fewest, 0
+        for _ in range(TRIAL * fewest):
             self.advance()

@@ -92,20 +92,19 @@ class MSF:
     @property
     def attractors(self) -> tuple[str, ...]:
         """Kind of motion of each start."""
-        return tuple(found.kind for found in self.fine.attractors)
+        return tuple(attractor.kind for attractor in self.fine.attractors)
 
     @property
     def errors(self) -> tuple[Interval, ...] | None:
         """The uncertainties of the ends; None if an average was too short to estimate them."""
-        found = self.uncertainties
-        return found if np.isfinite(found).all() else None
+        uncertainties = self.uncertainties
+        return uncertainties if np.isfinite(uncertainties).all() else None
 
     @property
     def windows(self) -> tuple[Window, ...]:
-        """Ranges of sigma in which every mode of the scene's network is stable; real eigenvalues
-        only.
+        """Ranges of sigma in which every mode of the scene's network is stable.
 
-        No mode is lost at an end that comes from an end of the grid.
+        Eigenvalues must be real. No mode is lost at an end that comes from an end of the grid.
         """
         return tuple(self._trimmed(window) for window in windows(self.open_ranges, self.scene.topology, self.errors))
 
@@ -124,8 +123,12 @@ class MSF:
         return self.intervals
 
     def as_dict(self) -> dict[str, Any]:
-        """Return alpha, exponent, stderr, intervals, uncertainties, class, attractors, time, starts
-        for JSON.
+        """Return the function for JSON.
+
+        Returns
+        -------
+        dict
+            alpha, exponent, stderr, intervals, uncertainties, class, attractors, time and starts.
         """
         return {
             "alpha": self.alpha.tolist(),
@@ -179,8 +182,12 @@ class Plane:
         return tuple(np.asarray(line) for line in lines)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return alpha, beta, exponent and stderr (rows of alpha), contours, attractors, time for
-        JSON.
+        """Return the function for JSON.
+
+        Returns
+        -------
+        dict
+            alpha, beta, exponent and stderr (rows of alpha), contours, attractors and time.
         """
         return {
             "alpha": self.alpha.tolist(),
@@ -207,15 +214,14 @@ def msf(
     show_progress: bool | None = False,
     **parameters: float,
 ) -> MSF:
-    """Compute the master stability function of an oscillator and coupling on a line of real
-    strengths.
+    """Compute the master stability function of an oscillator and coupling on a line.
 
     Parameters
     ----------
     scene : Scene
         Source of the oscillator and the coupling.
     alpha : array_like, shape (m,)
-        Increasing strengths alpha = -sigma gamma.
+        Increasing real strengths alpha = -sigma gamma.
     precision, periods, transient, starts, rtol, seed, workers, show_progress
         See `synchain.runtime.exponents`.
     **parameters : float
@@ -234,7 +240,7 @@ def msf(
     """
     line = row("alpha", alpha, 2, rising=True)
     fine = np.union1d(line, np.linspace(line[0], line[-1], FINE))
-    found = exponents(
+    fine_exponents = exponents(
         scene,
         fine,
         precision=precision,
@@ -247,7 +253,7 @@ def msf(
         show_progress=show_progress,
         **parameters,
     )
-    return MSF(scene, line, found)
+    return MSF(scene, line, fine_exponents)
 
 
 def plane(
@@ -294,7 +300,7 @@ def plane(
     """
     across, up = row("alpha", alpha, 2, rising=True), row("beta", beta, 2, rising=True)
     heights, place = np.unique(np.abs(up), return_inverse=True)
-    found = exponents(
+    half_plane = exponents(
         scene,
         (across[:, None] + 1j * heights).reshape(-1),
         precision=precision,
@@ -307,9 +313,9 @@ def plane(
         show_progress=show_progress,
         **parameters,
     )
-    table, error = (row.reshape(len(across), -1)[:, place] for row in (found.exponent, found.stderr))
-    kinds = tuple(a.kind for a in found.attractors)
-    return Plane(scene, across, up, table, error, kinds, found.time)
+    table, error = (row.reshape(len(across), -1)[:, place] for row in (half_plane.exponent, half_plane.stderr))
+    kinds = tuple(a.kind for a in half_plane.attractors)
+    return Plane(scene, across, up, table, error, kinds, half_plane.time)
 
 
 def classify(intervals: Sequence[Interval], end: float, begin: float = 0.0) -> StabilityClass:

@@ -1,4 +1,4 @@
-"""Synchronous orbits with all their modes, settled on an attractor, then advanced block by block."""
+"""Synchronous orbits with all their modes: settling on an attractor, then advancing by blocks."""
 
 from __future__ import annotations
 
@@ -134,9 +134,7 @@ class Orbits:
         self.state = integrator.state
 
     def prepare(self) -> None:
-        """Choose the block and the interpolation by trial on the next blocks, and start the
-        deviations.
-        """
+        """Choose block and interpolation by trial on the next blocks, and start the deviations."""
         limit = max(0.1 * self.scene.rtol, 1e-12)
         for block, nodes, parts in _choices(self.scene.forced):
             self.block, self.interpolation = block, strength_interpolation(self.strengths, nodes, parts)
@@ -171,10 +169,10 @@ class Orbits:
             basis[:, k, k::p] = 1.0
         integrator.set_deviations(basis)
         growth = integrator.advance(self.block * self.unit)
-        found = integrator.deviations * np.exp(growth)[:, None, :]
+        columns = integrator.deviations * np.exp(growth)[:, None, :]
         if size != p:
-            found = found[:, :p] + 1j * found[:, p:]
-        return np.asarray(found.reshape(len(self.state), p, -1, p).transpose(0, 2, 1, 3))
+            columns = columns[:, :p] + 1j * columns[:, p:]
+        return np.asarray(columns.reshape(len(self.state), p, -1, p).transpose(0, 2, 1, 3))
 
     def advance(self) -> np.ndarray:
         """Advance orbits and deviations by one block.
@@ -193,12 +191,12 @@ class Orbits:
             raise RuntimeError("orbits are not prepared")
         nodes = self.propagators()
         self.interpolation_error = max(self.interpolation_error, self.interpolation.error(nodes))
-        found = self.interpolation.apply(nodes)
-        moved = sum(found[..., k] * self.deviations[..., k, None] for k in range(self.components))
+        propagators = self.interpolation.apply(nodes)
+        moved = sum(propagators[..., k] * self.deviations[..., k, None] for k in range(self.components))
         length = np.linalg.norm(moved, axis=2)
         with np.errstate(divide="ignore", invalid="ignore"):
             self.deviations = np.where(length[..., None] > 0.0, moved / length[..., None], 0.0)
-            return np.log(length)
+            return np.asarray(np.log(length))
 
 
 def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:
@@ -219,9 +217,7 @@ def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _variation(equations: Equations, plane: bool) -> Variation:
-    """Variational equation of a mode, cached because Newton's method on an orbit needs it at every
-    step.
-    """
+    """Variational equation of a mode; Newton's method on an orbit needs it at every step."""
     return mode(equations, plane=plane)
 
 
@@ -236,7 +232,7 @@ def unit_of_time(scene: Scene) -> float:
     drive = scene.drive
     if scene.forced and drive.frequency is None:
         raise ValueError(
-            f"drive: the oscillator {scene.oscillator!r} {drive.problem}; expected one with a period; "
+            f"drive: the oscillator {scene.oscillator.name!r} {drive.problem}; expected one with a period; "
             "`run` integrates others with time_unit = 'time'"
         )
     return scene.period or 2.0 * math.pi
@@ -248,8 +244,8 @@ def _choices(forced: bool) -> list[tuple[float, int, int]]:
     Each block costs as much as twenty nodes by itself.
     """
     blocks = (4.0, 2.0, 1.0) if forced else (1.0, 0.5, 0.25, 0.125)
-    made = [(block, nodes, parts) for block in blocks for nodes in NODES for parts in PARTS]
-    return sorted(made, key=lambda choice: (20.0 + choice[1] * choice[2]) / choice[0])
+    choices = [(block, nodes, parts) for block in blocks for nodes in NODES for parts in PARTS]
+    return sorted(choices, key=lambda choice: (20.0 + choice[1] * choice[2]) / choice[0])
 
 
 def _stretches(periods: int) -> list[int]:

@@ -100,7 +100,7 @@ class VariationalIntegrator:
         width, count = kernel.origin.width, strengths.shape[1]
         order = np.argsort(np.hypot.reduce(strengths, axis=0) if len(strengths) else np.zeros(count), kind="stable")
         padded = -(-count // width) * width
-        chosen = np.concatenate([order, np.full(padded - count, order[-1])])
+        columns = np.concatenate([order, np.full(padded - count, order[-1])])
         where = np.empty(count, dtype=np.int64)
         where[order] = np.arange(count)
         rtol, atol = tolerances(scene, numbers)
@@ -108,7 +108,7 @@ class VariationalIntegrator:
         longest = half_swing(kernel.equations, dict(zip(kernel.equations.parameters, numbers.T, strict=True)))
         control = np.append(control_array(rtol, atol, longest, scene.max_steps, jumps=False), looseness)
         vectors = np.full((len(state), variation.size, padded), 1.0 / math.sqrt(variation.size))
-        kept = np.ascontiguousarray(strengths[:, chosen], dtype=float)
+        kept = np.ascontiguousarray(strengths[:, columns], dtype=float)
         kept = kept if len(kept) else np.zeros((1, padded))
         return cls(
             kernel=kernel,

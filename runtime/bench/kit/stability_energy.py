@@ -46,7 +46,7 @@ def _with_energy(scene: Scene) -> tuple[Scene, dict[str, float]]:
     """A scene with the same energy that has one, and the numbers to put in: smoothed, and with springs for "x->v"."""
     if scene.equations.sticks:
         return scene.replace(contact="atan", initial={name: scene.initial[name] for name in ("x", "v")}), {}
-    if scene.coupling == "x->v" and scene.equations.links:
+    if str(scene.coupling) == "x->v" and scene.equations.links:
         return scene.replace(coupling="spring", sigma=0.0), {"sigma": scene.parameters["sigma"]}
     return scene, {}
 

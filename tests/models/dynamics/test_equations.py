@@ -148,7 +148,8 @@ def test_states_and_parameters_come_in_a_fixed_order() -> None:
 
 DIGEST = """
 from fractions import Fraction
-from synchain.models.dynamics.network import edge, network, node
+from synchain.models.dynamics.network import edge, network
+from parts import node
 from synchain.models.presentation.equations import as_dict
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.links import Link

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import sympy as sp
-from connectivity import connectivity
+from parts import connectivity, node
 from samples import clocks
 from scipy.integrate import solve_ivp
 from sympy.physics import mechanics
@@ -14,7 +14,6 @@ from sympy.physics import mechanics
 from synchain.codegen.export.python import to_python
 from synchain.models import chain
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.network import node
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.scenes.file import load_scene

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import sympy as sp
+from parts import edge
 from variational_reference import ALPHA, transversal_equations
 
 from synchain.models import chain
@@ -17,7 +18,6 @@ from synchain.models.dynamics.variational import MODE, clustered, mode
 from synchain.models.graphs.clusters import orbital_partitions
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Edge, Node
-from synchain.models.mechanics.link import edge
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.certify import certify

@@ -2,30 +2,35 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
 import sympy as sp
-from connectivity import connectivity
 from effort import effort
+from parts import connectivity, coupling_of, edge, is_lagrangian, law_of, node, oscillator_of, parameters
 from sympy.physics import mechanics
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.network import network, node, parameters
+from synchain.models.dynamics.network import network
 from synchain.models.graphs.families import names as families
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.inputs.plugins import call, load, names
 from synchain.models.mechanics.components import TIME, Node
-from synchain.models.mechanics.friction import CONTACTS
-from synchain.models.mechanics.link import edge
+from synchain.models.mechanics.coupling import Coupling
+from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
+from synchain.models.mechanics.friction import ContactModel
 from synchain.models.mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, static_coefficient
 from synchain.models.mechanics.orientation import is_oriented
+from synchain.models.mechanics.oscillator import Oscillator
 
-FORCES = [c for c in names("coupling") if not hasattr(load("coupling", c), "kinetic")]
+FORCES = [c for c in names(COUPLING) if not hasattr(load(COUPLING, c), "kinetic")]
 """The couplings without inertia; tests/test_inertia.py has the others."""
 
-SPRING = load("coupling", "spring")
+SPRING = coupling_of("spring")
+HARMONIC = oscillator_of("harmonic")
+Q_I, Q_J, V, WEIGHT, SIGMA = sp.symbols("q_i q_j v weight sigma", real=True)
 WEIGHTED = from_matrix([["-5/2", 2, "1/2"], [2, -2, 0], ["1/2", 0, "-1/2"]], "weighted")
 CUT = from_matrix([[-1, 1, 0], [1, -1, 0], [0, 0, 0]], "cut")
 ONE_WAY = from_matrix([[0, 0, 0], [3, -3, 0], [0, "1/2", "-1/2"]], "one-way")
@@ -56,7 +61,7 @@ def pairs(graph: Topology) -> list[tuple[int, int, sp.Rational]]:
 
 def in_one_piece(oscillator: str, coupling: str, graph: Topology) -> list[sp.Expr]:
     """The accelerations of a network from its whole Lagrangian by sympy.physics.mechanics, in plain symbols."""
-    system, law = nondimensional(load("oscillator", oscillator)), load("coupling", coupling)
+    system, law = nondimensional(oscillator_of(oscillator)), load(COUPLING, coupling)
     x, v = system.coordinates[0], system.velocities[0]
     q = [mechanics.dynamicsymbols(f"x_{i + 1}") for i in range(graph.n)]
     rate = [mechanics.dynamicsymbols(f"x_{i + 1}", 1) for i in range(graph.n)]
@@ -96,7 +101,7 @@ def test_template_equals_the_lagrangian_in_one_piece(
 ) -> None:
     expected = in_one_piece(oscillator, coupling, graph)
     if friction is not None:
-        law = friction_coefficient(load("friction", friction), "atan")
+        law = friction_coefficient(law_of(friction), "atan")
         expected = [e.replace(FRICTION, law) for e in expected]
     equations = assemble(oscillator, friction, coupling, graph)
     found = equations.rhs()
@@ -139,7 +144,7 @@ def test_connectivity_of_the_papers_chain() -> None:
 def test_connectivity_of_one_way_links_is_the_jacobian_of_the_forces(coupling: str) -> None:
     equations = assemble("harmonic", None, coupling, ONE_WAY)
     sigma = sp.Symbol("sigma", real=True)
-    kind = "v" if hasattr(load("coupling", coupling), "dissipation") else "x"
+    kind = "v" if hasattr(load(COUPLING, coupling), "dissipation") else "x"
     felt = [rate + sp.Symbol(f"x_{i + 1}", real=True) for i, rate in enumerate(equations.rhs()[3:])]
     moving = sp.symbols(f"{kind}_1:4", real=True)
     matrix = sp.Matrix(felt).jacobian(moving) / sigma
@@ -155,13 +160,23 @@ def test_connectivity_of_a_thousand_nodes() -> None:
     assert found == ring.rows
 
 
-def test_a_coupling_without_a_matrix_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(SPRING, "potential", lambda q_i, q_j, weight, sigma: sigma * weight * (q_i - q_j) ** 4)
+def sprung(potential: sp.Expr) -> Coupling:
+    """The spring with another energy."""
+    return replace(SPRING, potential=potential)
+
+
+def heavy(mass: sp.Expr) -> Oscillator:
+    """The harmonic oscillator with another mass."""
+    return replace(HARMONIC, model=replace(HARMONIC.model, kinetic=mass * V**2 / 2))
+
+
+def test_a_coupling_without_a_matrix_is_refused() -> None:
+    quartic = sprung(SIGMA * WEIGHT * (Q_I - Q_J) ** 4)
     with pytest.raises(ValueError, match=r"coupling 'spring': Hessian over sigma and weight is 0, 0; expected numbers"):
-        connectivity("spring", topology("chain", 2))
-    monkeypatch.setattr(SPRING, "potential", lambda q_i, q_j, weight, sigma: sigma**2 * weight * (q_i - q_j) ** 2)
+        connectivity(quartic, topology("chain", 2))
+    squared = sprung(SIGMA**2 * WEIGHT * (Q_I - Q_J) ** 2)
     with pytest.raises(ValueError, match=r"coupling 'spring': Hessian over sigma and weight is .*; expected numbers"):
-        connectivity("spring", topology("chain", 2))
+        connectivity(squared, topology("chain", 2))
 
 
 # -- edges ----------------------------------------------------------------------------------------------------
@@ -169,7 +184,7 @@ def test_a_coupling_without_a_matrix_is_refused(monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize("coupling", FORCES)
 def test_couplings_are_symmetric_and_called_sigma(coupling: str) -> None:
-    module = load("coupling", coupling)
+    module = load(COUPLING, coupling)
     assert next(iter(module.PARAMETERS)) == "sigma"
     single = node("harmonic")
     assert is_oriented(edge(coupling, single, "harmonic")) == (coupling == "fput")
@@ -196,31 +211,28 @@ def test_the_link_keeps_the_difference() -> None:
     assert damper.diffusive
 
 
-def test_a_nonlinear_link_keeps_the_difference_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(SPRING, "potential", lambda q_i, q_j, weight, sigma: sigma * weight * (q_i - q_j) ** 4 / 4)
+def test_a_nonlinear_link_keeps_the_difference_too() -> None:
+    quartic = sprung(SIGMA * WEIGHT * (Q_I - Q_J) ** 4 / 4)
     x_i, x_j, weight, sigma = sp.symbols("x_i x_j weight sigma", real=True)
-    assert edge.__wrapped__("spring", node("harmonic")).rhs == (0, sigma * weight * (x_j - x_i) ** 3)
+    assert edge(quartic, node("harmonic")).rhs == (0, sigma * weight * (x_j - x_i) ** 3)
 
 
-def test_a_link_that_is_no_difference_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(SPRING, "potential", lambda q_i, q_j, weight, sigma: -sigma * weight * q_i * q_j)
+def test_a_link_that_is_no_difference_stays_as_it_is() -> None:
     x_j, weight, sigma = sp.symbols("x_j weight sigma", real=True)
-    found = edge.__wrapped__("spring", node("harmonic"))
+    found = edge(sprung(-SIGMA * WEIGHT * Q_I * Q_J), node("harmonic"))
     assert found.rhs == (0, sigma * weight * x_j)
     assert not found.diffusive
 
 
-def test_heavy_oscillators_feel_their_links_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(load("oscillator", "harmonic"), "kinetic", lambda v: 3 * v**2 / 2)
+def test_heavy_oscillators_feel_their_links_less() -> None:
+    x = sp.Symbol("x", real=True)
     x_i, x_j, weight, sigma = sp.symbols("x_i x_j weight sigma", real=True)
-    found = edge.__wrapped__("spring", node("harmonic"), "harmonic")
+    found = edge("spring", node("harmonic"), heavy(sp.Integer(3)))
     assert sp.expand(found.rhs[1] - sigma * weight * (x_j - x_i) / 3) == 0
-    monkeypatch.setattr(load("oscillator", "harmonic"), "kinetic", lambda x, v: (1 + x**2) * v**2 / 2)
-    found = edge.__wrapped__("spring", node("harmonic"), "harmonic")
+    found = edge("spring", node("harmonic"), heavy(1 + x**2))
     assert sp.expand(found.rhs[1] - sigma * weight * (x_j - x_i) / (1 + x_i**2)) == 0, "the mass of the target"
-    monkeypatch.setattr(load("oscillator", "harmonic"), "kinetic", lambda t, v: (1 + t**2) * v**2 / 2)
     with pytest.raises(ValueError, match="'harmonic': a coupling needs masses that do not depend on time"):
-        edge.__wrapped__("spring", node("harmonic"), "harmonic")
+        edge("spring", node("harmonic"), heavy(1 + TIME**2))
 
 
 def test_without_an_edge_or_links_nodes_stay_alone() -> None:
@@ -237,17 +249,17 @@ def test_without_an_edge_or_links_nodes_stay_alone() -> None:
 def models() -> list[tuple[str, str | None]]:
     """Every oscillator with every friction law that it takes."""
     found: list[tuple[str, str | None]] = []
-    for name in names("oscillator"):
-        module = load("oscillator", name)
-        laws = names("friction") if len(getattr(module, "COORDINATES", "x")) == 1 else ("exponential",)
+    for name in names(OSCILLATOR):
+        module = load(OSCILLATOR, name)
+        laws = names(FRICTION_LAW) if len(getattr(module, "COORDINATES", "x")) == 1 else ("exponential",)
         found += [(name, law) for law in laws] if module.FRICTION else [(name, None)]
     return found
 
 
 @pytest.mark.parametrize(("oscillator", "friction"), models())
-@pytest.mark.parametrize("contact", CONTACTS)
+@pytest.mark.parametrize("contact", ContactModel)
 def test_parameters_are_those_of_the_equations(oscillator: str, friction: str | None, contact: str) -> None:
-    if contact == "set-valued" and friction and len(getattr(load("oscillator", oscillator), "COORDINATES", "x")) > 1:
+    if contact == "set-valued" and friction and len(getattr(load(OSCILLATOR, oscillator), "COORDINATES", "x")) > 1:
         with pytest.raises(ValueError, match=r"set-valued contact: .* coordinates; expected one"):
             node(oscillator, friction, contact)
         return
@@ -256,11 +268,11 @@ def test_parameters_are_those_of_the_equations(oscillator: str, friction: str | 
     assert tuple(table) == tuple(s.name for s in single.parameters)
     conditions = () if single.contact is None else single.contact.expressions
     if friction is not None and contact != "set-valued":  # only set-valued contacts know a static coefficient
-        conditions = (static_coefficient(load("friction", friction)) or sp.S.Zero,)
+        conditions = (static_coefficient(law_of(friction)) or sp.S.Zero,)
     used = set().union(*(e.free_symbols for e in (*single.rhs, *conditions)))
     assert {s.name for s in single.parameters} == {s.name for s in used} - {s.name for s in single.state} - {"t"}
     first, last = single.state[0].name, single.state[-1 if single.contact is None else 1].name
-    springs = () if hasattr(load("oscillator", oscillator), "field") else FORCES
+    springs = () if not is_lagrangian(oscillator) else FORCES
     for coupling in (*springs, f"{first}->{last}"):
         joined = network(single, edge(coupling, single, oscillator), topology("chain", 2))
         assert joined.parameters == tuple(parameters(oscillator, friction, contact, coupling))

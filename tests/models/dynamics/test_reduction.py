@@ -10,15 +10,15 @@ import networkx as nx
 import numpy as np
 import pytest
 import sympy as sp
+from parts import edge, node
 from samples import friction_chain, harmonic_chain, looped, real
 
 from synchain.models import chain, complete, ring, star
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.network import network, node
+from synchain.models.dynamics.network import network
 from synchain.models.dynamics.reduction import collapse, quotient, substitute_constants
 from synchain.models.graphs.partitions import coarsest_balanced
 from synchain.models.mechanics.components import TIME, Edge, Node
-from synchain.models.mechanics.link import edge
 
 HALF = Fraction(1, 2)
 

@@ -8,14 +8,13 @@ import mpmath
 import pytest
 import sympy as sp
 from differences import DIGITS, TABLE, close, evaluate, made, slopes, states
+from parts import edge, node
 from variational_reference import ALPHA, deviation_names, tangent_equations, transversal_equations
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.network import node
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.mechanics.components import Edge, Node
-from synchain.models.mechanics.link import edge
 
 OSCILLATORS = [("friction", "exponential", "atan"), ("friction", "stribeck", "sign"), ("duffing", None, "atan")]
 NEAR = pytest.mark.parametrize("near", [None, 1, -1], ids=["anywhere", "stick, w > 0", "stick, w < 0"])

@@ -100,7 +100,7 @@ def test_eigenvectors_to_fifty_digits_and_as_many_as_nodes(text: str) -> None:
         vectors = []
         for term in form.terms:
             assert term.vector is not None
-            for value, count, chosen in term.at(form.given(numbers)):
+            for value, count, chosen in term.at(form.by_symbol(numbers)):
                 here = list(term.vectors(chosen))
                 assert len(here) == count or text in WITHOUT
                 gamma = mpmath.mpmathify(sp.N(value, 60))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 
@@ -9,12 +10,11 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from synchain.models.graphs import clusters as states
-from synchain.models.graphs import symmetry as symmetries
-from synchain.models.graphs.clusters import clusters, orbital_partitions
+from synchain.models.graphs.clusters import check, clusters, orbital_partitions
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.symmetry import automorphisms
 from synchain.models.graphs.topology import Topology, from_matrix
+from synchain.models.spectra.characteristic import characteristic
 from synchain.models.spectra.eigenvalue import ProofError
 
 ONE = Fraction(1)
@@ -193,7 +193,7 @@ def test_unbalanced_partitions_are_refused() -> None:
         clusters(topology("chain", 3), [0, 1])
 
 
-def test_limits_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_limits_are_kept() -> None:
     with pytest.raises(ValueError, match=r"chain\(65\): expected at most 64 nodes"):
         orbital_partitions(topology("chain", 65))
     with pytest.raises(ValueError, match=r"star\(9\) has more than 20000 automorphisms; expected at most 20000"):
@@ -201,21 +201,15 @@ def test_limits_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(automorphisms(topology("ring", 8), limit=16)) == 16
     with pytest.raises(ValueError, match="more than 15 automorphisms"):
         automorphisms(topology("ring", 8), limit=15)
-    monkeypatch.setattr(states, "PARTITION_LIMIT", 12)
     with pytest.raises(ValueError, match=r"ring\(6\) has more than 12 orbital partitions"):
-        orbital_partitions(topology("ring", 6))
-    monkeypatch.setattr(symmetries, "TRY_LIMIT", 50)
+        orbital_partitions(topology("ring", 6), partition_limit=12)
     with pytest.raises(ValueError, match="automorphisms not found in 50 steps"):
-        automorphisms(topology("ring", 8))
+        automorphisms(topology("ring", 8), step_limit=50)
 
 
-def test_a_wrong_block_does_not_pass_the_proof(monkeypatch: pytest.MonkeyPatch) -> None:
-    honest = states._blocks
-
-    def wrong(graph, classes):
-        found = honest(graph, classes)
-        return found[:-1] if found else found
-
-    monkeypatch.setattr(states, "_blocks", wrong)
+def test_a_wrong_block_does_not_pass_the_proof() -> None:
+    graph = topology("chain", 3)
+    state = clusters(graph, [0, 1, 0])
+    check(state, graph, characteristic(graph))
     with pytest.raises(ProofError, match=r"clusters \(0, 1, 0\) of chain\(3\)"):
-        orbital_partitions(topology("chain", 3))
+        check(replace(state, blocks=state.blocks[:-1]), graph, characteristic(graph))

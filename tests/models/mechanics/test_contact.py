@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import sympy as sp
+from parts import node
 
-from synchain.models.dynamics.network import node
 from synchain.models.dynamics.reduction import substitute_constants
 from synchain.models.graphs.families import topology
 from synchain.models.mechanics.stick_slip import SLIP, set_valued

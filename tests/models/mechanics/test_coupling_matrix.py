@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 import sympy as sp
-from connectivity import connectivity
 from hypothesis import given
 from hypothesis import strategies as st
+from parts import connectivity, edge, is_lagrangian, node, oscillator_of, parameters
 from scipy.integrate import solve_ivp
 from variational_reference import ALPHA, deviation_names, transversal_equations
 
 from synchain.codegen.printing.printer import show
 from synchain.models import chain, ring
-from synchain.models.dynamics.network import network, node, parameters
+from synchain.models.dynamics.network import network
 from synchain.models.graphs.topology import from_matrix
-from synchain.models.inputs.plugins import load, names
+from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.components import Node
-from synchain.models.mechanics.coupling_text import canonical, entries
-from synchain.models.mechanics.link import edge
+from synchain.models.mechanics.coupling import MatrixCoupling
+from synchain.models.mechanics.definition import OSCILLATOR
+from synchain.models.mechanics.oscillator import Field
 from synchain.models.presentation.equations import text
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
@@ -34,6 +36,21 @@ GAP = {name: sp.Symbol(f"{name}_j", real=True) - sp.Symbol(f"{name}_i", real=Tru
 
 
 # -- what is read --------------------------------------------------------------------------------------------
+
+
+def entries(words: str, state: tuple[str, ...]) -> dict[tuple[str, str], Fraction]:
+    """The entries of a text, whose components must be states."""
+    coupling = MatrixCoupling.parse(words)
+    if coupling is None:
+        raise ValueError("coupling without an arrow")
+    coupling.check(state)
+    return {(source, target): factor for source, target, factor in coupling.entries}
+
+
+def canonical(words: str, state: tuple[str, ...]) -> str:
+    """The one spelling of a text."""
+    entries(words, state)
+    return str(MatrixCoupling.parse(words).canonical(state))  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize(
@@ -123,10 +140,10 @@ def test_the_difference_of_the_first_enters_the_rate_of_the_second() -> None:
 OTHER_MASSES = ("beam", "belt_double_pendulum", "clock", "double_pendulum")
 
 
-@pytest.mark.parametrize("oscillator", [name for name in names("oscillator") if name not in OTHER_MASSES])
+@pytest.mark.parametrize("oscillator", [name for name in names(OSCILLATOR) if name not in OTHER_MASSES])
 def test_springs_and_dampers_of_mass_one_are_entries(oscillator: str) -> None:
-    single = node(oscillator, "coulomb" if load("oscillator", oscillator).FRICTION else None)
-    if hasattr(load("oscillator", oscillator), "field"):
+    single = node(oscillator, "coulomb" if oscillator_of(oscillator).takes_friction else None)
+    if not is_lagrangian(oscillator):
         with pytest.raises(ValueError, match=r"joins coordinates with velocities; .* coupling = 'x->x'"):
             edge("spring", single, oscillator)
         return
@@ -181,11 +198,11 @@ def test_the_parameter() -> None:
     assert (strength.default, strength.unit, strength.minimum, strength.scale) == (0.0, "1", None, "1")
 
 
-def test_a_field_of_positions_and_velocities_takes_a_spring(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_field_of_positions_and_velocities_takes_a_spring() -> None:
     """Mass 1: no kinetic energy is asked for."""
     x, v = sp.symbols("x v", real=True)
-    monkeypatch.setattr(load("oscillator", "rossler"), "STATE", ("x", "v"))
-    assert edge.__wrapped__("spring", Node((x, v), (v, -x), ()), "rossler").rhs[1] == SIGMA * WEIGHT * GAP["x"]
+    rossler = replace(oscillator_of("rossler"), model=Field(("x", "v"), (v, -x)))
+    assert edge("spring", Node((x, v), (v, -x), ()), rossler).rhs[1] == SIGMA * WEIGHT * GAP["x"]
 
 
 # -- scenes --------------------------------------------------------------------------------------------------
@@ -193,7 +210,7 @@ def test_a_field_of_positions_and_velocities_takes_a_spring(monkeypatch: pytest.
 
 def test_a_scene_keeps_its_coupling() -> None:
     scene = Scene(oscillator="rossler", topology=ring(3), coupling=" 0.5y->x,x -> x", parameters={"sigma": -0.1})
-    assert scene.coupling == "x->x, 1/2 y->x"
+    assert str(scene.coupling) == "x->x, 1/2 y->x"
     assert Scene.from_dict(json.loads(json.dumps(scene.as_dict()))) == scene
     assert scene.parameters["sigma"] == -0.1
     assert scene.equations.edge == edge("x->x, 1/2 y->x", node("rossler"))

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import inspect
 import random
-from types import ModuleType
 
 import pytest
 import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from parts import coupling_of, law_of
 
+from synchain.models.inputs.frozen import Frozen
 from synchain.models.inputs.plugins import load, names
-from synchain.models.mechanics.friction import CONTACTS, KAPPA, regularise
+from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
+from synchain.models.mechanics.friction import KAPPA, ContactModel, FrictionLaw, regularise
 from synchain.models.mechanics.nondimensional import friction_coefficient
 from synchain.models.mechanics.parameter import Parameter
 
-LAWS = names("friction")
+LAWS = names(FRICTION_LAW)
 W = sp.Symbol("w", real=True)
 FAST = sp.Symbol("w", positive=True)
 SPEEDS = [sp.Rational(10) ** k for k in range(-6, 4)]
@@ -24,7 +26,7 @@ SPEEDS = [sp.Rational(10) ** k for k in range(-6, 4)]
 
 def coefficient(name: str, w: sp.Expr = W) -> sp.Expr:
     """The law with its default parameters, exactly as fractions."""
-    law = load("friction", name)
+    law = load(FRICTION_LAW, name)
     return law.force(w, **{p: sp.Rational(str(value.default)) for p, value in law.PARAMETERS.items()})
 
 
@@ -34,7 +36,7 @@ def test_the_four_laws_are_found() -> None:
 
 @pytest.mark.parametrize("name", LAWS)
 def test_declarations(name: str) -> None:
-    law = load("friction", name)
+    law = load(FRICTION_LAW, name)
     assert law.SUMMARY.strip()
     assert any(character.isdigit() for character in law.SOURCE), "a source has a year or a volume"
     assert list(inspect.signature(law.force).parameters) == ["w", *law.PARAMETERS]
@@ -45,17 +47,17 @@ def test_declarations(name: str) -> None:
 @pytest.mark.parametrize("name", LAWS)
 def test_parameters_have_no_name_of_an_oscillator_or_coupling(name: str) -> None:
     others: set[str] = {"kappa", "t", "x", "v", "weight"}
-    for oscillator in names("oscillator"):
-        module = load("oscillator", oscillator)
+    for oscillator in names(OSCILLATOR):
+        module = load(OSCILLATOR, oscillator)
         others |= set(module.PARAMETERS) if module.FRICTION else set()
-    for coupling in names("coupling"):
-        others |= set(load("coupling", coupling).PARAMETERS)
-    assert not others & set(load("friction", name).PARAMETERS)
+    for coupling in names(COUPLING):
+        others |= set(coupling_of(coupling).parameters)
+    assert not others & set(law_of(name).parameters)
 
 
 @pytest.mark.parametrize("name", LAWS)
 def test_odd(name: str) -> None:
-    law = load("friction", name)
+    law = load(FRICTION_LAW, name)
     symbols = {p: sp.Symbol(p, real=True) for p in law.PARAMETERS}
     odd = sp.simplify(law.force(-W, **symbols) + law.force(W, **symbols)) == 0
     assert odd is law.ODD
@@ -71,17 +73,17 @@ def test_drags_along_and_never_drives(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", LAWS)
-@pytest.mark.parametrize("contact", CONTACTS)
+@pytest.mark.parametrize("contact", ContactModel)
 @given(st.integers(0, 10**6), st.floats(1e-9, 1e3))
 @settings(max_examples=25, deadline=None)
 def test_never_drives_with_any_allowed_parameters(name: str, contact: str, seed: int, speed: float) -> None:
     """w f(w) >= 0 also where friction grows with speed, mu_s < mu_k, and f(0) = 0 exactly, smoothed or not."""
-    numbers, law = random.Random(seed), load("friction", name)
+    numbers, law = random.Random(seed), load(FRICTION_LAW, name)
     values = {
         sp.Symbol(p, real=True): sp.Rational(allowed.check(p, numbers.choice([0.01, 0.3, 2.0, 50.0])))
         for p, allowed in {**law.PARAMETERS, "kappa": KAPPA}.items()
     }
-    f = friction_coefficient(law, contact)(W).xreplace(values)
+    f = friction_coefficient(law_of(name), contact)(W).xreplace(values)
     assert f.xreplace({W: sp.S.Zero}) == 0
     assert f.xreplace({W: sp.Rational(speed)}).evalf() >= 0
     assert f.xreplace({W: -sp.Rational(speed)}).evalf() <= 0
@@ -115,7 +117,7 @@ def test_values_between_the_limits() -> None:
     half = sp.Rational(3, 20)
     assert sp.expand(coefficient("exponential", sp.S.One) - half - half * sp.exp(-sp.Rational(5, 2))) == 0
     assert sp.expand(coefficient("stribeck", sp.S.One) - half - half * sp.exp(-sp.Rational(25, 4))) == 0
-    stribeck = load("friction", "stribeck").force
+    stribeck = load(FRICTION_LAW, "stribeck").force
     mu_s, mu_k, v_s, c = sp.symbols("mu_s mu_k v_s c", positive=True)
     assert sp.simplify(stribeck(FAST, mu_s, mu_k, v_s, c) - stribeck(FAST, mu_s, mu_k, v_s, 0) - c * FAST) == 0
     assert coefficient("viscous", sp.Integer(2)) == sp.Rational(3, 5)
@@ -137,24 +139,24 @@ def test_default_steepness_is_the_papers() -> None:
 
 
 @pytest.mark.parametrize("name", LAWS)
-@pytest.mark.parametrize("contact", CONTACTS)
+@pytest.mark.parametrize("contact", ContactModel)
 def test_units_cancel(name: str, contact: str) -> None:
     """A law in scaled parameters and the scaled velocity is the law itself: nothing of M, L and T is left over."""
-    law = load("friction", name)
+    law = load(FRICTION_LAW, name)
     expected = law.force(W, **{p: sp.Symbol(p, real=True) for p in law.PARAMETERS})
     if contact == "atan":
         expected = regularise(expected, sp.Symbol("kappa", real=True))
-    assert sp.simplify(friction_coefficient(law, contact)(W) - expected) == 0
+    assert sp.simplify(friction_coefficient(law_of(name), contact)(W) - expected) == 0
 
 
 def test_a_wrong_unit_is_noticed() -> None:
-    law = ModuleType("careless")
-    law.PARAMETERS = {"a": Parameter(1.0, "m/s", "rate of decay")}  # type: ignore[attr-defined]
-    law.force = lambda w, a: sp.exp(-a * sp.Abs(w)) * sp.sign(w)  # type: ignore[attr-defined]
+    a, w = sp.symbols("a w", real=True)
+    table = Frozen({"a": Parameter(1.0, "m/s", "rate of decay")})
+    law = FrictionLaw("careless", table, sp.exp(-a * sp.Abs(w)) * sp.sign(w))
     with pytest.raises(ValueError, match="friction law careless: the unit m does not cancel"):
         friction_coefficient(law, "sign")
 
 
 def test_unknown_contact() -> None:
     with pytest.raises(ValueError, match="unknown contact 'tanh'; known: atan, sign"):
-        friction_coefficient(load("friction", "coulomb"), "tanh")
+        friction_coefficient(law_of("coulomb"), "tanh")

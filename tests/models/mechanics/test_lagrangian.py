@@ -5,16 +5,18 @@ from __future__ import annotations
 import pytest
 import sympy as sp
 from mechanics_proof import vanishes
+from parts import is_lagrangian, oscillator_of
 from sympy.physics import mechanics
 
-from synchain.models.inputs.plugins import load, names
+from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.components import TIME
+from synchain.models.mechanics.definition import OSCILLATOR
 from synchain.models.mechanics.lagrangian import Mechanics, energy_rate, equations_of_motion, total_derivative
 from synchain.models.mechanics.nondimensional import nondimensional, physical
 
 x, y, v, w = sp.symbols("x y v w", real=True)
 m, g, length, b = sp.symbols("m g l b", positive=True)
-LAGRANGIAN = [name for name in names("oscillator") if not hasattr(load("oscillator", name), "field")]
+LAGRANGIAN = [name for name in names(OSCILLATOR) if is_lagrangian(name)]
 
 
 def test_pendulum() -> None:
@@ -59,7 +61,7 @@ def test_full_mass_matrix_agrees_with_sympy_mechanics() -> None:
 @pytest.mark.parametrize("name", LAGRANGIAN)
 @pytest.mark.parametrize("form", [physical, nondimensional])
 def test_energy_balance_of_every_oscillator(name: str, form: object) -> None:
-    system = form(load("oscillator", name))  # type: ignore[operator]
+    system = form(oscillator_of(name))  # type: ignore[operator]
     found, power = system.energy_rate()
     assert vanishes(found - power)
     lost = sp.Add(*(rate * force for rate, force in zip(system.velocities, system.forces, strict=True)))
@@ -69,7 +71,7 @@ def test_energy_balance_of_every_oscillator(name: str, form: object) -> None:
 
 def test_energy_balance_of_the_friction_oscillator_by_hand() -> None:
     """The belt does the work epsilon f(theta_b - v) v; the driven end -dL/dt = u omega sin(omega t) (x - u cos(omega t))."""
-    found, _ = nondimensional(load("oscillator", "friction")).energy_rate()
+    found, _ = nondimensional(oscillator_of("friction")).energy_rate()
     epsilon, belt, u, omega = sp.symbols("epsilon theta_b u omega", real=True)
     f = sp.Function("f", real=True)
     end = u * sp.cos(omega * TIME)

@@ -8,26 +8,27 @@ from __future__ import annotations
 import pytest
 import sympy as sp
 from mechanics_proof import T, by_kane, by_lagrange, residual, vanishes, whole
+from parts import edge, is_lagrangian, node, oscillator_of
 
-from synchain.models.dynamics.network import network, node
+from synchain.models.dynamics.network import network
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.link import edge
+from synchain.models.mechanics.definition import COUPLING, OSCILLATOR
 from synchain.models.mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
 
-FORCES = [c for c in names("coupling") if not hasattr(load("coupling", c), "kinetic")]
+FORCES = [c for c in names(COUPLING) if not hasattr(load(COUPLING, c), "kinetic")]
 """The couplings without inertia; tests/test_inertia.py has the others."""
 
-LAGRANGIAN = [name for name in names("oscillator") if not hasattr(load("oscillator", name), "field")]
-PLAIN = [name for name in LAGRANGIAN if len(nondimensional(load("oscillator", name)).coordinates) == 1]
+LAGRANGIAN = [name for name in names(OSCILLATOR) if is_lagrangian(name)]
+PLAIN = [name for name in LAGRANGIAN if len(nondimensional(oscillator_of(name)).coordinates) == 1]
 WEIGHTED = from_matrix([["-5/2", 2, "1/2"], [2, -2, 0], ["1/2", 0, "-1/2"]], "weighted")
 METHODS = [by_lagrange, by_kane]
 
 
 def law_of(oscillator: str) -> str | None:
-    return "viscous" if load("oscillator", oscillator).FRICTION else None
+    return "viscous" if oscillator_of(oscillator).takes_friction else None
 
 
 def accelerations(oscillator: str, coupling: str | None, graph: Topology, oriented: str = "") -> dict[str, sp.Expr]:
@@ -49,7 +50,7 @@ def accelerations(oscillator: str, coupling: str | None, graph: Topology, orient
 def check(method: object, oscillator: str, coupling: str | None, graph: Topology, on: tuple[str, ...] = ()) -> None:
     system = whole(oscillator, coupling, graph, on or None)
     if law_of(oscillator):
-        law = friction_coefficient(load("friction", "viscous"), "sign")
+        law = friction_coefficient(law_of("viscous"), "sign")
         forces = tuple(e.replace(FRICTION, law) for e in system.forces)
         system = type(system)(system.q, system.rates, system.kinetic, system.potential, forces, system.particles)
     ours = accelerations(oscillator, coupling, graph, f" on {', '.join(on)}" if on else "")
@@ -96,7 +97,7 @@ def test_couplings_on_one_coordinate() -> None:
     check(by_lagrange, "belt_double_pendulum", "spring", topology("chain", 2), ("x",))
 
 
-@pytest.mark.parametrize("oscillator", [name for name in LAGRANGIAN if hasattr(load("oscillator", name), "particles")])
+@pytest.mark.parametrize("oscillator", [name for name in LAGRANGIAN if hasattr(load(OSCILLATOR, name), "particles")])
 def test_the_kinetic_energy_is_that_of_the_particles(oscillator: str) -> None:
     system = whole(oscillator, None, topology("chain", 1))
     moving = sum(mass * (x.diff(T) ** 2 + y.diff(T) ** 2) / 2 for mass, x, y in system.particles)
@@ -124,7 +125,7 @@ PUBLISHED = {
 }
 
 
-@pytest.mark.parametrize("oscillator", [name for name in names("oscillator") if name not in LAGRANGIAN])
+@pytest.mark.parametrize("oscillator", [name for name in names(OSCILLATOR) if name not in LAGRANGIAN])
 def test_vector_fields_are_the_published_ones(oscillator: str) -> None:
     single = node(oscillator)
     assert oscillator in PUBLISHED, f"write the published equations of {oscillator} into PUBLISHED"

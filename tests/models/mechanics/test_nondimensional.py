@@ -7,37 +7,41 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
-from types import ModuleType
 
 import pytest
 import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
+from parts import edge, is_lagrangian, node, oscillator_of, parameters
 
 from synchain.models import oscillators
-from synchain.models.dynamics.network import node, parameters
-from synchain.models.inputs.plugins import call, load, names
+from synchain.models.inputs.plugins import Kind, call, load, names
 from synchain.models.mechanics.calculus import cancelled, operations
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.link import edge
+from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.mechanics.nondimensional import FRICTION, nondimensional, physical, scale
+from synchain.models.mechanics.oscillator import Oscillator
 from synchain.models.mechanics.parameter import Parameter, dimension
 
 x, v = sp.symbols("x v", real=True)
 theta_b, epsilon, u, omega = sp.symbols("theta_b epsilon u omega", real=True)
-OWNERS = [(kind, name) for kind in ("oscillator", "friction", "coupling") for name in names(kind)]
+OWNERS = [
+    pytest.param(kind, name, id=f"{kind.name}-{name}")
+    for kind in (OSCILLATOR, FRICTION_LAW, COUPLING)
+    for name in names(kind)
+]
 
 
 def test_eq_2_from_the_physical_lagrangian() -> None:
     m, k = sp.symbols("m k", positive=True)
     drive, frequency, belt, load_on_belt = sp.symbols("U Omega v_b F_N", real=True)
-    found = physical(load("oscillator", "friction")).accelerations()
+    found = physical(oscillator_of("friction")).accelerations()
     expected = (-k * (x - drive * sp.cos(frequency * TIME)) + load_on_belt * FRICTION(belt - v)) / m
     assert sp.expand(found[0] - expected) == 0
 
 
 def test_eq_3_comes_out_of_the_scaling() -> None:
-    (found,) = nondimensional(load("oscillator", "friction")).accelerations()
+    (found,) = nondimensional(oscillator_of("friction")).accelerations()
     assert found == -x + u * sp.cos(omega * TIME) + epsilon * FRICTION(theta_b - v)
 
 
@@ -54,7 +58,7 @@ def test_eq_3_with_the_law_of_eqs_4_and_5() -> None:
 
 def test_the_groups_of_the_paper() -> None:
     """x0 = g/omega0^2, tau = omega0 t, epsilon = F_N/(m g), theta_b = v_b/(x0 omega0), u = U/x0, omega = Omega/omega0."""
-    model = load("oscillator", "friction")
+    model = oscillator_of("friction")
     m, k, g = sp.symbols("m k g", positive=True)
     omega0 = sp.sqrt(k / m)
     x0 = g / omega0**2
@@ -96,7 +100,7 @@ def test_physical_and_scaled_motion_agree_in_numbers(
 
 def test_coupling_scales_with_the_oscillators_own_spring() -> None:
     """A spring of stiffness sigma k between two masses: its energy over k x0^2 is the non-dimensional potential."""
-    model, spring = load("oscillator", "friction"), load("coupling", "spring")
+    model, spring = oscillator_of("friction"), load(COUPLING, "spring")
     q_i, q_j, weight, sigma = sp.symbols("q_i q_j weight sigma", real=True)
     x0 = scale(model, "m")
     given_in_si = {"q_i": q_i * x0, "q_j": q_j * x0, "weight": weight, "sigma": sigma * scale(model, "N/m")}
@@ -174,15 +178,15 @@ def dissipation(v, m, c): return m * c * v**2 / 2
 
 
 @pytest.fixture
-def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str, str], ModuleType]]:
+def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str, str], Oscillator]]:
     """A function that puts one more file into the folder of the oscillators, as far as Python can see."""
     monkeypatch.setattr(oscillators, "__path__", [*oscillators.__path__, str(tmp_path)])
     added = []
 
-    def add(name: str, body: str) -> ModuleType:
+    def add(name: str, body: str) -> Oscillator:
         (tmp_path / f"{name}.py").write_text(body, encoding="utf-8")
         added.append(name)
-        return load("oscillator", name)
+        return oscillator_of(name)
 
     yield add
     for name in added:
@@ -190,15 +194,15 @@ def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
         vars(oscillators).pop(name, None)
 
 
-def test_a_lagrangian_in_one_file(plug_in: Callable[[str, str], ModuleType]) -> None:
+def test_a_lagrangian_in_one_file(plug_in: Callable[[str, str], Oscillator]) -> None:
     plug_in("van_der_pol_again", VAN_DER_POL)
     mu = sp.Symbol("mu", real=True)
-    assert "van_der_pol_again" in names("oscillator")
+    assert "van_der_pol_again" in names(OSCILLATOR)
     assert node("van_der_pol_again").rhs == (v, -x + mu * (1 - x**2) * v)
     assert edge("spring", node("van_der_pol_again"), "van_der_pol_again").rhs[0] == 0
 
 
-def test_a_vector_field_in_one_file(plug_in: Callable[[str, str], ModuleType]) -> None:
+def test_a_vector_field_in_one_file(plug_in: Callable[[str, str], Oscillator]) -> None:
     plug_in("roessler_again", ROESSLER)
     y, z, a, b, c = sp.symbols("y z a b c", real=True)
     found = node("roessler_again")
@@ -208,14 +212,14 @@ def test_a_vector_field_in_one_file(plug_in: Callable[[str, str], ModuleType]) -
         edge("spring", found, "roessler_again")
 
 
-def test_an_angle_scales_like_an_angle(plug_in: Callable[[str, str], ModuleType]) -> None:
+def test_an_angle_scales_like_an_angle(plug_in: Callable[[str, str], Oscillator]) -> None:
     plug_in("hanging", HANGING)
     delta = sp.Symbol("delta", real=True)
     assert node("hanging").rhs == (v, -sp.sin(x) - delta * v)
     assert parameters("hanging")["delta"].scale in {"sqrt(g)*l**(3/2)*m", "g**(1/2)*l**(3/2)*m", "l**(3/2)*sqrt(g)*m"}
 
 
-def test_equations_keep_no_common_factors(plug_in: Callable[[str, str], ModuleType]) -> None:
+def test_equations_keep_no_common_factors(plug_in: Callable[[str, str], Oscillator]) -> None:
     for name, body in (("hardening", HARDENING), ("heavy", HEAVY)):
         plug_in(name, body)
     beta, delta, g, c = sp.symbols("beta delta g c", real=True)
@@ -223,12 +227,10 @@ def test_equations_keep_no_common_factors(plug_in: Callable[[str, str], ModuleTy
     assert node("heavy").rhs == (v, -c * v - g * sp.sin(x))
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in names("oscillator") if not hasattr(load("oscillator", name), "field")]
-)
+@pytest.mark.parametrize("name", [name for name in names(OSCILLATOR) if is_lagrangian(name)])
 def test_cancelling_changes_the_text_of_an_equation_alone(name: str) -> None:
     """The rates of a node against those that the Euler-Lagrange equations give, at random places."""
-    system = nondimensional(load("oscillator", name))
+    system = nondimensional(oscillator_of(name))
     derived = system.accelerations()
     found = cancelled(derived)
     assert operations(found) <= operations(derived)
@@ -272,7 +274,7 @@ def test_long_equations_and_shorter_ones_stay_as_they_were_derived() -> None:
     ],
 )
 def test_a_careless_file_is_refused(
-    plug_in: Callable[[str, str], ModuleType], right: str, wrong: str, message: str
+    plug_in: Callable[[str, str], Oscillator], right: str, wrong: str, message: str
 ) -> None:
     assert right in HANGING
     with pytest.raises(ValueError, match=message):
@@ -306,7 +308,7 @@ def test_unreadable_units(unit: str) -> None:
 
 
 @pytest.mark.parametrize(("kind", "name"), OWNERS)
-def test_every_plug_in_declares_itself(kind: str, name: str) -> None:
+def test_every_plug_in_declares_itself(kind: Kind, name: str) -> None:
     module = load(kind, name)
     assert module.SUMMARY.strip()
     assert any(character.isdigit() for character in module.SOURCE), "a source has a year or a volume"

@@ -9,16 +9,16 @@ from fractions import Fraction
 import pytest
 import sympy as sp
 from differences import made
+from parts import edge, is_lagrangian, node, oscillator_of
 from variational_reference import tangent_equations, transversal_equations
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.network import node
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
-from synchain.models.inputs.plugins import load, names
+from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.components import TIME, Edge, Node
-from synchain.models.mechanics.friction import CONTACTS
-from synchain.models.mechanics.link import edge
+from synchain.models.mechanics.definition import FRICTION_LAW, OSCILLATOR
+from synchain.models.mechanics.friction import ContactModel
 from synchain.models.presentation.equations import LARGEST, as_dict, latex, text
 
 PAIR = made(topology("chain", 2))
@@ -68,8 +68,8 @@ LAW_TEXT = {
 }
 
 
-@pytest.mark.parametrize("law", names("friction"))
-@pytest.mark.parametrize("contact", CONTACTS)
+@pytest.mark.parametrize("law", names(FRICTION_LAW))
+@pytest.mark.parametrize("contact", ContactModel)
 def test_every_law_is_named_once_and_defined_below(law: str, contact: str) -> None:
     lines = text(made(topology("ring", 3), "friction", law, contact)).splitlines()
     assert lines[0] == "χ_1'' = -χ_1 + u cos(ω τ) + ε f(ϑ_b - χ_1') + σ (χ_2 + χ_3 - 2 χ_1)"
@@ -245,12 +245,12 @@ def test_a_force_turned_round_keeps_its_sign() -> None:
 # -- everything shipped --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("oscillator", names("oscillator"))
+@pytest.mark.parametrize("oscillator", names(OSCILLATOR))
 @pytest.mark.parametrize("n", [1, 3, 8])
 def test_latex_of_every_oscillator_balances(oscillator: str, n: int) -> None:
-    law = "stribeck" if load("oscillator", oscillator).FRICTION else None
+    law = "stribeck" if oscillator_of(oscillator).takes_friction else None
     coupling = "spring"
-    if hasattr(load("oscillator", oscillator), "field"):
+    if not is_lagrangian(oscillator):
         own = [s.name for s in node(oscillator).state]
         coupling = f"{own[0]}->{own[0]}, -1/2 {own[-1]}->{own[0]}"
     lines = body(made(topology("chain", n), oscillator, law, coupling=coupling if n > 1 else None))
@@ -283,7 +283,7 @@ def test_vector_fields_and_links_between_components() -> None:
 # -- for programs --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("contact", CONTACTS)
+@pytest.mark.parametrize("contact", ContactModel)
 def test_the_dictionary_is_read_back_exactly(contact: str) -> None:
     equations = made(topology("ring", 3), contact=contact)
     shown = json.loads(json.dumps(as_dict(equations)))

@@ -7,25 +7,27 @@ import numpy as np
 import pytest
 import sympy as sp
 from mechanics_proof import vanishes
+from parts import is_lagrangian, oscillator_of
 
 from synchain.models import chain, ring
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.components import TIME
+from synchain.models.mechanics.definition import COUPLING, OSCILLATOR
 from synchain.models.mechanics.lagrangian import total_derivative
 from synchain.models.scenes.energy import energy
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.results.energy import energy_function
 
-FORCES = [c for c in names("coupling") if not hasattr(load("coupling", c), "kinetic")]
+FORCES = [c for c in names(COUPLING) if not hasattr(load(COUPLING, c), "kinetic")]
 """The couplings without inertia: their accelerations are the right-hand side itself."""
 
-LAGRANGIAN = [name for name in names("oscillator") if not hasattr(load("oscillator", name), "field")]
+LAGRANGIAN = [name for name in names(OSCILLATOR) if is_lagrangian(name)]
 
 
 def scene_of(oscillator: str, coupling: str, n: int = 2, **more: object) -> Scene:
-    friction = "viscous" if load("oscillator", oscillator).FRICTION else None
+    friction = "viscous" if oscillator_of(oscillator).takes_friction else None
     return Scene(oscillator=oscillator, friction=friction, coupling=coupling, topology=chain(n), **more)
 
 
@@ -138,7 +140,7 @@ def test_arrays_have_the_energy_of_the_exact_expression(scene: Scene) -> None:
         assert np.allclose(found, written, rtol=1e-13, atol=1e-13)
     name = scene.equations.edges[0].parameters[0].name
     other = function(states, parameters={name: scene.parameters[name] + 0.4})
-    assert (np.abs(other - function(states)).max() > 0.1) == (scene.coupling != "damper")
+    assert (np.abs(other - function(states)).max() > 0.1) == (str(scene.coupling) != "damper")
 
 
 def test_the_imbalance_of_an_exact_solution_is_that_of_the_rule() -> None:

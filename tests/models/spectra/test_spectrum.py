@@ -453,11 +453,10 @@ def test_largest_and_slowest_of_long_chains_and_of_small_graphs() -> None:
         _ = spectrum(from_matrix([[0, 0], [0, 0]])).slowest
 
 
-def test_many_eigenvalues_are_shown_in_part(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_eigenvalues_are_shown_in_part() -> None:
     numbers = [Eigenvalue(sp.Integer(-k), k + 1, None) for k in range(5)]
-    monkeypatch.setattr("synchain.models.spectra.spectrum.SHOWN", 4)
-    assert repr(Spectrum(numbers)) == "{0: 1, -1: 2, -2: 3, … (1 more), -4: 5}"
-    assert repr(Spectrum(numbers[:4])) == "{0: 1, -1: 2, -2: 3, -3: 4}"
+    assert Spectrum(numbers).text(4) == "{0: 1, -1: 2, -2: 3, … (1 more), -4: 5}"
+    assert Spectrum(numbers[:4]).text(4) == repr(Spectrum(numbers[:4])) == "{0: 1, -1: 2, -2: 3, -3: 4}"
 
 
 def test_the_characteristic_polynomial_of_fractions_is_monic() -> None:

@@ -36,7 +36,7 @@ def test_closed_eigenratios_are_those_of_the_spectra_and_never_fall(family: str)
 
 @pytest.mark.parametrize("family", sorted(CLOSED))
 def test_rational_eigenratios_are_whole_numbers_and_only_those(family: str) -> None:
-    """Balls never reduce_scene equality, so every rational ratio must come as an int."""
+    """Balls never decide equality, so every rational ratio must come as an int."""
     for n in range(3, 60):
         ratio = eigenratio(family, n)
         if isinstance(ratio, arb):

@@ -1,0 +1,39 @@
+"""Words of scene files that have a fixed meaning."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Self
+
+from .checks import choice
+
+__all__ = ["Word"]
+
+
+class Word(StrEnum):
+    """One of a few words: it equals its text and is written as its text."""
+
+    __repr__ = str.__repr__
+
+    @classmethod
+    def parse(cls, what: str, value: object) -> Self:
+        """Return the word of a text.
+
+        Parameters
+        ----------
+        what : str
+            The keyword in messages.
+        value : object
+            What was given for it.
+
+        Returns
+        -------
+        Word
+            The word with this text.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If the value is another text, or no text.
+        """
+        return cls(choice(what, value, tuple(cls)))

@@ -1,0 +1,220 @@
+"""What a link between two nodes adds, as a value: entries of a matrix, or energies of two ends.
+
+The text "y->x" lets the difference of y between two nodes enter the rate of x.  A link of weight w from node j to
+node i adds sigma w H (s_j - s_i) to the rates of the states s_i, so the entry "1/2 y->x" is 1/2 in the row of x and
+the column of y.  H is the matrix of the master stability function (Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998)).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+
+import sympy as sp
+
+from ..inputs.checks import shown, suggestion, text
+from ..inputs.frozen import Frozen
+from .parameter import Parameter
+
+__all__ = ["STRENGTH", "WEIGHT", "Coupling", "LagrangianCoupling", "MatrixCoupling", "split"]
+
+STRENGTH = Frozen({"sigma": Parameter(0.0, "1", "strength of the coupling")})
+"""The parameters of every coupling by components; sigma may be negative."""
+
+WEIGHT = sp.Symbol("weight", real=True)
+"""The weight of a link in the energies of a coupling."""
+
+_NUMBER = r"[0-9]{1,9}(?:/[0-9]{1,9}|\.[0-9]{1,9})?"
+
+_NAME = r"[^\W\d]\w*"
+
+_ENTRY = re.compile(rf"\s*([+-]?)\s*(?:({_NUMBER})\s*\*?\s*)?({_NAME})\s*->\s*({_NAME})\s*")
+
+_EXPECTED = "expected 'a->b', the difference of a into the rate of b, with a rational factor or none: '1/2 x->y'"
+
+_CHOSEN = re.compile(r"(?P<name>\S.*?)\s+on\s+(?P<coordinates>[^\W\d]\w*(?:\s*,\s*[^\W\d]\w*)*)\s*")
+
+
+@dataclass(frozen=True, slots=True)
+class MatrixCoupling:
+    """A coupling that is linear in the states: the entries of its matrix H.
+
+    Parameters
+    ----------
+    entries : tuple of (str, str, Fraction)
+        Source component, target component, and the factor with which the difference enters the target's rate.
+
+    Raises
+    ------
+    ValueError
+        If an entry occurs twice.
+    """
+
+    entries: tuple[tuple[str, str, Fraction], ...]
+
+    def __post_init__(self) -> None:
+        pairs = [(source, target) for source, target, _ in self.entries]
+        twice = next((pair for i, pair in enumerate(pairs) if pair in pairs[:i]), None)
+        if twice is not None:
+            raise ValueError(
+                f"coupling {shown(str(self))}: '{twice[0]}->{twice[1]}' occurs twice; "
+                "expected each entry once; add the factors"
+            )
+
+    @classmethod
+    def parse(cls, words: str) -> MatrixCoupling | None:
+        """Return the coupling of a text such as "x->x, 1/2 y->z"; None if the text names a coupling instead.
+
+        Raises
+        ------
+        ValueError
+            If the text is no list of entries, or an entry repeats or has the factor 0.
+        """
+        return cls(tuple(_read(words))) if "->" in words else None
+
+    @property
+    def parameters(self) -> Frozen[Parameter]:
+        """The strength alone."""
+        return STRENGTH
+
+    def check(self, state: tuple[str, ...]) -> None:
+        """Raise ValueError for components outside `state`, the names of a node's states."""
+        for name in (name for source, target, _ in self.entries for name in (source, target)):
+            if name not in state:
+                raise ValueError(
+                    f"coupling {shown(str(self))}: unknown component {shown(name)}; known: {', '.join(state)}"
+                    f"{suggestion(name, state) or '; name states of the oscillator'}"
+                )
+
+    def canonical(self, state: tuple[str, ...], coordinates: tuple[str, ...] = ()) -> MatrixCoupling:
+        """Return the same coupling with its entries ordered by target and source as in `state`.
+
+        Raises
+        ------
+        ValueError
+            If a component is outside `state`, and if the text of the result is too long for a scene.
+        """
+        self.check(state)
+        ordered = MatrixCoupling(tuple(sorted(self.entries, key=lambda e: (state.index(e[1]), state.index(e[0])))))
+        text("coupling", str(ordered))
+        return ordered
+
+    def __str__(self) -> str:
+        return ", ".join(f"{_front(factor)}{source}->{target}" for source, target, factor in self.entries)
+
+
+@dataclass(frozen=True, slots=True)
+class LagrangianCoupling:
+    """A coupling by the energies of a link, as expressions of the coordinates and velocities of its two ends.
+
+    The ends are the real symbols q_i, q_j of `potential` and v_i, v_j of `kinetic` and `dissipation`, target first;
+    of a coupling `between` two named oscillators they are the states of these.  `WEIGHT` is the weight of the link.
+
+    Parameters
+    ----------
+    name : str
+        What messages and scene files call it.
+    parameters : mapping of str to Parameter
+        Parameters, "sigma" among them.
+    potential, dissipation, kinetic : Expr
+        The energy stored, Rayleigh's function and the kinetic energy of a link.
+    between : (str, str), optional
+        The names of the two oscillators that it joins, if it joins no others.
+    coordinates : tuple of str, optional
+        The coordinates that it joins, all of them if left out.
+    summary, source : str
+        What it is, and where it was published.
+    """
+
+    name: str
+    parameters: Frozen[Parameter]
+    potential: sp.Expr = sp.S.Zero
+    dissipation: sp.Expr = sp.S.Zero
+    kinetic: sp.Expr = sp.S.Zero
+    between: tuple[str, str] | None = None
+    coordinates: tuple[str, ...] | None = None
+    summary: str = field(default="", compare=False)
+    source: str = field(default="", compare=False)
+
+    def places(self, known: tuple[str, ...]) -> tuple[int, ...]:
+        """Return the numbers of the joined coordinates among those of a node, in ascending order.
+
+        Raises
+        ------
+        ValueError
+            For an unknown coordinate, and for one that is named twice.
+        """
+        if self.coordinates is None:
+            return tuple(range(len(known)))
+        if not known:
+            raise ValueError(
+                f"coupling {shown(str(self))}: found oscillators without coordinates, which are vector fields; expected "
+                "a coupling by components, e.g. 'x->x'"
+            )
+        for name in self.coordinates:
+            if name not in known:
+                raise ValueError(
+                    f"coupling {shown(str(self))}: unknown coordinate {shown(name)}; known: {', '.join(known)}"
+                    f"{suggestion(name, known) or '; name coordinates of the oscillator'}"
+                )
+        if len(set(self.coordinates)) < len(self.coordinates):
+            raise ValueError(
+                f"coupling {shown(str(self))}: found a coordinate twice; expected each once; leave one out"
+            )
+        return tuple(k for k, name in enumerate(known) if name in self.coordinates)
+
+    def canonical(self, state: tuple[str, ...], coordinates: tuple[str, ...]) -> LagrangianCoupling:
+        """Return the same coupling with its coordinates in the order of the nodes', none if it joins them all.
+
+        Raises
+        ------
+        ValueError
+            As `places` does.
+        """
+        if self.coordinates is None:
+            return self
+        places = self.places(coordinates)
+        joined = None if len(places) == len(coordinates) else tuple(coordinates[k] for k in places)
+        return replace(self, coordinates=joined)
+
+    def __str__(self) -> str:
+        return self.name if self.coordinates is None else f"{self.name} on {', '.join(self.coordinates)}"
+
+
+Coupling = MatrixCoupling | LagrangianCoupling
+"""What joins the nodes of a network."""
+
+
+def split(words: str) -> tuple[str, tuple[str, ...] | None]:
+    """Return the name of a coupling and the coordinates that its text gives, as in "spring on x"; None for all."""
+    match = _CHOSEN.fullmatch(words)
+    if match is None:
+        return words, None
+    return match["name"], tuple(part.strip() for part in match["coordinates"].split(","))
+
+
+def _read(coupling: str) -> Iterator[tuple[str, str, Fraction]]:
+    """The entries of a text."""
+    for part in coupling.split(","):
+        match = _ENTRY.fullmatch(part)
+        if match is None:
+            raise ValueError(f"coupling {shown(coupling)}: cannot read {shown(part.strip())}; {_EXPECTED}; correct it")
+        sign, number, source, target = match.groups()
+        try:
+            factor = Fraction(number or 1) * (-1 if sign == "-" else 1)
+        except ZeroDivisionError:
+            raise ValueError(f"coupling {shown(coupling)}: {number} divides by zero; {_EXPECTED}; correct it") from None
+        if factor == 0:
+            raise ValueError(
+                f"coupling {shown(coupling)}: the factor of '{source}->{target}' is 0; expected another; leave it out"
+            )
+        yield source, target, factor
+
+
+def _front(factor: Fraction) -> str:
+    """A factor as it stands before its entry: nothing for 1, a sign alone for -1."""
+    if abs(factor) == 1:
+        return "" if factor > 0 else "-"
+    return f"{factor} "

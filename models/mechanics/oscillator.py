@@ -1,0 +1,131 @@
+"""One oscillator as a value: a Lagrangian or a vector field with its parameters, wherever it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import sympy as sp
+
+from ..inputs.frozen import Frozen
+from .parameter import Parameter
+
+__all__ = ["FRICTION", "Coordinate", "Field", "Lagrangian", "Oscillator", "Scaling"]
+
+FRICTION = sp.Function("f", real=True)
+"""The friction coefficient as an unknown function of the sliding velocity; a law takes its place at the end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinate:
+    """A generalised coordinate, the name of its velocity, and its unit."""
+
+    name: str
+    velocity: str
+    unit: str = "m"
+
+
+@dataclass(frozen=True, slots=True)
+class Scaling:
+    """How the physical quantities of a Lagrangian become numbers.
+
+    Parameters
+    ----------
+    units : mapping of str to str
+        Unit of each quantity that fixes the scales.
+    physical : mapping of str to str
+        Physical quantity behind each parameter.
+    scales : mapping of str to Expr
+        The units of mass, length and time (keys kg, m, s), made of the quantities of `units`, which are positive symbols.
+    """
+
+    units: Frozen[str]
+    physical: Frozen[str]
+    scales: Frozen[sp.Expr]
+
+
+@dataclass(frozen=True, slots=True)
+class Lagrangian:
+    """A mechanical system: energies and forces as expressions, `FRICTION` for a friction law.
+
+    Coordinates, velocities and parameters are real symbols.  With a `scaling` all quantities are physical and the
+    parameters go by their physical names; without one they are the numbers of the non-dimensional equations.
+
+    Parameters
+    ----------
+    coordinates : tuple of Coordinate
+        The generalised coordinates.
+    kinetic, potential : Expr
+        The energies.
+    forces : tuple of Expr
+        A generalised force for each coordinate, without those of `dissipation`.
+    dissipation : Expr
+        Rayleigh's function, half the power lost; its negative derivatives are added to the forces.
+    scaling : Scaling, optional
+        The units of physical quantities.
+    """
+
+    coordinates: tuple[Coordinate, ...]
+    kinetic: sp.Expr
+    potential: sp.Expr
+    forces: tuple[sp.Expr, ...]
+    dissipation: sp.Expr = sp.S.Zero
+    scaling: Scaling | None = None
+
+    @property
+    def expressions(self) -> tuple[sp.Expr, ...]:
+        """All expressions of the system."""
+        return self.kinetic, self.potential, *self.forces, self.dissipation
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A first-order vector field: the names of the states and an expression for the rate of each."""
+
+    state: tuple[str, ...]
+    rates: tuple[sp.Expr, ...]
+
+    @property
+    def expressions(self) -> tuple[sp.Expr, ...]:
+        """All expressions of the field."""
+        return self.rates
+
+
+@dataclass(frozen=True, slots=True)
+class Oscillator:
+    """An oscillator by itself.  Equal contents make equal oscillators.
+
+    Parameters
+    ----------
+    name : str
+        What messages and scene files call it.
+    parameters : mapping of str to Parameter
+        Parameters of the non-dimensional equations.
+    model : Lagrangian or Field
+        What moves it.
+    initial : mapping of str to float, optional
+        The state around which oscillators start, 0 for the states left out.
+    summary, source : str
+        What it is, and where it was published.
+    """
+
+    name: str
+    parameters: Frozen[Parameter]
+    model: Lagrangian | Field
+    initial: Mapping[str, Any] | None = None
+    summary: str = field(default="", compare=False)
+    source: str = field(default="", compare=False)
+
+    def __str__(self) -> str:
+        return self.name
+
+    @property
+    def takes_friction(self) -> bool:
+        """True if the forces hold a friction coefficient, for which a law must be named."""
+        return any(e.has(FRICTION) for e in self.model.expressions)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates, none of a vector field."""
+        return tuple(c.name for c in self.model.coordinates) if isinstance(self.model, Lagrangian) else ()
