@@ -91,7 +91,7 @@ class FigureRuns:
         pair = scene.replace(topology=topology("chain", 2), initial=None, axes=(), title="", sigma=0.0)
         if pair not in self._sweeps:
             alpha = 2.0 * np.array(thin(_swept(pair, 0.6, 601), self.quality.grid).axes[0].values)
-            self._sweeps[pair] = probe(pair, alpha, **self._options(1.0))
+            self._sweeps[pair] = probe(pair, alpha, **self._options())
         return self._sweeps[pair]
 
     def network(self, scene: Scene) -> Sweep:
@@ -102,7 +102,7 @@ class FigureRuns:
         scene = thin(scene, self.quality.grid).replace(title="")
         if scene not in self._sweeps:
             sigma = np.array(scene.axes[0].values)
-            self._sweeps[scene] = simulate(scene.replace(axes=(), record=("sync_error",)), sigma, **self._options(1.0))
+            self._sweeps[scene] = simulate(scene.replace(axes=(), record=("sync_error",)), sigma, **self._options())
         return self._sweeps[scene]
 
     def after(self, scene: Scene, sigma: np.ndarray, transient: float) -> Sweep:
@@ -122,7 +122,7 @@ class FigureRuns:
         Sweep
         """
         criterion = replace(self.quality.criterion, transient=transient)
-        options = {**self._options(1.0), "criterion": criterion, "resolution": math.inf}
+        options = {**self._options(), "criterion": criterion, "resolution": math.inf}
         return simulate(scene.replace(axes=(), record=("sync_error",)), sigma, **options)
 
     def predicted(self, scene: Scene) -> list[Interval]:
@@ -135,10 +135,10 @@ class FigureRuns:
         largest = max(abs(value) for value in scene.spectrum.values)
         return _swept(scene, round(1.2 / largest, 3), 301)
 
-    def _options(self, factor: float) -> dict[str, Any]:
+    def _options(self) -> dict[str, Any]:
         """Options of probes and simulations; `factor` converts sigma to their own variable."""
         return {
-            "resolution": factor * self.quality.resolution,
+            "resolution": self.quality.resolution,
             "criterion": self.quality.criterion,
             "workers": self.workers,
             "show_progress": self.show_progress,

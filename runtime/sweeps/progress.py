@@ -111,6 +111,7 @@ class Reporter:
     preparing: float = 0.0
     compiling: float = 0.0
     began: float = field(default_factory=time.perf_counter)
+    every: float = EVERY
     _said: float = 0.0
     _bar: Any = None
 
@@ -143,7 +144,7 @@ class Reporter:
         if self._bar is not None:
             self._bar.set_postfix_str(self.now.failures, refresh=False)
             self._bar.update(int(counts.sum()))
-        elif self.show is None and time.perf_counter() - self._said > EVERY and sys.stderr is not None:
+        elif self.show is None and time.perf_counter() - self._said > self.every and sys.stderr is not None:
             self._said = time.perf_counter()
             print(self.now, file=sys.stderr, flush=True)
         self._tell()

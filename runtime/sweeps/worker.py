@@ -1,5 +1,5 @@
-"""The worker of a pool that does not share the memory of the main program: it rebuilds jobs and
-runs their blocks.
+"""The worker of a pool that does not share the memory of the main program: it rebuilds jobs and runs
+their blocks.
 """
 
 from __future__ import annotations
@@ -11,44 +11,58 @@ from typing import Any
 from ..cells.buffers import Buffers
 from .job import Job, JobSpec
 
-__all__ = ["forget", "run_block"]
+__all__ = ["JobCache", "forget", "run_block"]
 
-KEPT = 8
-"""Jobs that a worker process remembers; an older one is sent to it again."""
 
-_jobs: OrderedDict[str, Job] = OrderedDict()
-_lock = threading.Lock()
+class JobCache:
+    """The jobs that a process remembers: the last `size` ones; an older one is sent to it again."""
+
+    def __init__(self, size: int = 8) -> None:
+        self.size = size
+        self.jobs: OrderedDict[str, Job] = OrderedDict()
+        self.lock = threading.Lock()
+
+    def run(self, key: str, spec: bytes | None, *block: Any) -> Buffers | None:
+        """Run a block of a job.
+
+        Parameters
+        ----------
+        key : str
+            Names the job.
+        spec : bytes, optional
+            The packed specification, if the process may not know the job.
+        *block
+            Arguments of `Job.run`.
+
+        Returns
+        -------
+        Buffers or None
+            None if the process does not know the job and needs its specification.
+        """
+        with self.lock:
+            job = self.jobs.get(key)
+            if job is None and spec is not None:
+                job = self.jobs[key] = JobSpec.unpacked(spec).rebuilt()
+                while len(self.jobs) > self.size:
+                    self.jobs.popitem(last=False)
+        return None if job is None else job.run(*block)
+
+    def forget(self, key: str) -> None:
+        """Drop a job; its cells that still run end."""
+        with self.lock:
+            job = self.jobs.pop(key, None)
+        if job is not None:
+            job.cancel()
+
+
+_CACHE = JobCache()
 
 
 def run_block(key: str, spec: bytes | None, *block: Any) -> Buffers | None:
-    """Run a block of a job.
-
-    Parameters
-    ----------
-    key : str
-        Names the job.
-    spec : bytes, optional
-        The packed specification, if the worker may not know the job.
-    *block
-        Arguments of `Job.run`.
-
-    Returns
-    -------
-    Buffers or None
-        None if the worker does not know the job and needs its specification.
-    """
-    with _lock:
-        job = _jobs.get(key)
-        if job is None and spec is not None:
-            job = _jobs[key] = JobSpec.unpacked(spec).rebuilt()
-            while len(_jobs) > KEPT:
-                _jobs.popitem(last=False)
-    return None if job is None else job.run(*block)
+    """Run a block of a job in this process; parameters and result as for `JobCache.run`."""
+    return _CACHE.run(key, spec, *block)
 
 
 def forget(key: str) -> None:
     """Drop a job of this process; its cells that still run end."""
-    with _lock:
-        job = _jobs.pop(key, None)
-    if job is not None:
-        job.cancel()
+    _CACHE.forget(key)

@@ -26,12 +26,11 @@ from synchain.runtime.cells.kernels import write_kernel
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.results.open import open_result
 from synchain.runtime.results.result import Result
-from synchain.runtime.sweeps import worker
 from synchain.runtime.sweeps.errors import SweepFailed
 from synchain.runtime.sweeps.job import JobSpec, SweepSpec
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import stream
-from synchain.runtime.sweeps.worker import forget, run_block
+from synchain.runtime.sweeps.worker import JobCache, forget
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -94,17 +93,16 @@ def test_a_worker_with_another_processor_says_so(monkeypatch):
         JobSpec.unpacked(packed)
 
 
-def test_a_worker_that_does_not_know_the_sweep_asks_for_it(monkeypatch):
-    cells = np.arange(3)
-    assert run_block("first", None, cells) is None
-    made = run_block("first", spec(MAP).packed(), cells)
+def test_a_worker_that_does_not_know_the_sweep_asks_for_it():
+    cells, jobs = np.arange(3), JobCache(size=1)
+    assert jobs.run("first", None, cells) is None
+    made = jobs.run("first", spec(MAP).packed(), cells)
     assert (made.counts[:, 0] == 1).all()
-    again = run_block("first", None, cells)
+    again = jobs.run("first", None, cells)
     np.testing.assert_array_equal(made.end, again.end)
-    monkeypatch.setattr(worker, "KEPT", 1)
-    assert run_block("second", spec(MAP).packed(), cells) is not None
-    assert run_block("first", None, cells) is None
-    forget("second")
+    assert jobs.run("second", spec(MAP).packed(), cells) is not None
+    assert jobs.run("first", None, cells) is None
+    jobs.forget("second")
 
 
 class Foreign(Executor):

@@ -9,7 +9,6 @@ import pytest
 
 from synchain.runtime.cells.layout import Layout, block_size
 from synchain.runtime.support.status import CODES, Status
-from synchain.runtime.sweeps import progress
 from synchain.runtime.sweeps.progress import Progress, Reporter, duration
 
 
@@ -83,7 +82,7 @@ def test_a_pipe_has_a_line_now_and_then_and_nothing_in_a_short_run(monkeypatch):
     reporter.start(counts())
     reporter.add(counts(FINISHED=5))
     assert shown.text == ""
-    monkeypatch.setattr(progress, "EVERY", 0.0)
+    reporter.every = 0.0
     reporter.add(counts(FINISHED=5))
     reporter.close()
     assert shown.text.startswith("10 of 20 cells (50 %), ")
