@@ -49,7 +49,7 @@ from synchain.runtime.stability.lyapunov import lyapunov_spectrum
 from synchain.runtime.stability.msf import msf, plane
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import stream
-from synchain.runtime.synchronisation import basin
+from synchain.runtime.synchronisation.basin import basin
 from synchain.runtime.synchronisation.probe import universal_probe
 from synchain.runtime.synchronisation.threshold import thresholds
 
