@@ -29,13 +29,9 @@ def block(friction: str, x: float = 0.0, v: float = 0.0, **more: Any) -> Scene:
     settings = {"transient": 0.0, "rtol": 1e-13, "record": (), "time_unit": "time", **own}
     start = {"x": [x], "v": [v]}
     return Scene(
-        topology=ONE,
-        friction=friction,
-        contact="set-valued",
-        initial=start,
-        parameters={"epsilon": 1.0, "u": 0.0, **more},
-        **settings,
-    )
+        topology=ONE, friction=friction, contact="set-valued", initial=start, parameters={"epsilon": 1.0, "u": 0.0,
+        **more}, **settings,
+    )  # fmt: skip
 
 
 def finished(scene: Scene, **axes: Any) -> Result:
@@ -52,19 +48,9 @@ def test_amplitude_under_coulomb_friction(omega: float, r: float) -> None:
     late = mp.sin(mp.pi / beta) / (beta * (1 + mp.cos(mp.pi / beta)))
     amplitude = float(mp.sqrt(far**2 - mpf(r) ** 2 * late**2))
     scene = block(
-        "coulomb",
-        amplitude,
-        0.1,
-        theta_b=0.0,
-        mu=r,
-        u=1.0,
-        omega=omega,
-        transient=2000,
-        window=3,
-        time_unit="period",
-        record=("section",),
-        section="v_1 falling",
-    )
+        "coulomb", amplitude, 0.1, theta_b=0.0, mu=r, u=1.0, omega=omega, transient=2000, window=3, time_unit="period",
+        record=("section",), section="v_1 falling",
+    )  # fmt: skip
     turns = finished(scene).data.section.values[:, 0]
     assert len(turns) == 3
     np.testing.assert_allclose(turns, amplitude, rtol=0, atol=1e-12)
@@ -180,18 +166,10 @@ def damped(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 def damped_scene(oscillator: str, x: float, v: float, window: float, rtol: float, speed: float) -> Scene:
     return Scene(
-        oscillator=oscillator,
-        topology=ONE,
-        friction="exponential",
-        contact="set-valued",
-        time_unit="time",
-        transient=0.0,
-        window=window,
-        rtol=rtol,
-        record=(),
-        parameters={**STRIBECK, "theta_b": speed},
-        initial={"x": [x], "v": [v]},
-    )
+        oscillator=oscillator, topology=ONE, friction="exponential", contact="set-valued", time_unit="time",
+        transient=0.0, window=window, rtol=rtol, record=(), parameters={**STRIBECK, "theta_b": speed}, initial={"x": [x],
+        "v": [v]},
+    )  # fmt: skip
 
 
 def test_hopf_point(damped: str) -> None:
@@ -256,16 +234,9 @@ def test_propagator_against_differences_of_the_flow(
 ) -> None:
     """Turns multiply the deviation of the velocity by a ratio, landings by 0: seen in neighbouring orbits."""
     scene = Scene(
-        topology=ONE,
-        contact="set-valued",
-        parameters={"epsilon": 1.0, **numbers},
-        initial={"x": [x], "v": [v]},
-        transient=0,
-        window=1.0,
-        rtol=1e-12,
-        record=("trajectory",),
-        samples=400,
-    )
+        topology=ONE, contact="set-valued", parameters={"epsilon": 1.0, **numbers}, initial={"x": [x], "v": [v]},
+        transient=0, window=1.0, rtol=1e-12, record=("trajectory",), samples=400,
+    )  # fmt: skip
     modes = finished(scene).data.trajectory.values[:, 2]
     assert set(modes) == kinds
     scene = scene.replace(record=(), samples=0)
