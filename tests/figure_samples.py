@@ -117,7 +117,7 @@ def parabola(omega: float, alpha: np.ndarray) -> Exponents:
     value = (alpha - low) * (alpha - high)
     return Exponents(
         alpha, value, np.full(len(alpha), 1e-3), 500.0, 1, value[None], (Attractor(Motion.APERIODIC, 0.0),)
-    )  # fmt: skip
+    )
 
 
 def drawn(name: str, runs: figure_runs.FigureRuns) -> tuple[Any, Any]:

@@ -1,1 +1,1 @@
-"""Periodic orbits, their branches and their bifurcations."""
+"""Periodic orbits, their branches and bifurcations: may know stability and runs, no networks."""

@@ -92,7 +92,7 @@ class Arc:
         return Arc(self.scene, self.name, self.periods)
 
     def copy(self) -> Arc:
-        """Return an arc with the same orbits that can be extended by itself."""
+        """Return an arc with the same orbits, which can be extended independently."""
         return Arc(self.scene, self.name, self.periods, [*self.values], [*self.orbits], [*self.phases])
 
     def guess(self, value: float) -> np.ndarray:

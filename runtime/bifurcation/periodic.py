@@ -15,7 +15,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from numbers import Integral, Real
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -230,7 +229,7 @@ def strobe(scene: Scene, state: np.ndarray, periods: int, **parameters: float) -
     return image[: len(state)], matrix
 
 
-def _driven(function: Callable[..., Any], scene: Scene, parameters: dict[str, float]) -> Scene:
+def _driven(function: Callable[..., object], scene: Scene, parameters: dict[str, float]) -> Scene:
     """Scene with its parameters at the tolerance of orbits; ValueError if it has no drive."""
     scene = single_cell(function, scene, TOLERANCE, parameters)
     unit_of_time(scene)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -22,6 +22,7 @@ __all__ = ["NAMES", "SIZE", "compute", "draw", "table"]
 
 NAMES = ("figure_1b",)
 SIZE = (COLUMN, 2.5)
+Function = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +57,7 @@ def compute(name: str, runs: FigureRuns) -> Law:
     return Law(w, np.where(w == 0.0, np.nan, sharp(w)), smooth(w), kappa)
 
 
-def forces(scene: Scene) -> tuple[Any, Any]:
+def forces(scene: Scene) -> tuple[Function, Function]:
     """Return the friction coefficient by relative velocity, set-valued and smoothed."""
     law = scene.model.kinds[0].friction
     if law is None:

@@ -1,1 +1,1 @@
-"""Intervals, windows and verdicts from a spectrum alone. Simulates nothing."""
+"""Synchronisability of networks from spectra and stable ranges: may know no simulation."""

@@ -1,1 +1,1 @@
-"""Lyapunov and transversal exponents, master stability functions and the orbits that carry them."""
+"""Lyapunov and transversal exponents along orbits: may know kernels and one cell, no sweeps."""

@@ -12,7 +12,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -90,7 +89,7 @@ class ClusterExponents:
         first, second = np.nonzero(np.triu(self.separation < 1e-9, 1))
         return tuple((int(a), int(b)) for a, b in zip(first, second, strict=True))
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the exponents for JSON.
 
         Returns

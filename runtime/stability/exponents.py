@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -192,7 +191,7 @@ def _by_start(
     return exponent, error, length
 
 
-def coupled_cell(function: Callable[..., Any], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
+def coupled_cell(function: Callable[..., object], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
     """Return a single cell whose network has a coupling: a lone oscillator gets a partner.
 
     Parameters
@@ -211,7 +210,7 @@ def coupled_cell(function: Callable[..., Any], scene: Scene, rtol: float, parame
     return single_cell(function, coupled, rtol, parameters)
 
 
-def single_cell(function: Callable[..., Any], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
+def single_cell(function: Callable[..., object], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
     """Return a scene without axes and records, with the parameters passed to a public function.
 
     Parameters

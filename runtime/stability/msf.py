@@ -11,7 +11,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any
 
 import numpy as np
 
@@ -122,7 +121,7 @@ class MSF:
         """The intervals as used for a network: the function counts as unstable beyond the grid."""
         return self.intervals
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the function for JSON.
 
         Returns
@@ -181,7 +180,7 @@ class Plane:
         lines = contour_generator(self.alpha, self.beta, self.exponent.T).lines(0.0)
         return tuple(np.asarray(line) for line in lines)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the function for JSON.
 
         Returns

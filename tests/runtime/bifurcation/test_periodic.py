@@ -65,8 +65,10 @@ def test_the_end_of_the_stable_range_to_rounding() -> None:
     exact = stability_end(periodic_orbit(scene(), 2, omega=1.15), 0.4, 0.5)
     again = stability_end(periodic_orbit(scene(initial={"x": [0.1, 0.1]}, transient=401.0), 2, omega=1.15), 0.4, 0.5)
     assert abs(exact - again) < 1e-10
-    gaps = [abs(stability_end(periodic_orbit(scene(contact="atan"), 2, omega=1.15, kappa=k), 0.4, 0.5) - exact)
-            for k in (1e5, 1e7, 1e9)]  # fmt: skip
+    gaps = [
+        abs(stability_end(periodic_orbit(scene(contact="atan"), 2, omega=1.15, kappa=k), 0.4, 0.5) - exact)
+        for k in (1e5, 1e7, 1e9)
+    ]
     assert gaps[0] > 50 * gaps[1]
     assert gaps[2] < 1e-6
     with pytest.raises(ValueError, match="expected a change between them"):

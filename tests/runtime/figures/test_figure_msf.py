@@ -78,8 +78,13 @@ def test_one_function_serves_every_figure_of_the_same_runs_and_no_other(simulati
 
 def test_effort_follows_the_quality() -> None:
     assert exponent.effort(FigureRuns(Quality(), workers=3)) == {
-        "precision": 1e-3, "periods": 5000.0, "transient": 200.0, "starts": 4, "workers": 3, "show_progress": False
-    }  # fmt: skip
+        "precision": 1e-3,
+        "periods": 5000.0,
+        "transient": 200.0,
+        "starts": 4,
+        "workers": 3,
+        "show_progress": False,
+    }
     quick = exponent.effort(FigureRuns(QUICK))
     assert quick["precision"] > 1e-3
     assert quick["periods"] < 5000
@@ -168,8 +173,16 @@ def test_the_map_is_written_with_a_column_for_each_network(simulation: Simulatio
     found = rows(tmp_path / "synchronisability_map.csv")
     assert len(found) == 7 * 13
     assert list(found[0]) == [
-        "omega", "sigma", "chain_2", "chain_3", "chain_4", "ring_6", "star_5", "complete_5", "motion"
-    ]  # fmt: skip
+        "omega",
+        "sigma",
+        "chain_2",
+        "chain_3",
+        "chain_4",
+        "ring_6",
+        "star_5",
+        "complete_5",
+        "motion",
+    ]
     row = next(row for row in found if row["omega"] == "1.4" and row["sigma"] == "0.1")
     assert float(row["chain_2"]) == pytest.approx((0.2 - 0.09) * (0.2 - 0.6), abs=0.01)
     assert float(row["star_5"]) == pytest.approx((0.1 - 0.09) * (0.1 - 0.6), abs=0.01)  # gamma = -1 and -5

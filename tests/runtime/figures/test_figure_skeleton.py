@@ -69,8 +69,12 @@ def test_stable_pieces_are_lines_and_unstable_ones_dashed() -> None:
     np.testing.assert_allclose(mark.get_xdata(), DOUBLING)
     (legend,) = axes.figure.legends
     assert [text.get_text() for text in legend.get_texts()] == [
-        "2 drive periods", "stable", "unstable", "motion", "period doubling"
-    ]  # fmt: skip
+        "2 drive periods",
+        "stable",
+        "unstable",
+        "motion",
+        "period doubling",
+    ]
 
 
 def test_curves_stay_apart_where_crossings_change_places() -> None:

@@ -99,9 +99,16 @@ def test_table_of_thresholds(simulation: Simulation, tmp_path: Path) -> None:
     make(["thresholds"], tmp_path)
     found = rows(tmp_path / "thresholds.csv")
     assert [(row["n"], row["omega"]) for row in found] == [
-        ("2", "1.15"), ("2", "1.4"), ("2", "1.55"), ("3", "1.15"), ("3", "1.55"), ("4", "1.15"), ("4", "1.4"),
-        ("5", "1.4"), ("5", "1.55"),
-    ]  # fmt: skip
+        ("2", "1.15"),
+        ("2", "1.4"),
+        ("2", "1.55"),
+        ("3", "1.15"),
+        ("3", "1.55"),
+        ("4", "1.15"),
+        ("4", "1.4"),
+        ("5", "1.4"),
+        ("5", "1.55"),
+    ]
     first, three, five = found[1], found[4], found[-1]
     assert float(first["measured_high"]) == pytest.approx(0.3)
     assert float(first["measured_minus_published_low"]) == pytest.approx(0.0)

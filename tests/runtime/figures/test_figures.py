@@ -21,8 +21,24 @@ from synchain.runtime.figures.make import make
 from synchain.runtime.figures.tables import Table, as_csv
 from synchain.runtime.support.status import Status
 
-PAPER = ("figure_1b", "figure_3", "figure_4a", "figure_4b", "figure_4c", "figure_4d", "figure_4e", "figure_4f", "figure_5",
-         "figure_6", "figure_7", "figure_8", "msf", "msf_plane", "synchronisability_map", "thresholds")  # fmt: skip
+PAPER = (
+    "figure_1b",
+    "figure_3",
+    "figure_4a",
+    "figure_4b",
+    "figure_4c",
+    "figure_4d",
+    "figure_4e",
+    "figure_4f",
+    "figure_5",
+    "figure_6",
+    "figure_7",
+    "figure_8",
+    "msf",
+    "msf_plane",
+    "synchronisability_map",
+    "thresholds",
+)
 
 
 @pytest.fixture
@@ -175,8 +191,13 @@ def test_figures_share_their_runs(simulation: Simulation) -> None:
     assert sorted(omega for kind, omega, _ in simulation.functions if kind == "msf") == [1.15, 1.4, 1.55]
     assert sorted(set(simulation.networks)) == sorted(simulation.networks)
     assert {(n, omega) for n, omega, _ in simulation.networks} == {
-        (3, 1.15), (3, 1.55), (4, 1.15), (4, 1.4), (5, 1.4), (5, 1.55)
-    }  # fmt: skip
+        (3, 1.15),
+        (3, 1.55),
+        (4, 1.15),
+        (4, 1.4),
+        (5, 1.4),
+        (5, 1.55),
+    }
 
 
 def test_the_friction_law_is_that_of_the_equations() -> None:

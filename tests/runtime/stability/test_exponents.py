@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -227,3 +230,11 @@ def test_products_in_pieces_are_those_of_the_whole(size: int) -> None:
     pieces = combine(weights, propagators, 17 * 16 * size)
     np.testing.assert_allclose(pieces, whole, rtol=1e-13, atol=1e-13)
     assert combine(np.zeros((0, 17)), propagators, 17 * 16 * size).shape == (4, 0, 2, 2)
+
+
+@pytest.mark.parametrize("function", [msf, plane])
+def test_functions_of_strength_take_the_keywords_of_exponents(function: Callable[..., object]) -> None:
+    def keywords(of: Callable[..., object]) -> list[inspect.Parameter]:
+        return [p for p in inspect.signature(of).parameters.values() if p.kind in (p.KEYWORD_ONLY, p.VAR_KEYWORD)]
+
+    assert keywords(function) == keywords(exponents)
