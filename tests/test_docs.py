@@ -61,6 +61,13 @@ def test_dotted_names_and_test_files_exist(page: Path) -> None:
 
 
 @pages
+def test_imports_can_be_made(page: Path) -> None:
+    lines = re.findall(r"^ *from (synchain[\w.]*) import ([\w, ]+)", page.read_text(encoding="utf-8"), re.MULTILINE)
+    names = [f"{module}.{name.strip()}" for module, words in lines for name in words.split(",")]
+    assert not [name for name in names if not exists(name)]
+
+
+@pages
 def test_command_lines_can_be_read(page: Path) -> None:
     for command, *words in commands(page.read_text(encoding="utf-8")):
         parser(command).read(words)
