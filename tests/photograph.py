@@ -43,14 +43,13 @@ from synchain.runtime.bifurcation.branches import follow
 from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
 from synchain.runtime.results.open import open_result
-from synchain.runtime.stability import msf
 from synchain.runtime.stability.clusters import cluster_exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum
-from synchain.runtime.stability.msf import plane
+from synchain.runtime.stability.msf import msf, plane
 from synchain.runtime.stability.transversal import exponents
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import stream
-from synchain.runtime.synchronisation import basin
+from synchain.runtime.synchronisation.basin import basin
 from synchain.runtime.synchronisation.probe import universal_probe
 from synchain.runtime.synchronisation.threshold import thresholds
 
