@@ -33,15 +33,15 @@ def with_modes(equations: Equations, start: np.ndarray, numbers: np.ndarray) -> 
     contact = equations.node.contact if equations.sticks else None
     if contact is None:
         return start
-    made = np.array(start, dtype=float)
-    given = {sp.Symbol(p, real=True): c[:, None] for p, c in zip(equations.parameters, numbers.T, strict=True)}
-    given[TIME] = np.zeros((len(made), 1))
-    own = given | {s: made[:, k * n : (k + 1) * n] for k, s in enumerate(equations.node.state)}
-    sliding, up, down = (_at(e, own, (len(made), n)) for e in (contact.sliding, contact.up, contact.down))
-    push = _link_forces(equations, contact.speed, made, given)
+    states = np.array(start, dtype=float)
+    values = {sp.Symbol(p, real=True): c[:, None] for p, c in zip(equations.parameters, numbers.T, strict=True)}
+    values[TIME] = np.zeros((len(states), 1))
+    node_values = values | {s: states[:, k * n : (k + 1) * n] for k, s in enumerate(equations.node.state)}
+    sliding, up, down = (_at(e, node_values, (len(states), n)) for e in (contact.sliding, contact.up, contact.down))
+    push = _link_forces(equations, contact.speed, states, values)
     stuck = np.where(up + push < 0.0, 1.0, np.where(down + push > 0.0, -1.0, 0.0))
-    made[:, 2 * n :] = np.where(sliding == 0.0, stuck, np.sign(sliding))
-    return made
+    states[:, 2 * n :] = np.where(sliding == 0.0, stuck, np.sign(sliding))
+    return states
 
 
 def _link_forces(

@@ -136,7 +136,7 @@ class FigureRuns:
         return _swept(scene, round(1.2 / largest, 3), 301)
 
     def _options(self) -> dict[str, Any]:
-        """Options of probes and simulations; `factor` converts sigma to their own variable."""
+        """Options of probes and simulations."""
         return {
             "resolution": self.quality.resolution,
             "criterion": self.quality.criterion,
