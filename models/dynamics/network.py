@@ -23,9 +23,8 @@ from ..mechanics.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCou
 from ..mechanics.definition import FRICTION_LAW
 from ..mechanics.friction import KAPPA, ContactModel, FrictionLaw
 from ..mechanics.lagrangian import Mechanics
-from ..mechanics.link import check_coupling, edge
+from ..mechanics.link import check_coupling, edge, is_oriented
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
-from ..mechanics.orientation import is_oriented
 from ..mechanics.oscillator import Field, Oscillator
 from ..mechanics.parameter import Parameter
 from ..mechanics.stick_slip import SLIP, set_valued
@@ -143,7 +142,7 @@ def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str,
     Notes
     -----
     If a link tells its ends apart, its weight becomes the sign of its direction
-    (`synchain.models.mechanics.orientation`).
+    (`synchain.models.mechanics.link`).
     """
     if link is None:
         return Equations.of_equal_nodes(single, None, graph.n, (), varied)

@@ -288,7 +288,7 @@ def closed_form(name: str, **options: Any) -> ClosedForm:
     if unknown:
         raise ValueError(f"topology {name}: option {unknown[0]!r} with symbols; known: {', '.join(known) or 'none'}")
     try:
-        form = formula(**options)
+        form: ClosedForm = formula(**options)
     except ValueError as error:
         raise ValueError(f"topology {name}: {error}") from None
     more = ", ".join(f"{key}={_shown(value)}" for key, value in form.options.items() if key in options)

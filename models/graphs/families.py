@@ -20,7 +20,6 @@ from .topology import Topology
 if TYPE_CHECKING:
     import sympy as sp
 
-    from .closed_forms import ClosedForm
     from .links import Link
 
 __all__ = ["Family", "FamilyRule", "family", "names", "topology"]
@@ -86,7 +85,7 @@ class Family:
     count: Callable[..., int] | None = None
     expected: Callable[..., int] | None = None
     spectrum: Callable[..., Eigenvalues] | None = None
-    formula: Callable[..., ClosedForm] | None = None
+    formula: Callable[..., Any] | None = None
     sides: Callable[[int], tuple[int, ...]] | None = None
     link_limit: int = LINK_LIMIT
 

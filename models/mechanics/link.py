@@ -1,8 +1,15 @@
-"""The equations of one link: what a coupling adds to the rates of its target, between nodes of one kind or of two."""
+"""The equations of one link: what a coupling adds to the rates of its target, between nodes of one kind or of two.
+
+Some couplings have an energy that changes if their two ends are exchanged: V(q_i, q_j) is not
+V(q_j, q_i).  Their links say at which end node i is, by the sign of their weight W as seen from the
+target: W = 1 if the link runs from the target to the source, W = -1 if it runs from the source to
+the target.  The energy of the link is W^2 V_even + W V_odd, the parts of V that keep and that change
+their sign in the exchange.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import sympy as sp
@@ -11,11 +18,10 @@ from .components import TIME, Edge, Node
 from .coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling
 from .lagrangian import balance, mass_matrix, solve_masses
 from .nondimensional import nondimensional
-from .orientation import link_energy
 from .oscillator import Field, Oscillator
 from .stick_slip import SLIP
 
-__all__ = ["check_coupling", "edge", "link_energies"]
+__all__ = ["check_coupling", "edge", "is_oriented", "link_energies", "link_energy"]
 
 Symbols = tuple[sp.Symbol, ...]
 
@@ -285,3 +291,31 @@ def _masses(oscillator: Oscillator | None, single: Node, here: Symbols) -> sp.Ma
             f"oscillator {oscillator.name!r}: a coupling needs masses that do not depend on time, found {masses}"
         )
     return masses.xreplace(dict(zip(single.state, here, strict=True)))
+
+
+def link_energy(energy: sp.Expr, ends: Mapping[sp.Symbol, sp.Symbol], weight: sp.Symbol) -> sp.Expr:
+    """Return the energy (or Rayleigh function) of one link.
+
+    Parameters
+    ----------
+    energy : Expr
+        The function as a coupling has it, in the symbols of its two ends and `WEIGHT`.
+    ends : mapping of Symbol to Symbol
+        The symbols that take the place of those two, target first.
+    weight : Symbol
+        The symbol that takes the place of `WEIGHT`.
+    """
+    first, second = ends
+    back = {first: ends[second], second: ends[first]}
+    here, there = (energy.xreplace({**pair, WEIGHT: weight}) for pair in (ends, back))
+    if sp.expand(here - there) == 0:
+        return here
+    here, there = (e.xreplace({weight: sp.S.One}) for e in (here, there))
+    return sp.expand(weight**2 * (here + there) / 2 + weight * (here - there) / 2)
+
+
+@lru_cache(maxsize=64)
+def is_oriented(edge: Edge) -> bool:
+    """Return True if the rates of a link do not just change their sign with its weight."""
+    turned = {edge.weight: -edge.weight}
+    return any(sp.expand(e + e.xreplace(turned)) != 0 for e in edge.rhs)

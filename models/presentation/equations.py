@@ -14,8 +14,8 @@ import sympy as sp
 
 from ..dynamics.equations import Equations
 from ..mechanics.components import SLIDING, TIME, Edge, Node
+from ..mechanics.link import is_oriented
 from ..mechanics.nondimensional import FRICTION
-from ..mechanics.orientation import is_oriented
 from .writer import Latex, Style, Text, Writer
 
 __all__ = ["as_dict", "latex", "text"]

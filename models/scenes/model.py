@@ -14,12 +14,12 @@ from ..graphs.families import topology
 from ..graphs.topology import Topology
 from ..inputs.checks import check_integer, check_keys, check_number, check_table, short_repr, suggestion
 from ..inputs.frozen import Frozen
+from ..inputs.node_name import NodeName
 from ..inputs.plugins import part
 from ..mechanics.coupling import Coupling, LagrangianCoupling, MatrixCoupling
 from ..mechanics.friction import ContactModel, FrictionLaw
 from ..mechanics.link import check_coupling
 from ..mechanics.loader import load_friction_law, load_oscillator, read_coupling
-from ..mechanics.node_name import NodeName
 from ..mechanics.oscillator import Oscillator
 from ..mechanics.parameter import Parameter
 

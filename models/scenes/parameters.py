@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from ..dynamics.periodicity import Drive, drive_of
 from ..inputs.checks import check_table, short_repr
 from ..inputs.frozen import Frozen
-from ..mechanics.node_name import NodeName
+from ..inputs.node_name import NodeName
 from .axis import Axis
 from .model import Model, NodeKind, in_range
 

@@ -14,9 +14,9 @@ from ..dynamics.periodicity import Drive, as_function, names_in, period_of
 from ..graphs.topology import Topology
 from ..inputs.checks import check_instance, check_table, check_text, suggestion
 from ..inputs.frozen import Frozen
+from ..inputs.node_name import NodeName
 from ..mechanics.coupling import Coupling
 from ..mechanics.friction import ContactModel, FrictionLaw
-from ..mechanics.node_name import NodeName
 from ..mechanics.oscillator import Oscillator
 from ..mechanics.stick_slip import SLIP
 from .axis import Axis

@@ -12,8 +12,8 @@ import sympy as sp
 
 from ..dynamics.periodicity import as_function, names_in
 from ..inputs.checks import short_repr
+from ..inputs.node_name import NodeName
 from ..inputs.words import Word
-from ..mechanics.node_name import NodeName
 from .axis import LIMIT, Axis, known_length
 from .model import Model, in_range
 from .parameters import drive

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..graphs.topology import Topology
+from ..inputs.node_name import NodeName
 from ..mechanics.coupling import LagrangianCoupling
-from ..mechanics.node_name import NodeName
 from .model import Model
 
 __all__ = ["warnings", "zero_multiplicity"]

@@ -13,7 +13,7 @@ import sympy as sp
 from synchain.codegen.driver.columns import Control, Span
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import as_function, drive_of, names_in
-from synchain.models.mechanics.node_name import NodeName
+from synchain.models.inputs.node_name import NodeName
 from synchain.models.scenes.scene import Scene
 
 from .initial_modes import local_clock, with_modes

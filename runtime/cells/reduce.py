@@ -19,7 +19,7 @@ from synchain.codegen.driver.columns import Point, Sum
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.reduction import NoQuotient, quotient, substitute_constants
 from synchain.models.inputs.checks import check_flag
-from synchain.models.mechanics.node_name import NodeName
+from synchain.models.inputs.node_name import NodeName
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..support.status import Status

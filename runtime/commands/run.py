@@ -138,7 +138,7 @@ def changed_scene(arguments: Namespace) -> Scene:
 
 def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[str, Any]) -> Any:
     """The value of a setting as the scene wants it."""
-    from synchain.models.mechanics.node_name import NodeName
+    from synchain.models.inputs.node_name import NodeName
 
     if scene.takes(name) or name in scene.equations.state:
         return value

@@ -21,8 +21,8 @@ from synchain.models.mechanics.components import TIME, Node
 from synchain.models.mechanics.coupling import Coupling
 from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.mechanics.friction import ContactModel
+from synchain.models.mechanics.link import is_oriented
 from synchain.models.mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, static_coefficient
-from synchain.models.mechanics.orientation import is_oriented
 from synchain.models.mechanics.oscillator import Oscillator
 
 FORCES = [c for c in names(COUPLING) if not hasattr(load(COUPLING, c), "kinetic")]
