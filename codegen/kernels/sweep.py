@@ -11,6 +11,7 @@ import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import angular_frequency
+from synchain.models.dynamics.record import Record
 
 from .. import driver, simd
 from ..integrators import Integrator, integrator
@@ -26,27 +27,14 @@ from ..steps.rosenbrock import write_rosenbrock
 from ..steps.step import PAIR, SCALED, StepWriter, function_name, write_function
 
 __all__ = [
-    "RECORDS",
     "KernelKind",
     "KernelSource",
-    "Record",
     "default_width",
     "describe",
     "emit",
     "imports",
     "node_functions",
 ]
-
-
-class Record(StrEnum):
-    """What a kernel can record besides the final state."""
-
-    SYNC_ERROR = "sync_error"
-    SECTION = "section"
-    TRAJECTORY = "trajectory"
-
-
-RECORDS = tuple(Record)
 
 
 class KernelKind(StrEnum):
@@ -109,7 +97,7 @@ def emit(
     method
         An integrator or its name; "auto" is "rodas5p", the fastest at equal error in full lanes (docs/performance.md).
     records
-        What the kernel records besides the final state, out of RECORDS.
+        What the kernel records besides the final state, each a `Record`.
     section
         An expression in the state symbols (x_1 …), the parameters and t, whose zeros the record "section" needs.
     width
@@ -136,13 +124,13 @@ def emit(
     """
     method = AUTO if method == "auto" else method
     method = integrator(method) if isinstance(method, str) else method
-    unknown = [r for r in records if r not in list(RECORDS)]
+    unknown = [r for r in records if r not in list(Record)]
     if unknown:
-        raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(RECORDS)}")
+        raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(Record)}")
     if "section" in records and section is None:
         raise ValueError("the record 'section' needs a section function, for example v_1")
     width = default_width(equations) if width is None else width
-    ordered = tuple(r for r in RECORDS if r in records)
+    ordered = tuple(r for r in Record if r in records)
     weights = tuple(multiplicity) if multiplicity is not None and "sync_error" in ordered else None
     if "sync_error" in ordered and not equations.common:
         raise ValueError("the record 'sync_error' compares states of one name, and these nodes have none in common")
@@ -305,7 +293,7 @@ def _constants(
     width: int,
     multiplicity: tuple[int, ...] | None,
 ) -> str:
-    flags = {name.upper(): name in records for name in RECORDS}
+    flags = {name.upper(): name in records for name in Record}
     rows = {
         "WIDTH": width,
         "NODES": equations.n,

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..dynamics.record import Record
 from ..inputs.checks import check_choice, check_integer, check_number, check_text, short_repr
 from ..inputs.frozen import Frozen
 from ..inputs.words import Word
@@ -20,15 +21,7 @@ from .section import Section
 from .start import SEED_LIMIT, chosen_start, default_start
 from .sweep import check_sweep, read_axes
 
-__all__ = ["Record", "TimeUnit", "complete", "integrators"]
-
-
-class Record(Word):
-    """What a cell of a sweep records."""
-
-    SYNC_ERROR = "sync_error"
-    SECTION = "section"
-    TRAJECTORY = "trajectory"
+__all__ = ["TimeUnit", "complete", "integrators"]
 
 
 class TimeUnit(Word):

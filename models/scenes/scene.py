@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..dynamics.equations import Equations
 from ..dynamics.periodicity import Drive, as_function, names_in, period_of
+from ..dynamics.record import Record
 from ..graphs.topology import Topology
 from ..inputs.checks import check_instance, check_table, check_text, suggestion
 from ..inputs.frozen import Frozen
@@ -20,7 +21,7 @@ from ..mechanics.friction import ContactModel, FrictionLaw
 from ..mechanics.oscillator import Oscillator
 from ..mechanics.stick_slip import SLIP
 from .axis import Axis
-from .complete import Record, TimeUnit, complete
+from .complete import TimeUnit, complete
 from .dictionary import arguments, as_dict
 from .model import Group, Model, as_oscillator
 from .parameters import drive, varied, without
