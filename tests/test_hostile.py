@@ -15,10 +15,10 @@ import sympy as sp
 from effort import effort
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from parts import edge
 
 from synchain.models.claims.language import read_claims
 from synchain.models.claims.verdict import verify
-from synchain.models.dynamics import network
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.symbolic import weight
 from synchain.models.inputs import plugins
@@ -102,7 +102,7 @@ def test_a_coupling_that_does_not_vanish_between_equals_is_said(tmp_path: Path) 
     pull = law(tmp_path, PULL, "pull.py")
     found = Scene(topology=topology("ring", 4), coupling=pull).warnings
     assert any("does not vanish between oscillators in equal states" in words for words in found)
-    assert not network.edge(pull, Scene().equations.node, "friction").diffusive
+    assert not edge(pull, Scene().equations.node, "friction").diffusive
     assert Scene(topology=topology("ring", 4)).warnings == ()
 
 

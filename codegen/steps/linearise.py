@@ -61,8 +61,10 @@ def write_bound(w: StepWriter, own: list[dict[str, sp.Expr]]) -> None:
     """
     eq = w.equations
     w.mass.refuse("a step that bounds the eigenvalues")
-    half = len(eq.node.state) // 2
-    second_order = not eq.mixed and len(eq.node.state) % 2 == 0 and eq.node.rhs[:half] == eq.node.state[half:]
+    first_kind = eq.nodes[0]
+    half = len(first_kind.state) // 2
+    positions_move = len(first_kind.state) % 2 == 0 and first_kind.rhs[:half] == first_kind.state[half:]
+    second_order = positions_move and not eq.mixed
     slow: list[list[str]] = []
     fast: list[list[str]] = []
     links, places, rows = list(eq.link_jacobian()), eq.places, []

@@ -7,9 +7,12 @@ import re
 import tomllib
 from importlib import resources
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..inputs.checks import short_repr, suggestion
-from .scene import Scene
+
+if TYPE_CHECKING:
+    from .scene import Scene
 
 __all__ = ["load_scene", "scene_names"]
 
@@ -86,6 +89,8 @@ def _read(path: Path) -> bytes:
 
 
 def _scene(name: str, content: bytes, folder: Path | None) -> Scene:
+    """The scene of a file's content, whose paths start in `folder`."""
+    from .scene import Scene  # the list of scenes needs no SymPy
 
     try:
         words = content.decode("utf-8-sig")

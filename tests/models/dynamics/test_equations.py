@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import mpmath
 import pytest
@@ -148,8 +149,10 @@ def test_states_and_parameters_come_in_a_fixed_order() -> None:
 
 DIGEST = """
 from fractions import Fraction
-from synchain.models.dynamics.network import edge, network
-from parts import node
+import sys
+sys.path.insert(0, sys.argv[1])
+from parts import edge, node
+from synchain.models.dynamics.network import network
 from synchain.models.presentation.equations import as_dict
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.links import Link
@@ -162,7 +165,7 @@ for oscillator, law in (("friction", "stribeck"), ("duffing", None)):
 
 def test_the_digest_and_the_text_do_not_depend_on_the_hash_seed() -> None:
     runs = [
-        subprocess.run([sys.executable, "-c", DIGEST], env={**os.environ, "PYTHONHASHSEED": seed}, capture_output=True,
+        subprocess.run([sys.executable, "-c", DIGEST, str(Path(__file__).parents[2])], env={**os.environ, "PYTHONHASHSEED": seed}, capture_output=True,
                        text=True, check=True).stdout
         for seed in ("1", "77")
     ]  # fmt: skip

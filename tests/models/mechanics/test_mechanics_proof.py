@@ -9,6 +9,7 @@ import pytest
 import sympy as sp
 from mechanics_proof import T, by_kane, by_lagrange, residual, vanishes, whole
 from parts import edge, is_lagrangian, node, oscillator_of
+from parts import law_of as friction_law
 
 from synchain.models.dynamics.network import network
 from synchain.models.graphs.families import topology
@@ -50,7 +51,7 @@ def accelerations(oscillator: str, coupling: str | None, graph: Topology, orient
 def check(method: object, oscillator: str, coupling: str | None, graph: Topology, on: tuple[str, ...] = ()) -> None:
     system = whole(oscillator, coupling, graph, on or None)
     if law_of(oscillator):
-        law = friction_coefficient(law_of("viscous"), "sign")
+        law = friction_coefficient(friction_law("viscous"), "sign")
         forces = tuple(e.replace(FRICTION, law) for e in system.forces)
         system = type(system)(system.q, system.rates, system.kinetic, system.potential, forces, system.particles)
     ours = accelerations(oscillator, coupling, graph, f" on {', '.join(on)}" if on else "")

@@ -11,7 +11,6 @@ import synchain.models
 from synchain.models import chain, circulant, erdos_renyi, torus
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.products import cartesian
-from synchain.models.scenes.dictionary import as_dict, from_dict
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 
@@ -45,16 +44,16 @@ def test_options_stand_in_scene_files(tmp_path: Path) -> None:
 )
 def test_scenes_with_options_come_back(graph: synchain.models.Topology) -> None:
     scene = Scene(topology=graph)
-    written = as_dict(scene)
+    written = scene.as_dict()
     assert written["topology"]["n"] == graph.n
     assert "matrix" not in written["topology"]
-    assert from_dict(written) == scene
-    assert from_dict(written).topology.options == graph.options
+    assert Scene.from_dict(written) == scene
+    assert Scene.from_dict(written).topology.options == graph.options
     assert pickle.loads(pickle.dumps(scene)) == scene
 
 
 def test_scenes_with_products_are_written_as_matrices() -> None:
     scene = Scene(topology=cartesian(chain(2), chain(3)))
-    written = as_dict(scene)
+    written = scene.as_dict()
     assert len(written["topology"]["matrix"]) == 6
-    assert from_dict(written).topology.links == scene.topology.links
+    assert Scene.from_dict(written).topology.links == scene.topology.links

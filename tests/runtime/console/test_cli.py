@@ -23,7 +23,6 @@ from synchain.runtime.cli import main
 from synchain.runtime.console.outcome import print_json
 from synchain.runtime.results.open import open_result
 from synchain.runtime.sweeps import job, stream
-from synchain.runtime.sweeps import run as sweep
 from synchain.runtime.synchronisation import threshold
 
 SCENE = """
@@ -201,7 +200,7 @@ def test_kernel_prints_the_source_without_compiling(
     monkeypatch.delattr(kernels, "load")
     assert main(["kernel", scene]) == 0
     out = capsys.readouterr().out
-    assert out == sweep.kernel_source(load_scene(scene)).text
+    assert out == kernels.kernel_source(load_scene(scene)).text
     compile(out, "kernel", "exec")
 
 
