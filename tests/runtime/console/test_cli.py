@@ -47,6 +47,12 @@ def scene(tmp_path: Path) -> str:
     return str(path)
 
 
+@pytest.fixture
+def compiled(scene: str) -> None:
+    """The kernel of a sweep of the scene is there, so that a command has no line to say about it."""
+    kernels.kernel(load_scene(scene).replace(axes={"sigma": [0.0, 0.25, 0.5]}))
+
+
 def matrix(folder: Path, text: str) -> str:
     path = folder / "G.txt"
     path.write_text(text)
@@ -204,6 +210,7 @@ def test_kernel_prints_the_source_without_compiling(
     compile(out, "kernel", "exec")
 
 
+@pytest.mark.usefixtures("compiled")
 def test_run_writes_a_result_and_a_figure(scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "new" / "folder"
     assert main(["run", scene, "--out", str(out), "--rtol", "1e-6", "--set", "omega=1.4", "sigma=0:0.5:3"]) == 0
@@ -224,6 +231,7 @@ def test_run_writes_a_result_and_a_figure(scene: str, tmp_path: Path, capsys: py
     assert float(result.end[0, 0]) != float(result.end[1, 0])
 
 
+@pytest.mark.usefixtures("compiled")
 def test_a_figure_that_fails_says_that_the_result_is_complete(
     scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
