@@ -19,9 +19,6 @@ from ..simd.lanes import one_lane
 from ..simd.lanes import select
 from ..simd.lanes import store
 from .names import CONTACTS
-from .names import DIMENSION
-from .names import PARAMETERS
-from .names import REPEATS
 from .names import SECTION
 from .names import SYNC_ERROR
 from .names import TRAJECTORY
@@ -32,6 +29,7 @@ from .recording import BUDGET
 from .recording import CANCEL
 from .recording import CHANGE
 from .recording import CHATTERING
+from .recording import CLOCK
 from .recording import CYCLE
 from .recording import DIVERGED
 from .recording import END
@@ -60,7 +58,6 @@ from .recording import POWER
 from .recording import REJECTED
 from .recording import RUSH
 from .recording import SAMPLE_GAP
-from .recording import SAVED
 from .recording import SKIPPED
 from .recording import SMOOTH_STEPS
 from .recording import START
@@ -77,10 +74,9 @@ from .recording import UNDERFLOW
 from .recording import spread
 
 # --- kernel text below ---
-# What must repeat for the future to repeat, saved behind the other groups: the state and the step control.
+# What must repeat for the future to repeat, saved behind state and parameters: the state and these of the clock.
 REPEATING = (STEP, MODE, SYNC)
 LONGEST_CYCLE = 32.0
-SLOTS = SAVED + DIMENSION + len(REPEATING)
 
 
 @njit(error_model="numpy")
@@ -91,197 +87,208 @@ def aligned(count):
     return block[shift : shift + count]
 
 
+@njit(error_model="numpy")
+def memory(dims):
+    """The registers of a group: its clock, and the states and parameters of its lanes with room for saved ones."""
+    groups = 2 * dims.dimension + dims.parameters + len(REPEATING)
+    return aligned(CLOCK * WIDTH), aligned(groups * WIDTH)
+
+
 @njit(error_model="numpy", forceinline=True)
-def put(bank, slot, which, value):
+def put(array, slot, which, value):
     """Write one number of one lane as part of a whole register: reading that register back need not wait for memory."""
-    store(bank, slot, select(one_lane(which, WIDTH), broadcast(value, WIDTH), load(bank, slot, WIDTH)))
+    store(array, slot, select(one_lane(which, WIDTH), broadcast(value, WIDTH), load(array, slot, WIDTH)))
 
 
 @njit(error_model="numpy")
-def fill(which, cell, start, numbers, spans, control, bank, samples):
+def fill(which, cell, start, numbers, spans, control, clock, y, samples, multiplicity, dims):
     """Put a cell into a lane; a lane without a cell of its own (cell < 0) idles on a copy of the first one."""
     idle, cell = cell < 0, max(cell, 0)
-    for slot in range(SLOTS):
-        put(bank, slot, which, 0.0)
-    for c in range(DIMENSION):
-        put(bank, c, which, start[cell, c])
-    for c in range(PARAMETERS):
-        put(bank, DIMENSION + c, which, numbers[cell, c])
-    put(bank, PERIOD, which, spans[cell, 2] if spans[cell, 2] > 0.0 else math.inf)
-    put(bank, STEP, which, control[FIRST_STEP])
-    put(bank, CHANGE, which, math.inf)
-    put(bank, POWER, which, 1.0)
-    put(bank, LEFT, which, -1.0)
-    put(bank, NEXT_SAMPLE, which, spans[cell, 0])
+    for slot in range(CLOCK):
+        put(clock, slot, which, 0.0)
+    for slot in range(y.size // WIDTH):
+        put(y, slot, which, 0.0)
+    for c in range(dims.dimension):
+        put(y, c, which, start[cell, c])
+    for c in range(dims.parameters):
+        put(y, dims.dimension + c, which, numbers[cell, c])
+    put(clock, PERIOD, which, spans[cell, 2] if spans[cell, 2] > 0.0 else math.inf)
+    put(clock, STEP, which, control[FIRST_STEP])
+    put(clock, CHANGE, which, math.inf)
+    put(clock, POWER, which, 1.0)
+    put(clock, LEFT, which, -1.0)
+    put(clock, NEXT_SAMPLE, which, spans[cell, 0])
     if TRAJECTORY and samples.shape[1] > 1:
-        put(bank, SAMPLE_GAP, which, (spans[cell, 1] - spans[cell, 0]) / (samples.shape[1] - 1))
-    begin(which, cell, spans, bank)
+        put(clock, SAMPLE_GAP, which, (spans[cell, 1] - spans[cell, 0]) / (samples.shape[1] - 1))
+    begin(which, cell, spans, clock)
     if SYNC_ERROR:
         now = np.empty(WIDTH)
-        store(now, 0, spread(bank))
-        put(bank, SYNC, which, now[which])
+        store(now, 0, spread(y, multiplicity, dims))
+        put(clock, SYNC, which, now[which])
     if idle:
-        vacate(which, bank)
+        vacate(which, clock)
 
 
 @njit(error_model="numpy")
-def vacate(which, bank):
+def vacate(which, clock):
     """Let a lane run idly on what it holds: it never stops, and nobody asks for it."""
     for group in (STOP, START, END, PERIOD, NEXT_SAMPLE):
-        put(bank, group, which, math.inf)
-    put(bank, ACCEPTED, which, -math.inf)
+        put(clock, group, which, math.inf)
+    put(clock, ACCEPTED, which, -math.inf)
 
 
 @njit(error_model="numpy")
-def begin(which, cell, spans, bank):
+def begin(which, cell, spans, clock):
     """Set the clock of a lane to the beginning of its current period and find the next stop."""
-    period, periods = bank[PERIOD * WIDTH + which], bank[PERIODS * WIDTH + which]
+    period, periods = clock[PERIOD * WIDTH + which], clock[PERIODS * WIDTH + which]
     base = periods * period if periods > 0.0 else 0.0
     start, end = spans[cell, 0] - base, spans[cell, 1] - base
-    put(bank, BASE, which, base)
-    put(bank, TIME, which, 0.0)
-    put(bank, START, which, start)
-    put(bank, END, which, end)
-    put(bank, STOP, which, min(start if start > 0.0 else end, period))
+    put(clock, BASE, which, base)
+    put(clock, TIME, which, 0.0)
+    put(clock, START, which, start)
+    put(clock, END, which, end)
+    put(clock, STOP, which, min(start if start > 0.0 else end, period))
 
 
 @njit(error_model="numpy")
-def turn_over(which, cell, spans, control, bank):
+def turn_over(which, cell, spans, control, clock, y, dims):
     """Begin the next period of the drive; jump where the computation is known to repeat itself."""
-    put(bank, PERIODS, which, bank[PERIODS * WIDTH + which] + 1.0)
-    restart(which, bank)
-    if REPEATS and control[NO_JUMPS] == 0.0:
-        if bank[CYCLE * WIDTH + which] == 0.0:
-            compare(which, bank)
-        if bank[CYCLE * WIDTH + which] > 0.0:
-            jump(which, cell, spans, bank)
-    begin(which, cell, spans, bank)
-    if SYNC_ERROR and not SECTION and not TRAJECTORY and bank[SYNC * WIDTH + which] < spans[cell, 3]:
-        settle_down(which, cell, spans, bank)
+    put(clock, PERIODS, which, clock[PERIODS * WIDTH + which] + 1.0)
+    restart(which, clock)
+    if dims.repeats and control[NO_JUMPS] == 0.0:
+        if clock[CYCLE * WIDTH + which] == 0.0:
+            compare(which, clock, y, dims)
+        if clock[CYCLE * WIDTH + which] > 0.0:
+            jump(which, cell, spans, clock)
+    begin(which, cell, spans, clock)
+    if SYNC_ERROR and not SECTION and not TRAJECTORY and clock[SYNC * WIDTH + which] < spans[cell, 3]:
+        settle_down(which, cell, spans, clock)
 
 
 @njit(error_model="numpy")
-def settle_down(which, cell, spans, bank):
+def settle_down(which, cell, spans, clock):
     """End a cell that is known to stay synchronous: its error counts as what it is now for the rest of the window."""
-    error, start, end = bank[SYNC * WIDTH + which], spans[cell, 0], spans[cell, 1]
-    now = bank[BASE * WIDTH + which] + bank[TIME * WIDTH + which]
-    put(bank, SYNC_SUM, which, bank[SYNC_SUM * WIDTH + which] + error * (end - max(start, now)))
-    put(bank, SYNC_PEAK, which, max(error, bank[SYNC_PEAK * WIDTH + which]))
-    put(bank, END, which, -math.inf)
+    error, start, end = clock[SYNC * WIDTH + which], spans[cell, 0], spans[cell, 1]
+    now = clock[BASE * WIDTH + which] + clock[TIME * WIDTH + which]
+    put(clock, SYNC_SUM, which, clock[SYNC_SUM * WIDTH + which] + error * (end - max(start, now)))
+    put(clock, SYNC_PEAK, which, max(error, clock[SYNC_PEAK * WIDTH + which]))
+    put(clock, END, which, -math.inf)
 
 
 @njit(error_model="numpy")
-def restart(which, bank):
+def restart(which, clock):
     """Let the step control begin the period with nothing in mind but a power of two.
 
     What the steps of a period are then depends on the state at its beginning alone, and a computation on a periodic orbit
     comes to repeat itself, which the wandering of a step size that remembers would prevent.
     """
-    _, exponent = math.frexp(bank[STEP * WIDTH + which])
-    put(bank, STEP, which, math.ldexp(0.5, exponent))
-    put(bank, MEMORY, which, 0.0)
-    put(bank, CHANGE, which, math.inf)
+    _, exponent = math.frexp(clock[STEP * WIDTH + which])
+    put(clock, STEP, which, math.ldexp(0.5, exponent))
+    put(clock, MEMORY, which, 0.0)
+    put(clock, CHANGE, which, math.inf)
 
 
 @njit(error_model="numpy")
-def compare(which, bank):
+def compare(which, clock, y, dims):
     """Look for a cycle of periods: compare with a saved period, and save the present one after 1, 2, 4 … 32, 32 … periods.
 
     Source: Brent, BIT Numerical Mathematics 20, 176 (1980), with a bound that finds short cycles soon.
     """
-    lag = bank[LAG * WIDTH + which] + 1.0
+    lag, saved = clock[LAG * WIDTH + which] + 1.0, dims.dimension + dims.parameters
     same = True
-    for c in range(DIMENSION):
-        same = same and bank[c * WIDTH + which] == bank[(SAVED + c) * WIDTH + which]
+    for c in range(dims.dimension):
+        same = same and y[c * WIDTH + which] == y[(saved + c) * WIDTH + which]
     for k, group in enumerate(REPEATING):
-        same = same and bank[group * WIDTH + which] == bank[(SAVED + DIMENSION + k) * WIDTH + which]
+        same = same and clock[group * WIDTH + which] == y[(saved + dims.dimension + k) * WIDTH + which]
     if same:
-        put(bank, CYCLE, which, lag)
-    elif lag == bank[POWER * WIDTH + which]:
-        put(bank, POWER, which, min(LONGEST_CYCLE, bank[POWER * WIDTH + which] * 2.0))
+        put(clock, CYCLE, which, lag)
+    elif lag == clock[POWER * WIDTH + which]:
+        put(clock, POWER, which, min(LONGEST_CYCLE, clock[POWER * WIDTH + which] * 2.0))
         lag = 0.0
-        for c in range(DIMENSION):
-            put(bank, SAVED + c, which, bank[c * WIDTH + which])
+        for c in range(dims.dimension):
+            put(y, saved + c, which, y[c * WIDTH + which])
         for k, group in enumerate(REPEATING):
-            put(bank, SAVED + DIMENSION + k, which, bank[group * WIDTH + which])
-    put(bank, LAG, which, lag)
+            put(y, saved + dims.dimension + k, which, clock[group * WIDTH + which])
+    put(clock, LAG, which, lag)
 
 
 @njit(error_model="numpy")
-def jump(which, cell, spans, bank):
+def jump(which, cell, spans, clock):
     """Leave out whole cycles: before the window always, inside it after one whole cycle was measured."""
-    period, now = bank[PERIOD * WIDTH + which], bank[PERIODS * WIDTH + which]
-    cycle = bank[CYCLE * WIDTH + which]
+    period, now = clock[PERIOD * WIDTH + which], clock[PERIODS * WIDTH + which]
+    cycle = clock[CYCLE * WIDTH + which]
     start, end = spans[cell, 0], spans[cell, 1]
     if now * period < start:
-        leap(which, math.floor((start / period - now) / cycle + 1e-9) * cycle, bank)
+        leap(which, math.floor((start / period - now) / cycle + 1e-9) * cycle, clock)
     elif not SECTION and not TRAJECTORY:
-        left = bank[LEFT * WIDTH + which]
+        left = clock[LEFT * WIDTH + which]
         if left < 0.0:
-            put(bank, LEFT, which, cycle)
-            put(bank, SUM_BEFORE, which, bank[SYNC_SUM * WIDTH + which])
+            put(clock, LEFT, which, cycle)
+            put(clock, SUM_BEFORE, which, clock[SYNC_SUM * WIDTH + which])
         elif left > 0.0:
-            put(bank, LEFT, which, left - 1.0)
+            put(clock, LEFT, which, left - 1.0)
             if left == 1.0:
                 cycles = max(0.0, math.floor((end / period - now) / cycle + 1e-9))
-                leap(which, cycles * cycle, bank)
-                gain = bank[SYNC_SUM * WIDTH + which] - bank[SUM_BEFORE * WIDTH + which]
-                put(bank, SYNC_SUM, which, bank[SYNC_SUM * WIDTH + which] + cycles * gain)
+                leap(which, cycles * cycle, clock)
+                gain = clock[SYNC_SUM * WIDTH + which] - clock[SUM_BEFORE * WIDTH + which]
+                put(clock, SYNC_SUM, which, clock[SYNC_SUM * WIDTH + which] + cycles * gain)
 
 
 @njit(error_model="numpy")
-def leap(which, periods, bank):
+def leap(which, periods, clock):
     """Move the clock on by whole periods."""
-    put(bank, PERIODS, which, bank[PERIODS * WIDTH + which] + max(0.0, periods))
-    put(bank, SKIPPED, which, bank[SKIPPED * WIDTH + which] + max(0.0, periods))
+    put(clock, PERIODS, which, clock[PERIODS * WIDTH + which] + max(0.0, periods))
+    put(clock, SKIPPED, which, clock[SKIPPED * WIDTH + which] + max(0.0, periods))
 
 
 @njit(error_model="numpy")
-def outcome(which, bank, control):
+def outcome(which, clock, y, control, dims):
     """Status of the cell in a lane, 0 while it runs."""
-    t = bank[TIME * WIDTH + which]
+    t = clock[TIME * WIDTH + which]
     largest = 0.0
-    for c in range(DIMENSION):
-        size = abs(bank[c * WIDTH + which])
+    for c in range(dims.dimension):
+        size = abs(y[c * WIDTH + which])
         if not size < FAR:  # NaN too
             return DIVERGED
         largest = max(largest, size)
-    if t >= bank[END * WIDTH + which]:
+    if t >= clock[END * WIDTH + which]:
         return FINISHED
     if control[CANCEL] != 0.0:
         return INTERRUPTED
-    if bank[ACCEPTED * WIDTH + which] + bank[REJECTED * WIDTH + which] >= control[MAX_STEPS]:
+    if clock[ACCEPTED * WIDTH + which] + clock[REJECTED * WIDTH + which] >= control[MAX_STEPS]:
         return BUDGET
-    if CONTACTS and bank[RUSH * WIDTH + which] >= LONGEST_RUSH:
+    if CONTACTS and clock[RUSH * WIDTH + which] >= LONGEST_RUSH:
         return CHATTERING
-    if bank[STEP * WIDTH + which] <= 4e-16 * max(1.0, t):
+    if clock[STEP * WIDTH + which] <= 4e-16 * max(1.0, t):
         return DIVERGED if largest > 1e8 else UNDERFLOW  # a blow-up in finite time stops the steps first
     return 0
 
 
 @njit(error_model="numpy")
-def finish(which, status, bank, i, spans, end, sums, counts):
+def finish(which, status, clock, y, i, spans, end, sums, counts, dims):
     """Write what is known about the cell in a lane."""
-    for c in range(DIMENSION):
-        end[i, c] = bank[c * WIDTH + which]
+    for c in range(dims.dimension):
+        end[i, c] = y[c * WIDTH + which]
     length = spans[i, 1] - spans[i, 0]
-    sums[i, MEAN] = bank[SYNC_SUM * WIDTH + which] / length if length > 0.0 else bank[SYNC * WIDTH + which]
-    sums[i, PEAK] = bank[SYNC_PEAK * WIDTH + which] if length > 0.0 else bank[SYNC * WIDTH + which]
-    sums[i, LAST] = bank[SYNC * WIDTH + which]
-    stopped, early = bank[BASE * WIDTH + which] + bank[TIME * WIDTH + which], bank[END * WIDTH + which] == -math.inf
+    sums[i, MEAN] = clock[SYNC_SUM * WIDTH + which] / length if length > 0.0 else clock[SYNC * WIDTH + which]
+    sums[i, PEAK] = clock[SYNC_PEAK * WIDTH + which] if length > 0.0 else clock[SYNC * WIDTH + which]
+    sums[i, LAST] = clock[SYNC * WIDTH + which]
+    stopped, early = clock[BASE * WIDTH + which] + clock[TIME * WIDTH + which], clock[END * WIDTH + which] == -math.inf
     sums[i, STOPPED_AT] = spans[i, 1] if status == FINISHED and spans[i, 1] > 0.0 and not early else stopped
     counts[i, STATUS] = status
-    counts[i, N_ACCEPTED] = int(bank[ACCEPTED * WIDTH + which])
-    counts[i, N_REJECTED] = int(bank[REJECTED * WIDTH + which])
-    counts[i, N_SKIPPED] = int(bank[SKIPPED * WIDTH + which])
-    counts[i, N_SMOOTH] = int(bank[SMOOTH_STEPS * WIDTH + which])
+    counts[i, N_ACCEPTED] = int(clock[ACCEPTED * WIDTH + which])
+    counts[i, N_REJECTED] = int(clock[REJECTED * WIDTH + which])
+    counts[i, N_SKIPPED] = int(clock[SKIPPED * WIDTH + which])
+    counts[i, N_SMOOTH] = int(clock[SMOOTH_STEPS * WIDTH + which])
 
 
 @njit(error_model="numpy")
-def move(a, bank, cell, b, other_bank, other_cell):
-    """Move the cell of lane a in one bank to lane b in another."""
-    for slot in range(SLOTS):
-        put(other_bank, slot, b, bank[slot * WIDTH + a])
+def move(a, clock, y, cell, b, other_clock, other_y, other_cell):
+    """Move the cell of lane a in one group to lane b in another."""
+    for slot in range(CLOCK):
+        put(other_clock, slot, b, clock[slot * WIDTH + a])
+    for slot in range(y.size // WIDTH):
+        put(other_y, slot, b, y[slot * WIDTH + a])
     other_cell[b] = cell[a]
     cell[a] = -1
 
@@ -315,9 +322,9 @@ def held(cell):
 
 
 @njit(error_model="numpy")
-def waiting(bank, cell, mode):
+def waiting(clock, cell, mode):
     """The lane of a waiting cell of one kind, -1 where there is none."""
     for which in range(WIDTH):
-        if cell[which] >= 0 and bank[MODE * WIDTH + which] == mode:
+        if cell[which] >= 0 and clock[MODE * WIDTH + which] == mode:
             return which
     return -1

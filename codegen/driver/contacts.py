@@ -12,8 +12,9 @@ from __future__ import annotations
 from numba import njit
 
 from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, minimum, select, store
-from .names import NODES, WIDTH, pushes
-from .recording import ACCEPTED, REJECTED, RUSH, STEP, STOP, inside
+from .dense import inside
+from .names import LOOPED, WIDTH
+from .recording import ACCEPTED, REJECTED, RUSH, STEP, STOP
 
 # --- kernel text below ---
 # A gap this little below zero counts as zero; a passage is never sought closer than the shortest step to it.
@@ -24,100 +25,104 @@ LOOKS, SHALLOW = 4, 0.2
 
 
 @njit(error_model="numpy", forceinline=True)
-def gap_of(i, p, out):
+def gap_of(i, p, out, dims):
     """The gap of one contact, from what `pushes` has written."""
-    slip = load(p, 2 * NODES + i, WIDTH)
-    held = minimum(load(out, 2 * NODES + i, WIDTH), -load(out, 3 * NODES + i, WIDTH))
+    slip = load(p, 2 * dims.nodes + i, WIDTH)
+    held = minimum(load(out, 2 * dims.nodes + i, WIDTH), -load(out, 3 * dims.nodes + i, WIDTH))
     return select(absolute(slip) < 0.5, held, slip * load(out, i, WIDTH))
 
 
 @njit(error_model="numpy", forceinline=True)
-def smallest_gap(t, y, p, out, network):
+def smallest_gap(t, y, p, out, network, dims, pushes):
     """The smallest gap of all contacts at a state."""
-    pushes(t, y, p, out, network)
+    if LOOPED:
+        graph, weights = network
+        pushes(t, y, p, out, graph, weights)
+    else:
+        pushes(t, y, p, out)
     least = broadcast(1e300, WIDTH)
-    for i in range(NODES):
-        least = minimum(least, gap_of(i, p, out))
+    for i in range(dims.nodes):
+        least = minimum(least, gap_of(i, p, out, dims))
     return least
 
 
 @njit(error_model="numpy")
-def gap_inside(theta, t, h, bank, y_new, dense, middle, out, network):
+def gap_inside(theta, t, h, y, y_new, dense, middle, out, network, dims, pushes):
     """The smallest gap at a fraction of the step."""
-    for c in range(2 * NODES):
-        store(middle, c, inside(theta, c, bank, y_new, dense))
-    return smallest_gap(t + theta * h, middle, bank, out, network)
+    for c in range(2 * dims.nodes):
+        store(middle, c, inside(theta, c, y, y_new, dense, dims))
+    return smallest_gap(t + theta * h, middle, y, out, network, dims, pushes)
 
 
 @njit(error_model="numpy", forceinline=True)
-def keep_gaps(look, p, out):
+def keep_gaps(look, p, out, dims):
     """Keep the gaps of all contacts at a look; of three looks the gaps are known."""
-    for i in range(NODES):
-        store(out, (6 + look % 3) * NODES + i, gap_of(i, p, out))
+    for i in range(dims.nodes):
+        store(out, (6 + look % 3) * dims.nodes + i, gap_of(i, p, out, dims))
 
 
 @njit(error_model="numpy")
-def bottom(i, theta, span, t, h, bank, y_new, dense, middle, out, network):
+def bottom(i, theta, span, t, h, y, y_new, dense, middle, out, network, dims, pushes):
     """The least gap of a contact near a fraction of the step where a parabola has its bottom, and its place.
 
     A gap that dips below zero and comes back between two looks would otherwise pass unseen.
     """
-    gap_inside(theta, t, h, bank, y_new, dense, middle, out, network)
-    place, least = theta, gap_of(i, bank, out)
+    gap_inside(theta, t, h, y, y_new, dense, middle, out, network, dims, pushes)
+    place, least = theta, gap_of(i, y, out, dims)
     for divisor in (8.0, 64.0):
         part = span / divisor
-        gap_inside(place - part, t, h, bank, y_new, dense, middle, out, network)
-        before = gap_of(i, bank, out)
-        gap_inside(place + part, t, h, bank, y_new, dense, middle, out, network)
-        after = gap_of(i, bank, out)
+        gap_inside(place - part, t, h, y, y_new, dense, middle, out, network, dims, pushes)
+        before = gap_of(i, y, out, dims)
+        gap_inside(place + part, t, h, y, y_new, dense, middle, out, network, dims, pushes)
+        after = gap_of(i, y, out, dims)
         bend, slope = before - 2.0 * least + after, 0.5 * (after - before)
         turn = minimum(maximum(select(bend > 0.0, -slope / bend, 0.0 * bend), -1.0), 1.0)
         shifted = minimum(maximum(place + part * turn, theta - span), theta + span)
-        gap_inside(shifted, t, h, bank, y_new, dense, middle, out, network)
-        gap = gap_of(i, bank, out)
+        gap_inside(shifted, t, h, y, y_new, dense, middle, out, network, dims, pushes)
+        gap = gap_of(i, y, out, dims)
         better = gap < least
         place, least = select(better, shifted, place), select(better, gap, least)
     return place, least
 
 
 @njit(error_model="numpy")
-def first_dip(k, open_lanes, t, h, bank, y_new, dense, middle, out, network):
+def first_dip(k, open_lanes, t, h, y, y_new, dense, middle, out, network, dims, pushes):
     """The first place (2: none) between looks k-2 and k where the gap of a contact dips below zero, and that gap."""
     span = 1.0 / LOOKS
     first, depth = broadcast(2.0, WIDTH), broadcast(0.0, WIDTH)
-    for i in range(NODES):
-        earlier = load(out, (6 + (k - 2) % 3) * NODES + i, WIDTH)
-        before = load(out, (6 + (k - 1) % 3) * NODES + i, WIDTH)
-        gap = load(out, (6 + k % 3) * NODES + i, WIDTH)
+    for i in range(dims.nodes):
+        earlier = load(out, (6 + (k - 2) % 3) * dims.nodes + i, WIDTH)
+        before = load(out, (6 + (k - 1) % 3) * dims.nodes + i, WIDTH)
+        gap = load(out, (6 + k % 3) * dims.nodes + i, WIDTH)
         bend, slope = earlier - 2.0 * before + gap, 0.5 * (gap - earlier)
         dips = open_lanes & (absolute(slope) < bend) & (before - 0.5 * slope * slope / bend < SHALLOW * gap)
         if any_lane(dips):
             turn = minimum(maximum(span * (k - 1.0 - slope / bend), 0.0), 1.0)
-            place, least = bottom(i, turn, span, t, h, bank, y_new, dense, middle, out, network)
+            place, least = bottom(i, turn, span, t, h, y, y_new, dense, middle, out, network, dims, pushes)
             sunk = dips & (least < -PASSED) & (place < first)
             first, depth = select(sunk, place, first), select(sunk, least, depth)
     return first, depth
 
 
 @njit(error_model="numpy")
-def first_passage(accept, t, h, bank, y_new, dense, middle, out, network):
+def first_passage(accept, t, h, y, y_new, dense, middle, out, network, dims, pushes):
     """The fraction of the step after which the first gap has just become negative; 2 in lanes where none does."""
     zero, span = broadcast(0.0, WIDTH), 1.0 / LOOKS
     low, high, f_low, f_high = zero, broadcast(2.0, WIDTH), zero, broadcast(-1.0, WIDTH)
-    earlier, before, open_lanes = zero, smallest_gap(t, bank, bank, out, network), accept
-    keep_gaps(0, bank, out)
+    earlier, before, open_lanes = zero, smallest_gap(t, y, y, out, network, dims, pushes), accept
+    keep_gaps(0, y, out, dims)
     for k in range(1, LOOKS + 1):
         theta = broadcast(k * span, WIDTH)
         if k == LOOKS:
-            gap = smallest_gap(t + h, y_new, bank, out, network)
+            gap = smallest_gap(t + h, y_new, y, out, network, dims, pushes)
         else:
-            gap = gap_inside(theta, t, h, bank, y_new, dense, middle, out, network)
-        keep_gaps(k, bank, out)
+            gap = gap_inside(theta, t, h, y, y_new, dense, middle, out, network, dims, pushes)
+        keep_gaps(k, y, out, dims)
         hit = open_lanes & (gap < -PASSED)
         f_low, low = select(hit, maximum(before, 0.0), f_low), select(hit, theta - span, low)
         f_high, high = select(hit, gap, f_high), select(hit, theta, high)
         if k > 1:
-            place, least = first_dip(k, open_lanes & ~hit, t, h, bank, y_new, dense, middle, out, network)
+            place, least = first_dip(k, open_lanes & ~hit, t, h, y, y_new, dense, middle, out, network, dims, pushes)
             sunk, late = place < 1.5, place > theta - span
             f_low, low = (
                 select(sunk, maximum(select(late, before, earlier), 0.0), f_low),
@@ -126,11 +131,11 @@ def first_passage(accept, t, h, bank, y_new, dense, middle, out, network):
             f_high, high = select(sunk, least, f_high), select(sunk, place, high)
             hit = hit | sunk
         earlier, before, open_lanes = before, gap, open_lanes & ~hit
-    return narrowed(low, high, f_low, f_high, t, h, bank, y_new, dense, middle, out, network)
+    return narrowed(low, high, f_low, f_high, t, h, y, y_new, dense, middle, out, network, dims, pushes)
 
 
 @njit(error_model="numpy")
-def narrowed(low, high, f_low, f_high, t, h, bank, y_new, dense, middle, out, network):
+def narrowed(low, high, f_low, f_high, t, h, y, y_new, dense, middle, out, network, dims, pushes):
     """The end of the bracket `high` (2: no bracket) moved back until its gap is just below zero."""
     found = high < 1.5
     if any_lane(found):
@@ -143,7 +148,7 @@ def narrowed(low, high, f_low, f_high, t, h, bank, y_new, dense, middle, out, ne
             middle_point = 0.5 * (low + high)
             theta = middle_point if k % 3 == 2 else select(fit, secant, middle_point)
             theta = select(active, theta, 0.0 * high)
-            gap = gap_inside(theta, t, h, bank, y_new, dense, middle, out, network)
+            gap = gap_inside(theta, t, h, y, y_new, dense, middle, out, network, dims, pushes)
             below = active & (gap < 0.0)
             above = active & ~(gap < 0.0)
             # the end that stays is given half its weight (Illinois)
@@ -153,36 +158,36 @@ def narrowed(low, high, f_low, f_high, t, h, bank, y_new, dense, middle, out, ne
 
 
 @njit(error_model="numpy", forceinline=True)
-def take_back(accept, t, h, bank, y_new, dense, middle, out, network):
+def take_back(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, pushes):
     """Take back the steps that pass an event before their end, and aim at it; returns the lanes that go on."""
-    theta = first_passage(accept, t, h, bank, y_new, dense, middle, out, network)
+    theta = first_passage(accept, t, h, y, y_new, dense, middle, out, network, dims, pushes)
     least = SHORTEST * maximum(t, 1.0)
     wanted = maximum(theta * h, least)
     early = accept & (theta < 1.5) & (wanted < h) & (h > 2.0 * least)
     # a gap that closes at once after it has opened may be an error of a long step: a shorter one will tell
     doubtful = early & (theta * h < least) & (h > 16.0 * least)
-    store(bank, STEP, select(doubtful, 0.25 * h, load(bank, STEP, WIDTH)))
-    store(bank, STOP, select(early & ~doubtful, t + wanted, load(bank, STOP, WIDTH)))
-    store(bank, ACCEPTED, load(bank, ACCEPTED, WIDTH) - select(early, 1.0, 0.0 * h))
-    store(bank, REJECTED, load(bank, REJECTED, WIDTH) + select(early, 1.0, 0.0 * h))
-    rush = load(bank, RUSH, WIDTH)
+    store(clock, STEP, select(doubtful, 0.25 * h, load(clock, STEP, WIDTH)))
+    store(clock, STOP, select(early & ~doubtful, t + wanted, load(clock, STOP, WIDTH)))
+    store(clock, ACCEPTED, load(clock, ACCEPTED, WIDTH) - select(early, 1.0, 0.0 * h))
+    store(clock, REJECTED, load(clock, REJECTED, WIDTH) + select(early, 1.0, 0.0 * h))
+    rush = load(clock, RUSH, WIDTH)
     short = h <= 100.0 * least
-    store(bank, RUSH, select(accept & ~early, select(short, rush + 1.0, 0.0), rush))
+    store(clock, RUSH, select(accept & ~early, select(short, rush + 1.0, 0.0), rush))
     return accept & ~early
 
 
 @njit(error_model="numpy")
-def change_modes(moved, t, bank, out, network):
+def change_modes(moved, t, y, out, network, dims, pushes):
     """Let every contact whose gap has closed stick, slip or turn, by what acts on it; `t` is the time of the event."""
-    if not any_lane(moved & (smallest_gap(t, bank, bank, out, network) <= 0.0)):
+    if not any_lane(moved & (smallest_gap(t, y, y, out, network, dims, pushes) <= 0.0)):
         return
-    for i in range(NODES):
-        slip, speed = load(bank, 2 * NODES + i, WIDTH), load(bank, NODES + i, WIDTH)
-        up, down = load(out, 2 * NODES + i, WIDTH), load(out, 3 * NODES + i, WIDTH)
+    for i in range(dims.nodes):
+        slip, speed = load(y, 2 * dims.nodes + i, WIDTH), load(y, dims.nodes + i, WIDTH)
+        up, down = load(out, 2 * dims.nodes + i, WIDTH), load(out, 3 * dims.nodes + i, WIDTH)
         sticking = absolute(slip) < 0.5
         touch = moved & ~sticking & (slip * load(out, i, WIDTH) <= 0.0)
         leave = moved & sticking & (minimum(up, -down) <= 0.0)
         lands = select(up < 0.0, 1.0, select(down > 0.0, -1.0, 0.0 * slip))
         leaves = select(up <= 0.0, 1.0, -1.0 + 0.0 * slip)
-        store(bank, NODES + i, select(touch, load(out, NODES + i, WIDTH), speed))
-        store(bank, 2 * NODES + i, select(touch, lands, select(leave, leaves, slip)))
+        store(y, dims.nodes + i, select(touch, load(out, dims.nodes + i, WIDTH), speed))
+        store(y, 2 * dims.nodes + i, select(touch, lands, select(leave, leaves, slip)))

@@ -17,7 +17,6 @@ from ..simd.lanes import select
 from ..simd.lanes import store
 from ..simd.lanes import truncated
 from .names import CONTACTS
-from .names import DIMENSION
 from .names import WIDTH
 from .recording import ACCEPTED
 from .recording import CHANGE
@@ -39,14 +38,14 @@ from .recording import TIME
 
 # --- kernel text below ---
 @njit(error_model="numpy", forceinline=True)
-def aim(bank, control):
+def aim(clock, control):
     """The step to try in each lane: the proposed one, cut to land on the next stop."""
-    left = load(bank, STOP, WIDTH) - load(bank, TIME, WIDTH)
-    return minimum(minimum(load(bank, STEP, WIDTH), control[MAX_STEP]), left)
+    left = load(clock, STOP, WIDTH) - load(clock, TIME, WIDTH)
+    return minimum(minimum(load(clock, STEP, WIDTH), control[MAX_STEP]), left)
 
 
 @njit(error_model="numpy", forceinline=True)
-def judge(bank, h, error, power):
+def judge(clock, h, error, power):
     """Accept or reject by the error, propose the next step; returns the mask of accepted lanes.
 
     `power` is one over the order of the error.  The proposal is that of PI control (exponents 0.7 and 0.4), or that of
@@ -57,67 +56,67 @@ def judge(bank, h, error, power):
     known = error < 1e30
     size = log(select(known, maximum(error, 1e-10), 1e30))
     accept = known & (error <= 1.0)
-    memory, before = load(bank, MEMORY, WIDTH), load(bank, CHANGE, WIDTH)
+    memory, before = load(clock, MEMORY, WIDTH), load(clock, CHANGE, WIDTH)
     steady = power * (0.4 * memory - 0.7 * size)
     predicted = before + power * (memory - 2.0 * size)
     change = select(accept, minimum(steady, predicted), -power * size) - 0.10536051565782628  # the logarithm of 0.9
     change = minimum(maximum(change, -2.4), 1.8)
     proposed = h * exp(change)
-    cut_short = h < load(bank, STEP, WIDTH)  # to land on a stop: the old proposal still holds
-    proposed = select(accept & cut_short, maximum(proposed, load(bank, STEP, WIDTH)), proposed)
-    store(bank, STEP, truncated(proposed))
-    store(bank, MEMORY, select(accept, maximum(size, -9.0), memory))
-    store(bank, CHANGE, select(accept & ~cut_short, change, math.inf))
-    store(bank, ACCEPTED, load(bank, ACCEPTED, WIDTH) + select(accept, 1.0, 0.0 * h))
-    store(bank, REJECTED, load(bank, REJECTED, WIDTH) + select(accept, 0.0 * h, 1.0))
+    cut_short = h < load(clock, STEP, WIDTH)  # to land on a stop: the old proposal still holds
+    proposed = select(accept & cut_short, maximum(proposed, load(clock, STEP, WIDTH)), proposed)
+    store(clock, STEP, truncated(proposed))
+    store(clock, MEMORY, select(accept, maximum(size, -9.0), memory))
+    store(clock, CHANGE, select(accept & ~cut_short, change, math.inf))
+    store(clock, ACCEPTED, load(clock, ACCEPTED, WIDTH) + select(accept, 1.0, 0.0 * h))
+    store(clock, REJECTED, load(clock, REJECTED, WIDTH) + select(accept, 0.0 * h, 1.0))
     return accept
 
 
 @njit(error_model="numpy", forceinline=True)
-def arrive(bank, t, h):
+def arrive(clock, t, h):
     """The time at the end of the step; a lane that reaches its next stop is set to that time exactly."""
-    stop = load(bank, STOP, WIDTH)
+    stop = load(clock, STOP, WIDTH)
     return select(h >= stop - t, stop, t + h)
 
 
 @njit(error_model="numpy", forceinline=True)
-def next_stop(bank, t):
+def next_stop(clock, t):
     """The next stop after this one: the start of the window, the end of the period or of the run."""
-    last, start = minimum(load(bank, END, WIDTH), load(bank, PERIOD, WIDTH)), load(bank, START, WIDTH)
+    last, start = minimum(load(clock, END, WIDTH), load(clock, PERIOD, WIDTH)), load(clock, START, WIDTH)
     return select(t < start, minimum(start, last), last)
 
 
 @njit(error_model="numpy", forceinline=True)
-def advance(bank, t, t_new, accept, y_new):
+def advance(clock, y, t, t_new, accept, y_new, dims):
     """Move the accepted lanes on."""
-    stop, following = load(bank, STOP, WIDTH), next_stop(bank, t_new)
-    store(bank, TIME, select(accept, t_new, t))
-    store(bank, STOP, select(accept & (t_new >= stop), following, stop))
-    for c in range(DIMENSION):
-        store(bank, c, select(accept, load(y_new, c, WIDTH), load(bank, c, WIDTH)))
+    stop, following = load(clock, STOP, WIDTH), next_stop(clock, t_new)
+    store(clock, TIME, select(accept, t_new, t))
+    store(clock, STOP, select(accept & (t_new >= stop), following, stop))
+    for c in range(dims.dimension):
+        store(y, c, select(accept, load(y_new, c, WIDTH), load(y, c, WIDTH)))
 
 
 @njit(error_model="numpy", forceinline=True)
-def pause(bank, control):
+def pause(clock, y, control, dims):
     """Mask of lanes that need a look: at a stop, out of budget, with a vanishing step, or out of bounds."""
-    t, h = load(bank, TIME, WIDTH), load(bank, STEP, WIDTH)
-    spent = load(bank, ACCEPTED, WIDTH) + load(bank, REJECTED, WIDTH) >= control[MAX_STEPS]
-    largest = absolute(load(bank, 0, WIDTH))
-    for c in range(1, DIMENSION):
-        largest = maximum(largest, absolute(load(bank, c, WIDTH)))
-    stopped = (t >= load(bank, END, WIDTH)) | (t >= load(bank, PERIOD, WIDTH))
+    t, h = load(clock, TIME, WIDTH), load(clock, STEP, WIDTH)
+    spent = load(clock, ACCEPTED, WIDTH) + load(clock, REJECTED, WIDTH) >= control[MAX_STEPS]
+    largest = absolute(load(y, 0, WIDTH))
+    for c in range(1, dims.dimension):
+        largest = maximum(largest, absolute(load(y, c, WIDTH)))
+    stopped = (t >= load(clock, END, WIDTH)) | (t >= load(clock, PERIOD, WIDTH))
     found = stopped | spent | (h <= 4e-16 * maximum(t, 1.0)) | (largest >= FAR)
-    return found | (load(bank, RUSH, WIDTH) >= LONGEST_RUSH) if CONTACTS else found
+    return found | (load(clock, RUSH, WIDTH) >= LONGEST_RUSH) if CONTACTS else found
 
 
 @njit(error_model="numpy", forceinline=True)
-def turned(bank, accept, rate, mode):
+def turned(clock, accept, rate, mode):
     """Mask of lanes whose next step belongs to the other kind; `rate` bounds the eigenvalues at the start of this one.
 
     The explicit method is stable while its step times the rate stays below 3 or so (Hairer & Wanner, *Solving ODEs II*,
     2nd ed. 1996, section IV.2); a stiff cell is smooth again when that number has become small.
     """
-    reach = load(bank, STEP, WIDTH) * rate
+    reach = load(clock, STEP, WIDTH) * rate
     if mode == SMOOTH:
         return ~(reach <= 3.0)
     return accept & (reach < 0.5)

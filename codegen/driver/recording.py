@@ -8,17 +8,16 @@ import numpy as np
 from numba import njit
 
 from ..simd.lanes import absolute, any_lane, broadcast, lane_bits, load, maximum, select, sqrt, store
-from .names import COMPONENTS, DENSE_ROWS, DIMENSION, MULTIPLICITY, NODES, PARAMETERS, WEIGHTED, WIDTH, section
+from .dense import inside
+from .names import WIDTH
 
 # --- kernel text below ---
-# A bank holds the cells in the lanes of one group: the state, the parameters, then what the drive remembers about each.
+# Each lane has its state in `y`, followed by its parameters, and what the driver remembers about it in `clock`.
 # Times count from BASE, the beginning of the current period of the drive, so that they keep their digits in long runs.
-FIRST = DIMENSION + PARAMETERS
-TIME, STEP, STOP, START, END, MEMORY, CHANGE, ACCEPTED, REJECTED = (FIRST + k for k in range(9))
-SYNC, SYNC_SUM, SYNC_PEAK, NEXT_SAMPLE, SAMPLE_GAP, BASE, PERIOD, PERIODS = (FIRST + k for k in range(9, 17))
-MODE, SMOOTH_STEPS, POWER, LAG, CYCLE, LEFT, SUM_BEFORE, SKIPPED = (FIRST + k for k in range(17, 25))
-RUSH = FIRST + 25
-SAVED = FIRST + 26
+TIME, STEP, STOP, START, END, MEMORY, CHANGE, ACCEPTED, REJECTED = 0, 1, 2, 3, 4, 5, 6, 7, 8
+SYNC, SYNC_SUM, SYNC_PEAK, NEXT_SAMPLE, SAMPLE_GAP, BASE, PERIOD, PERIODS = 9, 10, 11, 12, 13, 14, 15, 16
+MODE, SMOOTH_STEPS, POWER, LAG, CYCLE, LEFT, SUM_BEFORE, SKIPPED, RUSH = 17, 18, 19, 20, 21, 22, 23, 24, 25
+CLOCK = 26
 # How a cell ended.
 FINISHED, BUDGET, UNDERFLOW, DIVERGED, INTERRUPTED, CHATTERING = 1, 2, 3, 4, 5, 6
 # Columns of `control`, of `sums` and of `counts`.
@@ -35,42 +34,29 @@ ALL = (1 << WIDTH) - 1
 
 
 @njit(error_model="numpy", forceinline=True)
-def inside(theta, c, bank, y_new, dense):
-    """State variable c at the fraction theta of the step."""
-    inner = load(dense, (DENSE_ROWS - 1) * DIMENSION + c, WIDTH)
-    for j in range(DENSE_ROWS - 2, -1, -1):
-        inner = load(dense, j * DIMENSION + c, WIDTH) + theta * inner
-    rest = 1.0 - theta
-    return rest * load(bank, c, WIDTH) + theta * (load(y_new, c, WIDTH) + rest * inner)
-
-
-@njit(error_model="numpy", forceinline=True)
-def spread(bank):
+def spread(y, multiplicity, dims):
     """Synchronisation error: sum over the oscillators of their distance from the first in state space."""
     total = broadcast(0.0, WIDTH)
-    for i in range(1, NODES):
+    for i in range(1, dims.nodes):
         square = broadcast(0.0, WIDTH)
-        for c in range(COMPONENTS):
-            gap = load(bank, c * NODES, WIDTH) - load(bank, c * NODES + i, WIDTH)
+        for c in range(dims.components):
+            gap = load(y, c * dims.nodes, WIDTH) - load(y, c * dims.nodes + i, WIDTH)
             square = square + gap * gap
-        if WEIGHTED:  # noqa: SIM108  (a module without weights has no MULTIPLICITY)
-            total = total + MULTIPLICITY[i] * sqrt(square)
-        else:
-            total = total + sqrt(square)
+        total = total + multiplicity[i] * sqrt(square)
     return total
 
 
 @njit(error_model="numpy", forceinline=True)
-def observe(bank, h, counted, accept, y_new, dense, middle):
+def observe(clock, y, h, counted, accept, y_new, dense, middle, multiplicity, dims):
     """Add the step to the time integral of the synchronisation error (Simpson) and to its maximum."""
-    for c in range(DIMENSION):
-        store(middle, c, inside(broadcast(0.5, WIDTH), c, bank, y_new, dense))
-    first, half, last = load(bank, SYNC, WIDTH), spread(middle), spread(y_new)
+    for c in range(dims.dimension):
+        store(middle, c, inside(broadcast(0.5, WIDTH), c, y, y_new, dense, dims))
+    first, half, last = load(clock, SYNC, WIDTH), spread(middle, multiplicity, dims), spread(y_new, multiplicity, dims)
     area = h * (first + 4.0 * half + last) / 6.0
-    peak = load(bank, SYNC_PEAK, WIDTH)
-    store(bank, SYNC_SUM, load(bank, SYNC_SUM, WIDTH) + select(counted, area, 0.0))
-    store(bank, SYNC_PEAK, select(counted, maximum(peak, maximum(first, maximum(half, last))), peak))
-    store(bank, SYNC, select(accept, last, first))
+    peak = load(clock, SYNC_PEAK, WIDTH)
+    store(clock, SYNC_SUM, load(clock, SYNC_SUM, WIDTH) + select(counted, area, 0.0))
+    store(clock, SYNC_PEAK, select(counted, maximum(peak, maximum(first, maximum(half, last))), peak))
+    store(clock, SYNC, select(accept, last, first))
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -85,7 +71,7 @@ def crosses(before, after, direction):
 
 
 @njit(error_model="numpy")
-def locate(hits, low, high, g_low, g_high, t, h, bank, y_new, dense):
+def locate(hits, low, high, g_low, g_high, t, h, y, y_new, dense, dims, section):
     """Zero of the section function between two fractions of the step, to rounding, in the lanes of `hits`.
 
     Regula falsi with the Anderson-Bjorck weight (BIT 13, 253, 1973), bisection where that stalls.
@@ -99,7 +85,7 @@ def locate(hits, low, high, g_low, g_high, t, h, bank, y_new, dense):
         good = (secant - a) * (b - secant) > 0.0
         c = select(good, secant, 0.5 * (a + b)) if k % 4 != 3 else 0.5 * (a + b)
         c = select(active, c, b)
-        fc = section(c, t, h, bank, y_new, dense)
+        fc = section(c, t, h, y, y_new, dense, dims)
         done = (fc == 0.0) | (absolute(c - b) <= 1e-15)
         other = fc * fb < 0.0  # the zero lies between c and b
         weight = 1.0 - fc / fb
@@ -110,63 +96,63 @@ def locate(hits, low, high, g_low, g_high, t, h, bank, y_new, dense):
 
 
 @njit(error_model="numpy")
-def keep_points(theta, hits, t, h, bank, y_new, dense, cell, counts, points):
+def keep_points(theta, hits, t, h, y, y_new, dense, cell, counts, points, dims):
     """Write the section points of the lanes in `hits`: time and state."""
     when = np.empty(WIDTH)
-    where = np.empty(DIMENSION * WIDTH)
+    where = np.empty(dims.dimension * WIDTH)
     store(when, 0, t + theta * h)
-    for c in range(DIMENSION):
-        store(where, c, inside(theta, c, bank, y_new, dense))
+    for c in range(dims.dimension):
+        store(where, c, inside(theta, c, y, y_new, dense, dims))
     for which in range(WIDTH):
         if (hits >> which) & 1:
             k = counts[cell[which], N_POINTS]
             counts[cell[which], N_POINTS] = k + 1
             if k < points.shape[1]:
                 points[cell[which], k, 0] = when[which]
-                for c in range(DIMENSION):
+                for c in range(dims.dimension):
                     points[cell[which], k, c + 1] = where[c * WIDTH + which]
 
 
 @njit(error_model="numpy")
-def cut(counted, t, h, bank, y_new, dense, cell, counts, points, direction):
+def cut(counted, t, h, y, y_new, dense, cell, counts, points, direction, dims, section):
     """Find section points in either half of the step."""
     zero, half, one = broadcast(0.0, WIDTH), broadcast(0.5, WIDTH), broadcast(1.0, WIDTH)
-    g0 = section(zero, t, h, bank, y_new, dense)
-    g1 = section(half, t, h, bank, y_new, dense)
-    g2 = section(one, t, h, bank, y_new, dense)
+    g0 = section(zero, t, h, y, y_new, dense, dims)
+    g1 = section(half, t, h, y, y_new, dense, dims)
+    g2 = section(one, t, h, y, y_new, dense, dims)
     early, late = crosses(g0, g1, direction) & counted, crosses(g1, g2, direction) & counted
     if any_lane(early):
-        theta = locate(early, zero, half, g0, g1, t, h, bank, y_new, dense)
-        keep_points(theta, lane_bits(early), t, h, bank, y_new, dense, cell, counts, points)
+        theta = locate(early, zero, half, g0, g1, t, h, y, y_new, dense, dims, section)
+        keep_points(theta, lane_bits(early), t, h, y, y_new, dense, cell, counts, points, dims)
     if any_lane(late):
-        theta = locate(late, half, one, g1, g2, t, h, bank, y_new, dense)
-        keep_points(theta, lane_bits(late), t, h, bank, y_new, dense, cell, counts, points)
+        theta = locate(late, half, one, g1, g2, t, h, y, y_new, dense, dims, section)
+        keep_points(theta, lane_bits(late), t, h, y, y_new, dense, cell, counts, points, dims)
 
 
 @njit(error_model="numpy")
-def sample(bank, t_new, h, accepted, y_new, dense, cell, spans, samples):
+def sample(clock, y, t_new, h, accepted, y_new, dense, cell, spans, samples, dims):
     """Write the trajectory at the sample times inside the step."""
     ends, lengths = np.empty(WIDTH), np.empty(WIDTH)
     store(ends, 0, t_new)
     store(lengths, 0, h)
-    place = np.empty(DIMENSION * WIDTH)
+    place = np.empty(dims.dimension * WIDTH)
     for which in range(WIDTH):
         if not (accepted >> which) & 1:
             continue
         begin, end = spans[cell[which], 0], spans[cell[which], 1]
-        reached = bank[BASE * WIDTH + which] + ends[which]
-        if ends[which] >= bank[END * WIDTH + which] or reached >= end - 4e-16 * abs(end):  # the end of the last period
+        reached = clock[BASE * WIDTH + which] + ends[which]
+        if ends[which] >= clock[END * WIDTH + which] or reached >= end - 4e-16 * abs(end):  # the end of the last period
             reached = end
-        gap = bank[SAMPLE_GAP * WIDTH + which]
-        while bank[NEXT_SAMPLE * WIDTH + which] <= reached:
-            wanted = bank[NEXT_SAMPLE * WIDTH + which]
+        gap = clock[SAMPLE_GAP * WIDTH + which]
+        while clock[NEXT_SAMPLE * WIDTH + which] <= reached:
+            wanted = clock[NEXT_SAMPLE * WIDTH + which]
             k = round((wanted - begin) / gap) if gap > 0.0 else 0
             if k >= samples.shape[1]:
                 break
             theta = max(0.0, 1.0 - (reached - wanted) / lengths[which])
             following = begin + (k + 1) * gap if k + 2 != samples.shape[1] else end
             still = samples.shape[1] if following <= wanted else k + 1  # a window without length: all samples are equal
-            for c in range(DIMENSION):
-                store(place, c, inside(broadcast(theta, WIDTH), c, bank, y_new, dense))
+            for c in range(dims.dimension):
+                store(place, c, inside(broadcast(theta, WIDTH), c, y, y_new, dense, dims))
                 samples[cell[which], k:still, c] = place[c * WIDTH + which]
-            bank[NEXT_SAMPLE * WIDTH + which] = following if still < samples.shape[1] else math.inf
+            clock[NEXT_SAMPLE * WIDTH + which] = following if still < samples.shape[1] else math.inf

@@ -21,11 +21,11 @@ from ..simd.lanes import any_lane
 from ..simd.lanes import lane_bits
 from ..simd.lanes import load
 from ..simd.lanes import store
-from .cells import SLOTS
 from .cells import aligned
 from .cells import fill
 from .cells import finish
 from .cells import held
+from .cells import memory
 from .cells import move
 from .cells import occupied
 from .cells import outcome
@@ -43,20 +43,12 @@ from .control import judge
 from .control import pause
 from .control import turned
 from .names import CONTACTS
-from .names import DENSE_ROWS
-from .names import DIMENSION
-from .names import ERROR_ORDER
 from .names import LOOPED
-from .names import NODES
 from .names import SECTION
-from .names import SMOOTH_ERROR_ORDER
 from .names import SWITCHING
 from .names import SYNC_ERROR
 from .names import TRAJECTORY
 from .names import WIDTH
-from .names import WORKSPACE
-from .names import step
-from .names import step_smooth
 from .recording import ALL
 from .recording import ATOL
 from .recording import BASE
@@ -80,8 +72,8 @@ from .recording import sample
 # --- kernel text below ---
 @njit(error_model="numpy")
 def settle(
-    mode, look, flips, queue, last, bank, cell, away_bank, away_cell, lot_bank, lot_cell, start, numbers, spans, control,
-    end, sums, counts, samples,
+    mode, look, flips, queue, last, clock, y, cell, away_clock, away_y, away_cell, lot_clock, lot_y, lot_cell, start,
+    numbers, spans, control, end, sums, counts, samples, multiplicity, dims,
 ):  # fmt: skip
     """See to the lanes in `look`: periods turn over, finished cells leave, others change sides; returns the queue's head.
 
@@ -94,120 +86,131 @@ def settle(
                 flip = False
                 if not SWITCHING and queue < last and control[CANCEL] == 0.0:
                     cell[which] = queue
-                    fill(which, queue, start, numbers, spans, control, bank, samples)
+                    fill(which, queue, start, numbers, spans, control, clock, y, samples, multiplicity, dims)
                     queue += 1
-                elif not fetch(which, mode, bank, cell, lot_bank, lot_cell):
-                    vacate(which, bank)
+                elif not fetch(which, mode, clock, y, cell, lot_clock, lot_y, lot_cell):
+                    vacate(which, clock)
                     break
-            status = outcome(which, bank, control)
-            if status == 0 and bank[TIME * WIDTH + which] >= bank[PERIOD * WIDTH + which]:
-                turn_over(which, cell[which], spans, control, bank)
-                status = outcome(which, bank, control)
+            status = outcome(which, clock, y, control, dims)
+            if status == 0 and clock[TIME * WIDTH + which] >= clock[PERIOD * WIDTH + which]:
+                turn_over(which, cell[which], spans, control, clock, y, dims)
+                status = outcome(which, clock, y, control, dims)
             if status != 0:
-                finish(which, status, bank, cell[which], spans, end, sums, counts)
+                finish(which, status, clock, y, cell[which], spans, end, sums, counts, dims)
                 cell[which] = -1
             elif SWITCHING and flip:
-                change_sides(which, mode, bank, cell, away_bank, away_cell, lot_bank, lot_cell)
+                change_sides(which, mode, clock, y, cell, away_clock, away_y, away_cell, lot_clock, lot_y, lot_cell)
             else:
                 break
     return queue
 
 
 @njit(error_model="numpy")
-def fetch(which, mode, bank, cell, lot_bank, lot_cell):
+def fetch(which, mode, clock, y, cell, lot_clock, lot_y, lot_cell):
     """Give a waiting cell the free lane of its kind; returns whether there was one."""
     if SWITCHING:
-        found = waiting(lot_bank, lot_cell, mode)
+        found = waiting(lot_clock, lot_cell, mode)
         if found >= 0:
-            move(found, lot_bank, lot_cell, which, bank, cell)
+            move(found, lot_clock, lot_y, lot_cell, which, clock, y, cell)
             return True
     return False
 
 
 @njit(error_model="numpy")
-def change_sides(which, mode, bank, cell, away_bank, away_cell, lot_bank, lot_cell):
+def change_sides(which, mode, clock, y, cell, away_clock, away_y, away_cell, lot_clock, lot_y, lot_cell):
     """Move a cell to the other kind of step; where no lane is free there, it waits."""
-    put(bank, MODE, which, 0.0 if mode == SMOOTH else 1.0)
-    put(bank, MEMORY, which, 0.0)
-    put(bank, CHANGE, which, math.inf)
+    put(clock, MODE, which, 0.0 if mode == SMOOTH else 1.0)
+    put(clock, MEMORY, which, 0.0)
+    put(clock, CHANGE, which, math.inf)
     free = vacant(away_cell)
     if free >= 0:
-        move(which, bank, cell, free, away_bank, away_cell)
+        move(which, clock, y, cell, free, away_clock, away_y, away_cell)
     else:
-        move(which, bank, cell, vacant(lot_cell), lot_bank, lot_cell)
+        move(which, clock, y, cell, vacant(lot_cell), lot_clock, lot_y, lot_cell)
 
 
 @njit(error_model="numpy")
-def admit(queue, last, flying, bank, cell, start, numbers, spans, control, samples):
+def admit(queue, last, flying, clock, y, cell, start, numbers, spans, control, samples, multiplicity, dims):
     """Take cells from the queue into free lanes while fewer than `flying` are wanted; returns the head of the queue."""
     while flying > 0 and queue < last and control[CANCEL] == 0.0:
         which = vacant(cell)
         if which < 0:
             break
         cell[which] = queue
-        fill(which, queue, start, numbers, spans, control, bank, samples)
+        fill(which, queue, start, numbers, spans, control, clock, y, samples, multiplicity, dims)
         queue += 1
         flying -= 1
     return queue
 
 
 @njit(error_model="numpy", forceinline=True)
-def attempt(mode, bank, dense, y_new, middle, out, cell, spans, control, counts, points, samples, graph, weights):
+def attempt(
+    mode, clock, y, dense, y_new, middle, out, cell, spans, control, counts, points, samples, multiplicity, dims, step,
+    step_smooth, section, pushes, graph, weights,
+):  # fmt: skip
     """One step of all lanes of a group; returns the lanes that need a look, and those that change sides, as bits."""
-    t, h = load(bank, TIME, WIDTH), aim(bank, control)
-    power = 1.0 / (ERROR_ORDER + 1.0)
+    t, h = load(clock, TIME, WIDTH), aim(clock, control)
+    power = 1.0 / (dims.error_order + 1.0)
     if SWITCHING:
         if mode == SMOOTH:
-            error, rate = step_smooth(t, h, bank, bank, y_new, dense, control[RTOL], control[ATOL])
-            power = 1.0 / (SMOOTH_ERROR_ORDER + 1.0)
-            store(bank, SMOOTH_STEPS, load(bank, SMOOTH_STEPS, WIDTH) + 1.0)
+            error, rate = step_smooth(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
+            power = 1.0 / (dims.smooth_error_order + 1.0)
+            store(clock, SMOOTH_STEPS, load(clock, SMOOTH_STEPS, WIDTH) + 1.0)
         else:
-            error, rate = step(t, h, bank, bank, y_new, dense, control[RTOL], control[ATOL])
+            error, rate = step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
     elif LOOPED:
-        error = step(t, h, bank, bank, y_new, dense, control[RTOL], control[ATOL], graph, weights)
+        error = step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL], graph, weights)
     else:
-        error = step(t, h, bank, bank, y_new, dense, control[RTOL], control[ATOL])
-    t_new = arrive(bank, t, h)
-    accept = judge(bank, h, error, power)
+        error = step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
+    t_new = arrive(clock, t, h)
+    accept = judge(clock, h, error, power)
     if CONTACTS:
-        accept = take_back(accept, t, h, bank, y_new, dense, middle, out, (graph, weights))
-    counted = accept & (t >= load(bank, START, WIDTH))
+        accept = take_back(accept, t, h, clock, y, y_new, dense, middle, out, (graph, weights), dims, pushes)
+    counted = accept & (t >= load(clock, START, WIDTH))
     if SYNC_ERROR:
-        observe(bank, h, counted, accept, y_new, dense, middle)
+        observe(clock, y, h, counted, accept, y_new, dense, middle, multiplicity, dims)
     if SECTION and any_lane(counted):
-        now = load(bank, BASE, WIDTH) + t
-        cut(counted, now, h, bank, y_new, dense, cell, counts, points, control[DIRECTION])
+        now = load(clock, BASE, WIDTH) + t
+        cut(counted, now, h, y, y_new, dense, cell, counts, points, control[DIRECTION], dims, section)
     if TRAJECTORY and any_lane(accept):
-        sample(bank, t_new, h, lane_bits(accept), y_new, dense, cell, spans, samples)
-    advance(bank, t, t_new, accept, y_new)
+        sample(clock, y, t_new, h, lane_bits(accept), y_new, dense, cell, spans, samples, dims)
+    advance(clock, y, t, t_new, accept, y_new, dims)
     if CONTACTS:
-        change_modes(accept, t_new, bank, out, (graph, weights))
+        change_modes(accept, t_new, y, out, (graph, weights), dims, pushes)
     flips = 0
     if SWITCHING:
-        flips = lane_bits(turned(bank, accept, rate, mode))
-    return ALL if control[CANCEL] != 0.0 else lane_bits(pause(bank, control)) | flips, flips
+        flips = lane_bits(turned(clock, accept, rate, mode))
+    return ALL if control[CANCEL] != 0.0 else lane_bits(pause(clock, y, control, dims)) | flips, flips
 
 
 @njit(error_model="numpy", nogil=True, cache=True)
-def drive(first, last, start, numbers, spans, control, end, sums, counts, points, samples, graph, weights):
+def drive(
+    step, step_smooth, section, pushes, dims, multiplicity, graph, weights, first, last, start, numbers, spans, control,
+    end, sums, counts, points, samples,
+):  # fmt: skip
     """Run the cells first … last-1.
 
-    start (cells, DIMENSION), numbers (cells, PARAMETERS), spans (cells, 4): start and end of the window, the period after
+    step, step_smooth, section, pushes: functions of a scene; those that this driver does not call may be any.  dims: the
+    sizes of its arrays.  multiplicity (nodes): how many oscillators each node stands for.  graph and weights: the links
+    and the elimination program of a network that is stepped through in loops (codegen/steps/program.py).
+    start (cells, dimension), numbers (cells, parameters), spans (cells, 4): start and end of the window, the period after
     which the right-hand side repeats (0: none), and the synchronisation error below which a cell that records nothing
-    else may end early (0: never); control: see the column names above.  Filled: end (cells, DIMENSION), sums (cells, 4),
-    counts (cells, 6), points (cells, room, DIMENSION + 1), samples (cells, samples, DIMENSION).  graph and weights: the
-    links and the elimination program of a network that is stepped through in loops (codegen/sparse.py).
+    else may end early (0: never); control: see the column names above.  Filled: end (cells, dimension), sums (cells, 4),
+    counts (cells, 6), points (cells, room, dimension + 1), samples (cells, samples, dimension).
     """
-    y_new, middle, bank = aligned(DIMENSION * WIDTH), aligned(DIMENSION * WIDTH), aligned(SLOTS * WIDTH)
-    dense, cell = aligned((DENSE_ROWS * DIMENSION + WORKSPACE) * WIDTH), np.full(WIDTH, -1)
-    size = SLOTS * WIDTH if SWITCHING else 0
-    away_bank, away_dense, away_cell = aligned(size), aligned(DENSE_ROWS * DIMENSION * WIDTH), np.full(WIDTH, -1)
-    lot_bank, lot_cell = aligned(size), np.full(WIDTH, -1)
-    out = aligned(9 * NODES * WIDTH if CONTACTS else 0)
+    y_new, middle = aligned(dims.dimension * WIDTH), aligned(dims.dimension * WIDTH)
+    clock, y = memory(dims)
+    dense, cell = aligned((dims.dense_rows * dims.dimension + dims.workspace) * WIDTH), np.full(WIDTH, -1)
+    away_clock, away_y, lot_clock, lot_y = clock, y, clock, y
+    away_dense, away_cell, lot_cell = dense, np.full(WIDTH, -1), np.full(WIDTH, -1)
+    out = aligned(9 * dims.nodes * WIDTH if CONTACTS else 0)
     for which in range(WIDTH):
-        fill(which, -1, start, numbers, spans, control, bank, samples)
-        if SWITCHING:
-            fill(which, -1, start, numbers, spans, control, away_bank, samples)
+        fill(which, -1, start, numbers, spans, control, clock, y, samples, multiplicity, dims)
+    if SWITCHING:
+        (away_clock, away_y), (lot_clock, lot_y) = memory(dims), memory(dims)
+        away_dense = aligned(dims.dense_rows * dims.dimension * WIDTH)
+        for which in range(WIDTH):
+            fill(which, -1, start, numbers, spans, control, away_clock, away_y, samples, multiplicity, dims)
     mode, queue, look, flips = STIFF, first, ALL, 0
     while True:
         if SWITCHING and look != 0:
@@ -215,28 +218,36 @@ def drive(first, last, start, numbers, spans, control, end, sums, counts, points
             head = queue
             flips = flips & held(cell)  # an idle lane may ask for anything; who moves in must not inherit it
             if mode == STIFF:
-                queue = admit(queue, last, room, bank, cell, start, numbers, spans, control, samples)
+                queue = admit(
+                    queue, last, room, clock, y, cell, start, numbers, spans, control, samples, multiplicity, dims
+                )
                 look = look if queue == head else ALL
             else:
-                queue = admit(queue, last, room, away_bank, away_cell, start, numbers, spans, control, samples)
+                queue = admit(
+                    queue, last, room, away_clock, away_y, away_cell, start, numbers, spans, control, samples,
+                    multiplicity, dims,
+                )  # fmt: skip
+            room -= queue - head
             queue = admit(
-                queue, last, room - (queue - head), lot_bank, lot_cell, start, numbers, spans, control, samples
+                queue, last, room, lot_clock, lot_y, lot_cell, start, numbers, spans, control, samples, multiplicity, dims
             )
         if look != 0:
             queue = settle(
-                mode, look, flips, queue, last, bank, cell, away_bank, away_cell, lot_bank, lot_cell, start, numbers,
-                spans, control, end, sums, counts, samples,
+                mode, look, flips, queue, last, clock, y, cell, away_clock, away_y, away_cell, lot_clock, lot_y, lot_cell,
+                start, numbers, spans, control, end, sums, counts, samples, multiplicity, dims,
             )  # fmt: skip
             full, other, flips = occupied(cell), occupied(away_cell), 0
             waits = occupied(lot_cell) > 0 or (queue < last and control[CANCEL] == 0.0)
             if SWITCHING and full < WIDTH and (other > full or (full + other == 0 and waits)):
                 mode, look = 1 - mode, ALL
-                bank, away_bank = away_bank, bank
+                clock, away_clock = away_clock, clock
+                y, away_y = away_y, y
                 dense, away_dense = away_dense, dense
                 cell, away_cell = away_cell, cell
                 continue
             if full == 0:
                 break
         look, flips = attempt(
-            mode, bank, dense, y_new, middle, out, cell, spans, control, counts, points, samples, graph, weights
-        )
+            mode, clock, y, dense, y_new, middle, out, cell, spans, control, counts, points, samples, multiplicity, dims,
+            step, step_smooth, section, pushes, graph, weights,
+        )  # fmt: skip

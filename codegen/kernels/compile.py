@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol
+from weakref import WeakValueDictionary
 
 import numba
 import numpy as np
@@ -31,84 +32,109 @@ from numba.core.serialize import dumps
 from synchain.models.dynamics.equations import Equations
 
 from ..printing.names import NAMES
+from ..driver import dimensions
+from ..driver.dimensions import Dimensions, ModeDimensions
 from ..simd import decorator, elementary, lane_types, lanes
+from ..simd.lane_types import Lane
 from ..steps.program import EMPTY
 from .cache import Folder, cache_folder, open_folder
+from .driver import Driver, KernelKind
 from .installation import InstallationError
 from .processor import processor
-from .sweep import KernelKind, KernelSource
+from .sweep import KernelSource
 
 __all__ = ["Kernel", "load"]
 
-_matrix, _counts = types.float64[:, ::1], types.int64[:, ::1]
+_vector, _matrix, _counts = types.float64[::1], types.float64[:, ::1], types.int64[:, ::1]
+_cube = types.float64[:, :, ::1]
 _input = types.Array(types.float64, 2, "C", readonly=True)
 """An array that a kernel only reads; it may be read-only or not."""
-_cube = types.float64[:, :, ::1]
+_graph = (types.UniTuple(types.int64[::1], len(NAMES)), _vector)
+"""The links and the elimination program of a network of loops, and the weights of its links."""
 
 
-def _signature(arrays: int) -> Any:
-    """The types of a sweep kernel's arguments, with so many arrays in its graph."""
-    inputs = (_input, _input, _input, types.float64[::1])
-    outputs = (_matrix, _matrix, _counts, _cube, _cube)
-    graph = (types.UniTuple(types.int64[::1], arrays), types.float64[::1])
-    return types.void(types.int64, types.int64, *inputs, *outputs, *graph)
+def _sizes(kind: type) -> Any:
+    """The type of the sizes that a driver is told."""
+    return types.NamedUniTuple(types.int64, len(kind._fields), kind)
 
 
-SIGNATURE = _signature(len(NAMES))
-"""first, last, start, numbers, spans, control, end, sums, counts, points, samples, graph, weights."""
-MODES = types.void(
-    types.int64,
-    types.int64,
-    *(_input, _input, _input, types.float64[::1], _input),
-    *(_cube, _matrix, _matrix, _matrix, _counts, _cube),
-)
-"""first, last, start, numbers, spans, control, strengths, vectors, growth, end, sums, counts, samples."""
+def signatures(driver: Driver) -> dict[str, Any]:
+    """Return the types of the functions of a scene that a driver calls, and those of its own entry, by name."""
+    more = _graph if driver.looped else ()
+    if driver.kind is KernelKind.MODES:
+        one, lane = Lane(1), Lane(driver.width)
+        known = {
+            "step": one(one, one, *[_vector] * 4, types.float64, types.float64, _vector),
+            "carry": types.UniTuple(lane, 2)(*[_vector] * 4, types.int64, types.int64),
+            "pushes": types.void(one, *[_vector] * 3),
+            "release": types.void(types.int64, *[types.float64] * 2, *[_vector] * 3, types.int64),
+        }
+        arrays = (*[_input] * 3, _vector, _input, _cube, _matrix, _matrix, _matrix, _counts, _cube)
+        own = (_sizes(ModeDimensions), types.int64[::1])
+    else:
+        lane, sizes = Lane(driver.width), _sizes(Dimensions)
+        step = (lane, lane, *[_vector] * 4, types.float64, types.float64, *more)
+        result = types.UniTuple(lane, 2) if driver.switching else lane
+        known = {
+            "step": result(*step),
+            "step_smooth": result(*step),
+            "section": lane(lane, lane, lane, _vector, _vector, _vector, sizes),
+            "pushes": types.void(lane, *[_vector] * 3, *more),
+        }
+        arrays = (*[_input] * 3, _vector, _matrix, _matrix, _counts, _cube, _cube)
+        own = (sizes, _vector, *_graph)
+    functions = [types.FunctionType(known[name]) for name in driver.functions]
+    entry = types.void(*functions, *own, types.int64, types.int64, *arrays)
+    return {**{name: known[name] for name in dict.fromkeys(driver.functions)}, driver.entry: entry}
+
 
 LOG = logging.getLogger(__name__)
 """Reports at the level INFO each compilation, which takes seconds."""
 
 _lock = threading.Lock()
+_kernels: WeakValueDictionary[KernelSource, Kernel] = WeakValueDictionary()
+"""The kernels of this process that somebody holds."""
+_drivers: dict[Driver, _Module] = {}
+"""The drivers of this process; there are few."""
 
 
 class EntryPoint(Protocol):
-    """The compiled entry point of a kernel module: `drive` of a sweep, `march` of a kernel of modes.
+    """The compiled entry point of a driver: `drive` of a sweep, `march` of a kernel of modes.
 
-    It runs the cells first … last-1 on arrays that are described in the text of the module.
+    It takes the functions of a scene and runs cells on arrays that are described in its text.
     """
 
-    def __call__(self, first: int, last: int, /, *arrays: np.ndarray | tuple[np.ndarray, ...]) -> None: ...
+    def __call__(self, /, *arguments: Any) -> None: ...
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class Kernel:
-    """A compiled kernel that keeps its text: `print(kernel.source)` shows what runs.
+    """The compiled functions of a scene and the driver that runs them: `print(kernel.source)` shows them as text.
 
-    `graph` and `weights` are the links and the elimination program of a network whose steps are loops.
+    `own` are the arguments of the driver that belong to the scene: its functions, sizes and links.
     """
 
     origin: KernelSource
     entry: EntryPoint = field(repr=False)
-    graph: tuple[np.ndarray, ...] = field(repr=False)
-    weights: np.ndarray = field(repr=False)
+    own: tuple[Any, ...] = field(repr=False)
     path: str
     from_cache: bool
 
     def drive(self, first: int, last: int, *arrays: np.ndarray) -> None:
-        """Run the cells first … last-1 of a sweep.
+        """Run the cells first … last-1.
 
         Parameters
         ----------
         first, last
             Rows of the arrays to run.
         *arrays
-            start, numbers, spans, control, end, sums, counts, points, samples, as the docstring of
-            `drive` in the text of the module describes them.
+            start, numbers, spans, control, …, as the docstring of the driver's last function describes them.
         """
-        self.entry(first, last, *arrays, self.graph, self.weights)
+        self.entry(*self.own, first, last, *arrays)
 
     @property
     def source(self) -> str:
-        """The whole text of the kernel module."""
+        """The text of the functions of the scene; `kernel.origin.driver.text` is what runs them."""
         return self.origin.text
 
     @property
@@ -154,55 +180,93 @@ def load(source: KernelSource) -> Kernel:
             "Numba: found compilation switched off (NUMBA_DISABLE_JIT); expected it on; unset NUMBA_DISABLE_JIT"
         )
     with _lock:
-        return _load(source)
+        kernel = _kernels.get(source)
+        if kernel is None:
+            kernel = _kernels[source] = _kernel(source)
+        return kernel
 
 
-@functools.lru_cache(maxsize=256)
-def _load(source: KernelSource) -> Kernel:
-    name = f"kernel_{_fingerprint(source)[:32]}"
+def load_driver(driver: Driver) -> Any:
+    """Compile a driver, or load its machine code from the cache; raises and warns as `load` does."""
+    with _lock:
+        return _driver(driver)
+
+
+def _driver(driver: Driver) -> Any:
+    """The entry of a driver; the last few are kept."""
+    if driver not in _drivers:
+        _drivers[driver] = _module(driver.text, "driver", {driver.entry: signatures(driver)[driver.entry]}, str(driver))
+    return _drivers[driver].functions[driver.entry]
+
+
+def _kernel(source: KernelSource) -> Kernel:
+    known = signatures(source.driver)
+    entry = _driver(source.driver)
+    module = _module(source.text, "kernel", {name: known[name] for name in dict.fromkeys(source.driver.functions)}, _what(source))
+    functions = [module.functions[name] for name in source.driver.functions]
+    if source.kind is KernelKind.MODES:
+        own = (*functions, source.dimensions, np.array(source.marks, np.int64))
+    else:
+        loops = source.elimination
+        graph = (EMPTY, np.zeros(0)) if loops is None else (loops.arrays, loops.weights)
+        own = (*functions, source.dimensions, np.array(source.marks, np.float64), *graph)
+    return Kernel(source, entry, own, module.path, module.from_cache)
+
+
+def _what(source: KernelSource) -> str:
+    n = source.equations.n
+    return f"a kernel for {n} oscillator{'s' * (n != 1)} ({source.integrator})"
+
+
+@dataclass(frozen=True, slots=True)
+class _Module:
+    """The compiled functions of one text, by name."""
+
+    functions: dict[str, Any]
+    path: str
+    from_cache: bool
+
+
+def _module(text: str, kind: str, wanted: dict[str, Any], what: str) -> _Module:
+    """The functions `wanted`, with their types, of a text; from the folder, or compiled into it."""
+    name = f"{kind}_{_fingerprint(text)[:32]}"
     try:
         with open_folder(cache_folder()) as folder:
-            return _from_folder(source, name, folder)
+            return _from_folder(text, name, wanted, what, folder)
     except (OSError, RuntimeError) as problem:  # RuntimeError: no home folder
-        warnings.warn(f"kernels are not kept on disk: {problem}", RuntimeWarning, stacklevel=3)
-    _report(source, "for this process alone")
+        warnings.warn(f"kernels are not kept on disk: {problem}", RuntimeWarning, stacklevel=5)
+    LOG.info("compiling %s, for this process alone", what)
     path = Path(tempfile.mkdtemp(prefix="synchain-"), f"{name}.py")
     atexit.register(shutil.rmtree, path.parent, ignore_errors=True)
-    path.write_text(source.text, encoding="utf-8")
-    return _compile(source, path, _MachineCode())
+    path.write_text(text, encoding="utf-8")
+    return _compile(text, path, wanted, _MachineCode())
 
 
-def _report(source: KernelSource, how: str) -> None:
-    n = source.equations.n
-    LOG.info("compiling a kernel for %d oscillator%s (%s), %s", n, "s" * (n != 1), source.integrator, how)
-
-
-def _from_folder(source: KernelSource, name: str, folder: Folder) -> Kernel:
-    """The kernel from the folder, or compiled into it; what cannot be loaded is compiled anew."""
-    path, text = folder.path / f"{name}.py", source.text.encode()
-    if folder.read(path.name) != text:
-        folder.write(path.name, text)
-    if (kernel := _stored(source, name, folder, path)) is not None:
-        return kernel
+def _from_folder(text: str, name: str, wanted: dict[str, Any], what: str, folder: Folder) -> _Module:
+    """The functions from the folder, or compiled into it; what cannot be loaded is compiled anew."""
+    path, written = folder.path / f"{name}.py", text.encode()
+    if folder.read(path.name) != written:
+        folder.write(path.name, written)
+    if (module := _stored(text, name, wanted, folder, path)) is not None:
+        return module
     with folder.turn(name):
-        if (kernel := _stored(source, name, folder, path)) is not None:
-            return kernel
-        _report(source, "kept for later runs")
+        if (module := _stored(text, name, wanted, folder, path)) is not None:
+            return module
+        LOG.info("compiling %s, kept for later runs", what)
         code = _MachineCode()
-        kernel = _compile(source, path, code)
+        module = _compile(text, path, wanted, code)
         folder.keep(name, code.data)
-    return kernel
+    return module
 
 
-def _stored(source: KernelSource, name: str, folder: Folder, path: Path) -> Kernel | None:
-    """The kernel by the machine code in the folder, None if there is none that can be loaded."""
+def _stored(text: str, name: str, wanted: dict[str, Any], folder: Folder, path: Path) -> _Module | None:
+    """The functions by the machine code in the folder, None if there is none that can be loaded."""
     code = folder.machine_code(name)
     if code is None:
         return None
     try:
-        return _compile(source, path, _MachineCode(code))
+        return _compile(text, path, wanted, _MachineCode(code))
     except Exception:
-        sys.modules.pop(name, None)
         return None
 
 
@@ -210,55 +274,55 @@ class _MachineCode:
     """Machine code as checked bytes, in place of the files that Numba reads and writes by their paths."""
 
     def __init__(self, data: bytes = b"") -> None:
-        self.data = data
+        self.known: dict[Any, Any] = pickle.loads(data) if data else {}
 
     def load(self, key: Any) -> Any:
         """What was compiled for these types and this processor; None if there is no such code."""
-        return pickle.loads(self.data).get(key) if self.data else None
+        return self.known.get(key)
 
     def save(self, key: Any, compiled: Any) -> None:
-        self.data = dumps({key: compiled})
+        self.known[key] = compiled
+
+    @property
+    def data(self) -> bytes:
+        return dumps(self.known)
 
 
-def _compile(source: KernelSource, path: Path, code: _MachineCode) -> Kernel:
-    module = _module(source.text, path)
-    loops = source.elimination
-    graph, weights = (EMPTY, np.zeros(0)) if loops is None else (loops.arrays, loops.weights)
-    modes = source.kind is KernelKind.MODES
-    entry = module.march if modes else module.drive
-    entry._cache._cache_file = code
-    entry.compile(MODES if modes else _signature(len(graph)))
-    entry.disable_compile()  # arrays of another type are a mistake of ours, not a reason to compile anew
-    hits = sum(entry.stats.cache_hits.values())
-    return Kernel(source, entry, graph, weights, str(path), hits > 0)
-
-
-def _module(text: str, path: Path) -> ModuleType:
-    """Run the text of a module.
+def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) -> _Module:
+    """Compile the functions `wanted` of a module.
 
     The text comes from memory, not from the file at `path` and not from `__pycache__`.  The file is
     there for readers, and for Numba, which caches no function without a file.
     """
     module = ModuleType(path.stem)
     module.__file__ = str(path)
-    sys.modules[path.stem] = module  # before execution: Numba looks its functions up there
     elsewhere, numba.config.CACHE_DIR = numba.config.CACHE_DIR, ""  # nothing is made in a folder of Numba's own
+    sys.modules[path.stem] = module  # Numba looks its functions up there
     try:
         exec(compile(text, str(path), "exec"), module.__dict__)
+        functions = {name: getattr(module, name) for name in wanted}
+        for name, function in functions.items():
+            function._cache._cache_file = code
+            function.compile(wanted[name])
+            function.disable_compile()  # arrays of another type are a mistake of ours, not a reason to compile anew
     finally:
         numba.config.CACHE_DIR = elsewhere
-    return module
+        del sys.modules[path.stem]
+    hits = all(sum(function.stats.cache_hits.values()) for function in functions.values())
+    return _Module(functions, str(path), hits)
 
 
 @functools.cache
 def _surroundings() -> str:
     """Everything besides the text that the machine code depends on."""
     here = [
-        Path(m.__file__).read_text(encoding="utf-8") for m in (decorator, lane_types, lanes, elementary) if m.__file__
+        Path(m.__file__).read_text(encoding="utf-8")
+        for m in (decorator, lane_types, lanes, elementary, dimensions)
+        if m.__file__
     ]
     versions = [sys.version, numba.__version__, importlib.metadata.version("llvmlite"), platform.machine()]
     return "\n".join([*here, *versions, processor()])
 
 
-def _fingerprint(source: KernelSource) -> str:
-    return hashlib.sha256(f"{_surroundings()}\n{source.text}".encode()).hexdigest()
+def _fingerprint(text: str) -> str:
+    return hashlib.sha256(f"{_surroundings()}\n{text}".encode()).hexdigest()

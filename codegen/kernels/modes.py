@@ -18,23 +18,34 @@ from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.calculus import derivative
 from synchain.models.mechanics.components import TIME
 
-from .. import driver
+from ..driver.dimensions import ModeDimensions
 from ..integrators import Integrator, integrator
 from ..printing.blocks import Body, Names, analyse
 from ..printing.names import tidy
 from ..printing.printer import show
 from ..simd import lanes
-from ..steps.contacts import event_constants, write_events
+from ..steps.contacts import write_events
 from ..steps.elimination import plan, write_factors, write_solve
 from ..steps.rosenbrock import stage_state, write_rosenbrock
 from ..steps.step import SCALED, StepWriter, combine, write_function
-from .sweep import LARGEST_UNROLLED, KernelKind, KernelSource, describe, imports, node_functions
+from .driver import Driver, KernelKind
+from .sweep import LARGEST_UNROLLED, KernelSource, describe, imports, node_functions
 
 __all__ = ["emit_modes"]
 
 METHOD = "rodas5p"
 HEAD = 3
 """First entries of the shared array: rate = 1/h, shift = 1/(gamma h), reach = gamma h."""
+
+CARRY = '''
+@njit(error_model='numpy', cache=True)
+def carry(shared, strengths, old, new, first, last):
+    """The same step of the modes in the registers first … last-1; returns error and size of the last of them."""
+    error, size = broadcast(0.0, LANES), broadcast(0.0, LANES)
+    for which in range(first, last):
+        error, size = mode_step(shared, strengths, old, new, which)
+    return error, size
+'''.strip()
 
 Place = tuple[int, int]
 
@@ -78,8 +89,17 @@ def emit_modes(variation: Variation, width: int | None = None) -> KernelSource:
     write_rosenbrock(writer, lambda i: _note(writer, parts, functions, method, i))
     carry = _mode_step(variation, parts, method)
     bodies = [*node_functions([writer], blocks), *(f.lines for f in functions if f.lines)]
-    text = _module(writer, variation, width, parts, bodies, carry, names)
-    return KernelSource(text, equations, method.name, (), width, KernelKind.MODES)
+    text = _module(writer, variation, width, bodies, carry, names)
+    events = variation.events
+    owners = (-1,) * variation.size if events is None else tuple(events.owners)
+    return KernelSource(
+        text,
+        equations,
+        method.name,
+        Driver(KernelKind.MODES, width, contacts=plain.sticks),
+        _dimensions(variation, plain, method, parts.size),
+        owners,
+    )
 
 
 def _renamed(variation: Variation, plain: Equations) -> Variation:
@@ -268,15 +288,13 @@ def _module(
     writer: StepWriter,
     variation: Variation,
     width: int,
-    parts: Parts,
     functions: list[list[str]],
     carry: list[str],
     names: Names,
 ) -> str:
-    plain, method, lines = writer.equations, writer.method, writer.lines
-    sticking = ("contacts",) if plain.sticks else ()
+    plain, lines = writer.equations, writer.lines
     orbit = [
-        "@njit(error_model='numpy')",
+        "@njit(error_model='numpy', cache=True)",
         "def step(t, h, y, p, y_new, dense, rtol, atol, shared):",
         '    """One step of the orbit from (t, y): writes y_new and what the modes need, returns the error."""',
         *(f"    {line}" for line in lines),
@@ -287,42 +305,24 @@ def _module(
         '    """The same step of the modes in one register: writes them, returns their error and their size."""',
         *(f"    {line}" for line in carry),
     ]
-    made = [
-        describe(variation.orbit, plain, method, (), lines, f"{variation.size} deviations, {width} modes a register"),
-        imports(functions, [*lines, *carry], None, ("scale_binary", "split_binary", "store")),
-        _constants(variation, plain, method, width, parts.size),
-        *("\n".join(f) for f in functions),
-        SCALED,
-        "\n".join(orbit),
-        "\n".join(modes),
-        *write_events(variation, names),
-        *(driver.text(name) for name in ("recording", "cells", "control", *sticking, "modes")),
-    ]
-    return "\n\n\n".join(made) + "\n"
+    made = ["\n".join(f) for f in functions] + [SCALED, "\n".join(orbit), "\n".join(modes), CARRY]
+    text = "\n\n\n".join([*made, *write_events(variation, names)]) + "\n"
+    deviations = f"{variation.size} deviations, {width} modes a register"
+    head = describe(variation.orbit, plain, writer.method, (), lines, deviations)
+    constants = f"WIDTH = 1\nLANES = {width}\nDENSE = {plain.sticks}"
+    return "\n\n\n".join([head, imports(text), constants, text])
 
 
-def _constants(variation: Variation, plain: Equations, method: Integrator, width: int, shared: int) -> str:
-    sticking = plain.sticks
-    constants = {
-        "WIDTH": 1,
-        "LANES": width,
-        "NODES": plain.n,
-        "COMPONENTS": len(plain.node.continuous),
-        "DIMENSION": plain.dimension,
-        "PARAMETERS": len(plain.parameters),
-        "DENSE_ROWS": len(method.dense),
-        "ERROR_ORDER": method.error_order,
-        "SWITCHING": False,
-        "WEIGHTED": False,
-        "CONTACTS": sticking,
-        "SYNC_ERROR": False,
-        "SECTION": False,
-        "TRAJECTORY": False,
-        "DENSE": sticking,
-        "LOOPED": False,
-        "REPEATS": False,
-        "MODE_SIZE": variation.size,
-        "STRENGTHS": len(variation.parameters),
-        "SHARED": shared,
-    }
-    return "\n".join([*(f"{name} = {value!r}" for name, value in constants.items()), *event_constants(variation)])
+def _dimensions(variation: Variation, plain: Equations, method: Integrator, shared: int) -> ModeDimensions:
+    return ModeDimensions(
+        nodes=plain.n,
+        components=len(plain.node.continuous),
+        dimension=plain.dimension,
+        parameters=len(plain.parameters),
+        dense_rows=len(method.dense),
+        error_order=method.error_order,
+        repeats=0,
+        strengths=len(variation.parameters),
+        shared=shared,
+        jumps=int(variation.events is not None and bool(variation.events.exits)),
+    )

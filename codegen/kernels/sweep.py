@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 
 import sympy as sp
 
@@ -14,10 +14,11 @@ from synchain.models.dynamics.periodicity import angular_frequency
 from synchain.models.dynamics.record import Record
 
 from .. import driver, simd
+from ..driver.dimensions import Dimensions, ModeDimensions
 from ..integrators import Integrator, integrator
 from ..printing.blocks import Names, NodeBlocks, analyse
 from ..printing.names import tidy
-from ..printing.printer import FUNCTIONS, show
+from ..printing.printer import show
 from ..simd import lanes
 from ..steps.contacts import write_pushes
 from ..steps.explicit import write_explicit
@@ -25,9 +26,9 @@ from ..steps.looped import LoopWriter
 from ..steps.program import FILL_LIMIT, Program, program, workspace
 from ..steps.rosenbrock import write_rosenbrock
 from ..steps.step import PAIR, SCALED, StepWriter, function_name, write_function
+from .driver import Driver, KernelKind
 
 __all__ = [
-    "KernelKind",
     "KernelSource",
     "default_width",
     "describe",
@@ -35,13 +36,6 @@ __all__ = [
     "imports",
     "node_functions",
 ]
-
-
-class KernelKind(StrEnum):
-    """What a kernel runs: the cells of a sweep, or orbits and the modes carried along each."""
-
-    SWEEP = "sweep"
-    MODES = "modes"
 
 
 AUTO = "rodas5p"
@@ -53,18 +47,35 @@ LARGEST_UNROLLED = 8
 
 @dataclass(frozen=True, slots=True)
 class KernelSource:
-    """The text of a kernel module and what its arrays mean.
+    """The functions of a scene as the text of a module, the driver that runs them, and what its arrays mean.
 
-    `elimination` holds the integer arrays that a kernel of loops runs through; None if its steps are written out.
+    `marks` says of each node how many oscillators it stands for, or of each component of a mode which contact's velocity
+    it is (-1: none).  `elimination` holds the integer arrays that a kernel of loops runs through; None if its steps are
+    written out.
     """
 
     text: str = field(repr=False)
     equations: Equations = field(repr=False)
     integrator: str
-    records: tuple[Record, ...]
-    width: int
-    kind: KernelKind = KernelKind.SWEEP
+    driver: Driver
+    dimensions: Dimensions | ModeDimensions = field(repr=False)
+    marks: tuple[int, ...] = field(repr=False)
     elimination: Program | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def records(self) -> tuple[Record, ...]:
+        """What the kernel records besides the final state."""
+        return self.driver.records
+
+    @property
+    def width(self) -> int:
+        """Cells, or modes, in one register."""
+        return self.driver.width
+
+    @property
+    def kind(self) -> KernelKind:
+        """What the kernel runs."""
+        return self.driver.kind
 
     @property
     def looped(self) -> bool:
@@ -73,8 +84,8 @@ class KernelSource:
 
     @property
     def digest(self) -> str:
-        """Hexadecimal SHA-256 of the text."""
-        return hashlib.sha256(self.text.encode()).hexdigest()
+        """Hexadecimal SHA-256 of the text and of its driver's."""
+        return hashlib.sha256(f"{self.text}{self.driver.text}".encode()).hexdigest()
 
 
 def emit(
@@ -140,8 +151,17 @@ def emit(
     if looped:
         method = _for_many(method, equations, unroll)
     elimination = program(equations, fill) if looped else None
-    text = _module(equations, method, ordered, section if "section" in ordered else None, width, weights, elimination)
-    return KernelSource(text, equations, method.name, ordered, width, elimination=elimination)
+    plain = tidy(equations)
+    weight = [edge.weight.name for edge in plain.edges]
+    states = [s.name for node in plain.nodes for s in node.state]
+    names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
+    blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
+    steps = _steps(plain, blocks, method, elimination)
+    chosen = Driver(KernelKind.SWEEP, width, ordered, looped, method.smooth is not None, plain.sticks)
+    written = section if "section" in ordered else None
+    text = _module(equations, method, chosen, steps, blocks, names, written, elimination)
+    sizes = _dimensions(plain, method, workspace(steps["step"], elimination) if elimination is not None else 0)
+    return KernelSource(text, equations, method.name, chosen, sizes, weights or (1,) * equations.n, elimination)
 
 
 def default_width(equations: Equations) -> int:
@@ -152,46 +172,43 @@ def default_width(equations: Equations) -> int:
 def _module(
     equations: Equations,
     method: Integrator,
-    records: tuple[Record, ...],
+    chosen: Driver,
+    steps: dict[str, StepWriter],
+    blocks: list[NodeBlocks],
+    names: Names,
     section: sp.Expr | None,
-    width: int,
-    multiplicity: tuple[int, ...] | None,
     elimination: Program | None,
 ) -> str:
-    looped = elimination is not None
-    plain = tidy(equations)
-    weight = [edge.weight.name for edge in plain.edges]
-    states = [s.name for node in plain.nodes for s in node.state]
-    names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
-    blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
-    sticking = ("contacts",) if plain.sticks else ()
-    steps = _steps(plain, blocks, method, elimination)
+    looped, plain = elimination is not None, steps["step"].equations
     lines = [line for writer in steps.values() for line in writer.lines]
     functions = [f for k in range(len(blocks)) for f in node_functions(list(steps.values()), blocks[k], k)]
-    parts = [
-        describe(equations, plain, method, records, lines),
-        imports(functions, lines, section),
-        _constants(plain, method, records, width, multiplicity)
-        + _loop_constants(steps["step"], elimination)
-        + f"\nREPEATS = {angular_frequency(plain) is not None}",
-        *("\n".join(f) for f in functions),
-        SCALED,
-        *([PAIR, driver.text("sparse")] if looped else []),
-        *(_step(name, writer.lines, looped) for name, writer in steps.items()),
-        write_pushes(plain, names, looped),
-        _section(equations, plain, section),
-        *(driver.text(name) for name in ("recording", "cells", "control", *sticking, "sweep")),
-    ]
-    return "\n\n\n".join(part for part in parts if part) + "\n"
+    made = ["\n".join(f) for f in functions]
+    made += [SCALED, *([PAIR, driver.text("sparse")] if looped else [])]
+    made += [_step(name, writer.lines, looped) for name, writer in steps.items()]
+    made += [write_pushes(plain, names, looped), _section(equations, plain, section)]
+    text = "\n\n\n".join(part for part in made if part) + "\n"
+    constants = {"WIDTH": chosen.width, "DENSE": bool(chosen.records) or plain.sticks}
+    if elimination is not None:
+        solves = method.implicit or plain.inertial
+        constants |= {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": len(method.dense)}
+        constants |= {"ENTRIES": elimination.entries if solves else 0}
+    head = describe(equations, plain, method, chosen.records, lines)
+    return "\n\n\n".join([head, imports(text), "\n".join(f"{k} = {v!r}" for k, v in constants.items()), text])
 
 
-def _loop_constants(step: StepWriter, elimination: Program | None) -> str:
-    """Whether a kernel is looped, and how much memory its loops need."""
-    if elimination is None:
-        return "\nLOOPED = False\nWORKSPACE = 0"
-    solves = step.method.implicit or step.equations.inertial
-    entries = elimination.entries if solves else 0
-    return f"\nENTRIES = {entries}\nLOOPED = True\nWORKSPACE = {workspace(step, elimination)}"
+def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimensions:
+    methods = [m for m in (method, method.smooth) if m is not None]
+    return Dimensions(
+        nodes=plain.n,
+        components=len(plain.compared),
+        dimension=plain.dimension,
+        parameters=len(plain.parameters),
+        dense_rows=max(len(m.dense) for m in methods),
+        workspace=scratch,
+        error_order=method.error_order,
+        smooth_error_order=0 if method.smooth is None else method.smooth.error_order,
+        repeats=int(angular_frequency(plain) is not None),
+    )
 
 
 def _for_many(method: Integrator, equations: Equations, unroll: int) -> Integrator:
@@ -273,50 +290,17 @@ def _operations(lines: list[str]) -> int:
     )
 
 
-def imports(functions: list[list[str]], lines: list[str], section: sp.Expr | None, more: Sequence[str] = ()) -> str:
-    """The import statements of a kernel module."""
-    text = "\n".join([*(line for f in functions for line in f), *lines, show(section) if section is not None else ""])
-    used = sorted(
-        n for n in {*FUNCTIONS.values(), "sqrt", "exp", "log"} if f"{n}(" in text or n in ("sqrt", "exp", "log")
-    )
-    needed = {"absolute", "any_lane", "broadcast", "lane_bits", "load", "maximum", "minimum", "njit", "one_lane"}
-    needed |= {"select", "store", "sqrt", "truncated", *more, *(n for n in used if n in simd.__all__)}
-    return "\n".join(
-        ["import math", "", "import numpy as np", "", f"from synchain.codegen.simd import {', '.join(sorted(needed))}"]
-    )
-
-
-def _constants(
-    equations: Equations,
-    method: Integrator,
-    records: tuple[str, ...],
-    width: int,
-    multiplicity: tuple[int, ...] | None,
-) -> str:
-    flags = {name.upper(): name in records for name in Record}
-    rows = {
-        "WIDTH": width,
-        "NODES": equations.n,
-        "COMPONENTS": len(equations.compared),
-        "DIMENSION": equations.dimension,
-        "PARAMETERS": len(equations.parameters),
-        "DENSE_ROWS": max(len(m.dense) for m in (method, method.smooth) if m is not None),
-        "ERROR_ORDER": method.error_order,
-        "SWITCHING": method.smooth is not None,
-        **({"SMOOTH_ERROR_ORDER": method.smooth.error_order} if method.smooth is not None else {}),
-        "WEIGHTED": multiplicity is not None,
-        **flags,
-        "DENSE": any(flags.values()) or equations.sticks,
-        "CONTACTS": equations.sticks,
-    }
-    text = "\n".join(f"{name} = {value!r}" for name, value in rows.items())
-    return text if multiplicity is None else f"{text}\nMULTIPLICITY = np.array({[float(m) for m in multiplicity]!r})"
+def imports(text: str) -> str:
+    """The import statements of a kernel module: what its text uses."""
+    used = sorted(name for name in simd.__all__ if re.search(rf"\b{name}\b", text))
+    modules = [line for line, sign in (("import math", "math."), ("import numpy as np", "np.")) if sign in text]
+    return "\n\n".join([*modules, f"from synchain.codegen.simd import {', '.join(used)}"])
 
 
 def _step(name: str, lines: list[str], looped: bool) -> str:
     more = ", graph, weights" if looped else ""
     head = [
-        "@njit(error_model='numpy')",
+        "@njit(error_model='numpy', cache=True)",
         f"def {name}(t, h, y, p, y_new, dense, rtol, atol{more}):",
         '    """One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."""',
     ]
@@ -335,16 +319,19 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
     if unknown:
         raise ValueError(f"section function {section}: unknown symbol {unknown[0]!r}; use the state, parameters and t")
     lines = [
-        "@njit(error_model='numpy', forceinline=True)",
-        "def section(theta, t, h, bank, y_new, dense):",
+        driver.text("dense"),
+        "",
+        "",
+        "@njit(error_model='numpy', cache=True)",
+        "def section(theta, t, h, y, y_new, dense, dims):",
         '    """The section function at the fraction theta of the step."""',
     ]
     for slot, (name, shown) in enumerate(zip(equations.state, plain.state, strict=True)):
         if name in used:
-            lines.append(f"    {shown} = inside(theta, {slot}, bank, y_new, dense)")
+            lines.append(f"    {shown} = inside(theta, {slot}, y, y_new, dense, dims)")
     for slot, (name, shown) in enumerate(zip(equations.parameters, plain.parameters, strict=True)):
         if name in used:
-            lines.append(f"    {shown} = load(bank, {equations.dimension + slot}, WIDTH)")
+            lines.append(f"    {shown} = load(y, {equations.dimension + slot}, WIDTH)")
     text = show(section.xreplace({_real("t"): sp.Symbol("(t + theta*h)")}).xreplace(swap))
     return "\n".join([*lines, f"    return {text}"])
 

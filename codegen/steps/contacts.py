@@ -16,16 +16,16 @@ from ..printing.blocks import Hoist, Names
 from ..printing.names import NAMES
 from ..printing.printer import show
 
-__all__ = ["event_constants", "write_events", "write_pushes"]
+__all__ = ["write_events", "write_pushes"]
 
 HEAD = '''
-@njit(error_model='numpy', forceinline=True)
-def pushes(t, y, p, out, network):
+@njit(error_model='numpy', cache=True)
+def pushes(t, y, p, out{network}):
     """For each contact: sliding velocity, ground's velocity, accelerations under static friction both ways, in slip."""
 '''.strip()
 
 RELEASE = '''
-@njit(error_model='numpy')
+@njit(error_model='numpy', cache=True)
 def release(i, after, t, y, strengths, modes, which):
     """Where a contact begins to slip and friction drops at once, deviations that let go early have gained a velocity."""
 '''.strip()
@@ -42,7 +42,8 @@ def write_pushes(equations: Equations, names: Names, looped: bool = False) -> st
     if not equations.sticks:
         return ""
     lines = (_looped if looped else _written_out)(equations, names)
-    return "\n".join([HEAD, *(f"    {line}" for line in lines)])
+    head = HEAD.format(network=", graph, weights" if looped else "")
+    return "\n".join([head, *(f"    {line}" for line in lines)])
 
 
 def _columns(contact: Contact) -> tuple[sp.Expr, ...]:
@@ -77,7 +78,7 @@ def _looped(equations: Equations, names: Names) -> list[str]:
     own += [f"store(out, {k}*NODES + i, {_lane(e)})" for k, e in enumerate(reduced)]
     lines += ["for i in range(NODES):", *(f"    {line}" for line in own)]
     if force:
-        lines += [f"({', '.join(NAMES)}), weights = network"]
+        lines += [f"{', '.join(NAMES)} = graph"]
         lines += ["for e in range(target.size):", *(f"    {line}" for line in force)]
     return lines
 
@@ -103,23 +104,14 @@ def write_events(variation: Variation, names: Names) -> list[str]:
     """The functions that the events of set-valued friction need in a kernel that carries deviations."""
     if variation.events is None:
         return []
-    made = _release(variation.events, variation, names)
-    return [write_pushes(variation.orbit, names), *([made] if made else [])]
-
-
-def event_constants(variation: Variation) -> list[str]:
-    """What the skeletons must know of the events: whether slip begins with a jump, and whose velocities the rows are."""
-    events = variation.events
-    if events is None:
-        return []
-    return [f"JUMPS = {bool(events.exits)}", f"OWNERS = np.array({list(events.owners)!r})"]
+    return [write_pushes(variation.orbit, names), _release(variation.events, variation, names)]
 
 
 def _release(events: Events, variation: Variation, names: Names) -> str:
-    """The function `release`, which sets the velocities of the deviations in one register; '' where they stay."""
+    """The function `release`, which sets the velocities of the deviations in one register."""
     equations, size, strengths = variation.orbit, variation.size, [s.name for s in variation.parameters]
     if not events.exits:
-        return ""
+        return f"{RELEASE}\n    return"
     used = _symbols(events.expressions)
     known = enumerate((*equations.state, *equations.parameters))  # the orbit is one, its numbers fill a register
     lines = [f"{name} = broadcast(y[{k}], LANES)" for k, name in known if _in(name, used)]

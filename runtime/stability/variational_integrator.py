@@ -183,7 +183,7 @@ class VariationalIntegrator:
         )
         cuts = np.linspace(0, cells, min(cells, self.workers) + 1).astype(int)
         if len(cuts) == 2:
-            self.kernel.entry(0, cells, *rest)
+            self.kernel.drive(0, cells, *rest)
         else:
             self._share(cuts, rest)
         bad = np.flatnonzero(counts[:, 0] != Status.FINISHED)
@@ -197,7 +197,7 @@ class VariationalIntegrator:
     def _share(self, cuts: np.ndarray, rest: tuple[np.ndarray, ...]) -> None:
         """Run parts of the cells on threads; Ctrl-C stops them at once."""
         with ThreadPoolExecutor(self.workers) as pool:
-            jobs = [pool.submit(self.kernel.entry, a, b, *rest) for a, b in itertools.pairwise(cuts)]
+            jobs = [pool.submit(self.kernel.drive, a, b, *rest) for a, b in itertools.pairwise(cuts)]
             try:
                 for job in jobs:
                     job.result()

@@ -1,0 +1,45 @@
+"""The sizes of the arrays of a scene, which a driver is told when it runs."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+__all__ = ["Dimensions", "ModeDimensions"]
+
+
+class Dimensions(NamedTuple):
+    """What a driver of a sweep must know of a scene and of its integrator."""
+
+    nodes: int
+    components: int
+    """States of a node that the synchronisation error compares."""
+    dimension: int
+    """State variables of the network."""
+    parameters: int
+    dense_rows: int
+    """Coefficients of the dense output for each state variable."""
+    workspace: int
+    """Groups of scratch memory behind the dense output."""
+    error_order: int
+    smooth_error_order: int
+    """That of the explicit step of a switching integrator; 0 if there is none."""
+    repeats: int
+    """1 if the right-hand side is periodic in time, so that a computation can repeat itself, else 0."""
+
+
+class ModeDimensions(NamedTuple):
+    """What a driver that carries deviations along an orbit must know."""
+
+    nodes: int
+    components: int
+    dimension: int
+    parameters: int
+    dense_rows: int
+    error_order: int
+    repeats: int
+    strengths: int
+    """Numbers that differ from mode to mode."""
+    shared: int
+    """Length of the array in which a step of the orbit leaves what the modes need."""
+    jumps: int
+    """1 if slip begins with a jump of acceleration, else 0."""

@@ -1,0 +1,83 @@
+"""The text of a driver: one module for a width, a set of records and a kind of step, whatever the scene."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from enum import StrEnum
+
+from synchain.models.dynamics.record import Record
+
+from .. import driver, simd
+
+__all__ = ["Driver", "KernelKind"]
+
+
+class KernelKind(StrEnum):
+    """What a kernel runs: the cells of a sweep, or orbits and the modes carried along each."""
+
+    SWEEP = "sweep"
+    MODES = "modes"
+
+
+@dataclass(frozen=True, slots=True)
+class Driver:
+    """What the text of a driver depends on; scenes that agree in it share its machine code.
+
+    `width` is the number of cells in a register, or of modes in one.
+    """
+
+    kind: KernelKind
+    width: int
+    records: tuple[Record, ...] = ()
+    looped: bool = False
+    switching: bool = False
+    contacts: bool = False
+
+    @property
+    def functions(self) -> tuple[str, ...]:
+        """The functions of a scene, in the order in which the driver takes them; `step` stands for those not called."""
+        wanted: tuple[tuple[str, bool], ...] = (
+            ("step_smooth", self.switching), ("section", Record.SECTION in self.records), ("pushes", self.contacts),
+        )  # fmt: skip
+        if self.kind is KernelKind.MODES:
+            wanted = (("carry", True), ("pushes", self.contacts), ("release", self.contacts))
+        return ("step", *(name if called else "step" for name, called in wanted))
+
+    @property
+    def entry(self) -> str:
+        """The name of the function that runs cells."""
+        return "march" if self.kind is KernelKind.MODES else "drive"
+
+    @property
+    def constants(self) -> dict[str, int | bool]:
+        """The names by which the text is specialised."""
+        modes = self.kind is KernelKind.MODES
+        return {
+            "WIDTH": 1 if modes else self.width,
+            **({"LANES": self.width} if modes else {}),
+            **{name.upper(): name in self.records for name in Record},
+            "CONTACTS": self.contacts,
+            "SWITCHING": self.switching,
+            "LOOPED": self.looped,
+        }
+
+    @property
+    def text(self) -> str:
+        """The module."""
+        last = "modes" if self.kind is KernelKind.MODES else "sweep"
+        pieces = ("dense", "recording", "cells", "control", *(("contacts",) if self.contacts else ()), last)
+        lines = [
+            f'"""Driver of {"orbits and their modes" if last == "modes" else "sweeps"}, {self.width} lanes.',
+            "",
+            f"Records     {', '.join(('final state', *self.records))}",
+            '"""',
+        ]
+        imports = f"import math\n\nimport numpy as np\n\nfrom synchain.codegen.simd import {', '.join(sorted(simd.__all__))}"
+        constants = "\n".join(f"{name} = {value!r}" for name, value in self.constants.items())
+        return "\n\n\n".join(["\n".join(lines), imports, constants, *map(driver.text, pieces)]) + "\n"
+
+    @property
+    def digest(self) -> str:
+        """Hexadecimal SHA-256 of the text."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
