@@ -132,7 +132,6 @@ def camera() -> dict[str, str]:
     features = llvm.get_host_cpu_features()
     return {
         "machine": platform.machine(),
-        "processor": numba.config.CPU_NAME or llvm.get_host_cpu_name(),
         "avx512": str(bool(features.get("avx512f"))),
         "fma": str(bool(features.get("fma"))),
         "versions": ", ".join(f"{m.__name__} {m.__version__}" for m in (numba, np, sp)),

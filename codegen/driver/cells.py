@@ -87,13 +87,6 @@ def aligned(count):
     return block[shift : shift + count]
 
 
-@njit(error_model="numpy")
-def memory(dims):
-    """The registers of a group: its clock, and the states and parameters of its lanes with room for saved ones."""
-    groups = 2 * dims.dimension + dims.parameters + len(REPEATING)
-    return aligned(CLOCK * WIDTH), aligned(groups * WIDTH)
-
-
 @njit(error_model="numpy", forceinline=True)
 def put(array, slot, which, value):
     """Write one number of one lane as part of a whole register: reading that register back need not wait for memory."""
@@ -106,7 +99,7 @@ def fill(which, cell, start, numbers, spans, control, clock, y, samples, multipl
     idle, cell = cell < 0, max(cell, 0)
     for slot in range(CLOCK):
         put(clock, slot, which, 0.0)
-    for slot in range(y.size // WIDTH):
+    for slot in range(2 * dims.dimension + dims.parameters + len(REPEATING)):
         put(y, slot, which, 0.0)
     for c in range(dims.dimension):
         put(y, c, which, start[cell, c])
@@ -283,11 +276,11 @@ def finish(which, status, clock, y, i, spans, end, sums, counts, dims):
 
 
 @njit(error_model="numpy")
-def move(a, clock, y, cell, b, other_clock, other_y, other_cell):
+def move(a, clock, y, cell, b, other_clock, other_y, other_cell, dims):
     """Move the cell of lane a in one group to lane b in another."""
     for slot in range(CLOCK):
         put(other_clock, slot, b, clock[slot * WIDTH + a])
-    for slot in range(y.size // WIDTH):
+    for slot in range(2 * dims.dimension + dims.parameters + len(REPEATING)):
         put(other_y, slot, b, y[slot * WIDTH + a])
     other_cell[b] = cell[a]
     cell[a] = -1

@@ -10,6 +10,7 @@ from numba import njit
 from ..simd.elementary import exp
 from ..simd.elementary import log
 from ..simd.lanes import absolute
+from ..simd.lanes import broadcast
 from ..simd.lanes import load
 from ..simd.lanes import maximum
 from ..simd.lanes import minimum
@@ -88,22 +89,23 @@ def next_stop(clock, t):
 
 @njit(error_model="numpy", forceinline=True)
 def advance(clock, y, t, t_new, accept, y_new, dims):
-    """Move the accepted lanes on."""
+    """Move the accepted lanes on; returns the largest modulus of each state."""
     stop, following = load(clock, STOP, WIDTH), next_stop(clock, t_new)
     store(clock, TIME, select(accept, t_new, t))
     store(clock, STOP, select(accept & (t_new >= stop), following, stop))
+    largest = broadcast(0.0, WIDTH)
     for c in range(dims.dimension):
-        store(y, c, select(accept, load(y_new, c, WIDTH), load(y, c, WIDTH)))
+        value = select(accept, load(y_new, c, WIDTH), load(y, c, WIDTH))
+        store(y, c, value)
+        largest = maximum(largest, absolute(value))
+    return largest
 
 
 @njit(error_model="numpy", forceinline=True)
-def pause(clock, y, control, dims):
+def pause(clock, largest, control):
     """Mask of lanes that need a look: at a stop, out of budget, with a vanishing step, or out of bounds."""
     t, h = load(clock, TIME, WIDTH), load(clock, STEP, WIDTH)
     spent = load(clock, ACCEPTED, WIDTH) + load(clock, REJECTED, WIDTH) >= control[MAX_STEPS]
-    largest = absolute(load(y, 0, WIDTH))
-    for c in range(1, dims.dimension):
-        largest = maximum(largest, absolute(load(y, c, WIDTH)))
     stopped = (t >= load(clock, END, WIDTH)) | (t >= load(clock, PERIOD, WIDTH))
     found = stopped | spent | (h <= 4e-16 * maximum(t, 1.0)) | (largest >= FAR)
     return found | (load(clock, RUSH, WIDTH) >= LONGEST_RUSH) if CONTACTS else found

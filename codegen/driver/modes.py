@@ -14,6 +14,7 @@ import math
 import numpy as np
 from numba import njit
 
+from ..simd.addresses import address
 from ..simd.lanes import absolute
 from ..simd.lanes import any_lane
 from ..simd.lanes import broadcast
@@ -24,9 +25,9 @@ from ..simd.lanes import scale_binary
 from ..simd.lanes import select
 from ..simd.lanes import split_binary
 from ..simd.lanes import store
+from .cells import REPEATING
 from .cells import aligned
 from .cells import fill
-from .cells import memory
 from .cells import outcome
 from .cells import turn_over
 from .contacts import change_modes
@@ -42,6 +43,7 @@ from .names import WIDTH
 from .recording import ACCEPTED
 from .recording import ATOL
 from .recording import BASE
+from .recording import CLOCK
 from .recording import N_ACCEPTED
 from .recording import N_REJECTED
 from .recording import PERIOD
@@ -148,29 +150,35 @@ def march(
     become zero. The number of modes is a multiple of LANES.  samples is not used.
     """
     registers, parts, kinds = growth.shape[1] // LANES, owners.size, dims.strengths
-    y_new, shared, multiplicity = aligned(dims.dimension), aligned(dims.shared), np.ones(dims.nodes)
-    clock, y = memory(dims)
-    old, new = aligned(registers * parts * LANES), aligned(registers * parts * LANES)
-    dense, middle, out = aligned(dims.dense_rows * dims.dimension), aligned(dims.dimension), aligned(9 * dims.nodes)
-    slips = np.zeros(dims.nodes)
-    powers, strong = aligned(registers * LANES), aligned(registers * max(1, kinds) * LANES)
+    size, steering, slips = dims.dimension, address(control, 0), np.zeros(dims.nodes)
+    orbit = CLOCK + 2 * size + dims.parameters + len(REPEATING)
+    block = aligned(orbit + 2 * size + dims.dense_rows * size + 9 * dims.nodes + dims.shared)
+    clock, y, y_new = address(block, 0), address(block, CLOCK), address(block, orbit)
+    middle, dense = address(y_new, size), address(y_new, 2 * size)
+    out = address(dense, dims.dense_rows * size)
+    shared = address(out, 9 * dims.nodes)
+    deviations = aligned(registers * (2 * parts + 1 + max(1, kinds)) * LANES)
+    old, new = address(deviations, 0), address(deviations, registers * parts * LANES)
+    powers = address(new, registers * parts * LANES)
+    strong = address(powers, registers * LANES)
     for which in range(registers):
         for k in range(kinds):
             for lane in range(LANES):
                 strong[(kinds * which + k) * LANES + lane] = strengths[k, which * LANES + lane]
     tolerance = control[RTOL] * control[LOOSENESS]
     for cell in range(first, last):
-        fill(0, cell, start, numbers, spans, control, clock, y, samples, multiplicity, dims)
+        fill(0, cell, start, numbers, spans, control, clock, y, samples, old, dims)
         take_in(vectors[cell], old, registers, parts)
         if CONTACTS:
             for i in range(dims.nodes):
                 if y[2 * dims.nodes + i] == 0.0:
                     brake(i, 0.0, old, registers, owners)  # a velocity beside that of the ground is lost at once
-        powers[:] = 0.0
+        for k in range(registers * LANES):
+            powers[k] = 0.0
         status, taken = outcome(0, clock, y, control, dims), 0
         while status == 0:
-            t, h = load(clock, TIME, WIDTH), aim(clock, control)
-            error = step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL], shared)
+            t, h = load(clock, TIME, WIDTH), aim(clock, steering)
+            error = step(t, h, y, y, y_new, dense, steering[RTOL], steering[ATOL], shared)
             if any_lane(error <= 1.0):
                 worst = watched(shared, strong, old, new, registers - 1, tolerance, carry)
                 if worst <= 1.0 and registers > 1:
@@ -186,7 +194,7 @@ def march(
                 taken += 1
                 if taken % BETWEEN_SCALINGS == 0:
                     scale(old, powers, registers, parts)
-            advance(clock, y, t, t_new, accept, y_new, dims)
+            largest = advance(clock, y, t, t_new, accept, y_new, dims)
             if CONTACTS:
                 for i in range(dims.nodes):
                     slips[i] = y[2 * dims.nodes + i]
@@ -194,7 +202,7 @@ def march(
                 for i in range(dims.nodes):
                     if y[2 * dims.nodes + i] != slips[i]:
                         saltate(i, slips[i], clock[TIME], y, out, strong, old, registers, owners, dims, release)
-            if lane_bits(pause(clock, y, control, dims)) != 0:
+            if lane_bits(pause(clock, largest, steering)) != 0:
                 status = outcome(0, clock, y, control, dims)
                 if status == 0 and clock[TIME] >= clock[PERIOD]:
                     turn_over(0, cell, spans, control, clock, y, dims)
@@ -206,3 +214,4 @@ def march(
         counts[cell, STATUS] = status
         counts[cell, N_ACCEPTED] = int(clock[ACCEPTED])
         counts[cell, N_REJECTED] = int(clock[REJECTED])
+    block[0] = deviations[0] = 0.0  # the memory behind the addresses is held until here

@@ -39,7 +39,7 @@ def spread(y, multiplicity, dims):
     total = broadcast(0.0, WIDTH)
     for i in range(1, dims.nodes):
         square = broadcast(0.0, WIDTH)
-        for c in range(dims.components):
+        for c in range(dims.components - 1, -1, -1):
             gap = load(y, c * dims.nodes, WIDTH) - load(y, c * dims.nodes + i, WIDTH)
             square = square + gap * gap
         total = total + multiplicity[i] * sqrt(square)

@@ -17,15 +17,16 @@ import math
 import numpy as np
 from numba import njit
 
+from ..simd.addresses import address
 from ..simd.lanes import any_lane
 from ..simd.lanes import lane_bits
 from ..simd.lanes import load
 from ..simd.lanes import store
+from .cells import REPEATING
 from .cells import aligned
 from .cells import fill
 from .cells import finish
 from .cells import held
-from .cells import memory
 from .cells import move
 from .cells import occupied
 from .cells import outcome
@@ -54,6 +55,7 @@ from .recording import ATOL
 from .recording import BASE
 from .recording import CANCEL
 from .recording import CHANGE
+from .recording import CLOCK
 from .recording import DIRECTION
 from .recording import MEMORY
 from .recording import MODE
@@ -88,7 +90,7 @@ def settle(
                     cell[which] = queue
                     fill(which, queue, start, numbers, spans, control, clock, y, samples, multiplicity, dims)
                     queue += 1
-                elif not fetch(which, mode, clock, y, cell, lot_clock, lot_y, lot_cell):
+                elif not fetch(which, mode, clock, y, cell, lot_clock, lot_y, lot_cell, dims):
                     vacate(which, clock)
                     break
             status = outcome(which, clock, y, control, dims)
@@ -99,34 +101,34 @@ def settle(
                 finish(which, status, clock, y, cell[which], spans, end, sums, counts, dims)
                 cell[which] = -1
             elif SWITCHING and flip:
-                change_sides(which, mode, clock, y, cell, away_clock, away_y, away_cell, lot_clock, lot_y, lot_cell)
+                change_sides(which, mode, clock, y, cell, away_clock, away_y, away_cell, lot_clock, lot_y, lot_cell, dims)
             else:
                 break
     return queue
 
 
 @njit(error_model="numpy")
-def fetch(which, mode, clock, y, cell, lot_clock, lot_y, lot_cell):
+def fetch(which, mode, clock, y, cell, lot_clock, lot_y, lot_cell, dims):
     """Give a waiting cell the free lane of its kind; returns whether there was one."""
     if SWITCHING:
         found = waiting(lot_clock, lot_cell, mode)
         if found >= 0:
-            move(found, lot_clock, lot_y, lot_cell, which, clock, y, cell)
+            move(found, lot_clock, lot_y, lot_cell, which, clock, y, cell, dims)
             return True
     return False
 
 
 @njit(error_model="numpy")
-def change_sides(which, mode, clock, y, cell, away_clock, away_y, away_cell, lot_clock, lot_y, lot_cell):
+def change_sides(which, mode, clock, y, cell, away_clock, away_y, away_cell, lot_clock, lot_y, lot_cell, dims):
     """Move a cell to the other kind of step; where no lane is free there, it waits."""
     put(clock, MODE, which, 0.0 if mode == SMOOTH else 1.0)
     put(clock, MEMORY, which, 0.0)
     put(clock, CHANGE, which, math.inf)
     free = vacant(away_cell)
     if free >= 0:
-        move(which, clock, y, cell, free, away_clock, away_y, away_cell)
+        move(which, clock, y, cell, free, away_clock, away_y, away_cell, dims)
     else:
-        move(which, clock, y, cell, vacant(lot_cell), lot_clock, lot_y, lot_cell)
+        move(which, clock, y, cell, vacant(lot_cell), lot_clock, lot_y, lot_cell, dims)
 
 
 @njit(error_model="numpy")
@@ -144,13 +146,10 @@ def admit(queue, last, flying, clock, y, cell, start, numbers, spans, control, s
 
 
 @njit(error_model="numpy", forceinline=True)
-def attempt(
-    mode, clock, y, dense, y_new, middle, out, cell, spans, control, counts, points, samples, multiplicity, dims, step,
-    step_smooth, section, pushes, graph, weights,
-):  # fmt: skip
-    """One step of all lanes of a group; returns the lanes that need a look, and those that change sides, as bits."""
+def attempt(mode, clock, y, dense, y_new, middle, out, control, dims, step, step_smooth, pushes, network):
+    """One step of all lanes of a group: times, lengths, the mask of accepted steps and a bound of the eigenvalues."""
     t, h = load(clock, TIME, WIDTH), aim(clock, control)
-    power = 1.0 / (dims.error_order + 1.0)
+    power, rate = 1.0 / (dims.error_order + 1.0), h
     if SWITCHING:
         if mode == SMOOTH:
             error, rate = step_smooth(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
@@ -159,58 +158,64 @@ def attempt(
         else:
             error, rate = step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
     elif LOOPED:
+        graph, weights = network
         error = step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL], graph, weights)
     else:
         error = step(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])
-    t_new = arrive(clock, t, h)
     accept = judge(clock, h, error, power)
     if CONTACTS:
-        accept = take_back(accept, t, h, clock, y, y_new, dense, middle, out, (graph, weights), dims, pushes)
-    counted = accept & (t >= load(clock, START, WIDTH))
-    if SYNC_ERROR:
-        observe(clock, y, h, counted, accept, y_new, dense, middle, multiplicity, dims)
-    if SECTION and any_lane(counted):
-        now = load(clock, BASE, WIDTH) + t
-        cut(counted, now, h, y, y_new, dense, cell, counts, points, control[DIRECTION], dims, section)
-    if TRAJECTORY and any_lane(accept):
-        sample(clock, y, t_new, h, lane_bits(accept), y_new, dense, cell, spans, samples, dims)
-    advance(clock, y, t, t_new, accept, y_new, dims)
+        accept = take_back(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, pushes)
+    return t, h, accept, rate
+
+
+@njit(error_model="numpy", forceinline=True)
+def conclude(mode, t, h, accept, rate, clock, y, y_new, out, control, dims, pushes, network):
+    """Move the accepted lanes on; returns the lanes that need a look, and those that change sides, as bits."""
+    t_new = arrive(clock, t, h)
+    largest = advance(clock, y, t, t_new, accept, y_new, dims)
     if CONTACTS:
-        change_modes(accept, t_new, y, out, (graph, weights), dims, pushes)
+        change_modes(accept, t_new, y, out, network, dims, pushes)
     flips = 0
     if SWITCHING:
         flips = lane_bits(turned(clock, accept, rate, mode))
-    return ALL if control[CANCEL] != 0.0 else lane_bits(pause(clock, y, control, dims)) | flips, flips
+    return ALL if control[CANCEL] != 0.0 else lane_bits(pause(clock, largest, control)) | flips, flips
 
 
 @njit(error_model="numpy", nogil=True, cache=True)
 def drive(
-    step, step_smooth, section, pushes, dims, multiplicity, graph, weights, first, last, start, numbers, spans, control,
-    end, sums, counts, points, samples,
+    step, step_smooth, section, pushes, dims, multiplicity, network, first, last, start, numbers, spans, control, end, sums,
+    counts, points, samples,
 ):  # fmt: skip
     """Run the cells first … last-1.
 
     step, step_smooth, section, pushes: functions of a scene; those that this driver does not call may be any.  dims: the
-    sizes of its arrays.  multiplicity (nodes): how many oscillators each node stands for.  graph and weights: the links
-    and the elimination program of a network that is stepped through in loops (codegen/steps/program.py).
+    sizes of its arrays.  multiplicity (nodes): how many oscillators each node stands for.  network: of one that is
+    stepped through in loops, the arrays of its program (codegen/steps/program.py) and the weights of its links.
     start (cells, dimension), numbers (cells, parameters), spans (cells, 4): start and end of the window, the period after
     which the right-hand side repeats (0: none), and the synchronisation error below which a cell that records nothing
     else may end early (0: never); control: see the column names above.  Filled: end (cells, dimension), sums (cells, 4),
     counts (cells, 6), points (cells, room, dimension + 1), samples (cells, samples, dimension).
     """
-    y_new, middle = aligned(dims.dimension * WIDTH), aligned(dims.dimension * WIDTH)
-    clock, y = memory(dims)
-    dense, cell = aligned((dims.dense_rows * dims.dimension + dims.workspace) * WIDTH), np.full(WIDTH, -1)
-    away_clock, away_y, lot_clock, lot_y = clock, y, clock, y
-    away_dense, away_cell, lot_cell = dense, np.full(WIDTH, -1), np.full(WIDTH, -1)
-    out = aligned(9 * dims.nodes * WIDTH if CONTACTS else 0)
+    steering, members = address(control, 0), address(multiplicity, 0)
+    size, rows = dims.dimension, dims.dense_rows * dims.dimension
+    group = CLOCK + 2 * size + dims.parameters + len(REPEATING)
+    groups = 3 if SWITCHING else 1
+    scratch = 9 * dims.nodes if CONTACTS else 0
+    block = aligned((2 * size + groups * (group + rows) + dims.workspace + scratch) * WIDTH)
+    y_new, middle, out = address(block, 0), address(block, size * WIDTH), address(block, 2 * size * WIDTH)
+    first_group = (2 * size + scratch) * WIDTH
+    clock, y = address(block, first_group), address(block, first_group + CLOCK * WIDTH)
+    dense = address(block, first_group + groups * group * WIDTH)
+    away_clock, away_y, away_dense, lot_clock, lot_y = clock, y, dense, clock, y
+    cell, away_cell, lot_cell = np.full(WIDTH, -1), np.full(WIDTH, -1), np.full(WIDTH, -1)
     for which in range(WIDTH):
-        fill(which, -1, start, numbers, spans, control, clock, y, samples, multiplicity, dims)
+        fill(which, -1, start, numbers, spans, control, clock, y, samples, members, dims)
     if SWITCHING:
-        (away_clock, away_y), (lot_clock, lot_y) = memory(dims), memory(dims)
-        away_dense = aligned(dims.dense_rows * dims.dimension * WIDTH)
+        away_clock, away_y = address(clock, group * WIDTH), address(y, group * WIDTH)
+        lot_clock, lot_y = address(away_clock, group * WIDTH), address(away_y, group * WIDTH)
+        away_dense = address(dense, rows * WIDTH)
         for which in range(WIDTH):
-            fill(which, -1, start, numbers, spans, control, away_clock, away_y, samples, multiplicity, dims)
+            fill(which, -1, start, numbers, spans, control, away_clock, away_y, samples, members, dims)
     mode, queue, look, flips = STIFF, first, ALL, 0
     while True:
         if SWITCHING and look != 0:
@@ -219,22 +224,22 @@ def drive(
             flips = flips & held(cell)  # an idle lane may ask for anything; who moves in must not inherit it
             if mode == STIFF:
                 queue = admit(
-                    queue, last, room, clock, y, cell, start, numbers, spans, control, samples, multiplicity, dims
+                    queue, last, room, clock, y, cell, start, numbers, spans, control, samples, members, dims
                 )
                 look = look if queue == head else ALL
             else:
                 queue = admit(
                     queue, last, room, away_clock, away_y, away_cell, start, numbers, spans, control, samples,
-                    multiplicity, dims,
+                    members, dims,
                 )  # fmt: skip
             room -= queue - head
             queue = admit(
-                queue, last, room, lot_clock, lot_y, lot_cell, start, numbers, spans, control, samples, multiplicity, dims
+                queue, last, room, lot_clock, lot_y, lot_cell, start, numbers, spans, control, samples, members, dims
             )
         if look != 0:
             queue = settle(
                 mode, look, flips, queue, last, clock, y, cell, away_clock, away_y, away_cell, lot_clock, lot_y, lot_cell,
-                start, numbers, spans, control, end, sums, counts, samples, multiplicity, dims,
+                start, numbers, spans, control, end, sums, counts, samples, members, dims,
             )  # fmt: skip
             full, other, flips = occupied(cell), occupied(away_cell), 0
             waits = occupied(lot_cell) > 0 or (queue < last and control[CANCEL] == 0.0)
@@ -247,7 +252,16 @@ def drive(
                 continue
             if full == 0:
                 break
-        look, flips = attempt(
-            mode, clock, y, dense, y_new, middle, out, cell, spans, control, counts, points, samples, multiplicity, dims,
-            step, step_smooth, section, pushes, graph, weights,
-        )  # fmt: skip
+        t, h, accept, rate = attempt(
+            mode, clock, y, dense, y_new, middle, out, steering, dims, step, step_smooth, pushes, network
+        )
+        counted = accept & (t >= load(clock, START, WIDTH))
+        if SYNC_ERROR:
+            observe(clock, y, h, counted, accept, y_new, dense, middle, members, dims)
+        if SECTION and any_lane(counted):
+            now = load(clock, BASE, WIDTH) + t
+            cut(counted, now, h, y, y_new, dense, cell, counts, points, steering[DIRECTION], dims, section)
+        if TRAJECTORY and any_lane(accept):
+            sample(clock, y, arrive(clock, t, h), h, lane_bits(accept), y_new, dense, cell, spans, samples, dims)
+        look, flips = conclude(mode, t, h, accept, rate, clock, y, y_new, out, steering, dims, pushes, network)
+    block[0] = 0.0  # the memory behind the addresses is held until here

@@ -18,6 +18,7 @@ import sys
 import tempfile
 import threading
 import warnings
+from collections import deque
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -34,9 +35,9 @@ from synchain.models.dynamics.equations import Equations
 from ..printing.names import NAMES
 from ..driver import dimensions
 from ..driver.dimensions import Dimensions, ModeDimensions
-from ..simd import decorator, elementary, lane_types, lanes
+from ..simd import addresses, decorator, elementary, lane_types, lanes
+from ..simd.addresses import ADDRESS
 from ..simd.lane_types import Lane
-from ..steps.program import EMPTY
 from .cache import Folder, cache_folder, open_folder
 from .driver import Driver, KernelKind
 from .installation import InstallationError
@@ -64,25 +65,25 @@ def signatures(driver: Driver) -> dict[str, Any]:
     if driver.kind is KernelKind.MODES:
         one, lane = Lane(1), Lane(driver.width)
         known = {
-            "step": one(one, one, *[_vector] * 4, types.float64, types.float64, _vector),
-            "carry": types.UniTuple(lane, 2)(*[_vector] * 4, types.int64, types.int64),
-            "pushes": types.void(one, *[_vector] * 3),
-            "release": types.void(types.int64, *[types.float64] * 2, *[_vector] * 3, types.int64),
+            "step": one(one, one, *[ADDRESS] * 4, types.float64, types.float64, ADDRESS),
+            "carry": types.UniTuple(lane, 2)(*[ADDRESS] * 4, types.int64, types.int64),
+            "pushes": types.void(one, *[ADDRESS] * 3),
+            "release": types.void(types.int64, *[types.float64] * 2, *[ADDRESS] * 3, types.int64),
         }
         arrays = (*[_input] * 3, _vector, _input, _cube, _matrix, _matrix, _matrix, _counts, _cube)
         own = (_sizes(ModeDimensions), types.int64[::1])
     else:
         lane, sizes = Lane(driver.width), _sizes(Dimensions)
-        step = (lane, lane, *[_vector] * 4, types.float64, types.float64, *more)
+        step = (lane, lane, *[ADDRESS] * 4, types.float64, types.float64, *more)
         result = types.UniTuple(lane, 2) if driver.switching else lane
         known = {
             "step": result(*step),
             "step_smooth": result(*step),
-            "section": lane(lane, lane, lane, _vector, _vector, _vector, sizes),
-            "pushes": types.void(lane, *[_vector] * 3, *more),
+            "section": lane(lane, lane, lane, *[ADDRESS] * 3, sizes),
+            "pushes": types.void(lane, *[ADDRESS] * 3, *more),
         }
         arrays = (*[_input] * 3, _vector, _matrix, _matrix, _counts, _cube, _cube)
-        own = (sizes, _vector, *_graph)
+        own = (sizes, _vector, types.Tuple(more))
     functions = [types.FunctionType(known[name]) for name in driver.functions]
     entry = types.void(*functions, *own, types.int64, types.int64, *arrays)
     return {**{name: known[name] for name in dict.fromkeys(driver.functions)}, driver.entry: entry}
@@ -94,6 +95,8 @@ LOG = logging.getLogger(__name__)
 _lock = threading.Lock()
 _kernels: WeakValueDictionary[KernelSource, Kernel] = WeakValueDictionary()
 """The kernels of this process that somebody holds."""
+_recent: deque[Kernel] = deque(maxlen=16)
+"""The last kernels that were asked for; older ones are freed where nobody else holds them."""
 _drivers: dict[Driver, _Module] = {}
 """The drivers of this process; there are few."""
 
@@ -183,6 +186,8 @@ def load(source: KernelSource) -> Kernel:
         kernel = _kernels.get(source)
         if kernel is None:
             kernel = _kernels[source] = _kernel(source)
+        if kernel not in _recent:
+            _recent.append(kernel)
         return kernel
 
 
@@ -208,8 +213,8 @@ def _kernel(source: KernelSource) -> Kernel:
         own = (*functions, source.dimensions, np.array(source.marks, np.int64))
     else:
         loops = source.elimination
-        graph = (EMPTY, np.zeros(0)) if loops is None else (loops.arrays, loops.weights)
-        own = (*functions, source.dimensions, np.array(source.marks, np.float64), *graph)
+        network = () if loops is None else (loops.arrays, loops.weights)
+        own = (*functions, source.dimensions, np.array(source.marks, np.float64), network)
     return Kernel(source, entry, own, module.path, module.from_cache)
 
 
@@ -273,8 +278,13 @@ def _stored(text: str, name: str, wanted: dict[str, Any], folder: Folder, path: 
 class _MachineCode:
     """Machine code as checked bytes, in place of the files that Numba reads and writes by their paths."""
 
-    def __init__(self, data: bytes = b"") -> None:
-        self.known: dict[Any, Any] = pickle.loads(data) if data else {}
+    def __init__(self, stored: bytes = b"") -> None:
+        self.stored = stored
+
+    @functools.cached_property
+    def known(self) -> dict[Any, Any]:
+        """What was compiled, by function, types and processor; it can be read while its module is known to Python."""
+        return dict(pickle.loads(self.stored)) if self.stored else {}
 
     def load(self, key: Any) -> Any:
         """What was compiled for these types and this processor; None if there is no such code."""
@@ -285,6 +295,7 @@ class _MachineCode:
 
     @property
     def data(self) -> bytes:
+        """All of it as bytes."""
         return dumps(self.known)
 
 
@@ -317,7 +328,7 @@ def _surroundings() -> str:
     """Everything besides the text that the machine code depends on."""
     here = [
         Path(m.__file__).read_text(encoding="utf-8")
-        for m in (decorator, lane_types, lanes, elementary, dimensions)
+        for m in (decorator, addresses, lane_types, lanes, elementary, dimensions)
         if m.__file__
     ]
     versions = [sys.version, numba.__version__, importlib.metadata.version("llvmlite"), platform.machine()]

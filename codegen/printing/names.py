@@ -17,6 +17,7 @@ __all__ = ["NAMES", "RESERVED", "tidy"]
 
 NAMES = (
     "target", "source", "node_slot", "here_slot", "there_slot", "order", "place", "row_start", "after_start", "column",
+    "where",
 )  # fmt: skip
 """What the arrays of a program are called, in the order in which a kernel takes them."""
 

@@ -5,10 +5,11 @@ Kernels name this package alone, so that no text of a kernel changes if a functi
 
 from __future__ import annotations
 
+from .addresses import address
 from .decorator import njit
 from .elementary import *  # noqa: F403
 from .elementary import __all__ as _elementary
 from .lanes import *  # noqa: F403
 from .lanes import __all__ as _lanes
 
-__all__ = [*_elementary, *_lanes, "njit"]
+__all__ = [*_elementary, *_lanes, "address", "njit"]

@@ -18,6 +18,7 @@ from numba.core import cgutils
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin
 
+from .addresses import data_of
 from .lane_types import BOOL, DOUBLE, INT64, Lane, Mask, as_lane, common_width, constant, native_width, splat, vector
 
 __all__ = [
@@ -185,7 +186,7 @@ def any_lane(typingctx: Any, mask: Any) -> Any:
 
 
 def _slot(context: Any, builder: Any, array: Any, array_type: Any, index: Any, width: int) -> Any:
-    data = context.make_array(array_type)(context, builder, array).data
+    data = data_of(context, builder, array, array_type)
     offset = builder.mul(index, ir.Constant(index.type, width))
     return builder.bitcast(builder.gep(data, [offset]), vector(DOUBLE, width).as_pointer())
 
@@ -196,7 +197,7 @@ def _width_of(literal: Any) -> int | None:
 
 @intrinsic(prefer_literal=True)
 def load(typingctx: Any, array: Any, slot: Any, width: Any) -> Any:
-    """Lane number `slot` of a flat float64 array whose entries stand in groups of `width`."""
+    """Lane number `slot` of a flat float64 array, or an address, whose entries stand in groups of `width`."""
     size = _width_of(width)
     if size is None or not isinstance(slot, types.Integer):
         return None
@@ -210,7 +211,7 @@ def load(typingctx: Any, array: Any, slot: Any, width: Any) -> Any:
 
 @intrinsic
 def store(typingctx: Any, array: Any, slot: Any, value: Any) -> Any:
-    """Write a lane to a flat float64 array at group number `slot`."""
+    """Write a lane to a flat float64 array, or an address, at group number `slot`."""
     if not isinstance(value, Lane) or not isinstance(slot, types.Integer):
         return None
 

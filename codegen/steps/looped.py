@@ -11,11 +11,12 @@ from collections.abc import Sequence
 import sympy as sp
 
 from ..printing.blocks import Body
+from ..printing.names import NAMES
 from ..printing.printer import show
 from .linearise import entry
 from .looped_mass import LoopMass
 from .places import Joint, Kind, Places, named
-from .program import Program, names
+from .program import Program
 from .rosenbrock import term
 from .step import StepWriter, combine, function_name
 
@@ -37,7 +38,7 @@ class LoopWriter:
         """All statements of the step."""
         w = self.w
         w.put(*(f"{name} = {text}" for name, text in self.base.items()))
-        w.put(f"{', '.join(names(w.equations))} = graph")
+        w.put(f"{', '.join(NAMES)} = graph")
         w.parameters(but={f"{name}_{i + 1}" for name in w.equations.varied for i in range(w.equations.n)})
         if self.method.implicit:
             self.rosenbrock()

@@ -31,10 +31,7 @@ from .places import by_joint, by_kind, joint_numbers, table
 if TYPE_CHECKING:
     from .step import StepWriter
 
-__all__ = ["EMPTY", "FILL_LIMIT", "Program", "block_pattern", "names", "program", "workspace"]
-
-EMPTY: tuple[np.ndarray, ...] = tuple(np.zeros(0, np.int64) for _ in NAMES)
-"""The program of a kernel that is written out."""
+__all__ = ["FILL_LIMIT", "Program", "block_pattern", "program", "workspace"]
 
 FILL_LIMIT = 3.0
 """Entries of the exact factors for each entry of the matrix, above which the elimination is incomplete."""
@@ -63,11 +60,6 @@ class Program:
 def block_pattern(block: Iterable[Iterable[object]]) -> tuple[Entry, ...]:
     """Row and column of the non-zero entries of a small block."""
     return tuple((a, b) for a, row in enumerate(block) for b, e in enumerate(row) if e != 0)
-
-
-def names(equations: Equations) -> tuple[str, ...]:
-    """Return what the arrays of a network's program are called, in their order."""
-    return (*NAMES, "where") if equations.mixed else NAMES
 
 
 def program(equations: Equations, fill: float = FILL_LIMIT) -> Program:
@@ -129,7 +121,7 @@ def _program(
     starts = np.searchsorted(keys, np.arange(dimension + 1) * dimension)
     middles = np.searchsorted(keys, np.arange(dimension) * (dimension + 1))
     slots = [blocks.slots(place, keys) for blocks in (alike, *ends)]
-    arrays = (target, source, *slots, pivots, place, starts, middles, pivots[columns], *([where] if where else []))
+    arrays = (target, source, *slots, pivots, place, starts, middles, pivots[columns], where)
     weights = np.array([float(link[2]) for link in links])
     return Program(tuple(np.ascontiguousarray(a, np.int64) for a in arrays), weights, dimension + len(keys), exact)
 
