@@ -6,10 +6,15 @@ beside each stands its error.
 
 from __future__ import annotations
 
+from typing import Any
+
+from numba.extending import intrinsic
+
 from .elementary import atan, cos, exp, expm1, lane_function, log, sin
+from .lane_types import INT64, Lane, constant, vector
 from .lanes import absolute, copysign, fma, minimum, select, sqrt
 
-__all__ = ["acos", "asin", "cosh", "erf", "power", "sinh", "tan"]
+__all__ = ["acos", "asin", "cosh", "erf", "power", "power_of_two", "sinh", "tan"]
 
 ERF = (
     1.1283791670955126, -0.37612638903183543, 0.11283791670945006, -0.02686617064323777, 0.0052239776071164225,
@@ -81,3 +86,16 @@ def erf(x):
 def power(x, y):
     """x**y for x > 0, as exp(y log x): the relative error is that of y log x times |y log x|; NaN for x < 0."""
     return exp(y * log(x))
+
+
+@intrinsic
+def power_of_two(typingctx: Any, value: Any) -> Any:
+    """The largest power of two up to a positive number: its significand cut to 1; NaN becomes infinite."""
+    if not isinstance(value, Lane):
+        return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        whole, mask = vector(INT64, value.width), constant(INT64, value.width, 0x7FF << 52)
+        return builder.bitcast(builder.and_(builder.bitcast(args[0], whole), mask), args[0].type)
+
+    return value(value), lower

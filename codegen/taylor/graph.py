@@ -243,9 +243,8 @@ class Graph:
 
     def term(self, e: sp.Expr) -> Series:
         """A product with a constant, or of series."""
-        factor, rest = self.scaled(e)
-        if factor != ONE:
-            return self.sum([(factor, rest)])
+        if not all(self.moves(f) for f in e.args):
+            return self.sum([self.scaled(e)])
         above = [self.of(f) for f in _sorted(e.args) if not _is_divisor(f)]
         below = [self.of(1 / f) for f in _sorted(e.args) if _is_divisor(f)]
         top = reduce(self.product, above) if above else Constant(ONE)

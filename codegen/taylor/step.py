@@ -29,7 +29,7 @@ SAFETY = 1.0
 FARTHEST = 2.772588722239781
 """The logarithm of how many times longer than `scale` a step may be: 16."""
 
-WORDS = frozenset({"scale", "ratio", "reach", "length", "total", "power", *STARTS.values()})
+WORDS = frozenset({"scale", "ratio", "reach", "length", "total", "raised", "power", *STARTS.values()})
 PREFIXES = ("i_", "e_", "half_", "w_", "n_", "size_")
 """Names of the step; a user's symbol of that name is called otherwise within the step."""
 
@@ -262,10 +262,10 @@ class StepWriter:
             self.put(f"store(y_new, {slot}, n_{name})")
         self.put(f"total = {' + '.join(f'n_{name}' for name in self.names)}", "if DENSE:")
         for k in range(1, p + 1):
-            self.put(f"    power = {'ratio' if k == 1 else 'power*ratio'}")
+            self.put(f"    raised = {'ratio' if k == 1 else 'raised*ratio'}")
             for slot in range(eq.dimension):
                 e = self.state_at(slot, k)
-                value = "0.0*power" if e == ZERO else show(times(e, Name("power")))
+                value = "0.0*raised" if e == ZERO else show(times(e, Name("raised")))
                 self.put(f"    store(dense, {(k - 1) * eq.dimension + slot}, {value})")
         self.put("return length + 0.0*total  # NaN where any coefficient is infinite or NaN")
 

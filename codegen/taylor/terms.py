@@ -75,7 +75,8 @@ class Assign:
 
 def add(*terms: Expr) -> Expr:
     """The sum, without zeros, its numbers together at the end."""
-    number, rest = 0.0, []
+    number = 0.0
+    rest: list[Expr] = []
     for term in _flat(terms):
         if isinstance(term, Number):
             number += term.value
@@ -96,7 +97,8 @@ def _flat(terms: tuple[Expr, ...]) -> Iterator[Expr]:
 
 def times(*factors: Expr) -> Expr:
     """The product; its numbers become one in front."""
-    number, rest = 1.0, []
+    number = 1.0
+    rest: list[Expr] = []
     for factor in factors:
         if isinstance(factor, Number):
             number *= factor.value

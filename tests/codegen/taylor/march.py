@@ -75,13 +75,12 @@ def compiled(equations: Equations, order: int, width: int = 1, dense: bool = Fal
     space = {**SPACE, "WIDTH": width, "DIMENSION": equations.dimension, "DENSE": dense}
     exec(text, space)
     step, load, store, select, broadcast = (space[n] for n in ("step", "load", "store", "select", "broadcast"))
-    size, rows, lane_bits = equations.dimension, order, simd.lane_bits
-    power_of_two = numba_njit(_power_of_two)
+    size, rows, lane_bits, power_of_two = equations.dimension, order, simd.lane_bits, simd.power_of_two
 
     @numba_njit(error_model="numpy")
     def march(t, y, ends, rtol, atol, first):
         y_new, work, scales = np.zeros(size * width), np.zeros(rows * size * width), np.full(width, first)
-        lengths, steps = np.zeros(width), 0
+        steps = 0
         while True:
             now, end = load(t, 0, width), load(ends, 0, width)
             h = step(now, end - now, load(scales, 0, width), y, y, y_new, work, rtol, atol)
@@ -93,10 +92,7 @@ def compiled(equations: Equations, order: int, width: int = 1, dense: bool = Fal
                 store(y, c, select(running, load(y_new, c, width), load(y, c, width)))
             landed = h >= end - now
             store(t, 0, select(landed, end, now + h))
-            store(lengths, 0, h)
-            for lane in range(width):
-                if t[lane] < ends[lane]:
-                    scales[lane] = power_of_two(lengths[lane])
+            store(scales, 0, select(landed, load(scales, 0, width), power_of_two(h)))
 
     @numba_njit(error_model="numpy")
     def once(t, h, scale, y, y_new, work, rtol, atol):
@@ -107,6 +103,3 @@ def compiled(equations: Equations, order: int, width: int = 1, dense: bool = Fal
 
     return Lanes(march, once, equations, width, order)
 
-
-def _power_of_two(x):
-    return 2.0 ** math.floor(math.log2(x))
