@@ -12,6 +12,7 @@ kernel        Step and driver as one Python module that Numba compiles.
 digest        Hash of the text of a kernel, by which the cache finds it.
 record        What a kernel writes: mean errors, section points, trajectories.
 dense output  The polynomial through a step, which gives states between its ends.
+series        Coefficients of the powers of time for one value, and the recurrence that makes them.
 unrolled      Written out node by node; larger networks are looped over their nodes and links.
 golden        A file of expected text in tests/golden, which `pytest --update` writes anew.
 """

@@ -77,7 +77,7 @@ def bottom(i, theta, span, t, h, y, y_new, dense, middle, out, network, dims, pu
         after = gap_of(i, y, out, dims)
         bend, slope = before - 2.0 * least + after, 0.5 * (after - before)
         turn = minimum(maximum(select(bend > 0.0, -slope / bend, 0.0 * bend), -1.0), 1.0)
-        shifted = minimum(maximum(place + part * turn, theta - span), theta + span)
+        shifted = minimum(maximum(place + part * turn, maximum(theta - span, 0.0)), minimum(theta + span, 1.0))
         gap_inside(shifted, t, h, y, y_new, dense, middle, out, network, dims, pushes)
         gap = gap_of(i, y, out, dims)
         better = gap < least
@@ -174,6 +174,32 @@ def take_back(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, 
     short = h <= 100.0 * least
     store(clock, RUSH, select(accept & ~early, select(short, rush + 1.0, 0.0), rush))
     return accept & ~early
+
+
+@njit(error_model="numpy", forceinline=True)
+def stop_at_event(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, pushes):
+    """End the steps that pass an event there: the series says what the state is; returns the lengths of the steps.
+
+    The rows of the dense output are scaled to the shorter step.
+    """
+    theta = first_passage(accept, t, h, y, y_new, dense, middle, out, network, dims, pushes)
+    least = SHORTEST * maximum(t, 1.0)
+    wanted = maximum(theta * h, least)
+    early = accept & (theta < 1.5) & (wanted < h)
+    if any_lane(early):
+        part = select(early, wanted / h, 1.0)
+        for c in range(2 * dims.nodes):
+            store(y_new, c, select(early, inside(part, c, y, y_new, dense, dims), load(y_new, c, WIDTH)))
+        power = part
+        for j in range(dims.dense_rows):
+            for c in range(dims.dimension):
+                row = j * dims.dimension + c
+                store(dense, row, power * load(dense, row, WIDTH))
+            power = power * part
+    rush = load(clock, RUSH, WIDTH)
+    taken = select(early, wanted, h)
+    store(clock, RUSH, select(accept, select(taken <= 100.0 * least, rush + 1.0, 0.0), rush))
+    return taken
 
 
 @njit(error_model="numpy")

@@ -14,6 +14,7 @@ from ..simd.lanes import broadcast
 from ..simd.lanes import load
 from ..simd.lanes import maximum
 from ..simd.lanes import minimum
+from ..simd.lanes import power_of_two
 from ..simd.lanes import select
 from ..simd.lanes import store
 from ..simd.lanes import truncated
@@ -70,6 +71,18 @@ def judge(clock, h, error, power):
     store(clock, CHANGE, select(accept & ~cut_short, change, math.inf))
     store(clock, ACCEPTED, load(clock, ACCEPTED, WIDTH) + select(accept, 1.0, 0.0 * h))
     store(clock, REJECTED, load(clock, REJECTED, WIDTH) + select(accept, 0.0 * h, 1.0))
+    return accept
+
+
+@njit(error_model="numpy", forceinline=True)
+def accept_series(clock, h, limit):
+    """Accept the steps of known length and keep their scale, a power of two; a length of NaN asks for a smaller scale."""
+    accept, scale = h > 0.0, load(clock, STEP, WIDTH)
+    taken = power_of_two(select(accept, h, 1.0))
+    kept = select(h < limit, taken, maximum(scale, taken))  # a step that was cut short says no more than that
+    store(clock, STEP, select(accept, kept, 0.0625 * scale))
+    store(clock, ACCEPTED, load(clock, ACCEPTED, WIDTH) + select(accept, 1.0, 0.0 * scale))
+    store(clock, REJECTED, load(clock, REJECTED, WIDTH) + select(accept, 0.0 * scale, 1.0))
     return accept
 
 

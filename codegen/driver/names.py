@@ -13,6 +13,8 @@ LOOPED = False
 """True if the step loops over nodes and links; it then takes their arrays."""
 CONTACTS = False
 """True if oscillators stick and slip: their third state is the mode, which events change."""
+SERIES = False
+"""True if the step is a Taylor step: it chooses its length, and its dense output is its series."""
 SYNC_ERROR = False
 SECTION = False
 TRAJECTORY = False

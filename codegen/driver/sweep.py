@@ -21,6 +21,7 @@ from ..simd.addresses import address
 from ..simd.lanes import any_lane
 from ..simd.lanes import lane_bits
 from ..simd.lanes import load
+from ..simd.lanes import minimum
 from ..simd.lanes import store
 from .cells import REPEATING
 from .cells import aligned
@@ -36,7 +37,9 @@ from .cells import vacant
 from .cells import vacate
 from .cells import waiting
 from .contacts import change_modes
+from .contacts import stop_at_event
 from .contacts import take_back
+from .control import accept_series
 from .control import advance
 from .control import aim
 from .control import arrive
@@ -46,6 +49,7 @@ from .control import turned
 from .names import CONTACTS
 from .names import LOOPED
 from .names import SECTION
+from .names import SERIES
 from .names import SWITCHING
 from .names import SYNC_ERROR
 from .names import TRAJECTORY
@@ -57,6 +61,7 @@ from .recording import CANCEL
 from .recording import CHANGE
 from .recording import CLOCK
 from .recording import DIRECTION
+from .recording import MAX_STEP
 from .recording import MEMORY
 from .recording import MODE
 from .recording import PERIOD
@@ -64,7 +69,9 @@ from .recording import RTOL
 from .recording import SMOOTH
 from .recording import SMOOTH_STEPS
 from .recording import START
+from .recording import STEP
 from .recording import STIFF
+from .recording import STOP
 from .recording import TIME
 from .recording import cut
 from .recording import observe
@@ -150,6 +157,17 @@ def attempt(mode, clock, y, dense, y_new, middle, out, control, dims, step, step
     """One step of all lanes of a group: times, lengths, the mask of accepted steps and a bound of the eigenvalues."""
     t, h = load(clock, TIME, WIDTH), aim(clock, control)
     power, rate = 1.0 / (dims.error_order + 1.0), h
+    if SERIES:
+        limit = minimum(load(clock, STOP, WIDTH) - t, control[MAX_STEP])
+        if LOOPED:
+            graph, weights = network
+            h = step(t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL], graph, weights)
+        else:
+            h = step(t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL])
+        accept = accept_series(clock, h, limit)
+        if CONTACTS:
+            h = stop_at_event(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, pushes)
+        return t, h, accept, rate
     if SWITCHING:
         if mode == SMOOTH:
             error, rate = step_smooth(t, h, y, y, y_new, dense, control[RTOL], control[ATOL])

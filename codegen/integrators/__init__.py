@@ -26,6 +26,8 @@ class IntegratorKind(StrEnum):
     EXPLICIT = "explicit"
     SWITCHING = "switching"
     """Two methods, of which each cell uses the one that suits its stiffness."""
+    TAYLOR = "taylor"
+    """The power series of the solution, from recurrences."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +93,8 @@ class Integrator:
     smooth: Integrator | None = None
 
     def __post_init__(self) -> None:
-        if self.kind not in (IntegratorKind.ROSENBROCK, IntegratorKind.EXPLICIT):
-            raise ValueError(f"integrator {self.name}: kind {str(self.kind)!r}; expected 'rosenbrock' or 'explicit'")
+        if self.kind is IntegratorKind.SWITCHING:
+            raise ValueError(f"integrator {self.name}: found kind 'switching'; expected that of one method")
         if len(self.a) != len(self.c) or any(len(row) > i for i, row in enumerate(self.a)):
             raise ValueError(f"integrator {self.name}: the tableau is not strictly lower triangular")
         if self.implicit and not self.gamma > 0:
@@ -102,6 +104,16 @@ class Integrator:
     def implicit(self) -> bool:
         """True for a Rosenbrock method, whose stages solve linear systems with the Jacobian."""
         return self.kind == IntegratorKind.ROSENBROCK
+
+    @property
+    def series(self) -> bool:
+        """True for a Taylor method, which has no stages and chooses the length of its steps itself."""
+        return self.kind == IntegratorKind.TAYLOR
+
+    @property
+    def dense_rows(self) -> int:
+        """Coefficients of the dense output for each state variable."""
+        return self.order if self.series else len(self.dense)
 
     @property
     def stages(self) -> int:
@@ -114,13 +126,15 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
 
 
-def integrator(name: str) -> Integrator:
+def integrator(name: str, order: int | None = None) -> Integrator:
     """Return the integrator of a name.
 
     Parameters
     ----------
     name
         One of `names()`.
+    order
+        The order of a Taylor method; the others have one.
 
     Raises
     ------
@@ -130,6 +144,9 @@ def integrator(name: str) -> Integrator:
     if name not in names():
         raise ValueError(f"unknown integrator {name!r}; known: {', '.join(names())}")
     data = importlib.import_module(f".{name}", __name__)
+    if data.KIND == IntegratorKind.TAYLOR:
+        order = data.ORDER if order is None else order
+        return Integrator(name, IntegratorKind.TAYLOR, order, order, order, data.SOURCE, (), (), (), (), ())
     if data.KIND != IntegratorKind.SWITCHING:
         return _read(name, data)
     stiff, smooth = integrator(data.STIFF), integrator(data.SMOOTH)

@@ -35,7 +35,7 @@ from synchain.models.dynamics.equations import Equations
 from ..printing.names import NAMES
 from ..driver import dimensions
 from ..driver.dimensions import Dimensions, ModeDimensions
-from ..simd import addresses, decorator, elementary, lane_types, lanes
+from ..simd import addresses, decorator, elementary, lane_types, lanes, special
 from ..simd.addresses import ADDRESS
 from ..simd.lane_types import Lane
 from .cache import Folder, cache_folder, open_folder
@@ -74,7 +74,8 @@ def signatures(driver: Driver) -> dict[str, Any]:
         own = (_sizes(ModeDimensions), types.int64[::1])
     else:
         lane, sizes = Lane(driver.width), _sizes(Dimensions)
-        step = (lane, lane, *[ADDRESS] * 4, types.float64, types.float64, *more)
+        times = (lane, lane, lane) if driver.series else (lane, lane)
+        step = (*times, *[ADDRESS] * 4, types.float64, types.float64, *more)
         result = types.UniTuple(lane, 2) if driver.switching else lane
         known = {
             "step": result(*step),
@@ -328,7 +329,7 @@ def _surroundings() -> str:
     """Everything besides the text that the machine code depends on."""
     here = [
         Path(m.__file__).read_text(encoding="utf-8")
-        for m in (decorator, addresses, lane_types, lanes, elementary, dimensions)
+        for m in (decorator, addresses, lane_types, lanes, elementary, special, dimensions)
         if m.__file__
     ]
     versions = [sys.version, numba.__version__, importlib.metadata.version("llvmlite"), platform.machine()]

@@ -24,7 +24,8 @@ class KernelKind(StrEnum):
 class Driver:
     """What the text of a driver depends on; scenes that agree in it share its machine code.
 
-    `width` is the number of cells in a register, or of modes in one.
+    `width` is the number of cells in a register, or of modes in one; `series` is True for Taylor steps, which choose
+    their length.
     """
 
     kind: KernelKind
@@ -33,6 +34,7 @@ class Driver:
     looped: bool = False
     switching: bool = False
     contacts: bool = False
+    series: bool = False
 
     @property
     def functions(self) -> tuple[str, ...]:
@@ -60,6 +62,7 @@ class Driver:
             "CONTACTS": self.contacts,
             "SWITCHING": self.switching,
             "LOOPED": self.looped,
+            "SERIES": self.series,
         }
 
     @property

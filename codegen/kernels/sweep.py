@@ -26,6 +26,7 @@ from ..steps.looped import LoopWriter
 from ..steps.program import FILL_LIMIT, Program, program, workspace
 from ..steps.rosenbrock import write_rosenbrock
 from ..steps.step import PAIR, SCALED, StepWriter, function_name, write_function
+from ..taylor import write_step
 from .driver import Driver, KernelKind
 
 __all__ = [
@@ -155,12 +156,19 @@ def emit(
     weight = [edge.weight.name for edge in plain.edges]
     states = [s.name for node in plain.nodes for s in node.state]
     names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
-    blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
-    steps = _steps(plain, blocks, method, elimination)
-    chosen = Driver(KernelKind.SWEEP, width, ordered, looped, method.smooth is not None, plain.sticks)
-    written = section if "section" in ordered else None
-    text = _module(equations, method, chosen, steps, blocks, names, written, elimination)
-    sizes = _dimensions(plain, method, workspace(steps["step"], elimination) if elimination is not None else 0)
+    chosen = Driver(KernelKind.SWEEP, width, ordered, looped, method.smooth is not None, plain.sticks, method.series)
+    functions, lines, scratch = (_series if method.series else _stages)(plain, method, names, elimination)
+    events = [write_pushes(plain, names, looped), _section(equations, plain, section if "section" in ordered else None)]
+    text = "\n\n\n".join([*functions, *(part for part in events if part)]) + "\n"
+    constants = {"WIDTH": width, "DENSE": bool(ordered) or plain.sticks}
+    if elimination is not None:
+        solves = method.implicit or plain.inertial
+        constants |= {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": method.dense_rows}
+        constants |= {"ENTRIES": elimination.entries if solves else 0}
+    head = describe(equations, plain, method, ordered, lines)
+    named = "\n".join(f"{name} = {value!r}" for name, value in constants.items())
+    text = "\n\n\n".join([head, imports(text), named, text])
+    sizes = _dimensions(plain, method, scratch)
     return KernelSource(text, equations, method.name, chosen, sizes, weights or (1,) * equations.n, elimination)
 
 
@@ -169,31 +177,29 @@ def default_width(equations: Equations) -> int:
     return lanes.native_width(2 if equations.dimension <= 2 else 1)
 
 
-def _module(
-    equations: Equations,
-    method: Integrator,
-    chosen: Driver,
-    steps: dict[str, StepWriter],
-    blocks: list[NodeBlocks],
-    names: Names,
-    section: sp.Expr | None,
-    elimination: Program | None,
-) -> str:
-    looped, plain = elimination is not None, steps["step"].equations
-    lines = [line for writer in steps.values() for line in writer.lines]
+def _series(
+    plain: Equations, method: Integrator, names: Names, elimination: Program | None
+) -> tuple[list[str], list[str], int]:
+    """The function of a Taylor step; its statements, and the groups of scratch memory that it needs."""
+    if elimination is not None:
+        raise ValueError(f"integrator taylor: found {plain.n} nodes; expected at most {LARGEST_UNROLLED}; use dop853")
+    text = write_step(plain, method.order).text
+    return [text], text.splitlines(), 0
+
+
+def _stages(
+    plain: Equations, method: Integrator, names: Names, elimination: Program | None
+) -> tuple[list[str], list[str], int]:
+    """The functions of a step in stages; the statements of the steps, and the groups of scratch memory they need."""
+    blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
+    steps = _steps(plain, blocks, method, elimination)
+    looped = elimination is not None
     functions = [f for k in range(len(blocks)) for f in node_functions(list(steps.values()), blocks[k], k)]
     made = ["\n".join(f) for f in functions]
     made += [SCALED, *([PAIR, driver.text("sparse")] if looped else [])]
     made += [_step(name, writer.lines, looped) for name, writer in steps.items()]
-    made += [write_pushes(plain, names, looped), _section(equations, plain, section)]
-    text = "\n\n\n".join(part for part in made if part) + "\n"
-    constants = {"WIDTH": chosen.width, "DENSE": bool(chosen.records) or plain.sticks}
-    if elimination is not None:
-        solves = method.implicit or plain.inertial
-        constants |= {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": len(method.dense)}
-        constants |= {"ENTRIES": elimination.entries if solves else 0}
-    head = describe(equations, plain, method, chosen.records, lines)
-    return "\n\n\n".join([head, imports(text), "\n".join(f"{k} = {v!r}" for k, v in constants.items()), text])
+    lines = [line for writer in steps.values() for line in writer.lines]
+    return made, lines, workspace(steps["step"], elimination) if elimination is not None else 0
 
 
 def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimensions:
@@ -203,7 +209,7 @@ def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimension
         components=len(plain.compared),
         dimension=plain.dimension,
         parameters=len(plain.parameters),
-        dense_rows=max(len(m.dense) for m in methods),
+        dense_rows=max(m.dense_rows for m in methods),
         workspace=scratch,
         error_order=method.error_order,
         smooth_error_order=0 if method.smooth is None else method.smooth.error_order,

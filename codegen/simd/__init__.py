@@ -11,5 +11,7 @@ from .elementary import *  # noqa: F403
 from .elementary import __all__ as _elementary
 from .lanes import *  # noqa: F403
 from .lanes import __all__ as _lanes
+from .special import *  # noqa: F403
+from .special import __all__ as _special
 
-__all__ = [*_elementary, *_lanes, "address", "njit"]
+__all__ = [*_elementary, *_lanes, *_special, "address", "njit"]

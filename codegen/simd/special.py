@@ -1,0 +1,101 @@
+"""Further elementary functions of lanes, which Taylor steps call once a step: for their first coefficients alone.
+
+They are made of those in codegen/simd/elementary.py.  `ERF` and `ERFCX` are our own Chebyshev fits in 40-digit arithmetic;
+beside each stands its error.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba.extending import intrinsic
+
+from .elementary import atan, cos, exp, expm1, lane_function, log, sin
+from .lane_types import INT64, Lane, constant, vector
+from .lanes import absolute, copysign, fma, minimum, select, sqrt
+
+__all__ = ["acos", "asin", "cosh", "erf", "power", "power_of_two", "sinh", "tan"]
+
+ERF = (
+    1.1283791670955126, -0.37612638903183543, 0.11283791670945006, -0.02686617064323777, 0.0052239776071164225,
+    -0.0008548325975389692, 0.00012055294904839707, -1.492473690741966e-05, 1.6447424703317362e-06,
+    -1.6208483801871705e-07, 1.3720064546777686e-08, -7.795898827002142e-10,
+)  # fmt: skip
+"""erf(x)/x in powers of x**2 on [0, 1]; error 7.4e-18."""
+ERFCX = (
+    0.25539567631050575, -0.4271858474139584, 0.24165819424246646, -0.07897858101573213, 0.003732892404327764,
+    0.006997461739200444, -0.0008471432509203844, -0.000981977026567889, 4.355560219515472e-05, 0.00017436116545392264,
+    2.7525480361206068e-05, -2.7579864674305787e-05, -1.396807230177146e-05, 1.392621183618803e-06,
+    3.789215643758464e-06, 1.1780775215625583e-06, -5.322696855655786e-07, -4.215301054238321e-07,
+)  # fmt: skip
+"""exp(x**2) erfc(x) in powers of (x - 2)/(x + 2) for x on [1, 6]; error 2.4e-19."""
+
+
+@lane_function
+def tan(x):
+    """Tangent; accurate like sine and cosine."""
+    return sin(x) / cos(x)
+
+
+@lane_function
+def sinh(x):
+    """Hyperbolic sine; infinite above 709.8."""
+    size = absolute(x)
+    e = expm1(select(size < 1.0, size, 0.0))
+    large = exp(size)
+    return copysign(select(size < 1.0, 0.5 * (e + e / (e + 1.0)), 0.5 * large - 0.5 / large), x)
+
+
+@lane_function
+def cosh(x):
+    """Hyperbolic cosine; infinite above 709.8."""
+    large = exp(absolute(x))
+    return 0.5 * large + 0.5 / large
+
+
+@lane_function
+def asin(x):
+    """Inverse sine; NaN beyond [-1, 1]."""
+    return atan(x / sqrt((1.0 - x) * (1.0 + x)))
+
+
+@lane_function
+def acos(x):
+    """Inverse cosine; NaN beyond [-1, 1]."""
+    return 2.0 * atan(sqrt((1.0 - x) / (1.0 + x)))
+
+
+@lane_function
+def erf(x):
+    """Error function."""
+    size = absolute(x)
+    z = x * x
+    small = z * 0.0 + ERF[11]
+    for k in range(10, -1, -1):
+        small = fma(small, z, ERF[k])
+    far = minimum(size, 6.0)
+    t = (far - 2.0) / (far + 2.0)
+    large = t * 0.0 + ERFCX[17]
+    for k in range(16, -1, -1):
+        large = fma(large, t, ERFCX[k])
+    large = 1.0 - exp(-far * far) * large
+    return select(x == x, select(size < 1.0, small * x, copysign(large, x)), x)
+
+
+@lane_function
+def power(x, y):
+    """x**y for x > 0, as exp(y log x): the relative error is that of y log x times |y log x|; NaN for x < 0."""
+    return exp(y * log(x))
+
+
+@intrinsic
+def power_of_two(typingctx: Any, value: Any) -> Any:
+    """The largest power of two up to a positive number: its significand cut to 1; NaN becomes infinite."""
+    if not isinstance(value, Lane):
+        return None
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        whole, mask = vector(INT64, value.width), constant(INT64, value.width, 0x7FF << 52)
+        return builder.bitcast(builder.and_(builder.bitcast(args[0], whole), mask), args[0].type)
+
+    return value(value), lower

@@ -1,0 +1,8 @@
+"""Steps of Taylor methods: recurrences of power series straight from expressions; neither the driver nor the disk."""
+
+from __future__ import annotations
+
+from .order import order_for
+from .step import TaylorStep, write_step
+
+__all__ = ["TaylorStep", "order_for", "write_step"]

@@ -1,0 +1,350 @@
+"""From the right-hand sides of equations to series: one graph, in which equal subexpressions are one series.
+
+A template of a node or a link is read for each of them in the same way, so that equal oscillators have equal bits.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+
+import sympy as sp
+from sympy.functions.elementary.piecewise import Piecewise
+
+from ..printing.blocks import Names
+from ..printing.printer import show
+from .series import (
+    Constant,
+    Integral,
+    Linear,
+    Power,
+    Product,
+    QuotientIntegral,
+    Ratio,
+    Series,
+    Slope,
+    Square,
+    SquareRoot,
+)  # fmt: skip
+from .terms import ONE, ZERO, Expr, Name, Number, add, times
+from .terms import Product as Factors
+
+__all__ = ["STARTS", "Graph", "Template"]
+
+STARTS: dict[type[sp.Expr], str] = {
+    sp.exp: "exp", sp.log: "log", sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.sinh: "sinh", sp.cosh: "cosh",
+    sp.tanh: "tanh", sp.atan: "atan", sp.asin: "asin", sp.acos: "acos", sp.erf: "erf",
+}  # fmt: skip
+"""The analytic functions, and the function of lanes that gives the first coefficient.
+
+The others follow from the derivative that SymPy knows.
+"""
+
+ODD = (sp.sin, sp.tan, sp.sinh, sp.tanh, sp.atan, sp.asin, sp.erf)
+EVEN = (sp.cos, sp.cosh)
+
+KINKED = (sp.Abs, sp.sign, sp.Max, sp.Min, Piecewise, sp.floor, sp.ceiling, sp.Heaviside)
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """Expressions with their repeated parts named: statements first, results last."""
+
+    statements: tuple[tuple[sp.Symbol, sp.Expr], ...]
+    results: tuple[sp.Expr, ...]
+
+    @classmethod
+    def of(cls, expressions: Sequence[sp.Expr], moving: Iterable[sp.Symbol], supply: Iterator[sp.Symbol]) -> Template:
+        """Share the repeated parts under names of the supply; ValueError for functions of `moving` symbols that are not analytic."""
+        symbols = frozenset(moving)
+        parts = {part for e in expressions for part in e.atoms(*KINKED) if part.free_symbols & symbols}
+        for part in sorted(parts, key=sp.default_sort_key):
+            raise ValueError(
+                f"taylor: a function that is not analytic; found {part}; expected analytic functions; "
+                f"use integrator dop853 or rodas5p"
+            )
+        shared, reduced = sp.cse(expressions, symbols=supply, order="canonical")
+        constant: dict[sp.Symbol, sp.Expr] = {}
+        statements = []
+        for symbol, e in shared:
+            e = e.xreplace(constant)
+            if e.free_symbols & symbols:
+                symbols |= {symbol}
+                statements.append((symbol, e))
+            else:
+                constant[symbol] = e
+        return cls(tuple(statements), tuple(e.xreplace(constant) for e in reduced))
+
+
+class Graph:
+    """Makes series of templates; `names` supplies what they are called.
+
+    Attributes
+    ----------
+    series : list of Series
+        All that were made, each behind those whose coefficients of the same order it needs.
+    inline, inline_start : set of Series
+        Those whose coefficients, or first coefficients, are written where they are used.
+    constants : dict
+        What depends on parameters alone, by the name under which it is computed once.
+    """
+
+    def __init__(self, names: Names) -> None:
+        self.series: list[Series] = []
+        self.inline: set[Series] = set()
+        self.inline_start: set[Series] = set()
+        self.constants: dict[str, sp.Expr] = {}
+        self.known: dict[tuple[object, ...], Series] = {}
+        self.numbers: dict[Series, int] = {}
+        self.fixed: dict[sp.Expr, Name] = {}
+        self.supplies = {what: names.fresh(what) for what in ("p", *_words())}
+        self.moving: dict[sp.Symbol, Series] = {}
+        self.swap: dict[sp.Symbol, sp.Expr] = {}
+        self.made: dict[sp.Expr, Series] = {}
+
+    def read(
+        self, template: Template, moving: Mapping[sp.Symbol, Series], swap: Mapping[sp.Symbol, sp.Expr]
+    ) -> list[Series]:
+        """The series of a template's results; `moving` symbols stand for series, constant ones are swapped."""
+        self.moving, self.swap, self.made = dict(moving), dict(swap), {}
+        for symbol, e in template.statements:
+            self.moving[symbol] = self.of(e)
+        return [self.of(e) for e in template.results]
+
+    def settle(self, roots: Sequence[Series]) -> None:
+        """Leave out what no root needs, name the rest, and find sums that are used once."""
+        needed, open_ends = set[Series](), list(roots)
+        while open_ends:
+            s = open_ends.pop()
+            if s not in needed:
+                needed.add(s)
+                open_ends += [*s.linear, *s.convolved, *s.started]
+        self.series = [s for s in self.series if s in needed]
+        uses = Counter([*roots, *(used for s in self.series for used in s.linear)])
+        starts = uses + Counter(used for s in self.series for used in s.started)
+        convolved = {used for s in self.series for used in s.convolved}
+        for s in self.series:
+            s.name = s.name or self.fresh(type(s).__name__.lower())
+            if isinstance(s, Linear | Slope) and s not in convolved:
+                if uses[s] < 2:
+                    self.inline.add(s)
+                if starts[s] < 2:
+                    self.inline_start.add(s)
+
+    def fresh(self, what: str) -> str:
+        """A name that is not yet taken."""
+        return next(self.supplies[what]).name
+
+    # -- series that are made once ----------------------------------------------------------------------------
+
+    def put(self, kind: type[Series], *parts: object) -> Series:
+        """The series of this kind with these parts."""
+        key = (kind, *parts)
+        if key not in self.known:
+            self.known[key] = kind(*parts)
+            self.series.append(self.known[key])
+        return self.known[key]
+
+    def sum(self, terms: Sequence[tuple[Expr, Series]], constant: Expr = ZERO) -> Series:
+        """constant + sum of factor * series; a difference and its negative share a series."""
+        pairs = []
+        for factor, series in terms:
+            if isinstance(series, Constant):
+                constant = add(constant, times(factor, series.value))
+            else:
+                own, inner = split(series)
+                pairs.append((times(factor, own), inner))
+        if not pairs:
+            return Constant(constant)
+        if len(pairs) == 1 and pairs[0][0] == ONE and constant == ZERO:
+            return pairs[0][1]
+        if len(pairs) == 2 and constant == ZERO and all(isinstance(factor, Number) for factor, _ in pairs):
+            pairs.sort(key=lambda pair: self.number(pair[1]))
+            if _negative(pairs[0][0]):
+                turned = tuple((times(Number(-1.0), factor), series) for factor, series in pairs)
+                return self.put(Linear, ((Number(-1.0), self.put(Linear, turned, ZERO)),), ZERO)
+        return self.put(Linear, tuple(pairs), constant)
+
+    def number(self, series: Series) -> int:
+        """The place of a series among those that have been asked for it."""
+        return self.numbers.setdefault(series, len(self.numbers))
+
+    def product(self, left: Series, right: Series) -> Series:
+        """left * right, constant factors in front."""
+        if isinstance(left, Constant):
+            return self.sum([(left.value, right)])
+        if isinstance(right, Constant):
+            return self.sum([(right.value, left)])
+        (a, left), (b, right) = split(left), split(right)
+        inner = self.put(Square, left) if left is right else self.put(Product, left, right)
+        return self.sum([(times(a, b), inner)])
+
+    def ratio(self, above: Series, below: Series) -> Series:
+        """above / below."""
+        return self.put(Ratio, above, below)
+
+    def slope(self, series: Series) -> Slope:
+        """The derivative of a series."""
+        found = self.put(Slope, series)
+        if not isinstance(found, Slope):
+            raise TypeError(f"found {found}; expected a slope")
+        return found
+
+    # -- expressions ------------------------------------------------------------------------------------------
+
+    def moves(self, e: sp.Expr) -> bool:
+        """True if an expression changes within a step."""
+        return any(s in self.moving for s in e.free_symbols)
+
+    def of(self, e: sp.Expr) -> Series:
+        """The series of an expression."""
+        if e not in self.made:
+            self.made[e] = self.make(e)
+        return self.made[e]
+
+    def make(self, e: sp.Expr) -> Series:
+        if not self.moves(e):
+            return Constant(self.constant(e.xreplace(self.swap)))
+        if e.is_Symbol:
+            return self.moving[e]
+        if e.is_Add:
+            parts = [self.scaled(a) for a in e.args if self.moves(a)]
+            rest = sp.Add(*(a for a in e.args if not self.moves(a)))
+            return self.sum(parts, self.constant(rest.xreplace(self.swap)))
+        if e.is_Mul:
+            return self.term(e)
+        if e.is_Pow:
+            return self.power(e.base, e.exp)
+        return self.function(e)
+
+    def constant(self, e: sp.Expr) -> Expr:
+        """What does not change within a step: a number, a parameter or a name for what is computed once."""
+        if e.is_number:
+            return Number(float(e if e.is_Rational else e.evalf(30)))
+        if e.is_Symbol:
+            return Name(e.name)
+        number, rest = e.as_coeff_Mul()
+        if number != 1:
+            return times(self.constant(number), self.constant(rest))
+        if e not in self.fixed:
+            plain = printable(e)
+            show(plain)  # refuses what cannot be printed
+            name = self.fresh("p")
+            self.constants[name], self.fixed[e] = plain, Name(name)
+        return self.fixed[e]
+
+    def scaled(self, e: sp.Expr) -> tuple[Expr, Series]:
+        """Constant factor and series of a term."""
+        factors = sp.Mul.make_args(e)
+        constant = sp.Mul(*(f for f in factors if not self.moves(f)))
+        return self.constant(constant.xreplace(self.swap)), self.of(sp.Mul(*(f for f in factors if self.moves(f))))
+
+    def term(self, e: sp.Expr) -> Series:
+        """A product with a constant, or of series."""
+        if not all(self.moves(f) for f in e.args):
+            return self.sum([self.scaled(e)])
+        above = [self.of(f) for f in _sorted(e.args) if not _is_divisor(f)]
+        below = [self.of(1 / f) for f in _sorted(e.args) if _is_divisor(f)]
+        top = reduce(self.product, above) if above else Constant(ONE)
+        return self.ratio(top, reduce(self.product, below)) if below else top
+
+    def power(self, base: sp.Expr, exponent: sp.Expr) -> Series:
+        if self.moves(exponent):
+            return self.of(sp.exp(exponent * sp.log(base), evaluate=False))
+        if not (2 * exponent).is_Integer:
+            inner = self.of(base)
+            return self.put(Power, inner, self.slope(inner), self.constant(exponent.xreplace(self.swap)))
+        if exponent.is_negative:
+            return self.ratio(Constant(ONE), self.of(base**-exponent))
+        if exponent == sp.S.Half:
+            return self.put(SquareRoot, self.of(base))
+        if not exponent.is_Integer:
+            return self.product(self.of(base ** (exponent - sp.S.Half)), self.of(sp.sqrt(base)))
+        half = self.of(base ** (exponent // 2))
+        return (
+            self.product(half, half)
+            if exponent % 2 == 0
+            else self.product(self.of(base ** (exponent - 1)), self.of(base))
+        )
+
+    def function(self, e: sp.Expr) -> Series:
+        """A function of one argument, even and odd ones of the argument without its sign."""
+        if type(e) not in STARTS:
+            known = ", ".join(sorted(STARTS.values()))
+            raise ValueError(f"taylor: no recurrence for {type(e).__name__} in {e}; known: {known}, sqrt, powers")
+        argument = self.of(e.args[0])
+        factor, inner = split(argument)
+        if factor == Number(-1.0) and type(e) in (*ODD, *EVEN):
+            found = self.solved(type(e), inner)
+            return found if type(e) in EVEN else self.sum([(factor, found)])
+        return self.solved(type(e), argument)
+
+    def solved(self, function: type[sp.Expr], argument: Series) -> Series:
+        """A function of a series, by the differential equation that its derivative makes."""
+        name, key = STARTS[function], (function, argument)
+        if key in self.known:
+            return self.known[key]
+        place = sp.Dummy("a", real=True)
+        derivative = function(place).diff(place)
+        number = sp.Mul(*(f for f in sp.Mul.make_args(derivative) if f.is_number))
+        derivative = derivative / number
+        value = float(number.evalf(30))
+        if _is_divisor(derivative):
+            divisor = self.inside(1 / derivative, place, argument)
+            quotient = QuotientIntegral(name, argument, divisor, value, name=self.fresh(name))
+            self.known[key] = quotient
+            self.series.append(quotient)
+            quotient.slope = self.slope(quotient)
+            return quotient
+        integral = Integral(name, argument, self.slope(argument), value, name=self.fresh(name))
+        self.known[key] = integral
+        self.series.append(integral)
+        integral.factor = self.inside(derivative, place, argument)
+        return integral
+
+    def inside(self, e: sp.Expr, place: sp.Symbol, argument: Series) -> Series:
+        """The series of an expression in one symbol that stands for a series."""
+        outer, self.moving, self.made = (self.moving, self.made), {place: argument}, {}
+        found = self.of(e)
+        self.moving, self.made = outer
+        return found
+
+
+def split(series: Series) -> tuple[Expr, Series]:
+    """The constant factor of a series and the rest."""
+    if isinstance(series, Linear) and len(series.terms) == 1 and series.constant == ZERO:
+        return series.terms[0]
+    return ONE, series
+
+
+def printable(e: sp.Expr) -> sp.Expr:
+    """The same constant by functions that kernels print."""
+    e = e.replace(lambda p: p.is_Pow and not _is_plain(p), lambda p: sp.exp(p.exp * sp.log(p.base)))
+    e = e.replace(sp.sinh, lambda a: (sp.exp(a) - sp.exp(-a)) / 2)
+    e = e.replace(sp.cosh, lambda a: (sp.exp(a) + sp.exp(-a)) / 2)
+    return e.replace(sp.tan, lambda a: sp.sin(a) / sp.cos(a))
+
+
+def _is_plain(e: sp.Expr) -> bool:
+    """True for a power that the printer knows."""
+    return bool(e.base == sp.E or (2 * e.exp).is_Integer)
+
+
+def _is_divisor(e: sp.Expr) -> bool:
+    return bool(e.is_Pow and e.exp.is_number and e.exp.is_negative and (2 * e.exp).is_Integer)
+
+
+def _sorted(factors: Iterable[sp.Expr]) -> list[sp.Expr]:
+    return sorted(factors, key=sp.default_sort_key)
+
+
+def _negative(e: Expr) -> bool:
+    return (isinstance(e, Number) and e.value < 0.0) or (isinstance(e, Factors) and e.number < 0.0)
+
+
+def _words() -> tuple[str, ...]:
+    """What names of series begin with."""
+    kinds = (Linear, Power, Product, Ratio, Slope, Square, SquareRoot)
+    return (*(kind.__name__.lower() for kind in kinds), *STARTS.values())

@@ -1,0 +1,315 @@
+"""Power series in time and the recurrences of their coefficients.
+
+Coefficient k of a series is that of ((t' - t)/scale)**k, t' the time within the step.  Every recurrence below is
+homogeneous in `scale`, so that only the states and time itself know it.
+
+A recurrence is written once.  It asks an `Order` for coefficients and convolutions: the straight-line writer answers with
+sums of names at a certain k, the looped one with loops over orders.
+
+Sources: R. E. Moore, Methods and Applications of Interval Analysis (SIAM, 1979), section 3.4; A. Griewank & A. Walther,
+Evaluating Derivatives (2nd ed., SIAM, 2008), section 13.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from .terms import ONE, ZERO, Call, Expr, Name, Number, add, over, times
+
+__all__ = ["Constant", "Integral", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio", "Series",
+           "Slope", "Square", "SquareRoot", "State", "Time"]  # fmt: skip
+
+
+class Order(Protocol):
+    """What a recurrence can ask for while coefficient k > 0 is made."""
+
+    @property
+    def inverse(self) -> Expr:
+        """1/k."""
+
+    @property
+    def number(self) -> Expr:
+        """k."""
+
+    def of(self, series: Series) -> Expr:
+        """Coefficient k of a series."""
+
+    def start(self, series: Series) -> Expr:
+        """Coefficient 0 of a series."""
+
+    def sum(self, left: Series, right: Series, first: int, last: int) -> Expr:
+        """Sum of left_j * right_(k-j) for j = first … k + last."""
+
+    def square(self, base: Series, first: int) -> Expr:
+        """Sum of base_j * base_(k-j) for j = first … k - first."""
+
+
+class Start(Protocol):
+    """What a series can ask for while coefficient 0 is made."""
+
+    def start(self, series: Series) -> Expr:
+        """Coefficient 0 of a series."""
+
+    def keep(self, what: str, value: Expr) -> str:
+        """Compute something once; returns its name."""
+
+
+@dataclass(eq=False, slots=True)
+class Series:
+    """A power series under a name.
+
+    `linear` are the series of which coefficient k enters its own coefficient k once, `convolved` those that it multiplies,
+    `started` those of which it needs the coefficient 0 alone.
+    """
+
+    name: str = field(default="", kw_only=True)
+
+    @property
+    def linear(self) -> tuple[Series, ...]:
+        return ()
+
+    @property
+    def convolved(self) -> tuple[Series, ...]:
+        return ()
+
+    @property
+    def started(self) -> tuple[Series, ...]:
+        return ()
+
+    def begin(self, at: Start) -> Expr:
+        """Coefficient 0."""
+        raise NotImplementedError
+
+    def coefficient(self, at: Order) -> Expr:
+        """Coefficient k > 0."""
+        raise NotImplementedError
+
+
+@dataclass(eq=False, slots=True)
+class Constant(Series):
+    """A number, or what depends on parameters alone."""
+
+    value: Expr
+
+    def begin(self, at: Start) -> Expr:
+        return self.value
+
+    def coefficient(self, at: Order) -> Expr:
+        return ZERO
+
+
+@dataclass(eq=False, slots=True)
+class State(Series):
+    """A state variable: its coefficient k comes from coefficient k - 1 of its rate, outside this file."""
+
+    rate: Series | None = None
+
+
+@dataclass(eq=False, slots=True)
+class Time(Series):
+    """Time: t, scale, 0, 0, …"""
+
+
+@dataclass(eq=False, slots=True)
+class Linear(Series):
+    """constant + sum of factor * series."""
+
+    terms: tuple[tuple[Expr, Series], ...]
+    constant: Expr = ZERO
+
+    @property
+    def linear(self) -> tuple[Series, ...]:
+        return tuple(series for _, series in self.terms)
+
+    def begin(self, at: Start) -> Expr:
+        return add(*(times(factor, at.start(series)) for factor, series in self.terms), self.constant)
+
+    def coefficient(self, at: Order) -> Expr:
+        return add(*(times(factor, at.of(series)) for factor, series in self.terms))
+
+
+@dataclass(eq=False, slots=True)
+class Product(Series):
+    """left * right."""
+
+    left: Series
+    right: Series
+
+    @property
+    def convolved(self) -> tuple[Series, ...]:
+        return self.left, self.right
+
+    def begin(self, at: Start) -> Expr:
+        return times(at.start(self.left), at.start(self.right))
+
+    def coefficient(self, at: Order) -> Expr:
+        return at.sum(self.left, self.right, 0, 0)
+
+
+@dataclass(eq=False, slots=True)
+class Square(Series):
+    """base**2, by half the products."""
+
+    base: Series
+
+    @property
+    def convolved(self) -> tuple[Series, ...]:
+        return (self.base,)
+
+    def begin(self, at: Start) -> Expr:
+        return times(at.start(self.base), at.start(self.base))
+
+    def coefficient(self, at: Order) -> Expr:
+        return at.square(self.base, 0)
+
+
+@dataclass(eq=False, slots=True)
+class SquareRoot(Series):
+    """u = sqrt(a) from u u = a."""
+
+    base: Series
+    inverse: str = ""
+
+    @property
+    def linear(self) -> tuple[Series, ...]:
+        return (self.base,)
+
+    @property
+    def convolved(self) -> tuple[Series, ...]:
+        return (self,)
+
+    def begin(self, at: Start) -> Expr:
+        root = Call("sqrt", (at.start(self.base),))
+        self.inverse = at.keep(f"half_{self.name}", over(Number(0.5), root))
+        return root
+
+    def coefficient(self, at: Order) -> Expr:
+        return times(add(at.of(self.base), times(Number(-1.0), at.square(self, 1))), Name(self.inverse))
+
+
+@dataclass(eq=False, slots=True)
+class Ratio(Series):
+    """u = a/b from u b = a."""
+
+    above: Series
+    below: Series
+    inverse: str = ""
+
+    @property
+    def linear(self) -> tuple[Series, ...]:
+        return (self.above,)
+
+    @property
+    def convolved(self) -> tuple[Series, ...]:
+        return self, self.below
+
+    def begin(self, at: Start) -> Expr:
+        self.inverse = at.keep(f"i_{self.below.name}", over(ONE, at.start(self.below)))
+        return times(at.start(self.above), Name(self.inverse))
+
+    def coefficient(self, at: Order) -> Expr:
+        known = at.sum(self.below, self, 1, 0)
+        return times(add(at.of(self.above), times(Number(-1.0), known)), Name(self.inverse))
+
+
+@dataclass(eq=False, slots=True)
+class Slope(Series):
+    """k a_k, the coefficients of a' times (t' - t)."""
+
+    of: Series
+
+    @property
+    def linear(self) -> tuple[Series, ...]:
+        return (self.of,)
+
+    def begin(self, at: Start) -> Expr:
+        return ZERO
+
+    def coefficient(self, at: Order) -> Expr:
+        return times(at.number, at.of(self.of))
+
+
+@dataclass(eq=False, slots=True)
+class Integral(Series):
+    """u = f(a) from u' = c g a' with f'(a) = c g, c a number: exp, sin, tan, sinh, tanh, erf and the like.
+
+    The factor g is set after the series was made, because it may hold u itself.
+    """
+
+    function: str
+    argument: Series
+    slope: Slope
+    number: float = 1.0
+    factor: Series | None = None
+
+    @property
+    def convolved(self) -> tuple[Series, ...]:
+        return (self.slope,) if self.factor is None else (self.slope, self.factor)
+
+    @property
+    def started(self) -> tuple[Series, ...]:
+        return (self.argument,)
+
+    def begin(self, at: Start) -> Expr:
+        return Call(self.function, (at.start(self.argument),))
+
+    def coefficient(self, at: Order) -> Expr:
+        if self.factor is None:
+            raise RuntimeError(f"{self.name} has no derivative yet; this is a mistake in the program")
+        return times(Number(self.number), at.inverse, at.sum(self.slope, self.factor, 1, 0))
+
+
+@dataclass(eq=False, slots=True)
+class QuotientIntegral(Series):
+    """u = f(a) from u' w = c a' with f'(a) = c/w, c a number: log, atan, asin, acos and the like."""
+
+    function: str
+    argument: Series
+    divisor: Series
+    sign: float
+    slope: Slope | None = None
+    inverse: str = ""
+
+    @property
+    def linear(self) -> tuple[Series, ...]:
+        return (self.argument,)
+
+    @property
+    def convolved(self) -> tuple[Series, ...]:
+        return (self.divisor,) if self.slope is None else (self.slope, self.divisor)
+
+    def begin(self, at: Start) -> Expr:
+        self.inverse = at.keep(f"i_{self.divisor.name}", over(ONE, at.start(self.divisor)))
+        return Call(self.function, (at.start(self.argument),))
+
+    def coefficient(self, at: Order) -> Expr:
+        if self.slope is None:
+            raise RuntimeError(f"{self.name} has no slope yet; this is a mistake in the program")
+        known = times(Number(-1.0), at.inverse, at.sum(self.slope, self.divisor, 1, -1))
+        return times(add(times(Number(self.sign), at.of(self.argument)), known), Name(self.inverse))
+
+
+@dataclass(eq=False, slots=True)
+class Power(Series):
+    """u = a**e for a constant e, from a u' = e a' u."""
+
+    base: Series
+    slope: Slope
+    exponent: Expr
+    inverse: str = ""
+    beyond: str = ""
+
+    @property
+    def convolved(self) -> tuple[Series, ...]:
+        return self, self.slope, self.base
+
+    def begin(self, at: Start) -> Expr:
+        base = at.start(self.base)
+        self.inverse = at.keep(f"i_{self.base.name}", over(ONE, base))
+        self.beyond = at.keep(f"e_{self.name}", add(self.exponent, ONE))
+        return Call("power", (base, self.exponent))
+
+    def coefficient(self, at: Order) -> Expr:
+        grown = times(at.inverse, Name(self.beyond), at.sum(self.slope, self, 1, 0))
+        return times(add(grown, times(Number(-1.0), at.sum(self.base, self, 1, 0))), Name(self.inverse))

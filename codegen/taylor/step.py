@@ -1,0 +1,355 @@
+"""The text of a Taylor step, written out for a small network.
+
+The step length is that of A. Jorba & M. Zou, Experimental Mathematics 14, 99 (2005), section 3.2, from the last three
+coefficients, so that no series that has zeros at every second or third place is taken for an exact one.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import TIME
+
+from ..printing.blocks import Names
+from ..printing.printer import show as show_constant
+from .graph import STARTS, Graph, Template
+from .series import Constant, Series, State, Time
+from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
+
+__all__ = ["SAFETY", "TaylorStep", "write_step"]
+
+SAFETY = 1.0
+"""Largest share of the tolerance that the last terms of the series may take in a step."""
+
+FARTHEST = 2.772588722239781
+"""The logarithm of how many times longer than `scale` a step may be: 16."""
+
+WORDS = frozenset({"scale", "ratio", "reach", "length", "total", "raised", "power", *STARTS.values()})
+PREFIXES = ("i_", "e_", "half_", "w_", "n_", "size_")
+"""Names of the step; a user's symbol of that name is called otherwise within the step."""
+
+COUNTED = re.compile(r"r\d+$")
+
+
+@dataclass(frozen=True, slots=True)
+class TaylorStep:
+    """The text of the function `step`, the order of its series, which is the number of rows of its dense output, and the
+    functions of `synchain.codegen.simd` that it calls.
+    """
+
+    text: str
+    order: int
+    imports: tuple[str, ...]
+
+
+@dataclass(slots=True)
+class Written:
+    """Coefficients that were made so far, as names and numbers; it is the `Order` and the `Start` of straight lines."""
+
+    values: dict[tuple[Series, int], Expr]
+    kept: dict[str, Expr]
+    lines: list[Assign]
+    k: int = 0
+
+    # -- what a recurrence asks for -------------------------------------------------------------------------------
+
+    @property
+    def inverse(self) -> Expr:
+        """1/k."""
+        return Number(1.0 / self.k)
+
+    @property
+    def number(self) -> Expr:
+        """k."""
+        return Number(float(self.k))
+
+    def at(self, series: Series, j: int) -> Expr:
+        """Coefficient j of a series."""
+        if isinstance(series, Constant):
+            return ZERO if j else series.value
+        return self.values[series, j]
+
+    def of(self, series: Series) -> Expr:
+        """Coefficient k of a series."""
+        return self.at(series, self.k)
+
+    def start(self, series: Series) -> Expr:
+        """Coefficient 0 of a series."""
+        return self.at(series, 0)
+
+    def sum(self, left: Series, right: Series, first: int, last: int) -> Expr:
+        """Sum of left_j * right_(k-j) for j = first … k + last."""
+        k = self.k
+        return add(*(times(self.at(left, j), self.at(right, k - j)) for j in range(first, k + last + 1)))
+
+    def square(self, base: Series, first: int) -> Expr:
+        """Sum of base_j * base_(k-j) for j = first … k - first, pairs of equal products once."""
+        k = self.k
+        half = add(*(times(self.at(base, j), self.at(base, k - j)) for j in range(first, (k + 1) // 2)))
+        middle = self.at(base, k // 2) if k % 2 == 0 and k // 2 >= first else ZERO
+        return add(times(Number(2.0), half), times(middle, middle))
+
+    def keep(self, what: str, value: Expr) -> str:
+        """Compute something once; returns its name."""
+        if what not in self.kept:
+            self.kept[what] = value
+            self.lines.append(Assign(what, value))
+        return what
+
+    # -- statements -----------------------------------------------------------------------------------------------
+
+    def put(self, series: Series, value: Expr, inline: bool = False) -> None:
+        """Name a coefficient, unless it is a name or a number or is written where it is used."""
+        if not inline and not isinstance(value, Name | Number):
+            name = f"{series.name}_{self.k}"
+            self.lines.append(Assign(name, value))
+            value = Name(name)
+        self.values[series, self.k] = value
+
+
+class StepWriter:
+    """Writes the step of some order for tidy equations."""
+
+    def __init__(self, equations: Equations, order: int) -> None:
+        self.equations, self.order = equations, order
+        self.lines: list[str] = []
+        taken = {*equations.state, *equations.parameters}
+        self.called = {name: _called(name, taken) for name in (*equations.state, *equations.parameters)}
+        taken |= set(self.called.values())
+        self.names = [_unlike(self.called[name], taken, order) for name in equations.state]
+        own = {s.name for node in equations.nodes for s in (*node.state, *node.parameters)}
+        self.supply = Names([*taken, *self.names, *own, *(s.name for edge in equations.edges for s in edge.parameters)])
+        self.time = Time(name="t")
+        self.states = {
+            slot: State(name=self.names[slot])
+            for i, places in enumerate(equations.places)
+            for slot, moves in zip(places, moving_states(equations, i), strict=True)
+            if moves
+        }
+        self.states = dict(sorted(self.states.items()))
+        self.graph = Graph(self.supply)
+        self.rates = self.read()
+        self.graph.settle(self.rates)
+        self.at = Written({}, {}, [])
+
+    def read(self) -> list[Series]:
+        """The rates of the states that move: those of the node, and what each link adds."""
+        eq, terms = self.equations, dict[int, list[tuple[Expr, Series]]]()
+        shared = self.supply.fresh("shared_")
+        nodes = [Template.of(node.rhs, (TIME, *node.state), shared) for node in eq.nodes]
+        edges = {edge: Template.of(edge.rhs, (*edge.here, *edge.there), shared) for edge in eq.edges}
+        for i, places in enumerate(eq.places):
+            found = self.graph.read(nodes[eq.kind_of[i]], *self.parted({TIME: self.time}, eq.at_node(i)))
+            terms |= {slot: [(ONE, rate)] for slot, rate in zip(places, found, strict=True)}
+        for link in eq.links:
+            found = self.graph.read(edges[eq.edge_at(link)], *self.parted({}, eq.at_link(link)))
+            for slot, rate in zip(eq.places[link[0]], found, strict=True):
+                terms[slot].append((ONE, rate))
+        return [self.graph.sum(terms[slot]) for slot in self.states]
+
+    def parted(
+        self, known: dict[sp.Symbol, Series], values: Mapping[sp.Symbol, sp.Expr]
+    ) -> tuple[dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]:
+        """Symbols of a template that stand for series, and those that stand for constants."""
+        slots = {sp.Symbol(name, real=True): slot for slot, name in enumerate(self.equations.state)}
+        called = {sp.Symbol(old, real=True): sp.Symbol(new, real=True) for old, new in self.called.items()}
+        moving, swap = dict(known), dict[sp.Symbol, sp.Expr](called)
+        for s, e in values.items():
+            if slots.get(e) in self.states:
+                moving[s] = self.states[slots[e]]
+            else:
+                swap[s] = called.get(e, e)
+        return moving, swap
+
+    def put(self, *lines: str) -> None:
+        """Append lines of text."""
+        self.lines += lines
+
+    def flush(self) -> None:
+        """Turn statements into text."""
+        for assign in self.at.lines:
+            self.put(*statement(assign))
+        self.at.lines.clear()
+
+    def write(self) -> list[str]:
+        """All statements of the step."""
+        self.opening()
+        for k in range(1, self.order + 1):
+            self.coefficients(k)
+        self.length()
+        self.closing()
+        return self.lines
+
+    def opening(self) -> None:
+        """Load states and parameters, compute constants and first coefficients."""
+        eq, at = self.equations, self.at
+        self.put(*(f"{self.called[name]} = load(y, {slot}, WIDTH)" for slot, name in enumerate(eq.state)))
+        for slot, name in enumerate(eq.parameters, start=eq.dimension):
+            self.put(f"{self.called[name]} = load(p, {slot}, WIDTH)")
+        self.put(*(f"{name} = {show_constant(e)}" for name, e in self.graph.constants.items()))
+        for slot, state in self.states.items():
+            at.values[state, 0] = Name(self.called[eq.state[slot]])
+        at.values[self.time, 0] = Name("t")
+        self.put("# order 0")
+        for s in self.graph.series:
+            at.put(s, s.begin(at), s in self.graph.inline_start)
+        self.flush()
+
+    def coefficients(self, k: int) -> None:
+        """Coefficients k of the states, and of all series but in the last order."""
+        at = self.at
+        self.put(f"# order {k}", f"r{k} = scale" if k == 1 else f"r{k} = {1.0 / k!r}*scale")
+        slopes = [at.at(rate, k - 1) for rate in self.rates]
+        at.k = k
+        for state, slope in zip(self.states.values(), slopes, strict=True):
+            at.put(state, times(Name(f"r{k}"), slope))
+        if k < self.order:
+            at.values[self.time, k] = Name("scale") if k == 1 else ZERO
+            for s in self.graph.series:
+                at.put(s, s.coefficient(at), s in self.graph.inline)
+        self.flush()
+
+    def state_at(self, slot: int, k: int) -> Expr:
+        """Coefficient k of a state."""
+        if slot not in self.states:
+            return ZERO if k else Name(self.called[self.equations.state[slot]])
+        return self.at.values[self.states[slot], k]
+
+    def length(self) -> None:
+        """The length of the step."""
+        p = self.order
+        self.put("# step length")
+        sizes: dict[int, list[Expr]] = {p: [], p - 1: [], p - 2: []}
+        for slot, state in self.states.items():
+            last = {k: e for k in sizes if (e := self.state_at(slot, k)) != ZERO}
+            if not last:
+                continue
+            size = _largest(Call("absolute", (e,)) for k in range(3) if (e := self.state_at(slot, k)) != ZERO)
+            self.put(f"w_{state.name} = 1.0/(atol + rtol*{show(size)})")
+            for k, e in last.items():
+                sizes[k].append(times(Call("absolute", (e,)), Name(f"w_{state.name}")))
+        reaches: list[Expr] = []
+        for k, found in sizes.items():
+            if found:
+                self.put(*statement(Assign(f"size_{k}", _largest(found))))
+                reaches.append(times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))))
+        if reaches:
+            self.put(*statement(Assign("reach", _extreme("minimum", reaches))))
+            # the weights were taken over a step of the length `scale`: shorter steps have smaller ones
+            self.put(f"reach = minimum(reach, {(p - 2) / (p - 4)!r}*reach)")
+            self.put(f"length = scale*exp(minimum(reach - {_margin(p)!r}, {FARTHEST!r}))")
+        else:
+            self.put("length = 16.0*scale")
+        self.put("length = minimum(truncated(length), h)", "ratio = length/scale")
+
+    def closing(self) -> None:
+        """The new state by Horner, the dense output, and the length of the step."""
+        p, eq = self.order, self.equations
+        self.put("# new state")
+        for slot, name in enumerate(self.names):
+            known = [self.state_at(slot, k) for k in range(p + 1)]
+            while len(known) > 1 and known[-1] == ZERO:
+                known.pop()
+            *rest, last = known
+            self.put(f"n_{name} = {show(last)}")
+            for e in reversed(rest):
+                self.put(f"n_{name} = {show(add(times(Name(f'n_{name}'), Name('ratio')), e))}")
+            self.put(f"store(y_new, {slot}, n_{name})")
+        self.put(f"total = {' + '.join(f'n_{name}' for name in self.names)}", "if DENSE:")
+        for k in range(1, p + 1):
+            self.put(f"    raised = {'ratio' if k == 1 else 'raised*ratio'}")
+            for slot in range(eq.dimension):
+                e = self.state_at(slot, k)
+                value = "0.0*raised" if e == ZERO else show(times(e, Name("raised")))
+                self.put(f"    store(dense, {(k - 1) * eq.dimension + slot}, {value})")
+        self.put("return length + 0.0*total  # NaN where any coefficient is infinite or NaN")
+
+
+def moving_states(equations: Equations, i: int) -> tuple[bool, ...]:
+    """Which states of node i move; one at rest, such as the mode of a contact, is a constant of the step."""
+    rates = list(equations.node_at(i).rhs)
+    for link in equations.links:
+        if link[0] == i:
+            rates = [a if b == 0 else b for a, b in zip(rates, equations.edge_at(link).rhs, strict=True)]
+    return tuple(rate != 0 for rate in rates)
+
+
+def write_step(equations: Equations, order: int) -> TaylorStep:
+    """Return the Taylor step of some order for equations with names that a kernel can use (`tidy`).
+
+    Parameters
+    ----------
+    equations : Equations
+        What the step integrates.
+    order : int
+        The order of the series, at least 6.
+
+    Raises
+    ------
+    ValueError
+        For an order that is too small, functions that are not analytic, and links with inertia.
+    """
+    if order < 6:
+        raise ValueError(f"taylor: found order {order}; expected at least 6")
+    if equations.inertial:
+        raise ValueError("taylor: found links with inertia; expected an identity mass matrix; use dop853 or rodas5p")
+    lines = StepWriter(equations, order).write()
+    head = [
+        "@njit(error_model='numpy', cache=True)",
+        "def step(t, h, scale, y, p, y_new, dense, rtol, atol):",
+        '    """One step from (t, y): writes y_new and the dense output, returns the length of the step."""',
+    ]
+    text = "\n".join([*head, *(f"    {line}" for line in lines)])
+    called = {
+        *STARTS.values(),
+        "absolute",
+        "exp",
+        "load",
+        "log",
+        "maximum",
+        "minimum",
+        "power",
+        "sqrt",
+        "store",
+        "truncated",
+    }
+    return TaylorStep(text, order, tuple(sorted(word for word in called if f"{word}(" in text)))
+
+
+def _margin(order: int) -> float:
+    """What is taken off the logarithm of a step."""
+    return 0.0
+
+
+def _largest(values: Iterable[Expr]) -> Expr:
+    return _extreme("maximum", list(values))
+
+
+def _extreme(function: str, values: Sequence[Expr]) -> Expr:
+    """Nested calls of a function of two values."""
+    if len(values) == 1:
+        return values[0]
+    half = len(values) // 2
+    return Call(function, (_extreme(function, values[:half]), _extreme(function, values[half:])))
+
+
+def _called(name: str, taken: set[str]) -> str:
+    """What a symbol is called within the step: as it is, unless the step needs that name itself."""
+    if name not in WORDS and not name.startswith(PREFIXES) and not COUNTED.match(name):
+        return name
+    name = f"user_{name}"
+    while name in taken:
+        name += "_"
+    return name
+
+
+def _unlike(name: str, taken: set[str], order: int) -> str:
+    """The name of a series of which no coefficient is called like a symbol."""
+    while any(f"{name}_{k}" in taken for k in range(order + 1)):
+        name += "_"
+    return name

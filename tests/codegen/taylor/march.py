@@ -1,0 +1,105 @@
+"""A minimal driver for Taylor steps: runs lanes of equal equations until all have reached their end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit as numba_njit
+
+from synchain.codegen import simd
+from synchain.codegen.printing.names import tidy
+from synchain.codegen.taylor.step import TaylorStep, write_step
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import Node
+
+SPACE = {name: getattr(simd, name) for name in simd.__all__}
+
+
+def alone(state: Sequence[Any], rhs: Sequence[Any], parameters: Sequence[Any] = ()) -> Equations:
+    """One node without links."""
+    return Equations.of_equal_nodes(Node(tuple(state), tuple(rhs), tuple(parameters)), None, 1)
+
+
+def step_of(equations: Equations, order: int) -> TaylorStep:
+    return write_step(tidy(equations), order)
+
+
+@dataclass(frozen=True, slots=True)
+class Lanes:
+    """A compiled step and loop."""
+
+    march: Callable[..., int]
+    once: Callable[..., np.ndarray]
+    equations: Equations
+    width: int
+    order: int
+
+    def run(self, start: Any, numbers: Any, end: Any, rtol: float, atol: float | None = None, **more: Any) -> Any:
+        """The end states (width, dimension) and the number of steps; rows of `start` and `numbers` are lanes or shared."""
+        y = self.bank(start, numbers)
+        t = np.full(self.width, float(more.get("t", 0.0)))
+        ends = np.broadcast_to(np.asarray(end, float), self.width).copy()
+        steps = self.march(t, y, ends, rtol, rtol / 10 if atol is None else atol, float(more.get("scale", 2.0**-6)))
+        return y[: self.equations.dimension * self.width].reshape(-1, self.width).T.copy(), steps
+
+    def bank(self, start: Any, numbers: Any) -> np.ndarray:
+        rows = np.hstack(
+            [np.broadcast_to(np.asarray(part, float), (self.width, np.shape(part)[-1])) for part in (start, numbers)]
+        )
+        return np.ascontiguousarray(rows.T).reshape(-1)
+
+    def step(
+        self, start: Any, numbers: Any, h: float = math.inf, **more: Any
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """One step: lengths, new states (width, dimension), rows of dense output (order, dimension, width)."""
+        y, size = self.bank(start, numbers), self.equations.dimension
+        y_new, dense, length = (
+            np.zeros(size * self.width),
+            np.zeros(self.order * size * self.width),
+            np.zeros(self.width),
+        )
+        rtol, atol = more.get("rtol", 1e-10), more.get("atol", 1e-11)
+        length = self.once(
+            float(more.get("t", 0.0)), float(h), float(more.get("scale", 1.0)), y, y_new, dense, rtol, atol, length
+        )
+        return length, y_new.reshape(size, -1).T, dense.reshape(self.order, size, -1)
+
+
+def compiled(equations: Equations, order: int, width: int = 1, dense: bool = False) -> Lanes:
+    """The step of some order, compiled for a width."""
+    text = step_of(equations, order).text
+    space = {**SPACE, "WIDTH": width, "DIMENSION": equations.dimension, "DENSE": dense}
+    exec(text, space)
+    step, load, store, select, broadcast = (space[n] for n in ("step", "load", "store", "select", "broadcast"))
+    size, rows, lane_bits, power_of_two = equations.dimension, order, simd.lane_bits, simd.power_of_two
+
+    @numba_njit(error_model="numpy")
+    def march(t, y, ends, rtol, atol, first):
+        y_new, work, scales = np.zeros(size * width), np.zeros(rows * size * width), np.full(width, first)
+        steps = 0
+        while True:
+            now, end = load(t, 0, width), load(ends, 0, width)
+            h = step(now, end - now, load(scales, 0, width), y, y, y_new, work, rtol, atol)
+            running = h > 0.0
+            if lane_bits(running) == 0:
+                return steps
+            steps += 1
+            for c in range(size):
+                store(y, c, select(running, load(y_new, c, width), load(y, c, width)))
+            landed = h >= end - now
+            store(t, 0, select(landed, end, now + h))
+            store(scales, 0, select(landed, load(scales, 0, width), power_of_two(h)))
+
+    @numba_njit(error_model="numpy")
+    def once(t, h, scale, y, y_new, work, rtol, atol):
+        length = np.zeros(width)
+        found = step(broadcast(t, width), broadcast(h, width), broadcast(scale, width), y, y, y_new, work, rtol, atol)
+        store(length, 0, found)
+        return length
+
+    return Lanes(march, once, equations, width, order)
+
