@@ -49,8 +49,11 @@ def smallest_gap(t, y, p, out, network, dims, pushes):
 @njit(error_model="numpy")
 def gap_inside(theta, t, h, y, y_new, dense, middle, out, network, dims, pushes):
     """The smallest gap at a fraction of the step."""
-    for c in range(2 * dims.nodes):
-        store(middle, c, inside(theta, c, y, y_new, dense, dims))
+    for i in range(dims.nodes):  # both states of a node together, so that neither waits for the other
+        place = inside(theta, i, y, y_new, dense, dims)
+        speed = inside(theta, dims.nodes + i, y, y_new, dense, dims)
+        store(middle, i, place)
+        store(middle, dims.nodes + i, speed)
     return smallest_gap(t + theta * h, middle, y, out, network, dims, pushes)
 
 
@@ -95,7 +98,7 @@ def first_dip(k, open_lanes, t, h, y, y_new, dense, middle, out, network, dims, 
         before = load(out, (6 + (k - 1) % 3) * dims.nodes + i, WIDTH)
         gap = load(out, (6 + k % 3) * dims.nodes + i, WIDTH)
         bend, slope = earlier - 2.0 * before + gap, 0.5 * (gap - earlier)
-        dips = open_lanes & (absolute(slope) < bend) & (before - 0.5 * slope * slope / bend < SHALLOW * gap)
+        dips = open_lanes & (absolute(slope) < 0.999 * bend) & (before - 0.5 * slope * slope / bend < SHALLOW * gap)
         if any_lane(dips):
             turn = minimum(maximum(span * (k - 1.0 - slope / bend), 0.0), 1.0)
             place, least = bottom(i, turn, span, t, h, y, y_new, dense, middle, out, network, dims, pushes)
@@ -136,24 +139,32 @@ def first_passage(accept, t, h, y, y_new, dense, middle, out, network, dims, pus
 
 @njit(error_model="numpy")
 def narrowed(low, high, f_low, f_high, t, h, y, y_new, dense, middle, out, network, dims, pushes):
-    """The end of the bracket `high` (2: no bracket) moved back until its gap is just below zero."""
+    """The end of the bracket `high` (2: no bracket) moved back until its gap is just below zero.
+
+    Regula falsi with the weight of Anderson & Bjorck, BIT 13, 253 (1973), for the passage of a level just below zero.
+    """
     found = high < 1.5
     if any_lane(found):
+        level, last = -0.75 * PASSED, 0.0 * high
         for k in range(60):
-            active = found & (f_high < -0.5 * PASSED) & (high - low > 1e-15)
+            active = found & (f_high < -PASSED) & (high - low > 1e-15)
             if not any_lane(active):
                 break
-            secant = high - f_high * (high - low) / (f_high - f_low)
+            secant = high - (f_high - level) * (high - low) / (f_high - f_low)
             fit = (secant > low) & (secant < high)
-            middle_point = 0.5 * (low + high)
-            theta = middle_point if k % 3 == 2 else select(fit, secant, middle_point)
+            theta = 0.5 * (low + high) if k % 4 == 3 else select(fit, secant, 0.5 * (low + high))
             theta = select(active, theta, 0.0 * high)
             gap = gap_inside(theta, t, h, y, y_new, dense, middle, out, network, dims, pushes)
-            below = active & (gap < 0.0)
-            above = active & ~(gap < 0.0)
-            # the end that stays is given half its weight (Illinois)
-            high, f_high = select(below, theta, high), select(below, gap, select(above, 0.5 * f_high, f_high))
-            low, f_low = select(above, theta, low), select(above, gap, select(below, 0.5 * f_low, f_low))
+            below = active & (gap < level + 0.25 * PASSED)
+            above = active & ~(gap < level + 0.25 * PASSED)
+            # an end that stays a second time is weighed less, the less the other one has gained
+            left = 1.0 - (gap - level) / (select(below, f_high, f_low) - level)
+            weight = select(left > 0.0, left, 0.5)
+            less_low = select(below & (last < 0.0), level + weight * (f_low - level), f_low)
+            less_high = select(above & (last > 0.0), level + weight * (f_high - level), f_high)
+            high, f_high = select(below, theta, high), select(below, gap, less_high)
+            low, f_low = select(above, theta, low), select(above, gap, less_low)
+            last = select(below, -1.0, select(above, 1.0, last))
     return high
 
 
