@@ -14,11 +14,9 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from synchain.models.inputs.checks import check_callable, check_flag
-
 from ..support.status import CODES, Status
 
-__all__ = ["Hook", "Progress", "Reporter", "check_reporting", "duration"]
+__all__ = ["Hook", "Progress", "Reporter", "duration"]
 
 EVERY = 60.0
 """Seconds between two lines if stderr is no terminal."""
@@ -87,16 +85,6 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
-def check_reporting(show: bool | None, hook: Hook | None) -> None:
-    """Raise TypeError if a hook cannot be called or if `show_progress` is neither True, False nor
-    None.
-    """
-    if hook is not None:
-        check_callable("progress", hook)
-    if show is not None:
-        check_flag("show_progress", show)
-
-
 @dataclass(slots=True)
 class Reporter:
     """Counts cells as they end and shows a bar on a terminal, else a line every minute; `show`
@@ -114,9 +102,6 @@ class Reporter:
     every: float = EVERY
     _said: float = 0.0
     _bar: Any = None
-
-    def __post_init__(self) -> None:
-        check_reporting(self.show, self.hook)
 
     def start(self, counts: np.ndarray, compiling: float = 0.0) -> None:
         """Begin to count cells.

@@ -12,8 +12,9 @@ from ..cells.keywords import with_axes
 from ..cells.reduce import Reduction, as_reduction
 from ..results.result import Result
 from .memory import Memory
+from .pool import Execution
 from .prepare import prepare
-from .progress import Hook, Reporter
+from .progress import Hook
 
 __all__ = ["run"]
 
@@ -76,10 +77,11 @@ def run(
     scene = with_axes(run, scene, axes)
     if resume is not None:
         check_instance("resume", resume, Result, "an earlier Result, e.g. from open_result")
-    reporter = Reporter(scene.cells, show_progress, progress)
+    execution = Execution(workers, executor, show_progress, progress)
+    reporter = execution.reporter(scene.cells)
     reduction = as_reduction(scene, reduce)
     reduction.check_memory()
-    prepared = prepare(reduction, certified, width=width, workers=workers, executor=executor)
+    prepared = prepare(reduction, execution, certified, width=width)
     memory = Memory.of(prepared, resume)
-    memory.run(executor, reporter)
+    memory.run(reporter)
     return memory.result()

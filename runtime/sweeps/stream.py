@@ -30,7 +30,7 @@ from ..support.files import check_replaceable, drop_leftovers, netcdf_data, unde
 from ..support.status import Status
 from .errors import SweepFailed, SweepInterrupted
 from .job import Start
-from .pool import Task, pool_size, worker_lost
+from .pool import Execution, Task, worker_lost
 from .prepare import PreparedRun, prepare
 from .progress import Hook, Progress, Reporter
 from .scheduler import BlockScheduler
@@ -107,35 +107,28 @@ def stream(
     """
     scene = with_axes(stream, scene, axes)
     reduction = as_reduction(scene, reduce)
-    reporter = Reporter(scene.cells, show_progress, progress)
-    pool_size(executor, workers)  # refuses what is no executor before there is a file
+    execution = Execution(workers, executor, show_progress, progress)
+    reporter = execution.reporter(scene.cells)
     if (state := claim(reduction, path, resume=resume, overwrite=overwrite, certified=certified)) == "complete":
         raise FileExistsError(
             f"{os.fspath(path)} holds the result of this scene already; give overwrite (--overwrite) to run it again"
         )
     partial = partial_path(path)
-    options = {"width": width, "workers": workers, "executor": executor}
-    prepared = _prepared(reduction, partial, state == "continue", certified, options)
+    if state == "continue":
+        certificate = certificate_of(BlockLog.describe(partial))
+        prepared = prepare(reduction, execution, certificate or False, width=width)
+    else:
+        prepared = prepare(reduction, execution, certified, width=width)
+        about = describe_sweep(reduction, prepared.layout(), prepared.attributes, prepared.certificate)
+        BlockLog.create(partial, about)
     log = BlockLog.open(partial, writing=True)
     try:
-        verdicts = _run_blocks(prepared, log, executor, reporter, path)
+        verdicts = _run_blocks(prepared, log, reporter, path)
     finally:
         log.close()
         reporter.close()
     partial.unlink()
     return Streamed(Path(path), reporter.now, verdicts)
-
-
-def _prepared(
-    reduction: Reduction, partial: Path, resume: bool, certified: bool, options: Mapping[str, Any]
-) -> PreparedRun:
-    """The kernel, the certificate (computed or kept) and, for a new run, the block log."""
-    if resume:
-        return prepare(reduction, certificate_of(BlockLog.describe(partial)) or False, **options)
-    prepared = prepare(reduction, certified, **options)
-    about = describe_sweep(reduction, prepared.layout(), prepared.attributes, prepared.certificate)
-    BlockLog.create(partial, about)
-    return prepared
 
 
 def claim(
@@ -240,7 +233,7 @@ class _Disk:
 
 
 def _run_blocks(
-    prepared: PreparedRun, log: BlockLog, executor: Executor | None, reporter: Reporter, path: str | os.PathLike[str]
+    prepared: PreparedRun, log: BlockLog, reporter: Reporter, path: str | os.PathLike[str]
 ) -> dict[str, int]:
     """Run what the log lacks, then write the result; returns the verdicts."""
     scene = prepared.scene
@@ -250,7 +243,7 @@ def _run_blocks(
     try:
         drop_leftovers(path)
         reporter.start(log.counts, prepared.compiling)
-        scheduler.run(executor)
+        scheduler.run()
         return write_result(log, path, scene)
     except KeyboardInterrupt:
         raise SweepInterrupted(int(log.counts.sum()), scene.cells) from None

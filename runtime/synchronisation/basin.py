@@ -25,6 +25,7 @@ from ..cells.plan import Planner
 from ..cells.reduce import reduce_scene
 from ..support.arrays import row
 from ..support.status import Status
+from ..sweeps.pool import Execution
 from ..sweeps.progress import Hook
 from .trials import Trials
 
@@ -148,11 +149,12 @@ def basin(
         If the number of samples is not whole.
     """
     _check(scene, samples, tolerance, confidence, seed)
+    execution = Execution(workers, executor, show_progress, progress)
     fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ("sync_error",)}
     scene = with_parameters(basin, scene, parameters, **fixed, transient=transient, window=window)
     planner = Planner(random_starts(scene, samples, ranges, seed))
     whole = replace(reduce_scene(planner.scene, reduce=False), jumps=True)
-    with Trials.of(whole, workers=workers, executor=executor, show_progress=show_progress, progress=progress) as trials:
+    with Trials.of(whole, execution) as trials:
         error, status = trials.run(samples, planner.rows)
     return Basin(scene, tolerance, confidence, planner.rows(np.arange(samples)).start, error, status)
 
