@@ -11,7 +11,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any
 
 import numpy as np
 
@@ -203,7 +202,16 @@ class Plane:
 def msf(
     scene: Scene,
     alpha: Sequence[float] | np.ndarray,
-    **settings: Any,
+    *,
+    precision: float = 1e-3,
+    periods: float = 5000,
+    transient: float = 300,
+    starts: int = 4,
+    rtol: float = 1e-6,
+    seed: int = 0,
+    workers: int | None = None,
+    show_progress: bool | None = False,
+    **parameters: float,
 ) -> MSF:
     """Compute the master stability function of an oscillator and coupling on a line.
 
@@ -213,9 +221,10 @@ def msf(
         Source of the oscillator and the coupling.
     alpha : array_like, shape (m,)
         Increasing real strengths alpha = -sigma gamma.
-    **settings : number
-        Keywords of `synchain.runtime.exponents`: precision, periods, transient, starts, rtol, seed,
-        workers, show_progress, and parameters of the scene to set.
+    precision, periods, transient, starts, rtol, seed, workers, show_progress
+        See `synchain.runtime.exponents`.
+    **parameters : float
+        Parameters of the scene to set.
 
     Returns
     -------
@@ -230,14 +239,36 @@ def msf(
     """
     line = row("alpha", alpha, 2, rising=True)
     fine = np.union1d(line, np.linspace(line[0], line[-1], FINE))
-    return MSF(scene, line, exponents(scene, fine, **settings))
+    fine_exponents = exponents(
+        scene,
+        fine,
+        precision=precision,
+        periods=periods,
+        transient=transient,
+        starts=starts,
+        rtol=rtol,
+        seed=seed,
+        workers=workers,
+        show_progress=show_progress,
+        **parameters,
+    )
+    return MSF(scene, line, fine_exponents)
 
 
 def plane(
     scene: Scene,
     alpha: Sequence[float] | np.ndarray,
     beta: Sequence[float] | np.ndarray,
-    **settings: Any,
+    *,
+    precision: float = 1e-3,
+    periods: float = 5000,
+    transient: float = 300,
+    starts: int = 4,
+    rtol: float = 1e-6,
+    seed: int = 0,
+    workers: int | None = None,
+    show_progress: bool | None = False,
+    **parameters: float,
 ) -> Plane:
     """Compute the master stability function on the rectangle alpha + i beta = -sigma gamma.
 
@@ -250,9 +281,10 @@ def plane(
     beta : array_like, shape (b,)
         Increasing imaginary parts. Conjugate strengths have the same exponent, so that only |beta|
         is integrated.
-    **settings : number
-        Keywords of `synchain.runtime.exponents`: precision, periods, transient, starts, rtol, seed,
-        workers, show_progress, and parameters of the scene to set.
+    precision, periods, transient, starts, rtol, seed, workers, show_progress
+        See `synchain.runtime.exponents`.
+    **parameters : float
+        Parameters of the scene to set.
 
     Returns
     -------
@@ -267,7 +299,19 @@ def plane(
     """
     across, up = row("alpha", alpha, 2, rising=True), row("beta", beta, 2, rising=True)
     heights, place = np.unique(np.abs(up), return_inverse=True)
-    half_plane = exponents(scene, (across[:, None] + 1j * heights).reshape(-1), **settings)
+    half_plane = exponents(
+        scene,
+        (across[:, None] + 1j * heights).reshape(-1),
+        precision=precision,
+        periods=periods,
+        transient=transient,
+        starts=starts,
+        rtol=rtol,
+        seed=seed,
+        workers=workers,
+        show_progress=show_progress,
+        **parameters,
+    )
     table, error = (row.reshape(len(across), -1)[:, place] for row in (half_plane.exponent, half_plane.stderr))
     kinds = tuple(a.kind for a in half_plane.attractors)
     return Plane(scene, across, up, table, error, kinds, half_plane.time)
