@@ -15,7 +15,6 @@ from typing import Any
 
 import sympy as sp
 
-from ..algebra.number_text import exact_number
 from .families import family, names, topology
 from .topology import Topology
 
@@ -82,11 +81,10 @@ class Term:
 
     def at(self, numbers: Mapping[sp.Symbol, int]) -> Iterator[tuple[sp.Expr, int, dict[sp.Symbol, int]]]:
         """Yield (eigenvalue, multiplicity > 0, all numbers) for numbers in place of the sizes."""
-        text = sp.sstr(self.value)
         for all_numbers in _with_indices(self.indices, dict(numbers)):
             count = int(self.times.subs(all_numbers))
             if count:
-                yield exact_number(text, {str(s): k for s, k in all_numbers.items()}), count, all_numbers
+                yield self.value.xreplace({s: sp.Integer(k) for s, k in all_numbers.items()}), count, all_numbers
 
     def vectors(self, numbers: Mapping[sp.Symbol, int]) -> Iterator[sp.Expr]:
         """Yield the eigenvectors of an eigenvalue as expressions in NODE; `numbers` as of `at`."""

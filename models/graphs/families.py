@@ -1,7 +1,8 @@
-"""Families of graphs: a plug-in file as a value, and the graphs that it makes."""
+"""Families of graphs: what their plug-in files must hold, a file as a value, and the graphs that it makes."""
 
 from __future__ import annotations
 
+import inspect
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,7 +14,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ..inputs import plugins
 from ..inputs.options import Options, as_options
-from .family_file import TOPOLOGY, defaults
+from ..inputs.plugin_file import PluginFile
+from ..inputs.plugins import Kind
 from .links import LINK_LIMIT
 from .topology import Topology
 
@@ -22,10 +24,78 @@ if TYPE_CHECKING:
 
     from .links import Link
 
-__all__ = ["Family", "FamilyRule", "family", "names", "topology"]
+__all__ = ["KNOWN", "TOPOLOGY", "Family", "FamilyRule", "check_topology", "family", "names", "topology"]
 
 Edges: TypeAlias = "Callable[..., Iterable[tuple[int, int, int | str | Fraction]]]"
 Eigenvalues: TypeAlias = "Sequence[tuple[sp.Expr, int]] | None"
+
+KNOWN = (
+    *("SUMMARY", "SOURCE", "MINIMUM", "TOO_SMALL", "DIRECTED", "CONNECTED"),
+    *("edges", "settle", "count", "expected", "spectrum", "formula", "sides"),
+)
+"""The public names that the file of a topology may define."""
+
+
+def _defaults(module: ModuleType) -> dict[str, Any]:
+    """The options of a family with their defaults: the keyword-only parameters of its `edges`."""
+    found = inspect.signature(module.edges).parameters.values()
+    return {p.name: p.default for p in found if p.kind is inspect.Parameter.KEYWORD_ONLY}
+
+
+def check_topology(module: ModuleType, where: str, text: bytes) -> None:
+    """Raise ValueError if a module is no topology.
+
+    Parameters
+    ----------
+    module : module
+        What the file defines.
+    where : str
+        The name of the file in messages.
+    text : bytes
+        What stands in the file.
+    """
+    file = PluginFile.of("topology", KNOWN, module, where, text)
+    file.check_names(("SUMMARY", "MINIMUM", "edges"))
+    file.check_values()
+    least = file.get("MINIMUM")
+    if isinstance(least, bool) or not isinstance(least, int):
+        raise file.wrong("MINIMUM", f"MINIMUM is {least!r}; expected the smallest number of nodes, a whole number")
+    options = _defaults(file.module)
+    for name, value in options.items():
+        if value is inspect.Parameter.empty:
+            raise file.wrong("edges", f"the option {name!r} of edges has no default; expected one, such as {name}=1")
+    if not options:
+        file.idle(("settle",), "without options, which are keyword-only parameters of edges")
+        return
+    file.need("settle")
+    for function in file.defined(("settle", "count", "expected", "spectrum")):
+        missing = [name for name in options if name not in inspect.signature(file.get(function)).parameters]
+        if missing:
+            raise file.wrong(function, f"{function} lacks the option {missing[0]!r} of edges; expected the same ones")
+
+
+TOPOLOGY = Kind(
+    "topology",
+    "topologies",
+    check_topology,
+    also={
+        "all_to_all": "complete",
+        "biclique": "complete_bipartite",
+        "clique": "complete",
+        "cubic": "random_cubic",
+        "cycle": "ring",
+        "gilbert": "erdos_renyi",
+        "gnp": "erdos_renyi",
+        "hamming": "hypercube",
+        "lattice": "grid",
+        "line": "chain",
+        "newman_watts": "small_world",
+        "open_chain": "chain",
+        "path": "chain",
+        "watts_strogatz": "small_world",
+    },
+)
+"""Graph families: the files of the folder `topologies`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -267,7 +337,7 @@ def _of_module(name: str, module: ModuleType) -> Family:
     if isinstance(name, plugins.OwnFile) and "spectrum" in parts:
         parts["spectrum"] = _checked(parts["spectrum"], name.place)
     edges = _blamed_edges(module.edges) if outside else module.edges
-    return Family(name=name, edges=edges, options=defaults(module), **parts)
+    return Family(name=name, edges=edges, options=_defaults(module), **parts)
 
 
 def _blamed_edges(edges: Edges) -> Edges:

@@ -17,9 +17,8 @@ from ..inputs.checks import check_instance, check_table, check_text, suggestion
 from ..inputs.frozen import Frozen
 from ..inputs.node_name import NodeName
 from ..mechanics.coupling import Coupling
-from ..mechanics.friction import ContactModel, FrictionLaw
+from ..mechanics.friction import SLIP, ContactModel, FrictionLaw
 from ..mechanics.oscillator import Oscillator
-from ..mechanics.stick_slip import SLIP
 from .axis import Axis
 from .complete import TimeUnit, complete
 from .dictionary import arguments, as_dict

@@ -141,9 +141,10 @@ def agreement(
         If the line lacks a strength, or if sigma is negative, not finite or does not increase; as
         `strengths` does.
     """
-    fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ("sync_error",)}
+    fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ()}
     scene = with_parameters(agreement, scene, parameters, **fixed)
     check_probe(scene.topology, scene.spectrum)
+    scene = scene.replace(record=("sync_error",))
     grid = np.atleast_1d(np.asarray(sigma, dtype=float))
     if grid.ndim != 1 or not (np.all(np.isfinite(grid)) and np.all(np.diff(grid) > 0.0) and np.all(grid >= 0.0)):
         raise ValueError("sigma: expected finite numbers from 0 up that increase")

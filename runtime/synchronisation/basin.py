@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from synchain.models.inputs.checks import check_integer, check_number, check_table
-from synchain.models.mechanics.stick_slip import SLIP
+from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import with_parameters
