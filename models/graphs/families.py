@@ -36,7 +36,7 @@ KNOWN = (
 """The public names that the file of a topology may define."""
 
 
-def _defaults(module: ModuleType) -> dict[str, Any]:
+def _defaults(module: ModuleType) -> dict[str, object]:
     """The options of a family with their defaults: the keyword-only parameters of its `edges`."""
     found = inspect.signature(module.edges).parameters.values()
     return {p.name: p.default for p in found if p.kind is inspect.Parameter.KEYWORD_ONLY}
@@ -150,8 +150,8 @@ class Family:
     too_small: str = "choose a larger n"
     directed: bool = False
     connected: bool = True
-    options: Mapping[str, Any] = field(default_factory=dict)
-    settle: Callable[..., Any] | None = None
+    options: Mapping[str, object] = field(default_factory=dict)
+    settle: Callable[..., object] | None = None
     count: Callable[..., int] | None = None
     expected: Callable[..., int] | None = None
     spectrum: Callable[..., Eigenvalues] | None = None
@@ -159,7 +159,7 @@ class Family:
     sides: Callable[[int], tuple[int, ...]] | None = None
     link_limit: int = LINK_LIMIT
 
-    def __call__(self, n: int, **options: Any) -> Topology:
+    def __call__(self, n: int, **options: object) -> Topology:
         """Return the graph of `n` nodes; see `topology`."""
         size = self._size(n)
         settled = self._settled(size, options)
@@ -192,7 +192,7 @@ class Family:
                 f"expected at most {self.link_limit}: reduce n"
             )
 
-    def _size(self, n: Any) -> int:
+    def _size(self, n: object) -> int:
         """The number of nodes; TypeError if it is no integer, ValueError if it is too small."""
         if isinstance(n, bool) or not hasattr(n, "__index__"):
             raise TypeError(f"topology {self.name}: n = {n!r} is a {type(n).__name__}; expected an integer")
@@ -201,7 +201,7 @@ class Family:
             raise ValueError(f"topology {self.name}: n = {size}; expected at least {self.minimum}: {self.too_small}")
         return size
 
-    def _settled(self, n: int, options: Mapping[str, Any]) -> Options:
+    def _settled(self, n: int, options: Mapping[str, object]) -> Options:
         """All options as they are stored, checked by the family's `settle`."""
         for key in options:
             if key not in self.options:
@@ -262,7 +262,7 @@ class FamilyRule:
         return None if spectrum is None else spectrum(self.n, **dict(self.options))
 
 
-def topology(name: str, n: int, **options: Any) -> Topology:
+def topology(name: str, n: int, **options: object) -> Topology:
     """Return the graph of a family by its name.
 
     Parameters
@@ -344,18 +344,18 @@ def _blamed_edges(edges: Edges) -> Edges:
     """Edges whose errors name file and line, wrong weights too."""
 
     @wraps(edges)
-    def blamed_edges(n: int, **options: Any) -> Iterator[tuple[int, int, Fraction]]:
+    def blamed_edges(n: int, **options: object) -> Iterator[tuple[int, int, Fraction]]:
         with plugins.blamed(edges):
             yield from ((i, j, Fraction(weight)) for i, j, weight in edges(n, **options))
 
     return blamed_edges
 
 
-def _checked(spectrum: Callable[..., Any], place: str) -> Callable[..., Eigenvalues]:
+def _checked(spectrum: Callable[..., Eigenvalues], place: str) -> Callable[..., Eigenvalues]:
     """A closed form that raises ValueError if it is no list of (eigenvalue, multiplicity)."""
 
     @wraps(spectrum)
-    def checked(n: int, **options: Any) -> Eigenvalues:
+    def checked(n: int, **options: object) -> Eigenvalues:
         pairs: Eigenvalues = spectrum(n, **options)
         for pair in () if pairs is None else pairs if isinstance(pairs, list | tuple) else (pairs,):
             if not (isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[1], int) and pair[1] > 0):

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
 
 from synchain.models.inputs.checks import check_number, suggestion
 from synchain.models.inputs.node_name import NodeName
@@ -15,7 +14,7 @@ from synchain.models.scenes.scene import KEYWORDS, Scene, a_scene
 __all__ = ["check_keywords", "with_axes", "with_parameters"]
 
 
-def with_axes(function: Callable[..., Any], scene: Scene, axes: Mapping[str, Any]) -> Scene:
+def with_axes(function: Callable[..., object], scene: Scene, axes: Mapping[str, object]) -> Scene:
     """Return a scene with parameters and initial states fixed or swept.
 
     Parameters
@@ -32,8 +31,8 @@ def with_axes(function: Callable[..., Any], scene: Scene, axes: Mapping[str, Any
     ValueError
         If a name is no parameter, setting or initial state.
     """
-    fixed: dict[str, Any] = {}
-    swept: dict[str, Any] = {axis.name: axis.values for axis in a_scene(scene).axes}
+    fixed: dict[str, object] = {}
+    swept: dict[str, object] = {axis.name: axis.values for axis in a_scene(scene).axes}
     start = {name: list(values) for name, values in scene.initial.items()}
     for name, value in axes.items():
         if isinstance(value, Iterable) and not isinstance(value, str | bytes) and getattr(value, "ndim", 1) > 0:
@@ -49,7 +48,7 @@ def with_axes(function: Callable[..., Any], scene: Scene, axes: Mapping[str, Any
 
 
 def with_parameters(
-    function: Callable[..., Any], scene: Scene, parameters: Mapping[str, Any], **settings: Any
+    function: Callable[..., object], scene: Scene, parameters: Mapping[str, object], **settings: object
 ) -> Scene:
     """Return the scene with the settings that a function needs and the parameters that its caller
     passed.
@@ -65,7 +64,7 @@ def with_parameters(
 
 
 def check_keywords(
-    function: Callable[..., Any],
+    function: Callable[..., object],
     scene: Scene,
     names: Iterable[str],
     *,
@@ -97,7 +96,7 @@ def _state(scene: Scene, name: str) -> NodeName | None:
     return state if state and state.base in scene.components and name in scene.equations.state else None
 
 
-def _own(function: Callable[..., Any]) -> list[str]:
+def _own(function: Callable[..., object]) -> list[str]:
     """The names of a function's keywords, without the scene and the collection of parameters."""
     arguments = inspect.signature(function).parameters.values()
     return [a.name for a in arguments if a.kind is not a.VAR_KEYWORD and a.name != "scene"]

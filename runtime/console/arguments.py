@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError
-from typing import Any
 
 from synchain.models.inputs.arithmetic import constant
 from synchain.models.inputs.checks import short_repr
@@ -72,7 +71,7 @@ def tolerance(text: str) -> float:
     return value
 
 
-def span(text: str) -> dict[str, Any]:
+def span(text: str) -> dict[str, object]:
     """LO:HI:N as the table from, to and count of an axis, none of whose values is built."""
     parts = text.split(":")
     if len(parts) != 3:
@@ -96,7 +95,7 @@ def grid(text: str) -> tuple[float, ...]:
     return values
 
 
-def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, Any]]:
+def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, object]]:
     """name=value, name=a,b,c or name=LO:HI:N."""
     name, equals, value = text.partition("=")
     if not (name.isidentifier() and equals and value):

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from synchain.models.inputs.checks import short_repr
 
 __all__ = ["numbers", "row"]
 
 
-def numbers(what: str, values: Any, *, complex_too: bool = False) -> np.ndarray:
+def numbers(what: str, values: object, *, complex_too: bool = False) -> np.ndarray:
     """Return the values as an array of any shape, of floats or, if `complex_too`, of complex
     numbers.
 
@@ -30,7 +29,7 @@ def numbers(what: str, values: Any, *, complex_too: bool = False) -> np.ndarray:
         raise ValueError(f"{what}: found {short_repr(values)}; expected {kind}") from None
 
 
-def row(what: str, values: Any, least: int = 1, *, rising: bool = False, complex_too: bool = False) -> np.ndarray:
+def row(what: str, values: ArrayLike, least: int = 1, *, rising: bool = False, complex_too: bool = False) -> np.ndarray:
     """Return the values as one row (m,) of floats or, if `complex_too`, of complex numbers.
 
     Parameters

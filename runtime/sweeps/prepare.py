@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any
 
 from synchain.codegen.driver.columns import Control
 from synchain.codegen.kernels.compile import load
@@ -56,7 +55,7 @@ class PreparedRun:
         return self.job.reduction.scene
 
     @property
-    def attributes(self) -> dict[str, Any]:
+    def attributes(self) -> dict[str, object]:
         """How the result came about."""
         job, spec = self.job, self.job.spec
         tolerances = float(job.control[Control.RTOL]), float(job.control[Control.ATOL])

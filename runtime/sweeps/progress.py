@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -73,7 +72,7 @@ class Progress:
         return f"{parts}; {self.failures}" if self.failures else parts
 
 
-Hook = Callable[[Progress], Any]
+Hook = Callable[[Progress], object]
 
 
 def duration(seconds: float) -> str:
@@ -101,7 +100,7 @@ class Reporter:
     began: float = field(default_factory=time.perf_counter)
     every: float = EVERY
     _said: float = 0.0
-    _bar: Any = None
+    _bar: tqdm | None = None
 
     def start(self, counts: np.ndarray, compiling: float = 0.0) -> None:
         """Begin to count cells.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from concurrent.futures import Executor
-from typing import Any
 
 from synchain.models.inputs.checks import check_instance
 from synchain.models.scenes.scene import Scene
@@ -30,7 +29,7 @@ def run(
     certified: bool = False,
     executor: Executor | None = None,
     progress: Hook | None = None,
-    **axes: Any,
+    **axes: object,
 ) -> Result:
     """Run every cell of a scene.
 

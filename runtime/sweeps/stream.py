@@ -67,7 +67,7 @@ def stream(
     certified: bool = False,
     executor: Executor | None = None,
     progress: Hook | None = None,
-    **axes: Any,
+    **axes: object,
 ) -> Streamed:
     """Run every cell of a scene and write its result to a netCDF file, block by block.
 

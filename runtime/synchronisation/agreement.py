@@ -15,7 +15,6 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -86,7 +85,7 @@ class Agreement:
         found = Counter(cell.cause for cell in self.cells if cell.cause)
         return {cause: found[cause] for cause in CAUSES if found[cause]}
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """JSON-ready: counts, causes, and for each sigma the numbers, outcome and cause."""
         names = ("sigma", "exponent", "stderr", "share", "error", "outcome", "cause")
         rows = [{name: getattr(cell, name) for name in names} for cell in self.cells]

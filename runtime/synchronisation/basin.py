@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -169,7 +168,7 @@ def random_starts(scene: Scene, samples: int, ranges: Mapping[str, Range] | None
     return scene.replace(axes=dict(zip(names, values.T, strict=True)), zipped=True)
 
 
-def _check(scene: Scene, samples: Any, tolerance: Any, confidence: Any, seed: Any) -> None:
+def _check(scene: Scene, samples: object, tolerance: object, confidence: object, seed: object) -> None:
     if a_scene(scene).n < 2:
         raise ValueError(f"basin: found {scene.n} oscillator; expected at least two, which can synchronise")
     check_integer("basin: samples", samples, 1, SAMPLE_LIMIT)
