@@ -8,7 +8,6 @@ from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future,
 from contextlib import suppress
 from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
-from typing import Any
 
 import numpy as np
 
@@ -35,8 +34,11 @@ class Task:
 
     block: int
     cells: np.ndarray
-    arguments: tuple[Any, ...]
+    arguments: tuple[object, ...]
 
+
+Running = Future[Buffers | None]
+"""A task that is with a worker; None is the answer of one that does not know the job yet."""
 
 Finish = Callable[[Task, Buffers], Task | None]
 """Takes the results of a task; returns the task that has waited for it, if there is one."""
@@ -111,8 +113,8 @@ class WorkerPool:
         On Ctrl-C the blocks in flight are finished first if that is possible; a second Ctrl-C
         leaves them.  Raises what a worker raised.
         """
-        arrived: SimpleQueue[Future[Any]] = SimpleQueue()
-        flying: dict[Future[Any], Task] = {}
+        arrived: SimpleQueue[Running] = SimpleQueue()
+        flying: dict[Running, Task] = {}
 
         def send(task: Task, introduce: bool = False) -> None:
             future = self.submit(task, introduce)
@@ -138,7 +140,7 @@ class WorkerPool:
                 _drain(waited, flying, finish)
             raise
 
-    def submit(self, task: Task, introduce: bool = False) -> Future[Any]:
+    def submit(self, task: Task, introduce: bool = False) -> Running:
         """Give a task to a worker; the first ones, and with `introduce`, come with the
         specification of the job.
         """
@@ -159,7 +161,7 @@ class WorkerPool:
         if self.owned:
             self.executor.shutdown(wait=True, cancel_futures=True)
 
-    def _fill(self, flying: dict[Future[Any], Task], tasks: Iterable[Task], send: Callable[[Task], None]) -> None:
+    def _fill(self, flying: dict[Running, Task], tasks: Iterable[Task], send: Callable[[Task], None]) -> None:
         """Send tasks until all workers are busy."""
         while len(flying) < self.limit:
             task = next(iter(tasks), None)
@@ -181,21 +183,22 @@ def _size(executor: Executor | None, workers: int | None) -> int:
     return max(1, int(count))
 
 
-def _next(arrived: SimpleQueue[Future[Any]]) -> Future[Any]:
+def _next(arrived: SimpleQueue[Running]) -> Running:
     """The next future that is done."""
     while True:
         with suppress(Empty):
             return arrived.get(timeout=LOOK)
 
 
-def _drain(waited: list[Future[Any]], flying: dict[Future[Any], Task], finish: Finish) -> None:
+def _drain(waited: list[Running], flying: dict[Running, Task], finish: Finish) -> None:
     """Wait for the blocks that are being run and keep those that succeed."""
     for future in waited:
         while not future.done():
             with suppress(TimeoutError):
                 future.exception(timeout=LOOK)
-        if not future.cancelled() and future.exception() is None and future.result() is not None:
-            finish(flying[future], future.result())
+        done = not future.cancelled() and future.exception() is None
+        if done and (buffers := future.result()) is not None:
+            finish(flying[future], buffers)
 
 
 def worker_lost(problem: BaseException) -> bool:

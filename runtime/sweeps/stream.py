@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -166,7 +165,8 @@ def claim(
         return "begin"
     if partial.exists() and (resume or not target.exists()):
         with understood(partial):
-            _check_same(reduction, certified, partial, BlockLog.describe(partial))
+            about = BlockLog.describe(partial)
+            _check_same(reduction, certified, partial, about["attributes"], about["certificate"] is not None)
         if not resume:
             raise FileExistsError(
                 f"{partial} keeps a run of this scene that was not finished; "
@@ -175,23 +175,21 @@ def claim(
         return "continue"
     if target.exists():
         with understood(target):
-            _check_same(reduction, certified, target, _described(target))
+            with netcdf_data(target) as file:
+                attributes, exponents = dict(file.attrs), "transversal_exponent" in file
+            _check_same(reduction, certified, target, attributes_of(attributes, target), exponents)
         return "complete"
     if resume:
         raise FileNotFoundError(f"nothing to resume: {target} does not exist; run without resume (--resume)")
     return "begin"
 
 
-def _described(target: Path) -> dict[str, Any]:
-    """What a block log says of its sweep, from the file of a finished result."""
-    with netcdf_data(target) as file:
-        attributes, certified = dict(file.attrs), "transversal_exponent" in file
-    return {"attributes": attributes_of(attributes, target), "certificate": certified or None}
-
-
-def _check_same(reduction: Reduction, certified: bool, path: Path, about: Mapping[str, Any]) -> None:
-    """Raise ValueError if a file is not that of this run."""
-    attributes = about["attributes"]
+def _check_same(
+    reduction: Reduction, certified: bool, path: Path, attributes: Mapping[str, object], exponents: bool
+) -> None:
+    """Raise ValueError if a file, with its attributes and with or without exponents, is not that of
+    this run.
+    """
     again = "repeat the options of that run, choose another path (--out), or replace it with overwrite (--overwrite)"
     if not alike(scene_of(attributes), reduction.scene):
         raise ValueError(f"{path} belongs to another scene ({short_repr(attributes['title'])}); {again}")
@@ -205,8 +203,8 @@ def _check_same(reduction: Reduction, certified: bool, path: Path, about: Mappin
             f"{path} left out other parts of its scene: {attributes.get('skipped', 'nothing')}; "
             f"{again.replace('the options of that run', 'its reduction (--no-skip, or the absence of it)')}"
         )
-    if (about["certificate"] is not None) != certified:
-        certificate = "with" if about["certificate"] is not None else "without"
+    if exponents != certified:
+        certificate = "with" if exponents else "without"
         raise ValueError(f"{path} was run {certificate} a certificate (certified, --certify); {again}")
 
 
