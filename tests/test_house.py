@@ -60,7 +60,7 @@ ARROWS = {
     "runtime.bench.peers": "support codegen models",
     "runtime.console": "figures bifurcation synchronisation sweeps stability results prediction cells "
     "support codegen models",
-    "runtime.commands": "console bench figures bifurcation synchronisation sweeps stability results prediction cells "
+    "runtime.commands": "console bench bench.kit figures bifurcation synchronisation sweeps stability results prediction cells "
     "support codegen models",
 }
 """The rooms that a room may import, beside itself; names without a package are rooms of the same
