@@ -130,7 +130,7 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
     return written
 
 
-def _graph(graph: Topology) -> dict[str, Any]:
+def _graph(graph: Topology) -> dict[str, object]:
     try:
         same = topology(graph.name, graph.n, **dict(graph.options)) == graph
     except (ValueError, TypeError):
