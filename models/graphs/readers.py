@@ -67,7 +67,7 @@ def from_graph(graph: Any, weight: str = "weight", name: str = "graph") -> Topol
     Parameters
     ----------
     graph : networkx graph
-        Any object with nodes, edges and is_directed.
+        An object with nodes, edges and is_directed.
     weight : str, optional
         The edge attribute that holds the weight, read through its decimal text; 1 without.
     name : str, optional
