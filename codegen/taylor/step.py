@@ -83,16 +83,20 @@ class Written:
         return self.at(series, 0)
 
     def sum(self, left: Series, right: Series, first: int, last: int) -> Expr:
-        """Sum of left_j * right_(k-j) for j = first … k + last."""
+        """Sum of left_j * right_(k-j) for j = first … k + last.
+
+        The latest coefficients come last, so that the processor can add up all others before they are known.
+        """
         k = self.k
-        return add(*(times(self.at(left, j), self.at(right, k - j)) for j in range(first, k + last + 1)))
+        order = sorted(range(first, k + last + 1), key=lambda j: max(j, k - j))
+        return add(*(times(self.at(left, j), self.at(right, k - j)) for j in order))
 
     def square(self, base: Series, first: int) -> Expr:
         """Sum of base_j * base_(k-j) for j = first … k - first, pairs of equal products once."""
         k = self.k
-        half = add(*(times(self.at(base, j), self.at(base, k - j)) for j in range(first, (k + 1) // 2)))
+        half = add(*(times(self.at(base, j), self.at(base, k - j)) for j in reversed(range(first, (k + 1) // 2))))
         middle = self.at(base, k // 2) if k % 2 == 0 and k // 2 >= first else ZERO
-        return add(times(Number(2.0), half), times(middle, middle))
+        return add(times(middle, middle), times(Number(2.0), half))
 
     def keep(self, what: str, value: Expr) -> str:
         """Compute something once; returns its name."""

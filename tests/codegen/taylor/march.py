@@ -64,7 +64,7 @@ class Lanes:
         )
         rtol, atol = more.get("rtol", 1e-10), more.get("atol", 1e-11)
         length = self.once(
-            float(more.get("t", 0.0)), float(h), float(more.get("scale", 1.0)), y, y_new, dense, rtol, atol, length
+            float(more.get("t", 0.0)), float(h), float(more.get("scale", 1.0)), y, y_new, dense, rtol, atol
         )
         return length, y_new.reshape(size, -1).T, dense.reshape(self.order, size, -1)
 
@@ -102,4 +102,3 @@ def compiled(equations: Equations, order: int, width: int = 1, dense: bool = Fal
         return length
 
     return Lanes(march, once, equations, width, order)
-
