@@ -162,7 +162,7 @@ class LoopWriter:
         named = {s for node in eq.nodes for s in (*node.state, *node.parameters)}
         named |= {s for edge in eq.edges for s in (edge.weight, *edge.parameters)}
         words = sorted({s.name for s in named} | set(eq.parameters))
-        self.called = {}
+        self.called: dict[str, str] = {}
         for name in words:
             self.called[name] = called(name, {*words, *self.called.values()})
         self.swap = {sp.Symbol(old, real=True): sp.Symbol(new, real=True) for old, new in self.called.items()}
