@@ -42,7 +42,7 @@ ARROWS = {
     "codegen.driver": "simd",
     "codegen.printing": "simd models",
     "codegen.steps": "printing integrators models",
-    "codegen.taylor": "printing integrators simd models",
+    "codegen.taylor": "steps printing integrators simd models",
     "codegen.kernels": "taylor steps printing driver integrators simd models",
     "codegen.export": "printing models",
     "runtime.support": "models.inputs",

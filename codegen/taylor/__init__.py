@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
+from .looped import write_looped
 from .order import order_for
 from .step import TaylorStep, write_step
 
-__all__ = ["TaylorStep", "order_for", "write_step"]
+__all__ = ["TaylorStep", "order_for", "write_looped", "write_step"]

@@ -21,30 +21,45 @@ from .graph import STARTS, Graph, Template
 from .series import Constant, Series, State, Time
 from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
 
-__all__ = ["SAFETY", "TaylorStep", "write_step"]
-
-SAFETY = 1.0
-"""Largest share of the tolerance that the last terms of the series may take in a step."""
+__all__ = ["FARTHEST", "TaylorStep", "called", "finished", "write_step"]
 
 FARTHEST = 2.772588722239781
 """The logarithm of how many times longer than `scale` a step may be: 16."""
 
-WORDS = frozenset({"scale", "ratio", "reach", "length", "total", "raised", "power", *STARTS.values()})
+WORDS = frozenset(
+    {"scale", "ratio", "reach", "length", "total", "raised", "power", "weight", "number", "inverse", "LINKS", "j_there",
+     "slope_scale", *STARTS.values()}
+)  # fmt: skip
 PREFIXES = ("i_", "e_", "half_", "w_", "n_", "size_")
 """Names of the step; a user's symbol of that name is called otherwise within the step."""
 
-COUNTED = re.compile(r"r\d+$")
+COUNTED = re.compile(r"[rs]\d+$")
 
 
 @dataclass(frozen=True, slots=True)
 class TaylorStep:
-    """The text of the function `step`, the order of its series, which is the number of rows of its dense output, and the
-    functions of `synchain.codegen.simd` that it calls.
+    """The text of the function `step` and what a kernel must know of it.
+
+    order: that of the series, and the number of rows of the dense output; imports: the functions of `synchain.codegen.simd`
+    that it calls; workspace: the groups of memory that a looped step needs behind the dense output.
     """
 
     text: str
     order: int
     imports: tuple[str, ...]
+    workspace: int = 0
+
+    @classmethod
+    def of(cls, lines: Sequence[str], order: int, workspace: int = 0, more: str = "") -> TaylorStep:
+        """The step of some statements."""
+        head = [
+            "@njit(error_model='numpy', cache=True)",
+            f"def step(t, h, scale, y, p, y_new, dense, rtol, atol{more}):",
+            '    """One step from (t, y): writes y_new and the dense output, returns the length of the step."""',
+        ]
+        text = "\n".join([*head, *(f"    {line}" for line in lines)])
+        functions = {*STARTS.values(), "absolute", "broadcast", "load", "maximum", "minimum", "power", "sqrt", "store"}
+        return cls(text, order, tuple(sorted(f for f in functions | {"truncated"} if f"{f}(" in text)), workspace)
 
 
 @dataclass(slots=True)
@@ -83,16 +98,20 @@ class Written:
         return self.at(series, 0)
 
     def sum(self, left: Series, right: Series, first: int, last: int) -> Expr:
-        """Sum of left_j * right_(k-j) for j = first … k + last."""
+        """Sum of left_j * right_(k-j) for j = first … k + last.
+
+        The latest coefficients come last, so that the processor can add up all others before they are known.
+        """
         k = self.k
-        return add(*(times(self.at(left, j), self.at(right, k - j)) for j in range(first, k + last + 1)))
+        order = sorted(range(first, k + last + 1), key=lambda j: max(j, k - j))
+        return add(*(times(self.at(left, j), self.at(right, k - j)) for j in order))
 
     def square(self, base: Series, first: int) -> Expr:
         """Sum of base_j * base_(k-j) for j = first … k - first, pairs of equal products once."""
         k = self.k
-        half = add(*(times(self.at(base, j), self.at(base, k - j)) for j in range(first, (k + 1) // 2)))
+        half = add(*(times(self.at(base, j), self.at(base, k - j)) for j in reversed(range(first, (k + 1) // 2))))
         middle = self.at(base, k // 2) if k % 2 == 0 and k // 2 >= first else ZERO
-        return add(times(Number(2.0), half), times(middle, middle))
+        return add(times(middle, middle), times(Number(2.0), half))
 
     def keep(self, what: str, value: Expr) -> str:
         """Compute something once; returns its name."""
@@ -119,7 +138,7 @@ class StepWriter:
         self.equations, self.order = equations, order
         self.lines: list[str] = []
         taken = {*equations.state, *equations.parameters}
-        self.called = {name: _called(name, taken) for name in (*equations.state, *equations.parameters)}
+        self.called = {name: called(name, taken) for name in (*equations.state, *equations.parameters)}
         taken |= set(self.called.values())
         self.names = [_unlike(self.called[name], taken, order) for name in equations.state]
         own = {s.name for node in equations.nodes for s in (*node.state, *node.parameters)}
@@ -238,14 +257,9 @@ class StepWriter:
             if found:
                 self.put(*statement(Assign(f"size_{k}", _largest(found))))
                 reaches.append(times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))))
-        if reaches:
-            self.put(*statement(Assign("reach", _extreme("minimum", reaches))))
-            # the weights were taken over a step of the length `scale`: shorter steps have smaller ones
-            self.put(f"reach = minimum(reach, {(p - 2) / (p - 4)!r}*reach)")
-            self.put(f"length = scale*exp(minimum(reach - {_margin(p)!r}, {FARTHEST!r}))")
-        else:
-            self.put("length = 16.0*scale")
-        self.put("length = minimum(truncated(length), h)", "ratio = length/scale")
+        if not reaches:
+            reaches = [Name(f"{FARTHEST!r} + 0.0*scale")]
+        self.put(*statement(Assign("reach", _extreme("minimum", reaches))), *finished(p, FARTHEST))
 
     def closing(self) -> None:
         """The new state by Horner, the dense output, and the length of the step."""
@@ -298,32 +312,17 @@ def write_step(equations: Equations, order: int) -> TaylorStep:
         raise ValueError(f"taylor: found order {order}; expected at least 6")
     if equations.inertial:
         raise ValueError("taylor: found links with inertia; expected an identity mass matrix; use dop853 or rodas5p")
-    lines = StepWriter(equations, order).write()
-    head = [
-        "@njit(error_model='numpy', cache=True)",
-        "def step(t, h, scale, y, p, y_new, dense, rtol, atol):",
-        '    """One step from (t, y): writes y_new and the dense output, returns the length of the step."""',
+    return TaylorStep.of(StepWriter(equations, order).write(), order)
+
+
+def finished(order: int, farthest: float) -> list[str]:
+    """The length of the step from the logarithm of its share of `scale`."""
+    return [
+        # weights are those of a step as long as `scale`; a shorter one changes the states less
+        f"reach = minimum(reach, {(order - 2) / (order - 4)!r}*reach)",
+        f"length = minimum(truncated(scale*exp(minimum(reach, {farthest!r}))), h)",
+        "ratio = length/scale",
     ]
-    text = "\n".join([*head, *(f"    {line}" for line in lines)])
-    called = {
-        *STARTS.values(),
-        "absolute",
-        "exp",
-        "load",
-        "log",
-        "maximum",
-        "minimum",
-        "power",
-        "sqrt",
-        "store",
-        "truncated",
-    }
-    return TaylorStep(text, order, tuple(sorted(word for word in called if f"{word}(" in text)))
-
-
-def _margin(order: int) -> float:
-    """What is taken off the logarithm of a step."""
-    return 0.0
 
 
 def _largest(values: Iterable[Expr]) -> Expr:
@@ -338,7 +337,7 @@ def _extreme(function: str, values: Sequence[Expr]) -> Expr:
     return Call(function, (_extreme(function, values[:half]), _extreme(function, values[half:])))
 
 
-def _called(name: str, taken: set[str]) -> str:
+def called(name: str, taken: set[str]) -> str:
     """What a symbol is called within the step: as it is, unless the step needs that name itself."""
     if name not in WORDS and not name.startswith(PREFIXES) and not COUNTED.match(name):
         return name

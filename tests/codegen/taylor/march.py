@@ -12,7 +12,8 @@ from numba import njit as numba_njit
 
 from synchain.codegen import simd
 from synchain.codegen.printing.names import tidy
-from synchain.codegen.taylor.step import TaylorStep, write_step
+from synchain.codegen.steps.program import program
+from synchain.codegen.taylor import TaylorStep, write_looped, write_step
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import Node
 
@@ -37,6 +38,7 @@ class Lanes:
     equations: Equations
     width: int
     order: int
+    groups: int
 
     def run(self, start: Any, numbers: Any, end: Any, rtol: float, atol: float | None = None, **more: Any) -> Any:
         """The end states (width, dimension) and the number of steps; rows of `start` and `numbers` are lanes or shared."""
@@ -59,27 +61,37 @@ class Lanes:
         y, size = self.bank(start, numbers), self.equations.dimension
         y_new, dense, length = (
             np.zeros(size * self.width),
-            np.zeros(self.order * size * self.width),
+            np.zeros(self.groups * self.width),
             np.zeros(self.width),
         )
         rtol, atol = more.get("rtol", 1e-10), more.get("atol", 1e-11)
         length = self.once(
-            float(more.get("t", 0.0)), float(h), float(more.get("scale", 1.0)), y, y_new, dense, rtol, atol, length
+            float(more.get("t", 0.0)), float(h), float(more.get("scale", 1.0)), y, y_new, dense, rtol, atol
         )
-        return length, y_new.reshape(size, -1).T, dense.reshape(self.order, size, -1)
+        return length, y_new.reshape(size, -1).T, dense[: self.order * size * self.width].reshape(self.order, size, -1)
 
 
-def compiled(equations: Equations, order: int, width: int = 1, dense: bool = False) -> Lanes:
+def compiled(equations: Equations, order: int, width: int = 1, dense: bool = False, looped: bool = False) -> Lanes:
     """The step of some order, compiled for a width."""
-    text = step_of(equations, order).text
-    space = {**SPACE, "WIDTH": width, "DIMENSION": equations.dimension, "DENSE": dense}
-    exec(text, space)
+    plan = program(tidy(equations))
+    written = write_looped(tidy(equations), order) if looped else step_of(equations, order)
+    space = {**SPACE, "WIDTH": width, "DIMENSION": equations.dimension, "NODES": equations.n, "DENSE": dense}
+    space["DENSE_ROWS"] = order
+    exec(written.text, space)
+    if looped:
+        graph, weights, inner = plan.arrays, plan.weights, space["step"]
+        space["step"] = numba_njit(error_model="numpy")(
+            lambda t, h, scale, y, p, y_new, dense, rtol, atol: inner(
+                t, h, scale, y, p, y_new, dense, rtol, atol, graph, weights
+            )
+        )
     step, load, store, select, broadcast = (space[n] for n in ("step", "load", "store", "select", "broadcast"))
-    size, rows, lane_bits, power_of_two = equations.dimension, order, simd.lane_bits, simd.power_of_two
+    size, lane_bits, power_of_two = equations.dimension, simd.lane_bits, simd.power_of_two
+    groups = order * size + written.workspace
 
     @numba_njit(error_model="numpy")
     def march(t, y, ends, rtol, atol, first):
-        y_new, work, scales = np.zeros(size * width), np.zeros(rows * size * width), np.full(width, first)
+        y_new, work, scales = np.zeros(size * width), np.zeros(groups * width), np.full(width, first)
         steps = 0
         while True:
             now, end = load(t, 0, width), load(ends, 0, width)
@@ -101,5 +113,4 @@ def compiled(equations: Equations, order: int, width: int = 1, dense: bool = Fal
         store(length, 0, found)
         return length
 
-    return Lanes(march, once, equations, width, order)
-
+    return Lanes(march, once, equations, width, order, groups)

@@ -41,20 +41,26 @@ def exact(text: str) -> str:
     return re.sub(r"(?<![\w.])\d+\.\d+(e[-+]\d+)?", number, text)
 
 
-def series(equations: Equations, start: list[Any], numbers: list[Any], t: Any = 0, order: int = ORDER, scale: int = 1) -> list:
+def series(
+    equations: Equations, start: list[Any], numbers: list[Any], t: Any = 0, order: int = ORDER, scale: int = 1
+) -> list:
     """The coefficients of all states, (order + 1, dimension), in 60 digits."""
     space = {**FUNCTIONS, "mpf": mpmath.mpf, "pi": mpmath.pi}
     exec(exact(step_of(equations, order).text), space)
     size = equations.dimension
     y, y_new, dense = [*start, *numbers], [None] * size, [None] * size * order
-    length = space["step"](t, mpmath.inf, mpmath.mpf(scale), y, y, y_new, dense, mpmath.mpf("1e-10"), mpmath.mpf("1e-11"))
+    length = space["step"](
+        t, mpmath.inf, mpmath.mpf(scale), y, y, y_new, dense, mpmath.mpf("1e-10"), mpmath.mpf("1e-11")
+    )
     rows = [dense[k * size : (k + 1) * size] for k in range(order)]
     return [list(start), *([c * (scale / length) ** (k + 1) for c in row] for k, row in enumerate(rows))]
 
 
 def close(found: list, expected: list, digits: int = 40) -> bool:
     size = max(abs(e) for e in expected)
-    return all(abs(a - b) <= mpmath.mpf(10) ** -digits * max(size, abs(b)) for a, b in zip(found, expected, strict=True))
+    return all(
+        abs(a - b) <= mpmath.mpf(10) ** -digits * max(size, abs(b)) for a, b in zip(found, expected, strict=True)
+    )
 
 
 POINTS = ["0.3", "-0.45", "0.7"]

@@ -1,0 +1,385 @@
+"""The text of a Taylor step for a large network: loops over orders, nodes and links around the same recurrences.
+
+Behind the rows of the dense output stand the coefficients of the states, the rates of one order, and the coefficients of
+every series that a convolution reads: coefficient k of node i at `at_… + k*NODES + i`, of link e at `at_… + k*LINKS + e`, of
+what depends on time alone at `at_… + k`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import sympy as sp
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import TIME, Node
+
+from ..printing.blocks import Body, Hoist, Names
+from ..printing.names import NAMES
+from ..printing.printer import show as show_constant
+from ..steps.places import Joint, Kind, Places
+from .graph import Graph, Template
+from .series import Constant, Series, State, Time
+from .step import FARTHEST, TaylorStep, called, finished
+from .terms import ZERO, Assign, Expr, Name, Number, add, show, statement
+
+__all__ = ["write_looped"]
+
+
+@dataclass(slots=True)
+class Section:
+    """What is done alike for all nodes of a kind, for all links of a joint, or once.
+
+    head, index, count: the loop, its variable and the number of its turns in the whole numbering; `before` loads what the
+    turn needs at any order, `places` are the states that it reads, and where they stand.
+    """
+
+    graph: Graph
+    head: str
+    index: str
+    count: int
+    before: list[str] = field(default_factory=list)
+    places: dict[Series, str] = field(default_factory=dict)
+    rates: list[tuple[str, Series]] = field(default_factory=list)
+    adds: bool = False
+    waves: dict[Series, Section] = field(default_factory=dict)
+    kept: list[str] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
+    values: dict[Series, Expr] = field(default_factory=dict)
+    sums: int = 0
+
+    # -- what a recurrence asks for -------------------------------------------------------------------------------
+
+    @property
+    def inverse(self) -> Expr:
+        """1/k."""
+        return Name("inverse")
+
+    @property
+    def number(self) -> Expr:
+        """k."""
+        return Name("number")
+
+    def of(self, series: Series) -> Expr:
+        """Coefficient k of a series."""
+        if isinstance(series, Constant):
+            return ZERO
+        return self.values[series]
+
+    def start(self, series: Series) -> Expr:
+        """Coefficient 0 of a series."""
+        return series.value if isinstance(series, Constant) else self.values[series]
+
+    def sum(self, left: Series, right: Series, first: int, last: int) -> Expr:
+        """Sum of left_j * right_(k-j) for j = first … k + last."""
+        total = f"s{self.sums}"
+        self.sums += 1
+        end = {0: "k + 1", -1: "k"}[last]
+        self.lines += [
+            f"{total} = 0.0*scale",
+            f"for j in range({first}, {end}):",
+            f"    {total} = {total} + {self.load(left, 'j')}*{self.load(right, '(k - j)')}",
+        ]
+        return Name(total)
+
+    def square(self, base: Series, first: int) -> Expr:
+        """Sum of base_j * base_(k-j) for j = first … k - first."""
+        return self.sum(base, base, first, -first)
+
+    def keep(self, what: str, value: Expr) -> str:
+        """Compute something once; returns its name."""
+        if what not in self.kept:
+            self.kept.append(what)
+            self.lines += [*statement(Assign(what, value)), f"store(dense, {self.slot(what, '0')}, {what} + 0.0*scale)"]
+        return what
+
+    # -- places ---------------------------------------------------------------------------------------------------
+
+    def slot(self, name: str, order: str) -> str:
+        """Where a coefficient of a series of this section stands."""
+        if not self.index:
+            return f"at_{name} + {order}"
+        size = "NODES" if self.index == "i" else "LINKS"
+        return f"at_{name} + {self.index}" if order == "0" else f"at_{name} + {order}*{size} + {self.index}"
+
+    def load(self, series: Series, order: str) -> str:
+        """A coefficient of a series from memory."""
+        if series in self.places:
+            return f"load(dense, at_states + {order}*DIMENSION + {self.places[series]}, WIDTH)"
+        owner = self.waves.get(series, self)
+        return f"load(dense, {owner.slot(series.name, order)}, WIDTH)"
+
+    @property
+    def remembered(self) -> set[Series]:
+        """Series whose earlier coefficients are needed."""
+        return {used for s in self.graph.series for used in s.convolved} - set(self.places) - set(self.waves)
+
+    # -- text -----------------------------------------------------------------------------------------------------
+
+    def text(self, order: str) -> list[str]:
+        """The statements for coefficients `order`: 0, or k for any later one."""
+        self.lines, first = list(self.before), order == "0"
+        outer = [*self.places, *self.waves]
+        if not first:
+            self.lines += [f"{name} = load(dense, {self.slot(name, '0')}, WIDTH)" for name in self.kept]
+        self.lines += [f"{s.name} = {self.load(s, order)}" for s in outer]
+        self.values = {s: Name(s.name) for s in outer}
+        remembered = self.remembered | ({s for _, s in self.rates} if not self.index else set())
+        for s in self.graph.series:
+            value = s.begin(self) if first else s.coefficient(self)
+            inline = s in (self.graph.inline_start if first else self.graph.inline) and s not in remembered
+            if not inline and not isinstance(value, Name | Number):
+                self.lines += statement(Assign(s.name, value))
+                value = Name(s.name)
+            self.values[s] = value
+            if s in remembered:
+                self.lines.append(f"store(dense, {self.slot(s.name, order)}, {lane(value)})")
+        for place, rate in self.rates if self.index else ():
+            value = self.start(rate) if first else self.of(rate)
+            if not self.adds:
+                text = f"{show(value)} + 0.0*scale" if isinstance(rate, Constant) else show(value)
+                self.lines.append(f"store(dense, at_rates + {place}, {text})")
+            elif value != ZERO:
+                self.lines += statement(Assign("rate", add(Name(f"load(dense, at_rates + {place}, WIDTH)"), value)))
+                self.lines.append(f"store(dense, at_rates + {place}, rate)")
+        return [self.head, *(f"    {line}" for line in self.lines)] if self.index else self.lines
+
+
+def lane(value: Expr) -> str:
+    """The text of a value that is stored: numbers become lanes."""
+    if isinstance(value, Number):
+        return f"broadcast({show(value)}, WIDTH)"
+    return show(value)
+
+
+class LoopWriter:
+    """Writes the looped step of some order for tidy equations."""
+
+    def __init__(self, equations: Equations, order: int) -> None:
+        self.equations, self.order, self.places = equations, order, Places(equations)
+        eq = equations
+        named = {s for node in eq.nodes for s in (*node.state, *node.parameters)}
+        named |= {s for edge in eq.edges for s in (edge.weight, *edge.parameters)}
+        words = sorted({s.name for s in named} | set(eq.parameters))
+        self.called: dict[str, str] = {}
+        for name in words:
+            self.called[name] = called(name, {*words, *self.called.values()})
+        self.swap = {sp.Symbol(old, real=True): sp.Symbol(new, real=True) for old, new in self.called.items()}
+        taken = {*words, *self.called.values(), *(f"{s}{end}" for s in words for end in ("_here", "_there"))}
+        self.names = Names(taken)
+        self.time = Time(name="t")
+        self.waves = Section(Graph(self.names), "", "", 1)
+        read = [self.hoisted(kind) for kind in self.places.kinds]
+        self.waves.graph.settle([s for _, s in self.waves.rates])
+        if self.waves.rates:
+            self.waves.waves[self.time] = self.waves
+        self.sections = [self.node(kind, *found) for kind, found in zip(self.places.kinds, read, strict=True)]
+        self.sections += [self.link(joint) for joint in self.places.joints]
+
+    # -- sections ---------------------------------------------------------------------------------------------
+
+    def varied(self) -> list[sp.Symbol]:
+        """Parameters that have a value for each node."""
+        return [sp.Symbol(name, real=True) for name in self.equations.varied]
+
+    def node(
+        self,
+        kind: Kind,
+        rates: Sequence[sp.Expr],
+        waves: Mapping[sp.Symbol, Series],
+        constants: Mapping[sp.Symbol, sp.Expr],
+    ) -> Section:
+        """The rates of the nodes of a kind."""
+        moves = self.moves(kind.node)
+        states = [s for s, moving in zip(kind.node.state, moves, strict=True) if moving]
+        fixed = [s for s in kind.node.state if s not in states]
+        section = Section(Graph(self.names), kind.head, "i", self.equations.n)
+        section.before += self.own(kind.node.rhs, fixed, kind.node, "i", "")
+        moving = {s: State(name=self.swap[s].name) for s in states}
+        component = {s: c for c, s in enumerate(kind.node.state)}
+        section.places = {state: self.places.place(component[s]) for s, state in moving.items()}
+        seen: dict[sp.Symbol, Series] = {symbol: State(name=series.name) for symbol, series in waves.items()}
+        section.waves = dict.fromkeys(seen.values(), self.waves)
+        found = self.read(section, rates, {**moving, **seen}, constants)
+        section.rates = [(self.places.place(c), rate) for c, rate in enumerate(found)]
+        return section
+
+    def link(self, joint: Joint) -> Section:
+        """What the links of a joint add."""
+        edge = joint.edge
+        section = Section(Graph(self.names), joint.head, "e", len(self.equations.links), adds=True)
+        weight = self.called[edge.weight.name]
+        section.before += ["i, j_there = target[e], source[e]", f"{weight} = weights[e]"]
+        moving: dict[sp.Symbol, Series] = {}
+        swap: dict[sp.Symbol, sp.Expr] = {}
+        used = {s for e in edge.rhs for s in e.free_symbols}
+        for symbols, node, suffix, index in (
+            (edge.here, joint.target, "_here", "i"),
+            (edge.there, joint.source, "_there", "j_there"),
+        ):
+            for c, (s, own, moves) in enumerate(zip(symbols, node.state, self.moves(node), strict=True)):
+                name = f"{self.called[own.name]}{suffix}"
+                if s not in used:
+                    continue
+                if moves:
+                    moving[s] = State(name=name)
+                    section.places[moving[s]] = self.places.place(c, index)
+                else:
+                    swap[s] = sp.Symbol(name, real=True)
+                    section.before.append(f"{name} = load(y, {self.places.place(c, index)}, WIDTH)")
+        section.before += self.own(edge.rhs, [], joint.target, "i", "_here")
+        found = self.read(section, edge.rhs, moving, swap)
+        section.rates = [(self.places.place(c), rate) for c, rate in enumerate(found)]
+        return section
+
+    def moves(self, node: Node) -> tuple[bool, ...]:
+        """Which states of a node move: one at rest, such as the mode of a contact, is a constant of the step."""
+        rates = [e != 0 for e in node.rhs]
+        for joint in self.places.joints:
+            if joint.target == node:
+                rates = [a or e != 0 for a, e in zip(rates, joint.edge.rhs, strict=True)]
+        return tuple(rates)
+
+    def own(
+        self, used: Sequence[sp.Expr], fixed: Sequence[sp.Symbol], node: Node, index: str, suffix: str
+    ) -> list[str]:
+        """Load the constants that a node has for itself: states at rest and parameters that vary."""
+        lines = [
+            f"{self.called[s.name]}{suffix} = load(y, {self.places.place(c, index)}, WIDTH)"
+            for c, s in enumerate(node.state)
+            if s in fixed
+        ]
+        for line in self.places.own(Body((), tuple(used))):
+            name, _, rest = line.partition(" = ")
+            lines.append(f"{self.called[name]} = {rest}")
+        return lines
+
+    def hoisted(self, kind: Kind) -> tuple[list[sp.Expr], dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]:
+        """The rates of a node with names for what depends on time and parameters, series for what depends on time, and
+        the rest, which depends on parameters alone.
+        """
+        hoist = Hoist(frozenset([*kind.node.state, *self.varied()]), self.names.fresh("wave_"))
+        rates = [hoist.apply(e) for e in kind.node.rhs]
+        waves: dict[sp.Symbol, Series] = {}
+        constants: dict[sp.Symbol, sp.Expr] = {}
+        for e, symbol in hoist.table.items():
+            if not e.has(TIME):
+                constants[symbol] = e.xreplace(self.swap)
+                continue
+            template = Template.of([e], [TIME], self.names.fresh("shared_"))
+            (waves[symbol],) = self.waves.graph.read(template, {TIME: self.time}, self.swap)
+            self.waves.rates.append(("", waves[symbol]))
+        return rates, waves, constants
+
+    def read(
+        self,
+        section: Section,
+        rates: Sequence[sp.Expr],
+        moving: Mapping[sp.Symbol, Series],
+        swap: Mapping[sp.Symbol, sp.Expr],
+    ) -> list[Series]:
+        """The series of a section, and the constants that each of its turns computes."""
+        graph = section.graph
+        template = Template.of(rates, moving, self.names.fresh("shared_"))
+        found = graph.read(template, moving, {**self.swap, **swap})
+        graph.settle(found)
+        section.before += [f"{name} = {show_constant(e)}" for name, e in graph.constants.items()]
+        return found
+
+    # -- text -------------------------------------------------------------------------------------------------
+
+    def write(self) -> tuple[list[str], int]:
+        """All statements, and the groups of workspace that they need."""
+        eq = self.equations
+        orders = [self.waves.text("0"), *(section.text("0") for section in self.sections)]
+        later = [self.waves.text("k"), *(section.text("k") for section in self.sections)]
+        bases, size = self.bases()
+        lines = [*bases, f"{', '.join((*NAMES, 'where') if eq.mixed else NAMES)} = graph", f"LINKS = {len(eq.links)}"]
+        own = {f"{name}_{i + 1}" for name in eq.varied for i in range(eq.n)}
+        for slot, name in enumerate(eq.parameters, start=eq.dimension):
+            if name not in own:
+                lines.append(f"{self.called[name]} = load(p, {slot}, WIDTH)")
+        lines += [f"{name} = {show_constant(e)}" for name, e in self.waves.graph.constants.items()]
+        lines += ["# order 0", *self.states("store(dense, at_states + {0}, load(y, {0}, WIDTH))")]
+        if self.waves.rates:
+            lines += ["store(dense, at_t, t)", "store(dense, at_t + 1, scale)", f"for k in range(2, {self.order + 1}):"]
+            lines += ["    store(dense, at_t + k, 0.0*scale)"]
+        lines += [line for part in orders for line in part]
+        lines += ["# all further orders", f"for k in range(1, {self.order}):"]
+        lines += [
+            f"    {line}" for line in ("number = 1.0*k", "inverse = 1.0/k", *self.next_states("inverse*scale", "k"))
+        ]
+        lines += [f"    {line}" for part in later for line in part]
+        lines += self.next_states(f"{1.0 / self.order!r}*scale", str(self.order))
+        lines += self.closing()
+        return lines, size
+
+    def bases(self) -> tuple[list[str], int]:
+        """Where everything stands in the workspace, and how much it takes."""
+        eq, p = self.equations, self.order
+        sizes = {"states": (p + 1) * eq.dimension, "rates": eq.dimension}
+        if self.waves.rates:
+            sizes["t"] = p + 1
+        for section in (self.waves, *self.sections):
+            kept = {
+                s.name for s in section.remembered | ({s for _, s in section.rates} if not section.index else set())
+            }
+            sizes |= {name: p * section.count for name in sorted(kept - {"t", ""})}
+            sizes |= {name: section.count for name in section.kept}
+        lines, size = [], 0
+        for name, groups in sizes.items():
+            lines.append(f"at_{name} = DENSE_ROWS*DIMENSION + {size}")
+            size += groups
+        return lines, size
+
+    def states(self, *lines: str) -> list[str]:
+        """Loops over all states; {0} is the place of one."""
+        return [
+            text
+            for head, place in self.places.rows
+            for text in (head, *(f"    {line.format(place)}" for line in lines))
+        ]
+
+    def next_states(self, factor: str, order: str) -> list[str]:
+        """Coefficients of the states from those of the rates."""
+        return [
+            f"slope_scale = {factor}",
+            *self.states(
+                f"store(dense, at_states + {order}*DIMENSION + {{0}}, slope_scale*load(dense, at_rates + {{0}}, WIDTH))"
+            ),
+        ]
+
+    def closing(self) -> list[str]:
+        """Step length, new state and dense output."""
+        p = self.order
+        at = "load(dense, at_states + {k}*DIMENSION + {{0}}, WIDTH)"
+        lines = ["# step length", *(f"size_{k} = 0.0*scale" for k in (p, p - 1, p - 2))]
+        largest = "absolute(load(y, {0}, WIDTH))"
+        for k in (1, 2):
+            largest = f"maximum({largest}, absolute({at.format(k=k)}))"
+        lines += self.states(
+            f"weight = 1.0/(atol + rtol*{largest})",
+            *(f"size_{k} = maximum(size_{k}, absolute({at.format(k=k)})*weight)" for k in (p, p - 1, p - 2)),
+        )
+        reaches = [f"{-1.0 / k!r}*log(size_{k})" for k in (p, p - 1, p - 2)]
+        lines.append(f"reach = minimum({reaches[0]}, minimum({reaches[1]}, {reaches[2]}))")
+        lines += finished(p, FARTHEST)
+        lines += ["# new state", "total = 0.0*scale"]
+        lines += self.states(
+            f"new = {at.format(k=p)}",
+            f"for k in range({p - 1}, -1, -1):",
+            f"    new = new*ratio + {at.format(k='k')}",
+            "store(y_new, {0}, new)",
+            "total = total + new",
+        )
+        lines += ["if DENSE:", "    raised = ratio", f"    for k in range(1, {p + 1}):"]
+        inner = self.states(f"store(dense, (k - 1)*DIMENSION + {{0}}, raised*{at.format(k='k')})")
+        lines += [f"        {line}" for line in (*inner, "raised = raised*ratio")]
+        return [*lines, "return length + 0.0*total  # NaN where any coefficient is infinite or NaN"]
+
+
+def write_looped(equations: Equations, order: int) -> TaylorStep:
+    """Return the looped Taylor step of some order; see `write_step`."""
+    lines, size = LoopWriter(equations, order).write()
+    return TaylorStep.of(lines, order, size, ", graph, weights")

@@ -1,0 +1,83 @@
+"""The functions that Taylor steps call: errors against mpmath, special values, the same bits at every width."""
+
+from __future__ import annotations
+
+import functools
+
+import mpmath
+import numpy as np
+import pytest
+from numba import njit
+
+from synchain.codegen.simd import special
+from synchain.codegen.simd.lanes import load, store
+
+INF, NAN = np.inf, np.nan
+NAMES = ("acos", "asin", "cosh", "erf", "power_of_two", "sinh", "tan")
+RANGES = {"acos": 1.0, "asin": 1.0, "cosh": 300.0, "erf": 7.0, "sinh": 300.0, "tan": 20.0}
+ULPS = {"acos": 4, "asin": 4, "cosh": 3, "erf": 3, "sinh": 4, "tan": 4}
+
+
+def squared(x):
+    return special.power(x, 2.5)
+
+
+@functools.cache
+def compiled(width: int):
+    functions = [*(getattr(special, name) for name in NAMES[:4]), njit(lambda x: special.power_of_two(x)),
+                 special.sinh, special.tan, njit(squared)]  # fmt: skip
+    calls = "\n".join(f"        store(out[{k}], i, f{k}(x))" for k in range(len(functions)))
+    text = f"def loop(a, out):\n    for i in range(a.size // {width}):\n        x = load(a, i, {width})\n{calls}\n"
+    space = {"load": load, "store": store, **{f"f{k}": f for k, f in enumerate(functions)}}
+    exec(text, space)
+    return njit(space["loop"], error_model="numpy")
+
+
+def at(x: np.ndarray, width: int = 8) -> dict[str, np.ndarray]:
+    fill = -len(x) % width
+    out = np.zeros((len(NAMES) + 1, len(x) + fill))
+    compiled(width)(np.concatenate([x, np.ones(fill)]), out)
+    return {name: row[: len(x)] for name, row in zip((*NAMES, "power"), out, strict=True)}
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_errors_are_a_few_units_in_the_last_place(name):
+    size = RANGES[name]
+    rng = np.random.default_rng(3)
+    x = np.concatenate([rng.uniform(-size, size, 1500), rng.uniform(-1, 1, 500) * 10.0 ** rng.uniform(-12, 0, 500)])
+    found = at(x)[name]
+    exact = np.array([float(getattr(mpmath, name)(float(v))) for v in x])
+    assert (np.abs(found - exact) <= ULPS[name] * np.spacing(np.abs(exact))).all()
+
+
+def test_powers_are_accurate_for_moderate_logarithms():
+    x = np.random.default_rng(4).uniform(0.1, 10.0, 1000)
+    exact = np.array([float(mpmath.mpf(v) ** 2.5) for v in x])
+    assert (np.abs(at(x)["power"] / exact - 1.0) < 2e-15).all()
+
+
+def test_special_values():
+    found = at(np.array([0.0, -0.0, 1.0, -1.0, 2.0, INF, -INF, NAN]))
+    assert found["asin"][:4].tolist() == [0.0, -0.0, np.pi / 2, -np.pi / 2]
+    assert found["acos"][[2, 3]].tolist() == [0.0, np.pi]
+    assert np.isnan(found["asin"][4:]).all()
+    assert np.isnan(found["acos"][4:]).all()
+    assert found["erf"][5:7].tolist() == [1.0, -1.0]
+    assert found["cosh"][[0, 5, 6]].tolist() == [1.0, INF, INF]
+    assert found["sinh"][[0, 5, 6]].tolist() == [0.0, INF, -INF]
+    assert np.signbit(found["sinh"][1])
+    for name in ("erf", "cosh", "sinh", "tan", "power"):
+        assert np.isnan(found[name][7])
+    assert np.isnan(found["power"][3])
+
+
+def test_powers_of_two_are_cut_downwards():
+    x = np.array([1.0, 1.999, 2.0, 3.7, 0.3, 1e-300, 1e300])
+    assert at(x)["power_of_two"].tolist() == [2.0 ** np.floor(np.log2(v)) for v in x]
+
+
+@pytest.mark.parametrize("width", [1, 4])
+def test_every_width_has_the_same_bits(width):
+    x = np.linspace(-3.0, 3.0, 101)
+    one, other = at(x, width), at(x, 8)
+    assert all(np.array_equal(one[name], other[name], equal_nan=True) for name in one)

@@ -1,0 +1,80 @@
+"""Networks of every shape, written out and looped, against SciPy and against each other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+from march import compiled
+from samples import TABLE, harmonic_chain, looped, parametric, tanh_pair, two_kinds, varied, waving
+from scipy.integrate import solve_ivp
+from test_step import friction_pair, pendula
+
+from synchain.codegen.printing.names import tidy
+from synchain.codegen.taylor import write_looped
+from synchain.models import Scene, chain, ring
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import TIME
+
+CASES = {
+    "chain": harmonic_chain(5), "one-way": looped(), "parametric": parametric(), "functions": tanh_pair(),
+    "driven pendulum": waving(), "own parameters": varied(), "two kinds": two_kinds(), "set-valued": friction_pair(),
+    "pendula": pendula(), "lorenz ring": Scene(oscillator="lorenz", topology=ring(4), coupling="x->x").equations,
+}  # fmt: skip
+END = 0.75
+
+
+def values(eq: Equations) -> tuple[list[float], list[float]]:
+    rng = np.random.default_rng(7)
+    start = [
+        1.0 if name.startswith("slip") else 0.2 * x
+        for name, x in zip(eq.state, rng.normal(size=eq.dimension), strict=True)
+    ]
+    return start, [
+        TABLE.get(name, 0.3 + 0.5 * x) for name, x in zip(eq.parameters, rng.random(len(eq.parameters)), strict=True)
+    ]
+
+
+def reference(eq: Equations) -> np.ndarray:
+    start, numbers = values(eq)
+    symbols = [sp.Symbol(name, real=True) for name in (*eq.state, *eq.parameters)]
+    f = sp.lambdify([TIME, symbols], eq.rhs())
+    found = solve_ivp(lambda t, y: f(t, [*y, *numbers]), (0, END), start, method="DOP853", rtol=1e-13, atol=1e-14)
+    return found.y[:, -1]
+
+
+@pytest.mark.parametrize("shape", ["written out", "looped"])
+@pytest.mark.parametrize("name", CASES)
+def test_networks_follow_their_equations(name, shape):
+    eq = CASES[name]
+    end, steps = compiled(eq, 14, looped=shape == "looped").run(*values(eq), END, 1e-12)
+    assert np.abs(end[0] - reference(eq)).max() < 3e-12 * (1 + np.abs(end).max())
+    assert steps < 60
+
+
+@pytest.mark.parametrize("name", ["own parameters", "two kinds", "set-valued"])
+def test_dense_output_of_loops_is_that_of_lines(name):
+    eq = CASES[name]
+    rows = [
+        compiled(eq, 8, 2, True, looped).step(*values(eq), 0.125, scale=0.125, rtol=1.0)[2] for looped in (False, True)
+    ]
+    assert np.abs(rows[0] - rows[1]).max() < 1e-15 * 8
+    assert np.abs(rows[0][0]).max() > 0.0
+
+
+def test_a_looped_step_without_numbers_has_no_length():
+    eq = CASES["pendula"]
+    start, numbers = values(eq)
+    assert np.isnan(compiled(eq, 8, looped=True).step([np.nan, *start[1:]], numbers)[0][0])
+
+
+def test_the_text_of_loops_does_not_grow():
+    few, many = (write_looped(tidy(Scene(oscillator="pendulum", topology=chain(n)).equations), 16) for n in (9, 900))
+    assert len(many.text) - len(few.text) < 200
+    assert many.workspace > 90 * few.workspace
+
+
+def test_equal_oscillators_of_a_ring_have_equal_bits_in_loops():
+    eq = Scene(oscillator="lorenz", topology=ring(4), coupling="x->x").equations
+    end, _ = compiled(eq, 12, looped=True).run([1.0] * 4 + [2.0] * 4 + [20.0] * 4, values(eq)[1], 2.0, 1e-9)
+    assert (np.ptp(end.reshape(3, 4), axis=1) == 0.0).all()

@@ -1,0 +1,290 @@
+"""Taylor steps on lanes: exact solutions, order, step lengths in hard cases, scales, NaN, dense output, equal bits."""
+
+from __future__ import annotations
+
+import functools
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+from march import Lanes, alone, compiled, step_of
+from samples import friction_scene, numbers, path, spring
+from scipy.integrate import solve_ivp
+
+from synchain.codegen.taylor import order_for
+from synchain.models import Scene, chain
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import TIME as T
+from synchain.models.mechanics.components import Edge, Node
+
+X, V, A = sp.symbols("x v a", real=True)
+NONE: list[float] = []
+INF, NAN = math.inf, math.nan
+
+
+@functools.cache
+def harmonic(order: int = 16, width: int = 1, dense: bool = False) -> Lanes:
+    return compiled(alone([X, V], [V, -A * A * X], [A]), order, width, dense)
+
+
+def exact(t: float, a: float = 1.0) -> list[float]:
+    return [math.cos(a * t), -a * math.sin(a * t)]
+
+
+# -- accuracy --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-10, 1e-13])
+def test_the_error_of_a_hundred_periods_is_what_the_tolerance_asks(rtol):
+    end, steps = harmonic(order_for(rtol, rtol)).run([1.0, 0.0], [1.0], 200 * math.pi, rtol)
+    error = np.abs(end[0] - exact(200 * math.pi)).max()
+    assert error < 30 * rtol
+    assert steps < 4000
+
+
+def test_rounding_grows_slowly_over_ten_thousand_periods():
+    end, _ = harmonic(24).run([1.0, 0.0], [1.0], 20_000 * math.pi, 1e-14)
+    with mpmath.workdps(30):
+        t = mpmath.mpf(20_000 * math.pi)
+        error = max(abs(end[0, 0] - mpmath.cos(t)), abs(end[0, 1] + mpmath.sin(t)))
+    assert error < 5e-12  # a random walk of 1e5 steps gives 3e-14, a drift of one rounding a step 1e-11
+
+
+@pytest.mark.parametrize("order", [8, 11])
+def test_a_step_has_its_order_and_none_above(order):
+    """x' = 1 + x**2: halving the step divides the error of one step by 2**(order + 1)."""
+    step = compiled(alone([X], [1 + X * X]), order)
+    errors = []
+    with mpmath.workdps(40):
+        for h in (2.0**-2, 2.0**-3):
+            length, new, _ = step.step([0.3], NONE, h, scale=h, rtol=1.0, atol=1.0)
+            assert length[0] == h
+            errors.append(abs(new[0, 0] - mpmath.tan(mpmath.atan(mpmath.mpf(0.3)) + h)))
+        assert abs(mpmath.log(errors[0] / errors[1], 2) - (order + 1)) < 0.3
+
+
+# -- vanishing coefficients -------------------------------------------------------------------------------------
+
+
+def test_free_motion_is_exact_and_its_step_bounded():
+    step = compiled(alone([X, V], [V, sp.S.Zero]), 8)
+    length, new, _ = step.step([1.0, 0.5], NONE, scale=2.0)
+    assert length[0] == 32.0
+    assert new.tolist() == [[17.0, 0.5]]
+
+
+def test_a_polynomial_drive_is_exact():
+    length, new, _ = compiled(alone([X], [T**3]), 8).step([0.0], NONE, t=1.0)
+    assert length[0] == 16.0
+    assert new[0, 0] == pytest.approx((17.0**4 - 1) / 4, rel=1e-15)
+
+
+@pytest.mark.parametrize("start", [[1.0, 0.0], [0.0, 1.0]])
+@pytest.mark.parametrize("order", [9, 16])
+def test_odd_and_even_series_are_not_taken_for_exact(order, start):
+    """At a turning point and at a zero every second coefficient vanishes."""
+    length, new, _ = harmonic(order).step(start, [1.0], rtol=1e-10, atol=1e-10)
+    turned = [start[0] * math.cos(length[0]) + start[1] * math.sin(length[0]),
+              start[1] * math.cos(length[0]) - start[0] * math.sin(length[0])]  # fmt: skip
+    assert 0.05 < length[0] < 4.0
+    assert np.abs(new[0] - turned).max() < 1e-9
+
+
+def test_series_with_two_zeros_in_a_row_are_not_taken_for_exact():
+    """x' = 1/(1 - t**3) from t = 0: of three coefficients one is left; the solution has a pole at t = 1."""
+    step = compiled(alone([X], [1 / (1 - T**3)]), 18)
+    for order in (16, 17, 18):
+        length, _, _ = (step if order == 18 else compiled(alone([X], [1 / (1 - T**3)]), order)).step([0.0], NONE)
+        assert 0.1 < length[0] < 0.6
+
+
+def test_an_equilibrium_stays_one():
+    end, steps = harmonic().run([0.0, 0.0], [1.0], 1e4, 1e-10)
+    assert end.tolist() == [[0.0, 0.0]]
+    assert steps < 1000
+
+
+# -- scales, and numbers that are none ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("exponent", [-660, -300, -30, 30, 300, 500])
+def test_time_scales_change_no_bit(exponent):
+    """Frequencies of 2**exponent: states x and v/a, so that all that changes is time."""
+    w = 2.0**exponent
+    end, steps = scaled().run([1.0, 0.0], [w], 20.0 / w, 1e-10, scale=2.0**-6 / w)
+    reference, count = scaled().run([1.0, 0.0], [1.0], 20.0, 1e-10, scale=2.0**-6)
+    assert steps == count
+    assert end.tolist() == reference.tolist()
+
+
+@functools.cache
+def scaled() -> Lanes:
+    return compiled(alone([X, V], [A * V, -A * X], [A]), 16)
+
+
+@pytest.mark.parametrize("size", [1e-250, 1e-100, 1e100, 1e250])
+def test_the_size_of_states_does_not_matter(size):
+    end, steps = harmonic().run([size, 0.0], [1.0], 20.0, 1e-10, 1e-280)
+    assert np.abs(end[0] / size - exact(20.0)).max() < 1e-9
+    assert steps < 100
+
+
+@pytest.mark.parametrize("scale", [2.0**-40, 2.0**-12, 1.0, 2.0**12])
+def test_a_bad_scale_costs_steps_and_no_accuracy(scale):
+    length, new, _ = harmonic().step([1.0, 0.0], [1.0], scale=scale, rtol=1e-10, atol=1e-10)
+    assert 0.0 < length[0] < 4.0
+    assert np.abs(new[0] - exact(length[0])).max() < 1e-9
+
+
+@pytest.mark.parametrize("start", [[NAN, 0.0], [1.0, NAN], [INF, 0.0], [1.0, -INF]])
+def test_states_that_are_no_numbers_give_no_length(start):
+    assert math.isnan(harmonic().step(start, [1.0])[0][0])
+
+
+def test_parameters_that_are_no_numbers_and_poles_give_no_length():
+    assert math.isnan(harmonic().step([1.0, 0.0], [NAN])[0][0])
+    assert math.isnan(compiled(alone([X], [sp.log(X)]), 8).step([-1.0], NONE)[0][0])
+    assert math.isnan(compiled(alone([X, V], [sp.S.One, sp.sqrt(V)]), 8).step([0.0, 0.0], NONE)[0][0])
+
+
+def test_coefficients_that_overflow_do_not_pass():
+    length = harmonic().step([1.0, 0.0], [1e200])[0][0]
+    assert math.isnan(length) or length == 0.0
+
+
+# -- dense output, widths, equal oscillators -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("width", [1, 2, 8])
+def test_dense_output_is_the_solution_inside_a_step(width):
+    start = np.stack([np.linspace(0.5, 1.0, width), np.linspace(-1.0, 1.0, width)]).T
+    length, new, dense = harmonic(16, width, True).step(start, [1.3])
+    for theta in (0.0, 0.25, 0.5, 1.0):
+        t = theta * length
+        value = start.T.copy()
+        for k, row in enumerate(dense):
+            value += theta ** (k + 1) * row
+        c, s = np.cos(1.3 * t), np.sin(1.3 * t)
+        assert (
+            np.abs(value - [start[:, 0] * c + start[:, 1] / 1.3 * s, start[:, 1] * c - 1.3 * start[:, 0] * s]).max()
+            < 1e-10
+        )
+    assert np.abs(value.T - new).max() < 1e-15 * 4
+
+
+@pytest.mark.parametrize("width", [2, 8])
+def test_every_width_has_the_same_bits(width):
+    single, many = (compiled(friction_pair(), 12, w) for w in (1, width))
+    values = numbers(friction_pair())
+    starts = [[0.1 * lane, 0.05, 0.02 * lane, 0.03, 1.0, 1.0] for lane in range(width)]
+    end, _ = many.run(starts, values, 0.5, 1e-9)
+    assert [single.run(start, values, 0.5, 1e-9)[0][0].tolist() for start in starts] == end.tolist()
+
+
+@functools.cache
+def friction_pair() -> Equations:
+    return Scene(oscillator="friction", topology=chain(2), contact="set-valued").equations
+
+
+def pendula() -> Equations:
+    """A ring of three pendula whose links are springs of a sine, with a term of each kind in a node."""
+    here, there, w = sp.symbols("xh xt w", real=True), sp.symbols("xt2 vt2", real=True), sp.Symbol("w", real=True)
+    edge = Edge(
+        (here[0], here[1]), there, w, (sp.S.Zero, A * w * sp.sin(there[0] - here[0]) + w * (there[1] - here[1])), (A,)
+    )
+    node = Node((X, V), (V, -sp.sin(X) - V**3 / 7 + sp.cos(T) * X - 1 / (2 + V**2) + sp.exp(-X) - V), (A,))
+    return Equations.of_equal_nodes(node, edge, 3, path(3))
+
+
+@pytest.mark.parametrize("case", ["pendula", "slip"])
+def test_equal_oscillators_have_equal_bits(case):
+    if case == "pendula":
+        end, _ = compiled(pendula(), 12).run([0.3] * 3 + [0.1] * 3, [0.4], 30.0, 1e-10)
+        assert end[0, 0] == end[0, 1] == end[0, 2]
+        assert end[0, 3] == end[0, 4] == end[0, 5]
+    else:
+        end, _ = compiled(friction_pair(), 12).run(
+            [0.3, 0.3, 0.01, 0.01, 1.0, 1.0], numbers(friction_pair()), 0.7, 1e-10
+        )
+        assert end[0, 0] == end[0, 1]
+        assert end[0, 2] == end[0, 3]
+
+
+# -- set-valued friction ---------------------------------------------------------------------------------------
+
+
+def test_modes_are_constants_of_a_step():
+    """A body that sticks moves with its ground; its mode stands in the new state and not in the dense output."""
+    eq = friction_pair()
+    values = dict(zip(eq.parameters, numbers(eq), strict=True))
+    length, new, dense = compiled(eq, 12, 1, True).step(
+        [0.3, 0.1, values["theta_b"], 0.02, 0.0, 1.0], list(values.values()), 0.0625
+    )
+    assert length[0] == 0.0625
+    assert new[0, 4:].tolist() == [0.0, 1.0]
+    assert (dense[:, 4:] == 0.0).all()
+    assert new[0, 2] == values["theta_b"]
+    assert new[0, 0] == pytest.approx(0.3 + 0.0625 * values["theta_b"], rel=1e-15)
+    assert new[0, 3] != 0.02
+
+
+def test_set_valued_slip_is_that_of_the_equations():
+    eq = friction_pair()
+    values = numbers(eq)
+    f = sp.lambdify((T, [sp.Symbol(n, real=True) for n in (*eq.state, *eq.parameters)]), eq.rhs())
+    start = [0.3, 0.25, 0.0, -0.01, 1.0, 1.0]
+    reference = solve_ivp(lambda t, y: f(t, [*y, *values]), (0, 0.8), start, method="DOP853", rtol=1e-13, atol=1e-14)
+    end, _ = compiled(eq, 16).run(start, values, 0.8, 1e-12)
+    assert np.abs(end[0] - reference.y[:, -1]).max() < 2e-12
+
+
+# -- refusals, names, orders -----------------------------------------------------------------------------------
+
+
+def test_links_with_inertia_are_refused():
+    scene = Scene(oscillator="harmonic", coupling="inerter", topology=chain(2))
+    with pytest.raises(ValueError, match="taylor: found links with inertia"):
+        step_of(scene.equations, 8)
+
+
+def test_smoothed_friction_of_a_sliding_velocity_with_abs_is_refused():
+    with pytest.raises(ValueError, match=r"found Abs\(.*v"):
+        step_of(friction_scene(2), 8)
+
+
+@pytest.mark.parametrize(
+    "name", ["scale", "ratio", "tan", "erf", "power", "r3", "w_x_1", "i_b", "n_", "raised", "x_1_4", "shared_0", "exp0"]
+)
+def test_words_of_the_step_are_free_for_symbols(name):
+    """The same motion whatever a parameter is called."""
+    p = sp.Symbol(name, real=True)
+    eq = Equations.of_equal_nodes(Node((X, V), (V, -p * X + sp.exp(-p) - sp.exp(-X)), (p,)), spring(), 2, path(2))
+    plain = eq.map_templates(lambda n: n.map(lambda e: e.xreplace({p: A})), lambda e: e, {p: A})
+    values = [1.1, 0.3]
+    ends = [compiled(e, 8).run([0.3, 0.1, 0.0, 0.2], values, 2.0, 1e-8)[0].tolist() for e in (eq, plain)]
+    assert ends[0] == ends[1]
+
+
+def test_orders_grow_with_the_tolerance_and_are_few():
+    orders = [order_for(10.0**-k, 10.0 ** -(k + 1)) for k in range(1, 16)]
+    assert orders == sorted(orders)
+    assert set(orders) == {8, 12, 16, 20, 24}
+    assert order_for(1e-14, 1e-6) == order_for(1e-6, 1e-14)
+
+
+def test_the_text_is_the_same_in_every_process():
+    code = "import sys; sys.path[:0] = sys.argv[1:]; from test_step import pendula, step_of; print(step_of(pendula(), 8).text)"
+    here = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
+    texts = {
+        subprocess.run([sys.executable, "-c", code, *here], env={**os.environ, "PYTHONHASHSEED": seed},
+                       capture_output=True, text=True, check=True).stdout
+        for seed in ("1", "2")
+    }  # fmt: skip
+    assert len(texts) == 1
+    assert "# order 8" in texts.pop()
