@@ -26,7 +26,7 @@ from ..steps.looped import LoopWriter
 from ..steps.program import FILL_LIMIT, Program, program, workspace
 from ..steps.rosenbrock import write_rosenbrock
 from ..steps.step import PAIR, SCALED, StepWriter, function_name, write_function
-from ..taylor import write_step
+from ..taylor import write_looped, write_step
 from .driver import Driver, KernelKind
 
 __all__ = [
@@ -181,10 +181,8 @@ def _series(
     plain: Equations, method: Integrator, names: Names, elimination: Program | None
 ) -> tuple[list[str], list[str], int]:
     """The function of a Taylor step; its statements, and the groups of scratch memory that it needs."""
-    if elimination is not None:
-        raise ValueError(f"integrator taylor: found {plain.n} nodes; expected at most {LARGEST_UNROLLED}; use dop853")
-    text = write_step(plain, method.order).text
-    return [text], text.splitlines(), 0
+    step = (write_step if elimination is None else write_looped)(plain, method.order)
+    return [step.text], step.text.splitlines(), step.workspace
 
 
 def _stages(

@@ -295,7 +295,7 @@ class LoopWriter:
         orders = [self.waves.text("0"), *(section.text("0") for section in self.sections)]
         later = [self.waves.text("k"), *(section.text("k") for section in self.sections)]
         bases, size = self.bases()
-        lines = [*bases, f"{', '.join((*NAMES, 'where') if eq.mixed else NAMES)} = graph", f"LINKS = {len(eq.links)}"]
+        lines = [*bases, f"{', '.join(NAMES)} = graph", f"LINKS = {len(eq.links)}"]
         own = {f"{name}_{i + 1}" for name in eq.varied for i in range(eq.n)}
         for slot, name in enumerate(eq.parameters, start=eq.dimension):
             if name not in own:
