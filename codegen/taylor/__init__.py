@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from .graph import kink
 from .looped import write_looped
 from .order import order_for
 from .step import TaylorStep, write_step
 
-__all__ = ["TaylorStep", "order_for", "write_looped", "write_step"]
+__all__ = ["TaylorStep", "kink", "order_for", "write_looped", "write_step"]

@@ -6,12 +6,15 @@ A template of a node or a link is read for each of them in the same way, so that
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import reduce
 
 import sympy as sp
 from sympy.functions.elementary.piecewise import Piecewise
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import TIME
 
 from ..printing.blocks import Names
 from ..printing.printer import show
@@ -31,7 +34,7 @@ from .series import (
 from .terms import ONE, ZERO, Expr, Name, Number, add, times
 from .terms import Product as Factors
 
-__all__ = ["STARTS", "Graph", "Template"]
+__all__ = ["STARTS", "Graph", "Template", "kink"]
 
 STARTS: dict[type[sp.Expr], str] = {
     sp.exp: "exp", sp.log: "log", sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.sinh: "sinh", sp.cosh: "cosh",
@@ -48,6 +51,18 @@ EVEN = (sp.cos, sp.cosh)
 KINKED = (sp.Abs, sp.sign, sp.Max, sp.Min, Piecewise, sp.floor, sp.ceiling, sp.Heaviside)
 
 
+def kink(equations: Equations) -> sp.Expr | None:
+    """Return a part of some equations that is not analytic in the states or in time, None if there is none."""
+    templates = [(node.rhs, {TIME, *node.state}) for node in equations.nodes]
+    templates += [(edge.rhs, {TIME, *edge.here, *edge.there}) for edge in equations.edges]
+    return next((part for rhs, moving in templates for part in _kinks(rhs, moving)), None)
+
+
+def _kinks(expressions: Sequence[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
+    parts = {part for e in expressions for part in e.atoms(*KINKED) if part.free_symbols & moving}
+    return sorted(parts, key=sp.default_sort_key)
+
+
 @dataclass(frozen=True, slots=True)
 class Template:
     """Expressions with their repeated parts named: statements first, results last."""
@@ -59,8 +74,7 @@ class Template:
     def of(cls, expressions: Sequence[sp.Expr], moving: Iterable[sp.Symbol], supply: Iterator[sp.Symbol]) -> Template:
         """Share the repeated parts under names of the supply; ValueError for functions of `moving` symbols that are not analytic."""
         symbols = frozenset(moving)
-        parts = {part for e in expressions for part in e.atoms(*KINKED) if part.free_symbols & symbols}
-        for part in sorted(parts, key=sp.default_sort_key):
+        for part in _kinks(expressions, symbols):
             raise ValueError(
                 f"taylor: a function that is not analytic; found {part}; expected analytic functions; "
                 f"use integrator dop853 or rodas5p"

@@ -7,17 +7,18 @@ from functools import lru_cache
 
 import sympy as sp
 
-from synchain.codegen.integrators import integrator
+from synchain.codegen.integrators import Integrator, integrator
 from synchain.codegen.kernels.compile import Kernel, load
-from synchain.codegen.kernels.sweep import AUTO, KernelSource, default_width, emit
+from synchain.codegen.kernels.sweep import KernelSource, default_width, emit
 from synchain.codegen.simd.lane_types import WIDTHS
 from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
+from .choice import chosen_integrator
 from .reduce import Reduction, as_reduction
 
-__all__ = ["best_integrator", "kernel", "kernel_source", "warn_of_chords", "write_kernel"]
+__all__ = ["kernel", "kernel_source", "warn_of_chords", "write_kernel"]
 
 
 def kernel(scene: Scene, width: int | None = None, reduce: bool | Reduction = True) -> Kernel:
@@ -59,7 +60,7 @@ def write_kernel(reduction: Reduction, width: int | None = None) -> KernelSource
     section = None
     if "section" in scene.record:
         section = sp.Symbol(reduction.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
-    method = best_integrator(scene.equations, scene.rtol) if scene.integrator == "auto" else scene.integrator
+    method = chosen_integrator(reduction)
     width = default_width(reduction.equations) if width is None else width
     return _emitted(reduction.equations, method, reduction.records, section, width, reduction.multiplicity)
 
@@ -67,7 +68,7 @@ def write_kernel(reduction: Reduction, width: int | None = None) -> KernelSource
 @lru_cache(maxsize=32)
 def _emitted(
     equations: Equations,
-    method: str,
+    method: Integrator,
     records: tuple[str, ...],
     section: sp.Expr | None,
     width: int,
@@ -75,16 +76,6 @@ def _emitted(
 ) -> KernelSource:
     """The text of a kernel; runs that differ in numbers alone share it."""
     return emit(equations, method, records, section, width, multiplicity)
-
-
-def best_integrator(equations: Equations, rtol: float) -> str:
-    """Return what "auto" stands for: the fastest integrator at equal error (docs/performance.md).
-
-    Two oscillators at a tight tolerance gain from DOP853 while none of them sticks; of more, some
-    nearly always stick.
-    """
-    pair = equations.n == 2 and not (equations.mixed or equations.inertial) and rtol <= 1e-9
-    return "dop853" if equations.sticks else "switching" if pair else AUTO
 
 
 def warn_of_chords(source: KernelSource) -> None:

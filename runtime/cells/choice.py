@@ -1,0 +1,109 @@
+"""Which integrator "auto" stands for, by what was measured (docs/performance.md)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from itertools import islice
+
+import numpy as np
+import sympy as sp
+
+from synchain.codegen.integrators import Integrator, integrator
+from synchain.codegen.kernels.sweep import AUTO
+from synchain.codegen.taylor import kink, order_for
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import TIME
+from synchain.models.scenes.scene import Scene
+
+from .plan import Planner
+from .reduce import Reduction
+
+__all__ = ["STIFF", "chosen_integrator", "stiffness"]
+
+STIFF = 30.0
+"""Stiffness from which Rosenbrock steps are faster than Taylor steps at equal error."""
+
+NODES, LINKS = 50, 5000
+"""Nodes of a large network that are looked at, and links."""
+
+
+def chosen_integrator(reduction: Reduction) -> Integrator:
+    """Return the integrator of a scene, the fastest at equal error where the scene says "auto".
+
+    Power series where all functions are analytic and the start is not stiff, in the extreme cells of
+    the sweep; between the events of set-valued friction too.  Otherwise Rosenbrock steps, or a
+    switching pair of methods for two oscillators at a tight tolerance.
+
+    Parameters
+    ----------
+    reduction : Reduction
+        What is left of the scene to integrate.
+    """
+    scene, equations = reduction.scene, reduction.equations
+    if scene.integrator == "taylor":
+        return integrator("taylor", order_for(scene.rtol, scene.atol))
+    if scene.integrator != "auto":
+        return integrator(scene.integrator)
+    if not equations.inertial and kink(equations) is None and (equations.sticks or stiffness(scene) < STIFF):
+        return integrator("taylor", order_for(scene.rtol, scene.atol))
+    if equations.sticks:
+        return integrator("dop853")
+    pair = equations.n == 2 and not (equations.mixed or equations.inertial) and scene.rtol <= 1e-9
+    return integrator("switching" if pair else AUTO)
+
+
+def stiffness(scene: Scene) -> float:
+    """Return how much faster motions decay or grow at the start than they turn, the largest of the extreme cells.
+
+    The rate is the real part of an eigenvalue of a node's own block of the Jacobian, with twice what
+    its links add, which bounds that of a network of springs; it is compared with the imaginary
+    parts, the frequency of the drive and one.
+    """
+    equations, planner = scene.equations, Planner(scene)
+    rows = planner.extremes()
+    worst = 0.0
+    for start, numbers in zip(rows.start, rows.numbers, strict=True):
+        values = dict(zip(equations.state, start, strict=True)) | dict(zip(equations.parameters, numbers, strict=True))
+        rates = [np.linalg.eigvals(block) for block in _blocks(equations, values) if np.all(np.isfinite(block))]
+        if rates:
+            all_rates = np.concatenate(rates)
+            turning = max(1.0, float(np.abs(all_rates.imag).max(initial=0.0)))
+            worst = max(worst, float(np.abs(all_rates.real).max(initial=0.0)) / turning)
+    return worst
+
+
+def _blocks(equations: Equations, values: Mapping[str, float]) -> list[np.ndarray]:
+    """The blocks of the Jacobian of the first nodes, with twice what their links add."""
+    nodes = range(min(equations.n, NODES))
+    blocks = [_value(equations.node_at(i).jacobian(), equations.at_node(i), values) for i in nodes]
+    for link in islice(equations.links, LINKS):
+        if link[0] < len(blocks):
+            found = _value(equations.edge_at(link).jacobian_here(), equations.at_link(link), values)
+            blocks[link[0]] = blocks[link[0]] + 2.0 * found
+    return blocks
+
+
+def _value(
+    entries: tuple[tuple[sp.Expr, ...], ...], at: Mapping[sp.Symbol, sp.Expr], values: Mapping[str, float]
+) -> np.ndarray:
+    """The numbers of a block; NaN where it has none."""
+    symbols, function = _compiled(entries)
+    known: dict[sp.Symbol, float] = {TIME: 0.0}
+    for s in symbols:
+        e = at.get(s, s)
+        known[s] = 0.0 if s == TIME else float(e) if e.is_number else values[e.name]
+    size = len(entries)
+    try:
+        with np.errstate(all="ignore"):
+            return np.array(function(*(known[s] for s in symbols)), dtype=float).reshape(size, size)
+    except (ArithmeticError, TypeError, ValueError):
+        return np.full((size, size), math.nan)
+
+
+@lru_cache(maxsize=64)
+def _compiled(entries: tuple[tuple[sp.Expr, ...], ...]) -> tuple[tuple[sp.Symbol, ...], Callable[..., object]]:
+    flat = [e for row in entries for e in row]
+    symbols = tuple(sorted(set().union(*(e.free_symbols for e in flat)), key=lambda s: s.name))
+    return symbols, sp.lambdify(symbols, flat, "math")
