@@ -30,8 +30,8 @@ from numba.core.serialize import dumps
 
 from synchain.models.dynamics.equations import Equations
 
-from ..printing.names import NAMES
 from ..simd import decorator, elementary, lane_types, lanes
+from ..steps.names import NAMES
 from ..steps.program import EMPTY
 from .cache import Folder, cache_folder, open_folder
 from .installation import InstallationError

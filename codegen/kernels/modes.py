@@ -20,12 +20,13 @@ from synchain.models.mechanics.components import TIME
 
 from .. import driver
 from ..integrators import Integrator, integrator
-from ..printing.blocks import Body, Names, analyse
-from ..printing.names import tidy
-from ..printing.printer import show
+from ..program.passes import Body, Names
+from ..program.printers import show
 from ..simd import lanes
+from ..steps.blocks import analyse
 from ..steps.contacts import event_constants, write_events
 from ..steps.elimination import plan, write_factors, write_solve
+from ..steps.names import tidy
 from ..steps.rosenbrock import stage_state, write_rosenbrock
 from ..steps.step import SCALED, StepWriter, combine, write_function
 from .sweep import LARGEST_UNROLLED, KernelKind, KernelSource, describe, imports, node_functions

@@ -15,13 +15,15 @@ from synchain.models.dynamics.record import Record
 
 from .. import driver, simd
 from ..integrators import Integrator, integrator
-from ..printing.blocks import Names, NodeBlocks, analyse
-from ..printing.names import tidy
-from ..printing.printer import FUNCTIONS, show
+from ..program.functions import LANES as FUNCTIONS
+from ..program.passes import Names
+from ..program.printers import show
 from ..simd import lanes
+from ..steps.blocks import NodeBlocks, analyse
 from ..steps.contacts import write_pushes
 from ..steps.explicit import write_explicit
 from ..steps.looped import LoopWriter
+from ..steps.names import tidy
 from ..steps.program import FILL_LIMIT, Program, program, workspace
 from ..steps.rosenbrock import write_rosenbrock
 from ..steps.step import PAIR, SCALED, StepWriter, function_name, write_function
@@ -276,9 +278,7 @@ def _operations(lines: list[str]) -> int:
 def imports(functions: list[list[str]], lines: list[str], section: sp.Expr | None, more: Sequence[str] = ()) -> str:
     """The import statements of a kernel module."""
     text = "\n".join([*(line for f in functions for line in f), *lines, show(section) if section is not None else ""])
-    used = sorted(
-        n for n in {*FUNCTIONS.values(), "sqrt", "exp", "log"} if f"{n}(" in text or n in ("sqrt", "exp", "log")
-    )
+    used = sorted(n for n in {*FUNCTIONS, "sqrt", "exp", "log"} if f"{n}(" in text or n in ("sqrt", "exp", "log"))
     needed = {"absolute", "any_lane", "broadcast", "lane_bits", "load", "maximum", "minimum", "njit", "one_lane"}
     needed |= {"select", "store", "sqrt", "truncated", *more, *(n for n in used if n in simd.__all__)}
     return "\n".join(

@@ -12,9 +12,9 @@ from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import TIME, Edge
 from synchain.models.mechanics.stick_slip import Contact
 
-from ..printing.blocks import Hoist, Names
-from ..printing.names import NAMES
-from ..printing.printer import show
+from ..program.passes import Hoist, Names
+from ..program.printers import show
+from .names import NAMES
 
 __all__ = ["event_constants", "write_events", "write_pushes"]
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ..printing.printer import show
+from ..program.printers import show
 
 __all__ = ["Plan", "plan", "write_elimination", "write_factors", "write_solve"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..printing.printer import show
+from ..program.printers import show
 from .step import StepWriter
 
 __all__ = ["entry", "linearise", "write_bound"]

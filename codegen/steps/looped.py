@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import sympy as sp
 
-from ..printing.blocks import Body
-from ..printing.printer import show
+from ..program.passes import Body
+from ..program.printers import show
 from .linearise import entry
 from .looped_mass import LoopMass
 from .places import Joint, Kind, Places, named

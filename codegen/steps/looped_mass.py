@@ -11,7 +11,7 @@ from typing import Protocol
 import sympy as sp
 
 from ..integrators import Integrator
-from ..printing.printer import show
+from ..program.printers import show
 from .mass import Mass, momentum_slopes
 from .places import Joint, Places, named
 from .program import Program

@@ -18,7 +18,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.calculus import derivative
 from synchain.models.mechanics.components import Edge
 
-from ..printing.printer import show
+from ..program.printers import show
 from .elimination import Entry, Factors, plan, write_elimination, write_solve
 
 __all__ = ["Mass", "momentum_slopes"]

@@ -18,7 +18,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import Edge, Node
 
-from ..printing.blocks import Body
+from ..program.passes import Body
 
 __all__ = ["Joint", "Kind", "Places", "by_joint", "by_kind", "joint_numbers", "named", "table"]
 

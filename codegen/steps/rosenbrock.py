@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import sympy as sp
 
-from ..printing.printer import show
+from ..program.printers import show
 from .elimination import Factors, Plan, plan, write_factors, write_solve
 from .linearise import entry, linearise, write_bound
 from .step import StepWriter, combine, indent_from

@@ -11,8 +11,9 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
 from ..integrators import Integrator
-from ..printing.blocks import Body, NodeBlocks
-from ..printing.printer import show
+from ..program.passes import Body
+from ..program.printers import show
+from .blocks import NodeBlocks
 from .mass import Mass
 
 __all__ = ["PAIR", "SCALED", "StepWriter", "combine", "function_name", "indent_from", "write_function"]

@@ -204,7 +204,7 @@ def test_the_program_solves_the_system(links, weighted):
 
 
 def driver_names() -> tuple[str, ...]:
-    from synchain.codegen.printing.names import NAMES
+    from synchain.codegen.steps.names import NAMES
 
     return NAMES
 

@@ -16,7 +16,7 @@ from parts import connectivity, edge, is_lagrangian, node, oscillator_of, parame
 from scipy.integrate import solve_ivp
 from variational_reference import ALPHA, deviation_names, transversal_equations
 
-from synchain.codegen.printing.printer import show
+from synchain.codegen.program.printers import show
 from synchain.models import chain, ring
 from synchain.models.dynamics.network import network
 from synchain.models.graphs.topology import from_matrix

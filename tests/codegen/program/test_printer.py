@@ -14,7 +14,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from samples import FLOATS, real
 
-from synchain.codegen.printing.printer import FUNCTIONS, UnprintableError, show
+from synchain.codegen.program import functions
+from synchain.codegen.program.lowering import UnprintableError
+from synchain.codegen.program.printers import show
+
+FUNCTIONS = {kind: name for kind, name in functions.FUNCTIONS.items() if name in functions.LANES}
 
 x, y, z, kappa = SYMBOLS = real("x", "y", "z", "kappa")
 
