@@ -13,20 +13,22 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import angular_frequency
 from synchain.models.dynamics.record import Record
 
-from .. import driver, simd
+from .. import driver
 from ..integrators import Integrator, integrator
-from ..program.functions import LANES as FUNCTIONS
+from ..program.expressions import Load, Number, call
+from ..program.lowering import lower
 from ..program.passes import Names
-from ..program.printers import show
+from ..program.printers import LANES
+from ..program.statements import Function, Return, Statement, called, let, operations
 from ..simd import lanes
 from ..steps.blocks import NodeBlocks, analyse
-from ..steps.contacts import write_pushes
+from ..steps.contacts import push_functions
 from ..steps.explicit import write_explicit
 from ..steps.looped import LoopWriter
 from ..steps.names import tidy
 from ..steps.program import FILL_LIMIT, Program, program, workspace
 from ..steps.rosenbrock import write_rosenbrock
-from ..steps.step import PAIR, SCALED, StepWriter, function_name, write_function
+from ..steps.step import PAIR, SCALED, StepWriter, function_name, node_function
 
 __all__ = [
     "KernelKind",
@@ -168,20 +170,19 @@ def _module(
     blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
     sticking = ("contacts",) if plain.sticks else ()
     steps = _steps(plain, blocks, method, elimination)
-    lines = [line for writer in steps.values() for line in writer.lines]
     functions = [f for k in range(len(blocks)) for f in node_functions(list(steps.values()), blocks[k], k)]
+    stepping = [_step(name, writer, looped) for name, writer in steps.items()]
+    sections = _section(equations, plain, section)
     parts = [
-        describe(equations, plain, method, records, lines),
-        imports(functions, lines, section),
+        describe(equations, plain, method, records, stepping),
+        imports([*functions, *stepping, *sections]),
         _constants(plain, method, records, width, multiplicity)
         + _loop_constants(steps["step"], elimination)
         + f"\nREPEATS = {angular_frequency(plain) is not None}",
-        *("\n".join(f) for f in functions),
+        *map(LANES.function, functions),
         SCALED,
         *([PAIR, driver.text("sparse")] if looped else []),
-        *(_step(name, writer.lines, looped) for name, writer in steps.items()),
-        write_pushes(plain, names, looped),
-        _section(equations, plain, section),
+        *map(LANES.function, (*stepping, *push_functions(plain, names, looped), *sections)),
         *(driver.text(name) for name in ("recording", "cells", "control", *sticking, "sweep")),
     ]
     return "\n\n\n".join(part for part in parts if part) + "\n"
@@ -213,13 +214,13 @@ def _steps(
     steps = {name: StepWriter(plain, first, m, bounded, more) for name, m in methods.items()}
     for writer in steps.values():
         if elimination is not None:
-            LoopWriter(writer, elimination).lines()
+            LoopWriter(writer, elimination).write()
         else:
             (write_rosenbrock if writer.method.implicit else write_explicit)(writer)
     return steps
 
 
-def node_functions(steps: list[StepWriter], blocks: NodeBlocks, kind: int = 0) -> list[list[str]]:
+def node_functions(steps: list[StepWriter], blocks: NodeBlocks, kind: int = 0) -> list[Function]:
     """The right-hand side of one node of some kind, and the linearisations that the steps call."""
     made = []
     first = [writer.first_of(blocks) for writer in steps]
@@ -231,7 +232,7 @@ def node_functions(steps: list[StepWriter], blocks: NodeBlocks, kind: int = 0) -
         results = [e for e in body.results if not steps[0].is_plain(e)]
         if results and (name == "node" or any(body is b for b in first)):
             arguments = [s.name for s in steps[0].arguments(body, results)]
-            made.append(write_function(function_name(name, kind), doc, body, arguments, results))
+            made.append(node_function(function_name(name, kind), doc, body, arguments, results))
     return made
 
 
@@ -240,7 +241,7 @@ def describe(
     plain: Equations,
     method: Integrator,
     records: tuple[str, ...],
-    lines: list[str],
+    steps: Sequence[Function],
     more: str = "",
 ) -> str:
     """The docstring at the head of a kernel module."""
@@ -255,7 +256,7 @@ def describe(
         f"Parameters  {_listed(equations.parameters) or 'none'}",
         f"Records     {', '.join(('final state', *records))}",
         *([f"Modes       {more}"] if more else []),
-        f"Step        {_operations(lines)} operations outside the node functions",
+        f"Step        {sum(operations(f.body) for f in steps)} operations outside the node functions",
     ]
     if swapped:
         rows.append(f"Renamed     {_listed(swapped)}")
@@ -269,18 +270,11 @@ def _listed(names: tuple[str, ...]) -> str:
     return f"{', '.join(names[:6])}, … {', '.join(names[-3:])} ({len(names)} variables)"
 
 
-def _operations(lines: list[str]) -> int:
-    return sum(line.count(f" {sign} ") for line in lines for sign in "+-") + sum(
-        line.count(sign) for line in lines for sign in "*/"
-    )
-
-
-def imports(functions: list[list[str]], lines: list[str], section: sp.Expr | None, more: Sequence[str] = ()) -> str:
+def imports(functions: Sequence[Function], more: Sequence[str] = ()) -> str:
     """The import statements of a kernel module."""
-    text = "\n".join([*(line for f in functions for line in f), *lines, show(section) if section is not None else ""])
-    used = sorted(n for n in {*FUNCTIONS, "sqrt", "exp", "log"} if f"{n}(" in text or n in ("sqrt", "exp", "log"))
-    needed = {"absolute", "any_lane", "broadcast", "lane_bits", "load", "maximum", "minimum", "njit", "one_lane"}
-    needed |= {"select", "store", "sqrt", "truncated", *more, *(n for n in used if n in simd.__all__)}
+    found = set().union(*(called(f.body) for f in functions))
+    needed = {"absolute", "any_lane", "broadcast", "exp", "lane_bits", "load", "log", "maximum", "minimum", "njit",
+              "one_lane", "select", "sqrt", "store", "truncated", *more, *found.intersection(LANES.functions)}  # fmt: skip
     return "\n".join(
         ["import math", "", "import numpy as np", "", f"from synchain.codegen.simd import {', '.join(sorted(needed))}"]
     )
@@ -313,20 +307,16 @@ def _constants(
     return text if multiplicity is None else f"{text}\nMULTIPLICITY = np.array({[float(m) for m in multiplicity]!r})"
 
 
-def _step(name: str, lines: list[str], looped: bool) -> str:
-    more = ", graph, weights" if looped else ""
-    head = [
-        "@njit(error_model='numpy')",
-        f"def {name}(t, h, y, p, y_new, dense, rtol, atol{more}):",
-        '    """One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."""',
-    ]
-    return "\n".join([*head, *(f"    {line}" for line in lines)])
+def _step(name: str, writer: StepWriter, looped: bool) -> Function:
+    arguments = ("t", "h", "y", "p", "y_new", "dense", "rtol", "atol", *(("graph", "weights") if looped else ()))
+    about = "One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."
+    return Function(name, arguments, about, tuple(writer.statements), inline=False)
 
 
-def _section(equations: Equations, plain: Equations, section: sp.Expr | None) -> str:
+def _section(equations: Equations, plain: Equations, section: sp.Expr | None) -> list[Function]:
     """The section function at a fraction of the step; a kernel without sections has none."""
     if section is None:
-        return ""
+        return []
     renamed = zip((*equations.state, *equations.parameters), (*plain.state, *plain.parameters), strict=True)
     swap = {_real(old): _real(new) for old, new in renamed}
     section = section.xreplace({s: _real(s.name) for s in section.free_symbols})
@@ -334,19 +324,16 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
     unknown = sorted(used - set(equations.state) - set(equations.parameters) - {"t"})
     if unknown:
         raise ValueError(f"section function {section}: unknown symbol {unknown[0]!r}; use the state, parameters and t")
-    lines = [
-        "@njit(error_model='numpy', forceinline=True)",
-        "def section(theta, t, h, bank, y_new, dense):",
-        '    """The section function at the fraction theta of the step."""',
-    ]
+    body: list[Statement] = []
     for slot, (name, shown) in enumerate(zip(equations.state, plain.state, strict=True)):
         if name in used:
-            lines.append(f"    {shown} = inside(theta, {slot}, bank, y_new, dense)")
+            body.append(let(shown, call("inside", "theta", slot, "bank", "y_new", "dense")))
     for slot, (name, shown) in enumerate(zip(equations.parameters, plain.parameters, strict=True)):
         if name in used:
-            lines.append(f"    {shown} = load(bank, {equations.dimension + slot}, WIDTH)")
-    text = show(section.xreplace({_real("t"): sp.Symbol("(t + theta*h)")}).xreplace(swap))
-    return "\n".join([*lines, f"    return {text}"])
+            body.append(let(shown, Load("bank", Number(equations.dimension + slot))))
+    value = lower(section.xreplace({_real("t"): sp.Symbol("(t + theta*h)")}).xreplace(swap))
+    about = "The section function at the fraction theta of the step."
+    return [Function("section", ("theta", "t", "h", "bank", "y_new", "dense"), about, (*body, Return((value,))))]
 
 
 def _real(name: str) -> sp.Symbol:

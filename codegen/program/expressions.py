@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 __all__ = [
     "ONE", "ZERO", "Call", "Choice", "Compare", "Expression", "Junction", "Load", "Name", "Negation", "Not", "Number",
-    "Power", "Product", "Quotient", "Sum", "Value", "as_expression", "call", "linear", "negative", "plus", "product",
+    "Power", "Product", "Quotient", "Sum", "Value", "as_expression", "call", "linear", "negative", "plus", "product", "scaled",
 ]  # fmt: skip
 
 
@@ -33,6 +33,9 @@ class Expression:
 
     def __add__(self, other: Value) -> Sum:
         return Sum((*_terms(self), as_expression(other)))
+
+    def __radd__(self, other: Value) -> Sum:
+        return Sum((as_expression(other), self))
 
     def __sub__(self, other: Value) -> Sum:
         return Sum((*_terms(self), Negation(as_expression(other))))
@@ -228,6 +231,16 @@ def negative(e: Expression) -> Expression:
     if isinstance(e, Negation):
         return e.value
     return Number(-e.value) if isinstance(e, Number) else Negation(e)
+
+
+def scaled(factor: Value, e: Expression) -> Expression:
+    """Return factor*e, multiplied from left to right."""
+    match e:
+        case Negation(value):
+            return Negation(scaled(factor, value))
+        case Quotient(top, bottom):
+            return Quotient(scaled(factor, top), bottom)
+    return Product((as_expression(factor), *_factors(e)))
 
 
 def linear(row: Iterable[float], values: Iterable[Value], start: Value | None = None) -> Expression:

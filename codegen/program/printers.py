@@ -22,10 +22,11 @@ from .expressions import (
     Product,
     Quotient,
     Sum,
+    negative,
     plus,
 )
 from .lowering import lower
-from .statements import Accumulate, Assign, Comment, Function, If, Index, Loop, Return, Statement, Store
+from .statements import Accumulate, Assign, Comment, Do, Function, If, Index, Loop, Return, Statement, Store
 
 __all__ = ["C99", "LANES", "MATH", "NUMPY", "Printer"]
 
@@ -80,8 +81,8 @@ class Printer:
         """Terms with their signs between them."""
         text = self.text(terms[0])
         for term in terms[1:]:
-            sign, value = ("-", term.value) if isinstance(term, Negation) else ("+", term)
-            text += f" {sign} {self.text(value, TERM)}"
+            minus = isinstance(term, Negation) or (isinstance(term, Number) and term.value < 0)
+            text += f" - {self.text(negative(term), TERM)}" if minus else f" + {self.text(term, TERM)}"
         return text
 
     def condition(self, e: Expression) -> str:
@@ -133,6 +134,8 @@ class Printer:
                 return self.block(f"if {self.text(condition)}", body)
             case Comment(text):
                 return [self.comment.format(text)]
+            case Do(call):
+                return [self.text(call)]
             case Return(values, remark):
                 return [f"return {', '.join(map(self.text, values))}{f'  # {remark}' if remark else ''}"]
 

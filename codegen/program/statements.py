@@ -19,8 +19,8 @@ from .expressions import (
 )
 
 __all__ = [
-    "Accumulate", "Assign", "Comment", "Function", "If", "Index", "Loop", "Return", "Statement", "Store", "accumulate",
-    "called", "expressions", "let", "operations", "store", "used",
+    "Accumulate", "Assign", "Comment", "Do", "Function", "If", "Index", "Loop", "Return", "Statement", "Store", "accumulate",
+    "called", "expressions", "let", "operations", "store", "used", "whole",
 ]  # fmt: skip
 
 
@@ -81,6 +81,13 @@ class Comment:
 
 
 @dataclass(frozen=True, slots=True)
+class Do:
+    """A call for what it does to its arguments."""
+
+    call: Call
+
+
+@dataclass(frozen=True, slots=True)
 class Return:
     """The end of a function and its results, with a remark."""
 
@@ -88,7 +95,7 @@ class Return:
     remark: str = ""
 
 
-Statement: TypeAlias = Assign | Store | Accumulate | Loop | If | Comment | Return
+Statement: TypeAlias = Assign | Store | Accumulate | Loop | If | Comment | Do | Return
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +112,11 @@ class Function:
 def let(name: str, value: Value) -> Assign:
     """Return the statement that gives one variable a value."""
     return Assign((name,), as_expression(value))
+
+
+def whole(name: str, value: Value) -> Assign:
+    """Return the statement that gives an index a value."""
+    return Assign((name,), as_expression(value), whole=True)
 
 
 def store(array: str, index: Value, value: Value) -> Store:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..program.printers import show
+from ..program.expressions import ZERO, Call, Expression, Name, call, plus
+from ..program.lowering import lower
+from ..program.statements import Assign, let
 from .step import StepWriter
 
 __all__ = ["entry", "linearise", "write_bound"]
@@ -17,7 +19,7 @@ def linearise(w: StepWriter) -> list[dict[str, sp.Expr]]:
     """
     eq = w.equations
     implicit = w.method.implicit
-    w.put(f"# right-hand side{', Jacobian and time derivative' if implicit else ' and Jacobian'} at the start")
+    w.note(f"right-hand side{', Jacobian and time derivative' if implicit else ' and Jacobian'} at the start")
     function = "node_linear" if implicit else "node_local"
     w.timed("t", w.wanted([w.first_of(blocks) for blocks in w.kinds]))
     kept = keep_times(w)
@@ -31,9 +33,9 @@ def linearise(w: StepWriter) -> list[dict[str, sp.Expr]]:
         at = w.at(i, "")
         plain = {kind: e.xreplace(at) for kind, e in zip(kinds, body.results, strict=True) if w.is_plain(e)}
         if coded:
-            left = ", ".join(named[kind].name for kind in kinds if kind not in plain)
-            w.put(f"{left} = {w.call(function, body, coded, i, '')}")
-        w.put(*(f"{named[kind]} = {show(plain[kind])}" for kind in kinds[: len(states)] if kind in plain))
+            left = tuple(named[kind].name for kind in kinds if kind not in plain)
+            w.put(Assign(left, w.call(function, body, coded, i, "")))
+        w.put(*(let(named[kind].name, lower(plain[kind])) for kind in kinds[: len(states)] if kind in plain))
         own.append({kind: plain.get(kind, named[kind]).xreplace(kept) for kind in kinds})
     w.links("", "f_")
     return own
@@ -44,7 +46,7 @@ def keep_times(w: StepWriter) -> dict[sp.Symbol, sp.Symbol]:
     plain = {s for blocks in w.kinds for e in w.first_of(blocks).results if w.is_plain(e) for s in e.free_symbols}
     moved = w.wanted([blocks.rhs for blocks in w.kinds]) & plain
     kept = {s: sp.Symbol(f"at_{s.name}", real=True) for s in sorted(moved, key=lambda s: s.name)}
-    w.put(*(f"{there} = {here}" for here, there in kept.items()))
+    w.put(*(let(there.name, here.name) for here, there in kept.items()))
     return kept
 
 
@@ -65,8 +67,8 @@ def write_bound(w: StepWriter, own: list[dict[str, sp.Expr]]) -> None:
     half = len(first_kind.state) // 2
     positions_move = len(first_kind.state) % 2 == 0 and first_kind.rhs[:half] == first_kind.state[half:]
     second_order = positions_move and not eq.mixed
-    slow: list[list[str]] = []
-    fast: list[list[str]] = []
+    slow: list[list[Expression]] = []
+    fast: list[list[Expression]] = []
     links, places, rows = list(eq.link_jacobian()), eq.places, []
     for i in range(eq.n):
         state = eq.node_at(i).state
@@ -79,28 +81,25 @@ def write_bound(w: StepWriter, own: list[dict[str, sp.Expr]]) -> None:
             if at == row:
                 parts[0 if eq.mixed else column // eq.n].append(size(e))
         columns = list(parts.items())
-        slow.append([t for b, texts in columns if second_order and b < half for t in texts if t])
-        fast.append([t for b, texts in columns if not second_order or b >= half for t in texts if t])
-    w.put("# a bound of the eigenvalues")
-    damping, stiffness = largest(fast), largest(slow)
-    w.put(f"bound = {damping or 'broadcast(0.0, WIDTH)'}")
-    if stiffness:
-        w.put(f"bound = bound + sqrt({stiffness})")
+        slow.append([t for b, sizes in columns if second_order and b < half for t in sizes if t != ZERO])
+        fast.append([t for b, sizes in columns if not second_order or b >= half for t in sizes if t != ZERO])
+    w.note("a bound of the eigenvalues")
+    w.let("bound", largest(fast))
+    if any(slow):
+        w.let("bound", Name("bound") + call("sqrt", largest(slow)))
 
 
-def size(e: sp.Expr) -> str:
-    """The text of an absolute value; empty for zero."""
-    if e == 0:
-        return ""
-    return show(sp.Abs(e)) if e.is_number else f"absolute({show(e)})"
+def size(e: sp.Expr) -> Expression:
+    """The absolute value."""
+    return lower(sp.Abs(e)) if e.is_number else call("absolute", lower(e))
 
 
-def largest(rows: list[list[str]]) -> str:
-    """The text of the largest of some sums; equal ones once."""
-    sums = list(dict.fromkeys(" + ".join(row) for row in rows if row))
-    if not sums:
-        return ""
-    text = sums[0] if "(" in "".join(sums[:1]) or len(sums) > 1 else f"broadcast({sums[0]}, WIDTH)"
-    for other in sums[1:]:
-        text = f"maximum({text}, {other})"
-    return text
+def largest(rows: list[list[Expression]]) -> Expression:
+    """The largest of some sums, zero without any; equal ones count once."""
+    first, *others = list(dict.fromkeys(plus(*row) for row in rows if row)) or [ZERO]
+    if not others and not any(isinstance(part, Call) for part in first.walk()):
+        return call("broadcast", first, "WIDTH")
+    found = first
+    for other in others:
+        found = call("maximum", found, other)
+    return found

@@ -6,18 +6,21 @@ Nodes of several kinds have a loop for each kind, and their links one for each p
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import sympy as sp
 
+from ..program.expressions import Expression, Load, Name, Product, call, linear, negative, plus, scaled
+from ..program.lowering import lower
 from ..program.passes import Body
-from ..program.printers import show
+from ..program.statements import Assign, If, Return, Statement, accumulate, let, store, whole
 from .linearise import entry
-from .looped_mass import LoopMass
-from .places import Joint, Kind, Places, named
+from .looped_mass import LoopMass, filled
+from .mass import Block
+from .places import Joint, Kind, Places, link_ends, named
 from .program import Program, names
-from .rosenbrock import term
-from .step import StepWriter, combine, function_name
+from .rosenbrock import scales, time_term
+from .step import StepWriter, function_name, lane
 
 __all__ = ["LoopWriter"]
 
@@ -30,32 +33,27 @@ class LoopWriter:
         self.mass = LoopMass(self)
         stages = len(w.method.c)
         bases = [*(f"K{j + 1}" for j in range(stages)), "STATE", "SLOPE", "TIME_SLOPE", "MATRIX"]
-        self.base = {name: f"DENSE_ROWS*DIMENSION + {i}*DIMENSION" for i, name in enumerate(bases)}
-        self.base |= self.mass.bases(len(bases) - 1)
+        self.base = {name: vector(i) for i, name in enumerate(bases)} | self.mass.bases(len(bases) - 1)
 
-    def lines(self) -> list[str]:
-        """All statements of the step."""
+    def write(self) -> None:
+        """Write the step."""
         w = self.w
-        w.put(*(f"{name} = {text}" for name, text in self.base.items()))
-        w.put(f"{', '.join(names(w.equations))} = graph")
+        w.put(*(whole(name, place) for name, place in self.base.items()))
+        w.put(Assign(names(w.equations), Name("graph"), whole=True))
         w.parameters(but={f"{name}_{i + 1}" for name in w.equations.varied for i in range(w.equations.n)})
         if self.method.implicit:
             self.rosenbrock()
         else:
             self.explicit()
-        return w.lines
 
     # -- pieces -----------------------------------------------------------------------------------------------
 
-    def loop(self, head: str, lines: Sequence[str]) -> None:
-        """A for loop."""
-        self.w.put(head, *(f"    {line}" for line in lines))
-
-    def node_call(self, function: str, kind: Kind, body: Body) -> tuple[str, list[sp.Expr]]:
-        """The call of a node function on the symbols of the template, and which results it returns."""
-        coded = [e for e in body.results if not self.w.is_plain(e)]
-        given = ", ".join(s.name for s in self.w.arguments(body, coded))
-        return f"{function_name(function, kind.number)}({given})", coded
+    def node_call(self, function: str, kind: Kind, body: Body, found: Sequence[str]) -> list[Statement]:
+        """The call of a node function on the symbols of the template; plain results among those `found` are left out."""
+        pairs = [(name, e) for name, e in zip(found, body.results, strict=True) if not self.w.is_plain(e)]
+        given = (s.name for s in self.w.arguments(body, [e for _, e in pairs]))
+        value = call(function_name(function, kind.number), *given)
+        return [Assign(tuple(name for name, _ in pairs), value)] if pairs else []
 
     def slopes(self, base: str, out: str) -> None:
         """The right-hand side of all nodes at a state, links included."""
@@ -66,80 +64,74 @@ class LoopWriter:
     def node_slopes(self, kind: Kind, base: str, out: str) -> None:
         """The right-hand side of the nodes of one kind."""
         body = self.w.kinds[kind.number].rhs
-        call, coded = self.node_call("node", kind, body)
-        lines = self.places.read(kind.node, base) + self.places.own(body)
         left = [f"f_{s.name}" for s in kind.node.state]
-        if coded:
-            found = ", ".join(n for n, e in zip(left, body.results, strict=True) if not self.w.is_plain(e))
-            lines.append(f"{found} = {call}")
+        found = self.places.read(kind.node, base) + self.places.own(body) + self.node_call("node", kind, body, left)
         for c, (name, e) in enumerate(zip(left, body.results, strict=True)):
-            value = (show(e) if not e.is_number else f"broadcast({show(e)}, WIDTH)") if self.w.is_plain(e) else name
-            lines.append(f"store(dense, {out} + {self.places.place(c)}, {value})")
-        self.loop(kind.head, lines)
+            value = lane(lower(e)) if self.w.is_plain(e) else Name(name)
+            found.append(store("dense", plus(Name(out), self.places.place(c)), value))
+        self.w.put(kind.span.over(found))
 
     def links(self, base: str, out: str, jacobian: bool = False) -> None:
         """Add what each link contributes to the slopes, where `out` says where, and on demand to the matrix."""
         for joint in self.places.joints:
             edge = joint.edge
             inertia = [e for block in edge.inertia for row in block for e in row] if jacobian else []
-            lines = self.link(joint, base, (*edge.rhs, *inertia))
+            found = self.link(joint, base, (*edge.rhs, *inertia))
             for c, e in enumerate(edge.rhs if out else ()):
                 if e != 0:
-                    lines.append(self.add(f"{out} + {self.places.place(c)}", f"+ {show(e.xreplace(named(joint)))}"))
+                    found.append(self.add(out, self.places.place(c), lower(e.xreplace(named(joint)))))
             if jacobian:
-                lines += self.matrix_of_link(joint)
-            self.loop(joint.head, lines)
+                found += self.matrix_of_link(joint)
+            self.w.put(joint.span.over(found))
 
-    def link(self, joint: Joint, base: str, used: tuple[sp.Expr, ...], states: bool = True) -> list[str]:
+    def link(self, joint: Joint, base: str, used: tuple[sp.Expr, ...], states: bool = True) -> list[Statement]:
         """The ends of a link, its weight, the parameters that `used` uses, and the states of both ends."""
         read = self.places.read
-        lines = self.places.ends(joint.edge) + self.places.own(Body((), used))
+        found = link_ends(joint.edge) + self.places.own(Body((), used))
         if states:
-            lines += read(joint.target, base, "_here", "i") + read(joint.source, base, "_there", "j")
-        return lines
+            found += read(joint.target, base, "_here", "i") + read(joint.source, base, "_there", "j")
+        return found
 
-    def add(self, place: str, value: str) -> str:
-        """A statement that adds to a group of the workspace; the value begins with its sign."""
-        return f"store(dense, {place}, load(dense, {place}, WIDTH) {value})"
+    def add(self, base: str, place: Expression, value: Expression) -> Statement:
+        """A statement that adds to a group of the workspace."""
+        return accumulate("dense", plus(Name(base), place), value)
 
-    def matrix_of_link(self, joint: Joint) -> list[str]:
+    def matrix_of_link(self, joint: Joint) -> list[Statement]:
         """What a link adds to shift*M - J."""
-        lines, swap = self.mass.rates_of_link(joint), named(joint)
+        found, swap = self.mass.rates_of_link(joint), named(joint)
         for block, slot in zip(self.mass.jacobian(joint), ("here_slot", "there_slot"), strict=True):
-            lines += self.entries(block, slot, swap)
+            found += self.entries(block, slot, swap)
         for block, slot in zip(joint.edge.inertia, ("here_slot", "there_slot"), strict=False):
-            lines += self.entries(block, slot, swap, "+ shift*")
-        return lines
+            found += self.entries(block, slot, swap, lambda e: scaled("shift", e))
+        return found
 
     def entries(
         self,
-        block: Sequence[Sequence[sp.Expr]],
+        block: Block,
         slot: str,
         swap: dict[sp.Symbol, sp.Symbol],
-        sign: str = "- ",
+        change: Callable[[Expression], Expression] = negative,
         matrix: str = "MATRIX",
-    ) -> list[str]:
-        """Statements that subtract the entries of a block from the matrix, or add them by another `sign`."""
-        lines = []
-        for a, row in enumerate(block):
-            for b, e in enumerate(row):
-                if e != 0:
-                    value = show(e.xreplace(swap))
-                    value = f"({value})" if sign != "+ " and e.is_Add else value
-                    lines.append(self.add(f"{matrix} + {self.places.entry(slot, a, b)}", sign + value))
-        return lines
+    ) -> list[Statement]:
+        """Statements that subtract the entries of a block from the matrix, or add what another `change` makes of them."""
+        return [
+            self.add(matrix, self.places.entry(slot, a, b), change(lower(e.xreplace(swap))))
+            for a, row in enumerate(block)
+            for b, e in enumerate(row)
+            if e != 0
+        ]
 
     # -- Rosenbrock -------------------------------------------------------------------------------------------
 
     def rosenbrock(self) -> None:
         """Linearise, factorise, and one solve for each stage."""
         w, m = self.w, self.method
-        w.put(f"reach = h*{m.gamma!r}", "shift = 1.0/reach", f"rate = shift*{m.gamma!r}")
+        w.put(*scales(m.gamma))
         self.linearise()
         self.mass.factorise()
         for i in range(m.stages):
             self.stage(i)
-        self.finish(m.b, [combine(row, self.stages(m.stages)) for row in m.e], m.a[-1])
+        self.finish(m.b, [linear(row, self.stages(m.stages)) for row in m.e])
 
     def stages(self, count: int) -> list[str]:
         """Names of the loaded stage values of one state variable."""
@@ -148,10 +140,9 @@ class LoopWriter:
     def linearise(self) -> None:
         """Slopes, matrix shift - J and time slopes at the start."""
         w, kinds = self.w, self.places.kinds
-        w.put("# right-hand side, shift - J and time derivative at the start")
+        w.note("right-hand side, shift - J and time derivative at the start")
         w.timed("t", w.wanted([blocks.linear for blocks in w.kinds]))
-        self.loop("for k in range(DIMENSION):", ["store(dense, MATRIX + k, shift)"])
-        self.loop("for k in range(DIMENSION, ENTRIES):", ["store(dense, MATRIX + k, 0.0*h)"])
+        w.put(*filled("MATRIX", Name("shift")))
         slopes = [w.kinds[kind.number].linear.results[-len(kind.node.state) :] for kind in kinds]
         moving = [[e != 0 for e in own] for own in slopes]
         self.timed_rows = [any(map(any, moving))] if self.places.mixed else moving[0]
@@ -161,101 +152,102 @@ class LoopWriter:
 
     def node_linear(self, kind: Kind) -> None:
         """Slopes, matrix entries and time slopes of the nodes of one kind."""
-        w, body, state = self.w, self.w.kinds[kind.number].linear, [s.name for s in kind.node.state]
+        w, body, state = self.w, self.w.kinds[kind.number].linear, kind.node.state
         size, place = len(state), self.places.place
-        call, coded = self.node_call("node_linear", kind, body)
-        found = [f"f_{r}" for r in state] + [entry(r, c) for r in kind.node.state for c in kind.node.state]
-        found += [f"ft_{r}" for r in state]
-        lines = self.places.read(kind.node, "y") + self.places.own(body)
-        if coded:
-            left = [name for name, e in zip(found, body.results, strict=True) if not w.is_plain(e)]
-            lines.append(f"{', '.join(left)} = {call}")
-        named = [e if w.is_plain(e) else sp.Symbol(k, real=True) for k, e in zip(found, body.results, strict=True)]
+        names = [f"f_{r.name}" for r in state] + [entry(r, c) for r in state for c in state]
+        names += [f"ft_{r.name}" for r in state]
+        found = self.places.read(kind.node, "y") + self.places.own(body)
+        found += self.node_call("node_linear", kind, body, names)
+        named = [e if w.is_plain(e) else sp.Symbol(k, real=True) for k, e in zip(names, body.results, strict=True)]
         for c in range(size):
-            lines.append(f"store(dense, SLOPE + {place(c)}, {_lane(named[c])})")
-            slope = named[size + size * size + c]
+            found.append(store("dense", plus(Name("SLOPE"), place(c)), lane(lower(named[c]))))
             if self.timed_rows[0 if self.places.mixed else c]:
-                lines.append(f"store(dense, TIME_SLOPE + {place(c)}, {_lane(slope)})")
-        block = [named[size + a * size : size + (a + 1) * size] for a in range(size)]
-        self.loop(kind.head, lines + self.entries(block, "node_slot", {}))
+                slope = lane(lower(named[size + size * size + c]))
+                found.append(store("dense", plus(Name("TIME_SLOPE"), place(c)), slope))
+        block = tuple(tuple(named[size + a * size : size + (a + 1) * size]) for a in range(size))
+        w.put(kind.span.over(found + self.entries(block, "node_slot", {})))
 
     def stage(self, i: int) -> None:
         """State, slopes, right-hand side and solve of one stage."""
         w, m = self.w, self.method
-        w.put(f"# stage {i + 1}")
+        w.note(f"stage {i + 1}")
         if i > 0:
-            self.state_of(m.a[i], "", "")
+            self.state_of(m.a[i])
             w.stage_time(i, first=1)
             self.slopes("STATE", "SLOPE")
             self.mass.rates_of_stage(i)
-        for row, (head, place) in enumerate(self.places.rows):
-            lines, text = [], f"load(dense, SLOPE + {place}, WIDTH)"
+        for row, (span, place) in enumerate(self.places.rows):
+            found: list[Statement] = []
+            terms: list[Expression] = [Load("dense", plus(Name("SLOPE"), place))]
             if i > 0:
-                lines += self.load_stages(place, m.big_c[i])
-                total = f"({combine(m.big_c[i], self.stages(i))})"
-                more, text = self.mass.known(place, text, total)
-                lines += more
+                found += self.load_stages(place, m.big_c[i])
+                more, terms = self.mass.known(place, terms[0], linear(m.big_c[i], self.stages(i)))
+                found += more
             if m.d[i] != 0.0 and self.timed_rows[row]:
-                text += term(m.d[i], f"load(dense, TIME_SLOPE + {place}, WIDTH)", tidy=False)
-            self.loop(head, [*lines, f"store(dense, K{i + 1} + {place}, {text})"])
+                terms.append(time_term(m.d[i], Load("dense", plus(Name("TIME_SLOPE"), place))))
+            w.put(span.over([*found, store("dense", plus(Name(f"K{i + 1}"), place), plus(*terms))]))
         if i > 0:
             self.mass.carried(i)
         self.mass.solve(f"K{i + 1}", "SLOPE")
 
-    def load_stages(self, place: str, row: Sequence[float]) -> list[str]:
+    def load_stages(self, place: Expression, row: Sequence[float]) -> list[Statement]:
         """Load the stage values of a state variable that a row of coefficients uses."""
-        used = [j for j, weight in enumerate(row) if weight != 0.0]
-        return [f"k{j + 1} = load(dense, K{j + 1} + {place}, WIDTH)" for j in used]
+        used = [j + 1 for j, weight in enumerate(row) if weight != 0.0]
+        return [let(f"k{j}", Load("dense", plus(Name(f"K{j}"), place))) for j in used]
 
-    def state_of(self, row: Sequence[float], before: str, behind: str) -> None:
-        """The state of a stage: y + (sum a_j k_j), the sum scaled for explicit methods."""
-        for head, place in self.places.rows:
-            total = combine(row, self.stages(len(row)))
-            lines = [*self.load_stages(place, row), f"old = load(y, {place}, WIDTH)"]
-            self.loop(head, [*lines, f"store(dense, STATE + {place}, old + {before}({total}){behind})"])
+    def increment(self, row: Sequence[float]) -> Expression:
+        """What a row of coefficients adds to the state at the start."""
+        total = linear(row, self.stages(len(row)))
+        return total if self.method.implicit else Product((Name("h"), total))
 
-    def finish(self, weights: Sequence[float], errors: list[str], last: Sequence[float], scale: str = "") -> None:
+    def state_of(self, row: Sequence[float]) -> None:
+        """The state of a stage: y + sum a_j k_j, the sum times h for explicit methods."""
+        for span, place in self.places.rows:
+            found = [*self.load_stages(place, row), let("old", Load("y", place))]
+            found.append(store("dense", plus(Name("STATE"), place), Name("old") + self.increment(row)))
+            self.w.put(span.over(found))
+
+    def finish(self, weights: Sequence[float], errors: list[Expression]) -> None:
         """New state, dense output and error."""
         w, m = self.w, self.method
-        w.put("# new state, error and dense output", "error = 0.0*h", "total = 0.0*h")
-        for head, place in self.places.rows:
-            lines = [*self.load_stages(place, [1.0] * len(m.c)), f"old = load(y, {place}, WIDTH)"]
-            lines += [
-                f"new = old + {scale}({combine(weights, self.stages(len(weights)))})",
-                f"store(y_new, {place}, new)",
-            ]
-            lines += [f"e = scaled({self.error(errors, scale)}, old, new, rtol, atol)"]
-            lines += ["total = total + e", "error = maximum(error, e)"]
+        w.note("new state, error and dense output")
+        w.put(let("error", 0.0 * Name("h")), let("total", 0.0 * Name("h")))
+        for span, place in self.places.rows:
+            found = [*self.load_stages(place, [1.0] * len(m.c)), let("old", Load("y", place))]
+            found += [let("new", Name("old") + self.increment(weights)), store("y_new", place, "new")]
+            found += [let("e", call("scaled", self.error(errors), "old", "new", "rtol", "atol"))]
+            found += [let("total", Name("total") + "e"), let("error", call("maximum", "error", "e"))]
             for j, row in enumerate(m.dense):
-                lines.append("if DENSE:")
-                value = combine(row, self.stages(len(row))) or "broadcast(0.0, WIDTH)"
-                lines.append(f"    store(dense, {j}*DIMENSION + {place}, {scale}({value}))")
-            self.loop(head, lines)
-        w.put("return error + 0.0*total  # NaN or infinite where any estimate is")
+                at = plus(j * Name("DIMENSION"), place)
+                value = lane(linear(row, self.stages(len(row))))
+                scale = value if m.implicit else Product((Name("h"), value))
+                found.append(If(Name("DENSE"), (store("dense", at, scale),)))
+            w.put(span.over(found))
+        w.put(Return((Name("error") + 0.0 * Name("total"),), "NaN or infinite where any estimate is"))
 
-    def error(self, errors: list[str], scale: str) -> str:
+    def error(self, errors: list[Expression]) -> Expression:
         """The error estimate of one state variable, from one or two embedded methods."""
         if len(errors) == 1:
-            return f"{scale}({errors[0]})"
-        return f"pair({errors[0]}, {errors[1]}, h)"
+            return errors[0] if self.method.implicit else Product((Name("h"), errors[0]))
+        return call("pair", *errors, "h")
 
     # -- explicit ---------------------------------------------------------------------------------------------
 
     def explicit(self) -> None:
-        """Stages, and those that serve the dense output alone under their flag."""
+        """Stages, those that serve the dense output alone too."""
         w, m = self.w, self.method
         self.mass.opening()
         for i in range(len(m.c)):
-            w.put(f"# stage {i + 1}")
+            w.note(f"stage {i + 1}")
             if i > 0:
-                self.state_of(m.a[i], "h*", "")
+                self.state_of(m.a[i])
             w.stage_time(i, first=0)
             base = "STATE" if i else "y"
             self.slopes(base, f"K{i + 1}")
             self.mass.explicit(base, f"K{i + 1}")
-        self.finish(m.b, [combine(row, self.stages(len(row))) for row in m.e], (), "h*")
+        self.finish(m.b, [linear(row, self.stages(len(row))) for row in m.e])
 
 
-def _lane(e: sp.Expr) -> str:
-    """The text of a value that is stored: numbers become lanes."""
-    return f"broadcast({show(e)}, WIDTH)" if e.is_number else show(e)
+def vector(number: int) -> Expression:
+    """Where a vector of the workspace begins."""
+    return Name("DENSE_ROWS") * "DIMENSION" + number * Name("DIMENSION")

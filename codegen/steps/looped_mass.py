@@ -5,21 +5,22 @@ What is solved, and why no system in M is solved where M is constant, says codeg
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from typing import Protocol
 
 import sympy as sp
 
 from ..integrators import Integrator
-from ..program.printers import show
-from .mass import Mass, momentum_slopes
-from .places import Joint, Places, named
+from ..program.expressions import Expression, Load, Name, Product, Value, call, negative, plus
+from ..program.lowering import lower
+from ..program.statements import Do, Statement, let, store
+from .mass import Block, Mass, momentum_slopes
+from .places import Joint, Places, named, span
 from .program import Program
 from .step import StepWriter
 
-__all__ = ["LoopMass"]
+__all__ = ["LoopMass", "filled"]
 
-Block = tuple[tuple[sp.Expr, ...], ...]
 SLOTS = ("here_slot", "there_slot")
 
 
@@ -31,16 +32,13 @@ class Loops(Protocol):
     places: Places
     elimination: Program
 
-    def loop(self, head: str, lines: Sequence[str]) -> None:
-        """A for loop."""
-
-    def link(self, joint: Joint, base: str, used: tuple[sp.Expr, ...], states: bool = True) -> list[str]:
+    def link(self, joint: Joint, base: str, used: tuple[sp.Expr, ...], states: bool = True) -> list[Statement]:
         """The ends of a link, its weight, the parameters that `used` uses, and the states of both ends."""
 
     def links(self, base: str, out: str, jacobian: bool = False) -> None:
         """Add what each link contributes to the slopes and on demand to the matrix."""
 
-    def add(self, place: str, value: str) -> str:
+    def add(self, base: str, place: Expression, value: Expression) -> Statement:
         """A statement that adds to a group of the workspace."""
 
     def entries(
@@ -48,10 +46,10 @@ class Loops(Protocol):
         block: Block,
         slot: str,
         swap: dict[sp.Symbol, sp.Symbol],
-        sign: str = "- ",
+        change: Callable[[Expression], Expression] = negative,
         matrix: str = "MATRIX",
-    ) -> list[str]:
-        """Statements that subtract the entries of a block from the matrix, or add them by another `sign`."""
+    ) -> list[Statement]:
+        """Statements that subtract the entries of a block from the matrix, or add what another `change` makes of them."""
 
 
 class LoopMass:
@@ -61,44 +59,44 @@ class LoopMass:
         self.writer, self.equations = writer, writer.w.equations
         self.inertial, self.constant = self.equations.inertial, Mass(self.equations).constant
         self.joints = [joint for joint in writer.places.joints if joint.edge.inertia]
-        self.apart = ""
 
-    def bases(self, before: int) -> dict[str, str]:
+    def bases(self, before: int) -> dict[str, Expression]:
         """Where a Rosenbrock step keeps the rates at its start and M in a stage, behind so many vectors and the matrix."""
         if self.constant or not self.writer.method.implicit:
             return {}
-        matrix = "ENTRIES" if self.writer.elimination.exact else "2*ENTRIES"
-        start = f"DENSE_ROWS*DIMENSION + {before}*DIMENSION + {matrix}"
-        return {"RATES": start, "MASS": f"{start} + DIMENSION"}
+        matrix = Name("ENTRIES") if self.writer.elimination.exact else 2 * Name("ENTRIES")
+        start = Name("DENSE_ROWS") * "DIMENSION" + before * Name("DIMENSION") + matrix
+        return {"RATES": start, "MASS": start + "DIMENSION"}
 
     # -- linear algebra ---------------------------------------------------------------------------------------
 
+    @property
+    def apart(self) -> Value:
+        """How far behind the matrix its factors stand."""
+        return 0 if self.writer.elimination.exact else "ENTRIES"
+
     def factorise(self, matrix: str = "MATRIX") -> None:
         """Factorise a matrix; STATE is lost."""
-        self.apart = "0" if self.writer.elimination.exact else "ENTRIES"
-        self.writer.w.put(
-            f"factorise(dense, {matrix}, {self.apart}, STATE, order, place, row_start, after_start, column)"
-        )
+        arrays = ("order", "place", "row_start", "after_start", "column")
+        self.writer.w.put(Do(call("factorise", "dense", matrix, self.apart, "STATE", *arrays)))
 
     def solve(self, vector: str, scratch: str, matrix: str = "MATRIX") -> None:
         """Solve in place for a vector; `scratch` and STATE are lost."""
-        self.writer.w.put(
-            f"solve(dense, {matrix}, {self.apart}, {vector}, {scratch}, STATE, order, row_start, after_start, column)"
-        )
+        arrays = ("order", "row_start", "after_start", "column")
+        self.writer.w.put(Do(call("solve", "dense", matrix, self.apart, vector, scratch, "STATE", *arrays)))
 
     def assemble(self, base: str, matrix: str) -> None:
         """M at a state, factorised; STATE is lost."""
         w = self.writer
-        w.loop("for k in range(DIMENSION):", [f"store(dense, {matrix} + k, 1.0 + 0.0*h)"])
-        w.loop("for k in range(DIMENSION, ENTRIES):", [f"store(dense, {matrix} + k, 0.0*h)"])
+        w.w.put(*filled(matrix, 1.0 + 0.0 * Name("h")))
         for joint in self.joints:
-            lines = self.link(joint, base)
+            found = self.link(joint, base)
             for block, slot in zip(joint.edge.inertia, SLOTS, strict=True):
-                lines += w.entries(block, slot, named(joint), "+ ", matrix)
-            w.loop(joint.head, lines)
+                found += w.entries(block, slot, named(joint), lambda e: e, matrix)
+            w.w.put(joint.span.over(found))
         self.factorise(matrix)
 
-    def link(self, joint: Joint, base: str) -> list[str]:
+    def link(self, joint: Joint, base: str) -> list[Statement]:
         """What the inertia of a link is made of."""
         used = tuple(e for block in joint.edge.inertia for row in block for e in row)
         return self.writer.link(joint, base, used, states=not self.constant)
@@ -126,11 +124,12 @@ class LoopMass:
         w = self.writer
         w.links("y", "SLOPE")
         self.assemble("y", "MASS")
-        w.loop("for k in range(DIMENSION):", ["store(dense, RATES + k, load(dense, SLOPE + k, WIDTH))"])
+        copied = store("dense", Name("RATES") + "k", Load("dense", Name("SLOPE") + "k"))
+        w.w.put(span("k", "DIMENSION").over([copied]))
         self.solve("RATES", "K1", "MASS")
         return True
 
-    def rates_of_link(self, joint: Joint) -> list[str]:
+    def rates_of_link(self, joint: Joint) -> list[Statement]:
         """Load the rates at both ends of a link whose inertia depends on them."""
         if self.constant or not joint.edge.inertia:
             return []
@@ -161,29 +160,37 @@ class LoopMass:
             self.assemble("STATE", "MASS")
             self.solve("SLOPE", f"K{i + 1}", "MASS")
 
-    def known(self, place: str, slope: str, total: str) -> tuple[list[str], str]:
-        """Statements and the text of what a stage has on its right-hand side besides the inertia of the links.
+    def known(
+        self, place: Expression, slope: Expression, total: Expression
+    ) -> tuple[list[Statement], list[Expression]]:
+        """Statements and the terms of what a stage has on its right-hand side besides the inertia of the links.
 
         `total` is the sum of earlier stages; what M multiplies is left in STATE: that sum, or with it the rates.
         """
-        text = f"{slope} + rate*{total}"
+        terms = [slope, Product((Name("rate"), total))]
+        kept = plus(Name("STATE"), place)
         if not self.inertial:
-            return [], text
+            return [], terms
         if self.constant:
-            return [f"store(dense, STATE + {place}, {total})"], text
-        return [f"new = {text}", f"store(dense, STATE + {place}, new)"], "new"
+            return [store("dense", kept, total)], terms
+        return [let("new", plus(*terms)), store("dense", kept, "new")], [Name("new")]
 
     def carried(self, i: int) -> None:
         """Add (M - 1) s to stage i, s what `known` has left in STATE, times the rate where that is a sum of stages."""
-        rate = "rate*" if self.constant else ""
-        w = self.writer
+        w, rate = self.writer, [Name("rate")] if self.constant else []
         for joint in self.joints:
-            lines = self.link(joint, "y")
+            found = self.link(joint, "y")
             for block, index in zip(joint.edge.inertia, "ij", strict=True):
                 for a, row in enumerate(block):
                     for b, e in enumerate(row):
                         if e != 0:
-                            inertia = show(e.xreplace(named(joint)))
-                            load = f"load(dense, STATE + {w.places.place(b, index)}, WIDTH)"
-                            lines.append(w.add(f"K{i + 1} + {w.places.place(a)}", f"+ {rate}({inertia})*{load}"))
-            w.loop(joint.head, lines)
+                            load = Load("dense", plus(Name("STATE"), w.places.place(b, index)))
+                            value = Product((*rate, lower(e.xreplace(named(joint))), load))
+                            found.append(w.add(f"K{i + 1}", w.places.place(a), value))
+            w.w.put(joint.span.over(found))
+
+
+def filled(matrix: str, diagonal: Expression) -> list[Statement]:
+    """A matrix with equal entries on its diagonal and zeros elsewhere."""
+    parts = ((span("k", "DIMENSION"), diagonal), (span("k", "ENTRIES", "DIMENSION"), 0.0 * Name("h")))
+    return [part.over([store("dense", Name(matrix) + "k", value)]) for part, value in parts]

@@ -18,7 +18,9 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.calculus import derivative
 from synchain.models.mechanics.components import Edge
 
-from ..program.printers import show
+from ..program.expressions import Expression, Name, Product
+from ..program.lowering import lower
+from ..program.statements import Statement, let
 from .elimination import Entry, Factors, plan, write_elimination, write_solve
 
 __all__ = ["Mass", "momentum_slopes"]
@@ -33,8 +35,11 @@ class Writer(Protocol):
     def state(self) -> tuple[str, ...]:
         """Names of the states."""
 
-    def put(self, *lines: str) -> None:
+    def put(self, *statements: Statement) -> None:
         """Append statements."""
+
+    def note(self, text: str) -> None:
+        """Append a comment."""
 
     def staged(self, prefix: str) -> dict[sp.Symbol, sp.Symbol]:
         """The names of all states in a stage."""
@@ -93,14 +98,15 @@ class Mass:
         }
         self.steps = plan(len(rows), set(matrix))
         self.factors = write_elimination(self.steps, matrix, {}, tuple(f"mass_{w.state[row]}" for row in rows))
-        w.put("# factors of M", *self.factors.lines)
+        w.note("factors of M")
+        w.put(*self.factors.statements)
 
     def solve(self, w: Writer, source: str, out: str) -> None:
         """Write out = M^-1 source for the rows that M couples, by the factors at hand."""
         if self.factors is None:
             raise RuntimeError("the mass matrix has not been factorised; this is a mistake in the program")
         names = [w.state[row] for row in self.rows]
-        w.put(*(f"r_{name} = {source}{name}" for name in names))
+        w.put(*(let(f"r_{name}", f"{source}{name}") for name in names))
         rights = {k: f"r_{name}" for k, name in enumerate(names)}
         w.put(*write_solve(self.steps, self.factors, rights, {k: f"{out}{name}" for k, name in enumerate(names)}))
 
@@ -126,21 +132,20 @@ class Mass:
                     found[row, k] = found.get((row, k), sp.S.Zero) - derivative(e, s) * rate
         return {key: e for key, e in found.items() if e != 0}
 
-    def known(self, w: Writer, sums: Mapping[str, str], i: int) -> dict[str, str]:
-        """By state, M (F + rate sum c k) for the rows that M couples, in stage i; `sums` are the texts of sum c k."""
+    def known(self, w: Writer, sums: Mapping[str, Expression], i: int) -> dict[str, Expression]:
+        """By state, M (F + rate sum c k) for the rows that M couples, in stage i; `sums` are the sums of c k."""
         if not self.entries or i == 0:
             return {}
-        rows, before = self.rows, "rate*"
-        if self.constant:
-            w.put(*(f"g_{w.state[row]} = {sums[w.state[row]]}" for row in rows))
-        else:
+        names, rate = {row: w.state[row] for row in self.rows}, Name("rate")
+        if not self.constant:
             self.factorise(w, "u_")
             self.solve(w, "f_", "g_")
-            w.put(*(f"g_{w.state[row]} = g_{w.state[row]} + rate*({sums[w.state[row]]})" for row in rows))
-            before = ""
         found = {}
-        for row in rows:
+        for name in names.values():
+            change = sums[name] if self.constant else Name(f"g_{name}") + Product((rate, sums[name]))
+            w.put(let(f"g_{name}", change))
+        for row, name in names.items():
             terms = [e * sp.Symbol(f"g_{w.state[c]}") for (r, c), e in self.entries.items() if r == row]
-            text = f"{before}({show(sp.Add(*terms))})"
-            found[w.state[row]] = f"f_{w.state[row]} + {text}" if self.constant else text
+            carried = lower(sp.Add(*terms))
+            found[name] = Name(f"f_{name}") + Product((rate, carried)) if self.constant else carried
         return found

@@ -6,21 +6,23 @@ from collections.abc import Callable, Sequence
 
 import sympy as sp
 
-from ..program.printers import show
+from ..program.expressions import ZERO, Expression, Name, Negation, Number, Product, linear, plus
+from ..program.lowering import lower
+from ..program.statements import Statement, let
 from .elimination import Factors, Plan, plan, write_factors, write_solve
 from .linearise import entry, linearise, write_bound
-from .step import StepWriter, combine, indent_from
+from .step import StepWriter
 
-__all__ = ["term", "write_rosenbrock"]
+__all__ = ["scales", "stage_state", "time_term", "write_rosenbrock"]
 
 Entries = dict[tuple[int, int], sp.Expr]
 
 
-def write_rosenbrock(w: StepWriter, note: Callable[[int], None] | None = None) -> list[str]:
-    """Return all statements of a Rosenbrock step; `note` may write more after each stage."""
+def write_rosenbrock(w: StepWriter, note: Callable[[int], None] | None = None) -> None:
+    """Write a Rosenbrock step; `note` may write more after each stage."""
     w.opening()
     # (shift - J) k = …; reach = 1/shift, rate = 1/h
-    w.put(f"reach = h*{w.method.gamma!r}", "shift = 1.0/reach", f"rate = shift*{w.method.gamma!r}")
+    w.put(*scales(w.method.gamma))
     own = linearise(w)
     if w.bounded:
         write_bound(w, own)
@@ -28,16 +30,21 @@ def write_rosenbrock(w: StepWriter, note: Callable[[int], None] | None = None) -
     entries = w.mass.at_start(w, entries)
     steps = plan(len(w.state), set(entries) | w.mass.coupled)
     factors = write_factors(steps, entries, tuple(w.state), w.mass.entries)
-    w.put(f"# factors of {'shift*M - J' if w.mass.entries else 'shift - J'}", *factors.lines)
+    w.note(f"factors of {'shift*M - J' if w.mass.entries else 'shift - J'}")
+    w.put(*factors.statements)
     places = [(k, i, s) for i, own_places in enumerate(w.equations.places)
               for k, s in zip(own_places, w.equations.node_at(i).state, strict=True)]  # fmt: skip
-    slopes = [show(own[i][f"ft_{s.name}"]) for _, i, s in sorted(places, key=lambda place: place[0])]
+    slopes = [lower(own[i][f"ft_{s.name}"]) for _, i, s in sorted(places, key=lambda place: place[0])]
     for i in range(w.method.stages):
         stage(w, i, steps, factors, slopes)
         if note is not None:
             note(i)
     finish(w)
-    return w.lines
+
+
+def scales(gamma: float) -> tuple[Statement, ...]:
+    """The three scales of a step of length h."""
+    return let("reach", Name("h") * gamma), let("shift", 1.0 / Name("reach")), let("rate", Name("shift") * gamma)
 
 
 def gather(w: StepWriter, own: list[dict[str, sp.Expr]]) -> Entries:
@@ -59,56 +66,51 @@ def gather(w: StepWriter, own: list[dict[str, sp.Expr]]) -> Entries:
     return {key: e for key, e in entries.items() if e != 0}
 
 
-def stage(w: StepWriter, i: int, steps: Plan, factors: Factors, time_slopes: Sequence[str]) -> None:
+def stage(w: StepWriter, i: int, steps: Plan, factors: Factors, time_slopes: Sequence[Expression]) -> None:
     """Write one stage: state, right-hand side, linear solve."""
     m = w.method
-    w.put(f"# stage {i + 1}")
+    w.note(f"stage {i + 1}")
     if i > 0:
         for name in w.state:
-            w.put(f"u_{name} = {stage_state(m.a[i], m.a[i - 1], name)}")
+            w.let(f"u_{name}", stage_state(m.a[i], m.a[i - 1], name))
         w.stage_time(i, first=1)
         w.slopes("u_", "f_")
     rights, results = {}, {}
-    sums = {name: combine(m.big_c[i], w.stages(name, i)) for name in w.state} if i > 0 else {}
+    sums = {name: linear(m.big_c[i], w.stages(name, i)) for name in w.state} if i > 0 else {}
     known = w.mass.known(w, sums, i)
     for slot, name in enumerate(w.state):
-        text = known.get(name, f"f_{name}")
+        terms = [known.get(name, Name(f"f_{name}"))]
         if i > 0 and name not in known:
-            text += f" + rate*({sums[name]})"
-        if m.d[i] != 0.0 and time_slopes[slot] != "0.0":
-            text += term(m.d[i], time_slopes[slot])
-        w.put(f"r_{name} = {text}")
+            terms.append(Product((Name("rate"), sums[name])))
+        if m.d[i] != 0.0 and time_slopes[slot] != ZERO:
+            terms.append(time_term(m.d[i], time_slopes[slot]))
+        w.let(f"r_{name}", plus(*terms))
         rights[slot], results[slot] = f"r_{name}", f"k{i + 1}_{name}"
     w.put(*write_solve(steps, factors, rights, results))
 
 
-def term(weight: float, slope: str, tidy: bool = True) -> str:
-    """weight * h * slope with its sign in front; a slope that is one call needs no tidying."""
-    if not tidy:
-        return f" {'-' if weight < 0 else '+'} {abs(weight)!r}*h*{slope}"
-    if slope.startswith("-") and not set("+- ") & set(slope[1:]):
-        weight, slope = -weight, slope[1:]
-    inner = f"({slope})" if set("+- ") & set(slope) else slope
-    return f" {'-' if weight < 0 else '+'} {abs(weight)!r}*h*{inner}"
+def time_term(weight: float, slope: Expression) -> Expression:
+    """weight * h * slope with its sign in front."""
+    if isinstance(slope, Negation):
+        weight, slope = -weight, slope.value
+    term = Product((Number(abs(weight)), Name("h"), slope))
+    return Negation(term) if weight < 0 else term
 
 
-def stage_state(row: Sequence[float], previous: Sequence[float], name: str) -> str:
+def stage_state(row: Sequence[float], previous: Sequence[float], name: str) -> Expression:
     """y + sum a_j k_j, written as the previous stage's state plus its increment where the rows allow that."""
     names = [f"k{j + 1}_{name}" for j in range(len(row))]
     if len(previous) > 0 and tuple(row) == (*previous, 1.0):
-        return f"u_{name} + {names[-1]}"
-    return combine(row, names, name)
+        return Name(f"u_{name}") + names[-1]
+    return linear(row, names, name)
 
 
 def finish(w: StepWriter) -> None:
     """Write the new state, the error and the dense output."""
     m = w.method
-    w.put("# new state and error")
-    errors = []
+    w.note("new state and error")
     for name in w.state:
-        w.put(f"n_{name} = {stage_state(m.b, m.a[-1], name)}")
-        errors.append(combine(m.e[0], w.stages(name, m.stages)))
-    w.put("if DENSE:")
-    with indent_from(w):
+        w.let(f"n_{name}", stage_state(m.b, m.a[-1], name))
+    with w.only_if("DENSE"):
         w.dense()
-    w.closing(errors)
+    w.closing([linear(m.e[0], w.stages(name, m.stages)) for name in w.state])

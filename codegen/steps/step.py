@@ -11,12 +11,14 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
 from ..integrators import Integrator
+from ..program.expressions import Expression, Load, Name, Number, Product, Value, call, linear, plus
+from ..program.lowering import lower
 from ..program.passes import Body
-from ..program.printers import show
+from ..program.statements import Assign, Comment, Function, If, Return, Statement, let, store
 from .blocks import NodeBlocks
 from .mass import Mass
 
-__all__ = ["PAIR", "SCALED", "StepWriter", "combine", "function_name", "indent_from", "write_function"]
+__all__ = ["PAIR", "SCALED", "StepWriter", "function_name", "lane", "node_function"]
 
 PAIR = '''
 @njit(error_model="numpy", forceinline=True)
@@ -38,26 +40,15 @@ def function_name(name: str, kind: int) -> str:
     return name if kind == 0 else name.replace("node", f"node{kind + 1}", 1)
 
 
-def write_function(name: str, doc: str, body: Body, arguments: Sequence[str], results: Sequence[sp.Expr]) -> list[str]:
+def node_function(name: str, about: str, body: Body, arguments: Sequence[str], results: Sequence[sp.Expr]) -> Function:
     """A small inlined function of lanes: statements first, results last."""
-    lines = ["@njit(error_model='numpy', forceinline=True)", f"def {name}({', '.join(arguments)}):", f'    """{doc}"""']
-    lines += [f"    {s} = {show(e)}" for s, e in body.statements]
-    lines.append(f"    return {', '.join(show(e) for e in results)}")
-    return lines
+    statements = [let(s.name, lower(e)) for s, e in body.statements]
+    return Function(name, tuple(arguments), about, (*statements, Return(tuple(map(lower, results)))))
 
 
-def combine(row: Sequence[float], names: Sequence[str], start: str = "") -> str:
-    """start + sum row_j * names_j without zero terms and unit factors; '' where nothing is left."""
-    text = start
-    for weight, name in zip(row, names, strict=False):
-        if weight == 0.0:
-            continue
-        term = name if abs(weight) == 1.0 else f"{abs(weight)!r}*{name}"
-        if not text:
-            text = term if weight > 0 else f"-{term}"
-        else:
-            text += f" + {term}" if weight > 0 else f" - {term}"
-    return text
+def lane(e: Expression, width: str = "WIDTH") -> Expression:
+    """The same value as a register: numbers are spread over its lanes."""
+    return call("broadcast", e, width) if isinstance(e, Number) else e
 
 
 class StepWriter:
@@ -78,21 +69,24 @@ class StepWriter:
         self.equations, self.blocks, self.method, self.bounded = equations, blocks, method, bounded
         self.kinds = (blocks, *more)
         self.state = equations.state
-        self.lines: list[str] = []
+        self.statements: list[Statement] = []
         self.mass = Mass(equations)
 
-    def put(self, *lines: str) -> None:
+    def put(self, *statements: Statement) -> None:
         """Append statements."""
-        self.lines += lines
+        self.statements += statements
+
+    def let(self, name: str, value: Value) -> None:
+        """Append the statement that gives a variable its value."""
+        self.statements.append(let(name, value))
+
+    def note(self, text: str) -> None:
+        """Append a comment."""
+        self.statements.append(Comment(text))
 
     def stages(self, name: str, count: int) -> list[str]:
         """Names of the first `count` stage values of one state variable."""
         return [f"k{j + 1}_{name}" for j in range(count)]
-
-    @property
-    def first_body(self) -> Body:
-        """What is evaluated of a node at the start of a step."""
-        return self.first_of(self.blocks)
 
     def first_of(self, blocks: NodeBlocks) -> Body:
         """What is evaluated of a node of some kind at the start of a step."""
@@ -136,17 +130,16 @@ class StepWriter:
         found = {s: sp.Symbol(f"{prefix}{s.name}_{i + 1}", real=True) for s in states}
         return {**self.equations.at_node(i), **found}
 
-    def call(self, function: str, body: Body, results: Sequence[sp.Expr], i: int, prefix: str) -> str:
+    def call(self, function: str, body: Body, results: Sequence[sp.Expr], i: int, prefix: str) -> Expression:
         """The call of a node function for node i with the state names of a stage."""
         at, kind = self.at(i, prefix), self.equations.kind_of[i]
-        names = (at.get(s, s).name for s in self.arguments(body, results))
-        return f"{function_name(function, kind)}({', '.join(names)})"
+        return call(function_name(function, kind), *(at.get(s, s).name for s in self.arguments(body, results)))
 
     def timed(self, time: str, wanted: set[sp.Symbol]) -> None:
         """Statements for the time terms in use, at the time of that name."""
         for symbol, e in (pair for blocks in self.kinds for pair in blocks.timed):
             if symbol in wanted:
-                self.put(f"{symbol} = {show(e.xreplace({TIME: sp.Symbol(time)}))}")
+                self.let(symbol.name, lower(e.xreplace({TIME: sp.Symbol(time)})))
 
     def stage_time(self, i: int, first: int) -> None:
         """The time of stage i and the time terms of the right-hand side, unless the stage before had the same time.
@@ -155,7 +148,7 @@ class StepWriter:
         """
         c = self.method.c
         if i == first or c[i] != c[i - 1]:
-            self.put(f"now = {combine((c[i],), ['h'], 't')}")
+            self.let("now", linear((c[i],), ["h"], "t"))
             self.timed("now", self.wanted([blocks.rhs for blocks in self.kinds]))
 
     def wanted(self, bodies: Sequence[Body]) -> set[sp.Symbol]:
@@ -170,11 +163,10 @@ class StepWriter:
             targets = [f"{out}{s.name}_{i + 1}" for s in self.equations.node_at(i).state]
             if coded:
                 left = [t for t, e in zip(targets, body.results, strict=True) if not self.is_plain(e)]
-                self.put(f"{', '.join(left)} = {self.call('node', body, coded, i, prefix)}")
+                self.put(Assign(tuple(left), self.call("node", body, coded, i, prefix)))
             for target, e in zip(targets, body.results, strict=True):
                 if self.is_plain(e):
-                    text = show(e.xreplace(names))
-                    self.put(f"{target} = broadcast({text}, WIDTH)" if e.is_number else f"{target} = {text}")
+                    self.let(target, lane(lower(e.xreplace(names))))
         self.links(prefix, out)
 
     def links(self, prefix: str, out: str) -> None:
@@ -188,7 +180,7 @@ class StepWriter:
                 if term != 0:
                     terms.setdefault(f"{out}{s.name}_{link[0] + 1}", []).append(term)
         for target, parts in terms.items():
-            self.put(f"{target} = {target} + " + " + ".join(show(p) for p in parts))
+            self.let(target, plus(Name(target), *map(lower, parts)))
 
     def staged(self, prefix: str) -> dict[sp.Symbol, sp.Symbol]:
         """The names of all states in a stage."""
@@ -199,44 +191,42 @@ class StepWriter:
     def opening(self) -> None:
         """Load the state and the parameters."""
         for slot, name in enumerate(self.state):
-            self.put(f"{name} = load(y, {slot}, WIDTH)")
+            self.let(name, Load("y", Number(slot)))
         self.parameters()
 
     def parameters(self, but: Container[str] = ()) -> None:
         """Load the parameters, `but` some, and compute what depends on them alone."""
         for slot, name in enumerate(self.equations.parameters):
             if name not in but:
-                self.put(f"{name} = load(p, {len(self.state) + slot}, WIDTH)")
+                self.let(name, Load("p", Number(len(self.state) + slot)))
         for blocks in self.kinds:
             used = self.first_of(blocks).symbols
             wanted = used.union(*(e.free_symbols for s, e in blocks.timed if s in used))
-            self.put(*(f"{symbol} = {show(e)}" for symbol, e in blocks.constants if symbol in wanted))
+            self.put(*(let(symbol.name, lower(e)) for symbol, e in blocks.constants if symbol in wanted))
 
-    def closing(self, errors: Sequence[str]) -> None:
+    def closing(self, errors: Sequence[Expression]) -> None:
         """Store the new state and reduce the error to one number a lane."""
-        terms = []
         for slot, (name, e) in enumerate(zip(self.state, errors, strict=True)):
-            self.put(f"store(y_new, {slot}, n_{name})", f"e_{name} = scaled({e}, {name}, n_{name}, rtol, atol)")
-            terms.append(f"e_{name}")
-        self.put(f"total = {' + '.join(terms)}", f"error = {terms[0]}")
-        self.put(*(f"error = maximum(error, {term})" for term in terms[1:]))
-        self.put(f"return error + 0.0*total{', bound' * self.bounded}  # NaN or infinite where any estimate is")
+            self.put(store("y_new", slot, f"n_{name}"))
+            self.let(f"e_{name}", call("scaled", e, name, f"n_{name}", "rtol", "atol"))
+        first, *others = terms = [Name(f"e_{name}") for name in self.state]
+        self.let("total", plus(*terms))
+        self.let("error", first)
+        self.put(*(let("error", call("maximum", "error", term)) for term in others))
+        results = (Name("error") + 0.0 * Name("total"), *([Name("bound")] * self.bounded))
+        self.put(Return(results, "NaN or infinite where any estimate is"))
 
-    def dense(self, scale: str = "") -> None:
+    def dense(self, scale: Expression | None = None) -> None:
         """Store the coefficients of the dense output."""
         for j, row in enumerate(self.method.dense):
             for slot, name in enumerate(self.state):
-                text = combine(row, [f"k{i + 1}_{name}" for i in range(len(row))]) or "broadcast(0.0, WIDTH)"
-                self.put(
-                    f"store(dense, {j * len(self.state) + slot}, {scale}({text}))"
-                    if scale
-                    else f"store(dense, {j * len(self.state) + slot}, {text})"
-                )
+                value = lane(linear(row, self.stages(name, len(row))))
+                place = j * len(self.state) + slot
+                self.put(store("dense", place, value if scale is None else Product((scale, value))))
 
-
-@contextmanager
-def indent_from(writer: StepWriter) -> Iterator[None]:
-    """Indent whatever is written inside the with block."""
-    mark = len(writer.lines)
-    yield
-    writer.lines[mark:] = ["    " + line for line in writer.lines[mark:]] or ["    pass"]
+    @contextmanager
+    def only_if(self, condition: str) -> Iterator[None]:
+        """Whatever is written inside the with block runs if a condition holds."""
+        before, self.statements = self.statements, []
+        yield
+        self.statements = [*before, If(Name(condition), tuple(self.statements))]
