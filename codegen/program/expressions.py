@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 __all__ = [
     "ONE", "ZERO", "Call", "Choice", "Compare", "Expression", "Junction", "Load", "Name", "Negation", "Not", "Number",
-    "Power", "Product", "Quotient", "Sum", "Value", "as_expression", "call", "linear", "negative", "plus", "product", "scaled",
+    "Power", "Product", "Quotient", "Slice", "Sum", "Value", "as_expression", "call", "linear", "negative", "plus", "product", "scaled",
 ]  # fmt: skip
 
 
@@ -196,6 +196,18 @@ class Load(Expression):
     @property
     def parts(self) -> tuple[Expression, ...]:
         return (self.index,)
+
+
+@dataclass(frozen=True, slots=True)
+class Slice(Expression):
+    """The places of an array from `start` up to `stop`."""
+
+    start: Expression
+    stop: Expression
+
+    @property
+    def parts(self) -> tuple[Expression, ...]:
+        return self.start, self.stop
 
 
 Value: TypeAlias = Expression | float | int | str

@@ -21,12 +21,28 @@ from .expressions import (
     Power,
     Product,
     Quotient,
+    Slice,
     Sum,
     negative,
     plus,
 )
 from .lowering import lower
-from .statements import Accumulate, Assign, Comment, Do, Function, If, Index, Loop, Return, Statement, Store
+from .statements import (
+    Accumulate,
+    Array,
+    Assign,
+    Block,
+    Comment,
+    Do,
+    Function,
+    Identity,
+    If,
+    Index,
+    Loop,
+    Return,
+    Statement,
+    Store,
+)
 
 __all__ = ["C99", "LANES", "MATH", "NUMPY", "Printer"]
 
@@ -73,6 +89,8 @@ class Printer:
                 return f"{name}({', '.join(map(self.text, arguments))})", ATOM
             case Choice(condition, yes, no):
                 return self.choice(*map(self.text, (condition, yes, no))), ATOM
+            case Slice(start, stop):
+                return f"{'' if start == Number(0) else self.text(start)}:{self.text(stop)}", SUM
             case Load(array, index, width):
                 return self.load(array, index, width), ATOM
         return self.condition(e), SUM
@@ -124,6 +142,10 @@ class Printer:
         match s:
             case Assign(targets, value, whole):
                 return [(self.whole if whole else self.assign).format(", ".join(targets), self.text(value))]
+            case Array(name, size):
+                return [self.array(name, self.text(size))]
+            case Identity(name, size):
+                return self.identity(name, self.text(size))
             case Store(array, index, value):
                 return [self.store(array, index, self.text(value))]
             case Accumulate(array, index, value):
@@ -132,17 +154,35 @@ class Printer:
                 return self.block(self.loop(index, start, stop), body)
             case If(condition, body):
                 return self.block(f"if {self.text(condition)}", body)
+            case Block(title, body):
+                return self.titled(self.comment.format(title), body)
             case Comment(text):
                 return [self.comment.format(text)]
             case Do(call):
-                return [self.text(call)]
+                return [self.do(call)]
             case Return(values, remark):
                 return [f"return {', '.join(map(self.text, values))}{f'  # {remark}' if remark else ''}"]
+
+    def array(self, name: str, size: str) -> str:
+        """A new array."""
+        return f"{name} = np.empty({size})"
+
+    def identity(self, name: str, size: str) -> list[str]:
+        """A new matrix."""
+        return [f"{name} = np.eye({size})"]
+
+    def titled(self, title: str, body: Iterable[Statement]) -> list[str]:
+        """Statements behind a comment."""
+        return [title, *self.lines(body)]
 
     def place(self, array: str, index: Index) -> str:
         """An element as the target of an assignment."""
         row_column = index if isinstance(index, tuple) else (index,)
         return f"{array}[{', '.join(map(self.text, row_column))}]"
+
+    def do(self, call: Call) -> str:
+        """A call as a statement."""
+        return self.text(call)
 
     def store(self, array: str, index: Index, value: str) -> str:
         """An assignment to an element."""
@@ -235,6 +275,10 @@ class C(Printer):
         row, column = map(self.text, index)
         return f"{array}[{row}*DIMENSION + {column}]"
 
+    def do(self, call: Call) -> str:
+        """A call as a statement."""
+        return super().do(call) + ";"
+
     def store(self, array: str, index: Index, value: str) -> str:
         """An assignment to an element."""
         return super().store(array, index, value) + ";"
@@ -250,6 +294,19 @@ class C(Printer):
     def block(self, head: str, body: Iterable[Statement]) -> list[str]:
         """Statements in braces."""
         return [f"{head} {{", *(f"    {line}" for line in self.lines(body)), "}"]
+
+    def array(self, name: str, size: str) -> str:
+        """A new array."""
+        return f"double {name}[{size}];"
+
+    def identity(self, name: str, size: str) -> list[str]:
+        """A new matrix."""
+        diagonal = f"for (int k_ = 0; k_ < {size}; k_++) {name}[k_*{size} + k_] = 1.0;"
+        return [f"double {name}[{size}*{size}] = {{0.0}};", diagonal]
+
+    def titled(self, title: str, body: Iterable[Statement]) -> list[str]:
+        """Statements in braces, with variables of their own."""
+        return [f"{{ {title}", *(f"    {line}" for line in self.lines(body)), "}"]
 
 
 LANES, NUMPY, MATH, C99 = Lanes(), NumPy(), Math(), C()

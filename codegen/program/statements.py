@@ -9,6 +9,7 @@ from typing import TypeAlias
 from .expressions import (
     Call,
     Expression,
+    Load,
     Name,
     Power,
     Product,
@@ -19,7 +20,7 @@ from .expressions import (
 )
 
 __all__ = [
-    "Accumulate", "Assign", "Comment", "Do", "Function", "If", "Index", "Loop", "Return", "Statement", "Store", "accumulate",
+    "Accumulate", "Array", "Assign", "Block", "Comment", "Do", "Function", "Identity", "If", "Index", "Loop", "Return", "Statement", "Store", "accumulate",
     "called", "expressions", "let", "operations", "store", "used", "whole",
 ]  # fmt: skip
 
@@ -56,6 +57,22 @@ class Accumulate:
 
 
 @dataclass(frozen=True, slots=True)
+class Array:
+    """A new array of some size."""
+
+    name: str
+    size: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """A new square matrix with ones on its diagonal."""
+
+    name: str
+    size: Expression
+
+
+@dataclass(frozen=True, slots=True)
 class Loop:
     """Statements for each whole number from `start` up to `stop`."""
 
@@ -70,6 +87,14 @@ class If:
     """Statements that run if a condition holds."""
 
     condition: Expression
+    body: tuple[Statement, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Statements with a title, and variables of their own where a language has that."""
+
+    title: str
     body: tuple[Statement, ...]
 
 
@@ -95,7 +120,7 @@ class Return:
     remark: str = ""
 
 
-Statement: TypeAlias = Assign | Store | Accumulate | Loop | If | Comment | Do | Return
+Statement: TypeAlias = Array | Identity | Assign | Store | Accumulate | Loop | If | Block | Comment | Do | Return
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,8 +160,10 @@ def expressions(statements: Iterable[Statement]) -> Iterator[Expression]:
         match statement:
             case Assign(_, value, False) | Store(_, _, value) | Accumulate(_, _, value):
                 yield from value.walk()
-            case Loop(_, _, _, body) | If(_, body):
+            case Loop(_, _, _, body) | If(_, body) | Block(_, body):
                 yield from expressions(body)
+            case Do(call):
+                yield from call.walk()
             case Return(values):
                 for value in values:
                     yield from value.walk()
@@ -148,8 +175,22 @@ def called(statements: Iterable[Statement]) -> set[str]:
 
 
 def used(statements: Iterable[Statement]) -> set[str]:
-    """Return the names of the variables that occur in values."""
-    return {e.text for e in expressions(statements) if isinstance(e, Name)}
+    """Return the names of the variables and arrays that values are made of, and of the arrays that are written."""
+    found = set()
+    for e in expressions(statements):
+        match e:
+            case Name(text) | Load(text):
+                found.add(text)
+    return found | set(_written(statements))
+
+
+def _written(statements: Iterable[Statement]) -> Iterator[str]:
+    for statement in statements:
+        match statement:
+            case Store(array) | Accumulate(array):
+                yield array
+            case Loop(_, _, _, body) | If(_, body) | Block(_, body):
+                yield from _written(body)
 
 
 def operations(statements: Iterable[Statement]) -> int:
@@ -172,5 +213,5 @@ def _added(statements: Iterable[Statement]) -> Iterator[int]:
         match statement:
             case Accumulate():
                 yield 1
-            case Loop(_, _, _, body) | If(_, body):
+            case Loop(_, _, _, body) | If(_, body) | Block(_, body):
                 yield from _added(body)
