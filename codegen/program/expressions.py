@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 __all__ = [
     "ONE", "ZERO", "Call", "Choice", "Compare", "Expression", "Junction", "Load", "Name", "Negation", "Not", "Number",
@@ -19,11 +19,14 @@ class Expression:
     """A value, a condition or a place; operators build larger ones."""
 
     __slots__ = ()
+    __match_args__: ClassVar[tuple[str, ...]] = ()
 
     @property
     def parts(self) -> tuple[Expression, ...]:
-        """What it is made of."""
-        return ()
+        """The expressions that it is made of."""
+        fields = (getattr(self, name) for name in self.__match_args__)
+        listed = (field if isinstance(field, tuple) else (field,) for field in fields)
+        return tuple(part for parts in listed for part in parts if isinstance(part, Expression))
 
     def walk(self) -> Iterator[Expression]:
         """Yield the expression and everything in it."""
@@ -73,20 +76,12 @@ class Sum(Expression):
 
     terms: tuple[Expression, ...]
 
-    @property
-    def parts(self) -> tuple[Expression, ...]:
-        return self.terms
-
 
 @dataclass(frozen=True, slots=True)
 class Product(Expression):
     """Factors, multiplied from left to right."""
 
     factors: tuple[Expression, ...]
-
-    @property
-    def parts(self) -> tuple[Expression, ...]:
-        return self.factors
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,10 +91,6 @@ class Quotient(Expression):
     top: Expression
     bottom: Expression
 
-    @property
-    def parts(self) -> tuple[Expression, ...]:
-        return self.top, self.bottom
-
 
 @dataclass(frozen=True, slots=True)
 class Power(Expression):
@@ -108,20 +99,12 @@ class Power(Expression):
     base: Expression
     exponent: Expression
 
-    @property
-    def parts(self) -> tuple[Expression, ...]:
-        return self.base, self.exponent
-
 
 @dataclass(frozen=True, slots=True)
 class Negation(Expression):
     """The value with its sign turned."""
 
     value: Expression
-
-    @property
-    def parts(self) -> tuple[Expression, ...]:
-        return (self.value,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,10 +113,6 @@ class Call(Expression):
 
     function: str
     arguments: tuple[Expression, ...]
-
-    @property
-    def parts(self) -> tuple[Expression, ...]:
-        return self.arguments
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,10 +123,6 @@ class Choice(Expression):
     yes: Expression
     no: Expression
 
-    @property
-    def parts(self) -> tuple[Expression, ...]:
-        return self.condition, self.yes, self.no
-
 
 @dataclass(frozen=True, slots=True)
 class Compare(Expression):
@@ -157,10 +132,6 @@ class Compare(Expression):
     left: Expression
     right: Expression
 
-    @property
-    def parts(self) -> tuple[Expression, ...]:
-        return self.left, self.right
-
 
 @dataclass(frozen=True, slots=True)
 class Junction(Expression):
@@ -169,20 +140,12 @@ class Junction(Expression):
     word: str
     conditions: tuple[Expression, ...]
 
-    @property
-    def parts(self) -> tuple[Expression, ...]:
-        return self.conditions
-
 
 @dataclass(frozen=True, slots=True)
 class Not(Expression):
     """The opposite of a condition that has a name."""
 
     condition: Name
-
-    @property
-    def parts(self) -> tuple[Expression, ...]:
-        return (self.condition,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,10 +156,6 @@ class Load(Expression):
     index: Expression
     width: str | None = "WIDTH"
 
-    @property
-    def parts(self) -> tuple[Expression, ...]:
-        return (self.index,)
-
 
 @dataclass(frozen=True, slots=True)
 class Slice(Expression):
@@ -204,10 +163,6 @@ class Slice(Expression):
 
     start: Expression
     stop: Expression
-
-    @property
-    def parts(self) -> tuple[Expression, ...]:
-        return self.start, self.stop
 
 
 Value: TypeAlias = Expression | float | int | str

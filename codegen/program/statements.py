@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -20,8 +20,8 @@ from .expressions import (
 )
 
 __all__ = [
-    "Accumulate", "Array", "Assign", "Block", "Comment", "Do", "Function", "Identity", "If", "Index", "Loop", "Return", "Statement", "Store", "accumulate",
-    "called", "expressions", "let", "operations", "store", "used", "whole",
+    "Accumulate", "Array", "Assign", "Block", "Comment", "Do", "Function", "Identity", "If", "Index", "Loop", "Return",
+    "Statement", "Store", "accumulate", "called", "let", "operations", "store", "used", "values", "walk", "whole",
 ]  # fmt: skip
 
 
@@ -154,64 +154,51 @@ def accumulate(array: str, index: Value, value: Value) -> Accumulate:
     return Accumulate(array, as_expression(index), as_expression(value))
 
 
-def expressions(statements: Iterable[Statement]) -> Iterator[Expression]:
-    """Yield everything in the values of statements, inner blocks included; indices and conditions are not values."""
+def walk(statements: Iterable[Statement]) -> Iterator[Statement]:
+    """Yield all statements, those of inner blocks too."""
     for statement in statements:
+        yield statement
+        if isinstance(statement, Loop | If | Block):
+            yield from walk(statement.body)
+
+
+def values(statements: Iterable[Statement]) -> Iterator[Expression]:
+    """Yield what is computed: neither the places where it goes, nor conditions, nor indices."""
+    for statement in walk(statements):
         match statement:
-            case Assign(_, value, False) | Store(_, _, value) | Accumulate(_, _, value):
-                yield from value.walk()
-            case Loop(_, _, _, body) | If(_, body) | Block(_, body):
-                yield from expressions(body)
-            case Do(call):
-                yield from call.walk()
-            case Return(values):
-                for value in values:
-                    yield from value.walk()
+            case Assign(_, value, False) | Store(_, _, value) | Accumulate(_, _, value) | Do(value):
+                yield value
+            case Return(results):
+                yield from results
 
 
 def called(statements: Iterable[Statement]) -> set[str]:
     """Return the names of the functions that are called."""
-    return {e.function for e in expressions(statements) if isinstance(e, Call)}
+    return {e.function for value in values(statements) for e in value.walk() if isinstance(e, Call)}
 
 
-def used(statements: Iterable[Statement]) -> set[str]:
-    """Return the names of the variables and arrays that values are made of, and of the arrays that are written."""
-    found = set()
-    for e in expressions(statements):
-        match e:
-            case Name(text) | Load(text):
-                found.add(text)
-    return found | set(_written(statements))
+def used(statements: Sequence[Statement]) -> set[str]:
+    """Return the names of the variables and arrays in values, and of the arrays that are written."""
+    found = {s.array for s in walk(statements) if isinstance(s, Store | Accumulate)}
+    for value in values(statements):
+        for e in value.walk():
+            match e:
+                case Name(text) | Load(text):
+                    found.add(text)
+    return found
 
 
-def _written(statements: Iterable[Statement]) -> Iterator[str]:
-    for statement in statements:
-        match statement:
-            case Store(array) | Accumulate(array):
-                yield array
-            case Loop(_, _, _, body) | If(_, body) | Block(_, body):
-                yield from _written(body)
-
-
-def operations(statements: Iterable[Statement]) -> int:
+def operations(statements: Sequence[Statement]) -> int:
     """Return how many sums, differences, products and quotients the statements hold."""
-    return sum(_cost(e) for e in expressions(statements)) + sum(_added(statements))
+    return sum(map(_cost, values(statements))) + sum(isinstance(s, Accumulate) for s in walk(statements))
 
 
 def _cost(e: Expression) -> int:
     match e:
-        case Sum(parts) | Product(parts):
-            return len(parts) - 1
-        case Quotient() | Power():
-            return 1
-        case _:
+        case Load():
             return 0
-
-
-def _added(statements: Iterable[Statement]) -> Iterator[int]:
-    for statement in statements:
-        match statement:
-            case Accumulate():
-                yield 1
-            case Loop(_, _, _, body) | If(_, body) | Block(_, body):
-                yield from _added(body)
+        case Sum(parts) | Product(parts):
+            own = len(parts) - 1
+        case _:
+            own = int(isinstance(e, Quotient | Power))
+    return own + sum(map(_cost, e.parts))
