@@ -30,8 +30,8 @@ from ..steps.blocks import analyse
 from ..steps.contacts import event_constants, event_functions, register
 from ..steps.elimination import plan, write_factors, write_solve
 from ..steps.names import tidy
-from ..steps.rosenbrock import stage_state, write_rosenbrock
-from ..steps.step import SCALED, StepWriter, node_function
+from ..steps.step import SCALED, Step, node_function
+from ..steps.unrolled import Unrolled, stage_state
 from .sweep import LARGEST_UNROLLED, KernelKind, KernelSource, describe, imports, node_functions
 
 __all__ = ["emit_modes"]
@@ -77,9 +77,9 @@ def emit_modes(variation: Variation, width: int | None = None) -> KernelSource:
     blocks = analyse(plain.node, names, plain.varied)
     variation = _renamed(variation, plain)
     parts = Parts.of(variation, method.stages)
-    writer = StepWriter(plain, blocks, method)
+    writer = Unrolled(plain, [blocks], method)
     functions = _functions(parts, plain.state, names)
-    write_rosenbrock(writer, lambda i: _note(writer, parts, functions, method, i))
+    writer.write(after=lambda i: _note(writer, parts, functions, method, i))
     carry = _mode_step(variation, parts, method)
     bodies = [*node_functions([writer], blocks), *functions.values()]
     text = _module(writer, variation, width, parts, bodies, carry, names)
@@ -159,7 +159,7 @@ def _functions(parts: Parts, state: tuple[str, ...], names: Names) -> dict[str, 
     return found
 
 
-def _note(w: StepWriter, parts: Parts, functions: Mapping[str, Function], method: Integrator, i: int) -> None:
+def _note(w: Step, parts: Parts, functions: Mapping[str, Function], method: Integrator, i: int) -> None:
     """Write what stage i leaves in the shared array."""
 
     def called(name: str, at: Mapping[str, Value]) -> Expression:
@@ -270,7 +270,7 @@ def _largest(values: Sequence[Expression]) -> Expression:
 
 
 def _module(
-    writer: StepWriter,
+    writer: Step,
     variation: Variation,
     width: int,
     parts: Parts,

@@ -23,12 +23,11 @@ from ..program.statements import Function, Return, Statement, called, let, opera
 from ..simd import lanes
 from ..steps.blocks import NodeBlocks, analyse
 from ..steps.contacts import push_functions
-from ..steps.explicit import write_explicit
-from ..steps.looped import LoopWriter
+from ..steps.looped import Looped
 from ..steps.names import tidy
 from ..steps.program import FILL_LIMIT, Program, program, workspace
-from ..steps.rosenbrock import write_rosenbrock
-from ..steps.step import PAIR, SCALED, StepWriter, function_name, node_function
+from ..steps.step import PAIR, SCALED, Step, function_name, node_function
+from ..steps.unrolled import Unrolled
 
 __all__ = [
     "KernelKind",
@@ -188,7 +187,7 @@ def _module(
     return "\n\n\n".join(part for part in parts if part) + "\n"
 
 
-def _loop_constants(step: StepWriter, elimination: Program | None) -> str:
+def _loop_constants(step: Step, elimination: Program | None) -> str:
     """Whether a kernel is looped, and how much memory its loops need."""
     if elimination is None:
         return "\nLOOPED = False\nWORKSPACE = 0"
@@ -206,21 +205,21 @@ def _for_many(method: Integrator, equations: Equations, unroll: int) -> Integrat
 
 def _steps(
     plain: Equations, blocks: Sequence[NodeBlocks], method: Integrator, elimination: Program | None
-) -> dict[str, StepWriter]:
+) -> dict[str, Step]:
     """The steps of a kernel by the name of their function, written."""
-    methods = {"step": method} if method.smooth is None else {"step": method, "step_smooth": method.smooth}
-    first, *more = blocks
-    bounded = len(methods) > 1
-    steps = {name: StepWriter(plain, first, m, bounded, more) for name, m in methods.items()}
+    if elimination is not None:
+        steps: dict[str, Step] = {"step": Looped(plain, blocks, method, elimination)}
+    elif method.smooth is None:
+        steps = {"step": Unrolled(plain, blocks, method)}
+    else:
+        methods = {"step": method, "step_smooth": method.smooth}
+        steps = {name: Unrolled(plain, blocks, m, bounded=True) for name, m in methods.items()}
     for writer in steps.values():
-        if elimination is not None:
-            LoopWriter(writer, elimination).write()
-        else:
-            (write_rosenbrock if writer.method.implicit else write_explicit)(writer)
+        writer.write()
     return steps
 
 
-def node_functions(steps: list[StepWriter], blocks: NodeBlocks, kind: int = 0) -> list[Function]:
+def node_functions(steps: Sequence[Step], blocks: NodeBlocks, kind: int = 0) -> list[Function]:
     """The right-hand side of one node of some kind, and the linearisations that the steps call."""
     made = []
     first = [writer.first_of(blocks) for writer in steps]
@@ -307,7 +306,7 @@ def _constants(
     return text if multiplicity is None else f"{text}\nMULTIPLICITY = np.array({[float(m) for m in multiplicity]!r})"
 
 
-def _step(name: str, writer: StepWriter, looped: bool) -> Function:
+def _step(name: str, writer: Step, looped: bool) -> Function:
     arguments = ("t", "h", "y", "p", "y_new", "dense", "rtol", "atol", *(("graph", "weights") if looped else ()))
     about = "One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."
     return Function(name, arguments, about, tuple(writer.statements), inline=False)

@@ -10,66 +10,74 @@ from collections.abc import Callable, Sequence
 
 import sympy as sp
 
-from ..program.expressions import Expression, Load, Name, Product, call, linear, negative, plus, scaled
+from synchain.models.dynamics.equations import Equations
+
+from ..integrators import Integrator
+from ..program.expressions import Expression, Load, Name, Product, Value, call, linear, negative, plus, scaled
 from ..program.lowering import lower
 from ..program.passes import Body
-from ..program.statements import Assign, If, Return, Statement, accumulate, let, store, whole
-from .linearise import entry
-from .looped_mass import LoopMass, filled
-from .mass import Block
-from .places import Joint, Kind, Places, link_ends, named
+from ..program.statements import Assign, Do, If, Return, Statement, accumulate, let, store, whole
+from .blocks import NodeBlocks
+from .mass import momentum_slopes
+from .places import Joint, Kind, Places, link_ends, named, span
 from .program import Program, names
-from .rosenbrock import scales, time_term
-from .step import StepWriter, function_name, lane
+from .step import Block, Step, lane, time_term
+from .unrolled import entry
 
-__all__ = ["LoopWriter"]
+__all__ = ["Looped"]
+
+SLOTS = ("here_slot", "there_slot")
+"""The arrays that say where the entries of a link's blocks stand, by its target and by its source."""
+
+GROUPS = {"y": "y", "u": "STATE", "f": "SLOPE"}
+"""What the vectors of a step are called in memory; those of stages are K1, K2, …"""
 
 
-class LoopWriter:
-    """Writes a step in loops; `w` supplies the naming and the node functions, `elimination` the order of the pivots."""
+class Looped(Step):
+    """Keeps its vectors in the workspace behind the dense output; `elimination` has the order of the pivots."""
 
-    def __init__(self, w: StepWriter, elimination: Program) -> None:
-        self.w, self.method, self.places, self.elimination = w, w.method, Places(w.equations), elimination
+    def __init__(
+        self, equations: Equations, kinds: Sequence[NodeBlocks], method: Integrator, elimination: Program
+    ) -> None:
+        super().__init__(equations, kinds, method)
+        self.places, self.elimination = Places(equations), elimination
         self.mass = LoopMass(self)
-        stages = len(w.method.c)
-        bases = [*(f"K{j + 1}" for j in range(stages)), "STATE", "SLOPE", "TIME_SLOPE", "MATRIX"]
-        self.base = {name: vector(i) for i, name in enumerate(bases)} | self.mass.bases(len(bases) - 1)
 
-    def write(self) -> None:
-        """Write the step."""
-        w = self.w
-        w.put(*(whole(name, place) for name, place in self.base.items()))
-        w.put(Assign(names(w.equations), Name("graph"), whole=True))
-        w.parameters(but={f"{name}_{i + 1}" for name in w.equations.varied for i in range(w.equations.n)})
-        if self.method.implicit:
-            self.rosenbrock()
-        else:
-            self.explicit()
+    def opening(self) -> None:
+        """Name the parts of the workspace, load the parameters that all nodes share."""
+        stages = [f"K{j + 1}" for j in range(len(self.method.c))]
+        vectors = [*stages, "STATE", "SLOPE", "TIME_SLOPE", "MATRIX"]
+        base = {name: vector(i) for i, name in enumerate(vectors)} | self.mass.bases(len(vectors) - 1)
+        self.put(*(whole(name, place) for name, place in base.items()))
+        self.put(Assign(names(self.equations), Name("graph"), whole=True))
+        self.parameters(but={f"{name}_{i + 1}" for name in self.equations.varied for i in range(self.equations.n)})
+        if not self.method.implicit:
+            self.mass.opening()
 
-    # -- pieces -----------------------------------------------------------------------------------------------
+    @property
+    def early(self) -> int:
+        """All stages: those of the dense output too."""
+        return len(self.method.c)
 
-    def node_call(self, function: str, kind: Kind, body: Body, found: Sequence[str]) -> list[Statement]:
-        """The call of a node function on the symbols of the template; plain results among those `found` are left out."""
-        pairs = [(name, e) for name, e in zip(found, body.results, strict=True) if not self.w.is_plain(e)]
-        given = (s.name for s in self.w.arguments(body, [e for _, e in pairs]))
-        value = call(function_name(function, kind.number), *given)
-        return [Assign(tuple(name for name, _ in pairs), value)] if pairs else []
+    # -- right-hand side --------------------------------------------------------------------------------------
 
     def slopes(self, base: str, out: str) -> None:
-        """The right-hand side of all nodes at a state, links included."""
+        """Compute the right-hand side at one vector of states into another."""
+        base, out = GROUPS[base], GROUPS.get(out, out.upper())
         for kind in self.places.kinds:
             self.node_slopes(kind, base, out)
         self.links(base, out)
 
     def node_slopes(self, kind: Kind, base: str, out: str) -> None:
         """The right-hand side of the nodes of one kind."""
-        body = self.w.kinds[kind.number].rhs
+        body = self.kinds[kind.number].rhs
         left = [f"f_{s.name}" for s in kind.node.state]
-        found = self.places.read(kind.node, base) + self.places.own(body) + self.node_call("node", kind, body, left)
+        found = self.places.read(kind.node, base) + self.places.own(body)
+        found += self.node_call("node", kind.number, body, left, {})
         for c, (name, e) in enumerate(zip(left, body.results, strict=True)):
-            value = lane(lower(e)) if self.w.is_plain(e) else Name(name)
+            value = lane(lower(e)) if self.is_plain(e) else Name(name)
             found.append(store("dense", plus(Name(out), self.places.place(c)), value))
-        self.w.put(kind.span.over(found))
+        self.put(kind.span.over(found))
 
     def links(self, base: str, out: str, jacobian: bool = False) -> None:
         """Add what each link contributes to the slopes, where `out` says where, and on demand to the matrix."""
@@ -82,7 +90,7 @@ class LoopWriter:
                     found.append(self.add(out, self.places.place(c), lower(e.xreplace(named(joint)))))
             if jacobian:
                 found += self.matrix_of_link(joint)
-            self.w.put(joint.span.over(found))
+            self.put(joint.span.over(found))
 
     def link(self, joint: Joint, base: str, used: tuple[sp.Expr, ...], states: bool = True) -> list[Statement]:
         """The ends of a link, its weight, the parameters that `used` uses, and the states of both ends."""
@@ -99,9 +107,9 @@ class LoopWriter:
     def matrix_of_link(self, joint: Joint) -> list[Statement]:
         """What a link adds to shift*M - J."""
         found, swap = self.mass.rates_of_link(joint), named(joint)
-        for block, slot in zip(self.mass.jacobian(joint), ("here_slot", "there_slot"), strict=True):
+        for block, slot in zip(self.mass.jacobian(joint), SLOTS, strict=True):
             found += self.entries(block, slot, swap)
-        for block, slot in zip(joint.edge.inertia, ("here_slot", "there_slot"), strict=False):
+        for block, slot in zip(joint.edge.inertia, SLOTS, strict=False):
             found += self.entries(block, slot, swap, lambda e: scaled("shift", e))
         return found
 
@@ -121,62 +129,58 @@ class LoopWriter:
             if e != 0
         ]
 
-    # -- Rosenbrock -------------------------------------------------------------------------------------------
-
-    def rosenbrock(self) -> None:
-        """Linearise, factorise, and one solve for each stage."""
-        w, m = self.w, self.method
-        w.put(*scales(m.gamma))
-        self.linearise()
-        self.mass.factorise()
-        for i in range(m.stages):
-            self.stage(i)
-        self.finish(m.b, [linear(row, self.stages(m.stages)) for row in m.e])
-
-    def stages(self, count: int) -> list[str]:
-        """Names of the loaded stage values of one state variable."""
-        return [f"k{j + 1}" for j in range(count)]
+    # -- linearisation ----------------------------------------------------------------------------------------
 
     def linearise(self) -> None:
-        """Slopes, matrix shift - J and time slopes at the start."""
-        w, kinds = self.w, self.places.kinds
-        w.note("right-hand side, shift - J and time derivative at the start")
-        w.timed("t", w.wanted([blocks.linear for blocks in w.kinds]))
-        w.put(*filled("MATRIX", Name("shift")))
-        slopes = [w.kinds[kind.number].linear.results[-len(kind.node.state) :] for kind in kinds]
+        """Slopes, matrix shift*M - J and time slopes at the start, and the factors of the matrix."""
+        kinds = self.places.kinds
+        self.note("right-hand side, shift - J and time derivative at the start")
+        self.timed("t", self.wanted([blocks.linear for blocks in self.kinds]))
+        self.put(*filled("MATRIX", Name("shift")))
+        slopes = [self.kinds[kind.number].linear.results[-len(kind.node.state) :] for kind in kinds]
         moving = [[e != 0 for e in own] for own in slopes]
         self.timed_rows = [any(map(any, moving))] if self.places.mixed else moving[0]
         for kind in kinds:
             self.node_linear(kind)
         self.links("y", "" if self.mass.at_start() else "SLOPE", jacobian=True)
+        self.mass.factorise()
 
     def node_linear(self, kind: Kind) -> None:
         """Slopes, matrix entries and time slopes of the nodes of one kind."""
-        w, body, state = self.w, self.w.kinds[kind.number].linear, kind.node.state
+        body, state = self.kinds[kind.number].linear, kind.node.state
         size, place = len(state), self.places.place
         names = [f"f_{r.name}" for r in state] + [entry(r, c) for r in state for c in state]
         names += [f"ft_{r.name}" for r in state]
         found = self.places.read(kind.node, "y") + self.places.own(body)
-        found += self.node_call("node_linear", kind, body, names)
-        named = [e if w.is_plain(e) else sp.Symbol(k, real=True) for k, e in zip(names, body.results, strict=True)]
+        found += self.node_call("node_linear", kind.number, body, names, {})
+        named = [e if self.is_plain(e) else sp.Symbol(k, real=True) for k, e in zip(names, body.results, strict=True)]
         for c in range(size):
             found.append(store("dense", plus(Name("SLOPE"), place(c)), lane(lower(named[c]))))
             if self.timed_rows[0 if self.places.mixed else c]:
                 slope = lane(lower(named[size + size * size + c]))
                 found.append(store("dense", plus(Name("TIME_SLOPE"), place(c)), slope))
         block = tuple(tuple(named[size + a * size : size + (a + 1) * size]) for a in range(size))
-        w.put(kind.span.over(found + self.entries(block, "node_slot", {})))
+        self.put(kind.span.over(found + self.entries(block, "node_slot", {})))
 
-    def stage(self, i: int) -> None:
-        """State, slopes, right-hand side and solve of one stage."""
-        w, m = self.w, self.method
-        w.note(f"stage {i + 1}")
+    # -- stages -----------------------------------------------------------------------------------------------
+
+    def advance(self, i: int) -> None:
+        """Compute the state of stage i > 0: y + sum a_j k_j, the sum times h for explicit methods."""
+        row = self.method.a[i]
+        for rows, place in self.places.rows:
+            found = [*self.load_stages(place, row), let("old", Load("y", place))]
+            value = Name("old") + self.increment(row, self.stages(len(row)))
+            self.put(rows.over([*found, store("dense", plus(Name("STATE"), place), value)]))
+
+    def solve(self, i: int) -> None:
+        """Turn the slopes of stage i into its rates."""
+        m = self.method
+        if not m.implicit:
+            self.mass.explicit("STATE" if i else "y", f"K{i + 1}")
+            return
         if i > 0:
-            self.state_of(m.a[i])
-            w.stage_time(i, first=1)
-            self.slopes("STATE", "SLOPE")
             self.mass.rates_of_stage(i)
-        for row, (span, place) in enumerate(self.places.rows):
+        for row, (rows, place) in enumerate(self.places.rows):
             found: list[Statement] = []
             terms: list[Expression] = [Load("dense", plus(Name("SLOPE"), place))]
             if i > 0:
@@ -185,69 +189,186 @@ class LoopWriter:
                 found += more
             if m.d[i] != 0.0 and self.timed_rows[row]:
                 terms.append(time_term(m.d[i], Load("dense", plus(Name("TIME_SLOPE"), place))))
-            w.put(span.over([*found, store("dense", plus(Name(f"K{i + 1}"), place), plus(*terms))]))
+            self.put(rows.over([*found, store("dense", plus(Name(f"K{i + 1}"), place), plus(*terms))]))
         if i > 0:
             self.mass.carried(i)
         self.mass.solve(f"K{i + 1}", "SLOPE")
+
+    def stages(self, count: int) -> list[str]:
+        """Names of the loaded stage values of one state variable."""
+        return [f"k{j + 1}" for j in range(count)]
 
     def load_stages(self, place: Expression, row: Sequence[float]) -> list[Statement]:
         """Load the stage values of a state variable that a row of coefficients uses."""
         used = [j + 1 for j, weight in enumerate(row) if weight != 0.0]
         return [let(f"k{j}", Load("dense", plus(Name(f"K{j}"), place))) for j in used]
 
-    def increment(self, row: Sequence[float]) -> Expression:
-        """What a row of coefficients adds to the state at the start."""
-        total = linear(row, self.stages(len(row)))
-        return total if self.method.implicit else Product((Name("h"), total))
-
-    def state_of(self, row: Sequence[float]) -> None:
-        """The state of a stage: y + sum a_j k_j, the sum times h for explicit methods."""
-        for span, place in self.places.rows:
-            found = [*self.load_stages(place, row), let("old", Load("y", place))]
-            found.append(store("dense", plus(Name("STATE"), place), Name("old") + self.increment(row)))
-            self.w.put(span.over(found))
-
-    def finish(self, weights: Sequence[float], errors: list[Expression]) -> None:
-        """New state, dense output and error."""
-        w, m = self.w, self.method
-        w.note("new state, error and dense output")
-        w.put(let("error", 0.0 * Name("h")), let("total", 0.0 * Name("h")))
-        for span, place in self.places.rows:
+    def finish(self) -> None:
+        """Compute the new state, the error and the dense output."""
+        m, values = self.method, self.stages(len(self.method.c))
+        self.note("new state, error and dense output")
+        self.put(let("error", 0.0 * Name("h")), let("total", 0.0 * Name("h")))
+        error = self.increment(m.e[0], values)
+        if len(m.e) > 1:
+            error = call("pair", *(linear(row, values) for row in m.e), "h")
+        for rows, place in self.places.rows:
             found = [*self.load_stages(place, [1.0] * len(m.c)), let("old", Load("y", place))]
-            found += [let("new", Name("old") + self.increment(weights)), store("y_new", place, "new")]
-            found += [let("e", call("scaled", self.error(errors), "old", "new", "rtol", "atol"))]
+            found += [let("new", Name("old") + self.increment(m.b, values)), store("y_new", place, "new")]
+            found += [let("e", call("scaled", error, "old", "new", "rtol", "atol"))]
             found += [let("total", Name("total") + "e"), let("error", call("maximum", "error", "e"))]
             for j, row in enumerate(m.dense):
+                value = lane(linear(row, values))
+                scaled_value = value if m.implicit else Product((Name("h"), value))
                 at = plus(j * Name("DIMENSION"), place)
-                value = lane(linear(row, self.stages(len(row))))
-                scale = value if m.implicit else Product((Name("h"), value))
-                found.append(If(Name("DENSE"), (store("dense", at, scale),)))
-            w.put(span.over(found))
-        w.put(Return((Name("error") + 0.0 * Name("total"),), "NaN or infinite where any estimate is"))
-
-    def error(self, errors: list[Expression]) -> Expression:
-        """The error estimate of one state variable, from one or two embedded methods."""
-        if len(errors) == 1:
-            return errors[0] if self.method.implicit else Product((Name("h"), errors[0]))
-        return call("pair", *errors, "h")
-
-    # -- explicit ---------------------------------------------------------------------------------------------
-
-    def explicit(self) -> None:
-        """Stages, those that serve the dense output alone too."""
-        w, m = self.w, self.method
-        self.mass.opening()
-        for i in range(len(m.c)):
-            w.note(f"stage {i + 1}")
-            if i > 0:
-                self.state_of(m.a[i])
-            w.stage_time(i, first=0)
-            base = "STATE" if i else "y"
-            self.slopes(base, f"K{i + 1}")
-            self.mass.explicit(base, f"K{i + 1}")
-        self.finish(m.b, [linear(row, self.stages(len(row))) for row in m.e])
+                found.append(If(Name("DENSE"), (store("dense", at, scaled_value),)))
+            self.put(rows.over(found))
+        self.put(Return((Name("error") + 0.0 * Name("total"),), "NaN or infinite where any estimate is"))
 
 
 def vector(number: int) -> Expression:
     """Where a vector of the workspace begins."""
     return Name("DENSE_ROWS") * "DIMENSION" + number * Name("DIMENSION")
+
+
+class LoopMass:
+    """What a looped step writes about M; where M is the identity, nothing but the solution of each stage."""
+
+    def __init__(self, writer: Looped) -> None:
+        self.writer, self.equations = writer, writer.equations
+        self.inertial, self.constant = self.equations.inertial, self.equations.constant_mass
+        self.joints = [joint for joint in writer.places.joints if joint.edge.inertia]
+
+    def bases(self, before: int) -> dict[str, Expression]:
+        """Where a Rosenbrock step keeps the rates at its start and M in a stage, behind so many vectors and the matrix."""
+        if self.constant or not self.writer.method.implicit:
+            return {}
+        matrix = Name("ENTRIES") if self.writer.elimination.exact else 2 * Name("ENTRIES")
+        start = Name("DENSE_ROWS") * "DIMENSION" + before * Name("DIMENSION") + matrix
+        return {"RATES": start, "MASS": start + "DIMENSION"}
+
+    # -- linear algebra ---------------------------------------------------------------------------------------
+
+    @property
+    def apart(self) -> Value:
+        """How far behind the matrix its factors stand."""
+        return 0 if self.writer.elimination.exact else "ENTRIES"
+
+    def factorise(self, matrix: str = "MATRIX") -> None:
+        """Factorise a matrix; STATE is lost."""
+        arrays = ("order", "place", "row_start", "after_start", "column")
+        self.writer.put(Do(call("factorise", "dense", matrix, self.apart, "STATE", *arrays)))
+
+    def solve(self, vector: str, scratch: str, matrix: str = "MATRIX") -> None:
+        """Solve in place for a vector; `scratch` and STATE are lost."""
+        arrays = ("order", "row_start", "after_start", "column")
+        self.writer.put(Do(call("solve", "dense", matrix, self.apart, vector, scratch, "STATE", *arrays)))
+
+    def assemble(self, base: str, matrix: str) -> None:
+        """M at a state, factorised; STATE is lost."""
+        w = self.writer
+        w.put(*filled(matrix, 1.0 + 0.0 * Name("h")))
+        for joint in self.joints:
+            found = self.link(joint, base)
+            for block, slot in zip(joint.edge.inertia, SLOTS, strict=True):
+                found += w.entries(block, slot, named(joint), lambda e: e, matrix)
+            w.put(joint.span.over(found))
+        self.factorise(matrix)
+
+    def link(self, joint: Joint, base: str) -> list[Statement]:
+        """What the inertia of a link is made of."""
+        used = tuple(e for block in joint.edge.inertia for row in block for e in row)
+        return self.writer.link(joint, base, used, states=not self.constant)
+
+    # -- explicit methods -------------------------------------------------------------------------------------
+
+    def opening(self) -> None:
+        """What an explicit step does at first: M, factorised, where it is constant."""
+        if self.inertial and self.constant:
+            self.assemble("y", "MATRIX")
+
+    def explicit(self, base: str, out: str) -> None:
+        """Turn the right-hand sides of a stage into rates."""
+        if self.inertial:
+            if not self.constant:
+                self.assemble(base, "MATRIX")
+            self.solve(out, "SLOPE")
+
+    # -- Rosenbrock methods -----------------------------------------------------------------------------------
+
+    def at_start(self) -> bool:
+        """The rates at the start, where M depends on the state; returns whether the links are in SLOPE by now."""
+        if self.constant:
+            return False
+        w = self.writer
+        w.links("y", "SLOPE")
+        self.assemble("y", "MASS")
+        copied = store("dense", Name("RATES") + "k", Load("dense", Name("SLOPE") + "k"))
+        w.put(span("k", "DIMENSION").over([copied]))
+        self.solve("RATES", "K1", "MASS")
+        return True
+
+    def rates_of_link(self, joint: Joint) -> list[Statement]:
+        """Load the rates at both ends of a link whose inertia depends on them."""
+        if self.constant or not joint.edge.inertia:
+            return []
+        read = self.writer.places.read
+        return [
+            *read(joint.target, "RATES", "_here", "i", prefix="g_"),
+            *read(joint.source, "RATES", "_there", "j", prefix="g_"),
+        ]
+
+    def jacobian(self, joint: Joint) -> tuple[Block, Block]:
+        """df/dy - d(M F)/dy at fixed F of one link, by its target and by its source."""
+        edge = joint.edge
+        own = (edge.jacobian_here(), edge.jacobian_there())
+        if self.constant or not edge.inertia:
+            return own
+        ends = ((joint.target, "_here"), (joint.source, "_there"))
+        rates = tuple(tuple(sp.Symbol(f"g_{s.name}{suffix}", real=True) for s in node.state) for node, suffix in ends)
+        turned = momentum_slopes(edge, *rates)
+        here, there = (
+            tuple(tuple(a - b for a, b in zip(*rows, strict=True)) for rows in zip(*blocks, strict=True))
+            for blocks in zip(own, turned, strict=True)
+        )
+        return here, there
+
+    def rates_of_stage(self, i: int) -> None:
+        """Turn the right-hand sides in SLOPE into rates, where M depends on the state."""
+        if not self.constant:
+            self.assemble("STATE", "MASS")
+            self.solve("SLOPE", f"K{i + 1}", "MASS")
+
+    def known(
+        self, place: Expression, slope: Expression, total: Expression
+    ) -> tuple[list[Statement], list[Expression]]:
+        """Statements and the terms of what a stage has on its right-hand side besides the inertia of the links.
+
+        `total` is the sum of earlier stages; what M multiplies is left in STATE: that sum, or with it the rates.
+        """
+        terms = [slope, Product((Name("rate"), total))]
+        kept = plus(Name("STATE"), place)
+        if not self.inertial:
+            return [], terms
+        if self.constant:
+            return [store("dense", kept, total)], terms
+        return [let("new", plus(*terms)), store("dense", kept, "new")], [Name("new")]
+
+    def carried(self, i: int) -> None:
+        """Add (M - 1) s to stage i, s what `known` has left in STATE, times the rate where that is a sum of stages."""
+        w, rate = self.writer, [Name("rate")] if self.constant else []
+        for joint in self.joints:
+            found = self.link(joint, "y")
+            for block, index in zip(joint.edge.inertia, "ij", strict=True):
+                for a, row in enumerate(block):
+                    for b, e in enumerate(row):
+                        if e != 0:
+                            load = Load("dense", plus(Name("STATE"), w.places.place(b, index)))
+                            value = Product((*rate, lower(e.xreplace(named(joint))), load))
+                            found.append(w.add(f"K{i + 1}", w.places.place(a), value))
+            w.put(joint.span.over(found))
+
+
+def filled(matrix: str, diagonal: Expression) -> list[Statement]:
+    """A matrix with equal entries on its diagonal and zeros elsewhere."""
+    parts = ((span("k", "DIMENSION"), diagonal), (span("k", "ENTRIES", "DIMENSION"), 0.0 * Name("h")))
+    return [part.over([store("dense", Name(matrix) + "k", value)]) for part, value in parts]
