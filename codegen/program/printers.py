@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-import sympy as sp
-
 from . import functions
 from .expressions import (
     Call,
@@ -26,7 +24,6 @@ from .expressions import (
     negative,
     plus,
 )
-from .lowering import lower
 from .statements import (
     Accumulate,
     Array,
@@ -310,8 +307,3 @@ class C(Printer):
 
 
 LANES, NUMPY, MATH, C99 = Lanes(), NumPy(), Math(), C()
-
-
-def show(e: sp.Expr) -> str:
-    """Return an expression as text of a kernel."""
-    return LANES.text(lower(sp.sympify(e)))

@@ -15,10 +15,17 @@ from hypothesis import strategies as st
 from samples import FLOATS, real
 
 from synchain.codegen.program import functions
-from synchain.codegen.program.lowering import UnprintableError
-from synchain.codegen.program.printers import show
+from synchain.codegen.program.lowering import UnprintableError, lower
+from synchain.codegen.program.printers import LANES
 
 FUNCTIONS = {kind: name for kind, name in functions.FUNCTIONS.items() if name in functions.LANES}
+"""What a kernel can call, by SymPy class."""
+
+
+def show(expression: sp.Expr) -> str:
+    """The text of an expression in a kernel."""
+    return LANES.text(lower(sp.sympify(expression)))
+
 
 x, y, z, kappa = SYMBOLS = real("x", "y", "z", "kappa")
 
