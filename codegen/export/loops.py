@@ -14,7 +14,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.links import Link
 
 from ..program.expressions import Expression, Load, Name, Number, plus
-from ..program.statements import Accumulate, Block, Identity, Loop, Statement, Store, let, whole
+from ..program.statements import Accumulate, Identity, Loop, Statement, Store, Titled, let, whole
 from .body import (
     Body,
     Storing,
@@ -42,7 +42,7 @@ def rhs_statements(equations: Equations, reads: bool = True) -> list[Statement]:
         for i, title in enumerate(_nodes(equations)):
             at = _literal(equations.places[i])
             body = node_body(equations, i=i).statements(_loads(equations, i, at, reads), _to("rates", Store, at))
-            found.append(Block(title, tuple(body)))
+            found.append(Titled(title, tuple(body)))
         return found + list(_of_links(equations, link_body, lambda at, _: _to("rates", Accumulate, at), reads))
     here = _indexed("i_")
     nodes = node_body(equations).statements(_loads(equations, None, here, reads), _to("rates", Store, here))
@@ -62,7 +62,7 @@ def jacobian_statements(equations: Equations, reads: bool = True) -> list[Statem
             at = _literal(equations.places[i])
             loads = _loads(equations, i, at, reads)
             storing = _entry("matrix", Store, at, at)
-            found.append(Block(title, tuple(node_body(equations, True, i).statements(loads, storing))))
+            found.append(Titled(title, tuple(node_body(equations, True, i).statements(loads, storing))))
 
         def link_jacobian(equations: Equations, link: Link) -> Body:
             return link_body(equations, link, True)
@@ -104,13 +104,13 @@ def _of_links(
     body_of: Callable[[Equations, Link], Body],
     storing: Callable[[Places, Places], Storing],
     reads: bool,
-) -> Iterator[Block]:
+) -> Iterator[Titled]:
     """One block for each link; `storing` is made of the places of its target and of its source."""
     places = equations.places
     for link in equations.links:
         at, other = _literal(places[link[0]]), _literal(places[link[1]])
         body = body_of(equations, link).statements(_pair(equations, at, other, link, reads), storing(at, other))
-        yield Block(f"oscillator {link[0] + 1} feels oscillator {link[1] + 1}", tuple(body))
+        yield Titled(f"oscillator {link[0] + 1} feels oscillator {link[1] + 1}", tuple(body))
 
 
 def _to(array: str, statement: type[Store] | type[Accumulate], at: Places) -> Storing:

@@ -28,7 +28,6 @@ from .statements import (
     Accumulate,
     Array,
     Assign,
-    Block,
     Comment,
     Do,
     Function,
@@ -39,6 +38,7 @@ from .statements import (
     Return,
     Statement,
     Store,
+    Titled,
 )
 
 __all__ = ["C99", "LANES", "MATH", "NUMPY", "Printer"]
@@ -151,7 +151,7 @@ class Printer:
                 return self.block(self.loop(index, start, stop), body)
             case If(condition, body):
                 return self.block(f"if {self.text(condition)}", body)
-            case Block(title, body):
+            case Titled(title, body):
                 return self.titled(self.comment.format(title), body)
             case Comment(text):
                 return [self.comment.format(text)]

@@ -20,8 +20,29 @@ from .expressions import (
 )
 
 __all__ = [
-    "Accumulate", "Array", "Assign", "Block", "Comment", "Do", "Function", "Identity", "If", "Index", "Loop", "Return",
-    "Statement", "Store", "accumulate", "called", "let", "operations", "store", "used", "values", "walk", "whole",
+    "Accumulate",
+    "Array",
+    "Assign",
+    "Comment",
+    "Do",
+    "Function",
+    "Identity",
+    "If",
+    "Index",
+    "Loop",
+    "Return",
+    "Statement",
+    "Store",
+    "Titled",
+    "accumulate",
+    "called",
+    "let",
+    "operations",
+    "store",
+    "used",
+    "values",
+    "walk",
+    "whole",
 ]  # fmt: skip
 
 
@@ -91,7 +112,7 @@ class If:
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class Titled:
     """Statements with a title, and variables of their own where a language has that."""
 
     title: str
@@ -120,7 +141,7 @@ class Return:
     remark: str = ""
 
 
-Statement: TypeAlias = Array | Identity | Assign | Store | Accumulate | Loop | If | Block | Comment | Do | Return
+Statement: TypeAlias = Array | Identity | Assign | Store | Accumulate | Loop | If | Titled | Comment | Do | Return
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +179,7 @@ def walk(statements: Iterable[Statement]) -> Iterator[Statement]:
     """Yield all statements, those of inner blocks too."""
     for statement in statements:
         yield statement
-        if isinstance(statement, Loop | If | Block):
+        if isinstance(statement, Loop | If | Titled):
             yield from walk(statement.body)
 
 

@@ -41,7 +41,6 @@ from synchain.codegen.program.statements import (
     Accumulate,
     Array,
     Assign,
-    Block,
     Comment,
     Do,
     Function,
@@ -49,6 +48,7 @@ from synchain.codegen.program.statements import (
     If,
     Loop,
     Return,
+    Titled,
     accumulate,
     called,
     let,
@@ -65,7 +65,7 @@ BODY = (
     whole("k", Load("where", 2 * Name("NODES") + "i", None)),
     let("a", Load("y", 3 * Name("NODES") + "k") * B + call("sin", C)),
     Loop("i", Number(0), Name("NODES"), (accumulate("out", Name("K") + "i", A * B), If(A, (store("out", 0, A / B),)))),
-    Block("part", (Do(call("solve", "dense", A - B)),)),
+    Titled("part", (Do(call("solve", "dense", A - B)),)),
     Return((A, call("maximum", A, 2.0))),
 )
 
