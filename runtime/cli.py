@@ -10,7 +10,7 @@ import re
 import signal
 import sys
 import warnings
-from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from argparse import Action, ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any, NoReturn
@@ -39,7 +39,7 @@ class Parser(ArgumentParser):
 
     optional_positionals = False
 
-    def add_argument(self, *names: Any, **options: Any) -> Any:
+    def add_argument(self, *names: str, **options: Any) -> Action:
         """Add an argument and remember whether it is a positional one that may be left out."""
         if names and not names[0].startswith("-") and options.get("nargs") in ("?", "*"):
             self.optional_positionals = True
@@ -192,7 +192,7 @@ def _report(name: str, problem: BaseException) -> int:
 def _short_warnings() -> Iterator[None]:
     """Python's warnings as one line without file and line number."""
 
-    def show(message: Warning | str, *rest: Any, **more: Any) -> None:
+    def show(message: Warning | str, *rest: object, **more: object) -> None:
         print(f"warning: {' '.join(str(message).split())}", file=sys.stderr)
 
     with warnings.catch_warnings():
@@ -215,7 +215,7 @@ def _news(name: str) -> Iterator[None]:
         logger.removeHandler(handler)
 
 
-def _readable(stream: Any) -> None:
+def _readable(stream: object) -> None:
     """Write characters that the stream's encoding lacks as escapes instead of failing."""
     if getattr(stream, "errors", None) == "strict" and hasattr(stream, "reconfigure"):
         stream.reconfigure(errors="backslashreplace")

@@ -66,7 +66,7 @@ from synchain.codegen.export.numba import to_numba
 from synchain.codegen.export.python import to_python
 
 from synchain.models.inputs.plugins import load  # isort: skip
-from synchain.models.graphs.family_file import TOPOLOGY
+from synchain.models.graphs.families import TOPOLOGY
 from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 
@@ -536,7 +536,8 @@ def _() -> Quantities:
         with netcdf_file(io.BytesIO(whole), mmap=False) as file:
             heads = [f"{name} {v.typecode()} {v.dimensions} {v._attributes}" for name, v in file.variables.items()]
             sizes = [-(-v.data.nbytes // 4) * 4 for v in file.variables.values()]
-            own = {name: value for name, value in file._attributes.items() if name not in ("versions", "kernel")}
+            ambient = ("versions", "kernel", "processor")
+            own = {name: value for name, value in file._attributes.items() if name not in ambient}
         return {
             "variables": "\n".join(heads),
             "attributes": "\n".join(f"{name} = {value}" for name, value in own.items()),

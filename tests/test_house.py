@@ -24,7 +24,7 @@ PACKAGES = ("models", "codegen", "runtime")
 
 ARROWS = {
     "models.inputs": "",
-    "models.algebra": "inputs",
+    "models.algebra": "",
     "models.mechanics": "inputs",
     "models.spectra": "algebra inputs",
     "models.graphs": "spectra algebra inputs",
@@ -58,9 +58,9 @@ ARROWS = {
     "runtime.bench.kit": "bench.peers figures synchronisation sweeps stability results prediction cells support "
     "codegen models",
     "runtime.bench.peers": "support codegen models",
-    "runtime.console": "bench.kit figures bifurcation synchronisation sweeps stability results prediction cells "
+    "runtime.console": "figures bifurcation synchronisation sweeps stability results prediction cells "
     "support codegen models",
-    "runtime.commands": "console bench figures bifurcation synchronisation sweeps stability results prediction cells "
+    "runtime.commands": "console bench bench.kit figures bifurcation synchronisation sweeps stability results prediction cells "
     "support codegen models",
 }
 """The rooms that a room may import, beside itself; names without a package are rooms of the same

@@ -10,7 +10,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.saltation import Entry, Events
 from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import TIME, Edge
-from synchain.models.mechanics.stick_slip import Contact
+from synchain.models.mechanics.friction import Contact
 
 from ..program.expressions import (
     ZERO,

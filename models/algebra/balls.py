@@ -14,7 +14,7 @@ from flint import acb, arb, ctx, fmpq, fmpz
 
 from .rationals import to_flint
 
-__all__ = ["Ball", "accurate", "decimals", "disjoint", "enclose", "nearest", "precision"]
+__all__ = ["Ball", "accurate", "cotangent", "decimals", "disjoint", "enclose", "nearest", "precision"]
 
 Ball: TypeAlias = Any
 """flint.arb if the number is real, flint.acb if it is complex (flint has no types)."""
@@ -51,6 +51,11 @@ def enclose(expression: sp.Expr, bits: int) -> Ball:
     """
     with precision(bits):
         return _ball(expression)
+
+
+def cotangent(turn: fmpq) -> arb:
+    """Return the cotangent of an angle in units of pi, a ball."""
+    return arb.cos_pi_fmpq(turn) / arb.sin_pi_fmpq(turn)
 
 
 def accurate(ball_at: Callable[[int], Ball], bits: int) -> Ball:

@@ -130,7 +130,7 @@ def _short(x: Fraction) -> str:
     return str(x) if longest < 100 else f"a fraction of {longest} bits"
 
 
-class _LongRoot(sp.CRootOf):
+class _LongRoot(sp.CRootOf):  # type: ignore[misc]  # SymPy has no types
     """SymPy's CRootOf of a polynomial whose coefficients Python refuses to write."""
 
     __slots__ = ()

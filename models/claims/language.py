@@ -20,13 +20,13 @@ from pathlib import Path
 import sympy as sp
 
 from ..algebra.cosine_sums import AngleSum, expression
-from ..algebra.cosine_text import angle_number, angle_wave
-from ..algebra.number_text import exact_number, whole_number
 from ..algebra.rationals import to_fraction
 from ..graphs.families import topology
 from ..graphs.graph_text import is_composed, read_graph
 from ..graphs.topology import Topology, read_matrix
 from ..inputs.checks import short_repr
+from .cosine_text import angle_number, angle_wave
+from .number_text import exact_number, whole_number
 from .parts import LARGEST, WORDS, Part, interval, is_part, read_part
 
 __all__ = ["Claim", "Claimed", "read_claims"]

@@ -26,10 +26,8 @@ import sympy as sp
 from flint import arb
 
 from ..algebra.cosine_sums import AngleSum, expression, read
-from ..algebra.cosine_text import angle_number
 from ..algebra.equality import Number, equal, sign
 from ..algebra.lazy import LazyEigenvalues
-from ..algebra.number_text import exact_number
 from ..algebra.roots import Root
 from ..graphs.families import family, topology
 from ..graphs.products import factors
@@ -37,6 +35,8 @@ from ..graphs.topology import Topology
 from ..spectra.eigenvalue import Eigenvalue, words
 from ..spectra.solve import Proof, has_closed_form, spectrum
 from ..spectra.spectrum import Spectrum
+from .cosine_text import angle_number
+from .number_text import exact_number
 
 __all__ = ["LARGEST", "WORDS", "Exact", "Part", "interval", "is_part", "read_part", "verify_parts"]
 

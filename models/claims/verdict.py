@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -114,13 +114,17 @@ def _compared(claim: Claim) -> tuple[str, ...]:
             tally[place] += claimed.count
     exact = tuple(tally)
     problems += _assign([c for c in claim.numbers if c.interval is not None], found, tally)
+    return (*problems, *_miscounted(found, exact, tally))
+
+
+def _miscounted(found: Sequence[Eigenvalue], exact: Sequence[int], tally: Sequence[int]) -> Iterator[str]:
+    """What is wrong with the multiplicities: `exact` times by its number, `tally` times in all."""
     for e, before, count in zip(found, exact, tally, strict=True):
         if count == 0:
-            problems.append(f"not claimed: {words(e)}, {times(e.multiplicity)}")
+            yield f"not claimed: {words(e)}, {times(e.multiplicity)}"
         elif count != e.multiplicity:
             how = "claimed" if before else "claimed (approximately)"
-            problems.append(f"{how} {words(e)} {times(count)}; it occurs {times(e.multiplicity)}")
-    return tuple(problems)
+            yield f"{how} {words(e)} {times(count)}; it occurs {times(e.multiplicity)}"
 
 
 def _angles(found: Sequence[Eigenvalue]) -> dict[AngleSum, int]:

@@ -15,7 +15,7 @@ import sympy as sp
 
 from ..graphs.links import Link
 from ..mechanics.components import Edge, Node
-from ..mechanics.stick_slip import Contact
+from ..mechanics.friction import Contact
 
 __all__ = ["Ends", "Equations", "check"]
 

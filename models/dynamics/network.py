@@ -21,13 +21,12 @@ from ..mechanics.calculus import cancelled
 from ..mechanics.components import SLIDING, Edge, Node
 from ..mechanics.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling
 from ..mechanics.definition import FRICTION_LAW
-from ..mechanics.friction import KAPPA, ContactModel, FrictionLaw
+from ..mechanics.friction import KAPPA, SLIP, ContactModel, FrictionLaw, set_valued
 from ..mechanics.lagrangian import Mechanics
 from ..mechanics.link import check_coupling, edge, is_oriented
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
 from ..mechanics.oscillator import Field, Oscillator
 from ..mechanics.parameter import Parameter
-from ..mechanics.stick_slip import SLIP, set_valued
 from .equations import Equations
 
 __all__ = ["check_coupling", "connectivity", "edge", "mixed_network", "network", "node", "oriented_links", "parameters"]

@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Any
 
 import sympy as sp
 
-from ..algebra.number_text import exact_number
 from .families import family, names, topology
 from .topology import Topology
 
@@ -82,11 +80,10 @@ class Term:
 
     def at(self, numbers: Mapping[sp.Symbol, int]) -> Iterator[tuple[sp.Expr, int, dict[sp.Symbol, int]]]:
         """Yield (eigenvalue, multiplicity > 0, all numbers) for numbers in place of the sizes."""
-        text = sp.sstr(self.value)
         for all_numbers in _with_indices(self.indices, dict(numbers)):
             count = int(self.times.subs(all_numbers))
             if count:
-                yield exact_number(text, {str(s): k for s, k in all_numbers.items()}), count, all_numbers
+                yield self.value.xreplace({s: sp.Integer(k) for s, k in all_numbers.items()}), count, all_numbers
 
     def vectors(self, numbers: Mapping[sp.Symbol, int]) -> Iterator[sp.Expr]:
         """Yield the eigenvectors of an eigenvalue as expressions in NODE; `numbers` as of `at`."""
@@ -98,7 +95,7 @@ class Term:
     def replaced(self, new: Mapping[sp.Symbol, sp.Expr]) -> Term:
         """Return the term with other expressions for some of its symbols, all at once."""
 
-        def put(part: Any) -> Any:
+        def put(part: object) -> object:
             return sp.S(part).xreplace(dict(new))
 
         indices, numbered = (
@@ -152,7 +149,7 @@ class ClosedForm:
 
     terms: tuple[Term, ...]
     size: sp.Expr = N
-    options: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, object] = field(default_factory=dict)
     least: int = 1
     note: str = ""
     blocks: str = ""
@@ -194,7 +191,7 @@ class ClosedForm:
             raise ValueError("this closed form has no graph; expected one made by closed_form or a product of such")
         return self.build(numbers)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return what `synchain spectrum FAMILY --symbolic --json` prints."""
         return {"n": sp.sstr(self.size), "terms": [_term_dict(term) for term in self.terms], "note": self.words}
 
@@ -227,7 +224,7 @@ class ClosedForm:
         return by_symbol
 
 
-def _term_dict(term: Term) -> dict[str, Any]:
+def _term_dict(term: Term) -> dict[str, object]:
     def listed(indices: tuple[Index, ...]) -> list[list[str]]:
         return [[str(s), sp.sstr(low), sp.sstr(high)] for s, low, high in indices]
 
@@ -241,14 +238,14 @@ def _term_dict(term: Term) -> dict[str, Any]:
     }
 
 
-def _filled(value: Any, numbers: Mapping[sp.Symbol, int]) -> Any:
+def _filled(value: object, numbers: Mapping[sp.Symbol, int]) -> object:
     """An option with numbers in place of symbols."""
     if isinstance(value, tuple):
         return tuple(_filled(part, numbers) for part in value)
     return int(sp.S(value).subs(numbers))
 
 
-def entries(what: str, given: Any) -> tuple[sp.Expr, ...]:
+def entries(what: str, given: str | Iterable[object]) -> tuple[sp.Expr, ...]:
     """Return the whole numbers and symbols of a list or a text such as "pxq"; else ValueError."""
     parts = re.split("[,x]", given.replace(" ", "")) if isinstance(given, str) else list(given)
     wrong = next((part for part in parts if not _ENTRY.fullmatch(str(part))), None)
@@ -265,7 +262,7 @@ def formulas() -> tuple[str, ...]:
     return tuple(name for name in names() if family(name).formula is not None)
 
 
-def closed_form(name: str, **options: Any) -> ClosedForm:
+def closed_form(name: str, **options: object) -> ClosedForm:
     """Return the spectrum of a family with symbols for its size.
 
     Parameters
@@ -300,6 +297,6 @@ def closed_form(name: str, **options: Any) -> ClosedForm:
     return replace(form, name=f"{name}({more})" if more else name, build=build)
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     """An option as text."""
     return f"({', '.join(map(str, value))})" if isinstance(value, tuple) else str(value)

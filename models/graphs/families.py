@@ -1,7 +1,8 @@
-"""Families of graphs: a plug-in file as a value, and the graphs that it makes."""
+"""Families of graphs: what their plug-in files must hold, a file as a value, and the graphs that it makes."""
 
 from __future__ import annotations
 
+import inspect
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,7 +14,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ..inputs import plugins
 from ..inputs.options import Options, as_options
-from .family_file import TOPOLOGY, defaults
+from ..inputs.plugin_file import PluginFile
+from ..inputs.plugins import Kind
 from .links import LINK_LIMIT
 from .topology import Topology
 
@@ -22,10 +24,78 @@ if TYPE_CHECKING:
 
     from .links import Link
 
-__all__ = ["Family", "FamilyRule", "family", "names", "topology"]
+__all__ = ["KNOWN", "TOPOLOGY", "Family", "FamilyRule", "check_topology", "family", "names", "topology"]
 
 Edges: TypeAlias = "Callable[..., Iterable[tuple[int, int, int | str | Fraction]]]"
 Eigenvalues: TypeAlias = "Sequence[tuple[sp.Expr, int]] | None"
+
+KNOWN = (
+    *("SUMMARY", "SOURCE", "MINIMUM", "TOO_SMALL", "DIRECTED", "CONNECTED"),
+    *("edges", "settle", "count", "expected", "spectrum", "formula", "sides"),
+)
+"""The public names that the file of a topology may define."""
+
+
+def _defaults(module: ModuleType) -> dict[str, object]:
+    """The options of a family with their defaults: the keyword-only parameters of its `edges`."""
+    found = inspect.signature(module.edges).parameters.values()
+    return {p.name: p.default for p in found if p.kind is inspect.Parameter.KEYWORD_ONLY}
+
+
+def check_topology(module: ModuleType, where: str, text: bytes) -> None:
+    """Raise ValueError if a module is no topology.
+
+    Parameters
+    ----------
+    module : module
+        What the file defines.
+    where : str
+        The name of the file in messages.
+    text : bytes
+        What stands in the file.
+    """
+    file = PluginFile.of("topology", KNOWN, module, where, text)
+    file.check_names(("SUMMARY", "MINIMUM", "edges"))
+    file.check_values()
+    least = file.get("MINIMUM")
+    if isinstance(least, bool) or not isinstance(least, int):
+        raise file.wrong("MINIMUM", f"MINIMUM is {least!r}; expected the smallest number of nodes, a whole number")
+    options = _defaults(file.module)
+    for name, value in options.items():
+        if value is inspect.Parameter.empty:
+            raise file.wrong("edges", f"the option {name!r} of edges has no default; expected one, such as {name}=1")
+    if not options:
+        file.idle(("settle",), "without options, which are keyword-only parameters of edges")
+        return
+    file.need("settle")
+    for function in file.defined(("settle", "count", "expected", "spectrum")):
+        missing = [name for name in options if name not in inspect.signature(file.get(function)).parameters]
+        if missing:
+            raise file.wrong(function, f"{function} lacks the option {missing[0]!r} of edges; expected the same ones")
+
+
+TOPOLOGY = Kind(
+    "topology",
+    "topologies",
+    check_topology,
+    also={
+        "all_to_all": "complete",
+        "biclique": "complete_bipartite",
+        "clique": "complete",
+        "cubic": "random_cubic",
+        "cycle": "ring",
+        "gilbert": "erdos_renyi",
+        "gnp": "erdos_renyi",
+        "hamming": "hypercube",
+        "lattice": "grid",
+        "line": "chain",
+        "newman_watts": "small_world",
+        "open_chain": "chain",
+        "path": "chain",
+        "watts_strogatz": "small_world",
+    },
+)
+"""Graph families: the files of the folder `topologies`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -80,8 +150,8 @@ class Family:
     too_small: str = "choose a larger n"
     directed: bool = False
     connected: bool = True
-    options: Mapping[str, Any] = field(default_factory=dict)
-    settle: Callable[..., Any] | None = None
+    options: Mapping[str, object] = field(default_factory=dict)
+    settle: Callable[..., object] | None = None
     count: Callable[..., int] | None = None
     expected: Callable[..., int] | None = None
     spectrum: Callable[..., Eigenvalues] | None = None
@@ -89,7 +159,7 @@ class Family:
     sides: Callable[[int], tuple[int, ...]] | None = None
     link_limit: int = LINK_LIMIT
 
-    def __call__(self, n: int, **options: Any) -> Topology:
+    def __call__(self, n: int, **options: object) -> Topology:
         """Return the graph of `n` nodes; see `topology`."""
         size = self._size(n)
         settled = self._settled(size, options)
@@ -122,7 +192,7 @@ class Family:
                 f"expected at most {self.link_limit}: reduce n"
             )
 
-    def _size(self, n: Any) -> int:
+    def _size(self, n: object) -> int:
         """The number of nodes; TypeError if it is no integer, ValueError if it is too small."""
         if isinstance(n, bool) or not hasattr(n, "__index__"):
             raise TypeError(f"topology {self.name}: n = {n!r} is a {type(n).__name__}; expected an integer")
@@ -131,7 +201,7 @@ class Family:
             raise ValueError(f"topology {self.name}: n = {size}; expected at least {self.minimum}: {self.too_small}")
         return size
 
-    def _settled(self, n: int, options: Mapping[str, Any]) -> Options:
+    def _settled(self, n: int, options: Mapping[str, object]) -> Options:
         """All options as they are stored, checked by the family's `settle`."""
         for key in options:
             if key not in self.options:
@@ -192,7 +262,7 @@ class FamilyRule:
         return None if spectrum is None else spectrum(self.n, **dict(self.options))
 
 
-def topology(name: str, n: int, **options: Any) -> Topology:
+def topology(name: str, n: int, **options: object) -> Topology:
     """Return the graph of a family by its name.
 
     Parameters
@@ -267,25 +337,25 @@ def _of_module(name: str, module: ModuleType) -> Family:
     if isinstance(name, plugins.OwnFile) and "spectrum" in parts:
         parts["spectrum"] = _checked(parts["spectrum"], name.place)
     edges = _blamed_edges(module.edges) if outside else module.edges
-    return Family(name=name, edges=edges, options=defaults(module), **parts)
+    return Family(name=name, edges=edges, options=_defaults(module), **parts)
 
 
 def _blamed_edges(edges: Edges) -> Edges:
     """Edges whose errors name file and line, wrong weights too."""
 
     @wraps(edges)
-    def blamed_edges(n: int, **options: Any) -> Iterator[tuple[int, int, Fraction]]:
+    def blamed_edges(n: int, **options: object) -> Iterator[tuple[int, int, Fraction]]:
         with plugins.blamed(edges):
             yield from ((i, j, Fraction(weight)) for i, j, weight in edges(n, **options))
 
     return blamed_edges
 
 
-def _checked(spectrum: Callable[..., Any], place: str) -> Callable[..., Eigenvalues]:
+def _checked(spectrum: Callable[..., Eigenvalues], place: str) -> Callable[..., Eigenvalues]:
     """A closed form that raises ValueError if it is no list of (eigenvalue, multiplicity)."""
 
     @wraps(spectrum)
-    def checked(n: int, **options: Any) -> Eigenvalues:
+    def checked(n: int, **options: object) -> Eigenvalues:
         pairs: Eigenvalues = spectrum(n, **options)
         for pair in () if pairs is None else pairs if isinstance(pairs, list | tuple) else (pairs,):
             if not (isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[1], int) and pair[1] > 0):

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from ..inputs.rationals import rational
 from .links import LINK_LIMIT
@@ -92,7 +92,7 @@ def complement(graph: Topology) -> Topology:
     return _made(name, graph.n, rule)
 
 
-def weighted(graph: Topology, factor: Any) -> Topology:
+def weighted(graph: Topology, factor: object) -> Topology:
     """Return the graph with all weights times a rational number; a float is its shortest decimal.
 
     Raises

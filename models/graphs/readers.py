@@ -24,7 +24,7 @@ Weights = dict[tuple[int, int], Fraction]
 
 
 def from_edges(
-    edges: Iterable[Sequence[Any]], n: int | None = None, directed: bool = False, name: str = "edges"
+    edges: Iterable[Sequence[object]], n: int | None = None, directed: bool = False, name: str = "edges"
 ) -> Topology:
     """Return the graph of a list of edges.
 
@@ -67,7 +67,7 @@ def from_graph(graph: Any, weight: str = "weight", name: str = "graph") -> Topol
     Parameters
     ----------
     graph : networkx graph
-        Any object with nodes, edges and is_directed.
+        An object with nodes, edges and is_directed.
     weight : str, optional
         The edge attribute that holds the weight, read through its decimal text; 1 without.
     name : str, optional
@@ -92,7 +92,7 @@ def from_graph(graph: Any, weight: str = "weight", name: str = "graph") -> Topol
     return _graph(name, len(nodes), weights)
 
 
-def from_sparse(matrix: Any, adjacency: bool = False, name: str = "matrix") -> Topology:
+def from_sparse(matrix: object, adjacency: bool = False, name: str = "matrix") -> Topology:
     """Return the graph of a SciPy sparse matrix.
 
     Parameters
@@ -196,7 +196,9 @@ def read_graphml(path: str | Path, weight: str = "weight") -> Topology:
     return assembled(nodes, edges, name)
 
 
-def assembled(nodes: Sequence[Hashable], edges: Iterable[tuple[Hashable, Hashable, Any, bool]], name: str) -> Topology:
+def assembled(
+    nodes: Sequence[Hashable], edges: Iterable[tuple[Hashable, Hashable, object, bool]], name: str
+) -> Topology:
     """Return the graph of named nodes and edges (from, to, weight, one-way)."""
     for node in nodes:
         check_printable(f"{name}: node name", str(node))
@@ -240,7 +242,7 @@ def _put(
             )
 
 
-def _edge(edge: Sequence[Any], where: str) -> tuple[int, int, Fraction]:
+def _edge(edge: Sequence[object], where: str) -> tuple[int, int, Fraction]:
     unordered = isinstance(edge, str | bytes | Set | Mapping)
     if unordered or not hasattr(edge, "__len__") or len(edge) not in (2, 3):
         raise ValueError(f"{where} is {short_repr(edge)}; expected (i, j) or (i, j, weight)")
@@ -254,7 +256,7 @@ def _graph(name: str, n: int, weights: Weights) -> Topology:
     return Topology(name, n, tuple((i, j, weights[i, j]) for i, j in sorted(weights) if weights[i, j]))
 
 
-Edge = tuple[str, str, Any, bool]
+Edge = tuple[str, str, object, bool]
 
 
 def parsed(text: str, name: str, weight: str) -> tuple[list[str], list[Edge]]:

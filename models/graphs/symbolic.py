@@ -14,7 +14,7 @@ from functools import reduce
 from math import comb
 from operator import add, mul
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
@@ -62,7 +62,7 @@ class SymbolicSpectrum:
         rows += [f"  the roots of {sp.sstr(f.as_expr())}{_often(count)}" for f, count in self.unsolved]
         return "\n".join(rows)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """What `synchain spectrum --symbolic --matrix FILE --json` prints."""
         return {
             "n": self.polynomial.degree(),
@@ -107,7 +107,7 @@ class SymbolicTopology:
             raise ProofError(f"spectrum of {self.name}: the factors do not multiply to the characteristic polynomial")
         return SymbolicSpectrum(polynomial, monic)
 
-    def at(self, **values: Any) -> Topology:
+    def at(self, **values: object) -> Topology:
         """The graph with rational numbers for all symbols; weights that become 0 are left out.
 
         Raises ValueError on a missing or unknown symbol, a number that is not rational and a division by zero.
@@ -129,7 +129,7 @@ class SymbolicTopology:
         return from_matrix(rows, self.name)
 
 
-def from_symbols(rows: Iterable[Iterable[Any]] | sp.MatrixBase, name: str = "matrix") -> SymbolicTopology:
+def from_symbols(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "matrix") -> SymbolicTopology:
     """The graph of a connectivity matrix of rational functions: SymPy expressions, numbers or texts such as "a/2".
 
     Every row must sum to zero.  Raises ValueError on another shape, a row sum that is not 0, more than LARGEST nodes and
@@ -156,7 +156,7 @@ def read_symbols(path: str | Path) -> SymbolicTopology:
     return from_symbols(parse_rows(text, name), name)
 
 
-def weight(entry: Any, where: str) -> sp.Expr:
+def weight(entry: object, where: str) -> sp.Expr:
     """A rational function in lowest terms; ValueError on anything else, and on the letter z."""
     if isinstance(entry, str):
         found = _read(entry.strip(), where)

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from ..inputs.checks import check_instance, check_integer, check_printable, short_repr, typed_repr
 from ..inputs.options import Options
@@ -195,7 +195,7 @@ class Topology:
         return f"Topology({self.name!r}, n={self.n}{more}, {self.link_count} links)"
 
 
-def from_matrix(rows: Iterable[Iterable[Any]] | sp.MatrixBase, name: str = "matrix") -> Topology:
+def from_matrix(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "matrix") -> Topology:
     """Return the graph of a connectivity matrix G; one-way links are allowed.
 
     Parameters
@@ -238,7 +238,7 @@ def from_matrix(rows: Iterable[Iterable[Any]] | sp.MatrixBase, name: str = "matr
     return Topology(name, len(table), links)
 
 
-def _rounded(entry: Any) -> bool:
+def _rounded(entry: object) -> bool:
     """True for a float, and for a text with decimals: they can be those of a rounded number."""
     return isinstance(entry, float) or (isinstance(entry, str) and not set(entry).isdisjoint(".eE"))
 
@@ -295,7 +295,7 @@ def _check_links(name: str, n: int, links: object) -> None:
         before = (target, source)
 
 
-def _refuse(what: str, n: int, before: tuple[int, int], link: tuple[Any, Any, Any]) -> None:
+def _refuse(what: str, n: int, before: tuple[int, int], link: tuple[object, object, object]) -> None:
     """Raise TypeError or ValueError that says what is wrong with a link."""
     target, source, weight = link
     if not isinstance(target, int) or not isinstance(source, int):

@@ -26,7 +26,7 @@ def as_options(given: Mapping[str, Any]) -> Options:
     return tuple((key, tuple(v) if isinstance(v, list) else v) for key, v in sorted(given.items()))
 
 
-def integer_option(what: str, value: object, low: int) -> int:
+def integer_option(what: str, value: object, low: int, high: int | None = None) -> int:
     """Return a whole number, given as such or as text.
 
     Parameters
@@ -35,8 +35,8 @@ def integer_option(what: str, value: object, low: int) -> int:
         The thing that the number is for, such as ``"seed"``.
     value : object
         The value of the option; a command line gives text.
-    low : int
-        The smallest number that is allowed.
+    low, high : int, optional
+        The range, both ends in it.
 
     Returns
     -------
@@ -48,11 +48,11 @@ def integer_option(what: str, value: object, low: int) -> int:
     TypeError
         If the value is no whole number.
     ValueError
-        If it is below `low`.
+        If it is out of range.
     """
     if isinstance(value, str) and _INTEGER.fullmatch(value.strip()):
         value = int(value)
-    return check_integer(what, value, low)
+    return check_integer(what, value, low, high)
 
 
 def integers_option(what: str, value: object, low: int) -> tuple[int, ...]:

@@ -54,7 +54,7 @@ class PluginFile:
         """True if the file defines a name."""
         return hasattr(self.module, name)
 
-    def get(self, name: str, otherwise: Any = None) -> Any:
+    def get(self, name: str, otherwise: object = None) -> Any:
         """Return what the file calls by a name, or `otherwise`."""
         return getattr(self.module, name, otherwise)
 
@@ -102,7 +102,7 @@ class PluginFile:
             if name.islower() and not callable(value):
                 raise self.wrong(name, f"{name} is {value!r}; expected a function: def {name}(…)")
 
-    def value(self, name: str, given: Mapping[str, Any]) -> Any:
+    def value(self, name: str, given: Mapping[str, object]) -> Any:
         """Return what a function of the file returns for symbols."""
         return call(self.get(name), given)
 

@@ -23,9 +23,12 @@ from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .checks import check_text, short_repr, suggestion
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 __all__ = [
     "Kind",
@@ -190,7 +193,7 @@ def part(what: str, value: object) -> str:
     return check_text(what, value, 1000 if isinstance(value, str) and ".py" in value else 200)
 
 
-def call(function: Callable[..., Any], symbols: Mapping[str, Any]) -> Any:
+def call(function: Callable[..., object], symbols: Mapping[str, object]) -> Any:
     """Call a plug-in's function with those of `symbols` that its signature names.
 
     Raises
@@ -209,7 +212,7 @@ def call(function: Callable[..., Any], symbols: Mapping[str, Any]) -> Any:
 
 
 @contextmanager
-def blamed(function: Callable[..., Any]) -> Iterator[None]:
+def blamed(function: Callable[..., object]) -> Iterator[None]:
     """Within it, an error of a function from outside the package becomes a ValueError with its file and line."""
     try:
         yield
@@ -228,7 +231,7 @@ def _instead(name: str, known: Iterable[str]) -> str:
     return "; correct the name or declare it as a parameter"
 
 
-def located(error: Exception, function: Callable[..., Any]) -> Exception:
+def located(error: Exception, function: Callable[..., object]) -> Exception:
     """The error of a plug-in's function: as it is from this package, else a ValueError with file and line."""
     if str(function.__module__).startswith(f"{PACKAGE}."):
         return error
@@ -240,13 +243,13 @@ def _own(kind: Kind) -> tuple[str, ...]:
     return tuple(m.name for m in pkgutil.iter_modules(package.__path__) if not m.name.startswith("_"))
 
 
-def _entry_points(kind: Kind) -> Mapping[str, Any]:
+def _entry_points(kind: Kind) -> Mapping[str, EntryPoint]:
     """The plug-ins that installed packages announce; none is loaded for this."""
     return _announced(f"synchain.{kind.folder}", tuple(sys.path))
 
 
 @lru_cache(maxsize=8)
-def _announced(group: str, places: tuple[str, ...]) -> Mapping[str, Any]:
+def _announced(group: str, places: tuple[str, ...]) -> Mapping[str, EntryPoint]:
     """The entry points of a group in the packages at these places, by name."""
     from importlib.metadata import entry_points
 

@@ -111,7 +111,7 @@ def rational_rows(rows: Any, name: str) -> list[list[Fraction]]:
     return [[_entry(entry, name, i, j) for j, entry in enumerate(line)] for i, line in enumerate(square(rows, name))]
 
 
-def _entry(entry: Any, name: str, i: int, j: int) -> Fraction:
+def _entry(entry: object, name: str, i: int, j: int) -> Fraction:
     found = _number(entry) if type(entry) is str else None
     return rational(entry, f"{name}: entry ({i + 1}, {j + 1})") if found is None else found
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import sympy as sp
 
 from .calculus import derivative
-from .stick_slip import SLIP, Contact
+from .friction import SLIP, Contact
 
 __all__ = ["SLIDING", "TIME", "Edge", "Node"]
 

@@ -54,11 +54,11 @@ class _PartFile(PluginFile):
                 like = f'Parameter({parameter!r}, "1", "what it means")'
                 raise self.wrong("PARAMETERS", f"PARAMETERS[{name!r}] is {parameter!r}; expected {like}")
 
-    def expression(self, name: str, given: Mapping[str, Any]) -> sp.Expr:
+    def expression(self, name: str, given: Mapping[str, object]) -> sp.Expr:
         """What a function returns for symbols, one expression."""
         return self.as_expression(name, self.value(name, given))
 
-    def as_expression(self, name: str, value: Any) -> sp.Expr:
+    def as_expression(self, name: str, value: object) -> sp.Expr:
         import sympy as sp
 
         if isinstance(value, int | float) and not isinstance(value, bool):

@@ -1,7 +1,18 @@
-"""Friction laws, and how a law that jumps is treated at rest."""
+"""Friction laws, and the jump of a law at rest: smoothed, or as it is.
+
+As it is, an oscillator sticks to its ground or slips over it in one of two directions.  A set-valued law says: while the
+surfaces slide with w > 0 the friction coefficient is f(w), with w < 0 it is f(w) of the other sign, and at w = 0 it is
+whatever holds the body, up to the static coefficient.  The equations carry a third state of each oscillator, its mode
+`slip`: +1 and -1 while it slips with w > 0 and w < 0, 0 while it sticks.  Between events the mode does not change, and
+every right-hand side is smooth.
+
+Sources: Filippov, Differential Equations with Discontinuous Righthand Sides (Kluwer, 1988); Leine, van Campen, de Kraker
+& van den Steen, Nonlinear Dynamics 16, 41 (1998).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import sympy as sp
@@ -10,7 +21,7 @@ from ..inputs.frozen import Frozen
 from ..inputs.words import Word
 from .parameter import Parameter
 
-__all__ = ["KAPPA", "ContactModel", "FrictionLaw", "regularise"]
+__all__ = ["KAPPA", "SLIP", "Contact", "ContactModel", "FrictionLaw", "regularise", "set_valued"]
 
 
 class ContactModel(Word):
@@ -25,6 +36,9 @@ class ContactModel(Word):
 
 
 KAPPA = Parameter(1e5, "s/m", "steepness of the regularised jump, sgn w = (2/pi) atan(kappa w)", positive=True)
+
+SLIP = sp.Symbol("slip", real=True)
+"""The mode of an oscillator: +1 or -1 while it slips, 0 while it sticks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,3 +91,117 @@ def regularise(expression: sp.Expr, kappa: sp.Symbol) -> sp.Expr:
     Marszal et al., Eur. Phys. J. Special Topics (2016), eq. 5.
     """
     return expression.replace(sp.sign, lambda w: 2 * sp.atan(kappa * w) / sp.pi)
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """What decides between stick and slip, in the symbols of a node.
+
+    speed: velocity of the ground; sliding: the sliding velocity w; up, down: accelerations under the largest static
+    friction in either direction, and pushed, pulled: those at which slip with w > 0 and w < 0 begins, all at the ground's
+    velocity. A body sticks while down <= 0 <= up.
+    """
+
+    speed: sp.Expr
+    sliding: sp.Expr
+    up: sp.Expr
+    down: sp.Expr
+    pushed: sp.Expr
+    pulled: sp.Expr
+    shown: sp.Expr
+
+    def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Contact:
+        """The same with every expression changed."""
+        return Contact(*(change(e) for e in self.expressions))
+
+    def under(self, force: sp.Expr) -> Contact:
+        """The same if a further force acts on the body, unit mass."""
+        pushes = (e + force for e in (self.up, self.down, self.pushed, self.pulled, self.shown))
+        return Contact(self.speed, self.sliding, *pushes)
+
+    @property
+    def expressions(self) -> tuple[sp.Expr, ...]:
+        """All of them, in the order of the fields."""
+        return self.speed, self.sliding, self.up, self.down, self.pushed, self.pulled, self.shown
+
+    @property
+    def jumps(self) -> bool:
+        """True if the static coefficient exceeds that of slow slip, so that slip begins with a jump of
+        acceleration."""
+        return bool(sp.simplify(self.up - self.pushed) != 0 or sp.simplify(self.down - self.pulled) != 0)
+
+
+def set_valued(
+    acceleration: sp.Expr,
+    friction: sp.Function,
+    law: sp.Expr,
+    argument: sp.Symbol,
+    static: sp.Expr | None,
+    velocity: sp.Symbol,
+) -> tuple[sp.Expr, Contact]:
+    """Return the acceleration in all modes and the contact conditions.
+
+    Parameters
+    ----------
+    acceleration : Expr
+        The acceleration, with the friction coefficient as `friction(w)`.
+    friction : Function
+        The coefficient as an unknown function.
+    law : Expr
+        That coefficient as an expression in `argument` with sign and Abs.
+    argument : Symbol
+        The sliding velocity in `law`.
+    static : Expr or None
+        The static coefficient; None for the limit of the law at 0+.
+    velocity : Symbol
+        The velocity of the body.
+
+    Raises
+    ------
+    ValueError
+        If friction does not occur exactly once or acts nonlinearly, if the ground's velocity is not a constant, and for
+        a law without a jump at w = 0 or one that is not odd.
+    """
+    applied = sorted(acceleration.atoms(friction), key=str)
+    if len(applied) != 1:
+        raise ValueError(f"set-valued contact: friction acts {len(applied)} times in {acceleration}; expected once")
+    sliding = sp.expand(applied[0].args[0])
+    speed = _ground(sliding, velocity)
+    moving = _by_mode(law, argument)
+    slow = moving.xreplace({argument: sp.S.Zero, SLIP: sp.S.One})
+    largest = slow if static is None else static
+    if largest == 0:
+        raise ValueError(
+            f"set-valued contact: the law {law} has no jump at w = 0, so nothing sticks; use contact 'atan'"
+        )
+    hidden = sp.Dummy("f", real=True)
+    plain = acceleration.xreplace({applied[0]: hidden})
+    if plain.diff(hidden).has(hidden) or plain.diff(hidden).has(velocity):
+        raise ValueError(f"set-valued contact: friction acts nonlinearly in {acceleration}")
+    at_rest = plain.xreplace({velocity: speed})
+    up, down = (at_rest.xreplace({hidden: sign * largest}) for sign in (1, -1))
+    pushed, pulled = (at_rest.xreplace({hidden: sign * slow}) for sign in (1, -1))
+    shown = plain.xreplace({hidden: law.xreplace({argument: sliding})})
+    rate = plain.xreplace({hidden: moving.xreplace({argument: sliding})})
+    return rate, Contact(speed, sliding, up, down, pushed, pulled, shown)
+
+
+def _ground(sliding: sp.Expr, velocity: sp.Symbol) -> sp.Expr:
+    """The velocity at which the sliding velocity is zero; ValueError if that is no constant, or it does not fall."""
+    slope = sliding.diff(velocity)
+    if not (slope.is_number and slope.is_negative):
+        raise ValueError(f"set-valued contact: the sliding velocity {sliding} must fall with {velocity}, linearly")
+    speed = sp.solve(sliding, velocity)[0]
+    if speed.free_symbols & {sp.Symbol("t", real=True)}:
+        raise ValueError(f"set-valued contact: the ground's velocity {speed} changes with time; expected a constant")
+    return speed
+
+
+def _by_mode(law: sp.Expr, argument: sp.Symbol) -> sp.Expr:
+    """The law with the mode for the sign of its argument; ValueError if it has other kinks or is not odd."""
+    moving = law.replace(sp.Abs, lambda w: SLIP * w).replace(sp.sign, lambda w: SLIP)
+    if moving.has(sp.Abs, sp.sign):
+        raise ValueError(f"set-valued contact: the law {law} has another kink than that at w = 0")
+    if sp.simplify(moving.xreplace({argument: -argument, SLIP: -SLIP}) + moving) != 0:
+        raise ValueError(f"set-valued contact: the law {law} is not odd")
+    return moving

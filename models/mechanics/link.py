@@ -16,10 +16,10 @@ import sympy as sp
 
 from .components import TIME, Edge, Node
 from .coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling
+from .friction import SLIP
 from .lagrangian import balance, mass_matrix, solve_masses
 from .nondimensional import nondimensional
 from .oscillator import Field, Oscillator
-from .stick_slip import SLIP
 
 __all__ = ["check_coupling", "edge", "is_oriented", "link_energies", "link_energy"]
 

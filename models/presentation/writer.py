@@ -206,8 +206,6 @@ class Writer:
         """Return an expression as text."""
         if isinstance(e, sp.Symbol):
             return self.letters.get(e, self.style.letter(e.name))
-        if e is sp.pi:
-            return self.style.letter("pi")
         if e.is_Add:
             return self.total(sorted(e.args, key=lambda x: (_negative(x), sp.count_ops(x), sp.default_sort_key(x))))
         if e.is_Integer and e >= 0:
@@ -216,6 +214,12 @@ class Writer:
             return "-" + self.write(-e) if _negative(e) else self._product(e)
         if e.is_Pow:
             return self._power(e)
+        return self._called(e)
+
+    def _called(self, e: sp.Expr) -> str:
+        """A function of expressions, the number pi, or what the style has another way for."""
+        if e is sp.pi:
+            return self.style.letter("pi")
         if isinstance(e, sp.Abs):
             return f"|{self.write(e.args[0])}|"
         if isinstance(e, sp.Function | sp.Max | sp.Min) and not e.is_Piecewise:

@@ -152,7 +152,7 @@ def _section(model: Model, given: object) -> Section:
     return section
 
 
-def _times(model: Model, numbers: Mapping[str, float], given: Mapping[str, Any]) -> dict[str, Any]:
+def _times(model: Model, numbers: Mapping[str, float], given: Mapping[str, object]) -> dict[str, object]:
     """The unit of time: the period of the drive if there is one."""
     motion = drive(model, numbers)
     default = TimeUnit.TIME if motion.frequency is None else TimeUnit.PERIOD
@@ -166,7 +166,7 @@ def _times(model: Model, numbers: Mapping[str, float], given: Mapping[str, Any])
     return {"time_unit": unit}
 
 
-def _numerics(given: Mapping[str, Any], records: Sequence[Record]) -> dict[str, Any]:
+def _numerics(given: Mapping[str, object], records: Sequence[Record]) -> dict[str, object]:
     """The integrator, its tolerances and limits."""
     rtol = check_number("rtol", given["rtol"], 1e-15, 0.1)
     atol = rtol / 10 if given["atol"] is None else check_number("atol", given["atol"], 0.0, 0.1)

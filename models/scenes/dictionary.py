@@ -78,24 +78,32 @@ def _topology(given: Mapping[object, Any], folder: Path | None) -> Topology:
     options = family(str(name)).options if known else {}
     check_keys("topology", given, ("name", "n", *options, "matrix", "file"))
     if "file" in given:
-        if len(given) > 1:
-            raise ValueError(f"topology: found {short_repr(dict(given))}; expected 'file' alone; remove the other keys")
-        path = Path(folder or ".", check_text("topology file", given["file"], 4096))
-        try:
-            return read_matrix(path)
-        except OSError as error:
-            raise ValueError(f"topology: {' '.join(str(error).split())}") from None
+        return _of_file(given, folder)
     if "matrix" in given:
-        graph = from_matrix(given["matrix"], name=check_text("topology name", given.get("name", "matrix")))
-        if "n" in given and check_integer("topology n", given["n"], 1, NODES) != graph.n:
-            raise ValueError(f"topology: n = {given['n']} but the matrix has {graph.n} rows; remove n")
-        return graph
+        return _of_matrix(given)
     for key in ("name", "n"):
         if key not in given:
             found = short_repr(dict(given))
             raise ValueError(f"topology: {key!r} is missing in {found}; expected name and n, or matrix, or file")
     chosen = {key: given[key] for key in options if key in given}
     return topology(part("topology name", name), check_integer("topology n", given["n"], 0, NODES), **chosen)
+
+
+def _of_file(given: Mapping[object, Any], folder: Path | None) -> Topology:
+    if len(given) > 1:
+        raise ValueError(f"topology: found {short_repr(dict(given))}; expected 'file' alone; remove the other keys")
+    path = Path(folder or ".", check_text("topology file", given["file"], 4096))
+    try:
+        return read_matrix(path)
+    except OSError as error:
+        raise ValueError(f"topology: {' '.join(str(error).split())}") from None
+
+
+def _of_matrix(given: Mapping[object, Any]) -> Topology:
+    graph = from_matrix(given["matrix"], name=check_text("topology name", given.get("name", "matrix")))
+    if "n" in given and check_integer("topology n", given["n"], 1, NODES) != graph.n:
+        raise ValueError(f"topology: n = {given['n']} but the matrix has {graph.n} rows; remove n")
+    return graph
 
 
 def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
@@ -122,7 +130,7 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
     return written
 
 
-def _graph(graph: Topology) -> dict[str, Any]:
+def _graph(graph: Topology) -> dict[str, object]:
     try:
         same = topology(graph.name, graph.n, **dict(graph.options)) == graph
     except (ValueError, TypeError):

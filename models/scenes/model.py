@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import islice
-from typing import Any
 
 from ..dynamics import network
 from ..dynamics.equations import Equations
@@ -55,7 +54,7 @@ class Group:
     friction: FrictionLaw | None
     at: tuple[int, ...]
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the group in the names of a scene file."""
         return {"oscillator": str(self.oscillator), "friction": str(self.friction or "none"), "at": list(self.at)}
 

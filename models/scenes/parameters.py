@@ -122,7 +122,7 @@ def drive(model: Model, values: Mapping[str, float]) -> Drive:
     return drive_of(model.unlinked.nodes, varied(values, model.parameters))
 
 
-def without(model: Model, values: Mapping[Any, Any], names: Iterable[str]) -> dict[Any, Any]:
+def without(model: Model, values: Mapping[object, object], names: Iterable[str]) -> dict[object, object]:
     """Return the values of parameters without those that single nodes have of some `names`."""
     gone = set(names)
     return {

@@ -17,9 +17,8 @@ from ..inputs.checks import check_instance, check_table, check_text, suggestion
 from ..inputs.frozen import Frozen
 from ..inputs.node_name import NodeName
 from ..mechanics.coupling import Coupling
-from ..mechanics.friction import ContactModel, FrictionLaw
+from ..mechanics.friction import SLIP, ContactModel, FrictionLaw
 from ..mechanics.oscillator import Oscillator
-from ..mechanics.stick_slip import SLIP
 from .axis import Axis
 from .complete import TimeUnit, complete
 from .dictionary import arguments, as_dict
@@ -134,10 +133,10 @@ class Scene:
         friction: FrictionLaw | str | None = "default",
         contact: str = "atan",
         coupling: Coupling | str | None = "spring",
-        nodes: Iterable[Group | Mapping[str, Any]] | None = None,
+        nodes: Iterable[Group | Mapping[str, object]] | None = None,
         topology: Topology | None = None,
-        parameters: Mapping[str, Any] | None = None,
-        initial: Mapping[str, Any] | None = None,
+        parameters: Mapping[str, object] | None = None,
+        initial: Mapping[str, object] | None = None,
         record: Iterable[str] | None = None,
         section: Section | str | None = None,
         transient: float = 300.0,
@@ -148,7 +147,7 @@ class Scene:
         rtol: float = 1e-8,
         atol: float | None = None,
         max_steps: int = 10_000_000,
-        axes: Iterable[Axis] | Mapping[str, Any] = (),
+        axes: Iterable[Axis] | Mapping[str, object] = (),
         zipped: bool = False,
         continuation: str = "none",
         seed: int = 0,
@@ -263,12 +262,12 @@ class Scene:
             raise ValueError(f"{self.varied[0]} has values for {self.n} nodes; give `parameters` for another number")
         return Scene(**given)
 
-    def _kept_start(self, changes: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    def _kept_start(self, changes: Mapping[str, object]) -> Mapping[str, object] | None:
         """The initial states that were given, if they fit a scene with other keywords."""
         other = "oscillator" in changes and as_oscillator(changes["oscillator"]) != self.oscillator
         if other or "nodes" in changes or getattr(changes.get("topology", self.topology), "n", None) != self.n:
             return None
-        start: Mapping[str, Any] | None = self.given["initial"]
+        start: Mapping[str, object] | None = self.given["initial"]
         if start and ("contact" in changes or "friction" in changes):
             return {name: at for name, at in start.items() if name != SLIP.name}  # modes follow from x and v
         return start
@@ -277,12 +276,12 @@ class Scene:
         """The completed value of each keyword."""
         return {name: getattr(self, name) for name in KEYWORDS}
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return the whole scene in JSON types; `Scene.from_dict` makes an equal scene of it."""
         return as_dict(self._values(), self.varied)
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any], folder: Path | None = None) -> Scene:
+    def from_dict(cls, values: Mapping[str, object], folder: Path | None = None) -> Scene:
         """Return the scene of a scene file's names and values.
 
         Parameters
@@ -340,9 +339,9 @@ def _kept(given: Mapping[str, Any], values: Mapping[str, Any]) -> Frozen[Any]:
     return Frozen(kept)
 
 
-def _kept_parameters(given: Mapping[str, Any], model: Model, numbers: Mapping[str, float]) -> dict[str, Any]:
+def _kept_parameters(given: Mapping[str, object], model: Model, numbers: Mapping[str, float]) -> dict[str, object]:
     """The parameters that were given: a number, or a tuple with one for each node."""
-    kept: dict[str, Any] = {}
+    kept: dict[str, object] = {}
     for name in given:
         if name in numbers:
             kept[name] = numbers[name]

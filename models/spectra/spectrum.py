@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any, overload
+from typing import overload
 
 import sympy as sp
 
@@ -125,7 +125,7 @@ class Spectrum:
         """Return SymPy Floats, each within one unit of the last of `digits` digits."""
         return tuple(e.evaluate(digits) for e in self.eigenvalues)
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """Return what `synchain spectrum --json` prints; a complex value is [real, imaginary].
 
         Each polynomial is written once; its roots have its number and their index as CRootOf.

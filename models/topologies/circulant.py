@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..inputs.options import integers_option
 
@@ -20,7 +20,7 @@ SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), sect
 CONNECTED = False
 
 
-def settle(n: int, offsets: Any) -> dict[str, Any]:
+def settle(n: int, offsets: object) -> dict[str, object]:
     """Distances of 1 … n/2, each once; n - s is s."""
     given = integers_option("offsets", offsets, 1)
     for s in given:
@@ -54,7 +54,7 @@ def spectrum(n: int, *, offsets: tuple[int, ...] = (1, 2)) -> list[tuple[sp.Expr
     return [(expression(number), times) for number, times in merged(numbers)]
 
 
-def formula(offsets: Any = (1, 2)) -> ClosedForm:
+def formula(offsets: str | Iterable[object] = (1, 2)) -> ClosedForm:
     """Sums of -4 sin²(ksπ/n) over the distances s: whole numbers or letters, each below n/2."""
     from itertools import combinations
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..inputs.options import integer_option
 
@@ -17,7 +17,7 @@ MINIMUM = 2
 SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.2"
 
 
-def settle(n: int, left: Any) -> dict[str, Any]:
+def settle(n: int, left: object) -> dict[str, object]:
     """1 … n - 1 nodes on the left."""
     if left is None:
         return {}

@@ -6,7 +6,6 @@ import random
 from collections.abc import Iterator
 from fractions import Fraction
 from math import log1p
-from typing import Any
 
 from ..inputs.options import integer_option, probability_option
 
@@ -20,7 +19,7 @@ SOURCE = (
 CONNECTED = False
 
 
-def settle(n: int, p: Any, seed: Any) -> dict[str, Any]:
+def settle(n: int, p: object, seed: object) -> dict[str, object]:
     """A probability and a whole number."""
     return {"p": probability_option("p", p), "seed": integer_option("seed", seed, 0)}
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator
 from itertools import combinations
-from typing import Any
 
 from ..inputs.options import integer_option
 
@@ -20,7 +19,7 @@ _ATTEMPTS = 1000
 _Edges = set[tuple[int, int]]
 
 
-def settle(n: int, degree: Any, seed: Any) -> dict[str, Any]:
+def settle(n: int, degree: object, seed: object) -> dict[str, object]:
     """A degree below n, and n times the degree even."""
     neighbours = integer_option("degree", degree, 1)
     if neighbours >= n or n * neighbours % 2:

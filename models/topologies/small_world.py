@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator
 from fractions import Fraction
-from typing import Any
 
 from ..inputs.options import integer_option, probability_option
 
@@ -18,7 +17,7 @@ _DRAWS = 10**7
 """Most random numbers of a graph: a node that is joined to nearly all others takes many."""
 
 
-def settle(n: int, neighbours: Any, p: Any, seed: Any) -> dict[str, Any]:
+def settle(n: int, neighbours: object, p: object, seed: object) -> dict[str, object]:
     """An even number of neighbours below n, a probability, a whole number; few draws."""
     count = integer_option("neighbours", neighbours, 2)
     if count % 2 or count >= n:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import isqrt, prod
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..inputs.options import integers_option
 
@@ -20,7 +20,7 @@ MINIMUM = 3
 SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.6 (Cartesian product of cycles)"
 
 
-def settle(n: int, shape: Any) -> dict[str, Any]:
+def settle(n: int, shape: object) -> dict[str, object]:
     """Three or more nodes in each direction, n in all."""
     if shape is None:
         return {}
@@ -60,7 +60,7 @@ def spectrum(n: int, *, shape: tuple[int, ...] | None = None) -> Sequence[tuple[
     return box(sizes, (True,) * len(sizes))
 
 
-def formula(shape: Any = ("p", "q")) -> ClosedForm:
+def formula(shape: str | Iterable[object] = ("p", "q")) -> ClosedForm:
     """Sums of -4 sin² of each direction, sizes as letters or numbers; the last varies fastest."""
     from dataclasses import replace
 

@@ -16,7 +16,6 @@ import platform
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 from .kit.tables import markdown
 
@@ -44,7 +43,7 @@ def machine() -> str:
     return f"{llvm.get_host_cpu_name()}, {platform.system()}, {versions}"
 
 
-def csv_text(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+def csv_text(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     """A table as comma-separated values, numbers in full, a number that is not there empty."""
     target = io.StringIO()
     writer = csv.writer(target, lineterminator="\n")
@@ -53,13 +52,13 @@ def csv_text(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     return target.getvalue()
 
 
-def text(module: ModuleType, rows: Sequence[Sequence[Any]]) -> str:
+def text(module: ModuleType, rows: Sequence[Sequence[object]]) -> str:
     """The table of a benchmark in Markdown, and under it its summary where it has one."""
     more = str(module.summary(rows)) if rows and hasattr(module, "summary") else ""
     return markdown(module.COLUMNS, rows) + (f"\n\n{more}" if more else "")
 
 
-def write(name: str, module: ModuleType, rows: Sequence[Sequence[Any]], folder: Path) -> list[Path]:
+def write(name: str, module: ModuleType, rows: Sequence[Sequence[object]], folder: Path) -> list[Path]:
     """Write `<name>.csv`, `<name>.md` and, where the benchmark draws, `<name>.png` and `.svg`;
     returns their paths.
     """

@@ -91,17 +91,17 @@ CASES = (
 )
 
 
-def measure(quick: bool = False) -> list[tuple[Any, ...]]:
+def measure(quick: bool = False) -> list[tuple[object, ...]]:
     """Return the rows of the table, in the order of COLUMNS."""
     return [row for case in CASES for row in _rows(case, 0.002 if quick else 1.0)]
 
 
-def measure_long() -> list[tuple[Any, ...]]:
+def measure_long() -> list[tuple[object, ...]]:
     """Return the rows of runs a hundred times as long."""
     return [row for case in CASES for row in _rows(case, LONGER)]
 
 
-def _rows(case: Case, factor: float) -> list[tuple[Any, ...]]:
+def _rows(case: Case, factor: float) -> list[tuple[object, ...]]:
     periods = max(2, round(PERIODS * case.share * factor))
     return [(case.name, method, RTOL, periods, *drift(case, method, RTOL, periods)) for method in INTEGRATORS]
 

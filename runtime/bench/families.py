@@ -27,6 +27,7 @@ from synchain.models.scenes.scene import Scene
 from ..prediction.families import CLOSED, LargestNetwork, largest_network
 from ..prediction.synchronisability import Verdict, verdict
 from ..stability.msf import MSF, msf
+from ..sweeps.pool import Execution
 from ..synchronisation.threshold import Criterion, simulate
 from .kit.tables import markdown
 
@@ -113,7 +114,7 @@ def _simulated(scene: Scene, graph: Topology, sigma: float, quick: bool) -> tupl
         return math.nan, math.nan
     criterion = Criterion(starts=2, transient=100.0, window=10.0) if quick else Criterion(starts=4)
     network = scene.replace(topology=graph, initial=None, record=("sync_error",))
-    found = simulate(network, [sigma], criterion=criterion, show_progress=False)
+    found = simulate(network, [sigma], criterion, execution=Execution(show_progress=False))
     return float(found.share[0]), float(found.error[0])
 
 

@@ -9,7 +9,6 @@ REFERENCE, which an independent integrator in 50 digits confirms (tests/test_con
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -31,11 +30,11 @@ CHOICES = (("rodas5p", False), ("switching", False), ("dop853", True))
 OWN = {"rodas5p", "switching", "dop853, set-valued"}
 
 
-def measure(quick: bool = False) -> list[tuple[Any, ...]]:
+def measure(quick: bool = False) -> list[tuple[object, ...]]:
     """Return the rows of the table, in the order of COLUMNS; every method with one lane and with
     all.
     """
-    rows: list[tuple[Any, ...]] = []
+    rows: list[tuple[object, ...]] = []
     for name in CASES[:1] if quick else CASES:
         smooth = read_case(name)
         for integrator, sticks in CHOICES[::2] if quick else CHOICES:
@@ -56,7 +55,7 @@ def exact(case: Case) -> Case:
     return Case(case.name, scene, case.times, states)
 
 
-def points(case: Case, integrator: str, full: bool, quick: bool) -> Iterator[tuple[Any, ...]]:
+def points(case: Case, integrator: str, full: bool, quick: bool) -> Iterator[tuple[object, ...]]:
     """Yield a row for each tolerance of a method."""
     lanes = native_width(2 if len(case.scene.y0) <= 3 else 1) if full else 1
     own = Own.compiled(case, integrator, lanes, REFILLS * lanes if full else 1, case.periods)
@@ -67,17 +66,17 @@ def points(case: Case, integrator: str, full: bool, quick: bool) -> Iterator[tup
         yield tuple(found)
 
 
-def summary(rows: list[tuple[Any, ...]]) -> str:
+def summary(rows: list[tuple[object, ...]]) -> str:
     """Times at equal error, and their ratio to the fastest."""
     return table(_named(rows), own=OWN)
 
 
-def draw(rows: list[tuple[Any, ...]]) -> Any:
+def draw(rows: list[tuple[object, ...]]) -> object:
     """A figure with one panel a case: time against error, a curve for each law and method."""
     from .kit.figure import figure
 
     return figure(_named(rows), own=OWN)
 
 
-def _named(rows: list[tuple[Any, ...]]) -> list[dict[str, Any]]:
+def _named(rows: list[tuple[object, ...]]) -> list[dict[str, object]]:
     return [dict(zip(COLUMNS, found, strict=True)) for found in rows]

@@ -35,9 +35,9 @@ are compared with.
 """
 
 
-def measure(quick: bool = False) -> list[tuple[Any, ...]]:
+def measure(quick: bool = False) -> list[tuple[object, ...]]:
     """Return the rows of the table, in the order of COLUMNS."""
-    rows: list[tuple[Any, ...]] = []
+    rows: list[tuple[object, ...]] = []
     for name in CASES[1:2] if quick else CASES:
         case = read_case(name)
         found = [point for choice in CHOICES for point in points(case, *choice, quick)]
@@ -48,7 +48,7 @@ def measure(quick: bool = False) -> list[tuple[Any, ...]]:
 
 def points(
     case: Case, method: str, registers: int, tolerances: tuple[float, ...], quick: bool
-) -> list[tuple[Any, ...]]:
+) -> list[tuple[object, ...]]:
     """Method, lanes, tolerance, error, microseconds and steps per period of each tolerance."""
     lanes = native_width(registers)
     own = Own.compiled(case, method, lanes, REFILLS * lanes, 5 if quick else min(case.periods, 50))

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -94,10 +93,10 @@ def notes() -> list[str]:
     return [f"skipped: {name} ({why})" for name, why in found if why]
 
 
-def measure(quick: bool = False) -> list[tuple[Any, ...]]:
+def measure(quick: bool = False) -> list[tuple[object, ...]]:
     """Return the rows of the table, in the order of COLUMNS."""
     present = [peer for peer in map(peers.load, peers.names()) if not peers.absent(peer)]
-    rows: list[tuple[Any, ...]] = []
+    rows: list[tuple[object, ...]] = []
     with tqdm(total=len(CASES) * (1 + len(present)), unit="curve", disable=None) as bar:
         for name in CASES:
             case = read_case(name)
@@ -121,7 +120,7 @@ def own_points(case: Case, quick: bool) -> Iterator[Point]:
             yield own.point(rtol, atol, quick)
 
 
-def row(case: Case, point: Point) -> tuple[Any, ...]:
+def row(case: Case, point: Point) -> tuple[object, ...]:
     """A point of a case in the order of COLUMNS."""
     steps = "" if np.isnan(point.steps) else point.steps
     return (
@@ -139,7 +138,7 @@ def row(case: Case, point: Point) -> tuple[Any, ...]:
     )
 
 
-def summary(rows: list[tuple[Any, ...]]) -> str:
+def summary(rows: list[tuple[object, ...]]) -> str:
     """A second table in Markdown: time of every method at the same error, and its ratio to the full
     lanes.
     """
@@ -148,7 +147,7 @@ def summary(rows: list[tuple[Any, ...]]) -> str:
     return table([dict(zip(COLUMNS, row, strict=False)) for row in rows], own={method.integrator for method in METHODS})
 
 
-def draw(rows: list[tuple[Any, ...]]) -> Any:
+def draw(rows: list[tuple[object, ...]]) -> object:
     """A figure with one panel a case: time against error, a curve for each method."""
     from .kit.figure import figure
 

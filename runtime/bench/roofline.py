@@ -12,6 +12,7 @@ from __future__ import annotations
 import inspect
 import math
 import time
+from collections.abc import Callable
 from statistics import median
 from typing import Any
 
@@ -81,7 +82,7 @@ def _row(n: int, width: int, quick: bool) -> tuple[object, ...]:
     return (n, width, flops, spent, median(x for x, _ in done), median(y for _, y in done), share)
 
 
-def _peak(width: int) -> Any:
+def _peak(width: int) -> Callable[[int], object]:
     """A function of a count that runs so many rounds of CHAINS independent multiply-adds."""
     names = [f"x{i}" for i in range(CHAINS)]
     text = PEAK.format(
@@ -94,17 +95,20 @@ def _peak(width: int) -> Any:
     return lambda count: function(start, count)
 
 
-def _function(text: str, width: int, names: dict[str, Any]) -> Any:
+def _function(text: str, width: int, names: dict[str, object]) -> Callable[..., object]:
     """Compile the function `work` of a text among the names of a module."""
     from numba import njit
 
     given = {name: getattr(lanes, name) for name in ("load", "store", "fma", "broadcast")}
-    space = {**names, **given, "njit": njit, "np": np, "WIDTH": width}
+    space: dict[str, Any] = {**names, **given, "njit": njit, "np": np, "WIDTH": width}
     exec(compile(text, "<roofline benchmark>", "exec"), space)
-    return space["work"]
+    work: Callable[..., object] = space["work"]
+    return work
 
 
-def _in_turn(first: Any, second: Any, seconds: float, rounds: int) -> list[tuple[float, float]]:
+def _in_turn(
+    first: Callable[[int], object], second: Callable[[int], object], seconds: float, rounds: int
+) -> list[tuple[float, float]]:
     """Seconds for one count of either function, timed in turn."""
     counts = []
     for function in (first, second):
@@ -117,7 +121,7 @@ def _in_turn(first: Any, second: Any, seconds: float, rounds: int) -> list[tuple
     return [(_timed(first, counts[0]) / counts[0], _timed(second, counts[1]) / counts[1]) for _ in range(rounds)]
 
 
-def _timed(function: Any, count: int) -> float:
+def _timed(function: Callable[[int], object], count: int) -> float:
     begin = time.perf_counter()
     function(count)
     return max(time.perf_counter() - begin, math.ulp(1.0))

@@ -13,9 +13,10 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -71,7 +72,7 @@ def measure(quick: bool = False) -> list[Row]:
     return rows
 
 
-def apart(function: Any, *arguments: object) -> Row:
+def apart(function: Callable[..., Row], *arguments: object) -> Row:
     """Call a function in a process of its own."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         row: Row = pool.submit(function, *arguments).result()

@@ -52,7 +52,7 @@ def measure(quick: bool = False) -> list[tuple[object, ...]]:
         grid = np.linspace(low, high, 13 if quick else 33)
         for words, change in CHANGES[:3] if quick else CHANGES:
             criterion = replace(Criterion(), **change)  # type: ignore[arg-type]
-            found = simulate(scene, grid, criterion=criterion).intervals
+            found = simulate(scene, grid, criterion).intervals
             rows.append((n, omega, words, *_widest(found), len(found)))
         rows.append(_by_exponent(n, omega, quick))
     return rows + [_by_exponent(n, omega, quick) for n, omega in (() if quick else PROJECTED)]

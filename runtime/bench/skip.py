@@ -53,7 +53,7 @@ class Case:
     name: str
     n: int
     given: dict[str, Any] = field(default_factory=dict)
-    less: dict[str, Any] = field(default_factory=dict)
+    less: dict[str, object] = field(default_factory=dict)
     fold_all: bool = False
     graph: str = "chain"
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -105,7 +105,7 @@ def _compared(name: str, graph: Topology, quick: bool) -> Iterator[Row]:
 
 
 def _sympy(graph: Topology) -> tuple[float, float, int, str]:
-    found: dict[Any, int] = {}
+    found: dict[object, int] = {}
 
     def run() -> None:
         found.update(graph.matrix.eigenvals())
@@ -117,7 +117,7 @@ def _sympy(graph: Topology) -> tuple[float, float, int, str]:
     return seconds, nan, len(found), "exact"
 
 
-def digits(exact: Spectrum, values: Any) -> float:
+def digits(exact: Spectrum, values: Iterable[complex]) -> float:
     """The decimal digits of the worst of the values, in the order of the distinct eigenvalues other
     than 0.
     """

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from synchain.models.inputs.checks import short_repr
-from synchain.models.mechanics.stick_slip import SLIP
+from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene
 
 from ..stability.attractor import cycle_propagators

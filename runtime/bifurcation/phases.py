@@ -22,7 +22,7 @@ from numpy.polynomial import Polynomial
 
 from synchain.models.graphs.families import topology
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.stick_slip import Contact
+from synchain.models.mechanics.friction import Contact
 from synchain.models.scenes.scene import Scene
 
 from ..sweeps.run import run

@@ -6,15 +6,15 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
 
 from synchain.models.inputs.checks import check_number, suggestion
+from synchain.models.inputs.node_name import NodeName
 from synchain.models.scenes.scene import KEYWORDS, Scene, a_scene
 
 __all__ = ["check_keywords", "with_axes", "with_parameters"]
 
 
-def with_axes(function: Callable[..., Any], scene: Scene, axes: Mapping[str, Any]) -> Scene:
+def with_axes(function: Callable[..., object], scene: Scene, axes: Mapping[str, object]) -> Scene:
     """Return a scene with parameters and initial states fixed or swept.
 
     Parameters
@@ -31,15 +31,14 @@ def with_axes(function: Callable[..., Any], scene: Scene, axes: Mapping[str, Any
     ValueError
         If a name is no parameter, setting or initial state.
     """
-    fixed: dict[str, Any] = {}
-    swept: dict[str, Any] = {axis.name: axis.values for axis in a_scene(scene).axes}
+    fixed: dict[str, object] = {}
+    swept: dict[str, object] = {axis.name: axis.values for axis in a_scene(scene).axes}
     start = {name: list(values) for name, values in scene.initial.items()}
     for name, value in axes.items():
         if isinstance(value, Iterable) and not isinstance(value, str | bytes) and getattr(value, "ndim", 1) > 0:
             swept[name] = value
-        elif _is_state(scene, name):
-            component, node = name.rsplit("_", 1)
-            start[component][scene.equations.holders(component).index(int(node) - 1)] = check_number(name, value)
+        elif state := _state(scene, name):
+            start[state.base][scene.equations.holders(state.base).index(state.index)] = check_number(name, value)
             swept.pop(name, None)
         else:
             fixed[name] = value
@@ -49,7 +48,7 @@ def with_axes(function: Callable[..., Any], scene: Scene, axes: Mapping[str, Any
 
 
 def with_parameters(
-    function: Callable[..., Any], scene: Scene, parameters: Mapping[str, Any], **settings: Any
+    function: Callable[..., object], scene: Scene, parameters: Mapping[str, object], **settings: object
 ) -> Scene:
     """Return the scene with the settings that a function needs and the parameters that its caller
     passed.
@@ -65,7 +64,7 @@ def with_parameters(
 
 
 def check_keywords(
-    function: Callable[..., Any],
+    function: Callable[..., object],
     scene: Scene,
     names: Iterable[str],
     *,
@@ -79,9 +78,7 @@ def check_keywords(
     settings that are `taken` are not.
     """
     settings = [name for name in KEYWORDS if name not in taken]
-    strange = next(
-        (n for n in names if not (scene.takes(n) or n in settings or (states and _is_state(scene, n)))), None
-    )
+    strange = next((n for n in names if not (scene.takes(n) or n in settings or (states and _state(scene, n)))), None)
     if strange is not None:
         initial = scene.equations.state if states else ()
         known = dict.fromkeys((*scene.parameters, *initial, *_own(function), *settings))
@@ -91,14 +88,15 @@ def check_keywords(
         )
 
 
-def _is_state(scene: Scene, name: str) -> bool:
-    """True for the name of an initial state; equations are derived only for a name that looks like
-    one.
+def _state(scene: Scene, name: str) -> NodeName | None:
+    """The parts of the name of an initial state, None for another name; equations are derived only
+    for a name that looks like one.
     """
-    return name.rpartition("_")[0] in scene.components and name in scene.equations.state
+    state = NodeName.parse(name)
+    return state if state and state.base in scene.components and name in scene.equations.state else None
 
 
-def _own(function: Callable[..., Any]) -> list[str]:
+def _own(function: Callable[..., object]) -> list[str]:
     """The names of a function's keywords, without the scene and the collection of parameters."""
     arguments = inspect.signature(function).parameters.values()
     return [a.name for a in arguments if a.kind is not a.VAR_KEYWORD and a.name != "scene"]

@@ -6,7 +6,7 @@ import re
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from ..console.outcome import FAILED, FINE, WrongUse, discard_output, print_json, wrong_use
 
@@ -122,7 +122,7 @@ def _problems(line: Sequence[Verdict]) -> list[str]:
     return rows
 
 
-def _as_dict(line: Sequence[Verdict]) -> dict[str, Any]:
+def _as_dict(line: Sequence[Verdict]) -> dict[str, object]:
     graphs = [
         {
             "topology": v.claim.graph.name,

@@ -1,15 +1,36 @@
-"""`synchain doctor`: is this installation sound?"""
+"""`synchain doctor`: is this installation sound?
+
+It looks at versions, cache, processor, an exact spectrum and a trial kernel.
+"""
 
 from __future__ import annotations
 
+import os
+import platform
 import sys
 import warnings
 from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ..console.outcome import FAILED, FINE, print_json
 
+if TYPE_CHECKING:
+    import sympy as sp
+
+__all__ = ["CHECKS", "Check", "configure", "examine", "execute", "judge_spectrum", "judge_trajectory"]
+
 SUMMARY = "check the installation, the cache, the processor and known answers"
 EXAMPLES = ("synchain doctor", "synchain doctor --json")
+
+SOUND, DOUBTFUL, WRONG = "fine", "doubtful", "wrong"
+
+TRAJECTORY_ERROR = 1e-9
+"""Largest error of a state of the trial kernel."""
+
+Answer = tuple[str, str, str]
+"""Outcome, what was found, what helps."""
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -19,8 +40,6 @@ def configure(parser: ArgumentParser) -> None:
 
 def execute(arguments: Namespace) -> int:
     """Print one line for each check; exit code 1 where something is wrong."""
-    from ..console.doctor import examine
-
     checks = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # that kernels are not kept on disk is a line of its own
@@ -29,9 +48,154 @@ def execute(arguments: Namespace) -> int:
             if not arguments.json:
                 remedy = f"\n{'':32}{check.remedy}" if check.remedy else ""
                 print(f"{check.outcome:<9} {check.name:<21} {check.found}{remedy}", flush=True)
-    wrong = [check.name for check in checks if check.outcome == "wrong"]
+    wrong = [check.name for check in checks if check.outcome == WRONG]
     if arguments.json:
         print_json({"sound": not wrong, "checks": [check.as_dict() for check in checks]})
     if wrong:
         print(f"synchain doctor: wrong: {', '.join(wrong)}", file=sys.stderr)
     return FAILED if wrong else FINE
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """The outcome of one check.
+
+    Attributes
+    ----------
+    name : str
+        What was checked.
+    outcome : str
+        "fine", "doubtful" or "wrong".
+    found : str
+        What the check saw.
+    remedy : str
+        What the user can do; empty if the outcome is fine.
+    """
+
+    name: str
+    outcome: str
+    found: str
+    remedy: str = ""
+
+    def as_dict(self) -> dict[str, str]:
+        """The check in JSON types."""
+        return {"name": self.name, "outcome": self.outcome, "found": self.found, "remedy": self.remedy}
+
+
+def examine(checks: Mapping[str, Callable[[], Answer]] | None = None) -> Iterator[Check]:
+    """Run checks one after the other.
+
+    Parameters
+    ----------
+    checks : mapping of str to callable, optional
+        Name -> function that returns outcome, finding and remedy; CHECKS by default.
+
+    Yields
+    ------
+    Check
+        One for each function; an exception in it is the outcome "wrong".
+    """
+    for name, check in (CHECKS if checks is None else checks).items():
+        try:
+            outcome, found, remedy = check()
+        except Exception as problem:  # a broken installation may raise anything anywhere
+            reason = " ".join(str(problem).split()) or "no reason given"
+            outcome, found, remedy = WRONG, f"{type(problem).__name__}: {reason}", "install synchain anew"
+        yield Check(name, outcome, found, remedy)
+
+
+def _packages() -> Answer:
+    import importlib.metadata
+
+    from packaging.requirements import Requirement
+
+    found, missing = [f"Python {platform.python_version()}"], []
+    for line in importlib.metadata.requires("synchain") or ():
+        need = Requirement(line)
+        if need.marker is not None and not need.marker.evaluate({"extra": ""}):
+            continue
+        try:
+            version = importlib.metadata.version(need.name)
+        except importlib.metadata.PackageNotFoundError:
+            missing.append(f"{need.name} is missing, expected {need.name}{need.specifier}")
+            continue
+        found.append(f"{need.name} {version}")
+        if not need.specifier.contains(version, prereleases=True):
+            missing.append(f"{need.name} is {version}, expected {need.name}{need.specifier}")
+    if missing:
+        return WRONG, "; ".join(missing), "python -m pip install --upgrade synchain"
+    return SOUND, f"synchain {importlib.metadata.version('synchain')}, {', '.join(found)}", ""
+
+
+def _cache() -> Answer:
+    from synchain.codegen.kernels.cache import cache_folder, describe, open_folder
+
+    try:
+        with open_folder(cache_folder()) as opened:
+            opened.write(probe := f"probe-{os.getpid()}", b"0" * 4096)
+            opened.delete(probe)
+            folder = opened.path
+    except (OSError, RuntimeError) as problem:  # RuntimeError: no home folder
+        words = " ".join(str(problem).split())
+        return DOUBTFUL, f"every process compiles its kernels: {words}", "set SYNCHAIN_CACHE to a folder of yours"
+    mode = f", mode {folder.stat().st_mode & 0o777:o}" if os.name == "posix" else ""
+    return SOUND, f"{folder}, {describe()['kernels']} kernels{mode}", ""
+
+
+def _processor() -> Answer:
+    import llvmlite.binding as llvm
+
+    from synchain.codegen.simd.lane_types import native_width
+
+    from ..support.threads import worker_count
+
+    width, threads = native_width(), worker_count(None)
+    words = f"{llvm.get_host_cpu_name()}, {width} lanes of double precision, {threads} threads"
+    if width < 4 and platform.machine().lower() in ("x86_64", "amd64"):
+        return DOUBTFUL, words, "without AVX sweeps take several times as long; unset SYNCHAIN_WIDTH if it is set"
+    return SOUND, words, ""
+
+
+def _spectrum() -> Answer:
+    from synchain.models.graphs.families import topology
+
+    return judge_spectrum({e.exact: e.multiplicity for e in topology("chain", 4).spectrum.eigenvalues})
+
+
+def judge_spectrum(eigenvalues: Mapping[sp.Expr, int]) -> Answer:
+    """Compare exact eigenvalues and their multiplicities with those of the chain of four nodes."""
+    import sympy as sp
+
+    root = sp.sqrt(2)
+    if dict(eigenvalues) != {sp.S.Zero: 1, root - 2: 1, sp.Integer(-2): 1, -root - 2: 1}:
+        return WRONG, f"the chain of 4 has {dict(eigenvalues)}", "install sympy and python-flint anew"
+    return SOUND, "the chain of 4 has 0, -2+√2, -2, -2-√2, exactly", ""
+
+
+def _trajectory() -> Answer:
+    import numpy as np
+
+    from ..bench.kit.cases import read_case
+    from ..bench.kit.own_program import prepare
+
+    case = read_case("friction, n = 1").within(5)
+    states, counts = prepare(case, "rodas5p", 1)(1e-11, 1e-12, case.times)
+    return judge_trajectory(float(np.abs(states - case.states).max()), int(counts[-1, 1]))
+
+
+def judge_trajectory(error: float, steps: int) -> Answer:
+    """Judge the largest error of a state over five drive periods; NaN is wrong."""
+    words = f"stick-slip over 5 periods: error {error:.1e} in {steps} steps"
+    if not error <= TRAJECTORY_ERROR:
+        return WRONG, f"{words}; expected at most {TRAJECTORY_ERROR:g}", "run: synchain cache clear"
+    return SOUND, words, ""
+
+
+CHECKS: Mapping[str, Callable[[], Answer]] = {
+    "packages": _packages,
+    "cache": _cache,
+    "processor": _processor,
+    "spectrum": _spectrum,
+    "trajectory": _trajectory,
+}
+"""Name -> check."""

@@ -55,7 +55,7 @@ def _check(kind: str, name: str) -> None:
             f"name {name!r}; expected small letters, digits and underscores, a letter first, at most {LENGTH}, no word "
             "of Python, and neither 'default' nor 'none': e.g. my_law"
         )
-    from synchain.models.graphs.family_file import TOPOLOGY
+    from synchain.models.graphs.families import TOPOLOGY
     from synchain.models.inputs import plugins
     from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 

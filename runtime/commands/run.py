@@ -10,7 +10,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..console.arguments import add_scene, add_workers, folder, setting, tolerance
 from ..console.outcome import FAILED, FINE, Failed, WrongUse, sentence, warn, wrong_use
@@ -125,7 +125,7 @@ def changed_scene(arguments: Namespace) -> Scene:
     from ..sweeps.run import run
 
     scene = load_scene(arguments.scene)
-    changes: dict[str, Any] = {}
+    changes: dict[str, object] = {}
     for name, value in arguments.set:
         if name in changes:
             raise WrongUse(f"--set gives {name} twice; expected it once")
@@ -136,7 +136,7 @@ def changed_scene(arguments: Namespace) -> Scene:
     return scene if arguments.rtol is None else scene.replace(rtol=arguments.rtol)
 
 
-def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[str, Any]) -> Any:
+def _fitting(scene: Scene, name: str, value: float | tuple[float, ...] | dict[str, object]) -> object:
     """The value of a setting as the scene wants it."""
     from synchain.models.inputs.node_name import NodeName
 

@@ -1,1 +1,1 @@
-"""What the commands share: arguments, networks, outcomes, reports, the doctor. Computes nothing."""
+"""What the commands share: arguments, networks, outcomes, reports. Computes nothing."""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from argparse import ArgumentParser, ArgumentTypeError
-from typing import Any
 
 from synchain.models.inputs.arithmetic import constant
 from synchain.models.inputs.checks import short_repr
+from synchain.models.inputs.options import integer_option
 from synchain.models.scenes.axis import LIMIT as AXIS_LIMIT
 from synchain.models.scenes.axis import Axis
 
@@ -28,21 +27,17 @@ NODES = 100_000
 """Largest number of oscillators that can be asked for."""
 
 
-def whole(text: str, most: int = NODES) -> int:
-    """A whole number of at most NODES, or of at most another limit."""
-    if not re.fullmatch(r"[+-]?[0-9]+", text):
-        raise ArgumentTypeError(f"found {short_repr(text)}; expected a whole number")
-    if len(text) > 9 or int(text) > most:
-        raise ArgumentTypeError(f"found {short_repr(text)}; expected at most {most}")
-    return int(text)
+def whole(text: str, least: int = -NODES, most: int = NODES) -> int:
+    """A whole number from `least` to `most`."""
+    try:
+        return integer_option("number", text, least, most)
+    except (TypeError, ValueError) as error:
+        raise ArgumentTypeError(str(error)) from None
 
 
 def positive(text: str, most: int = NODES) -> int:
     """A whole number of at least 1."""
-    value = whole(text, most)
-    if value < 1:
-        raise ArgumentTypeError(f"found {value}; expected at least 1")
-    return value
+    return whole(text, 1, most)
 
 
 def folder(text: str) -> str:
@@ -76,7 +71,7 @@ def tolerance(text: str) -> float:
     return value
 
 
-def span(text: str) -> dict[str, Any]:
+def span(text: str) -> dict[str, object]:
     """LO:HI:N as the table from, to and count of an axis, none of whose values is built."""
     parts = text.split(":")
     if len(parts) != 3:
@@ -100,7 +95,7 @@ def grid(text: str) -> tuple[float, ...]:
     return values
 
 
-def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, Any]]:
+def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, object]]:
     """name=value, name=a,b,c or name=LO:HI:N."""
     name, equals, value = text.partition("=")
     if not (name.isidentifier() and equals and value):

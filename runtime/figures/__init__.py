@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from synchain.models.inputs.checks import suggestion
 
@@ -54,30 +54,30 @@ class Drawing:
         width, height = self.module.SIZE
         return float(width), float(height)
 
-    def compute(self, runs: FigureRuns) -> Any:
+    def compute(self, runs: FigureRuns) -> object:
         """Compute the data of the figure, through runs that other figures may have made already."""
         return self.module.compute(self.name, runs)
 
-    def table(self, data: Any) -> Table:
+    def table(self, data: object) -> Table:
         """Return the numbers as columns for `<name>.csv`."""
         table: Table = self.module.table(data)
         return table
 
-    def layout(self, figure: Figure) -> Any:
+    def layout(self, figure: Figure) -> object:
         """Add the axes that `draw` needs to a matplotlib figure and return them."""
         return self.module.layout(figure) if hasattr(self.module, "layout") else figure.add_subplot()
 
-    def ranges(self, data: Any) -> Table | None:
+    def ranges(self, data: object) -> Table | None:
         """Return the ranges as columns for `<name>_ranges.csv`, or None if the figure has none."""
         table: Table | None = self.module.ranges(data) if hasattr(self.module, "ranges") else None
         return table
 
-    def document(self, data: Any) -> str | None:
+    def document(self, data: object) -> str | None:
         """Return the text of `<name>.md`, or None if the figure has none."""
         text: str | None = self.module.document(data) if hasattr(self.module, "document") else None
         return text
 
-    def draw(self, axes: Any, data: Any) -> Any:
+    def draw(self, axes: object, data: object) -> object:
         """Draw into axes from `layout` and return them."""
         return self.module.draw(axes, data)
 

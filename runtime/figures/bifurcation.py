@@ -8,7 +8,6 @@ attractors.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -89,7 +88,7 @@ def table(data: Diagram) -> Table:
     """Return one row for each section point; a cell without any has one row with its status."""
     result = data.result
     states = [str(name) for name in result.data.state.values]
-    rows: list[tuple[Any, ...]] = []
+    rows: list[tuple[object, ...]] = []
     names = status_names(result.status)
     for k, value in enumerate(result.data[data.axis].values):
         count = int(result.section_count.values[k]) if names[k] == "finished" else 0

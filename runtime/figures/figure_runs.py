@@ -14,6 +14,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..prediction.intervals import Interval, scale
 from ..results.result import Result
+from ..sweeps.pool import Execution
 from ..sweeps.run import run
 from ..synchronisation.threshold import Criterion, Sweep, probe, project, simulate
 
@@ -140,8 +141,7 @@ class FigureRuns:
         return {
             "resolution": self.quality.resolution,
             "criterion": self.quality.criterion,
-            "workers": self.workers,
-            "show_progress": self.show_progress,
+            "execution": Execution(self.workers, show_progress=self.show_progress),
         }
 
 

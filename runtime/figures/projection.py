@@ -9,7 +9,6 @@ inside, a darker band leads down from there: the predicted range of sigma.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -81,7 +80,7 @@ def compute(name: str, runs: FigureRuns) -> Projection:
 
 def table(data: Projection) -> Table:
     """Return errors (median over the starts), shares and status; exponents and their errors."""
-    rows: list[tuple[Any, ...]] = []
+    rows: list[tuple[object, ...]] = []
     for what, sweep in (("probe", data.probe), ("network", data.network)):
         for x, error, share in zip(sweep.x, sweep.error, sweep.share, strict=True):
             place = (x, None) if what == "probe" else (None, x)

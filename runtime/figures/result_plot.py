@@ -9,6 +9,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from synchain.models.inputs.node_name import NodeName
+
 from ..results.result import Result
 from ..support.status import Status
 from .style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, context, failures, new_figure, note, symbol
@@ -169,9 +171,9 @@ def _map(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
 def _phase(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
     """Velocity over position in the first cell; for many oscillators colours over time."""
     data = data.isel({name: 0 for name in data.status.dims})
-    own = [_own(data, i) for i in range(1, result.scene.n + 1)]
+    own = [_own(data, i) for i in range(result.scene.n)]
     if len(own) > len(CYCLE):
-        values = data.trajectory.sel(state=[names[0] for names in own])
+        values = data.trajectory.sel(state=[str(names[0]) for names in own])
         time = data.trajectory_time.values
         painted = axes.pcolormesh(
             time, np.arange(1, len(own) + 1), values.T, shading="nearest", cmap="cividis", rasterized=True
@@ -180,32 +182,33 @@ def _phase(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
         axes.figure.colorbar(painted, ax=axes, label=_common(names[0] for names in own))
         return axes
     for i, names in enumerate(own):
-        x, y = (data.trajectory.sel(state=name) for name in names)
+        x, y = (data.trajectory.sel(state=str(name)) for name in names)
         axes.plot(x, y, color=CYCLE[i % len(CYCLE)], linewidth=0.7, label="oscillator " * (i == 0) + str(i + 1))
     axes.set(xlabel=_common(names[0] for names in own), ylabel=_common(names[1] for names in own))
     return _legend(axes, result)
 
 
-def _own(data: xr.Dataset, i: int) -> tuple[str, str]:
-    """First two states of oscillator `i` (from 1); the first one twice if there is no other."""
-    names = [str(name) for name in data.state.values if str(name).rpartition("_")[2] == str(i)]
+def _own(data: xr.Dataset, i: int) -> tuple[NodeName, NodeName]:
+    """First two states of oscillator `i` (from 0); the first one twice if there is no other."""
+    states = (NodeName.parse(str(name)) for name in data.state.values)
+    names = [state for state in states if state and state.index == i]
     return names[0], names[min(1, len(names) - 1)]
 
 
-def _common(states: Iterable[str]) -> str:
+def _common(states: Iterable[NodeName]) -> str:
     """Name of states of several oscillators without their numbers; several names with commas."""
-    return ", ".join(dict.fromkeys(symbol(name.rpartition("_")[0]) for name in states))
+    return ", ".join(dict.fromkeys(symbol(state.base) for state in states))
 
 
 def _end(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
     """Final states of every oscillator, over the axis if there is one."""
-    own = [_own(data, i) for i in range(1, result.scene.n + 1)]
+    own = [_own(data, i) for i in range(result.scene.n)]
     first, second = (_common(names[k] for names in own) for k in (0, 1))
     along = _along(data, result) if data.status.ndim else None
     for i, names in enumerate(own, start=1):
-        end = data.end.sel(state=names[0])
+        end = data.end.sel(state=str(names[0]))
         x = end if along is None else along[0]
-        y = data.end.sel(state=names[1]) if along is None else end
+        y = data.end.sel(state=str(names[1])) if along is None else end
         color = CYCLE[(i - 1) % len(CYCLE)]
         axes.plot(x, y, linestyle="none", marker=".", color=color, label="oscillator " * (i == 1) + str(i))
     labels = (

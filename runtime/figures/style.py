@@ -47,7 +47,7 @@ COLUMN = 3.46
 """Width of one column in inches."""
 DPI = 300
 
-SETTINGS: dict[Any, Any] = {
+SETTINGS: dict[str, Any] = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "Helvetica", "sans-serif"],
     "font.size": 8.0,

@@ -45,7 +45,7 @@ class Table:
                 )
 
     @classmethod
-    def of(cls, **columns: Iterable[Any]) -> Table:
+    def of(cls, **columns: Iterable[object]) -> Table:
         """Build a table from columns of equal length."""
         return cls(tuple(columns), tuple(zip(*columns.values(), strict=True)))
 
@@ -69,7 +69,7 @@ def status_names(status: xr.DataArray) -> list[str]:
     return [Status(int(code)).name.lower() for code in np.ravel(status.values)]
 
 
-def _cell(value: Any) -> str:
+def _cell(value: object) -> str:
     """Text of one entry."""
     if value is None:
         return ""

@@ -18,7 +18,7 @@ from fractions import Fraction
 
 from flint import arb, fmpq
 
-from synchain.models.algebra.balls import Ball, precision
+from synchain.models.algebra.balls import Ball, cotangent, precision
 from synchain.models.graphs.families import family as family_plugin
 from synchain.models.graphs.families import topology
 
@@ -168,12 +168,7 @@ def _fits(ratio: Callable[[int], Ball], n: int, allowed: Fraction) -> bool:
 
 def _chain(n: int) -> Ball:
     """cot²(π/2n), which is (1 + cos(π/n)) / (1 - cos(π/n))."""
-    return {2: 1, 3: 3}.get(n) or _cotangent(fmpq(1, 2 * n)) ** 2
-
-
-def _cotangent(turn: fmpq) -> arb:
-    """Cotangent of an angle in units of π."""
-    return arb.cos_pi_fmpq(turn) / arb.sin_pi_fmpq(turn)
+    return {2: 1, 3: 3}.get(n) or cotangent(fmpq(1, 2 * n)) ** 2
 
 
 def _ring(n: int) -> Ball:

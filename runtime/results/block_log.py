@@ -15,12 +15,12 @@ import os
 import struct
 import time
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from io import FileIO
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, cast
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from ..cells.buffers import Buffers
 from ..support.files import whole_file
 from ..support.status import CODES, tally
 
-__all__ = ["BlockLog", "is_block_log"]
+__all__ = ["BlockLog", "Description", "is_block_log"]
 
 KIND = b"synchain blocks "
 MAGIC = KIND + b"2\n"
@@ -64,6 +64,23 @@ def is_block_log(path: str | os.PathLike[str]) -> bool:
     return start == KIND or (Path(path).suffix == ".partial" and start[:3] != b"CDF")
 
 
+class Description(TypedDict):
+    """What a log says of its sweep, in JSON types, so that it can be read without the kernel.
+
+    The numbers of blocks, of cells in a block, of the states and the samples of a cell; what its
+    reduction merged, and the exponents of a certified run.
+    """
+
+    attributes: dict[str, Any]
+    blocks: int
+    size: int
+    dimension: int
+    samples: int
+    merged: list[list[int]] | None
+    together: bool
+    certificate: list[list[float]] | None
+
+
 @dataclass(slots=True)
 class BlockLog:
     """An open log of finished blocks.
@@ -82,7 +99,7 @@ class BlockLog:
     """
 
     path: Path
-    about: Mapping[str, Any]
+    about: Description
     places: np.ndarray
     counts: np.ndarray
     _file: FileIO = field(repr=False)
@@ -91,13 +108,13 @@ class BlockLog:
     _flushed: float = field(default_factory=time.monotonic)
 
     @staticmethod
-    def describe(path: str | os.PathLike[str]) -> dict[str, Any]:
+    def describe(path: str | os.PathLike[str]) -> Description:
         """Return the description of the sweep, without its blocks; ValueError if it is damaged."""
         with open_regular(path) as file:
             return _about(file, path)
 
     @staticmethod
-    def create(path: str | os.PathLike[str], about: Mapping[str, Any]) -> None:
+    def create(path: str | os.PathLike[str], about: Description) -> None:
         """Create a log without blocks; `about` is what JSON can hold and says how many `blocks`
         there are.
         """
@@ -208,7 +225,7 @@ def _second(length: int) -> int:
     return -(-length // PAGE) * PAGE
 
 
-def _about(file: FileIO, path: str | os.PathLike[str]) -> dict[str, Any]:
+def _about(file: FileIO, path: str | os.PathLike[str]) -> Description:
     """The description of the sweep, from the first copy that is sound; the file is left at its
     first record.
     """
@@ -236,7 +253,7 @@ def _about(file: FileIO, path: str | os.PathLike[str]) -> dict[str, Any]:
     raise ValueError(f"{os.fspath(path)}: both copies of its first line are damaged; {AGAIN}")
 
 
-def _understood(text: bytes, path: str | os.PathLike[str]) -> dict[str, Any]:
+def _understood(text: bytes, path: str | os.PathLike[str]) -> Description:
     """The first line as JSON that has the numbers that a store needs."""
     try:
         about = json.loads(text)
@@ -244,11 +261,11 @@ def _understood(text: bytes, path: str | os.PathLike[str]) -> dict[str, Any]:
         about = None
     names = ("blocks", "dimension", "samples")
     if isinstance(about, dict) and all(type(about.get(n)) is int and 0 <= about[n] <= MOST for n in names):
-        return about
+        return cast(Description, about)
     raise ValueError(f"{os.fspath(path)}: its first line does not say what its sweep is; {AGAIN}")
 
 
-def _records(file: FileIO, place: int, size: int) -> Iterator[tuple[int, tuple[Any, ...], bool]]:
+def _records(file: FileIO, place: int, size: int) -> Iterator[tuple[int, tuple[int, ...], bool]]:
     """Place, head and soundness of the numbers of each record; what is no record is passed over."""
     while place + HEAD.size <= size:
         file.seek(place)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -21,7 +20,7 @@ from ..support.arrays import numbers
 __all__ = ["EnergyFunction", "energy_function"]
 
 Array = np.ndarray
-Formula = Callable[..., Any]
+Formula = Callable[..., np.ndarray | float]
 Values = Mapping[str, float] | None
 
 

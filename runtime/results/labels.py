@@ -141,7 +141,7 @@ def coordinates(scene: Scene) -> dict[str, Any]:
     return coords
 
 
-def scene_of(attributes: Mapping[Any, Any]) -> Scene:
+def scene_of(attributes: Mapping[str, Any]) -> Scene:
     """Return the scene of a result from its attributes.
 
     Raises
@@ -173,7 +173,7 @@ def alike(first: Scene, second: Scene) -> bool:
     return one == other or one.as_dict() == other.as_dict()
 
 
-def changed(attributes: Mapping[Any, Any], scene: Scene) -> bool:
+def changed(attributes: Mapping[str, Any], scene: Scene) -> bool:
     """True if the code behind the names of a scene's parts has changed since the result was
     computed.
     """
@@ -187,7 +187,7 @@ def provenance(
     skipped: tuple[str, ...],
     versions: str,
     processor: str,
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Return how a result came about, as its attributes; `skipped` says what was left out of the
     equations.
     """

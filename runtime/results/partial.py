@@ -8,7 +8,6 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -22,7 +21,7 @@ from ..cells.plan import Planner
 from ..cells.reduce import NodeMerge, Reduction
 from ..support.files import understood, whole_file
 from ..support.netcdf import Sheet, seal, unsealed
-from .block_log import BlockLog
+from .block_log import BlockLog, Description
 from .certificate import VERDICTS, Certificate
 from .labels import MEANINGS, Variable, coordinates, dimensions, scene_of, variables
 from .result import Result, gather
@@ -31,11 +30,9 @@ __all__ = ["certificate_of", "describe_sweep", "layout_of", "partial_path", "rea
 
 
 def describe_sweep(
-    reduction: Reduction, layout: Layout, attributes: Mapping[str, Any], certificate: Certificate | None
-) -> dict[str, Any]:
-    """Return what a block log says of its sweep, in JSON types, so that it can be read without the
-    kernel.
-    """
+    reduction: Reduction, layout: Layout, attributes: Mapping[str, object], certificate: Certificate | None
+) -> Description:
+    """Return what a block log says of its sweep."""
     merge = reduction.merge
     exponents = None if certificate is None else (certificate.exponent, certificate.stderr, certificate.diffusion)
     return {
@@ -50,7 +47,7 @@ def describe_sweep(
     }
 
 
-def layout_of(about: Mapping[str, Any], scene: Scene) -> Layout:
+def layout_of(about: Description, scene: Scene) -> Layout:
     """Return the blocks of a log.
 
     Raises
@@ -64,7 +61,7 @@ def layout_of(about: Mapping[str, Any], scene: Scene) -> Layout:
     return layout
 
 
-def certificate_of(about: Mapping[str, Any]) -> Certificate | None:
+def certificate_of(about: Description) -> Certificate | None:
     """Return the certificate of a log's cells; None if they are not certified."""
     exponents = about["certificate"]
     return None if exponents is None else Certificate(*(np.array(part, dtype=float) for part in exponents))

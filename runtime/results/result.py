@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -170,7 +170,7 @@ def read_result(path: Path) -> Result:
     return Result(data, scene)
 
 
-def attributes_of(attributes: Mapping[Any, Any], path: Path) -> dict[str, Any]:
+def attributes_of(attributes: Mapping[object, object], path: Path) -> dict[str, object]:
     """The attributes of a result's file without its digest; a RuntimeWarning says if there is none."""
     if "scene" in attributes and DIGEST not in attributes:
         warnings.warn(
@@ -183,7 +183,7 @@ def attributes_of(attributes: Mapping[Any, Any], path: Path) -> dict[str, Any]:
 
 def gather(
     scene: Scene,
-    attributes: Mapping[str, Any],
+    attributes: Mapping[str, object],
     spans: np.ndarray,
     buffers: Buffers,
     certificate: Certificate | None = None,

@@ -3,14 +3,71 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
+from tqdm import tqdm
 
-__all__ = ["Batches"]
+from synchain.models.inputs.checks import check_flag, check_integer, check_number, check_positive
+
+__all__ = ["Averaging", "Batches"]
 
 BATCHES = 64
 """Most batches that are kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Averaging:
+    """How long to average along an orbit; checked.
+
+    Parameters
+    ----------
+    precision : float
+        The average ends if every standard error is below this value.
+    periods : float
+        Longest average, in periods of the drive, or in units of 2 pi if there is none.
+    transient : float
+        Transient before the average, in the same units.
+    seed : int
+        Seed of what is drawn at random before the orbit begins.
+    show_progress : bool or None
+        Whether to show a progress bar; None shows it on terminals only.
+    """
+
+    precision: float
+    periods: float
+    transient: float
+    seed: int
+    show_progress: bool | None = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "precision", check_number("precision", self.precision, 0.0))
+        object.__setattr__(self, "periods", check_positive("periods", self.periods))
+        object.__setattr__(self, "transient", check_number("transient", self.transient, 0.0))
+        object.__setattr__(self, "seed", check_integer("seed", self.seed, 0))
+        if self.show_progress is not None:
+            check_flag("show_progress", self.show_progress)
+
+    def rounds(self, batches: Batches, step: float, error: Callable[[], np.ndarray]) -> Iterator[None]:
+        """Yield until the average is long or precise enough; each time one block must be added.
+
+        Parameters
+        ----------
+        batches : Batches
+            The average.
+        step : float
+            Length of a block in periods.
+        error : callable
+            Returns the standard errors (m,) that must become small.
+        """
+        hidden = None if self.show_progress is None else not self.show_progress
+        with tqdm(total=math.ceil(self.periods), unit="period", disable=hidden) as bar:
+            while batches.blocks * step < self.periods:
+                yield
+                bar.update(step)
+                if batches.due and np.all(error() <= self.precision):
+                    return
 
 
 @dataclass(slots=True)

@@ -8,21 +8,18 @@ Source: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from tqdm import tqdm
 
 from synchain.models.dynamics.variational import Variation, clustered
 from synchain.models.graphs.clusters import Clusters, clusters
 from synchain.models.scenes.scene import Scene
 
 from ..cells.initial_modes import with_modes
-from ..support.arrays import averaging
-from .averages import Batches
+from .averages import Averaging, Batches
 from .exponents import single_cell
 from .orbits import unit_of_time
 from .variational_integrator import VariationalIntegrator
@@ -167,21 +164,17 @@ def cluster_exponents(
     FloatingPointError
         If the integration fails.
     """
-    precision, periods, transient, seed = averaging(precision, periods, transient, seed)
+    settings = Averaging(precision, periods, transient, seed, show_progress)
     scene = single_cell(cluster_exponents, scene, rtol, parameters)
     partition = _of_graph(scene, state)
     variation, unit = clustered(scene.equations, partition), unit_of_time(scene)
-    integrator = _integrator(scene, partition, variation, seed)
-    for _ in range(round(transient)):
+    integrator = _integrator(scene, partition, variation, settings.seed)
+    for _ in range(round(settings.transient)):
         integrator.advance(unit)
     batches, apart = Batches(unit), np.zeros((partition.quotient.n,) * 2)
-    with tqdm(total=math.ceil(periods), unit="period", disable=not show_progress and show_progress is not None) as bar:
-        while batches.blocks < periods:
-            batches.add(integrator.advance(unit))
-            apart = np.maximum(apart, _differences(integrator.state[0], partition.quotient.n, _deviating(variation)))
-            bar.update(1)
-            if batches.due and np.all(batches.error() <= precision):
-                break
+    for _ in settings.rounds(batches, 1.0, batches.error):
+        batches.add(integrator.advance(unit))
+        apart = np.maximum(apart, _differences(integrator.state[0], partition.quotient.n, _deviating(variation)))
     mean, error, time = batches.mean()[0], batches.error_by_start()[0], batches.blocks * unit
     return ClusterExponents(partition, mean[1:], error[1:], float(mean[0]), float(error[0]), apart, time)
 

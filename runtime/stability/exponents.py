@@ -12,12 +12,10 @@ Strelcyn, Meccanica 15, 9 (1980); batch means: Flyvbjerg & Petersen, J. Chem. Ph
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from tqdm import tqdm
 
 from synchain.models.graphs.families import topology
 from synchain.models.inputs.checks import check_integer
@@ -25,11 +23,10 @@ from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import with_parameters
 from ..prediction.intervals import Interval
-from ..support.arrays import averaging
 from ..support.arrays import row as row_of
 from ..support.threads import worker_count
 from .attractor import Attractor, find_attractor
-from .averages import Batches
+from .averages import Averaging, Batches
 from .orbits import Orbits
 
 __all__ = ["Exponents", "coupled_cell", "exponents", "group_by_attractor", "initial_states", "single_cell"]
@@ -165,18 +162,18 @@ def exponents(
         If an integration fails.
     """
     scene, strengths = coupled_cell(exponents, scene, rtol, parameters), row_of("alpha", alpha, complex_too=True)
-    precision, periods, transient, seed = averaging(precision, periods, transient, seed)
-    orbits = Orbits.make(scene, strengths, initial_states(scene, starts, seed), worker_count(workers))
-    orbits.settle(transient)
-    attractors = tuple(find_attractor(orbits, row, transient) for row in range(starts))
-    by_start, error, length = _by_start(orbits, attractors, precision, periods, show_progress)
+    settings = Averaging(precision, periods, transient, seed, show_progress)
+    orbits = Orbits.make(scene, strengths, initial_states(scene, starts, settings.seed), worker_count(workers))
+    orbits.settle(settings.transient)
+    attractors = tuple(find_attractor(orbits, row, settings.transient) for row in range(starts))
+    by_start, error, length = _by_start(orbits, attractors, settings)
     largest = max(group_by_attractor(attractors, by_start), key=len)
     mean, spread = by_start[largest].mean(axis=0), np.sqrt((error[largest] ** 2).sum(axis=0)) / len(largest)
     return Exponents(strengths, mean, spread, length, starts, by_start, attractors)
 
 
 def _by_start(
-    orbits: Orbits, attractors: Sequence[Attractor], precision: float, periods: float, show_progress: bool | None
+    orbits: Orbits, attractors: Sequence[Attractor], settings: Averaging
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Exponents and errors (starts, m) from eigenvalues or averages, and the time averaged over."""
     exponent = np.empty((len(attractors), len(orbits.strengths)))
@@ -187,7 +184,7 @@ def _by_start(
             exponent[row], error[row] = attractor.exponents()
     length = max(attractor.cycle for attractor in attractors)
     if rest:
-        exponent[rest], error[rest], length = _average(orbits.part(rest), precision, periods, show_progress)
+        exponent[rest], error[rest], length = _average(orbits.part(rest), settings)
     return exponent, error, length
 
 
@@ -290,18 +287,11 @@ def group_by_attractor(attractors: Sequence[Attractor], by_start: np.ndarray) ->
     return groups
 
 
-def _average(
-    orbits: Orbits, precision: float, periods: float, show_progress: bool | None
-) -> tuple[np.ndarray, np.ndarray, float]:
+def _average(orbits: Orbits, settings: Averaging) -> tuple[np.ndarray, np.ndarray, float]:
     """Mean growth rates (starts, m), their standard errors and the time averaged over."""
     orbits.prepare()
     batches = Batches(orbits.unit * orbits.block)
-    hidden = None if show_progress is None else not show_progress
-    with tqdm(total=math.ceil(periods / orbits.block), unit="block", disable=hidden) as bar:
-        while batches.blocks * orbits.block < periods:
-            batches.add(orbits.advance())
-            bar.update(1)
-            if batches.due and np.all(batches.error() <= precision):
-                break
+    for _ in settings.rounds(batches, orbits.block, batches.error):
+        batches.add(orbits.advance())
     mean, error = batches.mean(), batches.error_by_start()
     return mean, error, batches.blocks * batches.length

@@ -19,15 +19,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from tqdm import tqdm
 
 from synchain.models.dynamics.variational import PHASE, Variation, network_variation, phase_shifted, with_volume
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
 from ..cells.initial_modes import with_modes
-from ..support.arrays import averaging
-from .averages import Batches
+from .averages import Averaging, Batches
 from .exponents import single_cell
 from .orbits import unit_of_time
 from .variational_integrator import VariationalIntegrator
@@ -153,22 +151,17 @@ def lyapunov_spectrum(
     FloatingPointError
         If the integration fails.
     """
-    precision, periods, transient, seed = averaging(precision, periods, transient, seed)
+    settings = Averaging(precision, periods, transient, seed, show_progress)
     scene = single_cell(lyapunov_spectrum, scene, rtol, parameters)
-    frame = TangentFrame.make(scene, _counted(scene, count), seed)
-    for _ in range(round(transient)):
+    frame = TangentFrame.make(scene, _counted(scene, count), settings.seed)
+    for _ in range(round(settings.transient)):
         frame.advance()
     frame.choose_block()
     batches, lost = Batches(frame.unit / frame.parts), np.zeros(frame.count, dtype=bool)
-    hidden = None if show_progress is None else not show_progress
-    with tqdm(total=math.ceil(periods), unit="period", disable=hidden) as bar:
-        while batches.blocks < periods * frame.parts:
-            growth, share, volume = frame.advance()
-            lost |= share < LOST * frame.rtol
-            batches.add(np.append(np.where(np.isfinite(growth), growth, 0.0), volume)[None])
-            bar.update(1.0 / frame.parts)
-            if batches.due and np.all(batches.error()[:-1][~lost] <= precision):
-                break
+    for _ in settings.rounds(batches, 1.0 / frame.parts, lambda: batches.error()[:-1][~lost]):
+        growth, share, volume = frame.advance()
+        np.logical_or(lost, share < LOST * frame.rtol, out=lost)
+        batches.add(np.append(np.where(np.isfinite(growth), growth, 0.0), volume)[None])
     return _report(frame, batches, lost)
 
 

@@ -26,7 +26,8 @@ NODES, PARTS = (14, 20, 28, 40, 60), (1, 2, 4, 8, 16)
 LOOSENESS = 10.0
 """Ratio of the tolerance of the modes to that of the orbit if their growth is averaged.
 
-It moves exponents by less than rtol.
+It moves exponents by less than rtol, but more where a multiplier passes through zero: there the
+exponent dips towards -inf and magnifies every error.
 """
 
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import ArrayLike
 
-from synchain.models.inputs.checks import check_integer, check_number, check_positive, short_repr
+from synchain.models.inputs.checks import short_repr
 
-__all__ = ["averaging", "numbers", "row"]
+__all__ = ["numbers", "row"]
 
 
-def numbers(what: str, values: Any, *, complex_too: bool = False) -> np.ndarray:
+def numbers(what: str, values: object, *, complex_too: bool = False) -> np.ndarray:
     """Return the values as an array of any shape, of floats or, if `complex_too`, of complex
     numbers.
 
@@ -30,19 +29,7 @@ def numbers(what: str, values: Any, *, complex_too: bool = False) -> np.ndarray:
         raise ValueError(f"{what}: found {short_repr(values)}; expected {kind}") from None
 
 
-def averaging(precision: Any, periods: Any, transient: Any, seed: Any) -> tuple[float, float, float, int]:
-    """Return the settings of an average along an orbit, checked: standard error, length, transient
-    and random seed.
-    """
-    return (
-        check_number("precision", precision, 0.0),
-        check_positive("periods", periods),
-        check_number("transient", transient, 0.0),
-        check_integer("seed", seed, 0),
-    )
-
-
-def row(what: str, values: Any, least: int = 1, *, rising: bool = False, complex_too: bool = False) -> np.ndarray:
+def row(what: str, values: ArrayLike, least: int = 1, *, rising: bool = False, complex_too: bool = False) -> np.ndarray:
     """Return the values as one row (m,) of floats or, if `complex_too`, of complex numbers.
 
     Parameters

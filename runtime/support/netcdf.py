@@ -168,13 +168,13 @@ def _dimensions(sizes: Mapping[str, int]) -> bytes:
     )
 
 
-def _attributes(values: Mapping[str, Any]) -> bytes:
+def _attributes(values: Mapping[str, object]) -> bytes:
     if not values:
         return ABSENT + ABSENT
     return ATTRIBUTE + struct.pack(">i", len(values)) + b"".join(_text(name) + _value(v) for name, v in values.items())
 
 
-def _value(value: Any) -> bytes:
+def _value(value: object) -> bytes:
     """An attribute: text as bytes, or numbers of any of the types."""
     if isinstance(value, bytes):
         return struct.pack(">ii", TYPES["c"], len(value)) + _padded(value)

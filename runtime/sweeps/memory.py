@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,7 +66,7 @@ class Memory:
         """Copy the cells of a block into the arrays of all cells."""
         self.buffers.put(task.cells, buffers)
 
-    def run(self, executor: Executor | None, reporter: Reporter) -> None:
+    def run(self, reporter: Reporter) -> None:
         """Run the blocks that have not finished.
 
         Raises
@@ -78,7 +77,7 @@ class Memory:
         scheduler = BlockScheduler(self.layout, self.done(), self, self.prepared, reporter)
         try:
             reporter.start(tally(self.buffers.status[self.buffers.finished]), self.prepared.compiling)
-            scheduler.run(executor)
+            scheduler.run()
         except (Exception, KeyboardInterrupt) as problem:
             if not (isinstance(problem, KeyboardInterrupt) or worker_lost(problem)):
                 raise

@@ -6,20 +6,20 @@ import uuid
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
-from typing import Any
 
 import numpy as np
 
-from synchain.models.inputs.checks import check_instance
+from synchain.models.inputs.checks import check_callable, check_flag, check_instance
 
 from ..cells.buffers import Buffers
 from ..support.threads import worker_count
 from .job import Job
+from .progress import Hook, Reporter
 from .worker import forget, run_block
 
-__all__ = ["Task", "WorkerPool", "pool_size", "worker_lost"]
+__all__ = ["Execution", "Task", "WorkerPool", "worker_lost"]
 
 LOOK = 0.2
 """Seconds after which a wait for a block looks whether Ctrl-C was pressed."""
@@ -34,21 +34,66 @@ class Task:
 
     block: int
     cells: np.ndarray
-    arguments: tuple[Any, ...]
+    arguments: tuple[object, ...]
 
+
+Running = Future[Buffers | None]
+"""A task that is with a worker; None is the answer of one that does not know the job yet."""
 
 Finish = Callable[[Task, Buffers], Task | None]
 """Takes the results of a task; returns the task that has waited for it, if there is one."""
 
 
+@dataclass(frozen=True, slots=True)
+class Execution:
+    """Who runs the blocks of a job, and who hears how far they are; checked.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Number of threads (default: all cores).
+    executor : concurrent.futures.Executor, optional
+        Runs the blocks in place of threads (docs/scale.md).
+    show_progress : bool, optional
+        Whether to show a bar; by default a bar on terminals and a line a minute elsewhere.
+    progress : callable, optional
+        Is called with a `Progress` after each block.
+
+    Attributes
+    ----------
+    size : int
+        Blocks that run at a time.
+    """
+
+    workers: int | None = None
+    executor: Executor | None = None
+    show_progress: bool | None = None
+    progress: Hook | None = None
+    size: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        if self.progress is not None:
+            check_callable("progress", self.progress)
+        if self.show_progress is not None:
+            check_flag("show_progress", self.show_progress)
+        if self.executor is not None:
+            expected = "a concurrent.futures.Executor, e.g. ProcessPoolExecutor(2)"
+            check_instance("executor", self.executor, Executor, expected)
+        object.__setattr__(self, "size", _size(self.executor, self.workers))
+
+    def reporter(self, cells: int) -> Reporter:
+        """Return the reporter of so many cells; its time begins now."""
+        return Reporter(cells, self.show_progress, self.progress)
+
+
 class WorkerPool:
     """Workers and the job that they work on; `limit` tasks are with them at a time, two for each."""
 
-    def __init__(self, job: Job, executor: Executor | None, workers: int) -> None:
+    def __init__(self, job: Job, execution: Execution) -> None:
         self.job = job
-        self.limit = 2 * workers
-        self.executor = ThreadPoolExecutor(workers) if executor is None else executor
-        self.owned = executor is None
+        self.limit = 2 * execution.size
+        self.owned = execution.executor is None
+        self.executor = ThreadPoolExecutor(execution.size) if execution.executor is None else execution.executor
         # interpreters of one process are a kind of threads to the library, but share nothing
         kinds = {kind.__name__ for kind in type(self.executor).__mro__}
         self.shared = "ThreadPoolExecutor" in kinds and "InterpreterPoolExecutor" not in kinds
@@ -68,8 +113,8 @@ class WorkerPool:
         On Ctrl-C the blocks in flight are finished first if that is possible; a second Ctrl-C
         leaves them.  Raises what a worker raised.
         """
-        arrived: SimpleQueue[Future[Any]] = SimpleQueue()
-        flying: dict[Future[Any], Task] = {}
+        arrived: SimpleQueue[Running] = SimpleQueue()
+        flying: dict[Running, Task] = {}
 
         def send(task: Task, introduce: bool = False) -> None:
             future = self.submit(task, introduce)
@@ -95,7 +140,7 @@ class WorkerPool:
                 _drain(waited, flying, finish)
             raise
 
-    def submit(self, task: Task, introduce: bool = False) -> Future[Any]:
+    def submit(self, task: Task, introduce: bool = False) -> Running:
         """Give a task to a worker; the first ones, and with `introduce`, come with the
         specification of the job.
         """
@@ -116,7 +161,7 @@ class WorkerPool:
         if self.owned:
             self.executor.shutdown(wait=True, cancel_futures=True)
 
-    def _fill(self, flying: dict[Future[Any], Task], tasks: Iterable[Task], send: Callable[[Task], None]) -> None:
+    def _fill(self, flying: dict[Running, Task], tasks: Iterable[Task], send: Callable[[Task], None]) -> None:
         """Send tasks until all workers are busy."""
         while len(flying) < self.limit:
             task = next(iter(tasks), None)
@@ -125,12 +170,10 @@ class WorkerPool:
             send(task)
 
 
-def pool_size(executor: Executor | None, workers: int | None) -> int:
-    """Return how many blocks can run at a time: `workers`, else as far as the executor tells, else
-    all cores.
+def _size(executor: Executor | None, workers: int | None) -> int:
+    """How many blocks can run at a time: `workers`, else as far as the executor tells, else all
+    cores.
     """
-    if executor is not None:
-        check_instance("executor", executor, Executor, "a concurrent.futures.Executor, e.g. ProcessPoolExecutor(2)")
     if executor is None or workers is not None:
         return worker_count(workers)
     client = getattr(executor, "_client", None)  # of dask.distributed
@@ -140,21 +183,22 @@ def pool_size(executor: Executor | None, workers: int | None) -> int:
     return max(1, int(count))
 
 
-def _next(arrived: SimpleQueue[Future[Any]]) -> Future[Any]:
+def _next(arrived: SimpleQueue[Running]) -> Running:
     """The next future that is done."""
     while True:
         with suppress(Empty):
             return arrived.get(timeout=LOOK)
 
 
-def _drain(waited: list[Future[Any]], flying: dict[Future[Any], Task], finish: Finish) -> None:
+def _drain(waited: list[Running], flying: dict[Running, Task], finish: Finish) -> None:
     """Wait for the blocks that are being run and keep those that succeed."""
     for future in waited:
         while not future.done():
             with suppress(TimeoutError):
                 future.exception(timeout=LOOK)
-        if not future.cancelled() and future.exception() is None and future.result() is not None:
-            finish(flying[future], future.result())
+        done = not future.cancelled() and future.exception() is None
+        if done and (buffers := future.result()) is not None:
+            finish(flying[future], buffers)
 
 
 def worker_lost(problem: BaseException) -> bool:

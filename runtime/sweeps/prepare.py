@@ -5,9 +5,7 @@ cells, machine code.
 from __future__ import annotations
 
 import time
-from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Any
 
 from synchain.codegen.driver.columns import Control
 from synchain.codegen.kernels.compile import load
@@ -21,7 +19,7 @@ from ..results.certificate import Certificate
 from ..results.labels import provenance
 from .certify import certify
 from .job import JobSpec, SweepJob, SweepSpec
-from .pool import pool_size
+from .pool import Execution
 
 __all__ = ["PreparedRun", "prepare"]
 
@@ -35,15 +33,15 @@ class PreparedRun:
     job : SweepJob
     certificate : Certificate, optional
         The exponents of all cells, if the run is certified.
-    workers : int
-        Blocks that run at a time.
+    execution : Execution
+        Runs the blocks.
     compiling : float
         Seconds that the compilation of the kernel took, or its loading.
     """
 
     job: SweepJob
     certificate: Certificate | None
-    workers: int
+    execution: Execution
     compiling: float
 
     @property
@@ -57,7 +55,7 @@ class PreparedRun:
         return self.job.reduction.scene
 
     @property
-    def attributes(self) -> dict[str, Any]:
+    def attributes(self) -> dict[str, object]:
         """How the result came about."""
         job, spec = self.job, self.job.spec
         tolerances = float(job.control[Control.RTOL]), float(job.control[Control.ATOL])
@@ -65,16 +63,15 @@ class PreparedRun:
 
     def layout(self) -> Layout:
         """Return the blocks of the sweep, of a size that suits the workers."""
-        return Layout.of(self.scene, block_size(self.scene, self.job.spec.width, self.workers))
+        return Layout.of(self.scene, block_size(self.scene, self.job.spec.width, self.execution.size))
 
 
 def prepare(
     reduction: Reduction,
+    execution: Execution,
     certified: bool | Certificate = False,
     *,
     width: int | None = None,
-    workers: int | None = None,
-    executor: Executor | None = None,
     room: int | None = None,
 ) -> PreparedRun:
     """Write and compile the kernel of a reduced scene.
@@ -82,13 +79,11 @@ def prepare(
     Parameters
     ----------
     reduction : Reduction
+    execution : Execution
     certified : bool or Certificate
         True computes the exponents of all cells; a Certificate has them already.
     width : int, optional
         Number of lanes.
-    workers : int, optional
-        Blocks that run at a time (default: as many as the executor or the processor can).
-    executor : Executor, optional
     room : int, optional
         Section points of a cell to make room for at first.
     """
@@ -96,11 +91,10 @@ def prepare(
     certify_now = not isinstance(certified, Certificate) and check_flag("certified", certified)
     source = write_kernel(reduction, width)
     warn_of_chords(source)
-    count = pool_size(executor, workers)
     certificate = certified if isinstance(certified, Certificate) else None
     if certify_now:
-        certificate = certify(scene, workers=None if executor is not None else count)
+        certificate = certify(scene, workers=execution.workers if execution.executor is None else None)
     began = time.perf_counter()
     problem = SweepSpec(reduction, room)
     job = problem.job(JobSpec.of(problem, source), load(source))
-    return PreparedRun(job, certificate, count, time.perf_counter() - began)
+    return PreparedRun(job, certificate, execution, time.perf_counter() - began)

@@ -9,16 +9,13 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
-from synchain.models.inputs.checks import check_callable, check_flag
-
 from ..support.status import CODES, Status
 
-__all__ = ["Hook", "Progress", "Reporter", "check_reporting", "duration"]
+__all__ = ["Hook", "Progress", "Reporter", "duration"]
 
 EVERY = 60.0
 """Seconds between two lines if stderr is no terminal."""
@@ -75,7 +72,7 @@ class Progress:
         return f"{parts}; {self.failures}" if self.failures else parts
 
 
-Hook = Callable[[Progress], Any]
+Hook = Callable[[Progress], object]
 
 
 def duration(seconds: float) -> str:
@@ -85,16 +82,6 @@ def duration(seconds: float) -> str:
     if seconds < 90.0:
         return f"{seconds:.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
-
-
-def check_reporting(show: bool | None, hook: Hook | None) -> None:
-    """Raise TypeError if a hook cannot be called or if `show_progress` is neither True, False nor
-    None.
-    """
-    if hook is not None:
-        check_callable("progress", hook)
-    if show is not None:
-        check_flag("show_progress", show)
 
 
 @dataclass(slots=True)
@@ -113,10 +100,7 @@ class Reporter:
     began: float = field(default_factory=time.perf_counter)
     every: float = EVERY
     _said: float = 0.0
-    _bar: Any = None
-
-    def __post_init__(self) -> None:
-        check_reporting(self.show, self.hook)
+    _bar: tqdm | None = None
 
     def start(self, counts: np.ndarray, compiling: float = 0.0) -> None:
         """Begin to count cells.

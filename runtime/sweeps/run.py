@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from concurrent.futures import Executor
-from typing import Any
 
 from synchain.models.inputs.checks import check_instance
 from synchain.models.scenes.scene import Scene
@@ -12,8 +11,9 @@ from ..cells.keywords import with_axes
 from ..cells.reduce import Reduction, as_reduction
 from ..results.result import Result
 from .memory import Memory
+from .pool import Execution
 from .prepare import prepare
-from .progress import Hook, Reporter
+from .progress import Hook
 
 __all__ = ["run"]
 
@@ -29,7 +29,7 @@ def run(
     certified: bool = False,
     executor: Executor | None = None,
     progress: Hook | None = None,
-    **axes: Any,
+    **axes: object,
 ) -> Result:
     """Run every cell of a scene.
 
@@ -76,10 +76,11 @@ def run(
     scene = with_axes(run, scene, axes)
     if resume is not None:
         check_instance("resume", resume, Result, "an earlier Result, e.g. from open_result")
-    reporter = Reporter(scene.cells, show_progress, progress)
+    execution = Execution(workers, executor, show_progress, progress)
+    reporter = execution.reporter(scene.cells)
     reduction = as_reduction(scene, reduce)
     reduction.check_memory()
-    prepared = prepare(reduction, certified, width=width, workers=workers, executor=executor)
+    prepared = prepare(reduction, execution, certified, width=width)
     memory = Memory.of(prepared, resume)
-    memory.run(executor, reporter)
+    memory.run(reporter)
     return memory.result()

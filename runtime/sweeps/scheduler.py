@@ -5,7 +5,6 @@ have ended.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -48,13 +47,13 @@ class BlockScheduler:
     prepared: PreparedRun
     reporter: Reporter
 
-    def run(self, executor: Executor | None) -> None:
+    def run(self) -> None:
         """Run all blocks that the sink does not have; raises what a worker raises, and
         KeyboardInterrupt on Ctrl-C.
         """
         if self.done.all():
             return
-        with WorkerPool(self.prepared.job, executor, self.prepared.workers) as pool:
+        with WorkerPool(self.prepared.job, self.prepared.execution) as pool:
             pool.run(self.tasks(), self.finish)
 
     def tasks(self) -> Iterator[Task]:

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -30,7 +29,7 @@ from ..support.files import check_replaceable, drop_leftovers, netcdf_data, unde
 from ..support.status import Status
 from .errors import SweepFailed, SweepInterrupted
 from .job import Start
-from .pool import Task, pool_size, worker_lost
+from .pool import Execution, Task, worker_lost
 from .prepare import PreparedRun, prepare
 from .progress import Hook, Progress, Reporter
 from .scheduler import BlockScheduler
@@ -67,7 +66,7 @@ def stream(
     certified: bool = False,
     executor: Executor | None = None,
     progress: Hook | None = None,
-    **axes: Any,
+    **axes: object,
 ) -> Streamed:
     """Run every cell of a scene and write its result to a netCDF file, block by block.
 
@@ -107,35 +106,28 @@ def stream(
     """
     scene = with_axes(stream, scene, axes)
     reduction = as_reduction(scene, reduce)
-    reporter = Reporter(scene.cells, show_progress, progress)
-    pool_size(executor, workers)  # refuses what is no executor before there is a file
+    execution = Execution(workers, executor, show_progress, progress)
+    reporter = execution.reporter(scene.cells)
     if (state := claim(reduction, path, resume=resume, overwrite=overwrite, certified=certified)) == "complete":
         raise FileExistsError(
             f"{os.fspath(path)} holds the result of this scene already; give overwrite (--overwrite) to run it again"
         )
     partial = partial_path(path)
-    options = {"width": width, "workers": workers, "executor": executor}
-    prepared = _prepared(reduction, partial, state == "continue", certified, options)
+    if state == "continue":
+        certificate = certificate_of(BlockLog.describe(partial))
+        prepared = prepare(reduction, execution, certificate or False, width=width)
+    else:
+        prepared = prepare(reduction, execution, certified, width=width)
+        about = describe_sweep(reduction, prepared.layout(), prepared.attributes, prepared.certificate)
+        BlockLog.create(partial, about)
     log = BlockLog.open(partial, writing=True)
     try:
-        verdicts = _run_blocks(prepared, log, executor, reporter, path)
+        verdicts = _run_blocks(prepared, log, reporter, path)
     finally:
         log.close()
         reporter.close()
     partial.unlink()
     return Streamed(Path(path), reporter.now, verdicts)
-
-
-def _prepared(
-    reduction: Reduction, partial: Path, resume: bool, certified: bool, options: Mapping[str, Any]
-) -> PreparedRun:
-    """The kernel, the certificate (computed or kept) and, for a new run, the block log."""
-    if resume:
-        return prepare(reduction, certificate_of(BlockLog.describe(partial)) or False, **options)
-    prepared = prepare(reduction, certified, **options)
-    about = describe_sweep(reduction, prepared.layout(), prepared.attributes, prepared.certificate)
-    BlockLog.create(partial, about)
-    return prepared
 
 
 def claim(
@@ -173,7 +165,8 @@ def claim(
         return "begin"
     if partial.exists() and (resume or not target.exists()):
         with understood(partial):
-            _check_same(reduction, certified, partial, BlockLog.describe(partial))
+            about = BlockLog.describe(partial)
+            _check_same(reduction, certified, partial, about["attributes"], about["certificate"] is not None)
         if not resume:
             raise FileExistsError(
                 f"{partial} keeps a run of this scene that was not finished; "
@@ -182,23 +175,21 @@ def claim(
         return "continue"
     if target.exists():
         with understood(target):
-            _check_same(reduction, certified, target, _described(target))
+            with netcdf_data(target) as file:
+                attributes, exponents = dict(file.attrs), "transversal_exponent" in file
+            _check_same(reduction, certified, target, attributes_of(attributes, target), exponents)
         return "complete"
     if resume:
         raise FileNotFoundError(f"nothing to resume: {target} does not exist; run without resume (--resume)")
     return "begin"
 
 
-def _described(target: Path) -> dict[str, Any]:
-    """What a block log says of its sweep, from the file of a finished result."""
-    with netcdf_data(target) as file:
-        attributes, certified = dict(file.attrs), "transversal_exponent" in file
-    return {"attributes": attributes_of(attributes, target), "certificate": certified or None}
-
-
-def _check_same(reduction: Reduction, certified: bool, path: Path, about: Mapping[str, Any]) -> None:
-    """Raise ValueError if a file is not that of this run."""
-    attributes = about["attributes"]
+def _check_same(
+    reduction: Reduction, certified: bool, path: Path, attributes: Mapping[str, object], exponents: bool
+) -> None:
+    """Raise ValueError if a file, with its attributes and with or without exponents, is not that of
+    this run.
+    """
     again = "repeat the options of that run, choose another path (--out), or replace it with overwrite (--overwrite)"
     if not alike(scene_of(attributes), reduction.scene):
         raise ValueError(f"{path} belongs to another scene ({short_repr(attributes['title'])}); {again}")
@@ -212,8 +203,8 @@ def _check_same(reduction: Reduction, certified: bool, path: Path, about: Mappin
             f"{path} left out other parts of its scene: {attributes.get('skipped', 'nothing')}; "
             f"{again.replace('the options of that run', 'its reduction (--no-skip, or the absence of it)')}"
         )
-    if (about["certificate"] is not None) != certified:
-        certificate = "with" if about["certificate"] is not None else "without"
+    if exponents != certified:
+        certificate = "with" if exponents else "without"
         raise ValueError(f"{path} was run {certificate} a certificate (certified, --certify); {again}")
 
 
@@ -240,7 +231,7 @@ class _Disk:
 
 
 def _run_blocks(
-    prepared: PreparedRun, log: BlockLog, executor: Executor | None, reporter: Reporter, path: str | os.PathLike[str]
+    prepared: PreparedRun, log: BlockLog, reporter: Reporter, path: str | os.PathLike[str]
 ) -> dict[str, int]:
     """Run what the log lacks, then write the result; returns the verdicts."""
     scene = prepared.scene
@@ -250,7 +241,7 @@ def _run_blocks(
     try:
         drop_leftovers(path)
         reporter.start(log.counts, prepared.compiling)
-        scheduler.run(executor)
+        scheduler.run()
         return write_result(log, path, scene)
     except KeyboardInterrupt:
         raise SweepInterrupted(int(log.counts.sum()), scene.cells) from None

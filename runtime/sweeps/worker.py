@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from typing import Any
 
 from ..cells.buffers import Buffers
 from .job import Job, JobSpec
@@ -22,7 +21,7 @@ class JobCache:
         self.jobs: OrderedDict[str, Job] = OrderedDict()
         self.lock = threading.Lock()
 
-    def run(self, key: str, spec: bytes | None, *block: Any) -> Buffers | None:
+    def run(self, key: str, spec: bytes | None, *block: object) -> Buffers | None:
         """Run a block of a job.
 
         Parameters
@@ -58,7 +57,7 @@ class JobCache:
 _CACHE = JobCache()
 
 
-def run_block(key: str, spec: bytes | None, *block: Any) -> Buffers | None:
+def run_block(key: str, spec: bytes | None, *block: object) -> Buffers | None:
     """Run a block of a job in this process; parameters and result as for `JobCache.run`."""
     return _CACHE.run(key, spec, *block)
 

@@ -15,7 +15,6 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -24,7 +23,8 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.keywords import with_parameters
 from ..stability.exponents import Exponents, exponents
-from .threshold import Criterion, check_probe, simulate
+from ..sweeps.pool import Execution
+from .threshold import Criterion, check_probe, checked, simulate
 
 __all__ = ["CAUSES", "OUTCOMES", "Agreement", "Cell", "agreement", "strengths"]
 
@@ -85,7 +85,7 @@ class Agreement:
         found = Counter(cell.cause for cell in self.cells if cell.cause)
         return {cause: found[cause] for cause in CAUSES if found[cause]}
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """JSON-ready: counts, causes, and for each sigma the numbers, outcome and cause."""
         names = ("sigma", "exponent", "stderr", "share", "error", "outcome", "cause")
         rows = [{name: getattr(cell, name) for name in names} for cell in self.cells]
@@ -140,13 +140,14 @@ def agreement(
         If the line lacks a strength, or if sigma is negative, not finite or does not increase; as
         `strengths` does.
     """
-    fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ("sync_error",)}
+    fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ()}
     scene = with_parameters(agreement, scene, parameters, **fixed)
     check_probe(scene.topology, scene.spectrum)
+    scene = scene.replace(record=("sync_error",))
     grid = np.atleast_1d(np.asarray(sigma, dtype=float))
     if grid.ndim != 1 or not (np.all(np.isfinite(grid)) and np.all(np.diff(grid) > 0.0) and np.all(grid >= 0.0)):
         raise ValueError("sigma: expected finite numbers from 0 up that increase")
-    simulation = DirectSimulation(scene, criterion or Criterion(), workers, show_progress)
+    simulation = DirectSimulation(scene, checked(criterion), Execution(workers, show_progress=show_progress))
     alpha = strengths(scene.topology, grid)
     line = line or exponents(scene, np.unique(alpha), workers=workers, show_progress=show_progress)
     places = _places(line, alpha)
@@ -200,8 +201,7 @@ class DirectSimulation:
 
     scene: Scene
     criterion: Criterion
-    workers: int | None
-    show_progress: bool | None
+    execution: Execution
 
     def simulate(self, sigma: np.ndarray, longer: float = 1.0, near: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Share of the starts that synchronised and median error (sigma,); `near` starts next to
@@ -213,14 +213,7 @@ class DirectSimulation:
             first[scene.components[0]] = first[scene.components[0]] + NUDGE * np.arange(scene.n)
             scene = scene.replace(initial={name: values.tolist() for name, values in first.items()})
         criterion = replace(self.criterion, transient=longer * self.criterion.transient)
-        sweep = simulate(
-            scene,
-            sigma,
-            resolution=math.inf,
-            criterion=criterion,
-            workers=self.workers,
-            show_progress=self.show_progress,
-        )
+        sweep = simulate(scene, sigma, criterion, math.inf, self.execution)
         return sweep.share, sweep.error
 
 

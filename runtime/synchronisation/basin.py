@@ -12,12 +12,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from synchain.models.inputs.checks import check_integer, check_number, check_table
-from synchain.models.mechanics.stick_slip import SLIP
+from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import with_parameters
@@ -25,6 +24,7 @@ from ..cells.plan import Planner
 from ..cells.reduce import reduce_scene
 from ..support.arrays import row
 from ..support.status import Status
+from ..sweeps.pool import Execution
 from ..sweeps.progress import Hook
 from .trials import Trials
 
@@ -148,11 +148,12 @@ def basin(
         If the number of samples is not whole.
     """
     _check(scene, samples, tolerance, confidence, seed)
+    execution = Execution(workers, executor, show_progress, progress)
     fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ("sync_error",)}
     scene = with_parameters(basin, scene, parameters, **fixed, transient=transient, window=window)
     planner = Planner(random_starts(scene, samples, ranges, seed))
     whole = replace(reduce_scene(planner.scene, reduce=False), jumps=True)
-    with Trials.of(whole, workers=workers, executor=executor, show_progress=show_progress, progress=progress) as trials:
+    with Trials.of(whole, execution) as trials:
         error, status = trials.run(samples, planner.rows)
     return Basin(scene, tolerance, confidence, planner.rows(np.arange(samples)).start, error, status)
 
@@ -167,7 +168,7 @@ def random_starts(scene: Scene, samples: int, ranges: Mapping[str, Range] | None
     return scene.replace(axes=dict(zip(names, values.T, strict=True)), zipped=True)
 
 
-def _check(scene: Scene, samples: Any, tolerance: Any, confidence: Any, seed: Any) -> None:
+def _check(scene: Scene, samples: object, tolerance: object, confidence: object, seed: object) -> None:
     if a_scene(scene).n < 2:
         raise ValueError(f"basin: found {scene.n} oscillator; expected at least two, which can synchronise")
     check_integer("basin: samples", samples, 1, SAMPLE_LIMIT)

@@ -27,6 +27,7 @@ from synchain.models.scenes.scene import Scene, a_scene
 from ..cells.plan import Plan, Planner, control_of
 from ..support.arrays import numbers
 from ..sweeps.job import RowsSpec
+from ..sweeps.pool import Execution
 from ..sweeps.progress import Hook
 from .threshold import Criterion, checked, offsets
 from .trials import Trials
@@ -99,7 +100,7 @@ def universal_probe(
         If strengths are missing or not finite, if the scene has no coupling, or if its coupling is
         not proportional to sigma and to the weight of a link.
     """
-    criterion = checked(criterion)
+    criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     real, imaginary = _broadcast(alpha, beta)
     ring = a_scene(scene).replace(
         topology=topology("ring", 3),
@@ -115,15 +116,7 @@ def universal_probe(
     equations, planner = ring_of_three(ring.equations), Planner(ring)
     rows = _rows(planner, equations.parameters, real.reshape(-1), imaginary.reshape(-1), criterion)
     problem = RowsSpec(equations, ring.integrator, control_of(planner, jumps=True))
-    with Trials(
-        ring,
-        problem,
-        problem.source(),
-        workers=workers,
-        executor=executor,
-        show_progress=show_progress,
-        progress=progress,
-    ) as trials:
+    with Trials(ring, problem, problem.source(), execution) as trials:
         error, status = trials.run(len(rows), rows.take)
     shape = (*real.shape, criterion.starts)
     error, status = error.reshape(shape), status.reshape(shape)

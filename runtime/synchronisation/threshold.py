@@ -13,7 +13,6 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -28,6 +27,7 @@ from ..cells.plan import Planner
 from ..cells.reduce import reduce_scene
 from ..prediction.intervals import Interval, intersect, refine, scale
 from ..support.arrays import row
+from ..sweeps.pool import Execution
 from ..sweeps.progress import Hook
 from .trials import Trials
 
@@ -116,7 +116,7 @@ class Thresholds:
     criterion: Criterion
     warnings: tuple[str, ...] = field(default=())
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, object]:
         """JSON-ready: {"intervals", "probe", "predicted"}, sigma for the first and last, alpha for
         the probe.
         """
@@ -174,21 +174,14 @@ def thresholds(
     a_scene(scene).equations.expect_alike("thresholds")
     fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ()}
     scene = with_parameters(thresholds, scene, parameters, **fixed)
-    criterion = checked(criterion)
+    criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     spectrum = scene.topology.spectrum
     check_probe(scene.topology, spectrum)
     scene = scene.replace(record=("sync_error",))
     grid = default_grid(spectrum) if sigma is None else row("sigma", sigma, 2, rising=True)
-    options: dict[str, Any] = {
-        "resolution": check_positive("resolution", resolution),
-        "criterion": criterion,
-        "workers": workers,
-        "executor": executor,
-        "show_progress": show_progress,
-        "progress": progress,
-    }
-    pair = probe(scene, _probe_grid(grid, spectrum), **options)
-    direct = simulate(scene, grid, **options)
+    resolution = check_positive("resolution", resolution)
+    pair = probe(scene, _probe_grid(grid, spectrum), criterion, resolution, execution)
+    direct = simulate(scene, grid, criterion, resolution, execution)
     predicted = project(pair.intervals, spectrum, float(grid[-1]))
     return Thresholds(scene, pair, tuple(predicted), direct, criterion, scene.warnings)
 
@@ -231,13 +224,9 @@ def check_probe(graph: Topology, spectrum: Spectrum) -> None:
 def probe(
     scene: Scene,
     alpha: Sequence[float] | np.ndarray,
-    *,
+    criterion: Criterion,
     resolution: float = RESOLUTION,
-    criterion: Criterion | None = None,
-    workers: int | None = None,
-    executor: Executor | None = None,
-    show_progress: bool | None = None,
-    progress: Hook | None = None,
+    execution: Execution | None = None,
 ) -> Sweep:
     """Sweep the two-oscillator probe over alpha = 2 sigma.
 
@@ -247,10 +236,10 @@ def probe(
         Oscillator, coupling and parameters; its network, start and axes are not used.
     alpha : sequence of float
         An increasing grid.
+    criterion : Criterion
     resolution : float
         Ends of ranges are refined to this width in sigma, twice as much in alpha.
-    criterion, workers, executor, show_progress, progress
-        As for `thresholds`.
+    execution : Execution, optional
 
     Returns
     -------
@@ -258,29 +247,16 @@ def probe(
         Its `x` and intervals are values of alpha.
     """
     pair = scene.replace(topology=topology("chain", 2), initial=None, axes=())
-    sweep = simulate(
-        pair,
-        0.5 * np.asarray(alpha, dtype=float),
-        resolution=resolution,
-        criterion=criterion,
-        workers=workers,
-        executor=executor,
-        show_progress=show_progress,
-        progress=progress,
-    )
+    sweep = simulate(pair, 0.5 * np.asarray(alpha, dtype=float), criterion, resolution, execution)
     return Sweep(2.0 * sweep.x, sweep.error, sweep.share, tuple(scale(sweep.intervals, 2.0)))
 
 
 def simulate(
     scene: Scene,
     sigma: Sequence[float] | np.ndarray,
-    *,
+    criterion: Criterion,
     resolution: float = RESOLUTION,
-    criterion: Criterion | None = None,
-    workers: int | None = None,
-    executor: Executor | None = None,
-    show_progress: bool | None = None,
-    progress: Hook | None = None,
+    execution: Execution | None = None,
 ) -> Sweep:
     """Sweep sigma by direct simulation of a scene's network.
 
@@ -291,19 +267,14 @@ def simulate(
     scene : Scene
     sigma : sequence of float
         An increasing grid; ranges between two of its points are not seen.
+    criterion : Criterion
     resolution : float
         Ends of ranges are refined to this width in sigma.
-    criterion, workers, executor, show_progress, progress
-        As for `thresholds`.
+    execution : Execution, optional
     """
-    criterion = checked(criterion)
     x = row("sigma", sigma, rising=True)
-    if not resolution > 0:
-        raise ValueError(f"resolution = {resolution}; expected a positive number")
     reduction = reduce_scene(cells_of(scene, x, criterion))
-    with Trials.of(
-        reduction, workers=workers, executor=executor, show_progress=show_progress, progress=progress
-    ) as trials:
+    with Trials.of(reduction, execution or Execution()) as trials:
 
         def measure(points: np.ndarray) -> np.ndarray:
             planner = Planner(cells_of(scene, points, criterion))

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from concurrent.futures import Executor
 
 import numpy as np
 
@@ -23,8 +22,7 @@ from ..cells.reduce import Reduction
 from ..support.status import CODES, Status, tally
 from ..sweeps.errors import SweepFailed, SweepInterrupted
 from ..sweeps.job import JobSpec, RowsSpec
-from ..sweeps.pool import Task, WorkerPool, pool_size, worker_lost
-from ..sweeps.progress import Hook, Reporter, check_reporting
+from ..sweeps.pool import Execution, Task, WorkerPool, worker_lost
 
 __all__ = ["Trials", "mean_errors"]
 
@@ -43,10 +41,10 @@ class Trials:
     problem : RowsSpec
     source : KernelSource
         The kernel of the problem.
+    execution : Execution
+        Runs all rounds; each has a bar of its own.
     expand : callable, optional
         Turns the results of a reduced network into those of the whole one.
-    workers, executor, show_progress, progress
-        As for `run`; each round has a bar of its own.
     """
 
     def __init__(
@@ -54,46 +52,22 @@ class Trials:
         scene: Scene,
         problem: RowsSpec,
         source: KernelSource,
-        *,
+        execution: Execution,
         expand: Callable[[Buffers], Buffers] | None = None,
-        workers: int | None = None,
-        executor: Executor | None = None,
-        show_progress: bool | None = None,
-        progress: Hook | None = None,
     ) -> None:
-        check_reporting(show_progress, progress)
-        self.scene, self.width, self.expand = scene, source.width, expand
-        self.show_progress, self.progress = show_progress, progress
-        self.workers = pool_size(executor, workers)
+        self.scene, self.width, self.execution, self.expand = scene, source.width, execution, expand
         began = time.perf_counter()
         job = problem.job(JobSpec.of(problem, source), load(source))
         self._compiling = time.perf_counter() - began
-        self.pool = WorkerPool(job, executor, self.workers)
+        self.pool = WorkerPool(job, execution)
 
     @classmethod
-    def of(
-        cls,
-        reduction: Reduction,
-        *,
-        workers: int | None = None,
-        executor: Executor | None = None,
-        show_progress: bool | None = None,
-        progress: Hook | None = None,
-    ) -> Trials:
+    def of(cls, reduction: Reduction, execution: Execution) -> Trials:
         """Return trials of what is left of a scene; its cells stand for those of all rounds."""
         source = write_kernel(reduction)
         control = control_of(Planner(reduction.scene), reduction.jumps)
         problem = RowsSpec(reduction.equations, source.integrator, control, reduction.multiplicity, reduction.records)
-        return cls(
-            reduction.scene,
-            problem,
-            source,
-            expand=reduction.expand,
-            workers=workers,
-            executor=executor,
-            show_progress=show_progress,
-            progress=progress,
-        )
+        return cls(reduction.scene, problem, source, execution, reduction.expand)
 
     def __enter__(self) -> Trials:
         return self
@@ -126,8 +100,8 @@ class Trials:
             If the workers are lost.
         """
         error, status = np.full(count, np.inf), np.full(count, int(Status.NOT_RUN))
-        reporter = Reporter(count, self.show_progress, self.progress)
-        size = block_size(self.scene, self.width, self.workers, count)
+        reporter = self.execution.reporter(count)
+        size = block_size(self.scene, self.width, self.execution.size, count)
 
         def finish(task: Task, buffers: Buffers) -> None:
             error[task.cells] = mean_errors(buffers if self.expand is None else self.expand(buffers))

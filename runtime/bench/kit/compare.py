@@ -56,7 +56,7 @@ def table(rows: Iterable[Mapping[str, Any]], own: set[str]) -> str:
         "lanes",
         *(f"{target:.0e}: {what}" for target in TARGETS for what in ("time", "ratio")),
     ]
-    lines: list[tuple[Any, ...]] = []
+    lines: list[tuple[object, ...]] = []
     for case, methods in curves(rows).items():
         widest = max((lanes for name, lanes in methods if name in own), default=1)
         times = {key: [time_at(points, target) for target in TARGETS] for key, points in methods.items()}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -16,7 +15,7 @@ COLOURS = (ORANGE, GREEN, PURPLE, SKY, BLACK)
 MARKERS = ("s", "^", "v", "D", "P", "X")
 
 
-def figure(rows: Iterable[Mapping[str, Any]], own: set[str]) -> Figure:
+def figure(rows: Iterable[Mapping[str, object]], own: set[str]) -> Figure:
     """Draw the rows: this program's methods in blue, dashed for one lane; peers told apart by
     colour and marker.
     """
@@ -40,12 +39,14 @@ def figure(rows: Iterable[Mapping[str, Any]], own: set[str]) -> Figure:
     return made
 
 
-def _looks(cases: Mapping[str, Mapping[tuple[str, int], Any]], own: set[str]) -> dict[tuple[str, int], dict[str, Any]]:
+def _looks(
+    cases: Mapping[str, Mapping[tuple[str, int], object]], own: set[str]
+) -> dict[tuple[str, int], dict[str, object]]:
     """How each curve is drawn, the same in all panels."""
     keys = list(dict.fromkeys(key for methods in cases.values() for key in methods))
     peers = [key for key in keys if key[0] not in own]
     integrators = list(dict.fromkeys(name for name, _ in keys if name in own))
-    looks: dict[tuple[str, int], dict[str, Any]] = {}
+    looks: dict[tuple[str, int], dict[str, object]] = {}
     for name, lanes in keys:
         label = f"{name}, {lanes} lanes" if lanes > 1 else name
         if name in own:

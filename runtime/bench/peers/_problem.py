@@ -103,13 +103,13 @@ class Problem:
         rhs, jacobian = self.compiled()
         size, given = self.equations.dimension, numba.types.Array(numba.float64, 1, "C", readonly=True)
 
-        @numba.njit(numba.float64[::1](numba.float64, given))
+        @numba.njit(numba.float64[::1](numba.float64, given))  # type: ignore[untyped-decorator]
         def f(t: float, y: np.ndarray) -> np.ndarray:
             out = np.empty(size)
             rhs(t, y, out)
             return out
 
-        @numba.njit(numba.float64[:, ::1](numba.float64, given))
+        @numba.njit(numba.float64[:, ::1](numba.float64, given))  # type: ignore[untyped-decorator]
         def j(t: float, y: np.ndarray) -> np.ndarray:
             out = np.empty((size, size))
             jacobian(t, y, out)

@@ -32,7 +32,7 @@ def prepare(problem: Problem) -> Solve:
     jax.config.update("jax_enable_x64", True)
     term = diffrax.ODETerm(_vector_field(problem, jnp))
 
-    @jax.jit
+    @jax.jit  # type: ignore[untyped-decorator]
     def run(rtol: float, atol: float, times: Any) -> Any:
         control = diffrax.ClipStepSizeController(diffrax.PIDController(rtol, atol), step_ts=times)
         done = diffrax.diffeqsolve(

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from synchain.models import chain, ring, star
 from synchain.models.algebra.equality import equal
-from synchain.models.algebra.number_text import exact_number, whole_number
 from synchain.models.claims.language import read_claims
+from synchain.models.claims.number_text import exact_number, whole_number
 from synchain.models.claims.verdict import verify
 from synchain.models.graphs.families import names, topology
 from synchain.runtime.cli import main

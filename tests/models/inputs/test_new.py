@@ -20,8 +20,7 @@ import test_topologies
 from parts import node
 
 from synchain.models import chain
-from synchain.models.graphs.families import names, topology
-from synchain.models.graphs.family_file import TOPOLOGY
+from synchain.models.graphs.families import TOPOLOGY, names, topology
 from synchain.models.inputs import plugins
 from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.mechanics.friction import ContactModel

@@ -9,7 +9,7 @@ from parts import node
 
 from synchain.models.dynamics.reduction import substitute_constants
 from synchain.models.graphs.families import topology
-from synchain.models.mechanics.stick_slip import SLIP, set_valued
+from synchain.models.mechanics.friction import SLIP, set_valued
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.run import run

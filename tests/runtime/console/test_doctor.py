@@ -11,7 +11,7 @@ import pytest
 from synchain.codegen.kernels import compile as loading
 from synchain.models.graphs.families import topology
 from synchain.runtime.cli import main
-from synchain.runtime.console import doctor
+from synchain.runtime.commands import doctor
 
 
 def outcome(name: str) -> doctor.Check:

@@ -19,6 +19,7 @@ from synchain.runtime.results.open import open_result
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.errors import SweepInterrupted
 from synchain.runtime.sweeps.memory import Memory
+from synchain.runtime.sweeps.pool import Execution
 from synchain.runtime.sweeps.prepare import prepare
 from synchain.runtime.sweeps.progress import Reporter
 from synchain.runtime.sweeps.run import run
@@ -89,8 +90,8 @@ def test_every_status_has_a_sentence():
 
 def run_with_room(scene, room):
     """Run a scene with room for so many section points of a cell at first."""
-    memory = Memory.of(prepare(reduce_scene(scene), room=room), None)
-    memory.run(None, Reporter(scene.cells, show=False))
+    memory = Memory.of(prepare(reduce_scene(scene), Execution(), room=room), None)
+    memory.run(Reporter(scene.cells, show=False))
     return memory.result()
 
 

@@ -14,6 +14,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.support.status import Status
+from synchain.runtime.sweeps.pool import Execution
 from synchain.runtime.synchronisation import threshold
 from synchain.runtime.synchronisation.threshold import (
     Criterion,
@@ -86,7 +87,7 @@ def swept(monkeypatch):
     """The calls of `simulate` as (scene, sigma, options); it finds the range 0.1 … 0.2."""
     calls = []
 
-    def fake(scene, sigma, **options):
+    def fake(scene, sigma, *options):
         sigma = np.asarray(sigma, dtype=float)
         calls.append((scene, sigma, options))
         return Sweep(sigma, np.zeros(len(sigma)), np.ones(len(sigma)), ((0.1, 0.2),))
@@ -103,8 +104,7 @@ def test_the_probe_covers_every_mode_and_the_network_is_swept_as_asked(swept):
     assert np.diff(2 * half).max() <= 0.01 + 1e-12
     assert 81 <= len(half) <= 82
     assert sigma.tolist() == [0.1, 0.2, 0.3]
-    asked = {"resolution": 1e-3, "criterion": SHORT, "workers": 1, "show_progress": None}
-    assert options == direct == {**asked, "executor": None, "progress": None}
+    assert options == direct == (SHORT, 1e-3, Execution(workers=1))
     assert found.probe.intervals == ((0.2, 0.4),)
     np.testing.assert_array_equal(found.probe.x, 2 * half)
     assert found.predicted == ()  # 0.2 … 0.4 holds no number and its triple
@@ -121,7 +121,7 @@ def test_the_grid_of_the_probe_begins_at_zero_where_zero_is_asked_for(swept, gra
     assert len(swept[0][1]) == count
     thresholds(Scene(topology=graph), sigma=np.linspace(sigma[0], sigma[1], 40))
     assert len(swept[2][1]) == 40
-    assert swept[0][2]["criterion"] == Criterion()
+    assert swept[0][2][0] == Criterion()
 
 
 def test_the_prediction_ends_with_the_grid_of_sigma(swept):
@@ -189,8 +189,7 @@ def test_the_grid_and_the_rounds_that_refine_its_ends_run_one_kernel():
             [0.0, 0.5],
             criterion=Criterion(transient=50, window=5, starts=1),
             resolution=1e-2,
-            executor=executor,
-            show_progress=False,
+            execution=Execution(executor=executor, show_progress=False),
         )
     assert found.share.tolist() == [0.0, 1.0]
     assert 0.0 < found.intervals[0][0] < 0.5

@@ -10,8 +10,8 @@ from flint import fmpq_poly
 
 from synchain.models import chain, ring, star, wheel
 from synchain.models.algebra.cosine_sums import AngleSum, expression, minimal_polynomial
-from synchain.models.algebra.cosine_text import Wave, angle_number, angle_wave
 from synchain.models.algebra.minimal_polynomials import multiplied
+from synchain.models.claims.cosine_text import Wave, angle_number, angle_wave
 from synchain.models.spectra.characteristic import characteristic
 
 SEVENTH = [AngleSum.cosine(-2, 1, k, 7) for k in (1, 2, 3)]

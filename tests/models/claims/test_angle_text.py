@@ -7,10 +7,10 @@ from fractions import Fraction
 import pytest
 
 from synchain.models.algebra.cosine_sums import AngleSum, expression
-from synchain.models.algebra.cosine_text import angle_number
 from synchain.models.algebra.equality import equal
-from synchain.models.algebra.number_text import exact_number
+from synchain.models.claims.cosine_text import angle_number
 from synchain.models.claims.language import _line
+from synchain.models.claims.number_text import exact_number
 from synchain.models.claims.verdict import verify
 from synchain.models.graphs.families import topology
 

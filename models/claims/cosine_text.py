@@ -14,8 +14,8 @@ from functools import lru_cache
 from itertools import product
 from math import lcm
 
+from ..algebra.cosine_sums import AngleSum, folded_sum
 from ..inputs.reader import Algebra, Expression, NoMeaning, parse
-from .cosine_sums import AngleSum, folded_sum
 
 __all__ = ["Wave", "angle_number", "angle_wave"]
 

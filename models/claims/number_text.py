@@ -16,8 +16,8 @@ from typing import NoReturn
 
 import sympy as sp
 
+from ..algebra.equality import check_size, equal
 from ..inputs.reader import Algebra, NoMeaning, parse, stray_character
-from .equality import check_size, equal
 
 __all__ = ["GRAMMAR", "exact_number", "whole_number"]
 
