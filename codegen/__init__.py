@@ -5,6 +5,9 @@ Glossary
 --------
 lane          One of the numbers in a SIMD register; each lane integrates a cell of its own.
 width         The number of lanes of a kernel: 1, 2, 4, 8 or 16.
+program       Generated code before it is text: statements of expressions that keep their order.
+lowering      From SymPy to the expressions of a program; decides how powers and constants compute.
+dialect       What a printer knows of one language: lanes for Numba, NumPy, Python's math, C99.
 step          Generated function: advances all states of one cell by one step of an integrator.
 stage         One evaluation of the right-hand side within a step.
 driver        The fixed text around the step: step size, events, records, the next cell of a lane.

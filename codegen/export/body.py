@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -13,10 +13,12 @@ from synchain.models.graphs.links import Link
 from synchain.models.mechanics.calculus import derivative
 from synchain.models.mechanics.components import Edge
 
-from .printer import Dialect, decimal, write
+from ..program.expressions import Expression
+from ..program.lowering import Library, number
+from ..program.statements import Statement, let
 
 __all__ = [
-    "LARGEST_UNROLLED", "Body", "Place", "Store", "Syntax", "check_inertia", "is_unrolled", "link_body", "link_places",
+    "LARGEST_UNROLLED", "Body", "Place", "Storing", "check_inertia", "is_unrolled", "link_body", "link_places",
     "mass_body", "node_body", "node_places", "own_parameters", "parameters", "rate_symbols", "weights", "wrapped",
 ]  # fmt: skip
 
@@ -28,8 +30,11 @@ Place = tuple[int, int]
 
 Block: TypeAlias = tuple[tuple[sp.Expr, ...], ...]
 
-Store: TypeAlias = Callable[[Any, str], str]
-"""Makes the statement that stores the text of a value at a component or place."""
+Storing: TypeAlias = Callable[[Any, Expression], Statement]
+"""Makes the statement that stores a value at a component or place."""
+
+lower = Library()
+"""All exported languages have a mathematical library."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,28 +49,11 @@ class Body:
         found: set[sp.Symbol] = set().union(*(e.free_symbols for _, e in (*self.steps, *self.results)))
         return [s for s in symbols if s in found]
 
-
-@dataclass(frozen=True, slots=True)
-class Syntax:
-    """How a language declares a number and a whole number, assigns, comments, and names an entry of a matrix.
-
-    `braces` where blocks are in braces; `reads` where parameters come in an array.
-    """
-
-    dialect: Dialect
-    declare: str
-    whole: str
-    assign: str
-    comment: str
-    entry: str
-    braces: bool = False
-    reads: bool = True
-
-    def body(self, body: Body, loads: dict[sp.Symbol, str], store: Store) -> list[str]:
-        """Read what is used, compute, and store; `loads` says where each state is, `store` writes a result."""
-        lines = [self.declare.format(s.name, loads[s]) for s in body.uses(loads)]
-        lines += [self.declare.format(s.name, write(e, self.dialect)) for s, e in body.steps]
-        return lines + [store(place, write(e, self.dialect)) for place, e in body.results]
+    def statements(self, loads: Mapping[sp.Symbol, Expression], storing: Storing) -> list[Statement]:
+        """Read what is used, compute, and store; `loads` says where each state is."""
+        found: list[Statement] = [let(s.name, loads[s]) for s in self.uses(loads)]
+        found += [let(s.name, lower(e)) for s, e in self.steps]
+        return found + [storing(place, lower(e)) for place, e in self.results]
 
 
 def node_body(equations: Equations, jacobian: bool = False, i: int = 0) -> Body:
@@ -198,14 +186,14 @@ def _body(table: dict, every: bool = False) -> Body:
 def wrapped(numbers: Iterable[str], indent: str = "    ", width: int = 110) -> list[str]:
     """Numbers of a long table with commas between them, broken into lines."""
     lines, line = [], indent
-    for number in numbers:
-        if len(line) + len(number) > width:
+    for text in numbers:
+        if len(line) + len(text) > width:
             lines.append(line.rstrip())
             line = indent
-        line += f"{number}, "
+        line += f"{text}, "
     return [*lines, line.rstrip()]
 
 
 def weights(equations: Equations) -> list[str]:
     """The weights of the links as decimals."""
-    return [decimal(weight) for _, _, weight in equations.links]
+    return [repr(number(weight).value) for _, _, weight in equations.links]

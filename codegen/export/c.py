@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from synchain.models.dynamics.equations import Equations
 
-from .body import Syntax, check_inertia, is_unrolled, link_places, node_places, weights, wrapped
+from ..program.expressions import Expression, Name, Number, call
+from ..program.printers import C99
+from ..program.statements import Array, Do, Statement, called, used
+from .body import check_inertia, is_unrolled, link_places, node_places, weights, wrapped
 from .header import given_values, header
-from .loops import jacobian_lines, mass_lines, rhs_lines
+from .loops import jacobian_statements, mass_statements, rhs_statements
 from .names import portable
-from .printer import C
 
 __all__ = ["to_c"]
 
-SYNTAX = Syntax(
-    C,
-    declare="const double {} = {};",
-    whole="const int {} = {};",
-    assign="{} {} {};",
-    comment="/* {} */",
-    entry="matrix[{}*DIMENSION + {}]",
-    braces=True,
-)
 ARGUMENTS = "double t, const double *state, const double *numbers, double *"
 SIGN = ["static double sign(double x)", "{", "    return (double)((x > 0.0) - (x < 0.0));", "}", ""]
 
@@ -71,7 +64,10 @@ def to_c(equations: Equations, values: Mapping[str, float] | None = None) -> str
     known = dict(zip(model.parameters, known.values(), strict=bool(known)))
     small = is_unrolled(model)
     check_inertia(model, "c")
-    functions = [*_rhs(model), "", *_jacobian(model, small)]
+    rhs, jacobian = _rhs(model), _jacobian(model, small)
+    functions = [*_function(f"void rhs({ARGUMENTS}rates)", rhs), ""]
+    functions += _function(f"void jacobian({ARGUMENTS}{'matrix' if small else 'values'})", jacobian)
+    functions += [] if small else ["", *_places(model)]
     lines = [
         "/*",
         *(f" * {_safe(line)}".rstrip() for line in header(equations, model, changed, known)),
@@ -85,7 +81,7 @@ def to_c(equations: Equations, values: Mapping[str, float] | None = None) -> str
         lines += ["/* values of the scene, in the order of `numbers` */"]
         lines += ["const double defaults[PARAMETERS] = {", *wrapped(map(repr, known.values())), "};", ""]
     lines += [*SOLVE.splitlines(), ""] if model.inertial else []
-    lines += [*(SIGN if _occurs("sign", "\n".join(functions)) else []), *functions]
+    lines += [*(SIGN if "sign" in called([*rhs, *jacobian]) else []), *functions]
     return "\n".join(lines) + "\n"
 
 
@@ -125,40 +121,31 @@ def _sizes(model: Equations, small: bool) -> list[str]:
     return [*lines, ""]
 
 
-def _function(head: str, lines: list[str]) -> list[str]:
+def _function(head: str, body: Sequence[Statement]) -> list[str]:
     """A function; arguments that are not used are named, so that compilers do not warn."""
-    text = "\n".join(lines)
     arguments = re.findall(r"(\w+)[,)]", head)
-    unused = [f"(void){name};" for name in arguments if not _occurs(name, text)]
-    return [head, "{", *(f"    {line}" for line in (*unused, *lines)), "}"]
+    unused = [f"(void){name};" for name in arguments if name not in used(body)]
+    return [head, "{", *(f"    {line}" for line in (*unused, *C99.lines(body))), "}"]
 
 
-def _occurs(name: str, text: str) -> bool:
-    return re.search(rf"\b{name}\b", text) is not None
+def _rhs(model: Equations) -> list[Statement]:
+    return [*rhs_statements(model), *_solved(model, "rates", Number(1))]
 
 
-def _rhs(model: Equations) -> list[str]:
-    return _function(f"void rhs({ARGUMENTS}rates)", [*rhs_lines(model, SYNTAX), *_solved(model, "rates", 1)])
-
-
-def _solved(model: Equations, name: str, columns: int) -> list[str]:
+def _solved(model: Equations, name: str, columns: Expression) -> list[Statement]:
     """Statements that multiply by the inverse of the mass matrix where it is not the identity."""
     if not model.inertial:
         return []
-    lines = ["double mass_[DIMENSION*DIMENSION] = {0.0};"]
-    lines += ["for (int k_ = 0; k_ < DIMENSION; k_++) mass_[k_*DIMENSION + k_] = 1.0;", *mass_lines(model, SYNTAX)]
-    return [*lines, f"solve(mass_, {name}, {columns if columns == 1 else 'DIMENSION'});"]
+    return [*mass_statements(model), Do(call("solve", "mass_", name, columns))]
 
 
-def _jacobian(model: Equations, small: bool) -> list[str]:
-    lines = jacobian_lines(model, SYNTAX)
-    if small:
-        lines.insert(0, "memset(matrix, 0, sizeof(double)*DIMENSION*DIMENSION);")
-        if not model.constant_mass:
-            lines[:0] = ["double rates[DIMENSION];", "rhs(t, state, numbers, rates);"]
-        lines += _solved(model, "matrix", model.dimension)
-        return _function(f"void jacobian({ARGUMENTS}matrix)", lines)
-    return [*_function(f"void jacobian({ARGUMENTS}values)", lines), "", *_places(model)]
+def _jacobian(model: Equations, small: bool) -> list[Statement]:
+    if not small:
+        return jacobian_statements(model)
+    rates: list[Statement] = [Array("rates", Name("DIMENSION")), Do(call("rhs", "t", "state", "numbers", "rates"))]
+    cleared = Do(call("memset", "matrix", 0, Name("sizeof(double)") * "DIMENSION" * "DIMENSION"))
+    solved = _solved(model, "matrix", Name("DIMENSION"))
+    return [*([] if model.constant_mass else rates), cleared, *jacobian_statements(model), *solved]
 
 
 def _places(model: Equations) -> list[str]:
@@ -169,7 +156,8 @@ def _places(model: Equations) -> list[str]:
     for source, block in zip(("TARGET", "SOURCE"), link_places(model), strict=True):
         for r, c in block:
             lines.append(_place("link", "LINKS", f"{r}*NODES + TARGET[link]", f"{c}*NODES + {source}[link]"))
-    return _function("void jacobian_places(int *rows, int *columns)", [*(["int k = 0;"] if lines else []), *lines])
+    inner = ["int k = 0;", *lines] if lines else ["(void)rows;", "(void)columns;"]
+    return ["void jacobian_places(int *rows, int *columns)", "{", *(f"    {line}" for line in inner), "}"]
 
 
 def _place(index: str, end: str, row: str, column: str) -> str:

@@ -1,18 +1,23 @@
-"""Functions of one scalar after another, as C and Numba have them: node by node, or in loops over nodes and links."""
+"""Functions of one scalar after another, as C and Numba have them: node by node, or in loops over nodes and links.
+
+Parameters come in the array `numbers` or, where a language has them as arguments, by their names.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, TypeAlias
 
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.links import Link
 
+from ..program.expressions import Expression, Load, Name, Number, plus
+from ..program.statements import Accumulate, Identity, Loop, Statement, Store, Titled, let, whole
 from .body import (
-    Store,
-    Syntax,
+    Body,
+    Storing,
     is_unrolled,
     link_body,
     link_places,
@@ -24,193 +29,173 @@ from .body import (
     rate_symbols,
 )
 
-__all__ = ["jacobian_lines", "mass_lines", "rhs_lines"]
+__all__ = ["jacobian_statements", "mass_statements", "place_of", "rhs_statements"]
+
+Places: TypeAlias = Callable[[int], Expression]
+"""Where the components of a node stand."""
 
 
-def rhs_lines(equations: Equations, syntax: Syntax) -> list[str]:
-    """The statements that write the right-hand side of the whole network to `rates`."""
-    lines = _parameters(equations, syntax, False)
+def rhs_statements(equations: Equations, reads: bool = True) -> list[Statement]:
+    """The statements that write the right-hand side of the whole network to `rates`; `reads` parameters from `numbers`."""
+    found = _parameters(equations, False) if reads else []
     if is_unrolled(equations):
-        places = equations.places
-        for i, begin in enumerate(_nodes(equations, syntax)):
-            lines += _block(syntax, begin, _node(equations, syntax, i, _literal(places[i])))
-        for link, begin in zip(equations.links, _links(equations, syntax), strict=True):
-            at, other = _literal(places[link[0]]), _literal(places[link[1]])
-            loads = _pair(equations, at, other, link, syntax.reads)
-            lines += _block(syntax, begin, syntax.body(link_body(equations, link), loads, _adding(syntax, at)))
-        return lines
-    lines += _loop(syntax, "i_", "NODES", _node(equations, syntax, None, _indexed("i_")))
+        for i, title in enumerate(_nodes(equations)):
+            at = _literal(equations.places[i])
+            body = node_body(equations, i=i).statements(_loads(equations, i, at, reads), _to("rates", Store, at))
+            found.append(Titled(title, tuple(body)))
+        return found + list(_of_links(equations, link_body, lambda at, _: _to("rates", Accumulate, at), reads))
+    here = _indexed("i_")
+    nodes = node_body(equations).statements(_loads(equations, None, here, reads), _to("rates", Store, here))
+    found.append(_loop("i_", "NODES", nodes))
     if equations.links:
-        loads = _pair(equations, _indexed("i_"), _indexed("j_"))
-        inner = syntax.body(link_body(equations), loads, _adding(syntax, _indexed("i_")))
-        lines += _loop(syntax, "link_", "LINKS", [*_ends(syntax, equations, False), *inner])
-    return lines
+        pair = _pair(equations, here, _indexed("j_"))
+        links = link_body(equations).statements(pair, _to("rates", Accumulate, here))
+        found.append(_loop("link_", "LINKS", [*_ends(equations, False), *links]))
+    return found
 
 
-def jacobian_lines(equations: Equations, syntax: Syntax) -> list[str]:
+def jacobian_statements(equations: Equations, reads: bool = True) -> list[Statement]:
     """The statements that write the Jacobian: dense to `matrix`, or for many nodes entry by entry to `values`."""
-    lines = _parameters(equations, syntax, True)
+    found = _parameters(equations, True) if reads else []
     if is_unrolled(equations):
-        return lines + _dense(equations, syntax)
-    own = list(node_places(equations))
+        for i, title in enumerate(_nodes(equations)):
+            at = _literal(equations.places[i])
+            loads = _loads(equations, i, at, reads)
+            storing = _entry("matrix", Store, at, at)
+            found.append(Titled(title, tuple(node_body(equations, True, i).statements(loads, storing))))
 
-    def place_own(place: Any, text: str) -> str:
-        return syntax.assign.format(f"values[{_index(own.index(place), 'NODES', 'i_')}]", "=", text)
+        def link_jacobian(equations: Equations, link: Link) -> Body:
+            return link_body(equations, link, True)
 
-    body = node_body(equations, True)
-    loads = _loads(equations, syntax, None, _indexed("i_"))
-    lines += _loop(syntax, "i_", "NODES", syntax.body(body, loads, place_own))
+        return found + list(_of_links(equations, link_jacobian, _either_end("matrix"), reads))
+    own, here = list(node_places(equations)), _indexed("i_")
+
+    def store_own(place: Any, value: Expression) -> Statement:
+        return Store("values", place_of(own.index(place), "NODES", "i_"), value)
+
+    body = node_body(equations, True).statements(_loads(equations, None, here, reads), store_own)
+    found.append(_loop("i_", "NODES", body))
     if equations.links:
-        here, there = link_places(equations)
-        slots = [(False, place) for place in here] + [(True, place) for place in there]
+        slots = [(there, place) for there, block in enumerate(link_places(equations)) for place in block]
 
-        def place_link(place: Any, text: str) -> str:
-            slot = _index(slots.index(place), "LINKS", "link_")
-            first = f"{len(own)}*NODES + " if own else ""
-            return syntax.assign.format(f"values[{first}{slot}]", "=", text)
+        def store_link(place: Any, value: Expression) -> Statement:
+            slot = place_of(slots.index(place), "LINKS", "link_")
+            return Store("values", plus(len(own) * Name("NODES"), slot) if own else slot, value)
 
-        pair = _pair(equations, _indexed("i_"), _indexed("j_"))
-        inner = syntax.body(link_body(equations, None, True), pair, place_link)
-        lines += _loop(syntax, "link_", "LINKS", [*_ends(syntax, equations, True), *inner])
-    return lines
+        pair = _pair(equations, here, _indexed("j_"))
+        links = link_body(equations, None, True).statements(pair, store_link)
+        found.append(_loop("link_", "LINKS", [*_ends(equations, True), *links]))
+    return found
 
 
-def _dense(equations: Equations, syntax: Syntax) -> list[str]:
-    places, lines = equations.places, list[str]()
-    for i, begin in enumerate(_nodes(equations, syntax)):
-        at, body = _literal(places[i]), node_body(equations, True, i)
-        loads = _loads(equations, syntax, i, at)
-        lines += _block(syntax, begin, syntax.body(body, loads, _entry(syntax, at, at, "=")))
-    for link, begin in zip(equations.links, _links(equations, syntax), strict=True):
+def mass_statements(equations: Equations, reads: bool = True) -> list[Statement]:
+    """The statements that build the mass matrix, for networks that are written out."""
+    blocks = _of_links(equations, mass_body, _either_end("mass_"), reads)
+    return [Identity("mass_", Name("DIMENSION")), *(block for block in blocks if block.body)]
+
+
+def place_of(block: int, size: str, index: str) -> Expression:
+    """Element `index` of one of several blocks of some size."""
+    return Name(index) if block == 0 else (Name(size) if block == 1 else block * Name(size)) + index
+
+
+def _of_links(
+    equations: Equations,
+    body_of: Callable[[Equations, Link], Body],
+    storing: Callable[[Places, Places], Storing],
+    reads: bool,
+) -> Iterator[Titled]:
+    """One block for each link; `storing` is made of the places of its target and of its source."""
+    places = equations.places
+    for link in equations.links:
         at, other = _literal(places[link[0]]), _literal(places[link[1]])
-        body = link_body(equations, link, True)
-
-        def store(place: Any, text: str, at: Callable[[int], str] = at, other: Callable[[int], str] = other) -> str:
-            there, inner = place
-            return _entry(syntax, at, other if there else at, "+=")(inner, text)
-
-        lines += _block(syntax, begin, syntax.body(body, _pair(equations, at, other, link, syntax.reads), store))
-    return lines
+        body = body_of(equations, link).statements(_pair(equations, at, other, link, reads), storing(at, other))
+        yield Titled(f"oscillator {link[0] + 1} feels oscillator {link[1] + 1}", tuple(body))
 
 
-def mass_lines(equations: Equations, syntax: Syntax) -> list[str]:
-    """The statements that add what the links contribute to the mass matrix, for networks that are written out."""
-    places, lines = equations.places, list[str]()
-    for link, begin in zip(equations.links, _links(equations, syntax), strict=True):
-        at, other = _literal(places[link[0]]), _literal(places[link[1]])
-        body = mass_body(equations, link)
-
-        def store(place: Any, text: str, at: Callable[[int], str] = at, other: Callable[[int], str] = other) -> str:
-            there, (r, c) = place
-            name = syntax.entry.format(at(r), (other if there else at)(c)).replace("matrix", "mass_", 1)
-            return syntax.assign.format(name, "+=", text)
-
-        if body.results:
-            lines += _block(syntax, begin, syntax.body(body, _pair(equations, at, other, link, syntax.reads), store))
-    return lines
+def _to(array: str, statement: type[Store] | type[Accumulate], at: Places) -> Storing:
+    return lambda c, value: statement(array, at(c), value)
 
 
-def _entry(syntax: Syntax, row: Callable[[int], str], column: Callable[[int], str], sign: str) -> Store:
-    def store(place: Any, text: str) -> str:
-        r, c = place
-        return syntax.assign.format(syntax.entry.format(row(r), column(c)), sign, text)
-
-    return store
+def _entry(array: str, statement: type[Store] | type[Accumulate], row: Places, column: Places) -> Storing:
+    return lambda place, value: statement(array, (row(place[0]), column(place[1])), value)
 
 
-def _parameters(equations: Equations, syntax: Syntax, jacobian: bool) -> list[str]:
-    """Read the parameters that are used from `numbers`; nothing where the language has them as arguments."""
+def _either_end(array: str) -> Callable[[Places, Places], Storing]:
+    """Adds to entries in the rows of the target and, as each place tells, the columns of the target or of the source."""
+
+    def made(at: Places, other: Places) -> Storing:
+        return lambda place, value: _entry(array, Accumulate, at, other if place[0] else at)(place[1], value)
+
+    return made
+
+
+def _parameters(equations: Equations, jacobian: bool) -> list[Statement]:
+    """Read the parameters that are used from `numbers`."""
     firsts = {kind: i for i, kind in enumerate(equations.kind_of)}.values()
     ends = {equations.ends(link): link for link in equations.links}.values()
     bodies = [node_body(equations, jacobian, i) for i in firsts]
     bodies += [link_body(equations, link, jacobian) for link in ends]
     bodies += [mass_body(equations, link) for link in ends]
-    if not syntax.reads:
-        return []
-    return [syntax.declare.format(equations.parameters[k], f"numbers[{k}]") for k in parameters(equations, bodies)]
+    return [let(equations.parameters[k], _at("numbers", Number(k))) for k in parameters(equations, bodies)]
 
 
-def _node(equations: Equations, syntax: Syntax, i: int | None, at: Callable[[int], str]) -> list[str]:
-    body, loads = node_body(equations, i=i or 0), _loads(equations, syntax, i, at)
-    return syntax.body(body, loads, lambda c, text: syntax.assign.format(f"rates[{at(c)}]", "=", text))
+def _at(array: str, index: Expression) -> Load:
+    return Load(array, index, None)
 
 
-def _loads(equations: Equations, syntax: Syntax, i: int | None, at: Callable[[int], str]) -> dict[sp.Symbol, str]:
+def _loads(equations: Equations, i: int | None, at: Places, reads: bool) -> dict[sp.Symbol, Expression]:
     """Where the states of a node are and the parameters that it has for itself; node None is the one of a loop."""
-    state = equations.node_at(i or 0).state
-    found = dict(zip(state, (f"state[{at(c)}]" for c in range(len(state))), strict=True))
+    found: dict[sp.Symbol, Expression] = {s: _at("state", at(c)) for c, s in enumerate(equations.node_at(i or 0).state)}
     for s, k in own_parameters(equations, i or 0).items():
-        found[s] = f"numbers[{k}{' + i_' if i is None else ''}]" if syntax.reads else equations.parameters[k]
+        place = Number(k) + "i_" if i is None else Number(k)
+        found[s] = _at("numbers", place) if reads else Name(equations.parameters[k])
     return found
 
 
-def _adding(syntax: Syntax, at: Callable[[int], str]) -> Store:
-    return lambda c, text: syntax.assign.format(f"rates[{at(c)}]", "+=", text)
-
-
 def _pair(
-    equations: Equations,
-    here: Callable[[int], str],
-    there: Callable[[int], str],
-    link: Link | None = None,
-    reads: bool = True,
-) -> dict[sp.Symbol, str]:
+    equations: Equations, here: Places, there: Places, link: Link | None = None, reads: bool = True
+) -> dict[sp.Symbol, Expression]:
     """Where the states at both ends of a link are, the parameters of its target, and the rates."""
     edge = equations.edge if link is None else equations.edge_at(link)
     if edge is None:
         return {}
     places = [*map(here, range(len(edge.here))), *map(there, range(len(edge.there)))]
-    found = {s: f"state[{place}]" for s, place in zip((*edge.here, *edge.there), places, strict=True)}
+    found: dict[sp.Symbol, Expression] = {
+        s: _at("state", place) for s, place in zip((*edge.here, *edge.there), places, strict=True)
+    }
     if link is not None:  # a mass of the target that differs from node to node
-        own = own_parameters(equations, link[0])
-        found |= {s: f"numbers[{k}]" if reads else equations.parameters[k] for s, k in own.items()}
-    rates = zip(rate_symbols(edge), places, strict=True)
-    return found | {s: f"rates[{place}]" for s, place in rates}
+        for s, k in own_parameters(equations, link[0]).items():
+            found[s] = _at("numbers", Number(k)) if reads else Name(equations.parameters[k])
+    return found | {s: _at("rates", place) for s, place in zip(rate_symbols(edge), places, strict=True)}
 
 
-def _literal(places: tuple[int, ...]) -> Callable[[int], str]:
-    return lambda c: str(places[c])
+def _literal(places: tuple[int, ...]) -> Places:
+    return lambda c: Number(places[c])
 
 
-def _indexed(name: str) -> Callable[[int], str]:
-    return lambda c: _index(c, "NODES", name)
+def _indexed(name: str) -> Places:
+    return lambda c: place_of(c, "NODES", name)
 
 
-def _index(block: int, size: str, name: str) -> str:
-    return name if block == 0 else f"{size} + {name}" if block == 1 else f"{block}*{size} + {name}"
+def _nodes(equations: Equations) -> list[str]:
+    return [f"oscillator {i + 1}" for i in range(equations.n)]
 
 
-def _nodes(equations: Equations, syntax: Syntax) -> Iterator[str]:
-    return (syntax.comment.format(f"oscillator {i + 1}") for i in range(equations.n))
-
-
-def _links(equations: Equations, syntax: Syntax) -> Iterator[str]:
-    return (syntax.comment.format(f"oscillator {i + 1} feels oscillator {j + 1}") for i, j, _ in equations.links)
-
-
-def _block(syntax: Syntax, comment: str, lines: list[str]) -> list[str]:
-    if not syntax.braces:
-        return [comment, *lines]
-    return [f"{{ {comment}", *(f"    {line}" for line in lines), "}"]
-
-
-def _ends(syntax: Syntax, equations: Equations, jacobian: bool) -> list[str]:
+def _ends(equations: Equations, jacobian: bool) -> list[Statement]:
     """The two ends and the weight of a link, those that are used."""
     edge, body = equations.edge, link_body(equations, None, jacobian)
     if edge is None:
         return []
-    lines = []
+    found, link = list[Statement](), Name("link_")
     if not jacobian or body.uses(edge.here):
-        lines.append(syntax.whole.format("i_", "TARGET[link_]"))
+        found.append(whole("i_", _at("TARGET", link)))
     if body.uses(edge.there):
-        lines.append(syntax.whole.format("j_", "SOURCE[link_]"))
+        found.append(whole("j_", _at("SOURCE", link)))
     if body.uses([edge.weight]):
-        lines.append(syntax.declare.format(edge.weight.name, "WEIGHT[link_]"))
-    return lines
+        found.append(let(edge.weight.name, _at("WEIGHT", link)))
+    return found
 
 
-def _loop(syntax: Syntax, index: str, end: str, lines: list[str]) -> list[str]:
-    inner = [f"    {line}" for line in lines]
-    if syntax.braces:
-        return [f"for (int {index} = 0; {index} < {end}; {index}++) {{", *inner, "}"]
-    return [f"for {index} in range({end}):", *(inner or ["    pass"])]
+def _loop(index: str, end: str, body: list[Statement]) -> Loop:
+    return Loop(index, Number(0), Name(end), tuple(body))

@@ -6,17 +6,15 @@ from collections.abc import Mapping
 
 from synchain.models.dynamics.equations import Equations
 
-from .body import Syntax, check_inertia, is_unrolled, weights, wrapped
+from ..program.expressions import Load, Name, Number, call
+from ..program.printers import MATH
+from ..program.statements import Array, Loop, let, store
+from .body import check_inertia, is_unrolled, weights, wrapped
 from .header import given_values, header
-from .loops import mass_lines, rhs_lines
+from .loops import mass_statements, rhs_statements
 from .names import portable
-from .printer import NUMBA
 
 __all__ = ["to_numba"]
-
-SYNTAX = Syntax(
-    NUMBA, declare="{} = {}", whole="{} = {}", assign="{} {} {}", comment="# {}", entry="matrix[{}, {}]"
-)  # fmt: skip
 
 
 def to_numba(equations: Equations, values: Mapping[str, float] | None = None) -> str:
@@ -43,14 +41,12 @@ def to_numba(equations: Equations, values: Mapping[str, float] | None = None) ->
     lines += [f"lsoda_sig = types.void(types.double, {pointer}, {pointer}, {pointer})", "", ""]
     check_inertia(model, "numba")
     lines += ["@cfunc(lsoda_sig)", "def rhs(t, state, rates, numbers):"]
-    inner = rhs_lines(model, SYNTAX)
+    body = rhs_statements(model)
     if model.inertial:
-        inner += ["mass_ = np.eye(DIMENSION)", *mass_lines(model, SYNTAX), "right_ = np.empty(DIMENSION)"]
-        inner += [
-            "for k_ in range(DIMENSION):",
-            "    right_[k_] = rates[k_]",
-            "right_ = np.linalg.solve(mass_, right_)",
-        ]
-        inner += ["for k_ in range(DIMENSION):", "    rates[k_] = right_[k_]"]
-    lines += ['    """Write d(state)/dt to `rates`."""', *(f"    {line}" for line in inner)]
+        k = Name("k_")
+        body += [*mass_statements(model), Array("right_", Name("DIMENSION"))]
+        body += [Loop("k_", Number(0), Name("DIMENSION"), (store("right_", k, Load("rates", k, None)),))]
+        body += [let("right_", call("np.linalg.solve", "mass_", "right_"))]
+        body += [Loop("k_", Number(0), Name("DIMENSION"), (store("rates", k, Load("right_", k, None)),))]
+    lines += ['    """Write d(state)/dt to `rates`."""', *(f"    {line}" for line in MATH.lines(body))]
     return "\n".join(lines) + "\n"

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 
+from ..program.expressions import (
+    Expression,
+    Load,
+    Name,
+    Number,
+    Product,
+    Slice,
+    call,
+    plus,
+)
+from ..program.printers import NUMPY
+from ..program.statements import Array, Do, Return, Statement, Store, let, whole
 from .body import (
-    Syntax,
     check_inertia,
     is_unrolled,
     link_body,
@@ -22,15 +33,10 @@ from .body import (
     wrapped,
 )
 from .header import given_values, header
-from .loops import jacobian_lines, mass_lines, rhs_lines
+from .loops import jacobian_statements, mass_statements, place_of, rhs_statements
 from .names import portable
-from .printer import NUMPY
 
 __all__ = ["to_python"]
-
-SYNTAX = Syntax(
-    NUMPY, declare="{} = {}", whole="{} = {}", assign="{} {} {}", comment="# {}", entry="matrix[{}, {}]", reads=False
-)  # fmt: skip
 
 SPARSITY = [
     "",
@@ -78,8 +84,9 @@ def to_python(equations: Equations, values: Mapping[str, float] | None = None) -
         "",
     ]
     check_inertia(model, "python")
-    rhs = ["rates = np.empty_like(state)", *(rhs_lines(model, SYNTAX) if small else _rhs(model))]
-    rhs += _solved(model, small, "rates")
+    rhs: list[Statement] = [let("rates", call("np.empty_like", "state"))]
+    rhs += rhs_statements(model, reads=False) if small else _rhs(model)
+    rhs += _solved(model, small, Name("rates"))
     lines += _function("rhs", arguments, "Return d(state)/dt, DIMENSION numbers.", rhs)
     jac = _jac(model, small, given)
     pattern = SPARSITY if small or not model.inertial else COUPLED
@@ -93,22 +100,23 @@ def _imports(model: Equations, small: bool) -> list[str]:
     return ["import numpy as np", *sorted(functions)]
 
 
-def _jac(model: Equations, small: bool, given: Mapping[str, str]) -> list[str]:
+def _jac(model: Equations, small: bool, given: Mapping[str, str]) -> list[Statement]:
     """The statements of jac."""
     if small:
-        jac = [] if model.constant_mass else [f"rates = rhs({', '.join(['t', 'state', *given])})"]
-        jac += ["matrix = np.zeros((DIMENSION, DIMENSION))", *jacobian_lines(model, SYNTAX)]
-        return jac + _solved(model, small, "matrix")
-    sparse = "csc_matrix((values, (ROWS, COLUMNS)), shape=(DIMENSION, DIMENSION))"
-    return ["values = np.empty(ROWS.size)", *_jacobian(model), *_solved(model, small, "matrix", sparse)]
+        found: list[Statement] = [] if model.constant_mass else [let("rates", call("rhs", "t", "state", *given))]
+        found += [let("matrix", call("np.zeros", "(DIMENSION, DIMENSION)"))]
+        return [*found, *jacobian_statements(model, reads=False), *_solved(model, small, Name("matrix"))]
+    sparse = call("csc_matrix", "(values, (ROWS, COLUMNS))", "shape=(DIMENSION, DIMENSION)")
+    return [Array("values", Name("ROWS.size")), *_jacobian(model), *_solved(model, small, sparse)]
 
 
-def _solved(model: Equations, small: bool, name: str, value: str = "") -> list[str]:
-    """Statements that return M^-1 times an array, which has a name or is the value of an expression."""
+def _solved(model: Equations, small: bool, value: Expression) -> list[Statement]:
+    """Statements that return M^-1 times an array, which has a name or is a sparse matrix of that."""
     if not model.inertial:
-        return [f"return {value or name}"]
-    assigned = [f"{name} = {value}"] if value else []
-    return [*assigned, *_masses(model, small), f"return solve(mass_, {name})"]
+        return [Return((value,))]
+    assigned = [] if isinstance(value, Name) else [let("matrix", value)]
+    name = value if isinstance(value, Name) else Name("matrix")
+    return [*assigned, *_masses(model, small), Return((call("solve", "mass_", name),))]
 
 
 def _arguments(model: Equations, known: Mapping[str, float]) -> dict[str, str]:
@@ -121,28 +129,38 @@ def _arguments(model: Equations, known: Mapping[str, float]) -> dict[str, str]:
     return {name: lists.get(name) or (repr(known[name]) if known else "") for name in names}
 
 
-def _function(name: str, arguments: str, about: str, lines: list[str]) -> list[str]:
+def _function(name: str, arguments: str, about: str, body: list[Statement]) -> list[str]:
     """A function of time, state and parameters."""
-    inner = [f'"""{about}"""', "state = np.asarray(state, dtype=float)", *lines]
+    inner = [f'"""{about}"""', "state = np.asarray(state, dtype=float)", *NUMPY.lines(body)]
     return ["", f"def {name}(t, state{arguments}):", *(f"    {line}" for line in inner), ""]
 
 
-def _masses(model: Equations, small: bool) -> list[str]:
+def _masses(model: Equations, small: bool) -> list[Statement]:
     """Statements that build M, by whose inverse the rates are M^-1 times the right-hand side."""
     if small:
-        return ["mass_ = np.eye(DIMENSION)", *mass_lines(model, SYNTAX)]
-    rows, columns, values = ["np.arange(DIMENSION)"], ["np.arange(DIMENSION)"], ["np.ones(DIMENSION)"]
+        return mass_statements(model, reads=False)
+    every = call("np.arange", "DIMENSION")
+    rows: list[Expression] = [every]
+    columns: list[Expression] = [every]
+    values: list[Expression] = [call("np.ones", "DIMENSION")]
 
-    def store(place: Any, text: str) -> str:
+    def storing(place: Any, value: Expression) -> Statement:
         there, (r, c) = place
         rows.append(_at(r, "TARGET"))
         columns.append(_at(c, "SOURCE" if there else "TARGET"))
-        values.append(f"mass_{len(values)}_")
-        return f"{values[-1]} = ({text})*np.ones(len(TARGET))"
+        name = f"mass_{len(values)}_"
+        values.append(Name(name))
+        return let(name, Product((value, call("np.ones", call("len", "TARGET")))))
 
-    lines = SYNTAX.body(mass_body(model), _loads(model)[1], store)
-    parts = (f"np.concatenate([{', '.join(part)}])" for part in (values, rows, columns))
-    return [*lines, "mass_ = csc_matrix(({}, ({}, {})), shape=(DIMENSION, DIMENSION))".format(*parts)]
+    body = mass_body(model).statements(_loads(model)[1], storing)
+    entries, row, column = (NUMPY.text(_joined(part)) for part in (values, rows, columns))
+    made = call("csc_matrix", f"({entries}, ({row}, {column}))", "shape=(DIMENSION, DIMENSION)")
+    return [*body, let("mass_", made)]
+
+
+def _joined(parts: Sequence[Expression]) -> Expression:
+    """Arrays behind each other."""
+    return call("np.concatenate", f"[{', '.join(map(NUMPY.text, parts))}]")
 
 
 def _state(model: Equations) -> str:
@@ -165,16 +183,17 @@ def _tables(model: Equations, small: bool) -> list[str]:
         for name, table in {**ends, "WEIGHT": weights(model)}.items():
             lines += [f"{name} = np.array([", *wrapped(table), "])"]
     here, there = link_places(model)
-    rows = [_at(r, "NODE") for r, _ in node_places(model)] + [_at(r, "TARGET") for r, _ in (*here, *there)]
-    columns = [_at(c, "NODE") for _, c in node_places(model)] + [_at(c, "TARGET") for _, c in here]
+    rows: list[Expression] = [_at(r, "NODE") for r, _ in node_places(model)] + [
+        _at(r, "TARGET") for r, _ in (*here, *there)
+    ]
+    columns: list[Expression] = [_at(c, "NODE") for _, c in node_places(model)] + [_at(c, "TARGET") for _, c in here]
     columns += [_at(c, "SOURCE") for _, c in there]
     heavy = sorted({r for _, (r, _) in dict(mass_body(model).results)})
     if heavy:
-        lines.append(f"HEAVY = np.concatenate([{', '.join(_at(r, 'NODE') for r in heavy)}])")
-    empty = "np.zeros(0, dtype=int)"
-    for name, parts in (("ROWS", rows), ("COLUMNS", columns)):
-        lines.append(f"{name} = np.concatenate([{', '.join(parts)}])" if parts else f"{name} = {empty}")
-    return lines
+        lines += NUMPY.lines([let("HEAVY", _joined([_at(r, "NODE") for r in heavy]))])
+    empty = call("np.zeros", 0, "dtype=int")
+    tables = (("ROWS", rows), ("COLUMNS", columns))
+    return lines + NUMPY.lines(let(name, _joined(parts) if parts else empty) for name, parts in tables)
 
 
 def _small_places(model: Equations) -> list[tuple[int, int]]:
@@ -183,52 +202,61 @@ def _small_places(model: Equations) -> list[tuple[int, int]]:
     return sorted(set(model.jacobian()) | {(row, column) for row in heavy for column in range(model.dimension)})
 
 
-def _at(component: int, index: str) -> str:
-    return index if component == 0 else f"NODES + {index}" if component == 1 else f"{component}*NODES + {index}"
+def _at(component: int, index: str) -> Expression:
+    return place_of(component, "NODES", index)
 
 
-def _part(component: int) -> str:
-    """The slice of one component of all nodes."""
-    begin = "" if component == 0 else "NODES" if component == 1 else f"{component}*NODES"
-    return f"{begin}:{'NODES' if component == 0 else f'{component + 1}*NODES'}"
+def _part(block: int, size: str = "NODES", first: Expression | None = None) -> Slice:
+    """One of several blocks of an array, behind a first part."""
+
+    def end(k: int) -> Expression:
+        if first is None:
+            return Name(size) if k == 1 else k * Name(size)
+        return plus(first, k * Name(size))
+
+    return Slice(Number(0) if block == 0 and first is None else end(block), end(block + 1))
 
 
-def _loads(model: Equations) -> tuple[dict, dict]:
+def _loads(model: Equations) -> tuple[dict[sp.Symbol, Expression], dict[sp.Symbol, Expression]]:
     """Where the states of all nodes are, and those of both ends of all links."""
-    size = range(len(model.node.state))
-    own = dict(zip(model.node.state, (f"state[{_part(c)}]" for c in size), strict=True))
-    own |= {sp.Symbol(name, real=True): f"np.asarray({name}, dtype=float)" for name in model.varied}
+
+    def state(index: Expression) -> Load:
+        return Load("state", index, None)
+
+    varied = {sp.Symbol(name, real=True): f"np.asarray({name}, dtype=float)" for name in model.varied}
+    own: dict[sp.Symbol, Expression] = {s: state(_part(c)) for c, s in enumerate(model.node.state)}
+    own |= {s: Name(text) for s, text in varied.items()}
     if model.edge is None or not model.links:
         return own, {}
-    here = dict(zip(model.edge.here, (f"state[{_at(c, 'TARGET')}]" for c in size), strict=True))
-    there = dict(zip(model.edge.there, (f"state[{_at(c, 'SOURCE')}]" for c in size), strict=True))
-    mine = {sp.Symbol(name, real=True): f"np.asarray({name}, dtype=float)[TARGET]" for name in model.varied}
-    return own, {**mine, **here, **there, model.edge.weight: "WEIGHT"}
+    ends: dict[sp.Symbol, Expression] = {s: Load(text, Name("TARGET"), None) for s, text in varied.items()}
+    for index, states in (("TARGET", model.edge.here), ("SOURCE", model.edge.there)):
+        ends |= {s: state(_at(c, index)) for c, s in enumerate(states)}
+    return own, ends | {model.edge.weight: Name("WEIGHT")}
 
 
-def _rhs(model: Equations) -> list[str]:
+def _rhs(model: Equations) -> list[Statement]:
     own, ends = _loads(model)
-    lines = SYNTAX.body(node_body(model), own, lambda c, text: f"rates[{_part(c)}] = {text}")
+    found = node_body(model).statements(own, lambda c, value: Store("rates", _part(c), value))
     if not model.links:
-        return lines
-    store = "np.add.at(rates, {}, {})"
-    return lines + SYNTAX.body(link_body(model), ends, lambda c, text: store.format(_at(c, "TARGET"), text))
+        return found
+
+    def adding(c: int, value: Expression) -> Statement:
+        return Do(call("np.add.at", "rates", _at(c, "TARGET"), value))
+
+    return found + link_body(model).statements(ends, adding)
 
 
-def _jacobian(model: Equations) -> list[str]:
+def _jacobian(model: Equations) -> list[Statement]:
     own, ends = _loads(model)
     mine = list(node_places(model))
+    found = node_body(model, True).statements(own, lambda place, e: Store("values", _part(mine.index(place)), e))
+    slots = [(there, place) for there, block in enumerate(link_places(model)) for place in block]
+    if not slots:
+        return found
+    behind = len(mine) * Name("NODES")
 
-    def node(place: Any, text: str) -> str:
-        return f"values[{_part(mine.index(place))}] = {text}"
+    def link(place: Any, value: Expression) -> Statement:
+        return Store("values", _part(slots.index(place), "LINKS", behind), value)
 
-    lines = SYNTAX.body(node_body(model, True), own, node)
-    here, there = link_places(model)
-    slots = [(False, place) for place in here] + [(True, place) for place in there]
-
-    def link(place: Any, text: str) -> str:
-        k = slots.index(place)
-        return f"values[{len(mine)}*NODES + {k}*LINKS:{len(mine)}*NODES + {k + 1}*LINKS] = {text}"
-
-    links = SYNTAX.body(link_body(model, None, True), ends, link)
-    return lines + (["LINKS = len(TARGET)", *links] if slots else [])
+    counted = whole("LINKS", call("len", "TARGET"))
+    return [*found, counted, *link_body(model, None, True).statements(ends, link)]

@@ -32,12 +32,12 @@ from numba.core.serialize import dumps
 
 from synchain.models.dynamics.equations import Equations
 
-from ..printing.names import NAMES
 from ..driver import dimensions
 from ..driver.dimensions import Dimensions, ModeDimensions
 from ..simd import addresses, decorator, elementary, lane_types, lanes, special
 from ..simd.addresses import ADDRESS
 from ..simd.lane_types import Lane
+from ..steps.names import NAMES
 from .cache import Folder, cache_folder, open_folder
 from .driver import Driver, KernelKind
 from .installation import InstallationError

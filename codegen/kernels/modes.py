@@ -8,7 +8,7 @@ for each of LANES modes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import sympy as sp
@@ -20,14 +20,18 @@ from synchain.models.mechanics.components import TIME
 
 from ..driver.dimensions import ModeDimensions
 from ..integrators import Integrator, integrator
-from ..printing.blocks import Body, Names, analyse
-from ..printing.names import tidy
-from ..printing.printer import show
+from ..program.expressions import ZERO, Expression, Load, Name, Number, Product, Value, call, linear, plus
+from ..program.lowering import lower
+from ..program.passes import Names, share
+from ..program.printers import LANES
+from ..program.statements import Assign, Comment, Function, Return, Statement, let, operations, store
 from ..simd import lanes
-from ..steps.contacts import write_events
+from ..steps.blocks import analyse
+from ..steps.contacts import event_functions, register
 from ..steps.elimination import plan, write_factors, write_solve
-from ..steps.rosenbrock import stage_state, write_rosenbrock
-from ..steps.step import SCALED, StepWriter, combine, write_function
+from ..steps.names import tidy
+from ..steps.step import SCALED, Step, node_function
+from ..steps.unrolled import Unrolled, stage_state
 from .driver import Driver, KernelKind
 from .sweep import LARGEST_UNROLLED, KernelSource, describe, imports, node_functions
 
@@ -84,11 +88,11 @@ def emit_modes(variation: Variation, width: int | None = None) -> KernelSource:
     blocks = analyse(plain.node, names, plain.varied)
     variation = _renamed(variation, plain)
     parts = Parts.of(variation, method.stages)
-    writer = StepWriter(plain, blocks, method)
+    writer = Unrolled(plain, [blocks], method)
     functions = _functions(parts, plain.state, names)
-    write_rosenbrock(writer, lambda i: _note(writer, parts, functions, method, i))
+    writer.write(after=lambda i: _note(writer, parts, functions, method, i))
     carry = _mode_step(variation, parts, method)
-    bodies = [*node_functions([writer], blocks), *(f.lines for f in functions if f.lines)]
+    bodies = [*node_functions([writer], blocks), *functions.values()]
     text = _module(writer, variation, width, bodies, carry, names)
     events = variation.events
     owners = (-1,) * variation.size if events is None else tuple(events.owners)
@@ -155,90 +159,88 @@ class Parts:
         return HEAD + len(self.steady) + 2 * (stage * len(self.moving) + k)
 
 
-@dataclass(frozen=True, slots=True)
-class Function:
-    """A small function of the kernel, and the names of its arguments."""
-
-    name: str
-    lines: list[str]
-    arguments: tuple[str, ...]
-
-
-def _functions(parts: Parts, state: tuple[str, ...], names: Names) -> tuple[Function, Function, Function]:
+def _functions(parts: Parts, state: tuple[str, ...], names: Names) -> dict[str, Function]:
     """The functions `steady`, `moving` and `bent`: coefficients, and derivatives of the moving ones along a stage."""
     along = {sp.Symbol(s, real=True): sp.Symbol(f"along_{s}", real=True) for s in state}
     lag = sp.Symbol("lag", real=True)
     bent = [sp.Add(*(derivative(e, s) * k for s, k in along.items()), derivative(e, TIME) * lag) for e in parts.moving]
-    return (
-        _function("steady", "Coefficients of the modes that do not move.", parts.steady, state, names),
-        _function("moving", "Coefficients of the modes that move along the orbit.", parts.moving, state, names),
-        _function("bent", "Their derivatives along a stage, `lag` the part of it in time.", bent, state, names),
-    )
+    described = {
+        "steady": ("Coefficients of the modes that do not move.", list(parts.steady)),
+        "moving": ("Coefficients of the modes that move along the orbit.", list(parts.moving)),
+        "bent": ("Their derivatives along a stage, `lag` the part of it in time.", bent),
+    }
+    found = {}
+    for name, (about, results) in described.items():
+        if results:
+            body = share(results, names.fresh("z"))
+            used = {s.name for s in body.symbols}
+            arguments = [s for s in state if s in used] + sorted(used - set(state))
+            found[name] = node_function(name, about, body, arguments, body.results)
+    return found
 
 
-def _function(name: str, doc: str, results: Iterable[sp.Expr], state: tuple[str, ...], names: Names) -> Function:
-    found = list(results)
-    if not found:
-        return Function(name, [], ())
-    statements, reduced = sp.cse(found, symbols=names.fresh("z"), order="canonical")
-    body = Body(tuple(statements), tuple(reduced))
-    used = {s.name for s in body.symbols}
-    arguments = tuple([s for s in state if s in used] + sorted(used - set(state)))
-    return Function(name, write_function(name, doc, body, arguments, body.results), arguments)
-
-
-def _note(w: StepWriter, parts: Parts, functions: tuple[Function, ...], method: Integrator, i: int) -> None:
+def _note(w: Step, parts: Parts, functions: Mapping[str, Function], method: Integrator, i: int) -> None:
     """Write what stage i leaves in the shared array."""
-    steady, moving, bent = functions
+
+    def called(name: str, at: Mapping[str, Value]) -> Expression:
+        return call(name, *(at.get(a, a) for a in functions[name].arguments))
+
     if i == 0:
-        w.put("# what the modes need of this step")
-        w.put("store(shared, 0, rate)", "store(shared, 1, shift)", "store(shared, 2, reach)")
-        if parts.steady:
-            w.put(f"{', '.join(parts.steady.values())} = {steady.name}({', '.join(steady.arguments)})")
-            w.put(*(f"store(shared, {HEAD + k}, {name} + 0.0*h)" for k, name in enumerate(parts.steady.values())))
+        w.note("what the modes need of this step")
+        w.put(*(store("shared", k, name) for k, name in enumerate(("rate", "shift", "reach"))))
+        steady = tuple(parts.steady.values())
+        if steady:
+            w.put(Assign(steady, called("steady", {})))
+            w.put(*(store("shared", HEAD + k, _on_lane(name)) for k, name in enumerate(steady)))
     if not parts.moving:
         return
-    at: dict[str, str] = {s: f"u_{s}" for s in w.state} if i > 0 else {}
-    at[TIME.name] = "now" if i > 0 else "t"
-    values = [f"value_{i + 1}_{k}" for k in range(len(parts.moving))]
-    w.put(f"{', '.join(values)} = moving({', '.join(at.get(a, a) for a in moving.arguments)})")
-    slopes = [f"bend_{i + 1}_{k}" for k in range(len(parts.moving))]
-    at = {f"along_{s}": f"k{i + 1}_{s}" for s in w.state} | {TIME.name: "t", "lag": f"{method.d[i]!r}*h"}
-    w.put(f"{', '.join(slopes)} = bent({', '.join(at.get(a, a) for a in bent.arguments)})")
+    at: dict[str, Value] = {s: f"u_{s}" for s in w.state} if i > 0 else {}
+    values, slopes = (tuple(f"{word}_{i + 1}_{k}" for k in range(len(parts.moving))) for word in ("value", "bend"))
+    w.put(Assign(values, called("moving", {**at, TIME.name: "now" if i > 0 else "t"})))
+    along: dict[str, Value] = {f"along_{s}": f"k{i + 1}_{s}" for s in w.state}
+    w.put(Assign(slopes, called("bent", {**along, TIME.name: "t", "lag": method.d[i] * Name("h")})))
     for k, (value, slope) in enumerate(zip(values, slopes, strict=True)):
-        w.put(
-            f"store(shared, {parts.value(i, k)}, {value})", f"store(shared, {parts.value(i, k) + 1}, {slope} + 0.0*h)"
-        )
+        place = parts.value(i, k)
+        w.put(store("shared", place, value), store("shared", place + 1, _on_lane(slope)))
 
 
-def _mode_step(variation: Variation, parts: Parts, method: Integrator) -> list[str]:
+def _on_lane(name: str) -> Expression:
+    """The same value as a register, if it does not depend on the step."""
+    return Name(name) + 0.0 * Name("h")
+
+
+def _shared(k: int) -> Load:
+    return Load("shared", Number(k), None)
+
+
+def _mode_step(variation: Variation, parts: Parts, method: Integrator) -> list[Statement]:
     """The statements of the step that one register of modes takes."""
     size, strengths = variation.size, [s.name for s in variation.parameters]
-    lines = ["rate, shift, reach = shared[0], shared[1], shared[2]"]
-    lines += [f"{s} = load(strengths, {len(strengths)}*which + {k}, LANES)" for k, s in enumerate(strengths)]
-    lines += [f"d{c} = load(old, {size}*which + {c}, LANES)" for c in range(size)]
-    lines += [f"{name} = shared[{HEAD + k}]" for k, name in enumerate(parts.steady.values())]
+    body: list[Statement] = [let(name, _shared(k)) for k, name in enumerate(("rate", "shift", "reach"))]
+    body += [let(s, register("strengths", len(strengths), k)) for k, s in enumerate(strengths)]
+    body += [let(f"d{c}", register("old", size, c)) for c in range(size)]
+    body += [let(name, _shared(HEAD + k)) for k, name in enumerate(parts.steady.values())]
     fixed = {}
     for (r, c), terms in parts.rows.items():
         if all(not _moves(a) for a, _ in terms) and not (len(terms) == 1 and terms[0][1] == 1):
             fixed[r, c] = f"g{r}_{c}"
-            lines.append(f"g{r}_{c} = {show(sp.Add(*(a * s for a, s in terms)))}")
+            body.append(let(f"g{r}_{c}", lower(sp.Add(*(a * s for a, s in terms)))))
     stages = [_at_stage(parts, fixed, i) for i in range(method.stages)]
-    lines += [f"a1_{k} = shared[{parts.value(0, k)}]" for k in range(len(parts.moving))]
+    body += [let(f"a1_{k}", _shared(parts.value(0, k))) for k in range(len(parts.moving))]
     steps = plan(size, set(parts.rows))
     factors = write_factors(steps, stages[0], tuple(f"d{c}" for c in range(size)))
-    lines += ["# factors of shift - A", *factors.lines]
+    body += [Comment("factors of shift - A"), *factors.statements]
     for i in range(method.stages):
-        lines += _mode_stage(parts, stages[i], method, i, size)
+        body += _mode_stage(parts, stages[i], method, i, size)
         right = {c: f"r{c}" for c in range(size)}
-        lines += write_solve(steps, factors, right, {c: f"k{i + 1}_d{c}" for c in range(size)})
-    lines.append("# new deviation, its error and its size")
+        body += write_solve(steps, factors, right, {c: f"k{i + 1}_d{c}" for c in range(size)})
+    body.append(Comment("new deviation, its error and its size"))
     for c in range(size):
-        lines += [f"n{c} = {stage_state(method.b, method.a[-1], f'd{c}')}", f"store(new, {size}*which + {c}, n{c})"]
-    error = [f"absolute({combine(method.e[0], [f'k{j + 1}_d{c}' for j in range(method.stages)])})" for c in range(size)]
-    lines.append(f"error = {_largest(error)}")
-    lines.append(f"return error, {_largest([f'absolute({x}{c})' for c in range(size) for x in 'dn'])}")
-    return lines
+        body.append(let(f"n{c}", stage_state(method.b, method.a[-1], f"d{c}")))
+        body.append(store("new", size * Name("which") + c, f"n{c}"))
+    errors = [linear(method.e[0], [f"k{j + 1}_d{c}" for j in range(method.stages)]) for c in range(size)]
+    body.append(let("error", _largest(errors)))
+    return [*body, Return((Name("error"), _largest([Name(f"{x}{c}") for c in range(size) for x in "dn"])))]
 
 
 def _moves(coefficient: sp.Expr) -> bool:
@@ -255,13 +257,15 @@ def _at_stage(parts: Parts, fixed: Mapping[Place, str], i: int) -> dict[Place, s
     return made
 
 
-def _mode_stage(parts: Parts, entries: Mapping[Place, sp.Expr], method: Integrator, i: int, size: int) -> list[str]:
+def _mode_stage(
+    parts: Parts, entries: Mapping[Place, sp.Expr], method: Integrator, i: int, size: int
+) -> list[Statement]:
     """Stage state, A times it, and what the moving Jacobian adds."""
-    lines = [f"# stage {i + 1}"]
+    body: list[Statement] = [Comment(f"stage {i + 1}")]
     if i > 0:
-        lines += [f"a{i + 1}_{k} = shared[{parts.value(i, k)}]" for k in range(len(parts.moving))]
-        lines += [f"u_d{c} = {stage_state(method.a[i], method.a[i - 1], f'd{c}')}" for c in range(size)]
-    lines += [f"b{i + 1}_{k} = shared[{parts.value(i, k) + 1}]" for k in range(len(parts.moving))]
+        body += [let(f"a{i + 1}_{k}", _shared(parts.value(i, k))) for k in range(len(parts.moving))]
+        body += [let(f"u_d{c}", stage_state(method.a[i], method.a[i - 1], f"d{c}")) for c in range(size)]
+    body += [let(f"b{i + 1}_{k}", _shared(parts.value(i, k) + 1)) for k in range(len(parts.moving))]
     for r in range(size):
         terms: list[sp.Expr] = []
         for (row, c), e in entries.items():
@@ -269,46 +273,48 @@ def _mode_stage(parts: Parts, entries: Mapping[Place, sp.Expr], method: Integrat
                 terms.append(e * sp.Symbol(f"u_d{c}" if i > 0 else f"d{c}"))
                 bends = [sp.Symbol(f"b{i + 1}_{str(a)[1:]}") * s for a, s in parts.rows[row, c] if _moves(a)]
                 terms += [sp.Add(*bends) * sp.Symbol(f"d{c}")] if bends else []
-        text = show(sp.Add(*terms, evaluate=False)) if len(terms) > 1 else show(terms[0]) if terms else ""
+        found = [lower(sp.Add(*terms, evaluate=False) if len(terms) > 1 else terms[0])] if terms else []
         if i > 0:
-            carried = combine(method.big_c[i], [f"k{j + 1}_d{r}" for j in range(i)])
-            text = f"{text} + rate*({carried})" if text else f"rate*({carried})"
-        lines.append(f"r{r} = {text or 'broadcast(0.0, LANES)'}")
-    return lines
+            carried = linear(method.big_c[i], [f"k{j + 1}_d{r}" for j in range(i)])
+            found.append(Product((Name("rate"), carried)))
+        body.append(let(f"r{r}", plus(*found) if found else call("broadcast", ZERO, "LANES")))
+    return body
 
 
-def _largest(texts: list[str]) -> str:
-    made = texts[0]
-    for other in texts[1:]:
-        made = f"maximum({made}, {other})"
-    return made
+def _largest(values: Sequence[Expression]) -> Expression:
+    """The largest absolute value."""
+    first, *others = (call("absolute", e) for e in values)
+    for other in others:
+        first = call("maximum", first, other)
+    return first
 
 
 def _module(
-    writer: StepWriter,
+    writer: Step,
     variation: Variation,
     width: int,
-    functions: list[list[str]],
-    carry: list[str],
+    functions: list[Function],
+    carry: list[Statement],
     names: Names,
 ) -> str:
-    plain, lines = writer.equations, writer.lines
-    orbit = [
-        "@njit(error_model='numpy', cache=True)",
-        "def step(t, h, y, p, y_new, dense, rtol, atol, shared):",
-        '    """One step of the orbit from (t, y): writes y_new and what the modes need, returns the error."""',
-        *(f"    {line}" for line in lines),
-    ]
-    modes = [
-        "@njit(error_model='numpy', forceinline=True)",
-        "def mode_step(shared, strengths, old, new, which):",
-        '    """The same step of the modes in one register: writes them, returns their error and their size."""',
-        *(f"    {line}" for line in carry),
-    ]
-    made = ["\n".join(f) for f in functions] + [SCALED, "\n".join(orbit), "\n".join(modes), CARRY]
-    text = "\n\n\n".join([*made, *write_events(variation, names)]) + "\n"
+    plain = writer.equations
+    orbit = Function(
+        "step",
+        ("t", "h", "y", "p", "y_new", "dense", "rtol", "atol", "shared"),
+        "One step of the orbit from (t, y): writes y_new and what the modes need, returns the error.",
+        tuple(writer.statements),
+        inline=False,
+    )
+    modes = Function(
+        "mode_step",
+        ("shared", "strengths", "old", "new", "which"),
+        "The same step of the modes in one register: writes them, returns their error and their size.",
+        tuple(carry),
+    )
     deviations = f"{variation.size} deviations, {width} modes a register"
-    head = describe(variation.orbit, plain, writer.method, (), lines, deviations)
+    made = [*map(LANES.function, functions), SCALED, LANES.function(orbit), LANES.function(modes), CARRY]
+    text = "\n\n\n".join([*made, *map(LANES.function, event_functions(variation, names))]) + "\n"
+    head = describe(variation.orbit, plain, writer.method, (), operations(orbit.body), deviations)
     constants = f"WIDTH = 1\nLANES = {width}\nDENSE = {plain.sticks}"
     return "\n\n\n".join([head, imports(text), constants, text])
 

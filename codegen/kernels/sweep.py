@@ -16,16 +16,19 @@ from synchain.models.dynamics.record import Record
 from .. import driver, simd
 from ..driver.dimensions import Dimensions, ModeDimensions
 from ..integrators import Integrator, integrator
-from ..printing.blocks import Names, NodeBlocks, analyse
-from ..printing.names import tidy
-from ..printing.printer import show
+from ..program.expressions import Load, Number, call
+from ..program.lowering import lower
+from ..program.passes import Names
+from ..program.printers import LANES
+from ..program.statements import Function, Return, Statement, let, operations
 from ..simd import lanes
-from ..steps.contacts import write_pushes
-from ..steps.explicit import write_explicit
-from ..steps.looped import LoopWriter
+from ..steps.blocks import NodeBlocks, analyse
+from ..steps.contacts import push_functions
+from ..steps.looped import Looped
+from ..steps.names import tidy
 from ..steps.program import FILL_LIMIT, Program, program, workspace
-from ..steps.rosenbrock import write_rosenbrock
-from ..steps.step import PAIR, SCALED, StepWriter, function_name, write_function
+from ..steps.step import PAIR, SCALED, Step, function_name, node_function
+from ..steps.unrolled import Unrolled
 from ..taylor import write_looped, write_step
 from .driver import Driver, KernelKind
 
@@ -157,15 +160,17 @@ def emit(
     states = [s.name for node in plain.nodes for s in node.state]
     names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
     chosen = Driver(KernelKind.SWEEP, width, ordered, looped, method.smooth is not None, plain.sticks, method.series)
-    functions, lines, scratch = (_series if method.series else _stages)(plain, method, names, elimination)
-    events = [write_pushes(plain, names, looped), _section(equations, plain, section if "section" in ordered else None)]
-    text = "\n\n\n".join([*functions, *(part for part in events if part)]) + "\n"
-    constants = {"WIDTH": width, "DENSE": bool(ordered) or plain.sticks}
+    functions, scratch, count = (_series if method.series else _stages)(plain, method, names, elimination)
+    events = [*push_functions(plain, names, looped), *_section(equations, plain, section if "section" in ordered else None)]
+    if "section" in ordered:
+        functions.append(driver.text("dense"))
+    text = "\n\n\n".join([*functions, *map(LANES.function, events)]) + "\n"
+    constants = {"WIDTH": width, "DENSE": bool(ordered) or plain.sticks, "SERIES": method.series}
     if elimination is not None:
         solves = method.implicit or plain.inertial
         constants |= {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": method.dense_rows}
         constants |= {"ENTRIES": elimination.entries if solves else 0}
-    head = describe(equations, plain, method, ordered, lines)
+    head = describe(equations, plain, method, ordered, count)
     named = "\n".join(f"{name} = {value!r}" for name, value in constants.items())
     text = "\n\n\n".join([head, imports(text), named, text])
     sizes = _dimensions(plain, method, scratch)
@@ -179,25 +184,24 @@ def default_width(equations: Equations) -> int:
 
 def _series(
     plain: Equations, method: Integrator, names: Names, elimination: Program | None
-) -> tuple[list[str], list[str], int]:
-    """The function of a Taylor step; its statements, and the groups of scratch memory that it needs."""
+) -> tuple[list[str], int, int]:
+    """The function of a Taylor step, the groups of scratch memory that it needs, and its operations."""
     step = (write_step if elimination is None else write_looped)(plain, method.order)
-    return [step.text], step.text.splitlines(), step.workspace
+    return [step.text], step.workspace, step.operations
 
 
 def _stages(
     plain: Equations, method: Integrator, names: Names, elimination: Program | None
-) -> tuple[list[str], list[str], int]:
-    """The functions of a step in stages; the statements of the steps, and the groups of scratch memory they need."""
+) -> tuple[list[str], int, int]:
+    """The functions of a step in stages, the groups of scratch memory that they need, and the operations of the steps."""
     blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
     steps = _steps(plain, blocks, method, elimination)
     looped = elimination is not None
     functions = [f for k in range(len(blocks)) for f in node_functions(list(steps.values()), blocks[k], k)]
-    made = ["\n".join(f) for f in functions]
-    made += [SCALED, *([PAIR, driver.text("sparse")] if looped else [])]
-    made += [_step(name, writer.lines, looped) for name, writer in steps.items()]
-    lines = [line for writer in steps.values() for line in writer.lines]
-    return made, lines, workspace(steps["step"], elimination) if elimination is not None else 0
+    stepping = [_step(name, writer, looped) for name, writer in steps.items()]
+    made = [*map(LANES.function, functions), SCALED, *([PAIR, driver.text("sparse")] if looped else [])]
+    scratch = workspace(steps["step"], elimination) if elimination is not None else 0
+    return [*made, *map(LANES.function, stepping)], scratch, sum(operations(f.body) for f in stepping)
 
 
 def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimensions:
@@ -224,21 +228,21 @@ def _for_many(method: Integrator, equations: Equations, unroll: int) -> Integrat
 
 def _steps(
     plain: Equations, blocks: Sequence[NodeBlocks], method: Integrator, elimination: Program | None
-) -> dict[str, StepWriter]:
+) -> dict[str, Step]:
     """The steps of a kernel by the name of their function, written."""
-    methods = {"step": method} if method.smooth is None else {"step": method, "step_smooth": method.smooth}
-    first, *more = blocks
-    bounded = len(methods) > 1
-    steps = {name: StepWriter(plain, first, m, bounded, more) for name, m in methods.items()}
+    if elimination is not None:
+        steps: dict[str, Step] = {"step": Looped(plain, blocks, method, elimination)}
+    elif method.smooth is None:
+        steps = {"step": Unrolled(plain, blocks, method)}
+    else:
+        methods = {"step": method, "step_smooth": method.smooth}
+        steps = {name: Unrolled(plain, blocks, m, bounded=True) for name, m in methods.items()}
     for writer in steps.values():
-        if elimination is not None:
-            LoopWriter(writer, elimination).lines()
-        else:
-            (write_rosenbrock if writer.method.implicit else write_explicit)(writer)
+        writer.write()
     return steps
 
 
-def node_functions(steps: list[StepWriter], blocks: NodeBlocks, kind: int = 0) -> list[list[str]]:
+def node_functions(steps: Sequence[Step], blocks: NodeBlocks, kind: int = 0) -> list[Function]:
     """The right-hand side of one node of some kind, and the linearisations that the steps call."""
     made = []
     first = [writer.first_of(blocks) for writer in steps]
@@ -250,7 +254,7 @@ def node_functions(steps: list[StepWriter], blocks: NodeBlocks, kind: int = 0) -
         results = [e for e in body.results if not steps[0].is_plain(e)]
         if results and (name == "node" or any(body is b for b in first)):
             arguments = [s.name for s in steps[0].arguments(body, results)]
-            made.append(write_function(function_name(name, kind), doc, body, arguments, results))
+            made.append(node_function(function_name(name, kind), doc, body, arguments, results))
     return made
 
 
@@ -259,7 +263,7 @@ def describe(
     plain: Equations,
     method: Integrator,
     records: tuple[str, ...],
-    lines: list[str],
+    count: int,
     more: str = "",
 ) -> str:
     """The docstring at the head of a kernel module."""
@@ -274,7 +278,7 @@ def describe(
         f"Parameters  {_listed(equations.parameters) or 'none'}",
         f"Records     {', '.join(('final state', *records))}",
         *([f"Modes       {more}"] if more else []),
-        f"Step        {_operations(lines)} operations outside the node functions",
+        f"Step        {count} operations outside the node functions",
     ]
     if swapped:
         rows.append(f"Renamed     {_listed(swapped)}")
@@ -288,12 +292,6 @@ def _listed(names: tuple[str, ...]) -> str:
     return f"{', '.join(names[:6])}, … {', '.join(names[-3:])} ({len(names)} variables)"
 
 
-def _operations(lines: list[str]) -> int:
-    return sum(line.count(f" {sign} ") for line in lines for sign in "+-") + sum(
-        line.count(sign) for line in lines for sign in "*/"
-    )
-
-
 def imports(text: str) -> str:
     """The import statements of a kernel module: what its text uses."""
     used = sorted(name for name in simd.__all__ if re.search(rf"\b{name}\b", text))
@@ -301,20 +299,16 @@ def imports(text: str) -> str:
     return "\n\n".join([*modules, f"from synchain.codegen.simd import {', '.join(used)}"])
 
 
-def _step(name: str, lines: list[str], looped: bool) -> str:
-    more = ", graph, weights" if looped else ""
-    head = [
-        "@njit(error_model='numpy', cache=True)",
-        f"def {name}(t, h, y, p, y_new, dense, rtol, atol{more}):",
-        '    """One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."""',
-    ]
-    return "\n".join([*head, *(f"    {line}" for line in lines)])
+def _step(name: str, writer: Step, looped: bool) -> Function:
+    arguments = ("t", "h", "y", "p", "y_new", "dense", "rtol", "atol", *(("graph", "weights") if looped else ()))
+    about = "One step from (t, y): writes y_new and the dense output, returns the error in units of the tolerance."
+    return Function(name, arguments, about, tuple(writer.statements), inline=False)
 
 
-def _section(equations: Equations, plain: Equations, section: sp.Expr | None) -> str:
+def _section(equations: Equations, plain: Equations, section: sp.Expr | None) -> list[Function]:
     """The section function at a fraction of the step; a kernel without sections has none."""
     if section is None:
-        return ""
+        return []
     renamed = zip((*equations.state, *equations.parameters), (*plain.state, *plain.parameters), strict=True)
     swap = {_real(old): _real(new) for old, new in renamed}
     section = section.xreplace({s: _real(s.name) for s in section.free_symbols})
@@ -322,22 +316,16 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
     unknown = sorted(used - set(equations.state) - set(equations.parameters) - {"t"})
     if unknown:
         raise ValueError(f"section function {section}: unknown symbol {unknown[0]!r}; use the state, parameters and t")
-    lines = [
-        driver.text("dense"),
-        "",
-        "",
-        "@njit(error_model='numpy', cache=True)",
-        "def section(theta, t, h, y, y_new, dense, dims):",
-        '    """The section function at the fraction theta of the step."""',
-    ]
+    body: list[Statement] = []
     for slot, (name, shown) in enumerate(zip(equations.state, plain.state, strict=True)):
         if name in used:
-            lines.append(f"    {shown} = inside(theta, {slot}, y, y_new, dense, dims)")
+            body.append(let(shown, call("inside", "theta", slot, "y", "y_new", "dense", "dims")))
     for slot, (name, shown) in enumerate(zip(equations.parameters, plain.parameters, strict=True)):
         if name in used:
-            lines.append(f"    {shown} = load(y, {equations.dimension + slot}, WIDTH)")
-    text = show(section.xreplace({_real("t"): sp.Symbol("(t + theta*h)")}).xreplace(swap))
-    return "\n".join([*lines, f"    return {text}"])
+            body.append(let(shown, Load("y", Number(equations.dimension + slot))))
+    value = lower(section.xreplace({_real("t"): sp.Symbol("(t + theta*h)")}).xreplace(swap))
+    about = "The section function at the fraction theta of the step."
+    return [Function("section", ("theta", "t", "h", "y", "y_new", "dense", "dims"), about, (*body, Return((value,))), inline=False)]
 
 
 def _real(name: str) -> sp.Symbol:

@@ -1,8 +1,8 @@
-"""The text that decides between stick and slip: what a kernel must know of each contact at a state."""
+"""The functions that decide between stick and slip: what a kernel must know of each contact at a state."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import sympy as sp
 
@@ -12,143 +12,152 @@ from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import TIME, Edge
 from synchain.models.mechanics.friction import Contact
 
-from ..printing.blocks import Hoist, Names
-from ..printing.names import NAMES
-from ..printing.printer import show
+from ..program.expressions import (
+    ZERO,
+    Compare,
+    Expression,
+    Junction,
+    Load,
+    Name,
+    Number,
+    Product,
+    call,
+    plus,
+)
+from ..program.lowering import lower
+from ..program.passes import Body, Hoist, Names, share
+from ..program.statements import Assign, Function, If, Statement, accumulate, let, store
+from .names import NAMES
+from .places import link_ends, span
+from .step import lane
 
-__all__ = ["write_events", "write_pushes"]
-
-HEAD = '''
-@njit(error_model='numpy', cache=True)
-def pushes(t, y, p, out{network}):
-    """For each contact: sliding velocity, ground's velocity, accelerations under static friction both ways, in slip."""
-'''.strip()
-
-RELEASE = '''
-@njit(error_model='numpy', cache=True)
-def release(i, after, t, y, strengths, modes, which):
-    """Where a contact begins to slip and friction drops at once, deviations that let go early have gained a velocity."""
-'''.strip()
+__all__ = ["event_functions", "push_functions", "register"]
 
 FORCES = (2, 3, 4, 5)
 """The groups of `pushes` that the force of a link adds to."""
 
 
-def write_pushes(equations: Equations, names: Names, looped: bool = False) -> str:
-    """The function `pushes`: writes six groups of NODES numbers, in the order of its docstring.
+def push_functions(equations: Equations, names: Names, looped: bool = False) -> list[Function]:
+    """The function `pushes`, if there are contacts: it writes six groups of NODES numbers, in the order that it tells.
 
-    Written out, its text grows with the network; `looped` it runs over nodes and links, which it takes from `network`.
+    Written out, it grows with the network; `looped` it runs over nodes and links, which it takes from `graph`.
     """
     if not equations.sticks:
-        return ""
-    lines = (_looped if looped else _written_out)(equations, names)
-    head = HEAD.format(network=", graph, weights" if looped else "")
-    return "\n".join([head, *(f"    {line}" for line in lines)])
+        return []
+    body = (_looped if looped else _written_out)(equations, names)
+    about = (
+        "For each contact: sliding velocity, ground's velocity, accelerations under static friction both ways, in slip."
+    )
+    network = ("graph", "weights") if looped else ()
+    return [Function("pushes", ("t", "y", "p", "out", *network), about, tuple(body), inline=False)]
 
 
 def _columns(contact: Contact) -> tuple[sp.Expr, ...]:
     return contact.sliding, contact.speed, contact.up, contact.down, contact.pushed, contact.pulled
 
 
-def _written_out(equations: Equations, names: Names) -> list[str]:
+def _written_out(equations: Equations, names: Names) -> list[Statement]:
     contacts = [found for i in range(equations.n) if (found := equations.contact_at(i)) is not None]
-    results = [e for column in zip(*map(_columns, contacts), strict=True) for e in column]
-    statements, reduced = sp.cse(results, symbols=names.fresh("z"), order="canonical")
-    used = _symbols((*reduced, *(e for _, e in statements)))
-    lines = [f"{name} = load(y, {k}, WIDTH)" for k, name in enumerate(equations.state) if _in(name, used)]
-    lines += _parameters(equations, used)
-    lines += [f"{s} = {show(e)}" for s, e in statements]
-    return lines + [f"store(out, {k}, {_lane(e)})" for k, e in enumerate(reduced)]
+    body = share([e for column in zip(*map(_columns, contacts), strict=True) for e in column], names.fresh("z"))
+    states = [let(name, Load("y", Number(k))) for k, name in enumerate(equations.state) if _in(name, body.symbols)]
+    stores = [store("out", k, lane(_lower(e))) for k, e in enumerate(body.results)]
+    return [*states, *_parameters(equations, body.symbols), *_assigned(body), *stores]
 
 
-def _looped(equations: Equations, names: Names) -> list[str]:
+def _looped(equations: Equations, names: Names) -> list[Statement]:
     """One loop over the nodes with what is fixed for all of them before it, and one over the links."""
-    node = equations.node
+    node, nodes = equations.node, span("i", "NODES")
     if node.contact is None:
         return []
-    fixed = Hoist(frozenset(node.state), names.fresh("fixed"))
-    moving = [fixed.apply(e) for e in _columns(node.contact)]
-    statements, reduced = sp.cse(moving, symbols=names.fresh("z"), order="canonical")
+    fixed = Hoist(frozenset(node.state), names.fresh("fixed"), frozenset({TIME}))
+    body = share([fixed.apply(e) for e in _columns(node.contact)], names.fresh("z"))
     force, link = _force(equations.edges, node.contact)
-    used = _symbols((*moving, *fixed.table, *link))
-    lines = _parameters(equations, used)
-    lines += [f"{s} = {_lane(e)}" for e, s in fixed.table.items()]
-    own = [f"{s} = load(y, {k}*NODES + i, WIDTH)" for k, s in enumerate(node.state) if s in used]
-    own += [f"{s} = {show(e)}" for s, e in statements]
-    own += [f"store(out, {k}*NODES + i, {_lane(e)})" for k, e in enumerate(reduced)]
-    lines += ["for i in range(NODES):", *(f"    {line}" for line in own)]
-    if force:
-        lines += [f"{', '.join(NAMES)} = graph"]
-        lines += ["for e in range(target.size):", *(f"    {line}" for line in force)]
-    return lines
+    used = body.symbols.union(*(e.free_symbols for e in (*fixed.table, *link)))
+    before = [*_parameters(equations, used), *(let(s.name, lane(_lower(e))) for e, s in fixed.table.items())]
+    own: list[Statement] = [let(s.name, Load("y", _place(k, "i"))) for k, s in enumerate(node.state) if s in used]
+    own += _assigned(body)
+    own += [store("out", _place(k, "i"), lane(_lower(e))) for k, e in enumerate(body.results)]
+    if not force:
+        return [*before, nodes.over(own)]
+    unpacked = Assign(NAMES, Name("graph"), whole=True)
+    return [*before, nodes.over(own), unpacked, span("e", "target.size").over(force)]
 
 
-def _force(edges: tuple[Edge, ...], contact: Contact) -> tuple[list[str], tuple[sp.Expr, ...]]:
+def _force(edges: tuple[Edge, ...], contact: Contact) -> tuple[list[Statement], tuple[sp.Expr, ...]]:
     """Statements that add the force of one link on a body that sticks, and the expressions they hold."""
     if not edges:
         return [], ()
     (edge,) = edges
     velocity, mode = edge.here[1], edge.here[2]
     force = edge.rhs[1].xreplace({mode: sp.S.One, velocity: contact.speed})
-    swap = {s: sp.Symbol(f"{s.name}_here", real=True) for s in edge.here}
-    swap |= {s: sp.Symbol(f"{s.name}_there", real=True) for s in edge.there}
-    lines = ["i, j = target[e], source[e]", f"{edge.weight.name} = weights[e]"]
-    for place, ends in (("i", edge.here), ("j", edge.there)):
-        lines += [f"{swap[s]} = load(y, {k}*NODES + {place}, WIDTH)" for k, s in enumerate(ends) if force.has(s)]
-    lines += [f"f_link = {show(force.xreplace(swap))}"]
-    lines += [f"store(out, {k}*NODES + i, load(out, {k}*NODES + i, WIDTH) + f_link)" for k in FORCES]
-    return lines, (force,)
+    found = link_ends(edge)
+    swap = {}
+    for place, suffix, states in (("i", "here", edge.here), ("j", "there", edge.there)):
+        for k, s in enumerate(states):
+            swap[s] = sp.Symbol(f"{s.name}_{suffix}", real=True)
+            if force.has(s):
+                found.append(let(swap[s].name, Load("y", _place(k, place))))
+    found.append(let("f_link", lower(force.xreplace(swap))))
+    return [*found, *(accumulate("out", _place(k, "i"), "f_link") for k in FORCES)], (force,)
 
 
-def write_events(variation: Variation, names: Names) -> list[str]:
+def event_functions(variation: Variation, names: Names) -> list[Function]:
     """The functions that the events of set-valued friction need in a kernel that carries deviations."""
     if variation.events is None:
         return []
-    return [write_pushes(variation.orbit, names), _release(variation.events, variation, names)]
+    return [*push_functions(variation.orbit, names), *_release(variation.events, variation, names)]
 
 
-def _release(events: Events, variation: Variation, names: Names) -> str:
+def _release(events: Events, variation: Variation, names: Names) -> list[Function]:
     """The function `release`, which sets the velocities of the deviations in one register."""
     equations, size, strengths = variation.orbit, variation.size, [s.name for s in variation.parameters]
-    if not events.exits:
-        return f"{RELEASE}\n    return"
-    used = _symbols(events.expressions)
+    used = set().union(*(e.free_symbols for e in events.expressions))
     known = enumerate((*equations.state, *equations.parameters))  # the orbit is one, its numbers fill a register
-    lines = [f"{name} = broadcast(y[{k}], LANES)" for k, name in known if _in(name, used)]
+    body: list[Statement] = [
+        let(name, call("broadcast", Load("y", Number(k), None), "LANES")) for k, name in known if _in(name, used)
+    ]
     loaded = enumerate(strengths)
-    lines += [f"{s} = load(strengths, {len(strengths)}*which + {k}, LANES)" for k, s in loaded if _in(s, used)]
+    body += [let(s, register("strengths", len(strengths), k)) for k, s in loaded if _in(s, used)]
     for i, (up, down) in enumerate(events.exits):
-        for words, entries in (("> 0.0", up), ("< 0.0", down)):
-            lines.append(f"if i == {i} and after {words}:")
-            lines += [f"    {line}" for line in _gained(entries, size, names)]
-    return "\n".join([RELEASE, *(f"    {line}" for line in lines)])
+        for sign, entries in ((">", up), ("<", down)):
+            side = Compare(sign, Name("after"), ZERO)
+            condition = Junction("both", (Compare("==", Name("i"), Number(i)), side))
+            body.append(If(condition, tuple(_gained(entries, size, names))))
+    about = "Where a contact begins to slip and friction drops at once, deviations that let go early have gained a velocity."
+    arguments = ("i", "after", "t", "y", "strengths", "modes", "which")
+    return [Function("release", arguments, about, tuple(body), inline=False)]
 
 
-def _gained(entries: Sequence[Entry], size: int, names: Names) -> list[str]:
+def register(array: str, size: int, k: int) -> Load:
+    """Number k of the registers of one group of modes, which fill `size` registers of an array."""
+    return Load(array, size * Name("which") + k, "LANES")
+
+
+def _gained(entries: Sequence[Entry], size: int, names: Names) -> list[Statement]:
     """Statements that put rows of a deviation together from others."""
-    statements, reduced = sp.cse([e for _, e in entries], symbols=names.fresh("z"), order="canonical")
-    lines = [f"{s} = {_text(e)}" for s, e in statements]
-    rows: dict[int, list[str]] = {}
-    for ((row, column), _), e in zip(entries, reduced, strict=True):
-        rows.setdefault(row, []).append(f"({_text(e)})*load(modes, {size}*which + {column}, LANES)")
-    return lines + [f"store(modes, {size}*which + {row}, {' + '.join(terms)})" for row, terms in rows.items()]
+    body = share([e for _, e in entries], names.fresh("z"))
+    rows: dict[int, list[Expression]] = {}
+    for ((row, column), _), e in zip(entries, body.results, strict=True):
+        rows.setdefault(row, []).append(Product((_lower(e), register("modes", size, column))))
+    stores = [store("modes", size * Name("which") + row, plus(*terms)) for row, terms in rows.items()]
+    return [*_assigned(body), *stores]
 
 
-def _parameters(equations: Equations, used: set[sp.Symbol]) -> list[str]:
+def _assigned(body: Body) -> list[Statement]:
+    return [let(s.name, _lower(e)) for s, e in body.statements]
+
+
+def _place(c: int, index: str) -> Expression:
+    return c * Name("NODES") + index
+
+
+def _parameters(equations: Equations, used: set[sp.Symbol]) -> list[Statement]:
     first = equations.dimension
-    return [f"{p} = load(p, {first + k}, WIDTH)" for k, p in enumerate(equations.parameters) if _in(p, used)]
+    return [let(p, Load("p", Number(first + k))) for k, p in enumerate(equations.parameters) if _in(p, used)]
 
 
-def _lane(e: sp.Expr) -> str:
-    return f"broadcast({_text(e)}, WIDTH)" if e.is_number else _text(e)
-
-
-def _text(e: sp.Expr) -> str:
-    return show(e.xreplace({TIME: sp.Symbol("t")}))
-
-
-def _symbols(expressions: Iterable[sp.Expr]) -> set[sp.Symbol]:
-    return set().union(*(e.free_symbols for e in expressions))
+def _lower(e: sp.Expr) -> Expression:
+    return lower(e.xreplace({TIME: sp.Symbol("t")}))
 
 
 def _in(name: str, used: set[sp.Symbol]) -> bool:

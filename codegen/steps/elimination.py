@@ -12,11 +12,14 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ..printing.printer import show
+from ..program.expressions import ONE, ZERO, Expression, Name, Negation, Product, negative, plus
+from ..program.lowering import lower
+from ..program.statements import Statement, let
 
-__all__ = ["Plan", "plan", "write_elimination", "write_factors", "write_solve"]
+__all__ = ["Entries", "Entry", "Plan", "plan", "write_elimination", "write_factors", "write_solve"]
 
 Entry = tuple[int, int]
+Entries = dict[Entry, sp.Expr]
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,32 +69,35 @@ def _order(size: int, pattern: set[Entry], first: frozenset[int]) -> Plan:
 
 
 class _Writer:
-    """Text of the factors; equal right-hand sides share one name."""
+    """Statements of the factors; equal right-hand sides share one name."""
 
     def __init__(self, labels: tuple[str, ...]) -> None:
         self.labels = labels
-        self.lines: list[str] = []
-        self.names: dict[str, str] = {}
+        self.statements: list[Statement] = []
+        self.names: dict[Expression, Name] = {}
 
-    def let(self, name: str, text: str) -> str:
-        if text in self.names:
-            return self.names[text]
-        self.names[text] = name
-        self.lines.append(f"{name} = {text}")
-        return name
+    def let(self, name: str, e: Expression) -> Name:
+        if e not in self.names:
+            self.names[e] = Name(name)
+            self.statements.append(let(name, e))
+        return self.names[e]
 
     def entry(self, kind: str, r: int, c: int) -> str:
         return f"{kind}_{self.labels[r]}" if r == c else f"{kind}_{self.labels[r]}_{self.labels[c]}"
+
+    def atomic(self, name: str, e: Expression) -> Expression:
+        """A name for an entry, or itself where that is a unit or already a name."""
+        return e if e in (ONE, negative(ONE)) or isinstance(e, Name) else self.let(name, e)
 
 
 @dataclass(frozen=True, slots=True)
 class Factors:
     """Statements that factorise, and the names (or 1.0, -1.0) that the solution uses."""
 
-    lines: tuple[str, ...]
-    lower: dict[Entry, str]
-    upper: dict[Entry, str]
-    inverse: dict[int, str]
+    statements: tuple[Statement, ...]
+    lower: dict[Entry, Expression]
+    upper: dict[Entry, Expression]
+    inverse: dict[int, Expression]
 
 
 def write_factors(
@@ -111,67 +117,55 @@ def write_elimination(
 ) -> Factors:
     """Write the elimination of `matrix` minus `taken`."""
     writer = _Writer(labels)
-    entries = {key: matrix.get(key, sp.S.Zero) - taken.get(key, sp.S.Zero) for key in sorted({*matrix, *taken})}
+    entries = {key: lower(matrix.get(key, sp.S.Zero) - taken.get(key, sp.S.Zero)) for key in sorted({*matrix, *taken})}
     value = {
-        key: _atomic(writer, writer.entry("m", *key), e) for key, e in entries.items() if key[0] != key[1] and e != 0
+        key: writer.atomic(writer.entry("m", *key), e) for key, e in entries.items() if key[0] != key[1] and e != ZERO
     }
-    diagonal = {k: show(entries[k, k]) for k in steps.order}
-    lower: dict[Entry, str] = {}
-    inverse: dict[int, str] = {}
+    diagonal = {k: entries[k, k] for k in steps.order}
+    below: dict[Entry, Expression] = {}
+    inverse: dict[int, Expression] = {}
     for k, down, right in zip(steps.order, steps.below, steps.after, strict=True):
         pivot = diagonal[k]
-        inverse[k] = "reach" if pivot == "shift" else writer.let(writer.entry("inv", k, k), f"1.0/({pivot})")
+        inverse[k] = Name("reach") if pivot == Name("shift") else writer.let(writer.entry("inv", k, k), 1.0 / pivot)
         for r in down:
-            lower[r, k] = writer.let(writer.entry("l", r, k), times(value[r, k], inverse[k]))
+            below[r, k] = writer.let(writer.entry("l", r, k), times(value[r, k], inverse[k]))
             for c in right:
-                old = diagonal[r] if r == c else value.get((r, c), "")
-                new = less(old, lower[r, k], value[k, c])
+                old = diagonal[r] if r == c else value.get((r, c))
+                new = less(old, below[r, k], value[k, c])
                 if r == c:
                     diagonal[r] = new
                 else:
                     value[r, c] = writer.let(writer.entry("m", r, c) + f"_{k}", new)
     upper = {(k, c): value[k, c] for k, right in zip(steps.order, steps.after, strict=True) for c in right}
-    return Factors(tuple(writer.lines), lower, upper, inverse)
+    return Factors(tuple(writer.statements), below, upper, inverse)
 
 
-def write_solve(steps: Plan, factors: Factors, right: Mapping[int, str], result: Mapping[int, str]) -> list[str]:
+def write_solve(steps: Plan, factors: Factors, right: Mapping[int, str], result: Mapping[int, str]) -> list[Statement]:
     """Write the solution: names `right` of the right-hand sides are overwritten, `result` names the unknowns."""
-    lines = []
+    found: list[Statement] = []
     for k, down in zip(steps.order, steps.below, strict=True):
-        for r in down:
-            lines.append(f"{right[r]} = {less(right[r], factors.lower[r, k], right[k])}")
+        found += [let(right[r], less(Name(right[r]), factors.lower[r, k], Name(right[k]))) for r in down]
     for k, after in zip(reversed(steps.order), reversed(steps.after), strict=True):
-        text = right[k]
+        rest: Expression = Name(right[k])
         for c in after:
-            text = less(text, factors.upper[k, c], result[c])
-        body = f"({text})" if after else text
-        lines.append(f"{result[k]} = {body}*{factors.inverse[k]}")
-    return lines
+            rest = less(rest, factors.upper[k, c], Name(result[c]))
+        found.append(let(result[k], Product((rest, factors.inverse[k]))))
+    return found
 
 
-def times(x: str, y: str) -> str:
-    """x*y with the signs of unit factors folded."""
-    if x in ("1.0", "-1.0"):
-        return y if x == "1.0" else negative(y)
-    if y in ("1.0", "-1.0"):
-        return x if y == "1.0" else negative(x)
-    return f"{x}*{y}"
+def times(x: Expression, y: Expression) -> Expression:
+    """x*y with signs and unit factors folded."""
+    for one, other in ((x, y), (y, x)):
+        if one == ONE:
+            return other
+        if one == negative(ONE):
+            return negative(other)
+    if isinstance(x, Negation):
+        return negative(times(x.value, y))
+    return x * y
 
 
-def negative(x: str) -> str:
-    """The text of -x for a name or a negated name."""
-    return x[1:] if x.startswith("-") else f"-{x}"
-
-
-def less(start: str, x: str, y: str) -> str:
-    """start - x*y, tidied."""
-    product = times(x, y)
-    if product.startswith("-"):
-        return f"{start} + {product[1:]}" if start else product[1:]
-    return f"{start} - {product}" if start else f"-{product}"
-
-
-def _atomic(writer: _Writer, name: str, e: sp.Expr) -> str:
-    """A name for an entry, or its text where that is a unit or already a name."""
-    text = show(e)
-    return text if text in ("1.0", "-1.0") or e.is_Symbol else writer.let(name, text)
+def less(start: Expression | None, x: Expression, y: Expression) -> Expression:
+    """start - x*y, tidied; without a start -x*y."""
+    change = negative(times(x, y))
+    return change if start is None else plus(start, change)

@@ -6,257 +6,370 @@ Nodes of several kinds have a loop for each kind, and their links one for each p
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import sympy as sp
 
-from ..printing.blocks import Body
-from ..printing.names import NAMES
-from ..printing.printer import show
-from .linearise import entry
-from .looped_mass import LoopMass
-from .places import Joint, Kind, Places, named
+from synchain.models.dynamics.equations import Equations
+
+from ..integrators import Integrator
+from ..program.expressions import Expression, Load, Name, Product, Value, call, linear, negative, plus, scaled
+from ..program.lowering import lower
+from ..program.passes import Body
+from ..program.statements import Assign, Do, If, Return, Statement, accumulate, let, store, whole
+from .blocks import NodeBlocks
+from .mass import momentum_slopes
+from .places import Joint, Kind, Places, link_ends, named, span
+from .names import NAMES
 from .program import Program
-from .rosenbrock import term
-from .step import StepWriter, combine, function_name
+from .step import Block, Step, lane, time_term
+from .unrolled import entry
 
-__all__ = ["LoopWriter"]
+__all__ = ["Looped"]
+
+SLOTS = ("here_slot", "there_slot")
+"""The arrays that say where the entries of a link's blocks stand, by its target and by its source."""
+
+GROUPS = {"y": "y", "u": "STATE", "f": "SLOPE"}
+"""What the vectors of a step are called in memory; those of stages are K1, K2, …"""
 
 
-class LoopWriter:
-    """Writes a step in loops; `w` supplies the naming and the node functions, `elimination` the order of the pivots."""
+class Looped(Step):
+    """Keeps its vectors in the workspace behind the dense output; `elimination` has the order of the pivots."""
 
-    def __init__(self, w: StepWriter, elimination: Program) -> None:
-        self.w, self.method, self.places, self.elimination = w, w.method, Places(w.equations), elimination
+    def __init__(
+        self, equations: Equations, kinds: Sequence[NodeBlocks], method: Integrator, elimination: Program
+    ) -> None:
+        super().__init__(equations, kinds, method)
+        self.places, self.elimination = Places(equations), elimination
         self.mass = LoopMass(self)
-        stages = len(w.method.c)
-        bases = [*(f"K{j + 1}" for j in range(stages)), "STATE", "SLOPE", "TIME_SLOPE", "MATRIX"]
-        self.base = {name: f"DENSE_ROWS*DIMENSION + {i}*DIMENSION" for i, name in enumerate(bases)}
-        self.base |= self.mass.bases(len(bases) - 1)
 
-    def lines(self) -> list[str]:
-        """All statements of the step."""
-        w = self.w
-        w.put(*(f"{name} = {text}" for name, text in self.base.items()))
-        w.put(f"{', '.join(NAMES)} = graph")
-        w.parameters(but={f"{name}_{i + 1}" for name in w.equations.varied for i in range(w.equations.n)})
-        if self.method.implicit:
-            self.rosenbrock()
-        else:
-            self.explicit()
-        return w.lines
+    def opening(self) -> None:
+        """Name the parts of the workspace, load the parameters that all nodes share."""
+        stages = [f"K{j + 1}" for j in range(len(self.method.c))]
+        vectors = [*stages, "STATE", "SLOPE", "TIME_SLOPE", "MATRIX"]
+        base = {name: vector(i) for i, name in enumerate(vectors)} | self.mass.bases(len(vectors) - 1)
+        self.put(*(whole(name, place) for name, place in base.items()))
+        self.put(Assign(NAMES, Name("graph"), whole=True))
+        self.parameters(but={f"{name}_{i + 1}" for name in self.equations.varied for i in range(self.equations.n)})
+        if not self.method.implicit:
+            self.mass.opening()
 
-    # -- pieces -----------------------------------------------------------------------------------------------
+    @property
+    def early(self) -> int:
+        """All stages: those of the dense output too."""
+        return len(self.method.c)
 
-    def loop(self, head: str, lines: Sequence[str]) -> None:
-        """A for loop."""
-        self.w.put(head, *(f"    {line}" for line in lines))
-
-    def node_call(self, function: str, kind: Kind, body: Body) -> tuple[str, list[sp.Expr]]:
-        """The call of a node function on the symbols of the template, and which results it returns."""
-        coded = [e for e in body.results if not self.w.is_plain(e)]
-        given = ", ".join(s.name for s in self.w.arguments(body, coded))
-        return f"{function_name(function, kind.number)}({given})", coded
+    # -- right-hand side --------------------------------------------------------------------------------------
 
     def slopes(self, base: str, out: str) -> None:
-        """The right-hand side of all nodes at a state, links included."""
+        """Compute the right-hand side at one vector of states into another."""
+        base, out = GROUPS[base], GROUPS.get(out, out.upper())
         for kind in self.places.kinds:
             self.node_slopes(kind, base, out)
         self.links(base, out)
 
     def node_slopes(self, kind: Kind, base: str, out: str) -> None:
         """The right-hand side of the nodes of one kind."""
-        body = self.w.kinds[kind.number].rhs
-        call, coded = self.node_call("node", kind, body)
-        lines = self.places.read(kind.node, base) + self.places.own(body)
+        body = self.kinds[kind.number].rhs
         left = [f"f_{s.name}" for s in kind.node.state]
-        if coded:
-            found = ", ".join(n for n, e in zip(left, body.results, strict=True) if not self.w.is_plain(e))
-            lines.append(f"{found} = {call}")
+        found = self.places.read(kind.node, base) + self.places.own(body)
+        found += self.node_call("node", kind.number, body, left, {})
         for c, (name, e) in enumerate(zip(left, body.results, strict=True)):
-            value = (show(e) if not e.is_number else f"broadcast({show(e)}, WIDTH)") if self.w.is_plain(e) else name
-            lines.append(f"store(dense, {out} + {self.places.place(c)}, {value})")
-        self.loop(kind.head, lines)
+            value = lane(lower(e)) if self.is_plain(e) else Name(name)
+            found.append(store("dense", plus(Name(out), self.places.place(c)), value))
+        self.put(kind.span.over(found))
 
     def links(self, base: str, out: str, jacobian: bool = False) -> None:
         """Add what each link contributes to the slopes, where `out` says where, and on demand to the matrix."""
         for joint in self.places.joints:
             edge = joint.edge
             inertia = [e for block in edge.inertia for row in block for e in row] if jacobian else []
-            lines = self.link(joint, base, (*edge.rhs, *inertia))
+            found = self.link(joint, base, (*edge.rhs, *inertia))
             for c, e in enumerate(edge.rhs if out else ()):
                 if e != 0:
-                    lines.append(self.add(f"{out} + {self.places.place(c)}", f"+ {show(e.xreplace(named(joint)))}"))
+                    found.append(self.add(out, self.places.place(c), lower(e.xreplace(named(joint)))))
             if jacobian:
-                lines += self.matrix_of_link(joint)
-            self.loop(joint.head, lines)
+                found += self.matrix_of_link(joint)
+            self.put(joint.span.over(found))
 
-    def link(self, joint: Joint, base: str, used: tuple[sp.Expr, ...], states: bool = True) -> list[str]:
+    def link(self, joint: Joint, base: str, used: tuple[sp.Expr, ...], states: bool = True) -> list[Statement]:
         """The ends of a link, its weight, the parameters that `used` uses, and the states of both ends."""
         read = self.places.read
-        lines = self.places.ends(joint.edge) + self.places.own(Body((), used))
+        found = link_ends(joint.edge) + self.places.own(Body((), used))
         if states:
-            lines += read(joint.target, base, "_here", "i") + read(joint.source, base, "_there", "j")
-        return lines
+            found += read(joint.target, base, "_here", "i") + read(joint.source, base, "_there", "j")
+        return found
 
-    def add(self, place: str, value: str) -> str:
-        """A statement that adds to a group of the workspace; the value begins with its sign."""
-        return f"store(dense, {place}, load(dense, {place}, WIDTH) {value})"
+    def add(self, base: str, place: Expression, value: Expression) -> Statement:
+        """A statement that adds to a group of the workspace."""
+        return accumulate("dense", plus(Name(base), place), value)
 
-    def matrix_of_link(self, joint: Joint) -> list[str]:
+    def matrix_of_link(self, joint: Joint) -> list[Statement]:
         """What a link adds to shift*M - J."""
-        lines, swap = self.mass.rates_of_link(joint), named(joint)
-        for block, slot in zip(self.mass.jacobian(joint), ("here_slot", "there_slot"), strict=True):
-            lines += self.entries(block, slot, swap)
-        for block, slot in zip(joint.edge.inertia, ("here_slot", "there_slot"), strict=False):
-            lines += self.entries(block, slot, swap, "+ shift*")
-        return lines
+        found, swap = self.mass.rates_of_link(joint), named(joint)
+        for block, slot in zip(self.mass.jacobian(joint), SLOTS, strict=True):
+            found += self.entries(block, slot, swap)
+        for block, slot in zip(joint.edge.inertia, SLOTS, strict=False):
+            found += self.entries(block, slot, swap, lambda e: scaled("shift", e))
+        return found
 
     def entries(
         self,
-        block: Sequence[Sequence[sp.Expr]],
+        block: Block,
         slot: str,
         swap: dict[sp.Symbol, sp.Symbol],
-        sign: str = "- ",
+        change: Callable[[Expression], Expression] = negative,
         matrix: str = "MATRIX",
-    ) -> list[str]:
-        """Statements that subtract the entries of a block from the matrix, or add them by another `sign`."""
-        lines = []
-        for a, row in enumerate(block):
-            for b, e in enumerate(row):
-                if e != 0:
-                    value = show(e.xreplace(swap))
-                    value = f"({value})" if sign != "+ " and e.is_Add else value
-                    lines.append(self.add(f"{matrix} + {self.places.entry(slot, a, b)}", sign + value))
-        return lines
+    ) -> list[Statement]:
+        """Statements that subtract the entries of a block from the matrix, or add what another `change` makes of them."""
+        return [
+            self.add(matrix, self.places.entry(slot, a, b), change(lower(e.xreplace(swap))))
+            for a, row in enumerate(block)
+            for b, e in enumerate(row)
+            if e != 0
+        ]
 
-    # -- Rosenbrock -------------------------------------------------------------------------------------------
-
-    def rosenbrock(self) -> None:
-        """Linearise, factorise, and one solve for each stage."""
-        w, m = self.w, self.method
-        w.put(f"reach = h*{m.gamma!r}", "shift = 1.0/reach", f"rate = shift*{m.gamma!r}")
-        self.linearise()
-        self.mass.factorise()
-        for i in range(m.stages):
-            self.stage(i)
-        self.finish(m.b, [combine(row, self.stages(m.stages)) for row in m.e], m.a[-1])
-
-    def stages(self, count: int) -> list[str]:
-        """Names of the loaded stage values of one state variable."""
-        return [f"k{j + 1}" for j in range(count)]
+    # -- linearisation ----------------------------------------------------------------------------------------
 
     def linearise(self) -> None:
-        """Slopes, matrix shift - J and time slopes at the start."""
-        w, kinds = self.w, self.places.kinds
-        w.put("# right-hand side, shift - J and time derivative at the start")
-        w.timed("t", w.wanted([blocks.linear for blocks in w.kinds]))
-        self.loop("for k in range(DIMENSION):", ["store(dense, MATRIX + k, shift)"])
-        self.loop("for k in range(DIMENSION, ENTRIES):", ["store(dense, MATRIX + k, 0.0*h)"])
-        slopes = [w.kinds[kind.number].linear.results[-len(kind.node.state) :] for kind in kinds]
+        """Slopes, matrix shift*M - J and time slopes at the start, and the factors of the matrix."""
+        kinds = self.places.kinds
+        self.note("right-hand side, shift - J and time derivative at the start")
+        self.timed("t", self.wanted([blocks.linear for blocks in self.kinds]))
+        self.put(*filled("MATRIX", Name("shift")))
+        slopes = [self.kinds[kind.number].linear.results[-len(kind.node.state) :] for kind in kinds]
         moving = [[e != 0 for e in own] for own in slopes]
         self.timed_rows = [any(map(any, moving))] if self.places.mixed else moving[0]
         for kind in kinds:
             self.node_linear(kind)
         self.links("y", "" if self.mass.at_start() else "SLOPE", jacobian=True)
+        self.mass.factorise()
 
     def node_linear(self, kind: Kind) -> None:
         """Slopes, matrix entries and time slopes of the nodes of one kind."""
-        w, body, state = self.w, self.w.kinds[kind.number].linear, [s.name for s in kind.node.state]
+        body, state = self.kinds[kind.number].linear, kind.node.state
         size, place = len(state), self.places.place
-        call, coded = self.node_call("node_linear", kind, body)
-        found = [f"f_{r}" for r in state] + [entry(r, c) for r in kind.node.state for c in kind.node.state]
-        found += [f"ft_{r}" for r in state]
-        lines = self.places.read(kind.node, "y") + self.places.own(body)
-        if coded:
-            left = [name for name, e in zip(found, body.results, strict=True) if not w.is_plain(e)]
-            lines.append(f"{', '.join(left)} = {call}")
-        named = [e if w.is_plain(e) else sp.Symbol(k, real=True) for k, e in zip(found, body.results, strict=True)]
+        names = [f"f_{r.name}" for r in state] + [entry(r, c) for r in state for c in state]
+        names += [f"ft_{r.name}" for r in state]
+        found = self.places.read(kind.node, "y") + self.places.own(body)
+        found += self.node_call("node_linear", kind.number, body, names, {})
+        named = [e if self.is_plain(e) else sp.Symbol(k, real=True) for k, e in zip(names, body.results, strict=True)]
         for c in range(size):
-            lines.append(f"store(dense, SLOPE + {place(c)}, {_lane(named[c])})")
-            slope = named[size + size * size + c]
+            found.append(store("dense", plus(Name("SLOPE"), place(c)), lane(lower(named[c]))))
             if self.timed_rows[0 if self.places.mixed else c]:
-                lines.append(f"store(dense, TIME_SLOPE + {place(c)}, {_lane(slope)})")
-        block = [named[size + a * size : size + (a + 1) * size] for a in range(size)]
-        self.loop(kind.head, lines + self.entries(block, "node_slot", {}))
+                slope = lane(lower(named[size + size * size + c]))
+                found.append(store("dense", plus(Name("TIME_SLOPE"), place(c)), slope))
+        block = tuple(tuple(named[size + a * size : size + (a + 1) * size]) for a in range(size))
+        self.put(kind.span.over(found + self.entries(block, "node_slot", {})))
 
-    def stage(self, i: int) -> None:
-        """State, slopes, right-hand side and solve of one stage."""
-        w, m = self.w, self.method
-        w.put(f"# stage {i + 1}")
+    # -- stages -----------------------------------------------------------------------------------------------
+
+    def advance(self, i: int) -> None:
+        """Compute the state of stage i > 0: y + sum a_j k_j, the sum times h for explicit methods."""
+        row = self.method.a[i]
+        for rows, place in self.places.rows:
+            found = [*self.load_stages(place, row), let("old", Load("y", place))]
+            value = Name("old") + self.increment(row, self.stages(len(row)))
+            self.put(rows.over([*found, store("dense", plus(Name("STATE"), place), value)]))
+
+    def solve(self, i: int) -> None:
+        """Turn the slopes of stage i into its rates."""
+        m = self.method
+        if not m.implicit:
+            self.mass.explicit("STATE" if i else "y", f"K{i + 1}")
+            return
         if i > 0:
-            self.state_of(m.a[i], "", "")
-            w.stage_time(i, first=1)
-            self.slopes("STATE", "SLOPE")
             self.mass.rates_of_stage(i)
-        for row, (head, place) in enumerate(self.places.rows):
-            lines, text = [], f"load(dense, SLOPE + {place}, WIDTH)"
+        for row, (rows, place) in enumerate(self.places.rows):
+            found: list[Statement] = []
+            terms: list[Expression] = [Load("dense", plus(Name("SLOPE"), place))]
             if i > 0:
-                lines += self.load_stages(place, m.big_c[i])
-                total = f"({combine(m.big_c[i], self.stages(i))})"
-                more, text = self.mass.known(place, text, total)
-                lines += more
+                found += self.load_stages(place, m.big_c[i])
+                more, terms = self.mass.known(place, terms[0], linear(m.big_c[i], self.stages(i)))
+                found += more
             if m.d[i] != 0.0 and self.timed_rows[row]:
-                text += term(m.d[i], f"load(dense, TIME_SLOPE + {place}, WIDTH)", tidy=False)
-            self.loop(head, [*lines, f"store(dense, K{i + 1} + {place}, {text})"])
+                terms.append(time_term(m.d[i], Load("dense", plus(Name("TIME_SLOPE"), place))))
+            self.put(rows.over([*found, store("dense", plus(Name(f"K{i + 1}"), place), plus(*terms))]))
         if i > 0:
             self.mass.carried(i)
         self.mass.solve(f"K{i + 1}", "SLOPE")
 
-    def load_stages(self, place: str, row: Sequence[float]) -> list[str]:
+    def stages(self, count: int) -> list[str]:
+        """Names of the loaded stage values of one state variable."""
+        return [f"k{j + 1}" for j in range(count)]
+
+    def load_stages(self, place: Expression, row: Sequence[float]) -> list[Statement]:
         """Load the stage values of a state variable that a row of coefficients uses."""
-        used = [j for j, weight in enumerate(row) if weight != 0.0]
-        return [f"k{j + 1} = load(dense, K{j + 1} + {place}, WIDTH)" for j in used]
+        used = [j + 1 for j, weight in enumerate(row) if weight != 0.0]
+        return [let(f"k{j}", Load("dense", plus(Name(f"K{j}"), place))) for j in used]
 
-    def state_of(self, row: Sequence[float], before: str, behind: str) -> None:
-        """The state of a stage: y + (sum a_j k_j), the sum scaled for explicit methods."""
-        for head, place in self.places.rows:
-            total = combine(row, self.stages(len(row)))
-            lines = [*self.load_stages(place, row), f"old = load(y, {place}, WIDTH)"]
-            self.loop(head, [*lines, f"store(dense, STATE + {place}, old + {before}({total}){behind})"])
-
-    def finish(self, weights: Sequence[float], errors: list[str], last: Sequence[float], scale: str = "") -> None:
-        """New state, dense output and error."""
-        w, m = self.w, self.method
-        w.put("# new state, error and dense output", "error = 0.0*h", "total = 0.0*h")
-        for head, place in self.places.rows:
-            lines = [*self.load_stages(place, [1.0] * len(m.c)), f"old = load(y, {place}, WIDTH)"]
-            lines += [
-                f"new = old + {scale}({combine(weights, self.stages(len(weights)))})",
-                f"store(y_new, {place}, new)",
-            ]
-            lines += [f"e = scaled({self.error(errors, scale)}, old, new, rtol, atol)"]
-            lines += ["total = total + e", "error = maximum(error, e)"]
+    def finish(self) -> None:
+        """Compute the new state, the error and the dense output."""
+        m, values = self.method, self.stages(len(self.method.c))
+        self.note("new state, error and dense output")
+        self.put(let("error", 0.0 * Name("h")), let("total", 0.0 * Name("h")))
+        error = self.increment(m.e[0], values)
+        if len(m.e) > 1:
+            error = call("pair", *(linear(row, values) for row in m.e), "h")
+        for rows, place in self.places.rows:
+            found = [*self.load_stages(place, [1.0] * len(m.c)), let("old", Load("y", place))]
+            found += [let("new", Name("old") + self.increment(m.b, values)), store("y_new", place, "new")]
+            found += [let("e", call("scaled", error, "old", "new", "rtol", "atol"))]
+            found += [let("total", Name("total") + "e"), let("error", call("maximum", "error", "e"))]
             for j, row in enumerate(m.dense):
-                lines.append("if DENSE:")
-                value = combine(row, self.stages(len(row))) or "broadcast(0.0, WIDTH)"
-                lines.append(f"    store(dense, {j}*DIMENSION + {place}, {scale}({value}))")
-            self.loop(head, lines)
-        w.put("return error + 0.0*total  # NaN or infinite where any estimate is")
-
-    def error(self, errors: list[str], scale: str) -> str:
-        """The error estimate of one state variable, from one or two embedded methods."""
-        if len(errors) == 1:
-            return f"{scale}({errors[0]})"
-        return f"pair({errors[0]}, {errors[1]}, h)"
-
-    # -- explicit ---------------------------------------------------------------------------------------------
-
-    def explicit(self) -> None:
-        """Stages, and those that serve the dense output alone under their flag."""
-        w, m = self.w, self.method
-        self.mass.opening()
-        for i in range(len(m.c)):
-            w.put(f"# stage {i + 1}")
-            if i > 0:
-                self.state_of(m.a[i], "h*", "")
-            w.stage_time(i, first=0)
-            base = "STATE" if i else "y"
-            self.slopes(base, f"K{i + 1}")
-            self.mass.explicit(base, f"K{i + 1}")
-        self.finish(m.b, [combine(row, self.stages(len(row))) for row in m.e], (), "h*")
+                value = lane(linear(row, values))
+                scaled_value = value if m.implicit else Product((Name("h"), value))
+                at = plus(j * Name("DIMENSION"), place)
+                found.append(If(Name("DENSE"), (store("dense", at, scaled_value),)))
+            self.put(rows.over(found))
+        self.put(Return((Name("error") + 0.0 * Name("total"),), "NaN or infinite where any estimate is"))
 
 
-def _lane(e: sp.Expr) -> str:
-    """The text of a value that is stored: numbers become lanes."""
-    return f"broadcast({show(e)}, WIDTH)" if e.is_number else show(e)
+def vector(number: int) -> Expression:
+    """Where a vector of the workspace begins."""
+    return Name("DENSE_ROWS") * "DIMENSION" + number * Name("DIMENSION")
+
+
+class LoopMass:
+    """What a looped step writes about M; where M is the identity, nothing but the solution of each stage."""
+
+    def __init__(self, writer: Looped) -> None:
+        self.writer, self.equations = writer, writer.equations
+        self.inertial, self.constant = self.equations.inertial, self.equations.constant_mass
+        self.joints = [joint for joint in writer.places.joints if joint.edge.inertia]
+
+    def bases(self, before: int) -> dict[str, Expression]:
+        """Where a Rosenbrock step keeps the rates at its start and M in a stage, behind so many vectors and the matrix."""
+        if self.constant or not self.writer.method.implicit:
+            return {}
+        matrix = Name("ENTRIES") if self.writer.elimination.exact else 2 * Name("ENTRIES")
+        start = Name("DENSE_ROWS") * "DIMENSION" + before * Name("DIMENSION") + matrix
+        return {"RATES": start, "MASS": start + "DIMENSION"}
+
+    # -- linear algebra ---------------------------------------------------------------------------------------
+
+    @property
+    def apart(self) -> Value:
+        """How far behind the matrix its factors stand."""
+        return 0 if self.writer.elimination.exact else "ENTRIES"
+
+    def factorise(self, matrix: str = "MATRIX") -> None:
+        """Factorise a matrix; STATE is lost."""
+        arrays = ("order", "place", "row_start", "after_start", "column")
+        self.writer.put(Do(call("factorise", "dense", matrix, self.apart, "STATE", *arrays)))
+
+    def solve(self, vector: str, scratch: str, matrix: str = "MATRIX") -> None:
+        """Solve in place for a vector; `scratch` and STATE are lost."""
+        arrays = ("order", "row_start", "after_start", "column")
+        self.writer.put(Do(call("solve", "dense", matrix, self.apart, vector, scratch, "STATE", *arrays)))
+
+    def assemble(self, base: str, matrix: str) -> None:
+        """M at a state, factorised; STATE is lost."""
+        w = self.writer
+        w.put(*filled(matrix, 1.0 + 0.0 * Name("h")))
+        for joint in self.joints:
+            found = self.link(joint, base)
+            for block, slot in zip(joint.edge.inertia, SLOTS, strict=True):
+                found += w.entries(block, slot, named(joint), lambda e: e, matrix)
+            w.put(joint.span.over(found))
+        self.factorise(matrix)
+
+    def link(self, joint: Joint, base: str) -> list[Statement]:
+        """What the inertia of a link is made of."""
+        used = tuple(e for block in joint.edge.inertia for row in block for e in row)
+        return self.writer.link(joint, base, used, states=not self.constant)
+
+    # -- explicit methods -------------------------------------------------------------------------------------
+
+    def opening(self) -> None:
+        """What an explicit step does at first: M, factorised, where it is constant."""
+        if self.inertial and self.constant:
+            self.assemble("y", "MATRIX")
+
+    def explicit(self, base: str, out: str) -> None:
+        """Turn the right-hand sides of a stage into rates."""
+        if self.inertial:
+            if not self.constant:
+                self.assemble(base, "MATRIX")
+            self.solve(out, "SLOPE")
+
+    # -- Rosenbrock methods -----------------------------------------------------------------------------------
+
+    def at_start(self) -> bool:
+        """The rates at the start, where M depends on the state; returns whether the links are in SLOPE by now."""
+        if self.constant:
+            return False
+        w = self.writer
+        w.links("y", "SLOPE")
+        self.assemble("y", "MASS")
+        copied = store("dense", Name("RATES") + "k", Load("dense", Name("SLOPE") + "k"))
+        w.put(span("k", "DIMENSION").over([copied]))
+        self.solve("RATES", "K1", "MASS")
+        return True
+
+    def rates_of_link(self, joint: Joint) -> list[Statement]:
+        """Load the rates at both ends of a link whose inertia depends on them."""
+        if self.constant or not joint.edge.inertia:
+            return []
+        read = self.writer.places.read
+        return [
+            *read(joint.target, "RATES", "_here", "i", prefix="g_"),
+            *read(joint.source, "RATES", "_there", "j", prefix="g_"),
+        ]
+
+    def jacobian(self, joint: Joint) -> tuple[Block, Block]:
+        """df/dy - d(M F)/dy at fixed F of one link, by its target and by its source."""
+        edge = joint.edge
+        own = (edge.jacobian_here(), edge.jacobian_there())
+        if self.constant or not edge.inertia:
+            return own
+        ends = ((joint.target, "_here"), (joint.source, "_there"))
+        rates = tuple(tuple(sp.Symbol(f"g_{s.name}{suffix}", real=True) for s in node.state) for node, suffix in ends)
+        turned = momentum_slopes(edge, *rates)
+        here, there = (
+            tuple(tuple(a - b for a, b in zip(*rows, strict=True)) for rows in zip(*blocks, strict=True))
+            for blocks in zip(own, turned, strict=True)
+        )
+        return here, there
+
+    def rates_of_stage(self, i: int) -> None:
+        """Turn the right-hand sides in SLOPE into rates, where M depends on the state."""
+        if not self.constant:
+            self.assemble("STATE", "MASS")
+            self.solve("SLOPE", f"K{i + 1}", "MASS")
+
+    def known(
+        self, place: Expression, slope: Expression, total: Expression
+    ) -> tuple[list[Statement], list[Expression]]:
+        """Statements and the terms of what a stage has on its right-hand side besides the inertia of the links.
+
+        `total` is the sum of earlier stages; what M multiplies is left in STATE: that sum, or with it the rates.
+        """
+        terms = [slope, Product((Name("rate"), total))]
+        kept = plus(Name("STATE"), place)
+        if not self.inertial:
+            return [], terms
+        if self.constant:
+            return [store("dense", kept, total)], terms
+        return [let("new", plus(*terms)), store("dense", kept, "new")], [Name("new")]
+
+    def carried(self, i: int) -> None:
+        """Add (M - 1) s to stage i, s what `known` has left in STATE, times the rate where that is a sum of stages."""
+        w, rate = self.writer, [Name("rate")] if self.constant else []
+        for joint in self.joints:
+            found = self.link(joint, "y")
+            for block, index in zip(joint.edge.inertia, "ij", strict=True):
+                for a, row in enumerate(block):
+                    for b, e in enumerate(row):
+                        if e != 0:
+                            load = Load("dense", plus(Name("STATE"), w.places.place(b, index)))
+                            value = Product((*rate, lower(e.xreplace(named(joint))), load))
+                            found.append(w.add(f"K{i + 1}", w.places.place(a), value))
+            w.put(joint.span.over(found))
+
+
+def filled(matrix: str, diagonal: Expression) -> list[Statement]:
+    """A matrix with equal entries on its diagonal and zeros elsewhere."""
+    parts = ((span("k", "DIMENSION"), diagonal), (span("k", "ENTRIES", "DIMENSION"), 0.0 * Name("h")))
+    return [part.over([store("dense", Name(matrix) + "k", value)]) for part, value in parts]

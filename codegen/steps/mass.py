@@ -10,34 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Protocol
 
 import sympy as sp
 
-from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.calculus import derivative
 from synchain.models.mechanics.components import Edge
 
-from ..printing.printer import show
-from .elimination import Entry, Factors, plan, write_elimination, write_solve
+from ..program.expressions import Expression, Name, Product
+from ..program.lowering import lower
+from ..program.statements import let
+from .elimination import Entries, Entry, Factors, plan, write_elimination, write_solve
+from .step import Block, Step
 
 __all__ = ["Mass", "momentum_slopes"]
-
-Block = tuple[tuple[sp.Expr, ...], ...]
-
-
-class Writer(Protocol):
-    """What a step offers to those that write about M: the names of its states, and statements."""
-
-    @property
-    def state(self) -> tuple[str, ...]:
-        """Names of the states."""
-
-    def put(self, *lines: str) -> None:
-        """Append statements."""
-
-    def staged(self, prefix: str) -> dict[sp.Symbol, sp.Symbol]:
-        """The names of all states in a stage."""
 
 
 def momentum_slopes(edge: Edge, here: Sequence[sp.Symbol], there: Sequence[sp.Symbol]) -> tuple[Block, Block]:
@@ -55,8 +40,8 @@ def momentum_slopes(edge: Edge, here: Sequence[sp.Symbol], there: Sequence[sp.Sy
 class Mass:
     """The entries of M and what a step writes about it; without entries M is the identity and nothing is written."""
 
-    def __init__(self, equations: Equations) -> None:
-        self.equations = equations
+    def __init__(self, writer: Step) -> None:
+        self.writer, self.equations = writer, writer.equations
         self.factors: Factors | None = None
 
     @cached_property
@@ -84,63 +69,66 @@ class Mass:
         if self.equations.inertial:
             raise ValueError(f"{what}: found links with inertia; expected none; use integrator 'rodas5p' or 'dop853'")
 
-    def factorise(self, w: Writer, prefix: str) -> None:
-        """Write the elimination of M at the states of a stage."""
-        rows, at = self.rows, w.staged(prefix)
+    def factorise(self, base: str) -> None:
+        """Write the elimination of M at a vector of states."""
+        w, rows = self.writer, self.rows
+        before = "" if base == "y" else f"{base}_"
+        at = {sp.Symbol(n, real=True): sp.Symbol(before + n, real=True) for n in w.state}
         place = {row: k for k, row in enumerate(rows)}
         matrix = {
             (place[r], place[c]): e.xreplace(at) for (r, c), e in self.entries.items() if r in place and c in place
         }
         self.steps = plan(len(rows), set(matrix))
         self.factors = write_elimination(self.steps, matrix, {}, tuple(f"mass_{w.state[row]}" for row in rows))
-        w.put("# factors of M", *self.factors.lines)
+        w.note("factors of M")
+        w.put(*self.factors.statements)
 
-    def solve(self, w: Writer, source: str, out: str) -> None:
+    def solve(self, source: str, out: str) -> None:
         """Write out = M^-1 source for the rows that M couples, by the factors at hand."""
         if self.factors is None:
             raise RuntimeError("the mass matrix has not been factorised; this is a mistake in the program")
-        names = [w.state[row] for row in self.rows]
-        w.put(*(f"r_{name} = {source}{name}" for name in names))
+        w, names = self.writer, [self.writer.state[row] for row in self.rows]
+        w.put(*(let(f"r_{name}", f"{source}_{name}") for name in names))
         rights = {k: f"r_{name}" for k, name in enumerate(names)}
-        w.put(*write_solve(self.steps, self.factors, rights, {k: f"{out}{name}" for k, name in enumerate(names)}))
+        w.put(*write_solve(self.steps, self.factors, rights, {k: f"{out}_{name}" for k, name in enumerate(names)}))
 
-    def explicit(self, w: Writer, prefix: str, out: str, first: bool) -> None:
+    def explicit(self, base: str, out: str, first: bool) -> None:
         """Turn the right-hand sides `out` of a stage into rates; a constant M is factorised in the first stage alone."""
         if self.entries:
             if first or not self.constant:
-                self.factorise(w, prefix)
-            self.solve(w, out, out)
+                self.factorise(base)
+            self.solve(out, out)
 
-    def at_start(self, w: Writer, jacobian: dict[Entry, sp.Expr]) -> dict[Entry, sp.Expr]:
+    def at_start(self, jacobian: Entries) -> Entries:
         """J = df/dy - d(M F)/dy at fixed F, from the entries of df/dy."""
         if not self.entries or self.constant:
             return jacobian
-        self.factorise(w, "")
-        self.solve(w, "f_", "g_")
-        found, rows = dict(jacobian), set(self.rows)
-        states = [sp.Symbol(name, real=True) for name in w.state]
+        self.factorise("y")
+        self.solve("f", "g")
+        found, rows, names = dict(jacobian), set(self.rows), self.writer.state
+        states = [sp.Symbol(name, real=True) for name in names]
         for (row, column), e in self.entries.items():
-            rate = sp.Symbol(f"{'g' if column in rows else 'f'}_{w.state[column]}", real=True)
+            rate = sp.Symbol(f"{'g' if column in rows else 'f'}_{names[column]}", real=True)
             for k, s in enumerate(states):
                 if e.has(s):
                     found[row, k] = found.get((row, k), sp.S.Zero) - derivative(e, s) * rate
         return {key: e for key, e in found.items() if e != 0}
 
-    def known(self, w: Writer, sums: Mapping[str, str], i: int) -> dict[str, str]:
-        """By state, M (F + rate sum c k) for the rows that M couples, in stage i; `sums` are the texts of sum c k."""
+    def known(self, sums: Mapping[str, Expression], i: int) -> dict[str, Expression]:
+        """By state, M (F + rate sum c k) for the rows that M couples, in stage i; `sums` are the sums of c k."""
         if not self.entries or i == 0:
             return {}
-        rows, before = self.rows, "rate*"
-        if self.constant:
-            w.put(*(f"g_{w.state[row]} = {sums[w.state[row]]}" for row in rows))
-        else:
-            self.factorise(w, "u_")
-            self.solve(w, "f_", "g_")
-            w.put(*(f"g_{w.state[row]} = g_{w.state[row]} + rate*({sums[w.state[row]]})" for row in rows))
-            before = ""
+        w, rate = self.writer, Name("rate")
+        names = {row: w.state[row] for row in self.rows}
+        if not self.constant:
+            self.factorise("u")
+            self.solve("f", "g")
         found = {}
-        for row in rows:
+        for name in names.values():
+            change = sums[name] if self.constant else Name(f"g_{name}") + Product((rate, sums[name]))
+            w.put(let(f"g_{name}", change))
+        for row, name in names.items():
             terms = [e * sp.Symbol(f"g_{w.state[c]}") for (r, c), e in self.entries.items() if r == row]
-            text = f"{before}({show(sp.Add(*terms))})"
-            found[w.state[row]] = f"f_{w.state[row]} + {text}" if self.constant else text
+            carried = lower(sp.Add(*terms))
+            found[name] = Name(f"f_{name}") + Product((rate, carried)) if self.constant else carried
         return found

@@ -7,7 +7,7 @@ c*NODES + i where state c of node i stands, and in further rows which parameters
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
@@ -18,32 +18,52 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import Edge, Node
 
-from ..printing.blocks import Body
+from ..program.expressions import Expression, Load, Name, Number, Value, as_expression, plus
+from ..program.passes import Body
+from ..program.statements import Loop, Statement, let, whole
 
-__all__ = ["Joint", "Kind", "Places", "by_joint", "by_kind", "joint_numbers", "named", "table"]
+__all__ = ["Joint", "Kind", "Places", "by_joint", "by_kind", "joint_numbers", "link_ends", "named", "span", "table"]
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A part of a numbering, for loops."""
+
+    index: str
+    start: Expression
+    stop: Expression
+
+    def over(self, body: Iterable[Statement]) -> Loop:
+        """The loop over it."""
+        return Loop(self.index, self.start, self.stop, tuple(body))
+
+
+def span(index: str, stop: Value, start: Value = 0) -> Span:
+    """The numbers from `start` up to `stop`."""
+    return Span(index, as_expression(start), as_expression(stop))
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """The nodes of one kind: their template, its number, and the head of the loop over them."""
+    """The nodes of one kind: their template, its number, and where they stand in the numbering."""
 
     node: Node
     number: int
-    head: str
+    span: Span
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """The links of one template, between nodes `target` and `source`, and the head of the loop over them."""
+    """The links of one template, between nodes `target` and `source`, and where they stand in the numbering."""
 
     edge: Edge
     target: Node
     source: Node
-    head: str
+    span: Span
 
 
 class Places:
-    """The texts by which loops over the nodes and links of a network read and write."""
+    """The places where loops over the nodes and links of a network read and write."""
 
     def __init__(self, equations: Equations) -> None:
         self.equations, self.mixed = equations, equations.mixed
@@ -54,42 +74,43 @@ class Places:
             self.slots = {name: slot for slot, name in enumerate(equations.parameters, start=equations.dimension)}
 
     @property
-    def rows(self) -> list[tuple[str, str]]:
-        """Loops over all states for what is done to each alike: the head of each, and the place of a state."""
+    def rows(self) -> list[tuple[Span, Expression]]:
+        """Loops over all states for what is done to each alike, and the place of a state."""
         if self.mixed:
-            return [("for i in range(DIMENSION):", "i")]
-        return [("for i in range(NODES):", f"{c}*NODES + i") for c in range(self.size)]
+            return [(span("i", "DIMENSION"), Name("i"))]
+        return [(span("i", "NODES"), self.place(c)) for c in range(self.size)]
 
-    def place(self, c: int, index: str = "i") -> str:
+    def place(self, c: int, index: str = "i") -> Expression:
         """Where state c of a node stands."""
-        return f"where[{c}*NODES + {index}]" if self.mixed else f"{c}*NODES + {index}"
+        slot = c * Name("NODES") + index
+        return Load("where", slot, None) if self.mixed else slot
 
-    def read(self, node: Node, base: str, suffix: str = "", index: str = "i", prefix: str = "") -> list[str]:
+    def read(self, node: Node, base: str, suffix: str = "", index: str = "i", prefix: str = "") -> list[Statement]:
         """Load the states of one node from an array or a part of the workspace."""
-        array, offset = ("y", "") if base == "y" else ("dense", f"{base} + ")
-        return [
-            f"{prefix}{s.name}{suffix} = load({array}, {offset}{self.place(c, index)}, WIDTH)"
-            for c, s in enumerate(node.state)
-        ]
+        places = [self.place(c, index) for c in range(len(node.state))]
+        loads = [Load("y", at) if base == "y" else Load("dense", plus(Name(base), at)) for at in places]
+        return [let(f"{prefix}{s.name}{suffix}", load) for s, load in zip(node.state, loads, strict=True)]
 
-    def own(self, body: Body) -> list[str]:
+    def own(self, body: Body) -> list[Statement]:
         """Load the parameters that a node has for itself, those that a body uses."""
         used = {s.name for s in body.symbols}
-        lines = []
+        found: list[Statement] = []
         for row, name in enumerate(self.equations.varied, start=self.size):
             if name in used:
-                slot = f"where[{row}*NODES + i]" if self.mixed else f"{self.slots[f'{name}_1']} + i"
-                lines.append(f"{name} = load(p, {slot}, WIDTH)")
-        return lines
+                slot = self.place(row) if self.mixed else Number(self.slots[f"{name}_1"]) + "i"
+                found.append(let(name, Load("p", slot)))
+        return found
 
-    def entry(self, slot: str, a: int, b: int) -> str:
+    def entry(self, slot: str, a: int, b: int) -> Expression:
         """Where an entry of a node's or a link's block stands in a matrix, by the array of its slots."""
         length, index = ("NODES", "i") if slot == "node_slot" else ("target.size", "e")
-        return f"{slot}[{a * self.size + b}*{length} + {index}]"
+        return Load(slot, (a * self.size + b) * Name(length) + index, None)
 
-    def ends(self, edge: Edge) -> list[str]:
-        """The two ends of a link and its weight."""
-        return ["i, j = target[e], source[e]", f"{edge.weight.name} = weights[e]"]
+
+def link_ends(edge: Edge) -> list[Statement]:
+    """The two ends of a link and its weight."""
+    i, j, weight = (Load(array, Name("e"), None) for array in ("target", "source", "weights"))
+    return [whole("i", i), whole("j", j), let(edge.weight.name, weight)]
 
 
 def named(joint: Joint) -> dict[sp.Symbol, sp.Symbol]:
@@ -104,8 +125,8 @@ def named(joint: Joint) -> dict[sp.Symbol, sp.Symbol]:
 
 def _kinds(equations: Equations) -> tuple[Kind, ...]:
     counts = [equations.kind_of.count(k) for k in range(len(equations.nodes))]
-    heads = _heads("i", counts) if equations.mixed else ["for i in range(NODES):"]
-    return tuple(Kind(node, k, head) for k, (node, head) in enumerate(zip(equations.nodes, heads, strict=True)))
+    spans = _spans("i", counts) if equations.mixed else [span("i", "NODES")]
+    return tuple(Kind(node, k, part) for k, (node, part) in enumerate(zip(equations.nodes, spans, strict=True)))
 
 
 def _joints(equations: Equations) -> tuple[Joint, ...]:
@@ -113,16 +134,15 @@ def _joints(equations: Equations) -> tuple[Joint, ...]:
         return ()
     numbers, nodes = joint_numbers(equations), equations.nodes
     counts = [numbers.count(k) for k in range(len(equations.edge_of))]
-    heads = _heads("e", counts) if equations.mixed else ["for e in range(target.size):"]
+    spans = _spans("e", counts) if equations.mixed else [span("e", "target.size")]
     return tuple(
-        Joint(edge, nodes[a], nodes[b], head) for ((a, b), edge), head in zip(equations.edge_of, heads, strict=True)
+        Joint(edge, nodes[a], nodes[b], part) for ((a, b), edge), part in zip(equations.edge_of, spans, strict=True)
     )
 
 
-def _heads(index: str, counts: Sequence[int]) -> list[str]:
-    """Heads of loops that follow each other through a numbering."""
-    ends = list(accumulate(counts, initial=0))
-    return [f"for {index} in range({a}, {b}):" for a, b in pairwise(ends)]
+def _spans(index: str, counts: Sequence[int]) -> list[Span]:
+    """Parts that follow each other through a numbering."""
+    return [span(index, b, a) for a, b in pairwise(accumulate(counts, initial=0))]
 
 
 def joint_numbers(equations: Equations) -> list[int]:

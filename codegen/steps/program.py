@@ -14,7 +14,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import accumulate, pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy as sp
@@ -23,13 +22,11 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import Edge
 
-from ..printing.names import NAMES
 from .elimination import Entry, Plan
-from .mass import Mass, momentum_slopes
+from .mass import momentum_slopes
+from .names import NAMES
 from .places import by_joint, by_kind, joint_numbers, table
-
-if TYPE_CHECKING:
-    from .step import StepWriter
+from .step import Step
 
 __all__ = ["FILL_LIMIT", "Program", "block_pattern", "program", "workspace"]
 
@@ -258,7 +255,7 @@ def _eliminate(k: int, rows: list[set[int]], columns: list[set[int]], near: list
     return fill
 
 
-def workspace(w: StepWriter, elimination: Program) -> int:
+def workspace(w: Step, elimination: Program) -> int:
     """Groups of scratch memory: stages, stage state, slopes, time slopes and, for implicit methods, the matrix.
 
     Factors of an incomplete elimination stand beside the matrix, exact ones replace it.  Where M depends on the state, an
@@ -268,6 +265,6 @@ def workspace(w: StepWriter, elimination: Program) -> int:
     if not w.method.implicit and not w.equations.inertial:
         return vectors
     matrix = elimination.entries if elimination.exact else 2 * elimination.entries
-    if not w.method.implicit or Mass(w.equations).constant:
+    if not w.method.implicit or w.equations.constant_mass:
         return vectors + matrix
     return vectors + 2 * matrix + w.equations.dimension

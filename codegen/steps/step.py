@@ -1,9 +1,9 @@
-"""The text of one integration step, unrolled over the nodes of a small network."""
+"""One step of an integrator as a program: its stages, whatever holds the state, registers or memory."""
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Sequence
-from contextlib import contextmanager
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Container, Mapping, Sequence
 
 import sympy as sp
 
@@ -11,11 +11,16 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
 from ..integrators import Integrator
-from ..printing.blocks import Body, NodeBlocks
-from ..printing.printer import show
-from .mass import Mass
+from ..program.expressions import Expression, Load, Name, Negation, Number, Product, Value, call, linear
+from ..program.lowering import lower
+from ..program.passes import Body
+from ..program.statements import Assign, Comment, Function, Return, Statement, let
+from .blocks import NodeBlocks
 
-__all__ = ["PAIR", "SCALED", "StepWriter", "combine", "function_name", "indent_from", "write_function"]
+__all__ = ["PAIR", "SCALED", "Block", "Step", "function_name", "lane", "node_function", "time_term"]
+
+Block = tuple[tuple[sp.Expr, ...], ...]
+"""Entries of a matrix that belong to one node or to one end of a link."""
 
 PAIR = '''
 @njit(error_model="numpy", forceinline=True)
@@ -37,73 +42,121 @@ def function_name(name: str, kind: int) -> str:
     return name if kind == 0 else name.replace("node", f"node{kind + 1}", 1)
 
 
-def write_function(name: str, doc: str, body: Body, arguments: Sequence[str], results: Sequence[sp.Expr]) -> list[str]:
+def node_function(name: str, about: str, body: Body, arguments: Sequence[str], results: Sequence[sp.Expr]) -> Function:
     """A small inlined function of lanes: statements first, results last."""
-    lines = ["@njit(error_model='numpy', forceinline=True)", f"def {name}({', '.join(arguments)}):", f'    """{doc}"""']
-    lines += [f"    {s} = {show(e)}" for s, e in body.statements]
-    lines.append(f"    return {', '.join(show(e) for e in results)}")
-    return lines
+    statements = [let(s.name, lower(e)) for s, e in body.statements]
+    return Function(name, tuple(arguments), about, (*statements, Return(tuple(map(lower, results)))))
 
 
-def combine(row: Sequence[float], names: Sequence[str], start: str = "") -> str:
-    """start + sum row_j * names_j without zero terms and unit factors; '' where nothing is left."""
-    text = start
-    for weight, name in zip(row, names, strict=False):
-        if weight == 0.0:
-            continue
-        term = name if abs(weight) == 1.0 else f"{abs(weight)!r}*{name}"
-        if not text:
-            text = term if weight > 0 else f"-{term}"
-        else:
-            text += f" + {term}" if weight > 0 else f" - {term}"
-    return text
+def lane(e: Expression, width: str = "WIDTH") -> Expression:
+    """The same value as a register: numbers are spread over its lanes."""
+    return call("broadcast", e, width) if isinstance(e, Number) else e
 
 
-class StepWriter:
-    """Writes the statements of one step of `method` for `equations`, whose node was analysed into `blocks`.
+def time_term(weight: float, slope: Expression) -> Expression:
+    """weight * h * slope with its sign in front."""
+    if isinstance(slope, Negation):
+        weight, slope = -weight, slope.value
+    term = Product((Number(abs(weight)), Name("h"), slope))
+    return Negation(term) if weight < 0 else term
 
-    Nodes of further kinds were analysed into `more`.  A `bounded` step returns a bound of the eigenvalues at its start
-    beside the error.
+
+class Step(ABC):
+    """Writes one step of `method` for `equations`, whose kinds of nodes were analysed into `kinds`.
+
+    The stages are the same for every network.  `Unrolled` keeps each state in a register and writes every node out,
+    `Looped` keeps them in memory and runs over nodes and links.  A `bounded` step returns a bound of the eigenvalues at
+    its start beside the error.
     """
 
     def __init__(
-        self,
-        equations: Equations,
-        blocks: NodeBlocks,
-        method: Integrator,
-        bounded: bool = False,
-        more: Sequence[NodeBlocks] = (),
+        self, equations: Equations, kinds: Sequence[NodeBlocks], method: Integrator, bounded: bool = False
     ) -> None:
-        self.equations, self.blocks, self.method, self.bounded = equations, blocks, method, bounded
-        self.kinds = (blocks, *more)
+        self.equations, self.kinds, self.method, self.bounded = equations, tuple(kinds), method, bounded
         self.state = equations.state
-        self.lines: list[str] = []
-        self.mass = Mass(equations)
+        self.statements: list[Statement] = []
 
-    def put(self, *lines: str) -> None:
+    def put(self, *statements: Statement) -> None:
         """Append statements."""
-        self.lines += lines
+        self.statements += statements
 
-    def stages(self, name: str, count: int) -> list[str]:
-        """Names of the first `count` stage values of one state variable."""
-        return [f"k{j + 1}_{name}" for j in range(count)]
+    def let(self, name: str, value: Value) -> None:
+        """Append the statement that gives a variable its value."""
+        self.statements.append(let(name, value))
+
+    def note(self, text: str) -> None:
+        """Append a comment."""
+        self.statements.append(Comment(text))
+
+    # -- the method -------------------------------------------------------------------------------------------
+
+    def write(self, after: Callable[[int], None] | None = None) -> None:
+        """Write the step; `after` may write more after each stage."""
+        self.opening()
+        if self.method.implicit:
+            gamma = self.method.gamma  # (shift - J) k = …; reach = 1/shift, rate = 1/h
+            self.let("reach", Name("h") * gamma)
+            self.let("shift", 1.0 / Name("reach"))
+            self.let("rate", Name("shift") * gamma)
+            self.linearise()
+        for i in range(self.early):
+            self.stage(i)
+            if after is not None:
+                after(i)
+        self.finish()
+
+    def stage(self, i: int) -> None:
+        """Write one stage: state, right-hand side, and what the method makes of it."""
+        self.note(f"stage {i + 1}")
+        if i > 0:
+            self.advance(i)
+        if i > 0 or not self.method.implicit:
+            self.stage_time(i)
+            out = "f" if self.method.implicit else f"k{i + 1}"
+            self.slopes("u" if i > 0 else "y", out)
+        self.solve(i)
 
     @property
-    def first_body(self) -> Body:
-        """What is evaluated of a node at the start of a step."""
-        return self.first_of(self.blocks)
+    def early(self) -> int:
+        """How many stages are computed before the new state."""
+        return self.method.stages
+
+    @abstractmethod
+    def opening(self) -> None:
+        """Load what the step needs."""
+
+    @abstractmethod
+    def linearise(self) -> None:
+        """Compute slopes and Jacobian at the start, and factorise."""
+
+    @abstractmethod
+    def advance(self, i: int) -> None:
+        """Compute the state of stage i > 0."""
+
+    @abstractmethod
+    def slopes(self, base: str, out: str) -> None:
+        """Compute the right-hand side at one vector of states into another."""
+
+    @abstractmethod
+    def solve(self, i: int) -> None:
+        """Turn the slopes of stage i into its rates."""
+
+    @abstractmethod
+    def finish(self) -> None:
+        """Compute the new state, the error and the dense output."""
+
+    # -- nodes and time ---------------------------------------------------------------------------------------
+
+    def increment(self, row: Sequence[float], values: Sequence[str]) -> Expression:
+        """What a row of coefficients adds to the state at the start: stages of explicit methods are rates."""
+        total = linear(row, values)
+        return total if self.method.implicit else Product((Name("h"), total))
 
     def first_of(self, blocks: NodeBlocks) -> Body:
         """What is evaluated of a node of some kind at the start of a step."""
         if self.method.implicit:
             return blocks.linear
         return blocks.local if self.bounded else blocks.rhs
-
-    def of(self, i: int) -> NodeBlocks:
-        """The blocks of node i."""
-        return self.kinds[self.equations.kind_of[i]]
-
-    # -- pieces of the right-hand side ------------------------------------------------------------------------
 
     def is_plain(self, e: sp.Expr) -> bool:
         """True where a result needs no function: a number, a parameter term, or one bare state symbol."""
@@ -129,113 +182,38 @@ class StepWriter:
         own = [s for s in states if s in used]
         return own + sorted((s for s in used if s not in own), key=lambda s: s.name)
 
-    def at(self, i: int, prefix: str) -> dict[sp.Symbol, sp.Symbol]:
-        """The names of the states of node i in a stage, and of the parameters that it has for itself."""
-        states = self.equations.node_at(i).state
-        found = {s: sp.Symbol(f"{prefix}{s.name}_{i + 1}", real=True) for s in states}
-        return {**self.equations.at_node(i), **found}
-
-    def call(self, function: str, body: Body, results: Sequence[sp.Expr], i: int, prefix: str) -> str:
-        """The call of a node function for node i with the state names of a stage."""
-        at, kind = self.at(i, prefix), self.equations.kind_of[i]
-        names = (at.get(s, s).name for s in self.arguments(body, results))
-        return f"{function_name(function, kind)}({', '.join(names)})"
-
     def timed(self, time: str, wanted: set[sp.Symbol]) -> None:
         """Statements for the time terms in use, at the time of that name."""
         for symbol, e in (pair for blocks in self.kinds for pair in blocks.timed):
             if symbol in wanted:
-                self.put(f"{symbol} = {show(e.xreplace({TIME: sp.Symbol(time)}))}")
+                self.let(symbol.name, lower(e.xreplace({TIME: sp.Symbol(time)})))
 
-    def stage_time(self, i: int, first: int) -> None:
-        """The time of stage i and the time terms of the right-hand side, unless the stage before had the same time.
-
-        `first` is the first stage that is evaluated at all.
-        """
-        c = self.method.c
+    def stage_time(self, i: int) -> None:
+        """The time of stage i and the time terms of the right-hand side, unless the stage before had the same time."""
+        c, first = self.method.c, int(self.method.implicit)
         if i == first or c[i] != c[i - 1]:
-            self.put(f"now = {combine((c[i],), ['h'], 't')}")
+            self.let("now", linear((c[i],), ["h"], "t"))
             self.timed("now", self.wanted([blocks.rhs for blocks in self.kinds]))
 
     def wanted(self, bodies: Sequence[Body]) -> set[sp.Symbol]:
         """Time terms that some bodies use."""
         return {s for blocks in self.kinds for s, _ in blocks.timed} & {s for body in bodies for s in body.symbols}
 
-    def slopes(self, prefix: str, out: str) -> None:
-        """Statements that give the right-hand side at the state `prefix`x_1 … under the names `out`x_1 …"""
-        for i in range(self.equations.n):
-            body, names = self.of(i).rhs, self.at(i, prefix)
-            coded = [e for e in body.results if not self.is_plain(e)]
-            targets = [f"{out}{s.name}_{i + 1}" for s in self.equations.node_at(i).state]
-            if coded:
-                left = [t for t, e in zip(targets, body.results, strict=True) if not self.is_plain(e)]
-                self.put(f"{', '.join(left)} = {self.call('node', body, coded, i, prefix)}")
-            for target, e in zip(targets, body.results, strict=True):
-                if self.is_plain(e):
-                    text = show(e.xreplace(names))
-                    self.put(f"{target} = broadcast({text}, WIDTH)" if e.is_number else f"{target} = {text}")
-        self.links(prefix, out)
-
-    def links(self, prefix: str, out: str) -> None:
-        """Add what the links contribute to the right-hand side."""
-        eq = self.equations
-        terms: dict[str, list[sp.Expr]] = {}
-        stage = self.staged(prefix)
-        for link in eq.links:
-            for s, e in zip(eq.node_at(link[0]).state, eq.edge_at(link).rhs, strict=True):
-                term = e.xreplace(eq.at_link(link)).xreplace(stage)
-                if term != 0:
-                    terms.setdefault(f"{out}{s.name}_{link[0] + 1}", []).append(term)
-        for target, parts in terms.items():
-            self.put(f"{target} = {target} + " + " + ".join(show(p) for p in parts))
-
-    def staged(self, prefix: str) -> dict[sp.Symbol, sp.Symbol]:
-        """The names of all states in a stage."""
-        return {sp.Symbol(n, real=True): sp.Symbol(prefix + n, real=True) for n in self.state}
-
-    # -- beginning and end ------------------------------------------------------------------------------------
-
-    def opening(self) -> None:
-        """Load the state and the parameters."""
-        for slot, name in enumerate(self.state):
-            self.put(f"{name} = load(y, {slot}, WIDTH)")
-        self.parameters()
-
     def parameters(self, but: Container[str] = ()) -> None:
         """Load the parameters, `but` some, and compute what depends on them alone."""
         for slot, name in enumerate(self.equations.parameters):
             if name not in but:
-                self.put(f"{name} = load(p, {len(self.state) + slot}, WIDTH)")
+                self.let(name, Load("p", Number(len(self.state) + slot)))
         for blocks in self.kinds:
             used = self.first_of(blocks).symbols
             wanted = used.union(*(e.free_symbols for s, e in blocks.timed if s in used))
-            self.put(*(f"{symbol} = {show(e)}" for symbol, e in blocks.constants if symbol in wanted))
+            self.put(*(let(symbol.name, lower(e)) for symbol, e in blocks.constants if symbol in wanted))
 
-    def closing(self, errors: Sequence[str]) -> None:
-        """Store the new state and reduce the error to one number a lane."""
-        terms = []
-        for slot, (name, e) in enumerate(zip(self.state, errors, strict=True)):
-            self.put(f"store(y_new, {slot}, n_{name})", f"e_{name} = scaled({e}, {name}, n_{name}, rtol, atol)")
-            terms.append(f"e_{name}")
-        self.put(f"total = {' + '.join(terms)}", f"error = {terms[0]}")
-        self.put(*(f"error = maximum(error, {term})" for term in terms[1:]))
-        self.put(f"return error + 0.0*total{', bound' * self.bounded}  # NaN or infinite where any estimate is")
-
-    def dense(self, scale: str = "") -> None:
-        """Store the coefficients of the dense output."""
-        for j, row in enumerate(self.method.dense):
-            for slot, name in enumerate(self.state):
-                text = combine(row, [f"k{i + 1}_{name}" for i in range(len(row))]) or "broadcast(0.0, WIDTH)"
-                self.put(
-                    f"store(dense, {j * len(self.state) + slot}, {scale}({text}))"
-                    if scale
-                    else f"store(dense, {j * len(self.state) + slot}, {text})"
-                )
-
-
-@contextmanager
-def indent_from(writer: StepWriter) -> Iterator[None]:
-    """Indent whatever is written inside the with block."""
-    mark = len(writer.lines)
-    yield
-    writer.lines[mark:] = ["    " + line for line in writer.lines[mark:]] or ["    pass"]
+    def node_call(
+        self, function: str, kind: int, body: Body, found: Sequence[str], at: Mapping[sp.Symbol, sp.Symbol]
+    ) -> list[Statement]:
+        """The call of a node function at some names of its arguments; plain results among those `found` need none."""
+        pairs = [(name, e) for name, e in zip(found, body.results, strict=True) if not self.is_plain(e)]
+        given = (at.get(s, s).name for s in self.arguments(body, [e for _, e in pairs]))
+        value = call(function_name(function, kind), *given)
+        return [Assign(tuple(name for name, _ in pairs), value)] if pairs else []

@@ -16,8 +16,8 @@ from sympy.functions.elementary.piecewise import Piecewise
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
-from ..printing.blocks import Names
-from ..printing.printer import show
+from ..program.lowering import lower
+from ..program.passes import Names
 from .series import (
     Constant,
     Integral,
@@ -244,7 +244,7 @@ class Graph:
             return times(self.constant(number), self.constant(rest))
         if e not in self.fixed:
             plain = printable(e)
-            show(plain)  # refuses what cannot be printed
+            lower(plain)  # refuses what cannot be printed
             name = self.fresh("p")
             self.constants[name], self.fixed[e] = plain, Name(name)
         return self.fixed[e]

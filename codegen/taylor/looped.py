@@ -15,10 +15,11 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Node
 
-from ..printing.blocks import Body, Hoist, Names
-from ..printing.names import NAMES
-from ..printing.printer import show as show_constant
-from ..steps.places import Joint, Kind, Places
+from ..program.lowering import lower
+from ..program.passes import Body, Hoist, Names
+from ..program.printers import LANES
+from ..steps.names import NAMES
+from ..steps.places import Joint, Kind, Places, Span
 from .graph import Graph, Template
 from .series import Constant, Series, State, Time
 from .step import FARTHEST, TaylorStep, called, finished
@@ -146,6 +147,11 @@ class Section:
         return [self.head, *(f"    {line}" for line in self.lines)] if self.index else self.lines
 
 
+def head_of(span: Span) -> str:
+    """The head of the loop over a part of a numbering."""
+    return LANES.loop(span.index, span.start, span.stop) + ":"
+
+
 def lane(value: Expr) -> str:
     """The text of a value that is stored: numbers become lanes."""
     if isinstance(value, Number):
@@ -194,21 +200,21 @@ class LoopWriter:
         moves = self.moves(kind.node)
         states = [s for s, moving in zip(kind.node.state, moves, strict=True) if moving]
         fixed = [s for s in kind.node.state if s not in states]
-        section = Section(Graph(self.names), kind.head, "i", self.equations.n)
+        section = Section(Graph(self.names), head_of(kind.span), "i", self.equations.n)
         section.before += self.own(kind.node.rhs, fixed, kind.node, "i", "")
         moving = {s: State(name=self.swap[s].name) for s in states}
         component = {s: c for c, s in enumerate(kind.node.state)}
-        section.places = {state: self.places.place(component[s]) for s, state in moving.items()}
+        section.places = {state: self.place(component[s]) for s, state in moving.items()}
         seen: dict[sp.Symbol, Series] = {symbol: State(name=series.name) for symbol, series in waves.items()}
         section.waves = dict.fromkeys(seen.values(), self.waves)
         found = self.read(section, rates, {**moving, **seen}, constants)
-        section.rates = [(self.places.place(c), rate) for c, rate in enumerate(found)]
+        section.rates = [(self.place(c), rate) for c, rate in enumerate(found)]
         return section
 
     def link(self, joint: Joint) -> Section:
         """What the links of a joint add."""
         edge = joint.edge
-        section = Section(Graph(self.names), joint.head, "e", len(self.equations.links), adds=True)
+        section = Section(Graph(self.names), head_of(joint.span), "e", len(self.equations.links), adds=True)
         weight = self.called[edge.weight.name]
         section.before += ["i, j_there = target[e], source[e]", f"{weight} = weights[e]"]
         moving: dict[sp.Symbol, Series] = {}
@@ -224,14 +230,18 @@ class LoopWriter:
                     continue
                 if moves:
                     moving[s] = State(name=name)
-                    section.places[moving[s]] = self.places.place(c, index)
+                    section.places[moving[s]] = self.place(c, index)
                 else:
                     swap[s] = sp.Symbol(name, real=True)
-                    section.before.append(f"{name} = load(y, {self.places.place(c, index)}, WIDTH)")
+                    section.before.append(f"{name} = load(y, {self.place(c, index)}, WIDTH)")
         section.before += self.own(edge.rhs, [], joint.target, "i", "_here")
         found = self.read(section, edge.rhs, moving, swap)
-        section.rates = [(self.places.place(c), rate) for c, rate in enumerate(found)]
+        section.rates = [(self.place(c), rate) for c, rate in enumerate(found)]
         return section
+
+    def place(self, c: int, index: str = "i") -> str:
+        """Where state c of a node stands."""
+        return LANES.text(self.places.place(c, index))
 
     def moves(self, node: Node) -> tuple[bool, ...]:
         """Which states of a node move: one at rest, such as the mode of a contact, is a constant of the step."""
@@ -246,11 +256,11 @@ class LoopWriter:
     ) -> list[str]:
         """Load the constants that a node has for itself: states at rest and parameters that vary."""
         lines = [
-            f"{self.called[s.name]}{suffix} = load(y, {self.places.place(c, index)}, WIDTH)"
+            f"{self.called[s.name]}{suffix} = load(y, {self.place(c, index)}, WIDTH)"
             for c, s in enumerate(node.state)
             if s in fixed
         ]
-        for line in self.places.own(Body((), tuple(used))):
+        for line in LANES.lines(self.places.own(Body((), tuple(used)))):
             name, _, rest = line.partition(" = ")
             lines.append(f"{self.called[name]} = {rest}")
         return lines
@@ -284,7 +294,7 @@ class LoopWriter:
         template = Template.of(rates, moving, self.names.fresh("shared_"))
         found = graph.read(template, moving, {**self.swap, **swap})
         graph.settle(found)
-        section.before += [f"{name} = {show_constant(e)}" for name, e in graph.constants.items()]
+        section.before += [f"{name} = {LANES.text(lower(e))}" for name, e in graph.constants.items()]
         return found
 
     # -- text -------------------------------------------------------------------------------------------------
@@ -300,7 +310,7 @@ class LoopWriter:
         for slot, name in enumerate(eq.parameters, start=eq.dimension):
             if name not in own:
                 lines.append(f"{self.called[name]} = load(p, {slot}, WIDTH)")
-        lines += [f"{name} = {show_constant(e)}" for name, e in self.waves.graph.constants.items()]
+        lines += [f"{name} = {LANES.text(lower(e))}" for name, e in self.waves.graph.constants.items()]
         lines += ["# order 0", *self.states("store(dense, at_states + {0}, load(y, {0}, WIDTH))")]
         if self.waves.rates:
             lines += ["store(dense, at_t, t)", "store(dense, at_t + 1, scale)", f"for k in range(2, {self.order + 1}):"]
@@ -337,8 +347,8 @@ class LoopWriter:
         """Loops over all states; {0} is the place of one."""
         return [
             text
-            for head, place in self.places.rows
-            for text in (head, *(f"    {line.format(place)}" for line in lines))
+            for span, place in self.places.rows
+            for text in (head_of(span), *(f"    {line.format(LANES.text(place))}" for line in lines))
         ]
 
     def next_states(self, factor: str, order: str) -> list[str]:

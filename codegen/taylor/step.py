@@ -15,8 +15,9 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
-from ..printing.blocks import Names
-from ..printing.printer import show as show_constant
+from ..program.lowering import lower
+from ..program.passes import Names
+from ..program.printers import LANES
 from .graph import STARTS, Graph, Template
 from .series import Constant, Series, State, Time
 from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
@@ -48,6 +49,12 @@ class TaylorStep:
     order: int
     imports: tuple[str, ...]
     workspace: int = 0
+
+    @property
+    def operations(self) -> int:
+        """The number of additions, multiplications and divisions in the text."""
+        body = self.text.split('"""')[-1]
+        return sum(body.count(sign) for sign in (" + ", " - ", "*", "/"))
 
     @classmethod
     def of(cls, lines: Sequence[str], order: int, workspace: int = 0, more: str = "") -> TaylorStep:
@@ -210,7 +217,7 @@ class StepWriter:
         self.put(*(f"{self.called[name]} = load(y, {slot}, WIDTH)" for slot, name in enumerate(eq.state)))
         for slot, name in enumerate(eq.parameters, start=eq.dimension):
             self.put(f"{self.called[name]} = load(p, {slot}, WIDTH)")
-        self.put(*(f"{name} = {show_constant(e)}" for name, e in self.graph.constants.items()))
+        self.put(*(f"{name} = {LANES.text(lower(e))}" for name, e in self.graph.constants.items()))
         for slot, state in self.states.items():
             at.values[state, 0] = Name(self.called[eq.state[slot]])
         at.values[self.time, 0] = Name("t")

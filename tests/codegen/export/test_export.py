@@ -21,8 +21,9 @@ from samples import CASES, real
 from synchain.codegen.export.c import to_c
 from synchain.codegen.export.names import RESERVED, portable
 from synchain.codegen.export.numba import to_numba
-from synchain.codegen.export.printer import NUMBA, NUMPY, C, decimal, write
 from synchain.codegen.export.python import to_python
+from synchain.codegen.program.lowering import Library, number
+from synchain.codegen.program.printers import C99, MATH, NUMPY, Printer
 from synchain.models import chain, ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.products import weighted
@@ -35,6 +36,16 @@ COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC"]
 Values = tuple[np.ndarray, np.ndarray]
 """Right-hand side and dense Jacobian."""
+
+
+def write(e: sp.Expr, printer: Printer) -> str:
+    """The text of an expression in a language with a mathematical library."""
+    return printer.text(Library()(sp.sympify(e)))
+
+
+def decimal(e: Any) -> str:
+    """The text of a number."""
+    return repr(number(e).value)
 
 
 def one_way(n: int) -> Equations:
@@ -419,10 +430,10 @@ def test_text(text: str, c: str | None, numba: str | None) -> None:
     symbols = dict(zip("xyz", real("x", "y", "z"), strict=True))
     e = sp.sympify(text, locals=symbols)
     if c is not None and numba is not None:
-        assert (write(e, C), write(e, NUMBA)) == (c, numba)
+        assert (write(e, C99), write(e, MATH)) == (c, numba)
     values = {"x": 0.37, "y": 1.91, "z": -2.3}
-    for dialect in (NUMPY, NUMBA):
-        found = eval(write(e, dialect), {"np": np, "math": math, **values})
+    for printer in (NUMPY, MATH):
+        found = eval(write(e, printer), {"np": np, "math": math, **values})
         assert found == pytest.approx(float(e.subs({symbols[k]: v for k, v in values.items()})), rel=1e-15)
 
 
@@ -431,7 +442,7 @@ def test_what_cannot_be_written_is_refused() -> None:
     for e, words in ((sp.gamma(x), "gamma"), (x + 0.5, "floating-point"), (sp.Piecewise((x, x > 0)), "no value"),
                      (x * 10**400, "does not fit"), (sp.I * x, "does not fit")):  # fmt: skip
         with pytest.raises(ValueError, match=words):
-            write(e, C)
+            write(e, C99)
 
 
 def test_values() -> None:

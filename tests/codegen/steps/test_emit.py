@@ -27,7 +27,8 @@ from samples import (
 
 from synchain.codegen import integrators
 from synchain.codegen.kernels.sweep import emit
-from synchain.codegen.printing import printer
+from synchain.codegen.program import lowering
+from synchain.codegen.program.expressions import Expression, call
 from synchain.codegen.steps.places import by_joint
 from synchain.codegen.steps.program import program
 from synchain.models.dynamics.equations import Equations
@@ -46,14 +47,14 @@ def _fifty_digits():
 @pytest.fixture
 def exact_numbers(monkeypatch):
     """Print every constant as a product that keeps all digits, so that only the structure of the text is tested."""
-    rounded = printer._number
+    rounded = lowering.number
 
-    def exact(e: sp.Expr) -> tuple[str, int]:
+    def exact(e: sp.Expr) -> Expression:
         if e.is_Integer or (e.is_Rational and float(e) == e):
             return rounded(e)
-        return f"exact({str(e)!r})", printer.ATOM
+        return call("exact", repr(str(e)))
 
-    monkeypatch.setattr(printer, "_number", exact)
+    monkeypatch.setattr(lowering, "number", exact)
 
 
 EXACT = {**DIGITS, "exact": lambda text: mpmath.mpmathify(sp.N(sp.sympify(text), 60))}

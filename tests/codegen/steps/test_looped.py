@@ -7,7 +7,7 @@ import pytest
 from samples import FLOATS, kernel, plain, run_cells
 
 from synchain.codegen import driver
-from synchain.codegen.printing.names import NAMES
+from synchain.codegen.steps.names import NAMES
 from synchain.codegen.steps.program import Program, order, program
 from synchain.models import chain, complete, grid, random_cubic, ring, star, tree
 from synchain.models.graphs.families import topology

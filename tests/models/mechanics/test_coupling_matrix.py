@@ -16,7 +16,8 @@ from parts import connectivity, edge, is_lagrangian, node, oscillator_of, parame
 from scipy.integrate import solve_ivp
 from variational_reference import ALPHA, deviation_names, transversal_equations
 
-from synchain.codegen.printing.printer import show
+from synchain.codegen.program.lowering import lower
+from synchain.codegen.program.printers import LANES
 from synchain.models import chain, ring
 from synchain.models.dynamics.network import network
 from synchain.models.graphs.topology import from_matrix
@@ -162,7 +163,7 @@ def test_equal_states_feel_exactly_nothing() -> None:
     for k in range(200):
         at = {"x": 0.1 * k, "y": 0.7 + k}
         values = {f"{name}_{end}": value for name, value in at.items() for end in "ij"}
-        assert eval(show(link.rhs[0]), {"sigma": 0.3, "weight": 1.7, **values}) == 0.0
+        assert eval(LANES.text(lower(link.rhs[0])), {"sigma": 0.3, "weight": 1.7, **values}) == 0.0
 
 
 def test_a_network_by_hand() -> None:

@@ -14,7 +14,18 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from samples import FLOATS, real
 
-from synchain.codegen.printing.printer import FUNCTIONS, UnprintableError, show
+from synchain.codegen.program import functions
+from synchain.codegen.program.lowering import UnprintableError, lower
+from synchain.codegen.program.printers import LANES
+
+FUNCTIONS = {kind: name for kind, name in functions.FUNCTIONS.items() if name in functions.LANES}
+"""What a kernel can call, by SymPy class."""
+
+
+def show(expression: sp.Expr) -> str:
+    """The text of an expression in a kernel."""
+    return LANES.text(lower(sp.sympify(expression)))
+
 
 x, y, z, kappa = SYMBOLS = real("x", "y", "z", "kappa")
 

@@ -12,8 +12,9 @@ from sympy.functions.elementary.piecewise import ExprCondPair
 
 from synchain.codegen import integrators
 from synchain.codegen.kernels.sweep import emit
-from synchain.codegen.printing.blocks import Body, Hoist, Names, analyse
-from synchain.codegen.printing.names import RESERVED, tidy
+from synchain.codegen.program.passes import Body, Hoist, Names
+from synchain.codegen.steps.blocks import analyse
+from synchain.codegen.steps.names import RESERVED, tidy
 from synchain.codegen.steps.program import program
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Edge, Node

@@ -12,7 +12,7 @@ import sympy as sp
 from samples import CASES, TABLE, friction_chain, real
 
 from synchain.codegen.kernels.sweep import emit
-from synchain.codegen.printing import printer
+from synchain.codegen.program.lowering import UnprintableError
 from synchain.models import chain
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import Node
@@ -101,13 +101,13 @@ def test_sections_are_checked():
         ValueError, match=r"section function v_2: unknown symbol 'v_2'; use the state, parameters and t"
     ):
         emit(friction_chain(1), "rodas5p", ("section",), sp.Symbol("v_2", real=True))
-    with pytest.raises(printer.UnprintableError, match="floating-point number"):
+    with pytest.raises(UnprintableError, match="floating-point number"):
         emit(friction_chain(1), "rodas5p", ("section",), V_1 - sp.Float(0.5))
 
 
 def test_what_cannot_be_printed_is_refused():
     x = real("x")[0]
-    with pytest.raises(printer.UnprintableError, match="no printing rule for gamma"):
+    with pytest.raises(UnprintableError, match="no printing rule for gamma"):
         emit(Equations.of_equal_nodes(Node((x,), (sp.gamma(x),), ()), None, 1))
 
 

@@ -1,0 +1,229 @@
+"""Expressions of a program: a tree that keeps the order of its terms, because rounding depends on it.
+
+`a + b` and `a*b` append to the sum or product on their left, as Python reads them; what stands on the right stays whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, TypeAlias
+
+__all__ = [
+    "ONE", "ZERO", "Call", "Choice", "Compare", "Expression", "Junction", "Load", "Name", "Negation", "Not", "Number",
+    "Power", "Product", "Quotient", "Slice", "Sum", "Value", "as_expression", "call", "linear", "negative", "plus", "product", "scaled",
+]  # fmt: skip
+
+
+class Expression:
+    """A value, a condition or a place; operators build larger ones."""
+
+    __slots__ = ()
+    __match_args__: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def parts(self) -> tuple[Expression, ...]:
+        """The expressions that it is made of."""
+        fields = (getattr(self, name) for name in self.__match_args__)
+        listed = (field if isinstance(field, tuple) else (field,) for field in fields)
+        return tuple(part for parts in listed for part in parts if isinstance(part, Expression))
+
+    def walk(self) -> Iterator[Expression]:
+        """Yield the expression and everything in it."""
+        yield self
+        for part in self.parts:
+            yield from part.walk()
+
+    def __add__(self, other: Value) -> Sum:
+        return Sum((*_terms(self), as_expression(other)))
+
+    def __radd__(self, other: Value) -> Sum:
+        return Sum((as_expression(other), self))
+
+    def __sub__(self, other: Value) -> Sum:
+        return Sum((*_terms(self), Negation(as_expression(other))))
+
+    def __mul__(self, other: Value) -> Product:
+        return Product((*_factors(self), as_expression(other)))
+
+    def __rmul__(self, other: Value) -> Product:
+        return Product((as_expression(other), self))
+
+    def __truediv__(self, other: Value) -> Quotient:
+        return Quotient(self, as_expression(other))
+
+    def __rtruediv__(self, other: Value) -> Quotient:
+        return Quotient(as_expression(other), self)
+
+
+@dataclass(frozen=True, slots=True)
+class Number(Expression):
+    """A double, or a whole number in indices and exponents."""
+
+    value: float | int
+
+
+@dataclass(frozen=True, slots=True)
+class Name(Expression):
+    """A variable."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sum(Expression):
+    """Terms, added from left to right."""
+
+    terms: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Product(Expression):
+    """Factors, multiplied from left to right."""
+
+    factors: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Quotient(Expression):
+    """One value over another."""
+
+    top: Expression
+    bottom: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Power(Expression):
+    """A power with any exponent; only languages with a function for it have these."""
+
+    base: Expression
+    exponent: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Negation(Expression):
+    """The value with its sign turned."""
+
+    value: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Call(Expression):
+    """A function of the table in `functions`, or one of the kernel's own."""
+
+    function: str
+    arguments: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Choice(Expression):
+    """One value if a condition holds, another if not."""
+
+    condition: Expression
+    yes: Expression
+    no: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Compare(Expression):
+    """A condition on two values: <, <=, > or >=."""
+
+    sign: str
+    left: Expression
+    right: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Junction(Expression):
+    """Conditions that hold together, "and", or one at least, "or"."""
+
+    word: str
+    conditions: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Not(Expression):
+    """The opposite of a condition that has a name."""
+
+    condition: Name
+
+
+@dataclass(frozen=True, slots=True)
+class Load(Expression):
+    """An element of an array, or as many from there on as a register of some width has lanes."""
+
+    array: str
+    index: Expression
+    width: str | None = "WIDTH"
+
+
+@dataclass(frozen=True, slots=True)
+class Slice(Expression):
+    """The places of an array from `start` up to `stop`."""
+
+    start: Expression
+    stop: Expression
+
+
+Value: TypeAlias = Expression | float | int | str
+"""An expression, a number, or the name of a variable."""
+
+ZERO, ONE = Number(0.0), Number(1.0)
+
+
+def as_expression(value: Value) -> Expression:
+    """Return a number or the name of a variable as an expression."""
+    if isinstance(value, Expression):
+        return value
+    return Name(value) if isinstance(value, str) else Number(value)
+
+
+def call(function: str, *arguments: Value) -> Call:
+    """Return the call of a function."""
+    return Call(function, tuple(map(as_expression, arguments)))
+
+
+def plus(first: Expression, *others: Expression) -> Expression:
+    """Return the sum of all terms of some expressions, in their order."""
+    return Sum(tuple(term for e in (first, *others) for term in _terms(e))) if others else first
+
+
+def product(factors: Sequence[Expression]) -> Expression:
+    """Return the product of some factors, one if there is none."""
+    return Product(tuple(factors)) if len(factors) > 1 else factors[0] if factors else ONE
+
+
+def negative(e: Expression) -> Expression:
+    """Return -e with its sign folded."""
+    if isinstance(e, Negation):
+        return e.value
+    return Number(-e.value) if isinstance(e, Number) else Negation(e)
+
+
+def scaled(factor: Value, e: Expression) -> Expression:
+    """Return factor*e, multiplied from left to right."""
+    match e:
+        case Negation(value):
+            return Negation(scaled(factor, value))
+        case Quotient(top, bottom):
+            return Quotient(scaled(factor, top), bottom)
+    return Product((as_expression(factor), *_factors(e)))
+
+
+def linear(row: Iterable[float], values: Iterable[Value], start: Value | None = None) -> Expression:
+    """Return start + sum row_j * value_j without zero terms and unit factors; `ZERO` where nothing is left."""
+    terms: list[Expression] = [] if start is None else [as_expression(start)]
+    for weight, value in zip(row, values, strict=False):
+        if weight != 0.0:
+            e = as_expression(value)
+            term = e if abs(weight) == 1.0 else abs(weight) * e
+            terms.append(term if weight > 0 else Negation(term))
+    return plus(*terms) if terms else ZERO
+
+
+def _terms(e: Expression) -> tuple[Expression, ...]:
+    return e.terms if isinstance(e, Sum) else (e,)
+
+
+def _factors(e: Expression) -> tuple[Expression, ...]:
+    return e.factors if isinstance(e, Product) else (e,)

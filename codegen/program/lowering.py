@@ -1,0 +1,212 @@
+"""From SymPy to the expressions of a program: the one place that decides how powers, roots and constants are computed.
+
+Nothing is guessed: a function without a counterpart, a floating-point number or a constant that is not real is an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+
+import sympy as sp
+from sympy.logic.boolalg import Boolean
+
+from . import functions
+from .expressions import (
+    ONE,
+    Call,
+    Choice,
+    Compare,
+    Expression,
+    Junction,
+    Name,
+    Negation,
+    Not,
+    Number,
+    Power,
+    Product,
+    Quotient,
+    Sum,
+    call,
+    product,
+)
+
+__all__ = ["Library", "Lowering", "UnprintableError", "lower", "number"]
+
+SIGNS = {sp.StrictLessThan: "<", sp.LessThan: "<=", sp.StrictGreaterThan: ">", sp.GreaterThan: ">="}
+
+
+class UnprintableError(ValueError):
+    """An expression that generated code cannot express; the message names the part and the remedy."""
+
+
+class Lowering:
+    """The rules of lanes: no power function, so powers are products and roots; constants are folded."""
+
+    names: Mapping[str, str] = functions.LANES
+    powers = "integer or half-integer powers, or exp and log"
+
+    def __call__(self, e: sp.Expr) -> Expression:
+        """Return the expression as a tree.
+
+        Raises
+        ------
+        UnprintableError
+            If it has an unknown function, a floating-point number or a non-real constant.
+        """
+        if e.is_Symbol:
+            return Name(e.name)
+        if e.is_Float:
+            raise UnprintableError(f"floating-point number {e} in an expression; make it a parameter or a Rational")
+        if self.is_constant(e):
+            return number(e)
+        if e.is_Add:
+            terms = sorted(e.args, key=lambda term: (_is_negative(term), sp.default_sort_key(term)))
+            return Sum(tuple(Negation(self(-t)) if _is_negative(t) else self(t) for t in terms))
+        if e.is_Mul:
+            return Negation(self(-e)) if _is_negative(e) else self.product(e)
+        if e.is_Pow:
+            return self.power(e.base, e.exp)
+        if isinstance(e, sp.Piecewise):
+            return self.choice(e)
+        if isinstance(e, Boolean):
+            return self.condition(e)
+        return self.function(e)
+
+    def is_constant(self, e: sp.Expr) -> bool:
+        """True for a real number that can be folded into one double: a rational, pi, e, and what is made of them."""
+        return bool(e.is_number) and not e.atoms(sp.Float) and e.is_real is True
+
+    def product(self, e: sp.Mul) -> Expression:
+        """One constant in front, what has negative powers below."""
+        constants = [f for f in e.args if self.is_constant(f)]
+        factors = [f for f in e.args if f not in constants]
+        below = [f for f in factors if f.is_Pow and f.exp.is_number and f.exp.is_negative and f.base != sp.E]
+        above = [self(f) for f in factors if f not in below]
+        coefficient = sp.Mul(*constants)
+        top = product(above if coefficient == 1 else [number(coefficient), *above])
+        return Quotient(top, product([self(1 / f) for f in below])) if below else top
+
+    def power(self, base: sp.Expr, exponent: sp.Expr) -> Expression:
+        """A power, by its exponent."""
+        if base == sp.E:
+            return call("exp", self(exponent))
+        if exponent.is_number and exponent.is_negative:
+            return Quotient(ONE, self(1 / base**exponent))
+        if exponent == sp.Rational(1, 2):
+            return call("sqrt", self(base))
+        if exponent.is_Rational and exponent.q == 2:
+            return Product((self(base ** (exponent - sp.Rational(1, 2))), call("sqrt", self(base))))
+        return self.general_power(base, exponent)
+
+    def general_power(self, base: sp.Expr, exponent: sp.Expr) -> Expression:
+        """A power whose exponent is neither negative nor a half."""
+        if exponent.is_Integer and exponent <= 16:
+            return Product((self(base),) * int(exponent))
+        raise UnprintableError(f"no printing rule for the power {base**exponent}; use {self.powers}")
+
+    def function(self, e: sp.Expr) -> Expression:
+        """The call of a function; Max and Min of several are nested pairs."""
+        name = functions.FUNCTIONS.get(type(e), "")
+        if name not in self.names:
+            known = ", ".join(sorted(set(self.names) - {"sqrt"}))
+            raise UnprintableError(
+                f"no printing rule for {type(e).__name__} in {e}; known: {known}, sqrt, powers, Piecewise"
+            )
+        arguments = [self(a) for a in e.args]
+        while len(arguments) > 2:
+            arguments[-2:] = [Call(name, tuple(arguments[-2:]))]
+        return Call(name, tuple(arguments))
+
+    def choice(self, e: sp.Piecewise) -> Expression:
+        """The value of the first condition that holds."""
+        value, condition = e.args[-1]
+        if condition is not sp.true:
+            raise UnprintableError(f"{e} has no value where no condition holds; end it with (value, True)")
+        found = self(value)
+        for value, condition in reversed(e.args[:-1]):
+            found = Choice(self.condition(condition), self(value), found)
+        return found
+
+    def condition(self, e: Boolean) -> Expression:
+        """A condition, whose negations are carried inwards; a symbol names one that was computed before."""
+        e = sp.to_nnf(e, simplify=False)
+        if e.is_Symbol:
+            return Name(e.name)
+        if isinstance(e, sp.Not) and e.args[0].is_Symbol:
+            return Not(Name(e.args[0].name))
+        if isinstance(e, sp.And | sp.Or):
+            parts = sorted(e.args, key=sp.default_sort_key)
+            return Junction("and" if isinstance(e, sp.And) else "or", tuple(map(self.condition, parts)))
+        for kind, sign in SIGNS.items():
+            if isinstance(e, kind):
+                return Compare(sign, self(e.lhs), self(e.rhs))
+        raise UnprintableError(f"no printing rule for the condition {e}; use <, <=, >, >=, And, Or, Not")
+
+
+class Library(Lowering):
+    """The rules of languages with a mathematical library: any power, and factors 1/q as divisions."""
+
+    names = functions.C99
+
+    def is_constant(self, e: sp.Expr) -> bool:
+        """True for every number; `number` refuses those that are not real."""
+        return bool(e.is_number) and not e.atoms(sp.Float)
+
+    def product(self, e: sp.Mul) -> Expression:
+        """What has negative rational powers below, with the factor 1/q of a rational."""
+        coefficient = sp.Mul(*(f for f in e.args if f.is_number))
+        factors = [f for f in e.args if not f.is_number]
+        below = [f for f in factors if f.is_Pow and f.exp.is_Rational and f.exp < 0]
+        above = _flat([self(f) for f in factors if f not in below])
+        under = [self(1 / f) for f in below]
+        under = _flat(under) if len(under) > 1 else under
+        if coefficient.is_Rational and coefficient.p == 1 and coefficient.q > 1 and above:
+            under.insert(0, number(sp.Integer(coefficient.q)))
+        elif coefficient != 1:
+            above.insert(0, number(coefficient))
+        return Quotient(product(above), product(under)) if under else product(above)
+
+    def power(self, base: sp.Expr, exponent: sp.Expr) -> Expression:
+        """A power, by its exponent."""
+        if base == sp.E or exponent == sp.Rational(1, 2) or (exponent.is_Rational and exponent < 0):
+            return super().power(base, exponent)
+        return self.general_power(base, exponent)
+
+    def general_power(self, base: sp.Expr, exponent: sp.Expr) -> Expression:
+        """Small powers of a variable are products."""
+        if exponent.is_Integer and base.is_Symbol and exponent <= 4:
+            return Product((self(base),) * int(exponent))
+        return Power(self(base), Number(int(exponent)) if exponent.is_Integer else self(exponent))
+
+
+lower = Lowering()
+"""Lowers to what lanes can compute."""
+
+
+def number(e: sp.Expr | Fraction) -> Number:
+    """Return the double nearest to an exact number.
+
+    Raises
+    ------
+    UnprintableError
+        If it is beyond the range of doubles or not real.
+    """
+    try:
+        if isinstance(e, Fraction) or e.is_Rational:
+            value = float(Fraction(e.numerator, e.denominator))
+        else:
+            value = float(sp.N(e, 50))
+    except (OverflowError, TypeError):
+        value = float("inf")
+    if not abs(value) < float("inf"):
+        raise UnprintableError(f"the number {e} does not fit into a double; rescale the equations")
+    return Number(value)
+
+
+def _flat(factors: Sequence[Expression]) -> list[Expression]:
+    return [part for f in factors for part in (f.factors if isinstance(f, Product) else (f,))]
+
+
+def _is_negative(e: sp.Expr) -> bool:
+    return bool(e.could_extract_minus_sign()) and (e.is_Number or e.is_Mul)

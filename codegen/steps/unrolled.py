@@ -1,0 +1,305 @@
+"""A step for a small network, written out node by node, its states in registers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import sympy as sp
+
+from synchain.models.dynamics.equations import Equations
+
+from ..integrators import Integrator
+from ..program.expressions import (
+    ZERO,
+    Call,
+    Expression,
+    Load,
+    Name,
+    Number,
+    Product,
+    call,
+    linear,
+    plus,
+)
+from ..program.lowering import lower
+from ..program.statements import If, Return, let, store
+from .blocks import NodeBlocks
+from .elimination import Entries, plan, write_factors, write_solve
+from .mass import Mass
+from .step import Step, lane, time_term
+
+__all__ = ["Unrolled", "entry", "stage_state"]
+
+
+class Unrolled(Step):
+    """Names its vectors by prefixes: x_1 at the start, u_x_1 in a stage, f_x_1 the slope, k2_x_1 of stage 2, n_x_1 new."""
+
+    def __init__(
+        self, equations: Equations, kinds: Sequence[NodeBlocks], method: Integrator, bounded: bool = False
+    ) -> None:
+        super().__init__(equations, kinds, method, bounded)
+        self.mass = Mass(self)
+
+    def of(self, i: int) -> NodeBlocks:
+        """The blocks of node i."""
+        return self.kinds[self.equations.kind_of[i]]
+
+    def at(self, i: int, base: str) -> dict[sp.Symbol, sp.Symbol]:
+        """The names of the states of node i in a vector, and of the parameters that it has for itself."""
+        states = self.equations.node_at(i).state
+        found = {s: sp.Symbol(f"{prefix(base)}{s.name}_{i + 1}", real=True) for s in states}
+        return {**self.equations.at_node(i), **found}
+
+    def stages(self, name: str, count: int) -> list[str]:
+        """Names of the first `count` stage values of one state variable."""
+        return [f"k{j + 1}_{name}" for j in range(count)]
+
+    def opening(self) -> None:
+        """Load the state and the parameters."""
+        for slot, name in enumerate(self.state):
+            self.let(name, Load("y", Number(slot)))
+        self.parameters()
+
+    # -- right-hand side --------------------------------------------------------------------------------------
+
+    def slopes(self, base: str, out: str) -> None:
+        """Compute the right-hand side at one vector of states into another."""
+        for i in range(self.equations.n):
+            body, names = self.of(i).rhs, self.at(i, base)
+            targets = [f"{prefix(out)}{s.name}_{i + 1}" for s in self.equations.node_at(i).state]
+            self.put(*self.node_call("node", self.equations.kind_of[i], body, targets, names))
+            for target, e in zip(targets, body.results, strict=True):
+                if self.is_plain(e):
+                    self.let(target, lane(lower(e.xreplace(names))))
+        self.links(base, out)
+
+    def links(self, base: str, out: str) -> None:
+        """Add what the links contribute to the right-hand side."""
+        eq, terms = self.equations, dict[str, list[Expression]]()
+        staged = {sp.Symbol(n, real=True): sp.Symbol(prefix(base) + n, real=True) for n in self.state}
+        for link in eq.links:
+            for s, e in zip(eq.node_at(link[0]).state, eq.edge_at(link).rhs, strict=True):
+                term = e.xreplace(eq.at_link(link)).xreplace(staged)
+                if term != 0:
+                    terms.setdefault(f"{prefix(out)}{s.name}_{link[0] + 1}", []).append(lower(term))
+        for target, parts in terms.items():
+            self.let(target, plus(Name(target), *parts))
+
+    # -- linearisation ----------------------------------------------------------------------------------------
+
+    def linearise(self) -> None:
+        """Right-hand side, Jacobian and time derivative at the start, and the factors of shift*M - J."""
+        if self.method.inexact:
+            self.mass.refuse(f"integrator {self.method.name}")
+        own = self.linear_nodes()
+        if self.bounded:
+            self.bound(own)
+        entries = self.mass.at_start(self.gather(own))
+        self.steps = plan(len(self.state), set(entries) | self.mass.coupled)
+        self.factors = write_factors(self.steps, entries, tuple(self.state), self.mass.entries)
+        self.note(f"factors of {'shift*M - J' if self.mass.entries else 'shift - J'}")
+        self.put(*self.factors.statements)
+        self.time_slopes = {
+            k: lower(own[i][f"ft_{s.name}"])
+            for i, places in enumerate(self.equations.places)
+            for k, s in zip(places, self.equations.node_at(i).state, strict=True)
+        }
+
+    def linear_nodes(self) -> list[dict[str, sp.Expr]]:
+        """Write right-hand side and Jacobian at the start, and the time derivative where the method wants it.
+
+        Returns what stands for each, by node.
+        """
+        eq, implicit = self.equations, self.method.implicit
+        self.note(f"right-hand side{', Jacobian and time derivative' if implicit else ' and Jacobian'} at the start")
+        self.timed("t", self.wanted([self.first_of(blocks) for blocks in self.kinds]))
+        kept = self.keep_times()
+        own: list[dict[str, sp.Expr]] = []
+        for i in range(eq.n):
+            states, body, at = eq.node_at(i).state, self.first_of(self.of(i)), self.at(i, "y")
+            words = [f"f_{r}" for r in states] + [entry(r, c) for r in states for c in states]
+            words += [f"ft_{r}" for r in states] if implicit else []
+            names = [f"{word}_{i + 1}" for word in words]
+            function = "node_linear" if implicit else "node_local"
+            self.put(*self.node_call(function, eq.kind_of[i], body, names, at))
+            found = {}
+            for k, (word, name, e) in enumerate(zip(words, names, body.results, strict=True)):
+                plain = self.is_plain(e)
+                if plain and k < len(states):
+                    self.let(name, lower(e.xreplace(at)))
+                found[word] = (e.xreplace(at) if plain else sp.Symbol(name, real=True)).xreplace(kept)
+            own.append(found)
+        self.links("y", "f")
+        return own
+
+    def keep_times(self) -> dict[sp.Symbol, sp.Symbol]:
+        """Keep time terms that stand for themselves in the linearisation, where stages give these names other values."""
+        results = [e for blocks in self.kinds for e in self.first_of(blocks).results if self.is_plain(e)]
+        moved = self.wanted([blocks.rhs for blocks in self.kinds]) & {s for e in results for s in e.free_symbols}
+        kept = {s: sp.Symbol(f"at_{s.name}", real=True) for s in sorted(moved, key=lambda s: s.name)}
+        self.put(*(let(there.name, here.name) for here, there in kept.items()))
+        return kept
+
+    def gather(self, own: list[dict[str, sp.Expr]]) -> Entries:
+        """Entries of the whole Jacobian: those of the nodes by name, plus what the links add."""
+        eq = self.equations
+        entries: Entries = {}
+        for i, places in enumerate(eq.places):
+            state = eq.node_at(i).state
+            for row, r in zip(places, state, strict=True):
+                for column, c in zip(places, state, strict=True):
+                    entries[row, column] = own[i][entry(r, c)]
+        node = {k: i for i, places in enumerate(eq.places) for k in places}
+        for key, e in eq.link_jacobian():
+            if node[key[0]] == node[key[1]] or not self.method.inexact:
+                entries[key] = entries.get(key, sp.S.Zero) + e
+        return {key: e for key, e in entries.items() if e != 0}
+
+    def bound(self, own: list[dict[str, sp.Expr]]) -> None:
+        """Write `bound`, above the absolute value of the eigenvalues at the start of the step.
+
+        In second-order form (rates of positions are the velocities) an eigenvalue solves z**2 = z D + K, hence
+        |z| <= |D| + sqrt|K| in any norm; otherwise the largest row sum is taken.
+        """
+        eq = self.equations
+        self.mass.refuse("a step that bounds the eigenvalues")
+        first_kind = eq.nodes[0]
+        half = len(first_kind.state) // 2
+        positions_move = len(first_kind.state) % 2 == 0 and first_kind.rhs[:half] == first_kind.state[half:]
+        second_order = positions_move and not eq.mixed
+        slow: list[list[Expression]] = []
+        fast: list[list[Expression]] = []
+        links, places, rows = list(eq.link_jacobian()), eq.places, []
+        for i in range(eq.n):
+            state = eq.node_at(i).state
+            first = half if second_order else 0
+            rows += [(places[i][a], i, a, r) for a, r in enumerate(state[first:], start=first)]
+        for row, i, _, r in sorted(rows, key=lambda found: found[0]):
+            state = eq.node_at(i).state
+            parts = {b: [size(own[i][entry(r, c)])] for b, c in enumerate(state)}
+            for (at, column), e in links:
+                if at == row:
+                    parts[0 if eq.mixed else column // eq.n].append(size(e))
+            columns = list(parts.items())
+            slow.append([t for b, sizes in columns if second_order and b < half for t in sizes if t != ZERO])
+            fast.append([t for b, sizes in columns if not second_order or b >= half for t in sizes if t != ZERO])
+        self.note("a bound of the eigenvalues")
+        self.let("bound", largest(fast))
+        if any(slow):
+            self.let("bound", Name("bound") + call("sqrt", largest(slow)))
+
+    # -- stages -----------------------------------------------------------------------------------------------
+
+    def stage(self, i: int) -> None:
+        """Write one stage; that of a bounded explicit step has its slopes from the linearisation."""
+        if i > 0 or self.method.implicit or not self.bounded:
+            super().stage(i)
+            return
+        self.note("stage 1")
+        self.bound(self.linear_nodes())
+        for name in self.state:
+            self.let(f"k1_{name}", f"f_{name}")
+
+    def advance(self, i: int) -> None:
+        """Compute the state of stage i > 0; a row of `a` equal to `b` is the new state itself."""
+        m = self.method
+        for name in self.state:
+            if m.implicit:
+                self.let(f"u_{name}", stage_state(m.a[i], m.a[i - 1], name))
+            elif i >= m.stages and m.a[i] == m.b:
+                self.let(f"u_{name}", f"n_{name}")
+            else:
+                self.let(f"u_{name}", Name(name) + self.increment(m.a[i], self.stages(name, i)))
+
+    def solve(self, i: int) -> None:
+        """Turn the slopes of stage i into its rates."""
+        m = self.method
+        if not m.implicit:
+            self.mass.explicit("u" if i else "y", f"k{i + 1}", first=i == 0)
+            return
+        rights, results = {}, {}
+        sums = {name: linear(m.big_c[i], self.stages(name, i)) for name in self.state} if i > 0 else {}
+        known = self.mass.known(sums, i)
+        for slot, name in enumerate(self.state):
+            terms = [known.get(name, Name(f"f_{name}"))]
+            if i > 0 and name not in known:
+                terms.append(Product((Name("rate"), sums[name])))
+            if m.d[i] != 0.0 and self.time_slopes[slot] != ZERO:
+                terms.append(time_term(m.d[i], self.time_slopes[slot]))
+            self.let(f"r_{name}", plus(*terms))
+            rights[slot], results[slot] = f"r_{name}", f"k{i + 1}_{name}"
+        self.put(*write_solve(self.steps, self.factors, rights, results))
+
+    # -- end --------------------------------------------------------------------------------------------------
+
+    def finish(self) -> None:
+        """Compute the new state and the error; stages that serve the dense output alone run if DENSE."""
+        m = self.method
+        self.note("new state and error")
+        errors = [self.new_state(name) for name in self.state]
+        before, self.statements = self.statements, []
+        for i in range(m.stages, len(m.c)):
+            self.stage(i)
+        for j, row in enumerate(m.dense):
+            for slot, name in enumerate(self.state):
+                value = lane(linear(row, self.stages(name, len(row))))
+                value = value if m.implicit else Product((Name("h"), value))
+                self.put(store("dense", j * len(self.state) + slot, value))
+        self.statements = [*before, If(Name("DENSE"), tuple(self.statements))]
+        for slot, (name, e) in enumerate(zip(self.state, errors, strict=True)):
+            self.put(store("y_new", slot, f"n_{name}"))
+            self.let(f"e_{name}", call("scaled", e, name, f"n_{name}", "rtol", "atol"))
+        first, *others = terms = [Name(f"e_{name}") for name in self.state]
+        self.let("total", plus(*terms))
+        self.let("error", first)
+        self.put(*(let("error", call("maximum", "error", term)) for term in others))
+        results = (Name("error") + 0.0 * Name("total"), *([Name("bound")] * self.bounded))
+        self.put(Return(results, "NaN or infinite where any estimate is"))
+
+    def new_state(self, name: str) -> Expression:
+        """Compute the new value of one state variable; returns its error, of one or two embedded methods."""
+        m, values = self.method, self.stages(name, self.method.stages)
+        last = stage_state(m.b, m.a[-1], name) if m.implicit else Name(name) + self.increment(m.b, values)
+        self.let(f"n_{name}", last)
+        if len(m.e) == 1:
+            return self.increment(m.e[0], values)
+        e5, e3, h = Name("e5"), Name("e3"), Name("h")
+        self.put(*(let(e.text, linear(row, values)) for e, row in zip((e5, e3), m.e, strict=True)))
+        # the smallest normal double keeps 0/0 away where both estimates vanish
+        size = call("sqrt", e5 * e5 + 0.01 * Product((e3, e3)) + 2.2250738585072014e-308)
+        self.let(f"e_{name}", h * e5 * call("absolute", e5) / size)
+        return Name(f"e_{name}")
+
+
+def prefix(vector: str) -> str:
+    """What stands before the name of a state in a vector; nothing at the start of the step."""
+    return "" if vector == "y" else f"{vector}_"
+
+
+def stage_state(row: Sequence[float], previous: Sequence[float], name: str) -> Expression:
+    """y + sum a_j k_j, written as the previous stage's state plus its increment where the rows allow that."""
+    names = [f"k{j + 1}_{name}" for j in range(len(row))]
+    if len(previous) > 0 and tuple(row) == (*previous, 1.0):
+        return Name(f"u_{name}") + names[-1]
+    return linear(row, names, name)
+
+
+def entry(r: sp.Symbol, c: sp.Symbol) -> str:
+    """The name of d(rhs of r)/dc: j_vx, and j_speed_by_place where letters run together."""
+    return f"j_{r.name}{c.name}" if len(r.name) == len(c.name) == 1 else f"j_{r.name}_by_{c.name}"
+
+
+def size(e: sp.Expr) -> Expression:
+    """The absolute value."""
+    return lower(sp.Abs(e)) if e.is_number else call("absolute", lower(e))
+
+
+def largest(rows: list[list[Expression]]) -> Expression:
+    """The largest of some sums, zero without any; equal ones count once."""
+    first, *others = list(dict.fromkeys(plus(*row) for row in rows if row)) or [ZERO]
+    if not others and not any(isinstance(part, Call) for part in first.walk()):
+        return call("broadcast", first, "WIDTH")
+    found = first
+    for other in others:
+        found = call("maximum", found, other)
+    return found

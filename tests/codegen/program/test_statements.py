@@ -1,0 +1,268 @@
+"""Programs: what is read off their statements, and one program in the text of each language."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+import sympy as sp
+from samples import real
+
+from synchain.codegen.program import functions
+from synchain.codegen.program.expressions import (
+    ONE,
+    ZERO,
+    Call,
+    Choice,
+    Compare,
+    Expression,
+    Junction,
+    Load,
+    Name,
+    Negation,
+    Number,
+    Power,
+    Product,
+    Quotient,
+    Slice,
+    Sum,
+    call,
+    linear,
+    negative,
+    plus,
+    scaled,
+)
+from synchain.codegen.program.lowering import Library, UnprintableError, lower
+from synchain.codegen.program.printers import C99, LANES, MATH, NUMPY, Printer
+from synchain.codegen.program.statements import (
+    Accumulate,
+    Array,
+    Assign,
+    Comment,
+    Do,
+    Function,
+    Identity,
+    If,
+    Loop,
+    Return,
+    Titled,
+    accumulate,
+    called,
+    let,
+    operations,
+    store,
+    used,
+    whole,
+)
+
+A, B, C = map(Name, "abc")
+
+BODY = (
+    Comment("a remark - with + signs * and / words(of) = text"),
+    whole("k", Load("where", 2 * Name("NODES") + "i", None)),
+    let("a", Load("y", 3 * Name("NODES") + "k") * B + call("sin", C)),
+    Loop("i", Number(0), Name("NODES"), (accumulate("out", Name("K") + "i", A * B), If(A, (store("out", 0, A / B),)))),
+    Titled("part", (Do(call("solve", "dense", A - B)),)),
+    Return((A, call("maximum", A, 2.0))),
+)
+
+
+# -- what is read off ----------------------------------------------------------------------------------------
+
+
+def test_operations_are_those_of_values() -> None:
+    """Neither those of indices nor signs in comments: product and sum, product and addition, quotient, difference."""
+    assert operations(BODY) == 2 + 2 + 1 + 1
+    assert operations([let("a", Negation(A))]) == 0
+    assert operations([let("a", Sum((A, Negation(B), C)))]) == 2
+
+
+def test_functions_and_names_are_found_at_any_depth() -> None:
+    assert called(BODY) == {"sin", "solve", "maximum"}
+    assert used(BODY) == {"y", "NODES", "k", "a", "b", "c", "out", "dense"}
+    assert used([Accumulate("rates", Name("i"), Load("state", Name("j"), None))]) == {"rates", "state", "j"}
+
+
+# -- expressions ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("e", "text"),
+    [
+        (A + B + C, "a + b + c"),
+        (A + (B + C), "a + (b + c)"),
+        (A - (B - C), "a - (b - c)"),
+        (plus(A, B - C), "a + b - c"),
+        (A * (B * C), "a*(b*c)"),
+        ((A * B) * C, "a*b*c"),
+        (A / (B * C), "a/(b*c)"),
+        (A / B / C, "a/b/c"),
+        ((A + B) / C, "(a + b)/c"),
+        (A / (B / C), "a/(b/c)"),
+        (Negation(A + B), "-(a + b)"),
+        (A - Negation(B), "a - (-b)"),
+        (A * Negation(B), "a*(-b)"),
+        (plus(A, Number(-2.0)), "a - 2.0"),
+        (Number(-2.0) * A, "-2.0*a"),
+        (A * Number(-2.0), "a*(-2.0)"),
+        (scaled("s", A * B), "s*a*b"),
+        (scaled("s", Negation(A / B)), "-s*a/b"),
+        (linear((0.5, 0.0, -1.0, -0.25), ["a", "b", "c", "d"], "y"), "y + 0.5*a - c - 0.25*d"),
+        (linear((0.0, -1.0), ["a", "b"]), "-b"),
+        (linear((0.0,), ["a"]), "0.0"),
+    ],
+)
+def test_text_keeps_the_order_of_operations(e: Expression, text: str) -> None:
+    assert LANES.text(e) == text
+    numbers = {"a": 0.3, "b": 0.7, "c": -1.9, "d": 2.3, "y": 0.1, "s": 1.7}
+    assert eval(text, dict(numbers)) == value(e, numbers)
+
+
+def value(e: Expression, numbers: dict[str, float]) -> float:
+    """The value of an expression, operation by operation."""
+    match e:
+        case Name(text):
+            return numbers[text]
+        case Number(found):
+            return found
+        case Negation(inner):
+            return -value(inner, numbers)
+        case Quotient(top, bottom):
+            return value(top, numbers) / value(bottom, numbers)
+        case Sum(terms):
+            found = value(terms[0], numbers)
+            for term in terms[1:]:
+                found = found + value(term, numbers)
+            return found
+        case Product(factors):
+            found = value(factors[0], numbers)
+            for factor in factors[1:]:
+                found = found * value(factor, numbers)
+            return found
+    raise TypeError(e)
+
+
+def test_signs_are_folded() -> None:
+    assert negative(negative(A)) == A
+    assert negative(Number(2.0)) == Number(-2.0)
+    assert negative(negative(ONE)) == ONE
+
+
+# -- languages -----------------------------------------------------------------------------------------------
+
+LANGUAGES: dict[str, Printer] = {"lanes": LANES, "numpy": NUMPY, "math": MATH, "c": C99}
+PROGRAM = (
+    Array("v", Number(3)),
+    Identity("m", Number(2)),
+    whole("k", Number(1)),
+    let("w", Power(Name("x"), Number(3)) + 0.5),
+    Loop(
+        "i", Number(0), Number(3), (store("v", Name("i"), call("absolute", "x")), accumulate("v", Name("i"), Name("w")))
+    ),
+    let("z", Choice(Junction("or", (Compare("<", Name("x"), ZERO), Compare(">=", Name("w"), ONE))), ONE, ZERO)),
+)
+
+
+@pytest.mark.parametrize(
+    ("language", "lines"),
+    [
+        (
+            "math",
+            [
+                "v = np.empty(3)",
+                "m = np.eye(2)",
+                "k = 1",
+                "w = x**3 + 0.5",
+                "for i in range(3):",
+                "    v[i] = abs(x)",
+                "    v[i] += w",
+                "z = (1.0 if (x < 0.0) or (w >= 1.0) else 0.0)",
+            ],
+        ),
+        (
+            "c",
+            [
+                "double v[3];",
+                "double m[2*2] = {0.0};",
+                "for (int k_ = 0; k_ < 2; k_++) m[k_*2 + k_] = 1.0;",
+                "const int k = 1;",
+                "const double w = pow(x, 3.0) + 0.5;",
+                "for (int i = 0; i < 3; i++) {",
+                "    v[i] = fabs(x);",
+                "    v[i] += w;",
+                "}",
+                "const double z = ((x < 0.0) || (w >= 1.0) ? 1.0 : 0.0);",
+            ],
+        ),
+    ],
+)
+def test_one_program_in_two_languages(language: str, lines: list[str]) -> None:
+    assert LANGUAGES[language].lines(PROGRAM) == lines
+
+
+def test_lanes_load_and_store_registers() -> None:
+    body = (
+        let("a", Load("y", Number(0))),
+        let("b", Load("shared", Number(1), None)),
+        accumulate("dense", Name("K1") + "i", A - B),
+        Return((A,), "a remark"),
+    )
+    found = LANES.function(Function("f", ("y", "shared", "dense"), "What it does.", body, inline=False))
+    assert found.splitlines() == [
+        "@njit(error_model='numpy')",
+        "def f(y, shared, dense):",
+        '    """What it does."""',
+        "    a = load(y, 0, WIDTH)",
+        "    b = shared[1]",
+        "    store(dense, K1 + i, load(dense, K1 + i, WIDTH) + a - b)",
+        "    return a  # a remark",
+    ]
+
+
+def test_slices_of_arrays() -> None:
+    assert NUMPY.text(Load("state", Slice(Number(0), Name("NODES")), None)) == "state[:NODES]"
+    assert NUMPY.text(Load("state", Slice(Name("NODES"), 2 * Name("NODES")), None)) == "state[NODES:2*NODES]"
+
+
+def test_every_function_has_a_name_in_every_language_or_is_refused() -> None:
+    x, y = real("x", "y")
+    for kind, name in functions.FUNCTIONS.items():
+        e = kind(x, y) if kind in (sp.Max, sp.Min, sp.atan2) else kind(x)
+        for printer in (NUMPY, MATH, C99):
+            assert printer.text(Library()(e)).startswith(f"{printer.functions[name]}(")
+        if name in functions.LANES:
+            assert lower(e) == Call(name, Library()(e).parts)
+        else:
+            with pytest.raises(UnprintableError, match=f"no printing rule for {kind.__name__} in"):
+                lower(e)
+
+
+def test_python_texts_run_and_agree() -> None:
+    x = sp.Symbol("x", real=True)
+    e = sp.atan(x) / 3 + sp.sqrt(1 + x**2) - sp.Abs(x - 1) * sp.exp(-(x**2))
+    import numpy as np
+
+    for printer in (NUMPY, MATH):
+        found = eval(printer.text(Library()(e)), {"np": np, "math": math, "x": 0.37})
+        assert found == pytest.approx(float(e.subs(x, 0.37)), rel=1e-15)
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_c_compiles(tmp_path: Path) -> None:
+    text = ["#include <math.h>", "double f(double x) {", *C99.lines(PROGRAM), "return z + v[k] + m[0]; }"]
+    (tmp_path / "f.c").write_text("\n".join(text) + "\n")
+    done = subprocess.run(
+        ["cc", "-std=c99", "-pedantic", "-Wall", "-Werror", "-c", "f.c"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_what_no_language_says_is_our_own_mistake() -> None:
+    with pytest.raises(TypeError, match="mistake in the program"):
+        LANES.text(Expression())
+    with pytest.raises(TypeError, match="one index"):
+        LANES.lines([Accumulate("a", (A, B), C)])
+    assert LANES.lines([Assign(("a", "b"), call("f", C))]) == ["a, b = f(c)"]
