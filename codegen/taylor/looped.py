@@ -21,7 +21,7 @@ from ..printing.printer import show as show_constant
 from ..steps.places import Joint, Kind, Places
 from .graph import Graph, Template
 from .series import Constant, Series, State, Time
-from .step import FARTHEST, TaylorStep, called, finished
+from .step import TaylorStep, called, finished
 from .terms import ZERO, Assign, Expr, Name, Number, add, show, statement
 
 __all__ = ["write_looped"]
@@ -364,7 +364,7 @@ class LoopWriter:
         )
         reaches = [f"{-1.0 / k!r}*log(size_{k})" for k in (p, p - 1, p - 2)]
         lines.append(f"reach = minimum({reaches[0]}, minimum({reaches[1]}, {reaches[2]}))")
-        lines += finished(p, FARTHEST)
+        lines += finished(p)
         lines += ["# new state", "total = 0.0*scale"]
         lines += self.states(
             f"new = {at.format(k=p)}",

@@ -21,10 +21,10 @@ from .graph import STARTS, Graph, Template
 from .series import Constant, Series, State, Time
 from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
 
-__all__ = ["FARTHEST", "TaylorStep", "called", "finished", "write_step"]
+__all__ = ["TaylorStep", "called", "finished", "write_step"]
 
-FARTHEST = 2.772588722239781
-"""The logarithm of how many times longer than `scale` a step may be: 16."""
+FARTHEST = 16.0
+"""How many times longer than `scale` a step may be."""
 
 WORDS = frozenset(
     {"scale", "ratio", "reach", "length", "total", "raised", "power", "weight", "number", "inverse", "LINKS", "j_there",
@@ -258,8 +258,8 @@ class StepWriter:
                 self.put(*statement(Assign(f"size_{k}", _largest(found))))
                 reaches.append(times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))))
         if not reaches:
-            reaches = [Name(f"{FARTHEST!r} + 0.0*scale")]
-        self.put(*statement(Assign("reach", _extreme("minimum", reaches))), *finished(p, FARTHEST))
+            reaches = [Name("-log(0.0*scale)")]
+        self.put(*statement(Assign("reach", _extreme("minimum", reaches))), *finished(p))
 
     def closing(self) -> None:
         """The new state by Horner, the dense output, and the length of the step."""
@@ -315,12 +315,13 @@ def write_step(equations: Equations, order: int) -> TaylorStep:
     return TaylorStep.of(StepWriter(equations, order).write(), order)
 
 
-def finished(order: int, farthest: float) -> list[str]:
+def finished(order: int) -> list[str]:
     """The length of the step from the logarithm of its share of `scale`."""
     return [
         # weights are those of a step as long as `scale`; a shorter one changes the states less
         f"reach = minimum(reach, {(order - 2) / (order - 4)!r}*reach)",
-        f"length = minimum(truncated(scale*exp(minimum(reach, {farthest!r}))), h)",
+        f"length = minimum(truncated(scale*exp(reach)), {FARTHEST!r}*scale)",
+        "length = minimum(length, h)",
         "ratio = length/scale",
     ]
 
