@@ -27,10 +27,10 @@ FARTHEST = 16.0
 """How many times longer than `scale` a step may be."""
 
 WORDS = frozenset(
-    {"scale", "ratio", "reach", "length", "total", "raised", "power", "weight", "number", "inverse", "LINKS", "j_there",
+    {"scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
      "slope_scale", *STARTS.values()}
 )  # fmt: skip
-PREFIXES = ("i_", "e_", "half_", "w_", "n_", "size_")
+PREFIXES = ("i_", "e_", "half_", "w_", "n_", "size_", "odd_")
 """Names of the step; a user's symbol of that name is called otherwise within the step."""
 
 COUNTED = re.compile(r"[rs]\d+$")
@@ -261,19 +261,27 @@ class StepWriter:
             reaches = [Name("-log(0.0*scale)")]
         self.put(*statement(Assign("reach", _extreme("minimum", reaches))), *finished(p))
 
+    def horner(self, name: str, coefficients: Sequence[Expr]) -> Expr:
+        """A polynomial in ratio**2: two of half the degree are ready sooner than one."""
+        known = list(coefficients)
+        while known and known[-1] == ZERO:
+            known.pop()
+        if not known:
+            return ZERO
+        self.put(f"{name} = {show(known.pop())}")
+        for e in reversed(known):
+            self.put(f"{name} = {show(add(times(Name(name), Name('square')), e))}")
+        return Name(name)
+
     def closing(self) -> None:
-        """The new state by Horner, the dense output, and the length of the step."""
+        """The new state, the dense output, and the length of the step."""
         p, eq = self.order, self.equations
-        self.put("# new state")
+        self.put("# new state", "square = ratio*ratio")
         for slot, name in enumerate(self.names):
-            known = [self.state_at(slot, k) for k in range(p + 1)]
-            while len(known) > 1 and known[-1] == ZERO:
-                known.pop()
-            *rest, last = known
-            self.put(f"n_{name} = {show(last)}")
-            for e in reversed(rest):
-                self.put(f"n_{name} = {show(add(times(Name(f'n_{name}'), Name('ratio')), e))}")
-            self.put(f"store(y_new, {slot}, n_{name})")
+            start, *known = [self.state_at(slot, k) for k in range(p + 1)]
+            odd, even = self.horner(f"odd_{name}", known[::2]), self.horner(f"n_{name}", known[1::2])
+            slope = add(times(even, Name("ratio")), odd)
+            self.put(f"n_{name} = {show(add(times(slope, Name('ratio')), start))}", f"store(y_new, {slot}, n_{name})")
         self.put(f"total = {' + '.join(f'n_{name}' for name in self.names)}", "if DENSE:")
         for k in range(1, p + 1):
             self.put(f"    raised = {'ratio' if k == 1 else 'raised*ratio'}")
