@@ -14,7 +14,7 @@ import sympy as sp
 from sympy.functions.elementary.piecewise import Piecewise
 
 from ..printing.blocks import Names
-from ..printing.printer import show
+from ..printing.printer import FUNCTIONS, show
 from .series import (
     Constant,
     Integral,
@@ -88,14 +88,14 @@ class Graph:
     inline, inline_start : set of Series
         Those whose coefficients, or first coefficients, are written where they are used.
     constants : dict
-        What depends on parameters alone, by the name under which it is computed once.
+        The text of what depends on parameters alone, by the name under which it is computed once.
     """
 
     def __init__(self, names: Names) -> None:
         self.series: list[Series] = []
         self.inline: set[Series] = set()
         self.inline_start: set[Series] = set()
-        self.constants: dict[str, sp.Expr] = {}
+        self.constants: dict[str, str] = {}
         self.known: dict[tuple[object, ...], Series] = {}
         self.numbers: dict[Series, int] = {}
         self.fixed: dict[sp.Expr, Name] = {}
@@ -228,11 +228,24 @@ class Graph:
         number, rest = e.as_coeff_Mul()
         if number != 1:
             return times(self.constant(number), self.constant(rest))
+        return self.named(e, show(self.printable(e)))
+
+    def printable(self, e: sp.Expr) -> sp.Expr:
+        """The same constant with names for the values that the printer has no rule for."""
+        if not e.args or e.is_number:
+            return e
+        e = e.func(*(self.printable(a) for a in e.args))
+        if e.is_Pow and e.base != sp.E and not (2 * e.exp).is_Integer:
+            return sp.Symbol(self.named(e, f"power({show(e.base)}, {show(e.exp)})").text, real=True)
+        if type(e) in STARTS and type(e) not in FUNCTIONS:
+            return sp.Symbol(self.named(e, f"{STARTS[type(e)]}({show(e.args[0])})").text, real=True)
+        return e
+
+    def named(self, e: sp.Expr, text: str) -> Name:
+        """The name of a constant, which is computed once."""
         if e not in self.fixed:
-            plain = printable(e)
-            show(plain)  # refuses what cannot be printed
             name = self.fresh("p")
-            self.constants[name], self.fixed[e] = plain, Name(name)
+            self.constants[name], self.fixed[e] = text, Name(name)
         return self.fixed[e]
 
     def scaled(self, e: sp.Expr) -> tuple[Expr, Series]:
@@ -317,19 +330,6 @@ def split(series: Series) -> tuple[Expr, Series]:
     if isinstance(series, Linear) and len(series.terms) == 1 and series.constant == ZERO:
         return series.terms[0]
     return ONE, series
-
-
-def printable(e: sp.Expr) -> sp.Expr:
-    """The same constant by functions that kernels print."""
-    e = e.replace(lambda p: p.is_Pow and not _is_plain(p), lambda p: sp.exp(p.exp * sp.log(p.base)))
-    e = e.replace(sp.sinh, lambda a: (sp.exp(a) - sp.exp(-a)) / 2)
-    e = e.replace(sp.cosh, lambda a: (sp.exp(a) + sp.exp(-a)) / 2)
-    return e.replace(sp.tan, lambda a: sp.sin(a) / sp.cos(a))
-
-
-def _is_plain(e: sp.Expr) -> bool:
-    """True for a power that the printer knows."""
-    return bool(e.base == sp.E or (2 * e.exp).is_Integer)
 
 
 def _is_divisor(e: sp.Expr) -> bool:

@@ -17,7 +17,6 @@ from synchain.models.mechanics.components import TIME, Node
 
 from ..printing.blocks import Body, Hoist, Names
 from ..printing.names import NAMES
-from ..printing.printer import show as show_constant
 from ..steps.places import Joint, Kind, Places
 from .graph import Graph, Template
 from .series import Constant, Series, State, Time
@@ -284,7 +283,7 @@ class LoopWriter:
         template = Template.of(rates, moving, self.names.fresh("shared_"))
         found = graph.read(template, moving, {**self.swap, **swap})
         graph.settle(found)
-        section.before += [f"{name} = {show_constant(e)}" for name, e in graph.constants.items()]
+        section.before += [f"{name} = {text}" for name, text in graph.constants.items()]
         return found
 
     # -- text -------------------------------------------------------------------------------------------------
@@ -300,7 +299,7 @@ class LoopWriter:
         for slot, name in enumerate(eq.parameters, start=eq.dimension):
             if name not in own:
                 lines.append(f"{self.called[name]} = load(p, {slot}, WIDTH)")
-        lines += [f"{name} = {show_constant(e)}" for name, e in self.waves.graph.constants.items()]
+        lines += [f"{name} = {text}" for name, text in self.waves.graph.constants.items()]
         lines += ["# order 0", *self.states("store(dense, at_states + {0}, load(y, {0}, WIDTH))")]
         if self.waves.rates:
             lines += ["store(dense, at_t, t)", "store(dense, at_t + 1, scale)", f"for k in range(2, {self.order + 1}):"]

@@ -16,7 +16,6 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
 from ..printing.blocks import Names
-from ..printing.printer import show as show_constant
 from .graph import STARTS, Graph, Template
 from .series import Constant, Series, State, Time
 from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
@@ -210,7 +209,7 @@ class StepWriter:
         self.put(*(f"{self.called[name]} = load(y, {slot}, WIDTH)" for slot, name in enumerate(eq.state)))
         for slot, name in enumerate(eq.parameters, start=eq.dimension):
             self.put(f"{self.called[name]} = load(p, {slot}, WIDTH)")
-        self.put(*(f"{name} = {show_constant(e)}" for name, e in self.graph.constants.items()))
+        self.put(*(f"{name} = {text}" for name, text in self.graph.constants.items()))
         for slot, state in self.states.items():
             at.values[state, 0] = Name(self.called[eq.state[slot]])
         at.values[self.time, 0] = Name("t")
