@@ -14,10 +14,10 @@ from ..simd.lanes import broadcast
 from ..simd.lanes import load
 from ..simd.lanes import maximum
 from ..simd.lanes import minimum
-from ..simd.lanes import power_of_two
 from ..simd.lanes import select
 from ..simd.lanes import store
 from ..simd.lanes import truncated
+from ..simd.special import power_of_two
 from .names import CONTACTS
 from .names import WIDTH
 from .recording import ACCEPTED

@@ -108,7 +108,9 @@ def settle(
                 finish(which, status, clock, y, cell[which], spans, end, sums, counts, dims)
                 cell[which] = -1
             elif SWITCHING and flip:
-                change_sides(which, mode, clock, y, cell, away_clock, away_y, away_cell, lot_clock, lot_y, lot_cell, dims)
+                change_sides(
+                    which, mode, clock, y, cell, away_clock, away_y, away_cell, lot_clock, lot_y, lot_cell, dims
+                )
             else:
                 break
     return queue
@@ -161,7 +163,9 @@ def attempt(mode, clock, y, dense, y_new, middle, out, control, dims, step, step
         limit = minimum(load(clock, STOP, WIDTH) - t, control[MAX_STEP])
         if LOOPED:
             graph, weights = network
-            h = step(t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL], graph, weights)
+            h = step(
+                t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL], graph, weights
+            )
         else:
             h = step(t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL])
         accept = accept_series(clock, h, limit)
@@ -241,9 +245,7 @@ def drive(
             head = queue
             flips = flips & held(cell)  # an idle lane may ask for anything; who moves in must not inherit it
             if mode == STIFF:
-                queue = admit(
-                    queue, last, room, clock, y, cell, start, numbers, spans, control, samples, members, dims
-                )
+                queue = admit(queue, last, room, clock, y, cell, start, numbers, spans, control, samples, members, dims)
                 look = look if queue == head else ALL
             else:
                 queue = admit(

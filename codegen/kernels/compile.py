@@ -208,7 +208,9 @@ def _driver(driver: Driver) -> Any:
 def _kernel(source: KernelSource) -> Kernel:
     known = signatures(source.driver)
     entry = _driver(source.driver)
-    module = _module(source.text, "kernel", {name: known[name] for name in dict.fromkeys(source.driver.functions)}, _what(source))
+    module = _module(
+        source.text, "kernel", {name: known[name] for name in dict.fromkeys(source.driver.functions)}, _what(source)
+    )
     functions = [module.functions[name] for name in source.driver.functions]
     if source.kind is KernelKind.MODES:
         own = (*functions, source.dimensions, np.array(source.marks, np.int64))

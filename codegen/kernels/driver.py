@@ -76,7 +76,9 @@ class Driver:
             f"Records     {', '.join(('final state', *self.records))}",
             '"""',
         ]
-        imports = f"import math\n\nimport numpy as np\n\nfrom synchain.codegen.simd import {', '.join(sorted(simd.__all__))}"
+        imports = (
+            f"import math\n\nimport numpy as np\n\nfrom synchain.codegen.simd import {', '.join(sorted(simd.__all__))}"
+        )
         constants = "\n".join(f"{name} = {value!r}" for name, value in self.constants.items())
         return "\n\n\n".join(["\n".join(lines), imports, constants, *map(driver.text, pieces)]) + "\n"
 

@@ -161,7 +161,10 @@ def emit(
     names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
     chosen = Driver(KernelKind.SWEEP, width, ordered, looped, method.smooth is not None, plain.sticks, method.series)
     functions, scratch, count = (_series if method.series else _stages)(plain, method, names, elimination)
-    events = [*push_functions(plain, names, looped), *_section(equations, plain, section if "section" in ordered else None)]
+    events = [
+        *push_functions(plain, names, looped),
+        *_section(equations, plain, section if "section" in ordered else None),
+    ]
     if "section" in ordered:
         functions.append(driver.text("dense"))
     text = "\n\n\n".join([*functions, *map(LANES.function, events)]) + "\n"
@@ -325,7 +328,15 @@ def _section(equations: Equations, plain: Equations, section: sp.Expr | None) ->
             body.append(let(shown, Load("y", Number(equations.dimension + slot))))
     value = lower(section.xreplace({_real("t"): sp.Symbol("(t + theta*h)")}).xreplace(swap))
     about = "The section function at the fraction theta of the step."
-    return [Function("section", ("theta", "t", "h", "y", "y_new", "dense", "dims"), about, (*body, Return((value,))), inline=False)]
+    return [
+        Function(
+            "section",
+            ("theta", "t", "h", "y", "y_new", "dense", "dims"),
+            about,
+            (*body, Return((value,))),
+            inline=False,
+        )
+    ]
 
 
 def _real(name: str) -> sp.Symbol:

@@ -23,7 +23,7 @@ from .lane_types import BOOL, DOUBLE, INT64, Lane, Mask, as_lane, common_width, 
 
 __all__ = [
     "Lane", "Mask", "absolute", "any_lane", "broadcast", "copysign", "floor", "fma", "lane_bits", "load",
-    "maximum", "minimum", "native_width", "one_lane", "power_of_two", "round_even",
+    "maximum", "minimum", "native_width", "one_lane", "round_even",
     "scale_binary", "select", "split_binary", "sqrt", "store", "truncated",
 ]  # fmt: skip
 
@@ -279,19 +279,6 @@ def truncated(typingctx: Any, value: Any) -> Any:
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         whole, mask = vector(INT64, value.width), constant(INT64, value.width, -(1 << 44))
-        return builder.bitcast(builder.and_(builder.bitcast(args[0], whole), mask), args[0].type)
-
-    return value(value), lower
-
-
-@intrinsic
-def power_of_two(typingctx: Any, value: Any) -> Any:
-    """The largest power of two that is not above a positive normal number."""
-    if not isinstance(value, Lane):
-        return None
-
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        whole, mask = vector(INT64, value.width), constant(INT64, value.width, 0x7FF << 52)
         return builder.bitcast(builder.and_(builder.bitcast(args[0], whole), mask), args[0].type)
 
     return value(value), lower

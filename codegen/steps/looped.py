@@ -19,8 +19,8 @@ from ..program.passes import Body
 from ..program.statements import Assign, Do, If, Return, Statement, accumulate, let, store, whole
 from .blocks import NodeBlocks
 from .mass import momentum_slopes
-from .places import Joint, Kind, Places, link_ends, named, span
 from .names import NAMES
+from .places import Joint, Kind, Places, link_ends, named, span
 from .program import Program
 from .step import Block, Step, lane, time_term
 from .unrolled import entry

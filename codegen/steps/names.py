@@ -11,7 +11,7 @@ import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 
-from ..simd import elementary, lanes
+from ..simd import elementary, lanes, special
 
 __all__ = ["NAMES", "RESERVED", "tidy"]
 
@@ -33,7 +33,7 @@ RESERVED = frozenset(
      "strengths", "which", "mode_step", "march", "pushes", "out", "network", "release",
      "after", "modes"}
     | set(NAMES)
-    | set(keyword.kwlist) | set(dir(builtins)) | set(elementary.__all__) | set(lanes.__all__)
+    | set(keyword.kwlist) | set(dir(builtins)) | set(elementary.__all__) | set(lanes.__all__) | set(special.__all__)
 )  # fmt: skip
 """Words of the generated code; a user's symbol of that name gets an underscore behind it."""
 

@@ -24,7 +24,6 @@ from synchain.models.mechanics.components import Edge
 
 from .elimination import Entry, Plan
 from .mass import momentum_slopes
-from .names import NAMES
 from .places import by_joint, by_kind, joint_numbers, table
 from .step import Step
 

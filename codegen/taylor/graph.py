@@ -16,8 +16,10 @@ from sympy.functions.elementary.piecewise import Piecewise
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
+from ..program import functions
 from ..program.lowering import lower
 from ..program.passes import Names
+from ..program.printers import LANES
 from .series import (
     Constant,
     Integral,
@@ -102,14 +104,14 @@ class Graph:
     inline, inline_start : set of Series
         Those whose coefficients, or first coefficients, are written where they are used.
     constants : dict
-        What depends on parameters alone, by the name under which it is computed once.
+        The text of what depends on parameters alone, by the name under which it is computed once.
     """
 
     def __init__(self, names: Names) -> None:
         self.series: list[Series] = []
         self.inline: set[Series] = set()
         self.inline_start: set[Series] = set()
-        self.constants: dict[str, sp.Expr] = {}
+        self.constants: dict[str, str] = {}
         self.known: dict[tuple[object, ...], Series] = {}
         self.numbers: dict[Series, int] = {}
         self.fixed: dict[sp.Expr, Name] = {}
@@ -242,11 +244,24 @@ class Graph:
         number, rest = e.as_coeff_Mul()
         if number != 1:
             return times(self.constant(number), self.constant(rest))
+        return self.named(e, _text(self.printable(e)))
+
+    def printable(self, e: sp.Expr) -> sp.Expr:
+        """The same constant with names for the values that the printer has no rule for."""
+        if not e.args or e.is_number:
+            return e
+        e = e.func(*(self.printable(a) for a in e.args))
+        if e.is_Pow and e.base != sp.E and not (2 * e.exp).is_Integer:
+            return sp.Symbol(self.named(e, f"power({_text(e.base)}, {_text(e.exp)})").text, real=True)
+        if type(e) in STARTS and functions.FUNCTIONS.get(type(e)) not in functions.LANES:
+            return sp.Symbol(self.named(e, f"{STARTS[type(e)]}({_text(e.args[0])})").text, real=True)
+        return e
+
+    def named(self, e: sp.Expr, text: str) -> Name:
+        """The name of a constant, which is computed once."""
         if e not in self.fixed:
-            plain = printable(e)
-            lower(plain)  # refuses what cannot be printed
             name = self.fresh("p")
-            self.constants[name], self.fixed[e] = plain, Name(name)
+            self.constants[name], self.fixed[e] = text, Name(name)
         return self.fixed[e]
 
     def scaled(self, e: sp.Expr) -> tuple[Expr, Series]:
@@ -333,19 +348,6 @@ def split(series: Series) -> tuple[Expr, Series]:
     return ONE, series
 
 
-def printable(e: sp.Expr) -> sp.Expr:
-    """The same constant by functions that kernels print."""
-    e = e.replace(lambda p: p.is_Pow and not _is_plain(p), lambda p: sp.exp(p.exp * sp.log(p.base)))
-    e = e.replace(sp.sinh, lambda a: (sp.exp(a) - sp.exp(-a)) / 2)
-    e = e.replace(sp.cosh, lambda a: (sp.exp(a) + sp.exp(-a)) / 2)
-    return e.replace(sp.tan, lambda a: sp.sin(a) / sp.cos(a))
-
-
-def _is_plain(e: sp.Expr) -> bool:
-    """True for a power that the printer knows."""
-    return bool(e.base == sp.E or (2 * e.exp).is_Integer)
-
-
 def _is_divisor(e: sp.Expr) -> bool:
     return bool(e.is_Pow and e.exp.is_number and e.exp.is_negative and (2 * e.exp).is_Integer)
 
@@ -362,3 +364,7 @@ def _words() -> tuple[str, ...]:
     """What names of series begin with."""
     kinds = (Linear, Power, Product, Ratio, Slope, Square, SquareRoot)
     return (*(kind.__name__.lower() for kind in kinds), *STARTS.values())
+
+
+def _text(e: sp.Expr) -> str:
+    return LANES.text(lower(e))

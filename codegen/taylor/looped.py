@@ -15,14 +15,13 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Node
 
-from ..program.lowering import lower
 from ..program.passes import Body, Hoist, Names
 from ..program.printers import LANES
 from ..steps.names import NAMES
 from ..steps.places import Joint, Kind, Places, Span
 from .graph import Graph, Template
 from .series import Constant, Series, State, Time
-from .step import FARTHEST, TaylorStep, called, finished
+from .step import TaylorStep, called, finished
 from .terms import ZERO, Assign, Expr, Name, Number, add, show, statement
 
 __all__ = ["write_looped"]
@@ -294,7 +293,7 @@ class LoopWriter:
         template = Template.of(rates, moving, self.names.fresh("shared_"))
         found = graph.read(template, moving, {**self.swap, **swap})
         graph.settle(found)
-        section.before += [f"{name} = {LANES.text(lower(e))}" for name, e in graph.constants.items()]
+        section.before += [f"{name} = {text}" for name, text in graph.constants.items()]
         return found
 
     # -- text -------------------------------------------------------------------------------------------------
@@ -310,7 +309,7 @@ class LoopWriter:
         for slot, name in enumerate(eq.parameters, start=eq.dimension):
             if name not in own:
                 lines.append(f"{self.called[name]} = load(p, {slot}, WIDTH)")
-        lines += [f"{name} = {LANES.text(lower(e))}" for name, e in self.waves.graph.constants.items()]
+        lines += [f"{name} = {text}" for name, text in self.waves.graph.constants.items()]
         lines += ["# order 0", *self.states("store(dense, at_states + {0}, load(y, {0}, WIDTH))")]
         if self.waves.rates:
             lines += ["store(dense, at_t, t)", "store(dense, at_t + 1, scale)", f"for k in range(2, {self.order + 1}):"]
@@ -374,7 +373,7 @@ class LoopWriter:
         )
         reaches = [f"{-1.0 / k!r}*log(size_{k})" for k in (p, p - 1, p - 2)]
         lines.append(f"reach = minimum({reaches[0]}, minimum({reaches[1]}, {reaches[2]}))")
-        lines += finished(p, FARTHEST)
+        lines += finished(p)
         lines += ["# new state", "total = 0.0*scale"]
         lines += self.states(
             f"new = {at.format(k=p)}",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 __all__ = ["order_for"]
 
-ORDERS = ((1e-3, 8), (1e-5, 12), (1e-10, 16), (1e-13, 20))
+ORDERS = ((1e-2, 8), (1e-4, 12), (1e-10, 16), (1e-13, 20))
 """Tolerances down to which an order is the fastest.
 
 They were measured in full lanes on a linear chain, a pair of pendula, a slip of dry friction and the Lorenz equations, at

@@ -15,23 +15,21 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
-from ..program.lowering import lower
 from ..program.passes import Names
-from ..program.printers import LANES
 from .graph import STARTS, Graph, Template
 from .series import Constant, Series, State, Time
 from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
 
-__all__ = ["FARTHEST", "TaylorStep", "called", "finished", "write_step"]
+__all__ = ["TaylorStep", "called", "finished", "write_step"]
 
-FARTHEST = 2.772588722239781
-"""The logarithm of how many times longer than `scale` a step may be: 16."""
+FARTHEST = 16.0
+"""How many times longer than `scale` a step may be."""
 
 WORDS = frozenset(
-    {"scale", "ratio", "reach", "length", "total", "raised", "power", "weight", "number", "inverse", "LINKS", "j_there",
+    {"scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
      "slope_scale", *STARTS.values()}
 )  # fmt: skip
-PREFIXES = ("i_", "e_", "half_", "w_", "n_", "size_")
+PREFIXES = ("i_", "e_", "half_", "w_", "n_", "size_", "odd_")
 """Names of the step; a user's symbol of that name is called otherwise within the step."""
 
 COUNTED = re.compile(r"[rs]\d+$")
@@ -217,7 +215,7 @@ class StepWriter:
         self.put(*(f"{self.called[name]} = load(y, {slot}, WIDTH)" for slot, name in enumerate(eq.state)))
         for slot, name in enumerate(eq.parameters, start=eq.dimension):
             self.put(f"{self.called[name]} = load(p, {slot}, WIDTH)")
-        self.put(*(f"{name} = {LANES.text(lower(e))}" for name, e in self.graph.constants.items()))
+        self.put(*(f"{name} = {text}" for name, text in self.graph.constants.items()))
         for slot, state in self.states.items():
             at.values[state, 0] = Name(self.called[eq.state[slot]])
         at.values[self.time, 0] = Name("t")
@@ -265,22 +263,30 @@ class StepWriter:
                 self.put(*statement(Assign(f"size_{k}", _largest(found))))
                 reaches.append(times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))))
         if not reaches:
-            reaches = [Name(f"{FARTHEST!r} + 0.0*scale")]
-        self.put(*statement(Assign("reach", _extreme("minimum", reaches))), *finished(p, FARTHEST))
+            reaches = [Name("-log(0.0*scale)")]
+        self.put(*statement(Assign("reach", _extreme("minimum", reaches))), *finished(p))
+
+    def horner(self, name: str, coefficients: Sequence[Expr]) -> Expr:
+        """A polynomial in ratio**2: two of half the degree are ready sooner than one."""
+        known = list(coefficients)
+        while known and known[-1] == ZERO:
+            known.pop()
+        if not known:
+            return ZERO
+        self.put(f"{name} = {show(known.pop())}")
+        for e in reversed(known):
+            self.put(f"{name} = {show(add(times(Name(name), Name('square')), e))}")
+        return Name(name)
 
     def closing(self) -> None:
-        """The new state by Horner, the dense output, and the length of the step."""
+        """The new state, the dense output, and the length of the step."""
         p, eq = self.order, self.equations
-        self.put("# new state")
+        self.put("# new state", "square = ratio*ratio")
         for slot, name in enumerate(self.names):
-            known = [self.state_at(slot, k) for k in range(p + 1)]
-            while len(known) > 1 and known[-1] == ZERO:
-                known.pop()
-            *rest, last = known
-            self.put(f"n_{name} = {show(last)}")
-            for e in reversed(rest):
-                self.put(f"n_{name} = {show(add(times(Name(f'n_{name}'), Name('ratio')), e))}")
-            self.put(f"store(y_new, {slot}, n_{name})")
+            start, *known = [self.state_at(slot, k) for k in range(p + 1)]
+            odd, even = self.horner(f"odd_{name}", known[::2]), self.horner(f"n_{name}", known[1::2])
+            slope = add(times(even, Name("ratio")), odd)
+            self.put(f"n_{name} = {show(add(times(slope, Name('ratio')), start))}", f"store(y_new, {slot}, n_{name})")
         self.put(f"total = {' + '.join(f'n_{name}' for name in self.names)}", "if DENSE:")
         for k in range(1, p + 1):
             self.put(f"    raised = {'ratio' if k == 1 else 'raised*ratio'}")
@@ -322,12 +328,13 @@ def write_step(equations: Equations, order: int) -> TaylorStep:
     return TaylorStep.of(StepWriter(equations, order).write(), order)
 
 
-def finished(order: int, farthest: float) -> list[str]:
+def finished(order: int) -> list[str]:
     """The length of the step from the logarithm of its share of `scale`."""
     return [
         # weights are those of a step as long as `scale`; a shorter one changes the states less
         f"reach = minimum(reach, {(order - 2) / (order - 4)!r}*reach)",
-        f"length = minimum(truncated(scale*exp(minimum(reach, {farthest!r}))), h)",
+        f"length = minimum(truncated(scale*exp(reach)), {FARTHEST!r}*scale)",
+        "length = minimum(length, h)",
         "ratio = length/scale",
     ]
 

@@ -135,7 +135,7 @@ def test_random_equations_are_solved_term_by_term(first, second):
                 e = e.diff(X) * first + e.diff(V) * second + e.diff(T)
                 factorial *= k
                 value = sp.lambdify((X, V, A, T), e, "mpmath")(*(numbers[s] for s in (X, V, A, T)))
-                assert abs(found[k][c] - value / factorial) <= mpmath.mpf(10) ** -40 * (1 + abs(value))
+                assert abs(found[k][c] - mpmath.mpf(value) / factorial) <= mpmath.mpf(10) ** -40 * (1 + abs(value))
 
 
 @pytest.mark.parametrize("kink", [sp.Abs(V), sp.sign(V), sp.Max(V, 0), sp.Min(X, V), sp.floor(X), sp.Heaviside(X),
@@ -147,6 +147,16 @@ def test_functions_with_kinks_are_refused(kink):
 
 def test_a_kink_of_parameters_is_no_kink():
     assert "absolute(a)" in step_of(alone([X], [-X * sp.Abs(A)], [A]), 8).text
+
+
+@pytest.mark.parametrize(
+    "constant", [sp.cbrt(2 + A**2), (2 + A) ** B, sp.tan(A), sp.sinh(A) * sp.cosh(B), sp.erf(sp.asin(A))]
+)
+def test_constants_take_every_function(constant):
+    with mpmath.workdps(DIGITS):
+        a, b = mpmath.mpf("0.4"), mpmath.mpf("1.3")
+        found = series(alone([X], [-X * constant], [A, B]), [mpmath.mpf(1)], [a, b], order=6)
+        assert abs(found[1][0] + sp.lambdify((A, B), constant, "mpmath")(a, b)) < mpmath.mpf(10) ** -40
 
 
 def test_unknown_functions_and_low_orders_are_refused():
