@@ -7,6 +7,7 @@ from numba import njit
 from ..simd.lanes import load
 from .names import WIDTH
 
+
 # --- kernel text below ---
 @njit(error_model="numpy", forceinline=True)
 def inside(theta, c, y, y_new, dense, dims):

@@ -9,8 +9,9 @@ from enum import StrEnum
 from synchain.models.dynamics.record import Record
 
 from .. import driver, simd
+from ..simd import lanes
 
-__all__ = ["Driver", "KernelKind"]
+__all__ = ["Driver", "KernelKind", "common_drivers"]
 
 
 class KernelKind(StrEnum):
@@ -33,6 +34,12 @@ class Driver:
     looped: bool = False
     switching: bool = False
     contacts: bool = False
+
+    def __str__(self) -> str:
+        traits = [name for name in ("looped", "switching", "contacts") if getattr(self, name)]
+        subject = "orbits and their modes" if self.kind is KernelKind.MODES else "sweeps"
+        records = ", ".join(("final state", *self.records))
+        return f"driver of {', '.join((subject, f'{self.width} lanes', *traits))} ({records})"
 
     @property
     def functions(self) -> tuple[str, ...]:
@@ -73,7 +80,9 @@ class Driver:
             f"Records     {', '.join(('final state', *self.records))}",
             '"""',
         ]
-        imports = f"import math\n\nimport numpy as np\n\nfrom synchain.codegen.simd import {', '.join(sorted(simd.__all__))}"
+        imports = (
+            f"import math\n\nimport numpy as np\n\nfrom synchain.codegen.simd import {', '.join(sorted(simd.__all__))}"
+        )
         constants = "\n".join(f"{name} = {value!r}" for name, value in self.constants.items())
         return "\n\n\n".join(["\n".join(lines), imports, constants, *map(driver.text, pieces)]) + "\n"
 
@@ -81,3 +90,14 @@ class Driver:
     def digest(self) -> str:
         """Hexadecimal SHA-256 of the text."""
         return hashlib.sha256(self.text.encode()).hexdigest()
+
+
+def common_drivers() -> list[Driver]:
+    """Return the drivers that most scenes need: of written-out steps at the processor's width, without and with contacts."""
+    width = lanes.native_width()
+    sync_error, section, trajectory = Record.SYNC_ERROR, Record.SECTION, Record.TRAJECTORY
+    records = ((), (sync_error,), (section,), (trajectory,), (sync_error, section))
+    return [
+        *(Driver(KernelKind.SWEEP, width, r, contacts=contacts) for contacts in (False, True) for r in records),
+        *(Driver(KernelKind.MODES, width, contacts=contacts) for contacts in (False, True)),
+    ]

@@ -23,7 +23,6 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import Edge
 
-from ..printing.names import NAMES
 from .elimination import Entry, Plan
 from .mass import Mass, momentum_slopes
 from .places import by_joint, by_kind, joint_numbers, table
