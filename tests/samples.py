@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -166,6 +166,11 @@ UNEQUAL: dict[str, Equations] = {
 def numbers(equations: Equations, **changed: float) -> list[float]:
     """Parameter values in the kernel's order."""
     return [{**TABLE, **changed}[name] for name in equations.parameters]
+
+
+def source_of(text: str, looped: bool = False) -> KernelSource:
+    """A kernel whose text is a test's own."""
+    return replace(emit(harmonic_chain(2), "cash_karp", (), width=1, unroll=0 if looped else 8), text=text)
 
 
 @functools.cache

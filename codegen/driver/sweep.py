@@ -101,7 +101,9 @@ def settle(
                 finish(which, status, clock, y, cell[which], spans, end, sums, counts, dims)
                 cell[which] = -1
             elif SWITCHING and flip:
-                change_sides(which, mode, clock, y, cell, away_clock, away_y, away_cell, lot_clock, lot_y, lot_cell, dims)
+                change_sides(
+                    which, mode, clock, y, cell, away_clock, away_y, away_cell, lot_clock, lot_y, lot_cell, dims
+                )
             else:
                 break
     return queue
@@ -223,9 +225,7 @@ def drive(
             head = queue
             flips = flips & held(cell)  # an idle lane may ask for anything; who moves in must not inherit it
             if mode == STIFF:
-                queue = admit(
-                    queue, last, room, clock, y, cell, start, numbers, spans, control, samples, members, dims
-                )
+                queue = admit(queue, last, room, clock, y, cell, start, numbers, spans, control, samples, members, dims)
                 look = look if queue == head else ALL
             else:
                 queue = admit(

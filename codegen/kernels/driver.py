@@ -9,7 +9,7 @@ from enum import StrEnum
 from synchain.models.dynamics.record import Record
 
 from .. import driver, simd
-from ..simd import lanes
+from ..simd.lanes import native_width
 
 __all__ = ["Driver", "KernelKind", "common_drivers"]
 
@@ -39,7 +39,8 @@ class Driver:
         traits = [name for name in ("looped", "switching", "contacts") if getattr(self, name)]
         subject = "orbits and their modes" if self.kind is KernelKind.MODES else "sweeps"
         records = ", ".join(("final state", *self.records))
-        return f"driver of {', '.join((subject, f'{self.width} lanes', *traits))} ({records})"
+        lanes = f"{self.width} lane{'s' * (self.width != 1)}"
+        return f"driver of {', '.join((subject, lanes, *traits))} ({records})"
 
     @property
     def functions(self) -> tuple[str, ...]:
@@ -94,7 +95,7 @@ class Driver:
 
 def common_drivers() -> list[Driver]:
     """Return the drivers that most scenes need: of written-out steps at the processor's width, without and with contacts."""
-    width = lanes.native_width()
+    width = native_width()
     sync_error, section, trajectory = Record.SYNC_ERROR, Record.SECTION, Record.TRAJECTORY
     records = ((), (sync_error,), (section,), (trajectory,), (sync_error, section))
     return [

@@ -23,12 +23,16 @@ import pytest
 import sympy as sp
 from samples import drive, friction_chain, harmonic_chain, real
 
-from synchain.codegen.kernels import cache
+from synchain.codegen.kernels import cache, driver
 from synchain.codegen.kernels import compile as loading
 from synchain.codegen.kernels.driver import Driver, KernelKind
+from synchain.codegen.kernels.modes import emit_modes
 from synchain.codegen.kernels.sweep import emit
+from synchain.codegen.simd import lanes
 from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.variational import network_variation
 from synchain.models.mechanics.components import Node
+from synchain.runtime.cli import main
 
 x, v = real("x", "v")
 SWING = Equations.of_equal_nodes(Node((x, v), (v, -x), ()), None, 1)
@@ -276,6 +280,128 @@ def test_the_file_name_follows_everything_that_shapes_machine_code(monkeypatch):
     names.add(loading._fingerprint(SOURCE.text + "\n"))
     assert len(names) == 12
     assert loading._fingerprint(SOURCE.text) in names
+
+
+# -- kernels that nobody holds, and drivers ahead of time ------------------------------------------------------
+
+
+MANY = textwrap.dedent(
+    """
+    import dataclasses, gc, json, os, resource, sys, weakref
+    sys.path[:0] = sys.argv[1].split(os.pathsep)
+    from pathlib import Path
+    from test_load import SOURCE, TINY
+    from synchain.codegen.kernels.compile import load
+
+    def kernels(first, last):
+        made = []
+        for k in range(first, last):
+            kernel = load(dataclasses.replace(SOURCE, text=TINY.replace("2.0", f"{k}.0")))
+            step = kernel.compiled.functions["step"]
+            made += [weakref.ref(kernel), weakref.ref(step), weakref.ref(step.overloads[step.signatures[0]].library)]
+        return made
+
+    def resident():
+        gc.collect()
+        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
+
+    first, held = kernels(0, 40), load(SOURCE)
+    before = resident()
+    more = kernels(40, 140)
+    after = resident()
+    print(json.dumps({"alive": [sum(ref() is not None for ref in refs[k::3]) for refs in (first, more) for k in range(3)],
+                      "grown": after - before, "held": load(SOURCE) is held}))
+    """
+)
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").is_file(), reason="needs the memory of a process in /proc")
+def test_kernels_that_nobody_holds_are_freed(folder):
+    done = subprocess.run(
+        [sys.executable, "-c", MANY, os.pathsep.join(map(str, (HERE, HERE.parents[1])))],
+        env={**os.environ, "SYNCHAIN_CACHE": str(folder)}, capture_output=True, text=True, check=True, timeout=300,
+    )  # fmt: skip
+    report = json.loads(done.stdout)
+    assert report["alive"] == [0, 0, 0, 16, 16, 16], "the last sixteen are kept: kernels, functions, machine code"
+    assert report["held"], "a kernel that somebody holds is not loaded again"
+    assert report["grown"] < 100 * 0.5, "MiB of a hundred kernels"
+
+
+WARMING = textwrap.dedent(
+    """
+    import json, os, sys
+    sys.path[:0] = sys.argv[1].split(os.pathsep)
+    from test_load import TinyDriver, KernelKind
+    from synchain.codegen.kernels import driver
+    from synchain.runtime.cli import main
+    driver.common_drivers = lambda: [TinyDriver(KernelKind.SWEEP, 1, scale=float(k)) for k in range(1, 5)]
+    sys.exit(main(["cache", "warm"]))
+    """
+)
+
+
+def warming(folder: Path) -> subprocess.Popen:
+    """A process that fills a cache with four small drivers."""
+    return subprocess.Popen(
+        [sys.executable, "-c", WARMING, os.pathsep.join(map(str, (HERE, HERE.parents[1])))],
+        env={**os.environ, "SYNCHAIN_CACHE": str(folder)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+
+
+def told(job: subprocess.Popen) -> list[str]:
+    """The first words of the lines of a process that fills a cache."""
+    text, _ = job.communicate(timeout=120)
+    assert job.returncode == 0
+    assert all(line.endswith("driver of sweeps, 1 lane (final state)") for line in text.splitlines())
+    return [line.partition("  ")[0] for line in text.splitlines()]
+
+
+def test_of_two_processes_that_fill_a_cache_one_compiles_each_driver(folder):
+    jobs = [warming(folder), warming(folder)]
+    lines = [told(job) for job in jobs]
+    assert [sorted(pair) for pair in zip(*lines, strict=True)] == [["compiled", "was there"]] * 4
+    assert not [*folder.glob("*.tmp"), *folder.glob("*.lock")]
+    assert len(machine_code(folder, "driver")) == 4
+
+
+def test_a_process_that_is_killed_while_it_fills_a_cache_leaves_whole_drivers(folder):
+    job = warming(folder)
+    assert job.stdout is not None
+    assert job.stdout.readline().startswith("compiled")
+    job.kill()
+    job.communicate()
+    lines = told(warming(folder))
+    assert lines[0] == "was there"
+    assert lines[-1] == "compiled", "the process was killed too late"
+    assert told(warming(folder)) == ["was there"] * 4
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_cache_that_cannot_be_filled_is_an_error(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(driver, "common_drivers", lambda: [TinyDriver(KernelKind.SWEEP, 1)])
+    monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path / "file"))
+    (tmp_path / "file").write_text("no folder")
+    loading.forget()
+    assert main(["cache", "warm"]) == 1
+    assert "drivers are not kept on disk" in capsys.readouterr().err
+
+
+def test_the_common_drivers_are_those_of_common_scenes():
+    common = driver.common_drivers()
+    assert len({made.text for made in common}) == len(common) == 12
+    width, speed = lanes.native_width(), real("v_1")[0]
+    for records in ((), ("sync_error",), ("section",), ("trajectory",), ("sync_error", "section")):
+        assert emit(friction_chain(3), "rodas5p", records, speed, width).driver in common
+    assert emit_modes(network_variation(friction_chain(2))).driver in common
+
+
+@pytest.mark.long
+def test_the_common_drivers_compile(folder, capsys):
+    for word in ("compiled", "was there"):
+        loading.forget()
+        assert main(["cache", "warm"]) == 0
+        assert [line.startswith(word) for line in capsys.readouterr().out.splitlines()] == [True] * 12
+    assert cache.describe()["drivers"] == 12
 
 
 # -- damage --------------------------------------------------------------------------------------------------

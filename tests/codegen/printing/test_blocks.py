@@ -126,7 +126,7 @@ def test_names_avoid_those_that_are_taken():
 
 def test_constants_are_computed_before_the_stages():
     text = emit(friction_chain(2), "rodas5p", ("sync_error",), width=1).text
-    step = ast.parse(text[text.index("def step") : text.index("# A bank holds")].strip().split("\n\n\n")[0])
+    step = ast.parse(text[text.index("def step") :].strip().split("\n\n\n")[0])
     names = [
         s.targets[0].id for s in ast.walk(step) if isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name)
     ]
