@@ -1,5 +1,5 @@
-"""From equations to machine code: text of one step, whole kernel modules, their compilation, and
-exports.
+"""From equations to machine code: text of one step, modules of kernels and drivers, their
+compilation, and exports.
 
 Glossary
 --------
@@ -7,9 +7,10 @@ lane          One of the numbers in a SIMD register; each lane integrates a cell
 width         The number of lanes of a kernel: 1, 2, 4, 8 or 16.
 step          Generated function: advances all states of one cell by one step of an integrator.
 stage         One evaluation of the right-hand side within a step.
-driver        The fixed text around the step: step size, events, records, the next cell of a lane.
-kernel        Step and driver as one Python module that Numba compiles.
-digest        Hash of the text of a kernel, by which the cache finds it.
+driver        Fixed text that calls the step: step size, events, records, the next cell of a lane.
+              It is compiled once for a width, a set of records and a kind of step.
+kernel        The functions of a scene, a module that Numba compiles, and the driver that runs them.
+digest        Hash of the text of a kernel.
 record        What a kernel writes: mean errors, section points, trajectories.
 dense output  The polynomial through a step, which gives states between its ends.
 unrolled      Written out node by node; larger networks are looped over their nodes and links.

@@ -17,7 +17,7 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--driver",
         action="store_true",
-        help="print the driver that runs the functions of the scene, and of others like it",
+        help="print the driver that runs them, which scenes share",
     )
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import inspect
 
 import pytest
+from samples import source_of
 
 from synchain.codegen.simd import elementary, lanes
 from synchain.models import chain, ring
