@@ -1,5 +1,5 @@
-"""From equations to machine code: text of one step, whole kernel modules, their compilation, and
-exports.
+"""From equations to machine code: text of one step, modules of kernels and drivers, their
+compilation, and exports.
 
 Glossary
 --------
@@ -10,9 +10,10 @@ lowering      From SymPy to the expressions of a program; decides how powers and
 dialect       What a printer knows of one language: lanes for Numba, NumPy, Python's math, C99.
 step          Generated function: advances all states of one cell by one step of an integrator.
 stage         One evaluation of the right-hand side within a step.
-driver        The fixed text around the step: step size, events, records, the next cell of a lane.
-kernel        Step and driver as one Python module that Numba compiles.
-digest        Hash of the text of a kernel, by which the cache finds it.
+driver        Fixed text that calls the step: step size, events, records, the next cell of a lane.
+              It is compiled once for a width, a set of records and a kind of step.
+kernel        The functions of a scene, a module that Numba compiles, and the driver that runs them.
+digest        Hash of the text of a kernel.
 record        What a kernel writes: mean errors, section points, trajectories.
 dense output  The polynomial through a step, which gives states between its ends.
 series        Coefficients of the powers of time for one value, and the recurrence that makes them.

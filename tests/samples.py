@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -13,8 +13,9 @@ import mpmath
 import numpy as np
 import sympy as sp
 
+from synchain.codegen import driver
 from synchain.codegen.kernels.compile import Kernel, load
-from synchain.codegen.kernels.sweep import emit
+from synchain.codegen.kernels.sweep import KernelSource, emit
 from synchain.models import chain, ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.topology import from_matrix
@@ -167,6 +168,11 @@ def numbers(equations: Equations, **changed: float) -> list[float]:
     return [{**TABLE, **changed}[name] for name in equations.parameters]
 
 
+def source_of(text: str, looped: bool = False) -> KernelSource:
+    """A kernel whose text is a test's own."""
+    return replace(emit(harmonic_chain(2), "cash_karp", (), width=1, unroll=0 if looped else 8), text=text)
+
+
 @functools.cache
 def kernel(
     equations: Equations,
@@ -268,7 +274,7 @@ DIGITS = {**PYTHON, **{n: getattr(mpmath, n) for n in ("exp", "log", "sin", "cos
 
 
 def plain(text: str, functions: dict[str, Any]) -> dict[str, Any]:
-    """The names that a kernel module of width 1 defines, run by Python itself on any kind of number."""
+    """The names that a module of width 1 defines, run by Python itself on any kind of number."""
     body = re.sub(r"^(import|from) .*$", "", text, flags=re.MULTILINE)
     space = dict(functions)
     exec(compile(body, "<kernel>", "exec"), space)
@@ -286,8 +292,29 @@ class Step:
     bound: Any = None
 
 
+@dataclass(frozen=True, slots=True)
+class Interpreted:
+    """The functions of a scene, and the dense output of its driver, as plain Python of width 1."""
+
+    source: KernelSource
+    names: dict[str, Any]
+
+    @classmethod
+    def of(cls, source: KernelSource, functions: dict[str, Any]) -> Interpreted:
+        return cls(source, plain(f"{driver.text('dense')}\n\n\n{source.text}", functions))
+
+    def inside(self, theta: Any, c: int, step: Step) -> Any:
+        """State variable c at the fraction theta of a step."""
+        return self.names["inside"](theta, c, step.y, step.y_new, step.dense, self.source.dimensions)
+
+    def section(self, theta: Any, t: Any, h: Any, p: list, step: Step) -> Any:
+        """The section function at the fraction theta of a step."""
+        y = [*step.y, *p]
+        return self.names["section"](theta, t, h, y, step.y_new, step.dense, self.source.dimensions)
+
+
 def take_step(
-    space: dict[str, Any],
+    kernel: Interpreted,
     t: Any,
     h: Any,
     y: list,
@@ -298,8 +325,9 @@ def take_step(
     name: str = "step",
 ) -> Step:
     """One step of a kernel that runs as plain Python; a looped one needs its graph and weights."""
-    room = space["DENSE_ROWS"] * len(y)
-    y_new, dense = [None] * len(y), [None] * (room + space["WORKSPACE"])
-    error = space[name](t, h, y, [*y, *p], y_new, dense, rtol, atol, *graph)
-    error, bound = error if space["SWITCHING"] else (error, None)
+    sizes = kernel.source.dimensions
+    room = sizes.dense_rows * len(y)
+    y_new, dense = [None] * len(y), [None] * (room + sizes.workspace)
+    error = kernel.names[name](t, h, y, [*y, *p], y_new, dense, rtol, atol, *graph)
+    error, bound = error if kernel.source.driver.switching else (error, None)
     return Step(y, y_new, dense[:room], error, bound)

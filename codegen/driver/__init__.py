@@ -1,6 +1,6 @@
 """The part of a kernel that is the same for all equations: control of the step size, recording, lanes.
 
-The files are Python that can be read and checked; their text becomes part of every kernel module.
+The files are Python that can be read and checked; their text becomes part of every driver.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ MARK = "# --- kernel text below ---\n"
 
 
 def text(name: str) -> str:
-    """Return the part of a file of this folder that a kernel module contains.
+    """Return the part of a file of this folder that a generated module contains.
 
     Parameters
     ----------

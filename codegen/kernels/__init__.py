@@ -1,1 +1,1 @@
-"""Whole kernel modules: step and driver put together, kept on disk, compiled and loaded."""
+"""Kernels: the functions of a scene and the driver that runs them, as modules that are compiled, kept and loaded."""

@@ -1,4 +1,4 @@
-"""The folder of compiled kernels.  Code is loaded from it, so a folder that others can change is refused.
+"""The folder of compiled kernels and drivers.  Code is loaded from it, so a folder that others can change is refused.
 
 The folder is opened once and its files are reached through it, so that nobody can replace the folder
 between a check and a reading.  A wrong bit in machine code is a crash or a wrong number, so the
@@ -32,6 +32,9 @@ except ImportError:  # Windows has no such locks
 __all__ = ["Folder", "cache_folder", "clear", "describe", "open_folder"]
 
 DIGEST = hashlib.sha256().digest_size
+
+KINDS = ("kernel", "driver")
+"""The modules in the folder, by the beginnings of their names: the functions of a scene, and what runs them."""
 
 PATIENCE = 120.0
 """Seconds after which a process no longer waits for another one that compiles the same kernel."""
@@ -240,23 +243,23 @@ def _check_way(real: Path) -> None:
 
 
 def describe() -> dict[str, str | int]:
-    """Return folder, number of kernels and bytes on disk."""
+    """Return folder, number of kernels, number of drivers that they share, and bytes on disk."""
     folder = cache_folder()
     files = [p for p in folder.rglob("*") if p.is_file()] if folder.is_dir() else []
     return {
         "folder": str(folder),
-        "kernels": sum(p.suffix == ".py" for p in files),
+        **{f"{kind}s": sum(p.match(f"{kind}_*.py") for p in files) for kind in KINDS},
         "bytes": sum(p.stat().st_size for p in files),
     }
 
 
-def clear() -> int:
-    """Delete all cached kernels and return their number; other files in the folder stay."""
+def clear() -> dict[str, int]:
+    """Delete all cached kernels and drivers and return their numbers; other files in the folder stay."""
     folder = cache_folder()
-    if not folder.is_dir():
-        return 0
-    kernels = len(list(folder.glob("kernel_*.py")))
-    for path in folder.glob("kernel_*"):
-        path.unlink(missing_ok=True)
+    counts = {}
+    for kind in KINDS:
+        counts[f"{kind}s"] = len(list(folder.glob(f"{kind}_*.py")))
+        for path in folder.glob(f"{kind}_*"):
+            path.unlink(missing_ok=True)
     shutil.rmtree(folder / "__pycache__", ignore_errors=True)
-    return kernels
+    return counts

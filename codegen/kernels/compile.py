@@ -1,6 +1,7 @@
 """From the text of a kernel to machine code, through a cache on disk that is named by content.
 
-A module file is named by the hash of everything that could change the machine code: its text, the
+The functions of a scene are one module, the driver that runs them is another, which scenes share.  A
+module file is named by the hash of everything that could change the machine code: its text, the
 sources of the lanes, the versions of Python, Numba and llvmlite, and the processor.
 """
 
@@ -18,8 +19,7 @@ import sys
 import tempfile
 import threading
 import warnings
-from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Protocol
@@ -44,7 +44,7 @@ from .installation import InstallationError
 from .processor import processor
 from .sweep import KernelSource
 
-__all__ = ["Kernel", "load"]
+__all__ = ["Compiled", "Kernel", "forget", "load", "load_driver"]
 
 _vector, _matrix, _counts = types.float64[::1], types.float64[:, ::1], types.int64[:, ::1]
 _cube = types.float64[:, :, ::1]
@@ -54,7 +54,7 @@ _graph = (types.UniTuple(types.int64[::1], len(NAMES)), _vector)
 """The links and the elimination program of a network of loops, and the weights of its links."""
 
 
-def _sizes(kind: type) -> Any:
+def _sizes(kind: type[Dimensions] | type[ModeDimensions]) -> Any:
     """The type of the sizes that a driver is told."""
     return types.NamedUniTuple(types.int64, len(kind._fields), kind)
 
@@ -71,7 +71,7 @@ def signatures(driver: Driver) -> dict[str, Any]:
             "release": types.void(types.int64, *[types.float64] * 2, *[ADDRESS] * 3, types.int64),
         }
         arrays = (*[_input] * 3, _vector, _input, _cube, _matrix, _matrix, _matrix, _counts, _cube)
-        own = (_sizes(ModeDimensions), types.int64[::1])
+        own: tuple[Any, ...] = (_sizes(ModeDimensions), types.int64[::1])
     else:
         lane, sizes = Lane(driver.width), _sizes(Dimensions)
         times = (lane, lane, lane) if driver.series else (lane, lane)
@@ -94,12 +94,8 @@ LOG = logging.getLogger(__name__)
 """Reports at the level INFO each compilation, which takes seconds."""
 
 _lock = threading.Lock()
-_kernels: WeakValueDictionary[KernelSource, Kernel] = WeakValueDictionary()
+_held: WeakValueDictionary[KernelSource, Kernel] = WeakValueDictionary()
 """The kernels of this process that somebody holds."""
-_recent: deque[Kernel] = deque(maxlen=16)
-"""The last kernels that were asked for; older ones are freed where nobody else holds them."""
-_drivers: dict[Driver, _Module] = {}
-"""The drivers of this process; there are few."""
 
 
 class EntryPoint(Protocol):
@@ -111,6 +107,28 @@ class EntryPoint(Protocol):
     def __call__(self, /, *arguments: Any) -> None: ...
 
 
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """The compiled functions of one module.
+
+    Attributes
+    ----------
+    functions
+        The functions by name.
+    path
+        The file that holds the text.
+    from_cache
+        True if the machine code was loaded from the cache, False if it was compiled.
+    problem
+        Why the machine code is not kept on disk; empty if it is.
+    """
+
+    functions: dict[str, Any]
+    path: str
+    from_cache: bool
+    problem: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Kernel:
     """The compiled functions of a scene and the driver that runs them: `print(kernel.source)` shows them as text.
@@ -119,10 +137,25 @@ class Kernel:
     """
 
     origin: KernelSource
-    entry: EntryPoint = field(repr=False)
+    compiled: Compiled = field(repr=False)
+    driver: Compiled = field(repr=False)
     own: tuple[Any, ...] = field(repr=False)
-    path: str
-    from_cache: bool
+
+    @property
+    def entry(self) -> EntryPoint:
+        """The function of the driver that runs cells."""
+        function: EntryPoint = self.driver.functions[self.origin.driver.entry]
+        return function
+
+    @property
+    def path(self) -> str:
+        """The file that holds the text of the functions of the scene."""
+        return self.compiled.path
+
+    @property
+    def from_cache(self) -> bool:
+        """True if the functions of the scene were loaded from the cache; `driver.from_cache` says so of the driver."""
+        return self.compiled.from_cache
 
     def drive(self, first: int, last: int, *arrays: np.ndarray) -> None:
         """Run the cells first … last-1.
@@ -179,46 +212,82 @@ def load(source: KernelSource) -> Kernel:
     -----
     A kernel whose cache file is damaged is compiled anew.
     """
-    if numba.config.DISABLE_JIT:
-        raise InstallationError(
-            "Numba: found compilation switched off (NUMBA_DISABLE_JIT); expected it on; unset NUMBA_DISABLE_JIT"
-        )
+    _check_numba()
     with _lock:
-        kernel = _kernels.get(source)
-        if kernel is None:
-            kernel = _kernels[source] = _kernel(source)
-        if kernel not in _recent:
-            _recent.append(kernel)
-        return kernel
+        return _load(source)
 
 
-def load_driver(driver: Driver) -> Any:
-    """Compile a driver, or load its machine code from the cache; raises and warns as `load` does."""
+def load_driver(driver: Driver) -> Compiled:
+    """Compile a driver, or load its machine code from the cache.
+
+    Parameters
+    ----------
+    driver
+        What the text of the driver depends on.
+
+    Returns
+    -------
+    Compiled
+        The same object for the same driver within a process.  No warning is given if it is not kept on disk: `problem`
+        says why.
+
+    Raises
+    ------
+    InstallationError
+        If Numba is told not to compile.
+    """
+    _check_numba()
     with _lock:
         return _driver(driver)
 
 
-def _driver(driver: Driver) -> Any:
-    """The entry of a driver; the last few are kept."""
-    if driver not in _drivers:
-        _drivers[driver] = _module(driver.text, "driver", {driver.entry: signatures(driver)[driver.entry]}, str(driver))
-    return _drivers[driver].functions[driver.entry]
+def forget() -> None:
+    """Forget the kernels and drivers of this process: the next `load` takes them from the cache folder.
+
+    What nobody holds is freed.
+    """
+    with _lock:
+        _load.cache_clear()
+        _driver.cache_clear()
+        _held.clear()
+
+
+def _check_numba() -> None:
+    if numba.config.DISABLE_JIT:
+        raise InstallationError(
+            "Numba: found compilation switched off (NUMBA_DISABLE_JIT); expected it on; unset NUMBA_DISABLE_JIT"
+        )
+
+
+@functools.lru_cache(maxsize=16)
+def _load(source: KernelSource) -> Kernel:
+    """The kernel; the last ones that were asked for are kept, others are freed when nobody holds them."""
+    kernel = _held.get(source)
+    if kernel is None:
+        kernel = _held[source] = _kernel(source)
+        if problem := kernel.compiled.problem or kernel.driver.problem:
+            warnings.warn(f"kernels are not kept on disk: {problem}", RuntimeWarning, stacklevel=3)
+    return kernel
+
+
+@functools.cache
+def _driver(driver: Driver) -> Compiled:
+    """The driver; a process needs few, and keeps them."""
+    return _module(driver.text, "driver", {driver.entry: signatures(driver)[driver.entry]}, f"the {driver}")
 
 
 def _kernel(source: KernelSource) -> Kernel:
     known = signatures(source.driver)
-    entry = _driver(source.driver)
-    module = _module(
-        source.text, "kernel", {name: known[name] for name in dict.fromkeys(source.driver.functions)}, _what(source)
-    )
-    functions = [module.functions[name] for name in source.driver.functions]
+    driver = _driver(source.driver)
+    compiled = _module(source.text, "kernel", {name: known[name] for name in source.driver.functions}, _what(source))
+    functions = [compiled.functions[name] for name in source.driver.functions]
     if source.kind is KernelKind.MODES:
         own = (*functions, source.dimensions, np.array(source.marks, np.int64))
     else:
         loops = source.elimination
         network = () if loops is None else (loops.arrays, loops.weights)
         own = (*functions, source.dimensions, np.array(source.marks, np.float64), network)
-    return Kernel(source, entry, own, module.path, module.from_cache)
+    return Kernel(source, compiled, driver, own)
 
 
 def _what(source: KernelSource) -> str:
@@ -226,31 +295,22 @@ def _what(source: KernelSource) -> str:
     return f"a kernel for {n} oscillator{'s' * (n != 1)} ({source.integrator})"
 
 
-@dataclass(frozen=True, slots=True)
-class _Module:
-    """The compiled functions of one text, by name."""
-
-    functions: dict[str, Any]
-    path: str
-    from_cache: bool
-
-
-def _module(text: str, kind: str, wanted: dict[str, Any], what: str) -> _Module:
+def _module(text: str, kind: str, wanted: dict[str, Any], what: str) -> Compiled:
     """The functions `wanted`, with their types, of a text; from the folder, or compiled into it."""
     name = f"{kind}_{_fingerprint(text)[:32]}"
     try:
         with open_folder(cache_folder()) as folder:
             return _from_folder(text, name, wanted, what, folder)
-    except (OSError, RuntimeError) as problem:  # RuntimeError: no home folder
-        warnings.warn(f"kernels are not kept on disk: {problem}", RuntimeWarning, stacklevel=5)
+    except (OSError, RuntimeError) as error:  # RuntimeError: no home folder
+        problem = str(error)
     LOG.info("compiling %s, for this process alone", what)
     path = Path(tempfile.mkdtemp(prefix="synchain-"), f"{name}.py")
     atexit.register(shutil.rmtree, path.parent, ignore_errors=True)
     path.write_text(text, encoding="utf-8")
-    return _compile(text, path, wanted, _MachineCode())
+    return replace(_compile(text, path, wanted, _MachineCode()), problem=problem)
 
 
-def _from_folder(text: str, name: str, wanted: dict[str, Any], what: str, folder: Folder) -> _Module:
+def _from_folder(text: str, name: str, wanted: dict[str, Any], what: str, folder: Folder) -> Compiled:
     """The functions from the folder, or compiled into it; what cannot be loaded is compiled anew."""
     path, written = folder.path / f"{name}.py", text.encode()
     if folder.read(path.name) != written:
@@ -267,7 +327,7 @@ def _from_folder(text: str, name: str, wanted: dict[str, Any], what: str, folder
     return module
 
 
-def _stored(text: str, name: str, wanted: dict[str, Any], folder: Folder, path: Path) -> _Module | None:
+def _stored(text: str, name: str, wanted: dict[str, Any], folder: Folder, path: Path) -> Compiled | None:
     """The functions by the machine code in the folder, None if there is none that can be loaded."""
     code = folder.machine_code(name)
     if code is None:
@@ -302,7 +362,7 @@ class _MachineCode:
         return dumps(self.known)
 
 
-def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) -> _Module:
+def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) -> Compiled:
     """Compile the functions `wanted` of a module.
 
     The text comes from memory, not from the file at `path` and not from `__pycache__`.  The file is
@@ -322,8 +382,10 @@ def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) 
     finally:
         numba.config.CACHE_DIR = elsewhere
         del sys.modules[path.stem]
+        for name in vars(module).keys() - {"__name__"}:  # Numba never frees a function that its module names
+            delattr(module, name)
     hits = all(sum(function.stats.cache_hits.values()) for function in functions.values())
-    return _Module(functions, str(path), hits)
+    return Compiled(functions, str(path), hits)
 
 
 @functools.cache

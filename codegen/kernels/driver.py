@@ -9,8 +9,9 @@ from enum import StrEnum
 from synchain.models.dynamics.record import Record
 
 from .. import driver, simd
+from ..simd.lanes import native_width
 
-__all__ = ["Driver", "KernelKind"]
+__all__ = ["Driver", "KernelKind", "common_drivers"]
 
 
 class KernelKind(StrEnum):
@@ -35,6 +36,13 @@ class Driver:
     switching: bool = False
     contacts: bool = False
     series: bool = False
+
+    def __str__(self) -> str:
+        traits = [name for name in ("looped", "switching", "contacts") if getattr(self, name)]
+        subject = "orbits and their modes" if self.kind is KernelKind.MODES else "sweeps"
+        records = ", ".join(("final state", *self.records))
+        lanes = f"{self.width} lane{'s' * (self.width != 1)}"
+        return f"driver of {', '.join((subject, lanes, *traits))} ({records})"
 
     @property
     def functions(self) -> tuple[str, ...]:
@@ -86,3 +94,14 @@ class Driver:
     def digest(self) -> str:
         """Hexadecimal SHA-256 of the text."""
         return hashlib.sha256(self.text.encode()).hexdigest()
+
+
+def common_drivers() -> list[Driver]:
+    """Return the drivers that most scenes need: of written-out steps at the processor's width, without and with contacts."""
+    width = native_width()
+    sync_error, section, trajectory = Record.SYNC_ERROR, Record.SECTION, Record.TRAJECTORY
+    records = ((), (sync_error,), (section,), (trajectory,), (sync_error, section))
+    return [
+        *(Driver(KernelKind.SWEEP, width, r, contacts=contacts) for contacts in (False, True) for r in records),
+        *(Driver(KernelKind.MODES, width, contacts=contacts) for contacts in (False, True)),
+    ]

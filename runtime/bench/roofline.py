@@ -9,7 +9,6 @@ share is the median over the rounds.
 
 from __future__ import annotations
 
-import inspect
 import math
 import time
 from collections.abc import Callable
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from synchain.codegen.simd import lanes
+from synchain.codegen.simd.addresses import address
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 
@@ -45,11 +45,11 @@ def work(start, count):
 
 STEPS = """
 @njit(error_model="numpy")
-def work(bank, clock, count):
-    y_new, dense = np.zeros(bank.size), np.zeros(DENSE_ROWS * bank.size)
+def work(step, bank, new, rows, clock, count):
+    y, y_new, dense = address(bank, 0), address(new, 0), address(rows, 0)
     worst = broadcast(0.0, WIDTH)
     for _ in range(count):
-        error = step(load(clock, 0, WIDTH), load(clock, 1, WIDTH), bank, bank, y_new, dense, 1e-8, 1e-9)
+        error = step(load(clock, 0, WIDTH), load(clock, 1, WIDTH), y, y, y_new, dense, 1e-8, 1e-9)
         worst = maximum(worst, error)
     store(clock, 2, worst)
 """
@@ -64,16 +64,15 @@ def measure(quick: bool = False) -> list[tuple[object, ...]]:
 def _row(n: int, width: int, quick: bool) -> tuple[object, ...]:
     scene = Scene(topology=topology("chain", n), record=(), integrator="rodas5p")
     compiled = kernel(scene, width, reduce=False)
-    flops = operations(compiled.source)
-    module = inspect.getmodule(compiled.entry)
-    if module is None:
-        raise RuntimeError("the kernel has no module; this is a mistake in the program")
+    flops = operations(compiled.origin)
+    step = compiled.compiled.functions["step"]
     cells = plan(scene)
     bank = np.repeat(np.concatenate([cells.start[0], cells.numbers[0]]), width)
     clock = np.repeat([0.3, 0.01, 0.0], width)
-    steps = _function(STEPS, width, vars(module))
+    new, rows = np.zeros(bank.size), np.zeros(compiled.origin.dimensions.dense_rows * bank.size)
+    steps = _function(STEPS, width)
     seconds, rounds = (1e-3, 3) if quick else (0.1, 15)
-    pairs = _in_turn(lambda count: steps(bank, clock, count), _peak(width), seconds, rounds)
+    pairs = _in_turn(lambda count: steps(step, bank, new, rows, clock, count), _peak(width), seconds, rounds)
     if not (clock[2 * width :] > 0.0).all() or not (clock[2 * width :] <= 1.0).all():
         raise RuntimeError(f"the timed step has the error {clock[-1]}; expected one that would be accepted")
     done = [(flops * width / a * 1e-9, 2 * CHAINS * width / b * 1e-9) for a, b in pairs]
@@ -90,17 +89,17 @@ def _peak(width: int) -> Callable[[int], object]:
         body="\n".join(f"        {name} = fma({name}, b, a)" for name in names),
         total=" + ".join(names),
     )
-    function = _function(text, width, {})
+    function = _function(text, width)
     start = np.repeat([1e-3, 0.999, 0.0], width)
     return lambda count: function(start, count)
 
 
-def _function(text: str, width: int, names: dict[str, object]) -> Callable[..., object]:
-    """Compile the function `work` of a text among the names of a module."""
+def _function(text: str, width: int) -> Callable[..., object]:
+    """Compile the function `work` of a text."""
     from numba import njit
 
-    given = {name: getattr(lanes, name) for name in ("load", "store", "fma", "broadcast")}
-    space: dict[str, Any] = {**names, **given, "njit": njit, "np": np, "WIDTH": width}
+    given = {name: getattr(lanes, name) for name in ("load", "store", "fma", "broadcast", "maximum")}
+    space: dict[str, Any] = {**given, "address": address, "njit": njit, "WIDTH": width}
     exec(compile(text, "<roofline benchmark>", "exec"), space)
     work: Callable[..., object] = space["work"]
     return work

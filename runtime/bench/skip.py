@@ -95,7 +95,7 @@ def scenes(case: Case, quick: bool) -> tuple[Reduction, Reduction]:
 
 def _row(case: Case, quick: bool) -> tuple[object, ...]:
     pair = scenes(case, quick)
-    counts = [operations(kernel_source(chosen.scene, reduce=chosen).text) for chosen in pair]
+    counts = [operations(kernel_source(chosen.scene, reduce=chosen)) for chosen in pair]
     seconds = [np.inf, np.inf]
     for _ in range(2 if quick else 6):  # the first may compile
         for k, chosen in enumerate(pair):

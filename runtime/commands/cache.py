@@ -6,33 +6,52 @@ from argparse import ArgumentParser, Namespace
 
 from ..console.outcome import FINE, Failed, sentence
 
-SUMMARY = "show or empty the folder of compiled kernels"
-EXAMPLES = ("synchain cache info", "synchain cache clear")
+SUMMARY = "show, empty or fill the folder of compiled kernels"
+EXAMPLES = ("synchain cache info", "synchain cache clear", "synchain cache warm")
 
 
 def configure(parser: ArgumentParser) -> None:
     """Add what to do."""
     parser.add_argument(
         "action",
-        choices=("info", "clear"),
-        help="info: folder, number of kernels and size; clear: delete the kernels; they are compiled again when needed",
+        choices=("info", "clear", "warm"),
+        help="info: folder, number of kernels and size; clear: delete the kernels and drivers; they are compiled again "
+        "when needed; warm: compile the drivers that most scenes share",
     )
 
 
 def execute(arguments: Namespace) -> int:
-    """Describe or empty the cache."""
+    """Describe, empty or fill the cache."""
+    if arguments.action == "warm":
+        return _warm()
     from synchain.codegen.kernels.cache import clear, describe
 
     try:
         info = describe()
         if arguments.action == "info":
-            print(f"folder   {info['folder']}\nkernels  {info['kernels']}\nsize     {_size(int(info['bytes']))}")
+            print(f"folder   {info['folder']}\nkernels  {info['kernels']}\ndrivers  {info['drivers']}")
+            print(f"size     {_size(int(info['bytes']))}")
         else:
-            print(f"deleted {_counted(clear())} from {info['folder']}")
+            counts = clear()
+            found = " and ".join(_counted(counts[f"{kind}s"], kind) for kind in ("kernel", "driver"))
+            print(f"deleted {found} from {info['folder']}")
     except PermissionError as problem:
         raise Failed(f"the kernel cache cannot be read or emptied: {sentence(problem)}") from problem
     except RuntimeError as problem:  # no home folder
         raise Failed(f"no kernel cache: {sentence(problem)} Set SYNCHAIN_CACHE to a folder of yours") from problem
+    return FINE
+
+
+def _warm() -> int:
+    """Compile the common drivers that the folder does not hold yet, with a line for each."""
+    from synchain.codegen.kernels import driver
+    from synchain.codegen.kernels.compile import load_driver
+
+    for common in driver.common_drivers():
+        made = load_driver(common)
+        if made.problem:
+            raise Failed(f"drivers are not kept on disk: {made.problem}")
+        print(f"{'was there' if made.from_cache else 'compiled':9}  {common}", flush=True)
     return FINE
 
 
@@ -42,5 +61,5 @@ def _size(count: int) -> str:
     return f"{count / 1e3:.0f} kB" if count < 1e6 else f"{count / 1e6:.1f} MB"
 
 
-def _counted(kernels: int) -> str:
-    return f"{kernels} kernel{'s' * (kernels != 1)}"
+def _counted(number: int, kind: str) -> str:
+    return f"{number} {kind}{'s' * (number != 1)}"

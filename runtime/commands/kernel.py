@@ -8,21 +8,27 @@ from ..console.arguments import add_scene
 from ..console.outcome import FINE, wrong_use
 
 SUMMARY = "print the Python source that is generated and compiled for a scene"
-EXAMPLES = ("synchain kernel figure_4a",)
+EXAMPLES = ("synchain kernel figure_4a", "synchain kernel figure_4a --driver")
 
 
 def configure(parser: ArgumentParser) -> None:
-    """Add the scene."""
+    """Add the scene and what to print."""
     add_scene(parser)
+    parser.add_argument(
+        "--driver",
+        action="store_true",
+        help="print the driver that runs them, which scenes share",
+    )
 
 
 def execute(arguments: Namespace) -> int:
-    """Print the source; nothing is compiled."""
+    """Print the functions of the scene, or the driver that runs them; nothing is compiled."""
     from synchain.models.scenes.file import load_scene
 
     from ..cells.kernels import kernel_source
 
     with wrong_use():
         source = kernel_source(load_scene(arguments.scene))
-    print(source.text, end="" if source.text.endswith("\n") else "\n")
+    text = source.driver.text if arguments.driver else source.text
+    print(text, end="" if text.endswith("\n") else "\n")
     return FINE

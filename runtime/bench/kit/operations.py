@@ -12,6 +12,7 @@ import ast
 import inspect
 from dataclasses import dataclass, field
 
+from synchain.codegen.kernels.sweep import KernelSource
 from synchain.codegen.simd import elementary
 
 __all__ = ["PRIMITIVE", "Counter", "operations"]
@@ -114,13 +115,13 @@ class Counter:
         raise ValueError(f"line {test.lineno}: the condition {ast.unparse(test)} is no constant of the text")
 
 
-def operations(text: str) -> int:
+def operations(source: KernelSource) -> int:
     """Operations of one step in one lane, from the text of a kernel that is written out; ValueError
     for one with loops.
     """
+    if source.looped:
+        raise ValueError("operations are counted in unrolled kernels alone; found one that loops over its nodes")
     counter = Counter()
     counter.read(inspect.getsource(elementary))
-    counter.read(text)
-    if counter.constants.get("LOOPED"):
-        raise ValueError("operations are counted in unrolled kernels alone; found one that loops over its nodes")
+    counter.read(source.text)
     return counter.count("step")

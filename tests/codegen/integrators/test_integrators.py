@@ -11,7 +11,7 @@ import mpmath
 import numpy as np
 import pytest
 from mpmath import mp, mpf
-from samples import DIGITS, plain, take_step, waving
+from samples import DIGITS, Interpreted, take_step, waving
 
 from synchain.codegen import integrators
 from synchain.codegen.integrators import Integrator
@@ -221,8 +221,8 @@ def test_a_wrong_digit_is_noticed(m):
 
 
 @functools.cache
-def generated(name: str) -> dict:
-    return plain(emit(waving(), name, ("trajectory",), width=1).text, DIGITS)
+def generated(name: str) -> Interpreted:
+    return Interpreted.of(emit(waving(), name, ("trajectory",), width=1), DIGITS)
 
 
 DAMPING = [mpf(1) / 5]
@@ -268,10 +268,10 @@ def test_measured_order_of_the_step(m):
 @every_method
 def test_measured_order_of_the_dense_output(m):
     def error(h: mpf) -> mpf:
-        inside, total = generated(m.name)["inside"], mpf(0)
+        kernel, total = generated(m.name), mpf(0)
         for t, theta in itertools.product(STARTS, (mpf(1) / 5, mpf(1) / 2, mpf(5) / 6)):
-            step = take_step(generated(m.name), t, h, exact(t), DAMPING)
-            found = [inside(theta, c, step.y, step.y_new, step.dense) for c in range(2)]
+            step = take_step(kernel, t, h, exact(t), DAMPING)
+            found = [kernel.inside(theta, c, step) for c in range(2)]
             total += distance(found, exact(t + theta * h))
         return total
 

@@ -41,8 +41,8 @@ def test_a_new_folder_belongs_to_its_user_alone(folder):
 
 
 def test_clearing_leaves_other_files_alone(folder):
-    assert cache.describe() == {"folder": str(folder), "kernels": 0, "bytes": 0}
-    assert cache.clear() == 0
+    assert cache.describe() == {"folder": str(folder), "kernels": 0, "drivers": 0, "bytes": 0}
+    assert cache.clear() == {"kernels": 0, "drivers": 0}
     (folder / "__pycache__").mkdir(parents=True)
     for name, text in (
         ("kernel_a.py", "12"),
@@ -50,9 +50,12 @@ def test_clearing_leaves_other_files_alone(folder):
         ("__pycache__/kernel_a.nbi", "6"),
         ("kernel_a.code", "7"),
         ("kernel_b8.tmp", "8"),
+        ("driver_a.py", "9"),
+        ("driver_a.code", "10"),
+        ("driver_b.py-0123.tmp", "11"),
         ("notes.txt", ""),
     ):
         (folder / name).write_text(text)
-    assert cache.describe() == {"folder": str(folder), "kernels": 2, "bytes": 8}
-    assert cache.clear() == 2
+    assert cache.describe() == {"folder": str(folder), "kernels": 2, "drivers": 1, "bytes": 13}
+    assert cache.clear() == {"kernels": 2, "drivers": 1}
     assert [p.name for p in folder.iterdir()] == ["notes.txt"]

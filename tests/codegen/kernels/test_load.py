@@ -23,28 +23,70 @@ import pytest
 import sympy as sp
 from samples import drive, friction_chain, harmonic_chain, real
 
-from synchain.codegen.kernels import cache
+from synchain.codegen.kernels import cache, driver
 from synchain.codegen.kernels import compile as loading
+from synchain.codegen.kernels.driver import Driver, KernelKind
+from synchain.codegen.kernels.modes import emit_modes
 from synchain.codegen.kernels.sweep import emit
+from synchain.codegen.simd import lanes
 from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.variational import network_variation
 from synchain.models.mechanics.components import Node
+from synchain.runtime.cli import main
 
 x, v = real("x", "v")
 SWING = Equations.of_equal_nodes(Node((x, v), (v, -x), ()), None, 1)
 REAL = emit(SWING, "cash_karp", (), width=1)
-MORE = ", ".join(f"more_{i}" for i in range(len(loading.SIGNATURE.args) - 7))
 TINY = """
 from numba import njit
 
+from synchain.codegen.simd import broadcast
+
+
+@njit(error_model="numpy", cache=True)
+def step(t, h, y, p, y_new, dense, rtol, atol):
+    y_new[0] = 2.0 * y[0]
+    y_new[1] = 3.0 * y[1]
+    return broadcast(0.0, 1)
+"""
+TINY_DRIVER = """
+import numpy as np
+from numba import njit
+
+from synchain.codegen.simd import address, broadcast
+
 
 @njit(error_model="numpy", nogil=True, cache=True)
-def drive(first, last, start, numbers, spans, control, end, MORE):
+def drive(
+    step, step_smooth, section, pushes, dims, multiplicity, network, first, last, start, numbers, spans, control, end, sums,
+    counts, points, samples,
+):
+    old, new, zero = np.zeros(dims.dimension), np.zeros(dims.dimension), broadcast(0.0, 1)
+    y, y_new = address(old, 0), address(new, 0)
     for i in range(first, last):
-        end[i, 0] = 2.0 * start[i, 0]
-        end[i, 1] = 3.0 * start[i, 1]
-""".replace("MORE", MORE)
-SOURCE = dataclasses.replace(REAL, text=TINY)
-"""A module with the entry point of a kernel that compiles ten times faster than one."""
+        for c in range(dims.dimension):
+            old[c] = start[i, c]
+        step(zero, zero, y, y, y_new, y_new, 0.0, 0.0)
+        for c in range(dims.dimension):
+            end[i, c] = new[c]
+"""
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class TinyDriver(Driver):
+    """A driver that takes one step of each cell."""
+
+    scale: float = 1.0
+
+    @property
+    def text(self) -> str:
+        return TINY_DRIVER.replace("end[i, c] = new[c]", f"end[i, c] = {self.scale!r} * new[c]")
+
+
+SOURCE = dataclasses.replace(REAL, text=TINY, driver=TinyDriver(KernelKind.SWEEP, 1))
+"""A module and a driver with the functions of a kernel that compile ten times faster than one."""
+MODULES = ("kernel", "driver")
+"""What a kernel is made of, by the beginnings of the names of its files."""
 
 HERE = Path(__file__).parent
 
@@ -59,9 +101,10 @@ PROGRAM = textwrap.dedent(
         warnings.simplefilter("always")
         k = load(source)
     end = drive(k, [[1.0, 2.0]], [[]], [(0.0, 1.0)], 1e-9).end[0]
-    stats = k.entry.stats
-    print(json.dumps({"end": list(end), "hits": sum(stats.cache_hits.values()), "from_cache": k.from_cache,
-                      "misses": sum(stats.cache_misses.values()), "path": k.path, "digest": k.digest,
+    stats = [f.stats for made in (k.compiled, k.driver) for f in made.functions.values()]
+    print(json.dumps({"end": list(end), "hits": sum(sum(s.cache_hits.values()) for s in stats),
+                      "from_cache": k.from_cache, "driver_from_cache": k.driver.from_cache,
+                      "misses": sum(sum(s.cache_misses.values()) for s in stats), "path": k.path, "digest": k.digest,
                       "warnings": [str(w.message) for w in caught]}))
     """
 )
@@ -103,7 +146,7 @@ def folder(tmp_path, monkeypatch) -> Path:
 
 def fresh(source=SOURCE):
     """Load without what this process remembers."""
-    loading._load.cache_clear()
+    loading.forget()
     return loading.load(source)
 
 
@@ -111,8 +154,17 @@ def works(compiled) -> bool:
     return drive(compiled, [[1.0, 2.0]], [[]], [(0.0, 1.0)], 1e-9).end[0].tolist() == [2.0, 6.0]
 
 
-def machine_code(place: Path) -> list[Path]:
-    return sorted(place.glob("kernel_*.code"))
+def machine_code(place: Path, module: str = "*") -> list[Path]:
+    return sorted(place.glob(f"{module}_*.code"))
+
+
+def from_cache(kernel: loading.Kernel) -> dict[str, bool]:
+    """Which modules were loaded from the cache."""
+    return {"kernel": kernel.from_cache, "driver": kernel.driver.from_cache}
+
+
+ALL_FROM_CACHE = dict.fromkeys(MODULES, True)
+every_module = pytest.mark.parametrize("module", MODULES)
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +172,7 @@ def compiled_folder(tmp_path_factory) -> Path:
     """A folder that a first process has filled."""
     place = tmp_path_factory.mktemp("shared") / "kernels"
     report = finish(start(place))
-    assert (report["hits"], report["misses"], report["from_cache"]) == (0, 1, False)
+    assert (report["hits"], report["misses"], report["from_cache"]) == (0, 2, False)
     assert Path(report["path"]).parent == place
     return place
 
@@ -135,7 +187,7 @@ def copied(source: Path, target: Path) -> None:
 
 def test_a_second_process_loads_without_compiling(compiled_folder):
     report = finish(start(compiled_folder))
-    assert (report["hits"], report["misses"], report["from_cache"]) == (1, 0, True)
+    assert (report["hits"], report["misses"], report["from_cache"]) == (2, 0, True)
     assert report["warnings"] == []
     assert report["digest"] == SOURCE.digest
 
@@ -143,7 +195,7 @@ def test_a_second_process_loads_without_compiling(compiled_folder):
 def test_a_real_kernel_is_loaded_without_compiling(tmp_path):
     exact = (math.cos(1.0) + 2 * math.sin(1.0), 2 * math.cos(1.0) - math.sin(1.0))
     reports = [finish(start(tmp_path / "kernels", "real"), exact) for _ in range(2)]
-    assert [(r["hits"], r["misses"], r["from_cache"]) for r in reports] == [(0, 1, False), (1, 0, True)]
+    assert [(r["hits"], r["misses"], r["from_cache"]) for r in reports] == [(0, 2, False), (2, 0, True)]
     assert reports[0]["end"] == reports[1]["end"]
 
 
@@ -151,14 +203,18 @@ def test_of_two_processes_that_miss_a_kernel_one_compiles_it(folder):
     jobs = [start(folder), start(folder)]
     reports = [finish(job) for job in jobs]
     assert all(r["warnings"] == [] for r in reports)
-    assert sorted(r["from_cache"] for r in reports) == [False, True]
+    for module in ("from_cache", "driver_from_cache"):
+        assert sorted(r[module] for r in reports) == [False, True]
     assert not [*folder.glob("*.tmp"), *folder.glob("*.lock")]
-    assert len(list(folder.glob("kernel_*.py"))) == 1
+    for module in MODULES:
+        assert len(list(folder.glob(f"{module}_*.py"))) == 1
     assert works(fresh())
 
 
-def test_the_lock_of_a_process_that_was_killed_keeps_nobody_waiting(folder):
-    name = f"kernel_{loading._fingerprint(SOURCE)[:32]}"
+@every_module
+def test_the_lock_of_a_process_that_was_killed_keeps_nobody_waiting(folder, module):
+    text = SOURCE.text if module == "kernel" else SOURCE.driver.text
+    name = f"{module}_{loading._fingerprint(text)[:32]}"
     holder = subprocess.Popen([sys.executable, "-c", HOLDER, str(folder), name], stdout=subprocess.PIPE, text=True)
     assert holder.stdout is not None
     assert holder.stdout.readline() == "held\n"
@@ -178,7 +234,9 @@ def test_the_kernel_keeps_its_text(compiled_folder, folder):
     assert compiled.digest == SOURCE.digest
     assert compiled.equations is SWING
     assert loading.load(SOURCE) is compiled, "the same kernel is loaded once"
-    assert stat.S_IMODE(Path(compiled.path).stat().st_mode) & 0o077 == 0
+    assert Path(compiled.driver.path).read_text(encoding="utf-8") == SOURCE.driver.text
+    for path in (compiled.path, compiled.driver.path):
+        assert stat.S_IMODE(Path(path).stat().st_mode) & 0o077 == 0
 
 
 def test_digests_are_stable_and_tell_kernels_apart():
@@ -195,17 +253,18 @@ def test_digests_are_stable_and_tell_kernels_apart():
 
 
 def test_the_file_name_follows_everything_that_shapes_machine_code(monkeypatch):
-    names = {loading._fingerprint(SOURCE)}
+    names = {loading._fingerprint(SOURCE.text)}
     import llvmlite.binding as llvm
     import numba
 
-    from synchain.codegen.simd import elementary, lanes
+    from synchain.codegen.driver import dimensions
+    from synchain.codegen.simd import addresses, elementary, lanes
 
     def changed(*change) -> None:
         with monkeypatch.context() as m:
             m.setattr(*change)
             loading._surroundings.cache_clear()
-            names.add(loading._fingerprint(SOURCE))
+            names.add(loading._fingerprint(SOURCE.text))
         loading._surroundings.cache_clear()
 
     changed(numba, "__version__", "9.9")
@@ -214,34 +273,164 @@ def test_the_file_name_follows_everything_that_shapes_machine_code(monkeypatch):
     changed(llvm, "get_host_cpu_features", lambda: {"beads": True})
     changed(lanes, "__file__", __file__)
     changed(elementary, "__file__", __file__)
+    changed(addresses, "__file__", __file__)
+    changed(dimensions, "__file__", __file__)
     changed(loading.importlib.metadata, "version", lambda name: "9.9")
     changed(loading.platform, "machine", lambda: "sun dial")
-    names.add(loading._fingerprint(dataclasses.replace(SOURCE, text=SOURCE.text + "\n")))
-    assert len(names) == 10
-    assert loading._fingerprint(SOURCE) in names
+    names.add(loading._fingerprint(SOURCE.text + "\n"))
+    assert len(names) == 12
+    assert loading._fingerprint(SOURCE.text) in names
+
+
+# -- kernels that nobody holds, and drivers ahead of time ------------------------------------------------------
+
+
+MANY = textwrap.dedent(
+    """
+    import dataclasses, gc, json, os, resource, sys, weakref
+    sys.path[:0] = sys.argv[1].split(os.pathsep)
+    from pathlib import Path
+    from test_load import SOURCE, TINY
+    from synchain.codegen.kernels.compile import load
+
+    def kernels():
+        made = []
+        for k in range(10, 50):
+            kernel = load(dataclasses.replace(SOURCE, text=TINY.replace("2.0", f"{k}.0")))
+            step = kernel.compiled.functions["step"]
+            made.append([weakref.ref(o) for o in (kernel, step, step.overloads[step.signatures[0]].library)])
+        return made
+
+    def resident():
+        gc.collect()
+        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
+
+    held, compiled, loaded = load(SOURCE), kernels(), kernels()
+    before = resident()
+    for _ in range(9):
+        kernels()
+    last = kernels()
+    grown = resident() - before
+    alive = [[sum(ref() is not None for ref in column) for column in zip(*made)] for made in (compiled, loaded, last)]
+    print(json.dumps({"alive": alive, "grown": grown, "held": load(SOURCE) is held}))
+    """
+)
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").is_file(), reason="needs the memory of a process in /proc")
+def test_kernels_that_nobody_holds_are_freed(folder):
+    """Of forty kernels in turn the last sixteen are kept, so each is loaded anew every time."""
+    done = subprocess.run(
+        [sys.executable, "-c", MANY, os.pathsep.join(map(str, (HERE, HERE.parents[1])))],
+        env={**os.environ, "SYNCHAIN_CACHE": str(folder)}, capture_output=True, text=True, check=True, timeout=300,
+    )  # fmt: skip
+    report = json.loads(done.stdout)
+    assert report["alive"] == [[0, 0, 0], [0, 0, 0], [16, 16, 16]], "kernels, functions, machine code"
+    assert report["held"], "a kernel that somebody holds is not loaded again"
+    assert report["grown"] < 20, "MiB after four hundred kernels; machine code itself is never freed by LLVM"
+
+
+WARMING = textwrap.dedent(
+    """
+    import json, os, sys
+    sys.path[:0] = sys.argv[1].split(os.pathsep)
+    from test_load import TinyDriver, KernelKind
+    from synchain.codegen.kernels import driver
+    from synchain.runtime.cli import main
+    driver.common_drivers = lambda: [TinyDriver(KernelKind.SWEEP, 1, scale=float(k)) for k in range(1, 5)]
+    sys.exit(main(["cache", "warm"]))
+    """
+)
+
+
+def warming(folder: Path) -> subprocess.Popen:
+    """A process that fills a cache with four small drivers."""
+    return subprocess.Popen(
+        [sys.executable, "-c", WARMING, os.pathsep.join(map(str, (HERE, HERE.parents[1])))],
+        env={**os.environ, "SYNCHAIN_CACHE": str(folder)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+
+
+def told(job: subprocess.Popen) -> list[str]:
+    """The first words of the lines of a process that fills a cache."""
+    text, _ = job.communicate(timeout=120)
+    assert job.returncode == 0
+    assert all(line.endswith("driver of sweeps, 1 lane (final state)") for line in text.splitlines())
+    return [line.partition("  ")[0] for line in text.splitlines()]
+
+
+def test_of_two_processes_that_fill_a_cache_one_compiles_each_driver(folder):
+    jobs = [warming(folder), warming(folder)]
+    lines = [told(job) for job in jobs]
+    assert [sorted(pair) for pair in zip(*lines, strict=True)] == [["compiled", "was there"]] * 4
+    assert not [*folder.glob("*.tmp"), *folder.glob("*.lock")]
+    assert len(machine_code(folder, "driver")) == 4
+
+
+def test_a_process_that_is_killed_while_it_fills_a_cache_leaves_whole_drivers(folder):
+    job = warming(folder)
+    assert job.stdout is not None
+    assert job.stdout.readline().startswith("compiled")
+    job.kill()
+    job.communicate()
+    lines = told(warming(folder))
+    assert lines[0] == "was there"
+    assert lines[-1] == "compiled", "the process was killed too late"
+    assert told(warming(folder)) == ["was there"] * 4
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_cache_that_cannot_be_filled_is_an_error(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(driver, "common_drivers", lambda: [TinyDriver(KernelKind.SWEEP, 1)])
+    monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path / "file"))
+    (tmp_path / "file").write_text("no folder")
+    loading.forget()
+    assert main(["cache", "warm"]) == 1
+    assert "drivers are not kept on disk" in capsys.readouterr().err
+
+
+def test_the_common_drivers_are_those_of_common_scenes():
+    common = driver.common_drivers()
+    assert len({made.text for made in common}) == len(common) == 12
+    width, speed = lanes.native_width(), real("v_1")[0]
+    for records in ((), ("sync_error",), ("section",), ("trajectory",), ("sync_error", "section")):
+        assert emit(friction_chain(3), "rodas5p", records, speed, width).driver in common
+    assert emit_modes(network_variation(friction_chain(2))).driver in common
+
+
+@pytest.mark.long
+def test_the_common_drivers_compile(folder, capsys):
+    for word in ("compiled", "was there"):
+        loading.forget()
+        assert main(["cache", "warm"]) == 0
+        assert [line.startswith(word) for line in capsys.readouterr().out.splitlines()] == [True] * 12
+    assert cache.describe()["drivers"] == 12
 
 
 # -- damage --------------------------------------------------------------------------------------------------
 
 
+@every_module
 @pytest.mark.parametrize("damage", ["empty", "half", "noise"])
-def test_damaged_files_are_compiled_anew(compiled_folder, folder, damage):
+def test_damaged_files_are_compiled_anew(compiled_folder, folder, damage, module):
     copied(compiled_folder, folder)
-    (path,) = machine_code(folder)
+    (path,) = machine_code(folder, module)
     whole = path.read_bytes()
     path.write_bytes({"empty": b"", "half": whole[: len(whole) // 2], "noise": b"\x93noise" * 40}[damage])
     compiled = fresh()
     assert works(compiled)
-    assert not compiled.from_cache
-    assert fresh().from_cache, "the repaired cache is used"
+    assert from_cache(compiled) == {**ALL_FROM_CACHE, module: False}
+    assert from_cache(fresh()) == ALL_FROM_CACHE, "the repaired cache is used"
 
 
-def test_a_changed_module_file_is_written_anew(compiled_folder, folder):
+@every_module
+def test_a_changed_module_file_is_written_anew(compiled_folder, folder, module):
     copied(compiled_folder, folder)
-    path = next(folder.glob("kernel_*.py"))
-    path.write_text(path.read_text().replace("2.0", "2.5") + "\nraise SystemExit('not ours')\n")
+    path = next(folder.glob(f"{module}_*.py"))
+    before = path.read_text()
+    path.write_text(before.replace("0", "5") + "\nraise SystemExit('not ours')\n")
     assert works(fresh())
-    assert path.read_text() == SOURCE.text
+    assert path.read_text() == before == (SOURCE.text if module == "kernel" else SOURCE.driver.text)
 
 
 def test_missing_machine_code_is_no_problem(compiled_folder, folder):
@@ -251,26 +440,37 @@ def test_missing_machine_code_is_no_problem(compiled_folder, folder):
     assert works(fresh())
 
 
-def test_one_wrong_bit_in_machine_code_is_not_run(compiled_folder, folder):
+@every_module
+def test_one_wrong_bit_in_machine_code_is_not_run(compiled_folder, folder, module):
     copied(compiled_folder, folder)
-    (path,) = machine_code(folder)
+    (path,) = machine_code(folder, module)
     content = bytearray(path.read_bytes())
     content[2 * len(content) // 3] ^= 4
     path.write_bytes(content)
     compiled = fresh()
-    assert not compiled.from_cache
+    assert from_cache(compiled) == {**ALL_FROM_CACHE, module: False}
     assert works(compiled)
-    assert fresh().from_cache
+    assert from_cache(fresh()) == ALL_FROM_CACHE
 
 
 def test_machine_code_of_another_kernel_is_not_run(compiled_folder, folder):
     copied(compiled_folder, folder)
     other = dataclasses.replace(SOURCE, text=TINY.replace("2.0", "5.0"))
-    (theirs,) = machine_code(folder)
+    (theirs,) = machine_code(folder, "kernel")
     mine = Path(fresh(other).path).with_suffix(".code")
     shutil.copyfile(theirs, mine)
     again = fresh(other)
     assert drive(again, [[1.0, 2.0]], [[]], [(0.0, 1.0)], 1e-9).end[0].tolist() == [5.0, 6.0]
+
+
+def test_machine_code_of_another_driver_is_not_run(compiled_folder, folder):
+    copied(compiled_folder, folder)
+    other = dataclasses.replace(SOURCE, driver=TinyDriver(KernelKind.SWEEP, 1, scale=10.0))
+    (theirs,) = machine_code(folder, "driver")
+    mine = Path(fresh(other).driver.path).with_suffix(".code")
+    shutil.copyfile(theirs, mine)
+    again = fresh(other)
+    assert drive(again, [[1.0, 2.0]], [[]], [(0.0, 1.0)], 1e-9).end[0].tolist() == [20.0, 60.0]
 
 
 def test_an_index_of_numba_is_not_read(compiled_folder, folder, tmp_path):
@@ -279,10 +479,11 @@ def test_an_index_of_numba_is_not_read(compiled_folder, folder, tmp_path):
     (folder / "__pycache__").mkdir(exist_ok=True)
     touch = f"import pathlib; pathlib.Path({str(tmp_path / 'ran')!r}).touch()"
     evil = pickle.dumps(numba.__version__) + pickle.dumps(Runs(touch))
-    (name,) = (path.stem for path in folder.glob("kernel_*.py"))
-    line = TINY[: TINY.index("@njit")].count("\n") + 1
     version = f"py{sys.version_info.major}{sys.version_info.minor}"
-    (folder / "__pycache__" / f"{name}.drive-{line}.{version}.nbi").write_bytes(evil)
+    for module, function, text in (("kernel", "step", TINY), ("driver", "drive", TINY_DRIVER)):
+        (name,) = (path.stem for path in folder.glob(f"{module}_*.py"))
+        line = text[: text.index("@njit")].count("\n") + 1
+        (folder / "__pycache__" / f"{name}.{function}-{line}.{version}.nbi").write_bytes(evil)
     for path in machine_code(folder):
         path.unlink()
     assert works(fresh())
@@ -299,9 +500,10 @@ class Runs:
         return exec, (self.line,)
 
 
-def test_what_python_keeps_beside_a_module_is_not_run(compiled_folder, folder):
+@every_module
+def test_what_python_keeps_beside_a_module_is_not_run(compiled_folder, folder, module):
     copied(compiled_folder, folder)
-    path = next(folder.glob("kernel_*.py"))
+    path = next(folder.glob(f"{module}_*.py"))
     status = path.stat()
     evil = folder / "evil.py"
     evil.write_text("raise SystemExit('not ours')")
@@ -328,12 +530,13 @@ def test_another_processor_compiles_its_own(compiled_folder, folder, monkeypatch
     loading._surroundings.cache_clear()
     try:
         compiled = fresh()
-        assert not compiled.from_cache
+        assert from_cache(compiled) == dict.fromkeys(MODULES, False)
         assert works(compiled)
     finally:
         monkeypatch.undo()
         loading._surroundings.cache_clear()
-    assert len(list(folder.glob("kernel_*.py"))) == 2
+    for module in MODULES:
+        assert len(list(folder.glob(f"{module}_*.py"))) == 2
 
 
 def test_a_full_disk_is_no_problem(folder, monkeypatch):
@@ -347,6 +550,12 @@ def test_a_full_disk_is_no_problem(folder, monkeypatch):
 def test_a_kernel_that_cannot_be_compiled_is_an_error(folder):
     broken = dataclasses.replace(SOURCE, text=TINY.replace("2.0", "undefined_name"))
     with pytest.raises(Exception, match="undefined_name"):
+        fresh(broken)
+
+
+def test_a_step_of_other_types_than_the_driver_calls_is_an_error(folder):
+    broken = dataclasses.replace(SOURCE, text=TINY.replace("broadcast(0.0, 1)", "0.0"))
+    with pytest.raises(Exception, match="float64"):
         fresh(broken)
 
 
@@ -370,16 +579,18 @@ def test_a_folder_that_others_can_write_is_refused(compiled_folder, folder, mode
     copied(compiled_folder, folder)
     folder.chmod(mode)
     compiled = warned(r"can be written by others; run: chmod go-w")
-    assert Path(compiled.path).parent != folder
-    assert not compiled.from_cache
+    assert folder not in (Path(compiled.path).parent, Path(compiled.driver.path).parent)
+    assert from_cache(compiled) == dict.fromkeys(MODULES, False)
 
 
 @posix
+@every_module
 @pytest.mark.parametrize("suffix", ["code", "py"])
-def test_a_file_that_others_can_write_is_refused(compiled_folder, folder, suffix):
+def test_a_file_that_others_can_write_is_refused(compiled_folder, folder, suffix, module):
     copied(compiled_folder, folder)
-    next(folder.glob(f"kernel_*.{suffix}")).chmod(0o666)
-    assert not warned("can be written by others; run: chmod go-w").from_cache
+    next(folder.glob(f"{module}_*.{suffix}")).chmod(0o666)
+    compiled = warned("can be written by others; run: chmod go-w")
+    assert from_cache(compiled) == {**ALL_FROM_CACHE, module: False}
 
 
 @posix
@@ -431,13 +642,14 @@ def test_missing_parents_are_made_for_the_user_alone(tmp_path, monkeypatch):
 
 
 @posix
+@every_module
 @pytest.mark.parametrize("suffix", ["code", "py"])
-def test_a_pipe_in_the_place_of_a_file_does_not_keep_anybody_waiting(compiled_folder, folder, suffix):
+def test_a_pipe_in_the_place_of_a_file_does_not_keep_anybody_waiting(compiled_folder, folder, suffix, module):
     copied(compiled_folder, folder)
-    path = next(folder.glob(f"kernel_*.{suffix}"))
+    path = next(folder.glob(f"{module}_*.{suffix}"))
     path.unlink()
     os.mkfifo(path, 0o600)
-    assert not warned("is a pipe or device; expected a file").from_cache
+    assert from_cache(warned("is a pipe or device; expected a file")) == {**ALL_FROM_CACHE, module: False}
 
 
 def test_a_read_only_folder_is_no_problem(folder, monkeypatch):
@@ -472,4 +684,4 @@ def test_a_good_folder_gives_no_warning(compiled_folder, folder):
     copied(compiled_folder, folder)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert fresh().from_cache
+        assert from_cache(fresh()) == ALL_FROM_CACHE

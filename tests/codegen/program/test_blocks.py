@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import ast
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import sympy as sp
-from samples import CASES, FLOATS, TABLE, friction_chain, path, plain, real, take_step
+from samples import CASES, FLOATS, TABLE, Interpreted, friction_chain, path, real, take_step
 from sympy.functions.elementary.piecewise import ExprCondPair
 
 from synchain.codegen import integrators
@@ -126,7 +127,7 @@ def test_names_avoid_those_that_are_taken():
 
 def test_constants_are_computed_before_the_stages():
     text = emit(friction_chain(2), "rodas5p", ("sync_error",), width=1).text
-    step = ast.parse(text[text.index("def step") : text.index("# A bank holds")].strip().split("\n\n\n")[0])
+    step = ast.parse(text[text.index("def step") :].strip().split("\n\n\n")[0])
     names = [
         s.targets[0].id for s in ast.walk(step) if isinstance(s, ast.Assign) and isinstance(s.targets[0], ast.Name)
     ]
@@ -159,15 +160,15 @@ def numbers_of(eq: Equations, method: str, looped: bool) -> list[float]:
     """Everything that a step writes, and a section function of state, parameters and time."""
     state, first, last = real(eq.state[2], eq.parameters[0], eq.parameters[6])
     section = state * first - TIME * last
-    space = plain(emit(eq, method, ("section",), section, width=1, unroll=0 if looped else 8).text, FLOATS)
+    kernel = Interpreted.of(emit(eq, method, ("section",), section, width=1, unroll=0 if looped else 8), FLOATS)
     made = program(eq)
     y, graph = [0.3, 0.1, -0.2, 0.5], (made.arrays, made.weights) if looped else ()
     found: list[float] = []
-    for name in ("step", "step_smooth") if space["SWITCHING"] else ("step",):
-        step = take_step(space, 0.3, 0.2, y, VALUES, 0.0, 1.0, *graph, name=name)
+    for name in ("step", "step_smooth") if kernel.source.driver.switching else ("step",):
+        step = take_step(kernel, 0.3, 0.2, y, VALUES, 0.0, 1.0, *graph, name=name)
         dense = [0.0 if d is None else d for d in step.dense]
         found += [*step.y_new, *dense, step.error, step.bound or 0.0]
-        found.append(space["section"](0.3, 0.3, 0.2, [*y, *VALUES], step.y_new, dense))
+        found.append(kernel.section(0.3, 0.3, 0.2, VALUES, replace(step, dense=dense)))
     return found
 
 

@@ -11,10 +11,12 @@ import pytest
 import sympy as sp
 from samples import CASES, TABLE, friction_chain, real
 
+from synchain.codegen.kernels.driver import Driver, KernelKind
 from synchain.codegen.kernels.sweep import emit
 from synchain.codegen.program.lowering import UnprintableError
 from synchain.models import chain
 from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.record import Record
 from synchain.models.mechanics.components import Node
 from synchain.models.scenes.scene import Scene
 
@@ -26,13 +28,47 @@ def test_golden_kernels(golden):
     golden("chain_1_dop853.txt", emit(friction_chain(1), "dop853", (), width=4).text)
 
 
+DRIVERS = {
+    "sync_error": Driver(KernelKind.SWEEP, 8, (Record.SYNC_ERROR,)),
+    "section": Driver(KernelKind.SWEEP, 8, (Record.SECTION,)),
+    "contacts": Driver(KernelKind.SWEEP, 8, contacts=True),
+    "looped": Driver(KernelKind.SWEEP, 8, looped=True),
+    "switching": Driver(KernelKind.SWEEP, 8, switching=True),
+    "modes": Driver(KernelKind.MODES, 8, contacts=True),
+}
+
+
+@pytest.mark.parametrize("name", DRIVERS)
+def test_golden_drivers(golden, name):
+    golden(f"driver_{name}.txt", DRIVERS[name].text)
+
+
+def test_scenes_of_the_same_kind_share_a_driver():
+    few, many = (emit(friction_chain(n), "rodas5p", ("section",), V_1, width=4) for n in (1, 5))
+    other = emit(
+        CASES["tanh pair"], "cash_karp", ("section",), sp.Symbol(CASES["tanh pair"].state[0], real=True), width=4
+    )
+    assert few.driver == many.driver == other.driver
+    assert few.dimensions != many.dimensions
+    ways = {
+        few.driver,
+        emit(friction_chain(1), "rodas5p", (), width=4).driver,
+        emit(friction_chain(1), "rodas5p", ("section",), V_1, width=8).driver,
+        emit(friction_chain(2), "rodas5p", ("section",), V_1, width=4, unroll=0).driver,
+        emit(friction_chain(1), "switching", ("section",), V_1, width=4).driver,
+    }
+    assert len({driver.text for driver in ways}) == 5
+
+
 def test_text_does_not_depend_on_the_hash_seed():
     program = (
         "import sys; sys.path.insert(0, sys.argv[1]); from samples import *\n"
         "from synchain.codegen.kernels.sweep import emit\n"
         "for eq in (CASES['looped'], CASES['friction 3']):\n"
-        "    for m in ('cash_karp', 'rodas5p'): print(emit(eq, m, ('section', 'trajectory'), "
-        "sp.Symbol(eq.state[-1], real=True) - sp.Rational(1, 3), width=2).text)\n"
+        "    for m in ('cash_karp', 'rodas5p'):\n"
+        "        source = emit(eq, m, ('section', 'trajectory'), "
+        "sp.Symbol(eq.state[-1], real=True) - sp.Rational(1, 3), width=2)\n"
+        "        print(source.text, source.driver.text)\n"
     )
     here = str(Path(__file__).parents[2])
     jobs = [
@@ -59,10 +95,14 @@ def test_the_header_says_what_runs():
 
 
 def test_records_that_are_not_wanted_cost_nothing():
-    text = emit(friction_chain(1), "cash_karp", (), width=4).text
-    for flag in ("SYNC_ERROR", "SECTION", "TRAJECTORY", "DENSE"):
-        assert f"\n{flag} = False\n" in text
-    assert "def section(" not in text
+    source = emit(friction_chain(1), "cash_karp", (), width=4)
+    for flag in ("SYNC_ERROR", "SECTION", "TRAJECTORY"):
+        assert f"\n{flag} = False\n" in source.driver.text
+        wanted = emit(friction_chain(1), "cash_karp", (flag.lower(),), V_1, width=4)
+        assert f"\n{flag} = True\n" in wanted.driver.text
+    assert "\nDENSE = False\n" in source.text
+    assert "def section(" not in source.text
+    assert "def section(" in emit(friction_chain(1), "cash_karp", ("section",), V_1, width=4).text
     assert "\nDENSE = True\n" in emit(friction_chain(1), "cash_karp", ("trajectory",), width=4).text
 
 

@@ -16,6 +16,7 @@ from samples import (
     DIGITS,
     TABLE,
     UNEQUAL,
+    Interpreted,
     friction_chain,
     harmonic_chain,
     plain,
@@ -180,8 +181,8 @@ def test_a_step_is_what_its_definition_says(case, method, looped, exact_numbers)
         with pytest.raises(ValueError, match="steps at most 0 nodes"):
             emit(eq, method, (), width=1, unroll=unroll)
         return
-    space = plain(emit(eq, method, ("trajectory",), width=1, unroll=unroll).text, EXACT)
-    assert space["LOOPED"] is looped
+    kernel = Interpreted.of(emit(eq, method, ("trajectory",), width=1, unroll=unroll), EXACT)
+    assert kernel.source.driver.looped is looped
     weights = [mpf(w.numerator) / w.denominator for _, _, w in by_joint(eq)]
     graph = (program(eq).arrays, np.array(weights, object)) if looped else ()
     steps = {"step": m} if m.smooth is None or looped else {"step": m, "step_smooth": m.smooth}
@@ -194,7 +195,7 @@ def test_a_step_is_what_its_definition_says(case, method, looped, exact_numbers)
         else:
             new, error, dense = explicit_reference(m, Right.of(eq, p), t, h, y)
         rtol, atol = mpf(1) / 7, mpf(1) / 1000
-        step = take_step(space, t, h, y, p, rtol, atol, *graph, name=name)
+        step = take_step(kernel, t, h, y, p, rtol, atol, *graph, name=name)
         assert close(step.y_new, new)
         assert close(step.dense[: len(dense)], dense)
         if len(steps) > 1:
@@ -226,8 +227,8 @@ def test_node_functions_of_the_friction_oscillator(exact_numbers):
     # `node` and `node_linear` by themselves; what they are given is computed at the beginning of the step
     eq = friction_chain(1)
     text = emit(eq, "rodas5p", (), width=1).text
-    head, rest = text.split("    # factors of shift - J\n")
-    space = plain(head + "    return locals()\n\n" + rest[rest.index("\n\n\n") :].replace("\n\n\n", "", 1), EXACT)
+    head, _ = text.split("    # factors of shift - J\n")  # the step is the last function
+    space = plain(head + "    return locals()\n", EXACT)
     for seed in range(6):
         y, p = states(eq, seed)
         found, f = space["step"](mpf(2), mpf(1) / 9, y, [*y, *p], [0, 0], [], 0, 1), Right.of(eq, p)
@@ -244,32 +245,33 @@ def test_a_section_function_is_evaluated_inside_the_step(exact_numbers):
     eq = third_order()
     x, z, a = real("x_1", "z_1", "a")
     section = x * z - a * TIME**2 + sp.Rational(1, 10)
-    space = plain(emit(eq, "rodas5p", ("section",), section, width=1).text, EXACT)
+    kernel = Interpreted.of(emit(eq, "rodas5p", ("section",), section, width=1), EXACT)
     y, p = states(eq, 4)
     t, h, theta = mpf(1) / 3, mpf(1) / 8, mpf(3) / 7
-    step = take_step(space, t, h, y, p)
-    inside = [space["inside"](theta, c, y, step.y_new, step.dense) for c in range(3)]
+    step = take_step(kernel, t, h, y, p)
+    inside = [kernel.inside(theta, c, step) for c in range(3)]
     expected = inside[0] * inside[2] - p[0] * (t + theta * h) ** 2 + mpf(1) / 10
-    assert abs(space["section"](theta, t, h, [*y, *p], step.y_new, step.dense) - expected) < SMALL
+    assert abs(kernel.section(theta, t, h, p, step) - expected) < SMALL
 
 
 def test_dense_output_meets_both_ends():
-    space = plain(emit(waving(), "dop853", ("trajectory",), width=1).text, DIGITS)
+    kernel = Interpreted.of(emit(waving(), "dop853", ("trajectory",), width=1), DIGITS)
     y = [mpf(1), mpf(0)]
-    step = take_step(space, mpf(0), mpf(1) / 4, y, [mpf(1) / 5])
+    step = take_step(kernel, mpf(0), mpf(1) / 4, y, [mpf(1) / 5])
     for c in range(2):
-        assert space["inside"](mpf(0), c, y, step.y_new, step.dense) == y[c]
-        assert space["inside"](mpf(1), c, y, step.y_new, step.dense) == step.y_new[c]
+        assert kernel.inside(mpf(0), c, step) == y[c]
+        assert kernel.inside(mpf(1), c, step) == step.y_new[c]
 
 
 @pytest.mark.parametrize("method", integrators.names())
 @pytest.mark.parametrize("broken", [mpf("nan"), mpf("inf")])
 def test_an_undefined_estimate_is_never_accepted(broken, method):
     # two nodes without links: what is wrong with one leaves the estimates of the other small
-    space = plain(emit(Equations.of_equal_nodes(harmonic_chain(2).node, None, 2), method, (), width=1).text, DIGITS)
+    unlinked = Equations.of_equal_nodes(harmonic_chain(2).node, None, 2)
+    kernel = Interpreted.of(emit(unlinked, method, (), width=1), DIGITS)
     tiny = mpf(10) ** -6
-    assert take_step(space, mpf(0), tiny, [mpf(1)] * 4, [], mpf(1), mpf(1)).error < 1
+    assert take_step(kernel, mpf(0), tiny, [mpf(1)] * 4, [], mpf(1), mpf(1)).error < 1
     for slot in range(4):
         y = [mpf(1)] * 4
         y[slot] = broken
-        assert not take_step(space, mpf(0), tiny, y, [], mpf(1), mpf(1)).error <= 1
+        assert not take_step(kernel, mpf(0), tiny, y, [], mpf(1), mpf(1)).error <= 1

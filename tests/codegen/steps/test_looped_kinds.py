@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 import sympy as sp
-from samples import FLOATS, clocks, plain, take_step
+from samples import FLOATS, Interpreted, clocks, take_step
 from scipy.integrate import solve_ivp
 
 from synchain.codegen.export.python import to_python
@@ -62,13 +62,13 @@ def test_loops_do_what_the_written_statements_do(case: str, method: str) -> None
     y, p = random.uniform(-1, 1, equations.dimension), random.uniform(0.5, 1.5, len(equations.parameters))
     ends = []
     for limit in (8, 0):
-        space = plain(emit(equations, method, (), width=1, unroll=limit, fill=fill).text, FLOATS)
-        assert space["LOOPED"] is (limit == 0)
+        kernel = Interpreted.of(emit(equations, method, (), width=1, unroll=limit, fill=fill), FLOATS)
+        assert kernel.source.driver.looped is (limit == 0)
         weights = [float(weight) for _, _, weight in by_joint(equations)]
         state, t, h = list(y), 0.0, 0.05
         for _ in range(10):
             graph = (program(equations, fill).arrays, weights) if limit == 0 else ()
-            state, t = take_step(space, t, h, state, list(p), 1e-6, 1e-6, *graph).y_new, t + h
+            state, t = take_step(kernel, t, h, state, list(p), 1e-6, 1e-6, *graph).y_new, t + h
         ends.append(state)
     assert program(equations).weights.tolist() == weights
     np.testing.assert_allclose(*ends, rtol=1e-11, atol=1e-11)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import inspect
 
 import pytest
+from samples import source_of
 
 from synchain.codegen.simd import elementary, lanes
 from synchain.models import chain, ring
@@ -80,8 +81,8 @@ def test_an_elementary_function_costs_what_its_text_does_in_both_benchmarks():
     `_expm1_parts` does.
     """
     made = counter(inspect.getsource(elementary))
-    text = "LOOPED = False\ndef step(y, p):\n    return tanh(load(y, 0, 1))*load(y, 1, 1)\n"
-    assert operations(text) == 1 + made.count("tanh")
+    text = "def step(y, p):\n    return tanh(load(y, 0, 1))*load(y, 1, 1)\n"
+    assert operations(source_of(text)) == 1 + made.count("tanh")
     assert made.count("tanh") == made.count("_expm1_parts") + 9 + 3 + 1 + 2 * 2
     assert skip.operations is operations
     assert roofline.operations is operations
@@ -89,7 +90,7 @@ def test_an_elementary_function_costs_what_its_text_does_in_both_benchmarks():
 
 def test_kernels_with_loops_are_refused():
     with pytest.raises(ValueError, match="unrolled"):
-        operations("LOOPED = True\ndef step(y, p):\n    return load(y, 0, 1)\n")
+        operations(source_of("def step(y, p):\n    return load(y, 0, 1)\n", looped=True))
 
 
 @pytest.mark.parametrize("oscillator", ["friction", "duffing", "harmonic"])
@@ -97,9 +98,7 @@ def test_kernels_with_loops_are_refused():
 def test_every_unrolled_kernel_can_be_counted(oscillator, integrator):
     """One more link of a ring than of a chain costs more, whatever the node."""
     counts = [
-        operations(
-            kernel_source(Scene(oscillator=oscillator, topology=graph, integrator=integrator), reduce=False).text
-        )
+        operations(kernel_source(Scene(oscillator=oscillator, topology=graph, integrator=integrator), reduce=False))
         for graph in (chain(3), ring(3))
     ]
     assert 0 < counts[0] < counts[1]

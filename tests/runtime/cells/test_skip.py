@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from samples import source_of
 
 from synchain.models import chain, ring, star
 from synchain.models.dynamics import reduction as reduction_module
@@ -328,22 +329,22 @@ def test_a_scene_without_anything_has_everything_left_out():
 
 
 def test_operations_are_counted_with_the_functions_they_call():
-    text = "DENSE = False\nLOOPED = False\ndef node(x):\n    return x*x + exp(-x)\n"
+    text = "DENSE = False\ndef node(x):\n    return x*x + exp(-x)\n"
     text += "def step(y, p):\n    a = load(y, 2*3, 8)\n    b = node(a) - node(2.0)\n    store(y, 1 + 2, b/a)\n"
     text += "    if DENSE:\n        b = a*a*a\n    return b\n"
-    e = bench.operations("LOOPED = False\ndef step(y, p):\n    return exp(y)\n")
+    e = bench.operations(source_of("def step(y, p):\n    return exp(y)\n"))
     assert e > 10
-    assert bench.operations(text) == 2 * (2 + e) + 2
-    assert bench.operations(text.replace("DENSE = False", "DENSE = True")) == 2 * (2 + e) + 4
+    assert bench.operations(source_of(text)) == 2 * (2 + e) + 2
+    assert bench.operations(source_of(text.replace("DENSE = False", "DENSE = True"))) == 2 * (2 + e) + 4
     with pytest.raises(ValueError, match="unrolled"):
-        bench.operations(text.replace("LOOPED = False", "LOOPED = True"))
+        bench.operations(source_of(text, looped=True))
 
 
 @pytest.mark.parametrize("case", bench.CASES, ids=lambda case: case.name)
 def test_every_case_of_the_benchmark_skips_something(case):
     fewer, more = bench.scenes(case, quick=True)
     assert fewer.skipped or len(fewer.records) < len(more.records)
-    counts = [bench.operations(kernel_source(chosen.scene, reduce=chosen).text) for chosen in (fewer, more)]
+    counts = [bench.operations(kernel_source(chosen.scene, reduce=chosen)) for chosen in (fewer, more)]
     assert counts[0] > 0
     assert counts[0] < counts[1] or case.fold_all
 

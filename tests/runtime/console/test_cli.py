@@ -206,8 +206,13 @@ def test_kernel_prints_the_source_without_compiling(
     monkeypatch.delattr(kernels, "load")
     assert main(["kernel", scene]) == 0
     out = capsys.readouterr().out
-    assert out == kernels.kernel_source(load_scene(scene)).text
+    source = kernels.kernel_source(load_scene(scene))
+    assert out == source.text
     compile(out, "kernel", "exec")
+    assert main(["kernel", scene, "--driver"]) == 0
+    out = capsys.readouterr().out
+    assert out == source.driver.text
+    compile(out, "driver", "exec")
 
 
 @pytest.mark.usefixtures("compiled")
@@ -463,11 +468,13 @@ def test_the_cache_is_described_and_emptied(
     assert "kernels  0" in capsys.readouterr().out
     folder.mkdir()
     (folder / "kernel_1.py").write_text("x" * 2000)
+    (folder / "driver_1.py").write_text("x" * 1000)
+    (folder / "driver_2.py").write_text("x" * 1000)
     (folder / "note.txt").write_text("not a kernel")
     assert main(["cache", "info"]) == 0
-    assert capsys.readouterr().out.splitlines() == [f"folder   {folder}", "kernels  1", "size     2 kB"]
+    assert capsys.readouterr().out.splitlines() == [f"folder   {folder}", "kernels  1", "drivers  2", "size     4 kB"]
     assert main(["cache", "clear"]) == 0
-    assert capsys.readouterr().out == f"deleted 1 kernel from {folder}\n"
+    assert capsys.readouterr().out == f"deleted 1 kernel and 2 drivers from {folder}\n"
     assert [path.name for path in folder.iterdir()] == ["note.txt"]
 
 

@@ -22,7 +22,7 @@ def outcome(name: str) -> doctor.Check:
 def test_a_sound_installation_without_a_cache(tmp_path: Path, monkeypatch, capsys) -> None:
     (tmp_path / "file").write_text("no folder")
     monkeypatch.setenv("SYNCHAIN_CACHE", str(tmp_path / "file"))
-    loading._load.cache_clear()
+    loading.forget()
     assert main(["doctor", "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["sound"] is True
