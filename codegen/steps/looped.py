@@ -1,7 +1,7 @@
 """The statements of a step for a large network: loops over nodes and links around the same node functions.
 
 The text has the same size for any number of nodes; it is compiled anew for each only because that number is a constant.
-Nodes of several kinds have a loop for each kind, and their links one for each pair of kinds (codegen/places.py).
+Nodes of several kinds have a loop for each kind, and their links one for each pair of kinds (codegen/steps/places.py).
 """
 
 from __future__ import annotations
