@@ -40,18 +40,11 @@ ARROWS = {
     "codegen.simd": "",
     "codegen.integrators": "",
     "codegen.driver": "simd",
-<<<<<<< HEAD
-    "codegen.printing": "simd models",
-    "codegen.steps": "printing integrators models",
-    "codegen.taylor": "steps printing integrators simd models",
-    "codegen.kernels": "taylor steps printing driver integrators simd models",
-    "codegen.export": "printing models",
-=======
     "codegen.program": "",
     "codegen.steps": "program integrators simd models",
-    "codegen.kernels": "steps program driver integrators simd models",
+    "codegen.taylor": "steps program integrators simd models",
+    "codegen.kernels": "taylor steps program driver integrators simd models",
     "codegen.export": "program models",
->>>>>>> ir
     "runtime.support": "models.inputs",
     "runtime.cells": "support codegen models",
     "runtime.prediction": "support models",

@@ -8,7 +8,6 @@ from ..simd.lanes import load
 from .names import SERIES, WIDTH
 
 
-
 # --- kernel text below ---
 @njit(error_model="numpy", forceinline=True)
 def inside(theta, c, y, y_new, dense, dims):

@@ -16,7 +16,6 @@ from ..program.expressions import (
     ZERO,
     Compare,
     Expression,
-    Junction,
     Load,
     Name,
     Number,
@@ -60,7 +59,7 @@ def _written_out(equations: Equations, names: Names) -> list[Statement]:
     contacts = [found for i in range(equations.n) if (found := equations.contact_at(i)) is not None]
     body = share([e for column in zip(*map(_columns, contacts), strict=True) for e in column], names.fresh("z"))
     states = [let(name, Load("y", Number(k))) for k, name in enumerate(equations.state) if _in(name, body.symbols)]
-    stores = [store("out", k, lane(_lower(e))) for k, e in enumerate(body.results)]
+    stores = [store("out", k, lane(lower(e))) for k, e in enumerate(body.results)]
     return [*states, *_parameters(equations, body.symbols), *_assigned(body), *stores]
 
 
@@ -73,10 +72,10 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
     body = share([fixed.apply(e) for e in _columns(node.contact)], names.fresh("z"))
     force, link = _force(equations.edges, node.contact)
     used = body.symbols.union(*(e.free_symbols for e in (*fixed.table, *link)))
-    before = [*_parameters(equations, used), *(let(s.name, lane(_lower(e))) for e, s in fixed.table.items())]
+    before = [*_parameters(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]
     own: list[Statement] = [let(s.name, Load("y", _place(k, "i"))) for k, s in enumerate(node.state) if s in used]
     own += _assigned(body)
-    own += [store("out", _place(k, "i"), lane(_lower(e))) for k, e in enumerate(body.results)]
+    own += [store("out", _place(k, "i"), lane(lower(e))) for k, e in enumerate(body.results)]
     if not force:
         return [*before, nodes.over(own)]
     unpacked = Assign(NAMES, Name("graph"), whole=True)
@@ -118,11 +117,12 @@ def _release(events: Events, variation: Variation, names: Names) -> list[Functio
     ]
     loaded = enumerate(strengths)
     body += [let(s, register("strengths", len(strengths), k)) for k, s in loaded if _in(s, used)]
-    for i, (up, down) in enumerate(events.exits):
-        for sign, entries in ((">", up), ("<", down)):
-            side = Compare(sign, Name("after"), ZERO)
-            condition = Junction("both", (Compare("==", Name("i"), Number(i)), side))
-            body.append(If(condition, tuple(_gained(entries, size, names))))
+    for i, sides in enumerate(events.exits):
+        after = [
+            If(Compare(sign, Name("after"), ZERO), tuple(_gained(entries, size, names)))
+            for sign, entries in zip("><", sides, strict=True)
+        ]
+        body.append(If(Compare("==", Name("i"), Number(i)), tuple(after)))
     about = "Where a contact begins to slip and friction drops at once, deviations that let go early have gained a velocity."
     arguments = ("i", "after", "t", "y", "strengths", "modes", "which")
     return [Function("release", arguments, about, tuple(body), inline=False)]
@@ -138,13 +138,13 @@ def _gained(entries: Sequence[Entry], size: int, names: Names) -> list[Statement
     body = share([e for _, e in entries], names.fresh("z"))
     rows: dict[int, list[Expression]] = {}
     for ((row, column), _), e in zip(entries, body.results, strict=True):
-        rows.setdefault(row, []).append(Product((_lower(e), register("modes", size, column))))
+        rows.setdefault(row, []).append(Product((lower(e), register("modes", size, column))))
     stores = [store("modes", size * Name("which") + row, plus(*terms)) for row, terms in rows.items()]
     return [*_assigned(body), *stores]
 
 
 def _assigned(body: Body) -> list[Statement]:
-    return [let(s.name, _lower(e)) for s, e in body.statements]
+    return [let(s.name, lower(e)) for s, e in body.statements]
 
 
 def _place(c: int, index: str) -> Expression:
@@ -154,10 +154,6 @@ def _place(c: int, index: str) -> Expression:
 def _parameters(equations: Equations, used: set[sp.Symbol]) -> list[Statement]:
     first = equations.dimension
     return [let(p, Load("p", Number(first + k))) for k, p in enumerate(equations.parameters) if _in(p, used)]
-
-
-def _lower(e: sp.Expr) -> Expression:
-    return lower(e.xreplace({TIME: sp.Symbol("t")}))
 
 
 def _in(name: str, used: set[sp.Symbol]) -> bool:

@@ -1,7 +1,7 @@
 """The statements of a step for a large network: loops over nodes and links around the same node functions.
 
 The text has the same size for any number of nodes; it is compiled anew for each only because that number is a constant.
-Nodes of several kinds have a loop for each kind, and their links one for each pair of kinds (codegen/places.py).
+Nodes of several kinds have a loop for each kind, and their links one for each pair of kinds (codegen/steps/places.py).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..program.statements import Assign, Do, If, Return, Statement, accumulate, 
 from .blocks import NodeBlocks
 from .mass import momentum_slopes
 from .names import NAMES
-from .places import Joint, Kind, Places, link_ends, named, span
+from .places import Joint, Kind, link_ends, named, places, span
 from .program import Program
 from .step import Block, Step, lane, time_term
 from .unrolled import entry
@@ -41,7 +41,7 @@ class Looped(Step):
         self, equations: Equations, kinds: Sequence[NodeBlocks], method: Integrator, elimination: Program
     ) -> None:
         super().__init__(equations, kinds, method)
-        self.places, self.elimination = Places(equations), elimination
+        self.places, self.elimination = places(equations), elimination
         self.mass = LoopMass(self)
 
     def opening(self) -> None:
@@ -139,8 +139,7 @@ class Looped(Step):
         self.timed("t", self.wanted([blocks.linear for blocks in self.kinds]))
         self.put(*filled("MATRIX", Name("shift")))
         slopes = [self.kinds[kind.number].linear.results[-len(kind.node.state) :] for kind in kinds]
-        moving = [[e != 0 for e in own] for own in slopes]
-        self.timed_rows = [any(map(any, moving))] if self.places.mixed else moving[0]
+        self.timed_rows = {self.places.row_of(c) for own in slopes for c, e in enumerate(own) if e != 0}
         for kind in kinds:
             self.node_linear(kind)
         self.links("y", "" if self.mass.at_start() else "SLOPE", jacobian=True)
@@ -157,7 +156,7 @@ class Looped(Step):
         named = [e if self.is_plain(e) else sp.Symbol(k, real=True) for k, e in zip(names, body.results, strict=True)]
         for c in range(size):
             found.append(store("dense", plus(Name("SLOPE"), place(c)), lane(lower(named[c]))))
-            if self.timed_rows[0 if self.places.mixed else c]:
+            if self.places.row_of(c) in self.timed_rows:
                 slope = lane(lower(named[size + size * size + c]))
                 found.append(store("dense", plus(Name("TIME_SLOPE"), place(c)), slope))
         block = tuple(tuple(named[size + a * size : size + (a + 1) * size]) for a in range(size))
@@ -188,7 +187,7 @@ class Looped(Step):
                 found += self.load_stages(place, m.big_c[i])
                 more, terms = self.mass.known(place, terms[0], linear(m.big_c[i], self.stages(i)))
                 found += more
-            if m.d[i] != 0.0 and self.timed_rows[row]:
+            if m.d[i] != 0.0 and row in self.timed_rows:
                 terms.append(time_term(m.d[i], Load("dense", plus(Name("TIME_SLOPE"), place))))
             self.put(rows.over([*found, store("dense", plus(Name(f"K{i + 1}"), place), plus(*terms))]))
         if i > 0:

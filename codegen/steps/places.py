@@ -22,7 +22,19 @@ from ..program.expressions import Expression, Load, Name, Number, Value, as_expr
 from ..program.passes import Body
 from ..program.statements import Loop, Statement, let, whole
 
-__all__ = ["Joint", "Kind", "Places", "by_joint", "by_kind", "joint_numbers", "link_ends", "named", "span", "table"]
+__all__ = [
+    "Joint",
+    "Kind",
+    "Places",
+    "by_joint",
+    "by_kind",
+    "joint_numbers",
+    "link_ends",
+    "named",
+    "places",
+    "span",
+    "table",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,27 +75,42 @@ class Joint:
 
 
 class Places:
-    """The places where loops over the nodes and links of a network read and write."""
+    """The places where loops over the nodes and links of a network read and write; this one has nodes of one kind."""
 
     def __init__(self, equations: Equations) -> None:
-        self.equations, self.mixed = equations, equations.mixed
         self.size = max(len(node.state) for node in equations.nodes)
-        self.kinds, self.joints = _kinds(equations), _joints(equations)
-        self.slots: dict[str, int] = {}
-        if equations.varied:
-            self.slots = {name: slot for slot, name in enumerate(equations.parameters, start=equations.dimension)}
+        self.varied = equations.varied
+        self.slots = {name: slot for slot, name in enumerate(equations.parameters, start=equations.dimension)}
+        counts = [equations.kind_of.count(k) for k in range(len(equations.nodes))]
+        parts = zip(equations.nodes, self.spans("i", "NODES", counts), strict=True)
+        self.kinds = tuple(Kind(node, k, part) for k, (node, part) in enumerate(parts))
+        self.joints: tuple[Joint, ...] = ()
+        if equations.links:
+            numbers, nodes = joint_numbers(equations), equations.nodes
+            shares = [numbers.count(k) for k in range(len(equations.edge_of))]
+            ends = zip(equations.edge_of, self.spans("e", "target.size", shares), strict=True)
+            self.joints = tuple(Joint(edge, nodes[a], nodes[b], part) for ((a, b), edge), part in ends)
+
+    def spans(self, index: str, stop: str, counts: Sequence[int]) -> list[Span]:
+        """The parts of a numbering that have one template each: here one part."""
+        return [span(index, stop)]
 
     @property
     def rows(self) -> list[tuple[Span, Expression]]:
         """Loops over all states for what is done to each alike, and the place of a state."""
-        if self.mixed:
-            return [(span("i", "DIMENSION"), Name("i"))]
         return [(span("i", "NODES"), self.place(c)) for c in range(self.size)]
+
+    def row_of(self, c: int) -> int:
+        """Which of the `rows` has state c of the nodes."""
+        return c
 
     def place(self, c: int, index: str = "i") -> Expression:
         """Where state c of a node stands."""
-        slot = c * Name("NODES") + index
-        return Load("where", slot, None) if self.mixed else slot
+        return c * Name("NODES") + index
+
+    def parameter(self, number: int) -> Expression:
+        """Where a node has its own value of one of the parameters that differ."""
+        return Number(self.slots[f"{self.varied[number]}_1"]) + "i"
 
     def read(self, node: Node, base: str, suffix: str = "", index: str = "i", prefix: str = "") -> list[Statement]:
         """Load the states of one node from an array or a part of the workspace."""
@@ -94,17 +121,42 @@ class Places:
     def own(self, body: Body) -> list[Statement]:
         """Load the parameters that a node has for itself, those that a body uses."""
         used = {s.name for s in body.symbols}
-        found: list[Statement] = []
-        for row, name in enumerate(self.equations.varied, start=self.size):
-            if name in used:
-                slot = self.place(row) if self.mixed else Number(self.slots[f"{name}_1"]) + "i"
-                found.append(let(name, Load("p", slot)))
-        return found
+        return [let(name, Load("p", self.parameter(k))) for k, name in enumerate(self.varied) if name in used]
 
     def entry(self, slot: str, a: int, b: int) -> Expression:
         """Where an entry of a node's or a link's block stands in a matrix, by the array of its slots."""
         length, index = ("NODES", "i") if slot == "node_slot" else ("target.size", "e")
         return Load(slot, (a * self.size + b) * Name(length) + index, None)
+
+
+class MixedPlaces(Places):
+    """Nodes of several kinds: their states stand where the array `where` says."""
+
+    def spans(self, index: str, stop: str, counts: Sequence[int]) -> list[Span]:
+        """Parts that follow each other through a numbering."""
+        return [span(index, b, a) for a, b in pairwise(accumulate(counts, initial=0))]
+
+    @property
+    def rows(self) -> list[tuple[Span, Expression]]:
+        """One loop over all states."""
+        return [(span("i", "DIMENSION"), Name("i"))]
+
+    def row_of(self, c: int) -> int:
+        """The only row."""
+        return 0
+
+    def place(self, c: int, index: str = "i") -> Expression:
+        """Where state c of a node stands."""
+        return Load("where", super().place(c, index), None)
+
+    def parameter(self, number: int) -> Expression:
+        """Where a node has its own value of one of the parameters that differ."""
+        return self.place(self.size + number)
+
+
+def places(equations: Equations) -> Places:
+    """Return where loops find the nodes and links of a network."""
+    return (MixedPlaces if equations.mixed else Places)(equations)
 
 
 def link_ends(edge: Edge) -> list[Statement]:
@@ -121,28 +173,6 @@ def named(joint: Joint) -> dict[sp.Symbol, sp.Symbol]:
         for symbols, node, suffix in ends
         for s, own in zip(symbols, node.state, strict=True)
     }
-
-
-def _kinds(equations: Equations) -> tuple[Kind, ...]:
-    counts = [equations.kind_of.count(k) for k in range(len(equations.nodes))]
-    spans = _spans("i", counts) if equations.mixed else [span("i", "NODES")]
-    return tuple(Kind(node, k, part) for k, (node, part) in enumerate(zip(equations.nodes, spans, strict=True)))
-
-
-def _joints(equations: Equations) -> tuple[Joint, ...]:
-    if not equations.links:
-        return ()
-    numbers, nodes = joint_numbers(equations), equations.nodes
-    counts = [numbers.count(k) for k in range(len(equations.edge_of))]
-    spans = _spans("e", counts) if equations.mixed else [span("e", "target.size")]
-    return tuple(
-        Joint(edge, nodes[a], nodes[b], part) for ((a, b), edge), part in zip(equations.edge_of, spans, strict=True)
-    )
-
-
-def _spans(index: str, counts: Sequence[int]) -> list[Span]:
-    """Parts that follow each other through a numbering."""
-    return [span(index, b, a) for a, b in pairwise(accumulate(counts, initial=0))]
 
 
 def joint_numbers(equations: Equations) -> list[int]:

@@ -18,7 +18,7 @@ from synchain.models.mechanics.components import TIME, Node
 from ..program.passes import Body, Hoist, Names
 from ..program.printers import LANES
 from ..steps.names import NAMES
-from ..steps.places import Joint, Kind, Places, Span
+from ..steps.places import Joint, Kind, Span, places
 from .graph import Graph, Template
 from .series import Constant, Series, State, Time
 from .step import TaylorStep, called, finished
@@ -162,7 +162,7 @@ class LoopWriter:
     """Writes the looped step of some order for tidy equations."""
 
     def __init__(self, equations: Equations, order: int) -> None:
-        self.equations, self.order, self.places = equations, order, Places(equations)
+        self.equations, self.order, self.places = equations, order, places(equations)
         eq = equations
         named = {s for node in eq.nodes for s in (*node.state, *node.parameters)}
         named |= {s for edge in eq.edges for s in (edge.weight, *edge.parameters)}
