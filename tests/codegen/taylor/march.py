@@ -11,13 +11,18 @@ import numpy as np
 from numba import njit as numba_njit
 
 from synchain.codegen import simd
-from synchain.codegen.printing.names import tidy
+from synchain.codegen.steps.names import tidy
 from synchain.codegen.steps.program import program
 from synchain.codegen.taylor import TaylorStep, write_looped, write_step
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import Node
 
-SPACE = {name: getattr(simd, name) for name in simd.__all__}
+def plain(**options: Any) -> Callable[..., Any]:
+    """The decorator of kernels for text that stands in no file."""
+    return simd.njit(**{**options, "cache": False})
+
+
+SPACE = {name: getattr(simd, name) for name in simd.__all__} | {"njit": plain}
 
 
 def alone(state: Sequence[Any], rhs: Sequence[Any], parameters: Sequence[Any] = ()) -> Equations:

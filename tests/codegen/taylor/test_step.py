@@ -17,7 +17,7 @@ from march import Lanes, alone, compiled, step_of
 from samples import friction_scene, numbers, path, spring
 from scipy.integrate import solve_ivp
 
-from synchain.codegen.printing.names import tidy
+from synchain.codegen.steps.names import tidy
 from synchain.codegen.taylor import order_for, write_looped
 from synchain.models import Scene, chain
 from synchain.models.dynamics.equations import Equations
