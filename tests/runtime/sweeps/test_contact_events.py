@@ -32,7 +32,7 @@ def scene(graph: Topology, x: list[float], v: list[float], window: float = 1.0, 
 
 def ran(made: Scene, **more: Any) -> Result:
     """All cells, as they stand, to the end."""
-    result = run(made, show_progress=False, **{"skip": False, "workers": 1, **more})
+    result = run(made, show_progress=False, **{"reduce": False, "workers": 1, **more})
     assert np.all(result.status == Status.FINISHED)
     return result
 
