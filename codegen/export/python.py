@@ -9,16 +9,7 @@ import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 
-from ..program.expressions import (
-    Expression,
-    Load,
-    Name,
-    Number,
-    Product,
-    Slice,
-    call,
-    plus,
-)
+from ..program.expressions import Expression, Load, Name, Number, Product, Slice, call, plus
 from ..program.printers import NUMPY
 from ..program.statements import Array, Do, Return, Statement, Store, let, whole
 from .body import (

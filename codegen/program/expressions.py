@@ -10,9 +10,32 @@ from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
 __all__ = [
-    "ONE", "ZERO", "Call", "Choice", "Compare", "Expression", "Junction", "Load", "Name", "Negation", "Not", "Number",
-    "Power", "Product", "Quotient", "Slice", "Sum", "Value", "as_expression", "call", "linear", "negative", "plus", "product", "scaled",
-]  # fmt: skip
+    "ONE",
+    "ZERO",
+    "Call",
+    "Choice",
+    "Compare",
+    "Expression",
+    "Junction",
+    "Load",
+    "Name",
+    "Negation",
+    "Not",
+    "Number",
+    "Power",
+    "Product",
+    "Quotient",
+    "Slice",
+    "Sum",
+    "Value",
+    "as_expression",
+    "call",
+    "linear",
+    "negative",
+    "plus",
+    "product",
+    "scaled",
+]
 
 
 class Expression:

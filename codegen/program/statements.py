@@ -6,18 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from .expressions import (
-    Call,
-    Expression,
-    Load,
-    Name,
-    Power,
-    Product,
-    Quotient,
-    Sum,
-    Value,
-    as_expression,
-)
+from .expressions import Call, Expression, Load, Name, Power, Product, Quotient, Sum, Value, as_expression
 
 __all__ = [
     "Accumulate",
@@ -43,7 +32,7 @@ __all__ = [
     "values",
     "walk",
     "whole",
-]  # fmt: skip
+]
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,17 +12,7 @@ from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import TIME, Edge
 from synchain.models.mechanics.friction import Contact
 
-from ..program.expressions import (
-    ZERO,
-    Compare,
-    Expression,
-    Load,
-    Name,
-    Number,
-    Product,
-    call,
-    plus,
-)
+from ..program.expressions import ZERO, Compare, Expression, Load, Name, Number, Product, call, plus
 from ..program.lowering import lower
 from ..program.passes import Body, Hoist, Names, share
 from ..program.statements import Assign, Function, If, Statement, accumulate, let, store

@@ -20,7 +20,7 @@ from ..program.expressions import Expression, Name, Product
 from ..program.lowering import lower
 from ..program.statements import let
 from .elimination import Entries, Entry, Factors, plan, write_elimination, write_solve
-from .step import Block, Step
+from .step import Block, Step, prefix
 
 __all__ = ["Mass", "momentum_slopes"]
 
@@ -72,8 +72,7 @@ class Mass:
     def factorise(self, base: str) -> None:
         """Write the elimination of M at a vector of states."""
         w, rows = self.writer, self.rows
-        before = "" if base == "y" else f"{base}_"
-        at = {sp.Symbol(n, real=True): sp.Symbol(before + n, real=True) for n in w.state}
+        at = {sp.Symbol(n, real=True): sp.Symbol(prefix(base) + n, real=True) for n in w.state}
         place = {row: k for k, row in enumerate(rows)}
         matrix = {
             (place[r], place[c]): e.xreplace(at) for (r, c), e in self.entries.items() if r in place and c in place

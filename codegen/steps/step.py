@@ -17,7 +17,7 @@ from ..program.passes import Body
 from ..program.statements import Assign, Comment, Function, Return, Statement, let
 from .blocks import NodeBlocks
 
-__all__ = ["PAIR", "SCALED", "Block", "Step", "function_name", "lane", "node_function", "time_term"]
+__all__ = ["PAIR", "SCALED", "Block", "Step", "function_name", "lane", "node_function", "prefix", "time_term"]
 
 Block = tuple[tuple[sp.Expr, ...], ...]
 """Entries of a matrix that belong to one node or to one end of a link."""
@@ -51,6 +51,11 @@ def node_function(name: str, about: str, body: Body, arguments: Sequence[str], r
 def lane(e: Expression, width: str = "WIDTH") -> Expression:
     """The same value as a register: numbers are spread over its lanes."""
     return call("broadcast", e, width) if isinstance(e, Number) else e
+
+
+def prefix(vector: str) -> str:
+    """What stands before the name of a state in a vector; nothing at the start of the step."""
+    return "" if vector == "y" else f"{vector}_"
 
 
 def time_term(weight: float, slope: Expression) -> Expression:

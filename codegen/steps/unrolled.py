@@ -9,24 +9,13 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 
 from ..integrators import Integrator
-from ..program.expressions import (
-    ZERO,
-    Call,
-    Expression,
-    Load,
-    Name,
-    Number,
-    Product,
-    call,
-    linear,
-    plus,
-)
+from ..program.expressions import ZERO, Call, Expression, Load, Name, Number, Product, call, linear, plus
 from ..program.lowering import lower
 from ..program.statements import If, Return, let, store
 from .blocks import NodeBlocks
 from .elimination import Entries, plan, write_factors, write_solve
 from .mass import Mass
-from .step import Step, lane, time_term
+from .step import Step, lane, prefix, time_term
 
 __all__ = ["Unrolled", "entry", "stage_state"]
 
@@ -269,11 +258,6 @@ class Unrolled(Step):
         size = call("sqrt", e5 * e5 + 0.01 * Product((e3, e3)) + 2.2250738585072014e-308)
         self.let(f"e_{name}", h * e5 * call("absolute", e5) / size)
         return Name(f"e_{name}")
-
-
-def prefix(vector: str) -> str:
-    """What stands before the name of a state in a vector; nothing at the start of the step."""
-    return "" if vector == "y" else f"{vector}_"
 
 
 def stage_state(row: Sequence[float], previous: Sequence[float], name: str) -> Expression:
