@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -84,11 +85,9 @@ class Driver:
             f"Records     {', '.join(('final state', *self.records))}",
             '"""',
         ]
-        imports = (
-            f"import math\n\nimport numpy as np\n\nfrom synchain.codegen.simd import {', '.join(sorted(simd.__all__))}"
-        )
         constants = "\n".join(f"{name} = {value!r}" for name, value in self.constants.items())
-        return "\n\n\n".join(["\n".join(lines), imports, constants, *map(driver.text, pieces)]) + "\n"
+        body = "\n\n\n".join(map(driver.text, pieces)) + "\n"
+        return "\n\n\n".join(["\n".join(lines), imports(body), constants, body])
 
     @property
     def digest(self) -> str:
@@ -97,11 +96,19 @@ class Driver:
 
 
 def common_drivers() -> list[Driver]:
-    """Return the drivers that most scenes need: of written-out steps at the processor's width, without and with contacts."""
+    """Return the drivers that most scenes need: of written-out steps at the processor's width."""
     width = native_width()
     sync_error, section, trajectory = Record.SYNC_ERROR, Record.SECTION, Record.TRAJECTORY
     records = ((), (sync_error,), (section,), (trajectory,), (sync_error, section))
+    ways = ((False, False), (False, True), (True, True))  # contacts, series
     return [
-        *(Driver(KernelKind.SWEEP, width, r, contacts=contacts) for contacts in (False, True) for r in records),
+        *(Driver(KernelKind.SWEEP, width, r, contacts=c, series=s) for c, s in ways for r in records),
         *(Driver(KernelKind.MODES, width, contacts=contacts) for contacts in (False, True)),
     ]
+
+
+def imports(text: str) -> str:
+    """The import statements of a kernel module: what its text uses."""
+    used = sorted(name for name in simd.__all__ if re.search(rf"\b{name}\b", text))
+    modules = [line for line, sign in (("import math", "math."), ("import numpy as np", "np.")) if sign in text]
+    return "\n\n".join([*modules, f"from synchain.codegen.simd import {', '.join(used)}"])

@@ -32,8 +32,8 @@ from ..steps.elimination import plan, write_factors, write_solve
 from ..steps.names import tidy
 from ..steps.step import SCALED, Step, node_function
 from ..steps.unrolled import Unrolled, stage_state
-from .driver import Driver, KernelKind
-from .sweep import LARGEST_UNROLLED, KernelSource, describe, imports, node_functions
+from .driver import Driver, KernelKind, imports
+from .sweep import LARGEST_UNROLLED, KernelSource, describe, node_functions
 
 __all__ = ["emit_modes"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -13,7 +12,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import angular_frequency
 from synchain.models.dynamics.record import Record
 
-from .. import driver, simd
+from .. import driver
 from ..driver.dimensions import Dimensions, ModeDimensions
 from ..integrators import Integrator, integrator
 from ..program.expressions import Load, Number, call
@@ -30,14 +29,13 @@ from ..steps.program import FILL_LIMIT, Program, program, workspace
 from ..steps.step import PAIR, SCALED, Step, function_name, node_function
 from ..steps.unrolled import Unrolled
 from ..taylor import write_looped, write_step
-from .driver import Driver, KernelKind
+from .driver import Driver, KernelKind, imports
 
 __all__ = [
     "KernelSource",
     "default_width",
     "describe",
     "emit",
-    "imports",
     "node_functions",
 ]
 
@@ -293,13 +291,6 @@ def _listed(names: tuple[str, ...]) -> str:
     if len(names) <= 40:
         return ", ".join(names)
     return f"{', '.join(names[:6])}, … {', '.join(names[-3:])} ({len(names)} variables)"
-
-
-def imports(text: str) -> str:
-    """The import statements of a kernel module: what its text uses."""
-    used = sorted(name for name in simd.__all__ if re.search(rf"\b{name}\b", text))
-    modules = [line for line, sign in (("import math", "math."), ("import numpy as np", "np.")) if sign in text]
-    return "\n\n".join([*modules, f"from synchain.codegen.simd import {', '.join(used)}"])
 
 
 def _step(name: str, writer: Step, looped: bool) -> Function:

@@ -268,7 +268,7 @@ class LoopWriter:
         """The rates of a node with names for what depends on time and parameters, series for what depends on time, and
         the rest, which depends on parameters alone.
         """
-        hoist = Hoist(frozenset([*kind.node.state, *self.varied()]), self.names.fresh("wave_"))
+        hoist = Hoist(frozenset([*kind.node.state, *self.varied()]), self.names.fresh("wave_"), frozenset({TIME}))
         rates = [hoist.apply(e) for e in kind.node.rhs]
         waves: dict[sp.Symbol, Series] = {}
         constants: dict[sp.Symbol, sp.Expr] = {}

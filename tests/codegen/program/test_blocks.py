@@ -177,7 +177,7 @@ def same_numbers():
     """A function that fails where equations with other names give other numbers."""
 
     def check(eq: Equations) -> None:
-        for method in integrators.names():
+        for method in (name for name in integrators.names() if name != "taylor"):  # it has a test of its own
             for looped in (False,) if integrators.integrator(method).inexact else (False, True):
                 expected = numbers_of(network(), method, looped)
                 found = numbers_of(eq, method, looped)

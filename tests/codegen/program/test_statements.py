@@ -212,7 +212,7 @@ def test_lanes_load_and_store_registers() -> None:
     )
     found = LANES.function(Function("f", ("y", "shared", "dense"), "What it does.", body, inline=False))
     assert found.splitlines() == [
-        "@njit(error_model='numpy')",
+        "@njit(error_model='numpy', cache=True)",
         "def f(y, shared, dense):",
         '    """What it does."""',
         "    a = load(y, 0, WIDTH)",

@@ -167,7 +167,7 @@ def refused(eq: Equations, m: integrators.Integrator, looped: bool) -> str:
 
 
 @pytest.mark.parametrize("looped", [False, True], ids=["written out", "looped"])
-@pytest.mark.parametrize("method", integrators.names())
+@pytest.mark.parametrize("method", [name for name in integrators.names() if name != "taylor"])
 @pytest.mark.parametrize("case", NETWORKS)
 def test_a_step_is_what_its_definition_says(case, method, looped, exact_numbers):
     eq, m = NETWORKS[case], integrators.integrator(method)
@@ -263,7 +263,7 @@ def test_dense_output_meets_both_ends():
         assert kernel.inside(mpf(1), c, step) == step.y_new[c]
 
 
-@pytest.mark.parametrize("method", integrators.names())
+@pytest.mark.parametrize("method", [name for name in integrators.names() if name != "taylor"])
 @pytest.mark.parametrize("broken", [mpf("nan"), mpf("inf")])
 def test_an_undefined_estimate_is_never_accepted(broken, method):
     # two nodes without links: what is wrong with one leaves the estimates of the other small

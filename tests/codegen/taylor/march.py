@@ -17,6 +17,7 @@ from synchain.codegen.taylor import TaylorStep, write_looped, write_step
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import Node
 
+
 def plain(**options: Any) -> Callable[..., Any]:
     """The decorator of kernels for text that stands in no file."""
     return simd.njit(**{**options, "cache": False})
