@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from itertools import islice
@@ -10,17 +11,19 @@ from itertools import islice
 import numpy as np
 import sympy as sp
 
+from synchain.codegen.driver.columns import Count, Sum
 from synchain.codegen.integrators import Integrator, integrator
-from synchain.codegen.kernels.sweep import AUTO
+from synchain.codegen.kernels.sweep import AUTO, KernelSource
 from synchain.codegen.taylor import kink, order_for
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
 
-from .plan import Planner
+from .buffers import Buffers
+from .plan import Plan, Planner
 from .reduce import Reduction
 
-__all__ = ["STIFF", "chosen_integrator", "stiffness"]
+__all__ = ["STIFF", "chosen_integrator", "stiffness", "warn_of_stiffness"]
 
 STIFF = 30.0
 """Stiffness from which Rosenbrock steps are faster than Taylor steps at equal error."""
@@ -61,17 +64,48 @@ def stiffness(scene: Scene) -> float:
     its links add, which bounds that of a network of springs; it is compared with the imaginary
     parts, the frequency of the drive and one.
     """
-    equations, planner = scene.equations, Planner(scene)
-    rows = planner.extremes()
-    worst = 0.0
-    for start, numbers in zip(rows.start, rows.numbers, strict=True):
-        values = dict(zip(equations.state, start, strict=True)) | dict(zip(equations.parameters, numbers, strict=True))
-        rates = [np.linalg.eigvals(block) for block in _blocks(equations, values) if np.all(np.isfinite(block))]
-        if rates:
-            all_rates = np.concatenate(rates)
-            turning = max(1.0, float(np.abs(all_rates.imag).max(initial=0.0)))
-            worst = max(worst, float(np.abs(all_rates.real).max(initial=0.0)) / turning)
-    return worst
+    rows = Planner(scene).extremes()
+    found = (_rates(scene.equations, *row) for row in zip(rows.start, rows.numbers, strict=True))
+    return max((fastest / max(1.0, turning) for fastest, turning in found), default=0.0)
+
+
+def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[[np.ndarray], Plan]) -> None:
+    """Warn if Taylor steps of some cells were short because the equations are stiff, not because the motion is fast.
+
+    The three cells with the shortest steps are looked at, where they ended.
+
+    Parameters
+    ----------
+    source : KernelSource
+    buffers : Buffers
+        What the kernel filled.
+    rows_of : callable
+        Gives the rows of some cells, as the kernel took them.
+    """
+    steps = buffers.counts[:, Count.ACCEPTED] + buffers.counts[:, Count.REJECTED]
+    times = buffers.sums[:, Sum.STOPPED_AT]
+    lengths = np.where((steps > 0) & (times > 0.0), times / np.maximum(steps, 1), math.inf)
+    cells = np.argsort(lengths)[:3]
+    for cell, numbers in zip(cells, rows_of(cells).numbers, strict=True):
+        if not math.isfinite(lengths[cell]) or not np.isfinite(buffers.end[cell]).all():
+            continue
+        fastest, turning = _rates(source.equations, buffers.end[cell], numbers)
+        if fastest * lengths[cell] > 1.0 and fastest > STIFF * max(1.0, turning):
+            warnings.warn(
+                f"stiff equations: found a rate of {fastest:.3g} beside slow motion, and {steps[cell]} Taylor steps in a cell; "
+                "expected few; integrator = 'rodas5p' takes longer steps",
+                RuntimeWarning,
+                stacklevel=4,
+            )
+            return
+
+
+def _rates(equations: Equations, state: np.ndarray, numbers: np.ndarray) -> tuple[float, float]:
+    """The fastest decay or growth at a state, and the fastest turning; 0 where there are no numbers."""
+    values = dict(zip(equations.state, state, strict=True)) | dict(zip(equations.parameters, numbers, strict=True))
+    blocks = [block for block in _blocks(equations, values) if np.all(np.isfinite(block))]
+    rates = np.concatenate([np.linalg.eigvals(block) for block in blocks]) if blocks else np.zeros(0)
+    return float(np.abs(rates.real).max(initial=0.0)), float(np.abs(rates.imag).max(initial=0.0))
 
 
 def _blocks(equations: Equations, values: Mapping[str, float]) -> list[np.ndarray]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..cells.buffers import Buffers
+from ..cells.choice import warn_of_stiffness
 from ..cells.layout import Layout
 from ..results.result import Result, gather
 from ..support.status import tally
@@ -78,6 +79,7 @@ class Memory:
         try:
             reporter.start(tally(self.buffers.status[self.buffers.finished]), self.prepared.compiling)
             scheduler.run()
+            self.warn()
         except (Exception, KeyboardInterrupt) as problem:
             if not (isinstance(problem, KeyboardInterrupt) or worker_lost(problem)):
                 raise
@@ -88,6 +90,14 @@ class Memory:
             raise SweepFailed(reason, count, result.scene.cells, result) from problem
         finally:
             reporter.close()
+
+    def warn(self) -> None:
+        """Warn of cells whose equations are stiff for the kernel that ran them."""
+        job = self.prepared.job
+        source = job.kernel.origin
+        if source.driver.series and not source.driver.contacts:
+            reduction = self.prepared.reduction
+            warn_of_stiffness(source, self.buffers, lambda cells: reduction.rows(job.planner.rows(cells)))
 
     def result(self) -> Result:
         """Return the cells so far."""
