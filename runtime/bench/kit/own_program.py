@@ -10,10 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from synchain.codegen.kernels.compile import Kernel
+
 from ...cells.buffers import Buffers
 from ...cells.initial_modes import with_modes
 from ...cells.kernels import kernel
-from ...cells.plan import control_array
+from ...cells.plan import control_array, longest_step
 from .cases import Case
 from .clock import Point, best_time
 
@@ -36,7 +38,9 @@ def prepare(case: Case, integrator: str, width: int) -> Integrate:
     `solve` integrates one cell to each of the end times and raises RuntimeError where a cell did
     not reach its end.
     """
-    compiled = kernel(case.scene.replace(integrator=integrator), width, reduce=False)
+    chosen = case.scene.replace(integrator=integrator)
+    made: dict[tuple[float, float], Kernel] = {}
+    longest = longest_step(case.scene)
     one = np.array([case.scene.parameters[name] for name in case.scene.equations.parameters])
     (y0,) = with_modes(case.scene.equations, np.array([case.scene.y0]), one[None])
 
@@ -45,7 +49,10 @@ def prepare(case: Case, integrator: str, width: int) -> Integrate:
         spans = np.ascontiguousarray(
             np.stack([np.zeros(cells), ends, np.full(cells, case.period), np.zeros(cells)], axis=1)
         )
-        control = control_array(rtol, atol, 0.5 * case.period, 1e12, jumps=False)
+        if (rtol, atol) not in made:  # the order of a Taylor step follows the tolerance
+            made[rtol, atol] = kernel(chosen.replace(rtol=rtol, atol=atol), width, reduce=False)
+        compiled = made[rtol, atol]
+        control = control_array(rtol, atol, longest, 1e12, jumps=False)
         buffers = Buffers.empty(cells, len(y0), room=0, samples=0)
         compiled.drive(0, cells, np.tile(y0, (cells, 1)), np.tile(one, (cells, 1)), spans, control, *buffers.arrays())
         if not np.isfinite(buffers.end).all():

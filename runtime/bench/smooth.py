@@ -1,0 +1,101 @@
+"""Smooth equations and the exact law of friction: time per unit and core against the error, in long runs.
+
+The Taylor steps of this program, its explicit Runge-Kutta steps and heyoka's Taylor series, all in
+full lanes, each row with one reading time at the end, so that calls and restarts weigh little. The
+unit of time is the drive's period, or 2 pi without a drive. The error is the largest over all
+components of the state at the end; the reference is DOP853 at rtol = 1e-14 with a tenth of the step
+limit, a method and a step control of their own. heyoka has no events and takes no part in the exact
+law. Times are CPU times of one core, compilation apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from synchain.codegen.simd.lane_types import native_width
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
+
+from ..stability.orbits import unit_of_time
+from . import peers
+from .kit.cases import Case
+from .kit.clock import Point, curve
+from .kit.own_program import REFILLS, Own, prepare
+from .precision import COLUMNS, row
+
+__all__ = ["CASES", "COLUMNS", "METHODS", "case_of", "measure", "notes", "summary"]
+
+PEER = "heyoka_batch"
+METHODS = ("taylor", "dop853")
+"""This program's rows; the first is what the others are compared with."""
+TOLERANCES = tuple((rtol, 0.1 * rtol) for rtol in (1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12))
+REFERENCE = (1e-14, 1e-16)
+
+_EXACT = {"contact": "set-valued", "initial": {"x": 0.3, "v": 0.0}}
+
+CASES: dict[str, tuple[dict[str, object], int]] = {
+    "linear, driven, n = 4": (
+        {"oscillator": "duffing", "topology": topology("chain", 4), "parameters": {"beta": 0.0, "delta": 0.0, "sigma": 0.1}}, 200,
+    ),
+    "Duffing, driven, n = 2": ({"oscillator": "duffing", "topology": topology("chain", 2), "parameters": {"sigma": 0.1}}, 20),
+    "pendulum, n = 2": ({"oscillator": "pendulum", "topology": topology("chain", 2), "parameters": {"sigma": 0.1}}, 200),
+    "FPUT ring, n = 8": (
+        {"oscillator": "mass", "coupling": "fput", "topology": topology("ring", 8)}, 50,
+    ),
+    "van der Pol, n = 2": ({"oscillator": "van_der_pol", "topology": topology("chain", 2), "parameters": {"sigma": 0.1}}, 50),
+    "exact law, n = 1": ({"topology": topology("chain", 1), **_EXACT}, 20),
+    "exact law, n = 2": ({"topology": topology("chain", 2), "parameters": {"sigma": 0.1}, **_EXACT}, 20),
+    "exact law, n = 4": ({"topology": topology("chain", 4), "parameters": {"sigma": 0.1}, **_EXACT}, 20),
+}  # fmt: skip
+"""The arguments of each scene, and its length in units of time."""
+
+
+def notes() -> list[str]:
+    """A line if the peer cannot run here."""
+    peer = peers.load(PEER)
+    why = peers.absent(peer)
+    return [f"skipped: {peer.NAME} ({why})"] if why else []
+
+
+def case_of(name: str, periods: int | None = None) -> Case:
+    """Return a case with its reference at half its length and at its end; ValueError for an unknown name."""
+    if name not in CASES:
+        raise ValueError(f"unknown case {name!r}; known: {'; '.join(CASES)}")
+    arguments, length = CASES[name]
+    scene = Scene(**{"record": (), **arguments})  # type: ignore[arg-type]
+    periods = length if periods is None else periods
+    times = unit_of_time(scene) * np.array([math.ceil(periods / 2), periods], dtype=float)
+    blank = Case(name, scene, times, np.zeros((2, len(scene.y0))))
+    states, _ = prepare(blank, "dop853", 1)(*REFERENCE, times)
+    return Case(name, scene, times, states)
+
+
+def measure(quick: bool = False) -> list[tuple[object, ...]]:
+    """Return the rows of the table, in the order of COLUMNS."""
+    peer = peers.load(PEER)
+    rows: list[tuple[object, ...]] = []
+    for name in list(CASES)[:1] + list(CASES)[5:6] if quick else CASES:
+        case = case_of(name, 4 if quick else None)
+        rows += [row(case, point) for point in own_points(case, quick)]
+        if not (case.scene.equations.sticks or peers.absent(peer)):
+            rows += [row(case, point) for point in curve(peer, case, quick)]
+    return rows
+
+
+def own_points(case: Case, quick: bool) -> Iterator[Point]:
+    """Yield this program's points of a case."""
+    for method in METHODS:
+        lanes = native_width(2 if len(case.scene.y0) <= 2 else 1)
+        own = Own.compiled(case, method, lanes, REFILLS * lanes, case.periods)
+        for rtol, atol in TOLERANCES[::3] if quick else TOLERANCES:
+            yield own.point(rtol, atol, quick)
+
+
+def summary(rows: Sequence[Sequence[object]]) -> str:
+    """A second table in Markdown: time of every method at the same error, and its ratio to the fastest row."""
+    from .kit.compare import table
+
+    return table([dict(zip(COLUMNS, row, strict=False)) for row in rows], own=set(METHODS))
