@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
-import re
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -108,7 +108,8 @@ def common_drivers() -> list[Driver]:
 
 
 def imports(text: str) -> str:
-    """The import statements of a kernel module: what its text uses."""
-    used = sorted(name for name in simd.__all__ if re.search(rf"\b{name}\b", text))
-    modules = [line for line, sign in (("import math", "math."), ("import numpy as np", "np.")) if sign in text]
-    return "\n\n".join([*modules, f"from synchain.codegen.simd import {', '.join(used)}"])
+    """Return the import statements of a module: what its text names."""
+    named = {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
+    modules = [line for name, line in (("math", "import math"), ("np", "import numpy as np")) if name in named]
+    used = ", ".join(sorted(named.intersection(simd.__all__)))
+    return "\n\n".join([*modules, f"from synchain.codegen.simd import {used}"])

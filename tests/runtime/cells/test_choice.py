@@ -46,7 +46,9 @@ def test_the_order_follows_the_tolerance():
 
 
 def test_what_is_not_analytic_is_refused():
-    with pytest.raises(ValueError, match=r"taylor: a function that is not analytic; found Abs\(.*use integrator dop853"):
+    with pytest.raises(
+        ValueError, match=r"taylor: a function that is not analytic; found Abs\(.*use integrator dop853"
+    ):
         kernel_source(Scene(topology=chain(2), integrator="taylor"))
 
 
@@ -60,7 +62,13 @@ def test_stiffness_is_that_of_the_extreme_cells():
 
 def test_stiffness_that_appears_is_said():
     scene = Scene(
-        oscillator="van_der_pol", topology=chain(2), record=(), transient=0, window=60, time_unit="time", integrator="taylor"
+        oscillator="van_der_pol",
+        topology=chain(2),
+        record=(),
+        transient=0,
+        window=60,
+        time_unit="time",
+        integrator="taylor",
     )
     with pytest.warns(RuntimeWarning, match=r"stiff equations: found a rate of .*integrator = 'rodas5p'"):
         run(scene, mu=[1.0, 200.0], show_progress=False)
