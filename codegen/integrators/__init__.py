@@ -93,8 +93,11 @@ class Integrator:
     smooth: Integrator | None = None
 
     def __post_init__(self) -> None:
-        if self.kind is IntegratorKind.SWITCHING:
-            raise ValueError(f"integrator {self.name}: found kind 'switching'; expected that of one method")
+        single = (IntegratorKind.ROSENBROCK, IntegratorKind.EXPLICIT, IntegratorKind.TAYLOR)
+        if self.kind not in single:
+            raise ValueError(
+                f"integrator {self.name}: kind {str(self.kind)!r}; expected 'rosenbrock', 'explicit' or 'taylor'"
+            )
         if len(self.a) != len(self.c) or any(len(row) > i for i, row in enumerate(self.a)):
             raise ValueError(f"integrator {self.name}: the tableau is not strictly lower triangular")
         if self.implicit and not self.gamma > 0:

@@ -1,4 +1,5 @@
-"""Smooth equations and the exact law of friction: time per unit and core against the error, in long runs.
+"""Smooth equations and the exact law of friction: time per unit and core against the error, long
+runs.
 
 The Taylor steps of this program, its explicit Runge-Kutta steps and heyoka's Taylor series, all in
 full lanes, each row with one reading time at the end, so that calls and restarts weigh little. The
@@ -34,23 +35,21 @@ METHODS = ("taylor", "dop853")
 TOLERANCES = tuple((rtol, 0.1 * rtol) for rtol in (1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12))
 REFERENCE = (1e-14, 1e-16)
 
-_EXACT = {"contact": "set-valued", "initial": {"x": 0.3, "v": 0.0}}
+_EXACT: dict[str, object] = {"contact": "set-valued", "initial": {"x": 0.3, "v": 0.0}}
+_LINKED: dict[str, object] = {"sigma": 0.1}
+_LINEAR: dict[str, object] = {"beta": 0.0, "delta": 0.0, **_LINKED}
 
-CASES: dict[str, tuple[dict[str, object], int]] = {
-    "linear, driven, n = 4": (
-        {"oscillator": "duffing", "topology": topology("chain", 4), "parameters": {"beta": 0.0, "delta": 0.0, "sigma": 0.1}}, 200,
-    ),
-    "Duffing, driven, n = 2": ({"oscillator": "duffing", "topology": topology("chain", 2), "parameters": {"sigma": 0.1}}, 20),
-    "pendulum, n = 2": ({"oscillator": "pendulum", "topology": topology("chain", 2), "parameters": {"sigma": 0.1}}, 200),
-    "FPUT ring, n = 8": (
-        {"oscillator": "mass", "coupling": "fput", "topology": topology("ring", 8)}, 50,
-    ),
-    "van der Pol, n = 2": ({"oscillator": "van_der_pol", "topology": topology("chain", 2), "parameters": {"sigma": 0.1}}, 50),
-    "exact law, n = 1": ({"topology": topology("chain", 1), **_EXACT}, 20),
-    "exact law, n = 2": ({"topology": topology("chain", 2), "parameters": {"sigma": 0.1}, **_EXACT}, 20),
-    "exact law, n = 4": ({"topology": topology("chain", 4), "parameters": {"sigma": 0.1}, **_EXACT}, 20),
-}  # fmt: skip
-"""The arguments of each scene, and its length in units of time."""
+CASES: dict[str, tuple[str, int, dict[str, object], int]] = {
+    "linear, driven, n = 4": ("chain", 4, {"oscillator": "duffing", "parameters": _LINEAR}, 200),
+    "Duffing, driven, n = 2": ("chain", 2, {"oscillator": "duffing", "parameters": _LINKED}, 20),
+    "pendulum, n = 2": ("chain", 2, {"oscillator": "pendulum", "parameters": _LINKED}, 200),
+    "FPUT ring, n = 8": ("ring", 8, {"oscillator": "mass", "coupling": "fput"}, 50),
+    "van der Pol, n = 2": ("chain", 2, {"oscillator": "van_der_pol", "parameters": _LINKED}, 50),
+    "exact law, n = 1": ("chain", 1, _EXACT, 20),
+    "exact law, n = 2": ("chain", 2, {"parameters": _LINKED, **_EXACT}, 20),
+    "exact law, n = 4": ("chain", 4, {"parameters": _LINKED, **_EXACT}, 20),
+}
+"""Family and size of the graph, other arguments of the scene, length in units of time."""
 
 
 def notes() -> list[str]:
@@ -61,11 +60,14 @@ def notes() -> list[str]:
 
 
 def case_of(name: str, periods: int | None = None) -> Case:
-    """Return a case with its reference at half its length and at its end; ValueError for an unknown name."""
+    """Return a case with its reference at half its length and at its end.
+
+    Raises ValueError for an unknown name.
+    """
     if name not in CASES:
         raise ValueError(f"unknown case {name!r}; known: {'; '.join(CASES)}")
-    arguments, length = CASES[name]
-    scene = Scene(**{"record": (), **arguments})  # type: ignore[arg-type]
+    family, n, arguments, length = CASES[name]
+    scene = Scene(**{"topology": topology(family, n), "record": (), **arguments})  # type: ignore[arg-type]
     periods = length if periods is None else periods
     times = unit_of_time(scene) * np.array([math.ceil(periods / 2), periods], dtype=float)
     blank = Case(name, scene, times, np.zeros((2, len(scene.y0))))
@@ -95,7 +97,9 @@ def own_points(case: Case, quick: bool) -> Iterator[Point]:
 
 
 def summary(rows: Sequence[Sequence[object]]) -> str:
-    """A second table in Markdown: time of every method at the same error, and its ratio to the fastest row."""
+    """A second table in Markdown: time of every method at the same error, and its ratio to the
+    fastest row.
+    """
     from .kit.compare import table
 
     return table([dict(zip(COLUMNS, row, strict=False)) for row in rows], own=set(METHODS))

@@ -294,7 +294,7 @@ def test_measured_order_of_the_error_estimate(m):
 def test_wrong_integrators_are_refused():
     good = METHODS["cash_karp"]
     fields = {name: getattr(good, name) for name in Integrator.__slots__}
-    with pytest.raises(ValueError, match="kind 'implicit'; expected 'rosenbrock' or 'explicit'"):
+    with pytest.raises(ValueError, match="kind 'implicit'; expected 'rosenbrock', 'explicit' or 'taylor'"):
         Integrator(**{**fields, "kind": "implicit"})
     with pytest.raises(ValueError, match="not strictly lower triangular"):
         Integrator(**{**fields, "a": ((1.0,), *good.a[1:])})
@@ -302,7 +302,7 @@ def test_wrong_integrators_are_refused():
         Integrator(**{**fields, "kind": "rosenbrock"})
     with pytest.raises(
         ValueError,
-        match="unknown integrator 'euler'; known: cash_karp, dop853, rodas4, rodas5p, rodas6p, ros34pw2, switching",
+        match="unknown integrator 'euler'; known: cash_karp, dop853, rodas4, rodas5p, rodas6p, ros34pw2, switching, taylor",
     ):
         integrators.integrator("euler")
 
