@@ -132,6 +132,7 @@ def camera() -> dict[str, str]:
     features = llvm.get_host_cpu_features()
     return {
         "machine": platform.machine(),
+        "processor": numba.config.CPU_NAME or llvm.get_host_cpu_name(),
         "avx512": str(bool(features.get("avx512f"))),
         "fma": str(bool(features.get("fma"))),
         "versions": ", ".join(f"{m.__name__} {m.__version__}" for m in (numba, np, sp)),
@@ -416,6 +417,24 @@ def _() -> Quantities:
 def _() -> Quantities:
     given = load_scene("huygens").replace(transient=0, window=5, samples=5, integrator="rodas5p")
     return simulated(given, mass=[10, 12])
+
+
+@scene("pendulum pair, taylor")
+def _() -> Quantities:
+    given = SHORT | {"integrator": "taylor", "record": ALL, "samples": 5, "time_unit": "time"}
+    return simulated(Scene(oscillator="pendulum", topology=chain(2), **given), sigma=[0.1, 0.3])
+
+
+@scene("set-valued pair, taylor")
+def _() -> Quantities:
+    given = SHORT | {"integrator": "taylor", "record": ALL, "samples": 5}
+    return simulated(Scene(contact="set-valued", topology=chain(2), **given), sigma=[0.1, 0.3])
+
+
+@scene("Duffing, looped ring of ten, taylor", long=True)
+def _() -> Quantities:
+    given = SHORT | {"integrator": "taylor", "rtol": 1e-12}
+    return simulated(Scene(oscillator="duffing", topology=ring(10), **given), sigma=[0.1, 0.3])
 
 
 @scene("van der Pol and Lorenz in a ring, dop853")
