@@ -36,7 +36,7 @@ from .series import (
 from .terms import ONE, ZERO, Expr, Name, Number, add, times
 from .terms import Product as Factors
 
-__all__ = ["STARTS", "Graph", "Template", "kink"]
+__all__ = ["STARTS", "Graph", "Template", "is_linear", "kink"]
 
 STARTS: dict[type[sp.Expr], str] = {
     sp.exp: "exp", sp.log: "log", sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.sinh: "sinh", sp.cosh: "cosh",
@@ -58,6 +58,14 @@ def kink(equations: Equations) -> sp.Expr | None:
     templates = [(node.rhs, {TIME, *node.state}) for node in equations.nodes]
     templates += [(edge.rhs, {TIME, *edge.here, *edge.there}) for edge in equations.edges]
     return next((part for rhs, moving in templates for part in _kinks(rhs, moving)), None)
+
+
+def is_linear(equations: Equations) -> bool:
+    """True if the rates are sums of states with constant coefficients and of terms of time."""
+    blocks = [(node.jacobian(), {TIME, *node.state}) for node in equations.nodes]
+    for edge in equations.edges:
+        blocks += [(block, {*edge.here, *edge.there}) for block in (edge.jacobian_here(), edge.jacobian_there())]
+    return not any(e.free_symbols & moving for block, moving in blocks for row in block for e in row)
 
 
 def _kinks(expressions: Sequence[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:

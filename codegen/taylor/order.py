@@ -14,14 +14,20 @@ section 3.1, because the convolutions, whose number grows with the square of the
 
 HIGHEST = 24
 
+LINEAR = 1e-5
+"""Tolerance from which linear equations take the highest order."""
 
-def order_for(rtol: float, atol: float) -> int:
+
+def order_for(rtol: float, atol: float, linear: bool = False) -> int:
     """Return the order of the Taylor step for these tolerances.
 
     Parameters
     ----------
     rtol, atol : float
         Tolerances relative to the states and absolute; states are taken to be of the order of one.
+    linear : bool, optional
+        True for equations without products of states: their orders cost alike, since nothing is convolved, so the highest
+        is the fastest from moderate tolerances on.
 
     Returns
     -------
@@ -29,4 +35,6 @@ def order_for(rtol: float, atol: float) -> int:
         One of a few even numbers from 8 to 24, so that few kernels are compiled.
     """
     tolerance = max(rtol, atol)
+    if linear and tolerance <= LINEAR:
+        return HIGHEST
     return next((order for limit, order in ORDERS if tolerance >= limit), HIGHEST)

@@ -14,7 +14,7 @@ import sympy as sp
 from synchain.codegen.driver.columns import Count, Sum
 from synchain.codegen.integrators import Integrator, integrator
 from synchain.codegen.kernels.sweep import AUTO, KernelSource
-from synchain.codegen.taylor import kink, order_for
+from synchain.codegen.taylor import is_linear, kink, order_for
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
@@ -46,15 +46,19 @@ def chosen_integrator(reduction: Reduction) -> Integrator:
     """
     scene, equations = reduction.scene, reduction.equations
     if scene.integrator == "taylor":
-        return integrator("taylor", order_for(scene.rtol, scene.atol))
+        return _taylor(scene, equations)
     if scene.integrator != "auto":
         return integrator(scene.integrator)
     if not equations.inertial and kink(equations) is None and (equations.sticks or stiffness(scene) < STIFF):
-        return integrator("taylor", order_for(scene.rtol, scene.atol))
+        return _taylor(scene, equations)
     if equations.sticks:
         return integrator("dop853")
     pair = equations.n == 2 and not (equations.mixed or equations.inertial) and scene.rtol <= 1e-9
     return integrator("switching" if pair else AUTO)
+
+
+def _taylor(scene: Scene, equations: Equations) -> Integrator:
+    return integrator("taylor", order_for(scene.rtol, scene.atol, is_linear(equations)))
 
 
 def stiffness(scene: Scene) -> float:

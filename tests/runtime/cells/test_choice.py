@@ -45,6 +45,13 @@ def test_the_order_follows_the_tolerance():
     assert orders[0] < orders[-1]
 
 
+def test_linear_equations_take_the_highest_order():
+    scene = Scene(oscillator="harmonic", topology=chain(2))
+    assert method(scene) == ("taylor", 24)
+    assert method(scene.replace(oscillator="pendulum"))[1] < 24
+    assert method(scene.replace(rtol=1e-2))[1] < 24
+
+
 def test_what_is_not_analytic_is_refused():
     with pytest.raises(
         ValueError, match=r"taylor: a function that is not analytic; found Abs\(.*use integrator dop853"
