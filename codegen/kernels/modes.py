@@ -99,7 +99,7 @@ def emit_modes(variation: Variation, width: int | None = None) -> KernelSource:
     return KernelSource(
         text,
         equations,
-        method.name,
+        method,
         Driver(KernelKind.MODES, width, contacts=plain.sticks),
         _dimensions(variation, plain, method, parts.size),
         owners,

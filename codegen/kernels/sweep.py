@@ -58,11 +58,16 @@ class KernelSource:
 
     text: str = field(repr=False)
     equations: Equations = field(repr=False)
-    integrator: str
+    method: Integrator = field(repr=False)
     driver: Driver
     dimensions: Dimensions | ModeDimensions = field(repr=False)
     marks: tuple[int, ...] = field(repr=False)
     elimination: Program | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def integrator(self) -> str:
+        """The name of the integrator."""
+        return self.method.name
 
     @property
     def records(self) -> tuple[Record, ...]:
@@ -175,7 +180,7 @@ def emit(
     named = "\n".join(f"{name} = {value!r}" for name, value in constants.items())
     text = "\n\n\n".join([head, imports(text), named, text])
     sizes = _dimensions(plain, method, scratch)
-    return KernelSource(text, equations, method.name, chosen, sizes, weights or (1,) * equations.n, elimination)
+    return KernelSource(text, equations, method, chosen, sizes, weights or (1,) * equations.n, elimination)
 
 
 def default_width(equations: Equations) -> int:

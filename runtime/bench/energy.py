@@ -32,7 +32,7 @@ COLUMNS = (
     "drift in the first tenth",
     "steps per period",
 )
-INTEGRATORS = ("cash_karp", "dop853", "rodas5p", "rodas6p")
+INTEGRATORS = ("cash_karp", "dop853", "taylor", "rodas5p", "rodas6p")
 CHORDS = ("rodas6p",)
 """Methods that join the ends of their steps by chords: samples within a step say nothing about the
 drift.

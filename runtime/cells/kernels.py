@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import sympy as sp
 
-from synchain.codegen.integrators import Integrator, integrator
+from synchain.codegen.integrators import Integrator
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.sweep import KernelSource, default_width, emit
 from synchain.codegen.simd.lane_types import WIDTHS
@@ -83,7 +83,7 @@ def warn_of_chords(source: KernelSource) -> None:
     there.
     """
     between = [record for record in ("trajectory", "section") if record in source.records]
-    if between and integrator(source.integrator).dense_order < 2:
+    if between and source.method.dense_order < 2:
         warnings.warn(
             f"{source.integrator} draws straight lines between its steps, so errors of {' and '.join(between)} are not bounded "
             "by rtol; take another integrator for these records, e.g. rodas5p",

@@ -18,6 +18,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from synchain.codegen.driver.columns import Control
+from synchain.codegen.integrators import Integrator
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.installation import InstallationError
 from synchain.codegen.kernels.processor import processor, told_apart
@@ -221,7 +222,7 @@ class RowsSpec:
     Attributes
     ----------
     equations : Equations
-    integrator : str
+    integrator : Integrator or str
     control : ndarray, shape (len(Control),)
     multiplicity : tuple of int, optional
         How many oscillators each node stands for in the synchronisation error.
@@ -230,7 +231,7 @@ class RowsSpec:
     """
 
     equations: Equations
-    integrator: str
+    integrator: Integrator | str
     control: np.ndarray
     multiplicity: tuple[int, ...] | None = None
     records: tuple[str, ...] = ("sync_error",)

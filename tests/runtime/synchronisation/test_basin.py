@@ -18,6 +18,7 @@ from synchain.runtime.synchronisation.threshold import Criterion
 
 FREE = Scene(oscillator="harmonic", topology=chain(2), parameters={"sigma": 0.0})
 DAMPED = Scene(oscillator="harmonic", topology=chain(3), coupling="damper", parameters={"sigma": 0.5})
+PENDULA = Scene(oscillator="pendulum", topology=chain(2), parameters={"sigma": 0.0}, rtol=1e-12)
 SHORT = {"transient": 5.0, "window": 5.0}
 
 
@@ -165,7 +166,11 @@ def plane(**more) -> Probe:
     return universal_probe(DAMPED, np.linspace(0.1, 1.0, 8), 0.1, criterion=short, **more)
 
 
-@pytest.mark.parametrize("found", [starts, plane])
+def tight(**more) -> Basin:
+    return basin(PENDULA, samples=40, tolerance=1.0, **SHORT, **more)
+
+
+@pytest.mark.parametrize("found", [starts, plane, tight])
 def test_starts_run_on_any_executor_and_tell_how_far_they_are(found):
     here, elsewhere, seen = found(workers=1), Elsewhere(), []
     there = found(workers=2, executor=elsewhere, progress=seen.append, show_progress=False)
