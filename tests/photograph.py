@@ -554,7 +554,7 @@ def _() -> Quantities:
         with netcdf_file(io.BytesIO(whole), mmap=False) as file:
             heads = [f"{name} {v.typecode()} {v.dimensions} {v._attributes}" for name, v in file.variables.items()]
             sizes = [-(-v.data.nbytes // 4) * 4 for v in file.variables.values()]
-            ambient = ("versions", "kernel", "processor")
+            ambient = ("versions", "kernel", "processor", "digest")
             own = {name: value for name, value in file._attributes.items() if name not in ambient}
         return {
             "variables": "\n".join(heads),

@@ -13,15 +13,16 @@ from numba import njit
 
 from ..simd.lanes import absolute, any_lane, broadcast, load, maximum, minimum, select, store
 from .dense import inside
-from .names import LOOPED, WIDTH
+from .names import LOOPED, SERIES, WIDTH
 from .recording import ACCEPTED, REJECTED, RUSH, STEP, STOP
 
 # --- kernel text below ---
 # A gap this little below zero counts as zero; a passage is never sought closer than the shortest step to it.
 PASSED, SHORTEST = 1e-13, 1e-13
 # Steps in which an event is looked for, equally spaced; a dip is followed to its bottom where a parabola through three
-# looks comes down to this part of the third.
-LOOKS, SHALLOW = 4, 0.2
+# looks comes down to this part of the third, or of the first: looks of a Taylor step lie so far apart, up to a sixth of
+# half a swing, that a parabola is off by a hundredth of what the gap has lost.
+LOOKS, SHALLOW, SHARE = 6 if SERIES else 4, 0.2, 0.05 if SERIES else 0.0
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -98,7 +99,8 @@ def first_dip(k, open_lanes, t, h, y, y_new, dense, middle, out, network, dims, 
         before = load(out, (6 + (k - 1) % 3) * dims.nodes + i, WIDTH)
         gap = load(out, (6 + k % 3) * dims.nodes + i, WIDTH)
         bend, slope = earlier - 2.0 * before + gap, 0.5 * (gap - earlier)
-        dips = open_lanes & (absolute(slope) < 0.999 * bend) & (before - 0.5 * slope * slope / bend < SHALLOW * gap)
+        shallow = maximum(SHALLOW * gap, SHARE * earlier)
+        dips = open_lanes & (absolute(slope) < 0.999 * bend) & (before - 0.5 * slope * slope / bend < shallow)
         if any_lane(dips):
             turn = minimum(maximum(span * (k - 1.0 - slope / bend), 0.0), 1.0)
             place, least = bottom(i, turn, span, t, h, y, y_new, dense, middle, out, network, dims, pushes)
