@@ -147,9 +147,9 @@ def narrowed(low, high, f_low, f_high, t, h, y, y_new, dense, middle, out, netwo
     """
     found = high < 1.5
     if any_lane(found):
-        level, last = -0.75 * PASSED, 0.0 * high
+        level, last, depth = -0.75 * PASSED, 0.0 * high, f_high
         for k in range(60):
-            active = found & (f_high < -PASSED) & (high - low > 1e-15)
+            active = found & (depth < -PASSED) & (high - low > 1e-15)  # what it is there, whatever it weighs
             if not any_lane(active):
                 break
             secant = high - (f_high - level) * (high - low) / (f_high - f_low)
@@ -164,7 +164,7 @@ def narrowed(low, high, f_low, f_high, t, h, y, y_new, dense, middle, out, netwo
             weight = select(left > 0.0, left, 0.5)
             less_low = select(below & (last < 0.0), level + weight * (f_low - level), f_low)
             less_high = select(above & (last > 0.0), level + weight * (f_high - level), f_high)
-            high, f_high = select(below, theta, high), select(below, gap, less_high)
+            high, f_high, depth = select(below, theta, high), select(below, gap, less_high), select(below, gap, depth)
             low, f_low = select(above, theta, low), select(above, gap, less_low)
             last = select(below, -1.0, select(above, 1.0, last))
     return high

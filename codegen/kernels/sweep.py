@@ -113,7 +113,7 @@ def emit(
     equations
         What the kernel integrates.
     method
-        An integrator or its name; "auto" is "rodas5p", the fastest at equal error in full lanes (docs/performance.md).
+        An integrator or its name; "auto" is "rodas5p", which steps whatever can be stepped (a scene's "auto" chooses).
     records
         What the kernel records besides the final state, each a `Record`.
     section

@@ -39,13 +39,12 @@ COUNTED = re.compile(r"[rs]\d+$")
 class TaylorStep:
     """The text of the function `step` and what a kernel must know of it.
 
-    order: that of the series, and the number of rows of the dense output; imports: the functions of `synchain.codegen.simd`
-    that it calls; workspace: the groups of memory that a looped step needs behind the dense output.
+    order: that of the series, and the number of rows of the dense output; workspace: the groups of memory that a looped
+    step needs behind the dense output.
     """
 
     text: str
     order: int
-    imports: tuple[str, ...]
     workspace: int = 0
 
     @property
@@ -62,9 +61,7 @@ class TaylorStep:
             f"def step(t, h, scale, y, p, y_new, dense, rtol, atol{more}):",
             '    """One step from (t, y): writes y_new and the dense output, returns the length of the step."""',
         ]
-        text = "\n".join([*head, *(f"    {line}" for line in lines)])
-        functions = {*STARTS.values(), "absolute", "broadcast", "load", "maximum", "minimum", "power", "sqrt", "store"}
-        return cls(text, order, tuple(sorted(f for f in functions | {"truncated"} if f"{f}(" in text)), workspace)
+        return cls("\n".join([*head, *(f"    {line}" for line in lines)]), order, workspace)
 
 
 @dataclass(slots=True)

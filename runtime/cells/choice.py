@@ -66,7 +66,7 @@ def stiffness(scene: Scene) -> float:
 
     The rate is the real part of an eigenvalue of a node's own block of the Jacobian, with twice what
     its links add, which bounds that of a network of springs; it is compared with the imaginary
-    parts, the frequency of the drive and one.
+    parts and one.
     """
     rows = Planner(scene).extremes()
     found = (_rates(scene.equations, *row) for row in zip(rows.start, rows.numbers, strict=True))
