@@ -12,11 +12,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from synchain.codegen.simd.lane_types import native_width
-
 from .kit.cases import Case, read_case
 from .kit.compare import table
-from .kit.own_program import REFILLS, Own, prepare
+from .kit.own_program import REFILLS, Own, full_width, prepare
 from .precision import COLUMNS, row
 
 __all__ = ["CASES", "CHOICES", "COLUMNS", "draw", "exact", "measure", "points", "summary"]
@@ -57,7 +55,7 @@ def exact(case: Case) -> Case:
 
 def points(case: Case, integrator: str, full: bool, quick: bool) -> Iterator[tuple[object, ...]]:
     """Yield a row for each tolerance of a method."""
-    lanes = native_width(2 if len(case.scene.y0) <= 3 else 1) if full else 1
+    lanes = full_width(case, integrator) if full else 1
     own = Own.compiled(case, integrator, lanes, REFILLS * lanes if full else 1, case.periods)
     for rtol in LADDER[1:6:4] if quick else LADDER:
         found = list(row(case, own.point(rtol, 0.1 * rtol, quick)))

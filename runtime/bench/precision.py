@@ -16,12 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from tqdm import tqdm
 
-from synchain.codegen.simd.lane_types import native_width
-
 from . import peers
 from .kit.cases import CASES, Case, read_case
 from .kit.clock import Point, curve
-from .kit.own_program import REFILLS, Own, prepare
+from .kit.own_program import REFILLS, Own, full_width, prepare
 
 __all__ = [
     "CASES",
@@ -69,7 +67,7 @@ class Method:
 
     def width(self, case: Case) -> int:
         """Number of lanes on this processor: that of a sweep, or one."""
-        return native_width(2 if len(case.scene.y0) <= 2 else 1) if self.full else 1
+        return full_width(case, self.integrator) if self.full else 1
 
 
 TOLERANCES = tuple((rtol, 0.1 * rtol) for rtol in LADDER)

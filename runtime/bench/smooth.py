@@ -16,7 +16,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from synchain.codegen.simd.lane_types import native_width
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 
@@ -24,7 +23,7 @@ from ..stability.orbits import unit_of_time
 from . import peers
 from .kit.cases import Case
 from .kit.clock import Point, curve
-from .kit.own_program import REFILLS, Own, prepare
+from .kit.own_program import REFILLS, Own, full_width, prepare
 from .precision import COLUMNS, row
 
 __all__ = ["CASES", "COLUMNS", "METHODS", "case_of", "measure", "notes", "summary"]
@@ -90,7 +89,7 @@ def measure(quick: bool = False) -> list[tuple[object, ...]]:
 def own_points(case: Case, quick: bool) -> Iterator[Point]:
     """Yield this program's points of a case."""
     for method in METHODS:
-        lanes = native_width(2 if len(case.scene.y0) <= 2 else 1)
+        lanes = full_width(case, method)
         own = Own.compiled(case, method, lanes, REFILLS * lanes, case.periods)
         for rtol, atol in TOLERANCES[::3] if quick else TOLERANCES:
             yield own.point(rtol, atol, quick)

@@ -12,13 +12,15 @@ import numpy as np
 from ..peers._problem import Problem, Solve
 from .cases import Case
 
-__all__ = ["LONGEST", "SHORTEST", "Point", "best_time", "curve"]
+__all__ = ["LONGEST", "SHORTEST", "Point", "best_time", "curve", "timed_periods"]
 
 SHORTEST = 0.2
 """A timed run lasts at least this many seconds of CPU time, by repetition."""
 LONGEST = 1.0
 """A slower run than this is shortened to fewer periods, down to FEWEST, and not repeated."""
 FEWEST = 5
+MOST = 10_000
+"""Periods of the longest timed run; more would not change the share of what one call costs."""
 GIVE_UP = 2.0
 """A peer that needs more seconds of CPU time for one period is not tried at tighter tolerances."""
 
@@ -53,6 +55,21 @@ def best_time(run: Callable[[], object], quick: bool) -> float:
         return first
     repetitions = max(1, int(np.ceil(SHORTEST / max(first, 1e-9))))
     return min(first, *(_seconds(run, repetitions) for _ in range(3)))
+
+
+def timed_periods(cost: float, periods: int, quick: bool) -> int:
+    """Return the length of a timed run: the work of SHORTEST seconds, so that what a call costs is no part of the time.
+
+    Parameters
+    ----------
+    cost : float
+        CPU seconds of one period.
+    periods : int
+        The least length.
+    quick : bool
+        Whether the least length will do.
+    """
+    return periods if quick else max(periods, min(MOST, int(np.ceil(SHORTEST / max(cost, 1e-9)))))
 
 
 def _seconds(run: Callable[[], object], repetitions: int) -> float:
@@ -98,8 +115,8 @@ def _pilot(solve: Solve, rtol: float, atol: float, period: float) -> float:
 
 
 def _measure(solve: Solve, rtol: float, atol: float, case: Case, cost: float, quick: bool) -> tuple[int, float, float]:
-    """Periods run, error and CPU seconds a period; the timed run has one end, as the pilot had, for
-    which JAX compiled.
+    """Periods compared, error and CPU seconds a period; the timed run has one end, as the pilot had,
+    for which JAX compiled, and goes on beyond the reference if that is short.
     """
     longest = 0.1 * LONGEST if quick else LONGEST
     fewest = max(
@@ -110,9 +127,10 @@ def _measure(solve: Solve, rtol: float, atol: float, case: Case, cost: float, qu
     states = solve(rtol, atol, part.times)
     if states.shape != part.states.shape or not np.isfinite(states).all():
         raise RuntimeError(f"states {states.shape} that are not all finite; expected {part.states.shape}")
-    end = np.array([periods * case.period])
+    length = timed_periods(cost, periods, quick)
+    end = np.array([length * case.period])
     seconds = best_time(lambda: solve(rtol, atol, end), quick)
-    return periods, float(np.abs(states - part.states).max()), seconds / periods
+    return periods, float(np.abs(states - part.states).max()), seconds / length
 
 
 def _failed(name: str, lanes: int, tolerances: tuple[float, float], compiled: float, problem: Exception) -> Point:

@@ -10,16 +10,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from synchain.codegen.integrators import integrator as method_of
 from synchain.codegen.kernels.compile import Kernel
+from synchain.codegen.kernels.sweep import default_width
 
 from ...cells.buffers import Buffers
 from ...cells.initial_modes import with_modes
 from ...cells.kernels import kernel
 from ...cells.plan import control_array, longest_step
 from .cases import Case
-from .clock import Point, best_time
+from .clock import Point, best_time, timed_periods
 
-__all__ = ["REFILLS", "Own", "prepare"]
+__all__ = ["REFILLS", "Own", "full_width", "prepare"]
 
 Ends = tuple[np.ndarray, np.ndarray]
 """States at the ends (m, dimension) and counts (m, …) of the kernel."""
@@ -29,6 +31,11 @@ REFILLS = 8
 """Cells that each lane works through in the rows with full lanes: the last ones cost what they do
 in a sweep.
 """
+
+
+def full_width(case: Case, integrator: str) -> int:
+    """Return the lanes in which a sweep of the case runs on this processor."""
+    return default_width(case.scene.equations, method_of(integrator))
 
 
 def prepare(case: Case, integrator: str, width: int) -> Integrate:
@@ -88,9 +95,12 @@ class Own:
         case, periods = self.case, self.periods
         part = case.within(periods)
         states, _ = self.solve(rtol, atol, part.times)
-        ends = np.full(self.cells, periods * case.period)
+        begin = time.process_time()
+        self.solve(rtol, atol, np.full(self.cells, periods * case.period))
+        length = timed_periods((time.process_time() - begin) / periods, periods, quick)
+        ends = np.full(self.cells, length * case.period)
         _, counts = self.solve(rtol, atol, ends)
-        seconds = best_time(lambda: self.solve(rtol, atol, ends), quick) / (periods * self.cells)
-        error, steps = float(np.abs(states - part.states).max()), float(counts[0, 1] + counts[0, 2]) / periods
+        seconds = best_time(lambda: self.solve(rtol, atol, ends), quick) / (length * self.cells)
+        error, steps = float(np.abs(states - part.states).max()), float(counts[0, 1] + counts[0, 2]) / length
         remark = "" if periods == case.periods else f"{periods} of {case.periods} periods"
         return Point(self.integrator, self.lanes, rtol, atol, error, seconds, periods, self.compile, steps, remark)
