@@ -58,7 +58,7 @@ def best_time(run: Callable[[], object], quick: bool) -> float:
 
 
 def timed_periods(cost: float, periods: int, quick: bool) -> int:
-    """Return the length of a timed run: the work of SHORTEST seconds, so that what a call costs is no part of the time.
+    """Return the length of a timed run: the work of SHORTEST seconds, so that calls do not count.
 
     Parameters
     ----------
@@ -79,9 +79,9 @@ def _seconds(run: Callable[[], object], repetitions: int) -> float:
     return (time.process_time() - begin) / repetitions
 
 
-def curve(peer: ModuleType, case: Case, quick: bool) -> Iterator[Point]:
+def curve(peer: ModuleType, case: Case, quick: bool, read_all: bool = False) -> Iterator[Point]:
     """Yield a point for each tolerance of a peer, loose first; a failure is a point with NaN and a
-    remark.
+    remark.  The timed run has one end, or with `read_all` all times of the case.
     """
     lanes = getattr(peer, "CELLS", 1)
     tolerances = peer.TOLERANCES[:: max(2, len(peer.TOLERANCES) // 2)] if quick else peer.TOLERANCES
@@ -97,7 +97,7 @@ def curve(peer: ModuleType, case: Case, quick: bool) -> Iterator[Point]:
         try:
             cost = _pilot(solve, rtol, atol, case.period)
             compiled = prepared + max(0.0, time.perf_counter() - begin - 2.0 * cost)
-            periods, error, seconds = _measure(solve, rtol, atol, case, cost, quick)
+            periods, error, seconds = _measure(solve, rtol, atol, case, cost, quick, read_all)
         except Exception as problem:
             yield _failed(peer.NAME, lanes, (rtol, atol), prepared, problem)
             continue
@@ -114,8 +114,10 @@ def _pilot(solve: Solve, rtol: float, atol: float, period: float) -> float:
     return _seconds(lambda: solve(rtol, atol, one), 1)
 
 
-def _measure(solve: Solve, rtol: float, atol: float, case: Case, cost: float, quick: bool) -> tuple[int, float, float]:
-    """Periods compared, error and CPU seconds a period; the timed run has one end, as the pilot had,
+def _measure(
+    solve: Solve, rtol: float, atol: float, case: Case, cost: float, quick: bool, read_all: bool
+) -> tuple[int, float, float]:
+    """Periods compared, error and CPU seconds a period; a timed run with one end is like the pilot,
     for which JAX compiled, and goes on beyond the reference if that is short.
     """
     longest = 0.1 * LONGEST if quick else LONGEST
@@ -127,9 +129,9 @@ def _measure(solve: Solve, rtol: float, atol: float, case: Case, cost: float, qu
     states = solve(rtol, atol, part.times)
     if states.shape != part.states.shape or not np.isfinite(states).all():
         raise RuntimeError(f"states {states.shape} that are not all finite; expected {part.states.shape}")
-    length = timed_periods(cost, periods, quick)
-    end = np.array([length * case.period])
-    seconds = best_time(lambda: solve(rtol, atol, end), quick)
+    length = periods if read_all else timed_periods(cost, periods, quick)
+    ends = part.times if read_all else np.array([length * case.period])
+    seconds = best_time(lambda: solve(rtol, atol, ends), quick)
     return periods, float(np.abs(states - part.states).max()), seconds / length
 
 

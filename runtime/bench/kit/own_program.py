@@ -38,14 +38,15 @@ def full_width(case: Case, integrator: str) -> int:
     return default_width(case.scene.equations, method_of(integrator))
 
 
-def prepare(case: Case, integrator: str, width: int) -> Integrate:
-    """Compile or load the kernel of a case; returns solve(rtol, atol, ends) -> (states (m,
-    dimension), counts).
+def prepare(case: Case, integrator: str, width: int, readings: int = 0) -> Integrate:
+    """Compile or load the kernel of a case; returns solve(rtol, atol, ends) -> (states, counts).
 
     `solve` integrates one cell to each of the end times and raises RuntimeError where a cell did
-    not reach its end.
+    not reach its end; its states are those at the ends (m, dimension), or at evenly spaced times
+    from the start to the ends (m, readings, dimension) if there are readings.
     """
-    chosen = case.scene.replace(integrator=integrator)
+    record = ("trajectory",) if readings else ()
+    chosen = case.scene.replace(integrator=integrator, record=record, samples=readings)
     made: dict[tuple[float, float], Kernel] = {}
     longest = longest_step(case.scene)
     one = np.array([case.scene.parameters[name] for name in case.scene.equations.parameters])
@@ -60,11 +61,11 @@ def prepare(case: Case, integrator: str, width: int) -> Integrate:
             made[rtol, atol] = kernel(chosen.replace(rtol=rtol, atol=atol), width, reduce=False)
         compiled = made[rtol, atol]
         control = control_array(rtol, atol, longest, 1e12, jumps=False)
-        buffers = Buffers.empty(cells, len(y0), room=0, samples=0)
+        buffers = Buffers.empty(cells, len(y0), room=0, samples=readings)
         compiled.drive(0, cells, np.tile(y0, (cells, 1)), np.tile(one, (cells, 1)), spans, control, *buffers.arrays())
         if not np.isfinite(buffers.end).all():
             raise RuntimeError(f"{integrator}: a cell did not finish at rtol = {rtol:g}")
-        return buffers.end, buffers.counts
+        return buffers.samples if readings else buffers.end, buffers.counts
 
     return solve
 
