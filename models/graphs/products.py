@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from ..inputs.rationals import rational
 from .links import LINK_LIMIT
-from .topology import Rule, Topology, a_graph
+from .readers import as_topology
+from .topology import Rule, Topology
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -40,8 +41,7 @@ def cartesian(first: Topology, second: Topology) -> Topology:
     ValueError
         On more than LINK_LIMIT links.
     """
-    a_graph("cartesian: first", first)
-    a_graph("cartesian: second", second)
+    first, second = as_topology("cartesian: first", first), as_topology("cartesian: second", second)
     return _made(f"cartesian({_named(first)}, {_named(second)})", first.n * second.n, Cartesian(first, second))
 
 
@@ -56,8 +56,7 @@ def kronecker(first: Topology, second: Topology) -> Topology:
     ValueError
         On more than LINK_LIMIT links.
     """
-    a_graph("kronecker: first", first)
-    a_graph("kronecker: second", second)
+    first, second = as_topology("kronecker: first", first), as_topology("kronecker: second", second)
     return _made(f"kronecker({_named(first)}, {_named(second)})", first.n * second.n, Kronecker(first, second))
 
 
@@ -69,8 +68,7 @@ def union(first: Topology, second: Topology) -> Topology:
     ValueError
         On more than LINK_LIMIT links.
     """
-    a_graph("union: first", first)
-    a_graph("union: second", second)
+    first, second = as_topology("union: first", first), as_topology("union: second", second)
     return _made(f"union({_named(first)}, {_named(second)})", first.n + second.n, Union(first, second))
 
 
@@ -82,7 +80,7 @@ def complement(graph: Topology) -> Topology:
     ValueError
         If a link is one-way or has a weight other than 1, or on more than LINK_LIMIT links.
     """
-    a_graph("complement", graph)
+    graph = as_topology("complement", graph)
     name, rule = f"complement({_named(graph)})", Complement(graph)
     _small(name, rule.link_count)
     odd = next((link for link in graph.links if link[2] != 1), None)
@@ -100,7 +98,7 @@ def weighted(graph: Topology, factor: object) -> Topology:
     ValueError
         If the factor is 0.
     """
-    a_graph("weighted", graph)
+    graph = as_topology("weighted", graph)
     by = rational(factor, "factor")
     if not by:
         raise ValueError(f"weighted({_named(graph)}): factor = 0; expected another number: no link would be left")

@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ..inputs.checks import check_instance, check_integer, check_printable, short_repr, typed_repr
 from ..inputs.options import Options
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from ..spectra.spectrum import Spectrum
     from .links import Link
 
-__all__ = ["Rule", "Topology", "a_graph", "from_matrix", "read_matrix"]
+__all__ = ["Rule", "Topology", "from_matrix", "read_matrix"]
 
 
 class Rule(Protocol):
@@ -190,6 +191,35 @@ class Topology:
 
         return spectrum(self)
 
+    def to_networkx(self) -> Any:
+        """Return the graph as one of networkx, which must be installed.
+
+        Returns
+        -------
+        networkx.Graph or networkx.DiGraph
+            Nodes 0 … n - 1; the edge attribute `weight` is an int, or a Fraction.  A graph that is
+            not symmetric is directed: an edge from j to i means that i feels j.  `from_graph` makes
+            the same links of it.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            If networkx is not installed.
+        """
+        try:
+            networkx = import_module("networkx")
+        except ModuleNotFoundError:
+            raise ModuleNotFoundError(
+                'to_networkx needs the package networkx; install it: python -m pip install "synchain[graphs]"'
+            ) from None
+        both = self.symmetric
+        graph = networkx.Graph(name=self.name) if both else networkx.DiGraph(name=self.name)
+        graph.add_nodes_from(range(self.n))
+        for target, source, weight in self.links:
+            if not both or source < target:
+                graph.add_edge(source, target, weight=int(weight) if weight.denominator == 1 else weight)
+        return graph
+
     def __repr__(self) -> str:
         more = "".join(f", {key}={value!r}" for key, value in self.options)
         return f"Topology({self.name!r}, n={self.n}{more}, {self.link_count} links)"
@@ -259,15 +289,6 @@ def read_matrix(path: str | Path) -> Topology:
     """
     text, name = file_text(path, "matrix file", "a text file of rows")
     return from_matrix(parse_rows(text, name), name)
-
-
-def a_graph(what: str, value: object) -> Topology:
-    """Return the value if it is a Topology, else raise TypeError."""
-    if all(hasattr(value, need) for need in ("nodes", "edges", "is_directed")):
-        raise TypeError(
-            f"{what}: found {typed_repr(value)}; expected a graph such as chain(4); make it with from_graph"
-        )
-    return check_instance(what, value, Topology, "a graph, e.g. chain(4)")
 
 
 def _check_size(name: object, n: object) -> None:

@@ -436,7 +436,11 @@ FAMILY = (
             WELL + "def force(v, friction):\n    return friction(v)\n",
             "FRICTION is False, but a function uses",
         ),
-        ("topology", FAMILY.replace(", *, step=1", "", 1).replace("step", "1", 2), "found settle without options"),
+        (
+            "topology",
+            FAMILY.replace(", *, step=1", "", 1).replace("step", "1", 2),
+            "settle asks for 'step', which is no option of edges",
+        ),
     ],
 )
 def test_what_would_be_ignored_is_refused(kind: str, text: str, words: str, tmp_path: Path) -> None:

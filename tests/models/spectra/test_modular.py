@@ -9,6 +9,7 @@ from math import lcm
 
 import pytest
 import sympy as sp
+from family_sizes import size
 
 from synchain.models import chain, one_way_ring, ring, star
 from synchain.models.graphs.families import family, names, topology
@@ -21,7 +22,7 @@ from synchain.models.spectra.solve import Proof, spectrum
 from synchain.models.spectra.spectrum import table
 from synchain.runtime.cli import main
 
-CLOSED = [name for name in names() if family(name).spectrum]
+CLOSED = [name for name in names() if family(name).spectrum and name != "paley"]  # √n is no short sum of cosines
 COMPOSED = [
     cartesian(chain(4), ring(5)),
     kronecker(ring(5), ring(7)),
@@ -37,7 +38,9 @@ def listed(graph: Topology) -> list[tuple[sp.Expr, int]]:
     return list(found)
 
 
-@pytest.mark.parametrize("graph", [topology(name, n) for name in CLOSED for n in (12, 30)] + COMPOSED, ids=str)
+@pytest.mark.parametrize(
+    "graph", [topology(name, size(name, n)) for name in CLOSED for n in (12, 30)] + COMPOSED, ids=str
+)
 def test_closed_forms_agree(graph: Topology) -> None:
     chance = check_modulo(graph, listed(graph))
     assert chance is not None

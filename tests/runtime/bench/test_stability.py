@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from family_sizes import size
 
 from synchain.models.graphs.families import names, topology
 from synchain.models.scenes.scene import Scene
@@ -98,7 +99,7 @@ def test_equal_starts_stay_equal_to_the_last_bit(name: str) -> None:
     """At a coupling at which the synchronous state is unstable, on every graph, as `run` integrates
     it.
     """
-    graph = topology(name, 8)
+    graph = topology(name, size(name, 8))
     scene = Scene(
         topology=graph,
         initial={"x": 0.3, "v": 0.0},
