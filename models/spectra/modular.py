@@ -130,14 +130,12 @@ def _claimed(numbers: Sequence[tuple[Powers, int]], m: int, p: int) -> nmod_poly
 def _characteristic(graph: Matrix, p: int) -> nmod_poly:
     """det(z - G) modulo p."""
     residues: dict[Fraction, int] = {}
-    entries, sums = dict[tuple[int, int], int](), [0] * graph.n
-    for target, source, weight in graph.links:
-        value = residues.get(weight)
+    entries = {(i, i): 0 for i in range(graph.n)}
+    for row, column, number in graph.entries:
+        value = residues.get(number)
         if value is None:
-            value = residues[weight] = _residue(weight, p)
-        entries[target, source] = value
-        sums[target] -= value
-    entries.update({(i, i): total % p for i, total in enumerate(sums)})
+            value = residues[number] = _residue(number, p)
+        entries[row, column] = value
     polynomial = sparse(graph.n, entries, lambda c: nmod_poly([x % p for x in c], p))
     if polynomial is not None:
         return polynomial
@@ -150,10 +148,10 @@ def _characteristic(graph: Matrix, p: int) -> nmod_poly:
 def _error_probability(graph: Matrix, numbers: Sequence[tuple[Powers, int]], m: int) -> float:
     """About the largest share of primes that divide the norm of a coefficient of the difference."""
     parts = [x for (a, terms), _ in numbers for x in (a, *(b for _, b in terms))]
-    scale = lcm(*{x.denominator for x in (*parts, *(w for _, _, w in graph.links))})
+    scale = lcm(*{x.denominator for x in (*parts, *(w for _, _, w in graph.entries))})
     rows = [0.0] * graph.n
-    for target, _, weight in graph.links:
-        rows[target] += 2.0 * abs(weight.numerator) / weight.denominator
+    for row, _, number in graph.entries:
+        rows[row] += abs(number.numerator) / number.denominator
     largest = max(*rows, *(float(abs(a) + sum(abs(b) for _, b in c)) for (a, c), _ in numbers))
     units = int(fmpz(m).euler_phi())
     bad = units * (graph.n * log2(1 + scale * largest) + 1) / BITS
