@@ -20,6 +20,7 @@ from flint import fmpz, nmod_mat, nmod_poly
 
 from ..algebra import cosines
 from ..algebra.cosine_sums import read
+from ..algebra.rationals import to_fraction
 from .characteristic import pairwise_product, sparse
 from .eigenvalue import ProofError
 from .matrix import Matrix
@@ -31,6 +32,9 @@ PRIMES = 3
 
 BITS = 61
 """Primes lie between 2**BITS and twice that."""
+
+LONGEST = 10_000
+"""Most terms of a square root as a sum of roots of unity."""
 
 Powers = tuple[Fraction, tuple[tuple[Fraction, Fraction], ...]]
 """shift + Σ b exp(2πit) as (shift, ((t, b), …))."""
@@ -84,6 +88,9 @@ def _powers(number: sp.Expr) -> Powers | None:
     real = read(number)
     if real is not None:
         return real.shift, tuple((turn, b) for t, b in real.terms for turn in (t, 1 - t))
+    surd = _surd(number)
+    if surd is not None:
+        return surd
     re, im = number.as_real_imag()  # radicals of short angles: a + b I with a, b real sums
     first, second, quarter = read(re), read(sp.expand(im)), Fraction(1, 4)
     if first is None or second is None:
@@ -91,6 +98,18 @@ def _powers(number: sp.Expr) -> Powers | None:
     terms = [(turn, b) for t, b in first.terms for turn in (t, 1 - t)]
     terms += [((turn + quarter) % 1, b) for t, b in second.terms for turn in (t, 1 - t)]
     return first.shift, (*terms, (quarter, second.shift))
+
+
+def _surd(number: sp.Expr) -> Powers | None:
+    """a + b √c, c = 1 mod 4, by the sum Σ exp(2πik²/c) = √c of Gauss (Washington 1997, chapter 6); else None."""
+    a, rest = number.as_coeff_Add()
+    b, root = rest.as_coeff_Mul()
+    if not (a.is_Rational and b.is_Rational and root.is_Pow and root.exp == sp.S.Half and root.base.is_Integer):
+        return None
+    c, factor = int(root.base), to_fraction(b)
+    if c % 4 != 1 or not 0 < c <= LONGEST:
+        return None
+    return to_fraction(a), tuple((Fraction(k * k % c, c), factor) for k in range(c))
 
 
 def _primes(m: int, seed: str) -> Iterator[int]:

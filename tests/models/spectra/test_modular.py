@@ -9,7 +9,7 @@ from math import lcm
 
 import pytest
 import sympy as sp
-from family_sizes import size
+from family_sizes import size, sizes
 
 from synchain.models import chain, one_way_ring, ring, star
 from synchain.models.graphs.families import family, names, topology
@@ -22,7 +22,7 @@ from synchain.models.spectra.solve import Proof, spectrum
 from synchain.models.spectra.spectrum import table
 from synchain.runtime.cli import main
 
-CLOSED = [name for name in names() if family(name).spectrum and name != "paley"]  # √n is no short sum of cosines
+CLOSED = [name for name in names() if family(name).spectrum]
 COMPOSED = [
     cartesian(chain(4), ring(5)),
     kronecker(ring(5), ring(7)),
@@ -39,7 +39,9 @@ def listed(graph: Topology) -> list[tuple[sp.Expr, int]]:
 
 
 @pytest.mark.parametrize(
-    "graph", [topology(name, size(name, n)) for name in CLOSED for n in (12, 30)] + COMPOSED, ids=str
+    "graph",
+    [topology(name, n) for name in CLOSED for n in (size(name, 12), sizes(name, range(31))[-1])] + COMPOSED,
+    ids=str,
 )
 def test_closed_forms_agree(graph: Topology) -> None:
     chance = check_modulo(graph, listed(graph))
@@ -47,7 +49,9 @@ def test_closed_forms_agree(graph: Topology) -> None:
     assert 0 < chance < 1e-40
 
 
-@pytest.mark.parametrize("graph", [ring(12), one_way_ring(9), topology("torus", 30), *COMPOSED], ids=str)
+@pytest.mark.parametrize(
+    "graph", [ring(12), one_way_ring(9), topology("torus", 30), topology("paley", 37), *COMPOSED], ids=str
+)
 def test_any_small_mistake_shows(graph: Topology) -> None:
     right = listed(graph)
     (first, count), (second, other) = right[0], right[-1]
