@@ -847,7 +847,7 @@ def _() -> Quantities:
 def _() -> Quantities:
     seen: Quantities = {}
     for name in names(TOPOLOGY):
-        for n in (6, 12):
+        for n in (family_sizes.size(name, n) for n in (6, 12)):
             given = Scene(oscillator="harmonic", topology=getattr(models, name)(n))
             seen |= {f"{name} {n} {key}": value for key, value in written(given).items()}
     return seen

@@ -62,7 +62,8 @@ class Kind:
         Called with the module of a file from outside, its name in messages and its text; raises ValueError if the
         module is not what the kind must be.
     also : mapping of str to str
-        Other names of shipped files: what they name is what the file's own name names.
+        Other names of shipped files: what they name is what the file's own name names, unless there
+        is a file of that name.
     near : mapping of str to str
         Names of other things that are close to a shipped file; they serve suggestions only.
     otherwise : str
@@ -153,7 +154,7 @@ def named(kind: Kind, name: str) -> str:
     What is an `OwnFile` already stays what it is, whatever has become of its file.
     """
     if isinstance(name, OwnFile) or not (isinstance(name, str) and name.endswith(".py")):
-        return kind.also.get(name, name)
+        return name if name not in kind.also or name in names(kind) else kind.also[name]
     place = Path(name).resolve()
     text = _text(kind, name, place)
     own = OwnFile(name, str(place), hashlib.sha256(text).hexdigest())
