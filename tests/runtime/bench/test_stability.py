@@ -110,7 +110,7 @@ def test_equal_starts_stay_equal_to_the_last_bit(name: str) -> None:
     )
     for width in (1, 8):
         found = run(scene, width=width, show_progress=False)
-        x, v = found.end.values.reshape(2, 8)
+        x, v = found.end.values.reshape(2, graph.n)
         assert (x == x[0]).all(), "positions"
         assert (v == v[0]).all(), "velocities"
         assert float(found.sync_error_max) == 0.0
