@@ -18,7 +18,7 @@ SUMMARY = (
     "another (the unit of each group)"
 )
 MINIMUM = 2
-SOURCE = "L. Lovász, Period. Math. Hung. 6, 191 (1975); A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 6.4"
+SOURCE = "L. Lovász, Period. Math. Hung. 6, 191 (1975); L. Babai, J. Comb. Theory B 27, 180 (1979)"
 
 CONNECTED = False
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 SUMMARY = "Paley graph: the elements of a finite field (n a prime power 5, 9, 13 …), joined if they differ by a square"
 MINIMUM = 5
-SOURCE = "C. Godsil, G. Royle, Algebraic Graph Theory (Springer, 2001), section 10.3; R. E. A. C. Paley, J. Math. Phys. 12, 311 (1933)"
+SOURCE = "C. Godsil, G. Royle, Algebraic Graph Theory (Springer, 2001), chapter 10; R. E. A. C. Paley, J. Math. Phys. 12, 311 (1933)"
 
 
 def _prime_power(n: int) -> tuple[int, int] | None:
