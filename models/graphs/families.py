@@ -108,6 +108,17 @@ TOPOLOGY = Kind(
 """Graph families: the files of the folder `topologies`."""
 
 
+class _Signature:
+    """The signature of a call of a family: n, and its options with their defaults; the class has its own."""
+
+    def __get__(self, made: Family | None, owner: type[Family]) -> inspect.Signature:
+        if made is None:
+            raise AttributeError("__signature__")
+        kind = inspect.Parameter
+        options = (kind(name, kind.KEYWORD_ONLY, default=value) for name, value in made.options.items())
+        return inspect.Signature([kind("n", kind.POSITIONAL_OR_KEYWORD, annotation=int), *options])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Family:
     """A family of graphs: a function of the number of nodes and of the options of the family.
@@ -169,6 +180,7 @@ class Family:
     formula: Callable[..., Any] | None = None
     sides: Callable[[int], tuple[int, ...]] | None = None
     link_limit: int = LINK_LIMIT
+    __signature__ = _Signature()
 
     def __call__(self, n: int, **options: object) -> Topology:
         """Return the graph of `n` nodes; see `topology`."""

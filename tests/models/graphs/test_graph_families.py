@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import pickle
 from collections import Counter
 from fractions import Fraction
@@ -485,3 +486,10 @@ def test_the_names_of_networkx_make_equal_graphs() -> None:
     assert {"path": "chain", "cycle": "ring"}.items() <= TOPOLOGY.also.items()
     assert Scene(topology=models.path(3)) == Scene(topology=models.chain(3))
     assert closed_form("path").text == closed_form("chain").text
+
+
+def test_editors_see_the_options_of_a_family() -> None:
+    assert str(inspect.signature(models.circulant)) == "(n: int, *, offsets=(1, 2))"
+    assert str(inspect.signature(models.small_world)) == "(n: int, *, neighbours=4, p='1/10', seed=0)"
+    assert str(inspect.signature(models.path)) == "(n: int)"
+    assert "name" in inspect.signature(type(models.circulant)).parameters
