@@ -14,7 +14,6 @@ import sympy as sp
 
 from ..dynamics.equations import Equations
 from ..mechanics.components import SLIDING, TIME, Edge, Node
-from ..mechanics.link import is_oriented
 from ..mechanics.nondimensional import FRICTION
 from .writer import Latex, Style, Text, Writer
 
@@ -129,7 +128,7 @@ def _lines(equations: Equations, style: Style) -> Iterator[str]:
     if generic:
         count, weights = len(equations.links), style.letter("G", "ij")
         meaning = f", {weights}" + style.words(f" the weights of the {count} links") if count else ""
-        if any(map(is_oriented, equations.edges)):
+        if any(edge.oriented for edge in equations.edges):
             meaning += style.words(", -1 where a link runs from j to i")
         yield ("i, j" if count else "i") + f" = 1, {style.dots}, {equations.n}{meaning}"
 
@@ -175,10 +174,10 @@ def _at_node(equations: Equations, named: tuple[_Named, ...], style: Style, i: i
         index = str(j + 1) if equations.n > 1 else ""
         letters |= _letters(equations, named[equations.kind_of[j]], style, equations.symbols(j), index, j)
     writer = Writer(style, letters, frozenset((*letters, TIME)))
-    links = [link for link in equations.links if link[0] == i]
+    links = [(link, edge) for link, edge in equations.linked() if link[0] == i]
     for c in _shown(equations, i):
         terms = [term.xreplace(here) for term in _ordered(own.rhs[c], node)]
-        parts = (equations.edge_at(link).rhs[c].xreplace(equations.at_link(link)) for link in links)
+        parts = (edge.rhs[c].xreplace(equations.at_link(link, edge)) for link, edge in links)
         felt = sp.factor_terms(sp.Add(*parts))
         terms += [term for term in sp.Add.make_args(felt) if term != 0]
         yield f"{_left(equations, writer, c, i)} = {writer.total(terms)}"
@@ -192,10 +191,10 @@ def _left(equations: Equations, writer: Writer, c: int, i: int) -> str:
     own = writer.write(equations.symbols(i)[c]) + "'"
     rates: dict[sp.Symbol, str] = {}
     terms: list[sp.Expr] = []
-    for link in equations.links if equations.inertial else ():
+    for link, edge in equations.linked() if equations.inertial else ():
         if link[0] == i:
-            for block, end in zip(equations.edge_at(link).inertia, link[:2], strict=False):
-                values = equations.at_link(link)
+            for block, end in zip(edge.inertia, link[:2], strict=False):
+                values = equations.at_link(link, edge)
                 for symbol, e in zip(equations.symbols(end), block[c], strict=True):
                     rate = sp.Symbol(f"{symbol.name}'", real=True)
                     rates[rate] = writer.write(symbol) + "'"
@@ -267,7 +266,7 @@ def _pairs(equations: Equations, i: int = 0) -> dict[int, int]:
     The rate of such a component is that state alone: links add nothing.
     """
     node, kind = equations.node_at(i), equations.kind_of[i]
-    edges = [edge for (target, _), edge in equations.edge_of if target == kind] if equations.links else []
+    edges = [edge for (target, _), edge in equations.edge_of if target == kind]
     found: dict[int, int] = {}
     for c, rate in enumerate(node.rhs):
         free = all(edge.rhs[c] == 0 for edge in edges)
