@@ -121,14 +121,13 @@ def quotient(equations: Equations, colours: Sequence[Hashable]) -> tuple[Equatio
 
 def _balanced(equations: Equations, colours: Sequence[Hashable]) -> tuple[int, ...]:
     """The coarsest partition with classes of one colour that is balanced in every layer."""
-    classes: tuple[int, ...] = ()
+    found = coarsest_balanced(equations.n, (), colours)
     while True:
-        before, found = classes, colours if not classes else classes
+        before = found
         for layer in equations.layers:
             found = coarsest_balanced(equations.n, layer.links, found)
-        classes = coarsest_balanced(equations.n, (), found)
-        if classes == before or len(equations.layers) < 2:
-            return classes
+        if found == before or len(equations.layers) < 2:
+            return found
 
 
 def collapse(equations: Equations, classes: Sequence[int]) -> Equations:

@@ -340,7 +340,9 @@ def source_slope(equations: Equations) -> sp.Matrix:
     matrix = weighted.xreplace({edge.weight: sp.S.One})
     zero = sp.zeros(*matrix.shape)
     if not edge.oriented and (weighted - edge.weight * matrix).applyfunc(sp.simplify) != zero:
-        raise ValueError("links are not proportional to their weight; the modes of the graph are no modes of the network")
+        raise ValueError(
+            "links are not proportional to their weight; the modes of the graph are no modes of the network"
+        )
     slope = matrix.diff(sigma)
     if (matrix - sigma * slope).applyfunc(sp.simplify) != zero:
         raise ValueError(f"links are not proportional to {sigma}; a mode has no single strength alpha")

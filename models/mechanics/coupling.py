@@ -238,9 +238,7 @@ class LagrangianCoupling:
         for node in (single,) if other is None else (single, other):
             half = len(node.state) // 2
             if self.between is not None and other is None:
-                raise ValueError(
-                    f"coupling {str(self)!r} joins {' and '.join(self.between)}; found nodes of one kind"
-                )
+                raise ValueError(f"coupling {str(self)!r} joins {' and '.join(self.between)}; found nodes of one kind")
             if node.contact is None and node.rhs[:half] != node.state[half:]:
                 name = node.state[0].name
                 raise ValueError(
@@ -280,7 +278,9 @@ class LagrangianCoupling:
             raise ValueError(f"coupling {str(self)!r} joins {wanted}; found a link between {pair.described}")
         symbols = dict(zip(pair.nodes[0].state, pair.here, strict=True))
         symbols |= dict(zip(pair.nodes[1].state, pair.there, strict=True))
-        kinetic, potential, dissipation = (e.xreplace(symbols) for e in (self.kinetic, self.potential, self.dissipation))
+        kinetic, potential, dissipation = (
+            e.xreplace(symbols) for e in (self.kinetic, self.potential, self.dissipation)
+        )
         return Terms(kinetic, potential, dissipation)
 
     def __str__(self) -> str:

@@ -24,6 +24,8 @@ _ONE: Mapping[str, Any] = {
 
 _TWO: Mapping[str, Any] = {"atan2": sp.atan2, "Mod": sp.Mod, "Min": sp.Min, "Max": sp.Max}
 
+CONSTANTS: Mapping[str, Any] = {"pi": sp.pi, "E": sp.E}
+
 _KNOWN = ("numbers, names, pi, + - * / **, parentheses and", *_ONE, *_TWO)
 
 
@@ -47,8 +49,11 @@ def exact(what: str, value: object) -> sp.Expr:
     if isinstance(value, bool) or not isinstance(value, sp.Expr | int | float):
         raise TypeError(f"{what}: found {typed_repr(value)}; expected an expression of symbols")
     e = sp.sympify(value)
-    if e.has(sp.nan, sp.zoo, sp.oo, -sp.oo):
-        raise ValueError(f"{what}: found {short_repr(e)}; expected a finite expression")
+    if e.has(sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I):
+        raise ValueError(f"{what}: found {short_repr(e)}; expected a real, finite expression")
+    taken = sorted(s.name for s in e.free_symbols if s.name in CONSTANTS or s.name in _ONE or s.name in _TWO)
+    if taken:
+        raise ValueError(f"{what}: the symbol {taken[0]!r} has the name of a constant or a function; rename it")
     decimals = {number: sp.Rational(repr(float(number))) for number in e.atoms(sp.Float)}
     return read(what, str(e.xreplace(decimals)))
 
@@ -102,7 +107,7 @@ class _Expressions(Algebra[sp.Expr]):
     def name(self, name: str) -> sp.Expr:
         if name in _ONE or name in _TWO:
             raise NoMeaning("a function without arguments")
-        return {"pi": sp.pi, "E": sp.E}.get(name) or sp.Symbol(name, real=True)
+        return CONSTANTS.get(name) or sp.Symbol(name, real=True)
 
     def positive(self, value: sp.Expr) -> sp.Expr:
         return value

@@ -212,9 +212,7 @@ class _Content:
     own: frozenset[sp.Symbol]
 
     @classmethod
-    def of(
-        cls, what: str, given: Iterable[object], parameters: Mapping[sp.Symbol | str, object] | None
-    ) -> _Content:
+    def of(cls, what: str, given: Iterable[object], parameters: Mapping[sp.Symbol | str, object] | None) -> _Content:
         table = _parameters(what, parameters)
         symbols = {sp.Symbol(name, real=True) for name in table}
         own = frozenset({TIME, WEIGHT, *symbols})
@@ -230,8 +228,12 @@ class _Content:
         for s in sorted(symbols - used, key=lambda s: s.name):
             raise ValueError(f"{what}: nothing uses the parameter {s.name!r}; use it or leave it out")
         if WEIGHT not in used:
-            raise ValueError(f"{what}: nothing uses the weight of a link; expected it as a factor, e.g. W*sin(j.x - i.x)")
-        strange = next((f for e in found for f in sorted(e.atoms(AppliedUndef, sp.Derivative, sp.Integral), key=str)), None)
+            raise ValueError(
+                f"{what}: nothing uses the weight of a link; expected it as a factor, e.g. W*sin(j.x - i.x)"
+            )
+        strange = next(
+            (f for e in found for f in sorted(e.atoms(AppliedUndef, sp.Derivative, sp.Integral), key=str)), None
+        )
         if strange is not None:
             raise ValueError(f"{what}: found {strange}; expected known functions of symbols; write it out")
         return cls(found, table, own)
@@ -252,7 +254,8 @@ def _parameters(what: str, given: Mapping[sp.Symbol | str, object] | None) -> Fr
     for key, value in check_table(f"{what}: parameters", {} if given is None else given).items():
         name = key.name if isinstance(key, sp.Symbol) else key
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
-            raise ValueError(f"{what}: found the parameter {short_repr(key)}; expected a name such as 'K'")
+            why = ", a word of Python" if isinstance(name, str) and keyword.iskeyword(name) else ""
+            raise ValueError(f"{what}: found the parameter {short_repr(key)}{why}; expected a name such as 'K'")
         if name in (TIME.name, WEIGHT.name, _WEIGHT):
             meaning = "the time" if name == TIME.name else "the weight of a link"
             raise ValueError(f"{what}: the parameter {name!r} has the name of {meaning}; rename it")
@@ -310,7 +313,8 @@ def from_table(what: str, given: Mapping[object, object]) -> Rates | Potential:
         return Potential(_read(f"{what}: potential", given["potential"]), named)
     table = check_table(f"{what}: rates", given["rates"])
     return Rates(
-        {sp.Symbol(f"{name}_i", real=True): _read(f"{what}: rate of {name}", text) for name, text in table.items()}, named
+        {sp.Symbol(f"{name}_i", real=True): _read(f"{what}: rate of {name}", text) for name, text in table.items()},
+        named,
     )
 
 

@@ -101,10 +101,7 @@ def strength(edge: Edge, parameters: Iterable[sp.Symbol] = ()) -> sp.Symbol:
     if len(factors) == 1:
         return factors[0]
     names = ", ".join(s.name for s in own) or "no parameter"
-    if factors:
-        found = f"found the factors {', '.join(s.name for s in factors)}"
-    else:
-        found = f"found {names}"
+    found = f"found the factors {', '.join(s.name for s in factors)}" if factors else f"found {names}"
     raise ValueError(
         f"strength of the links: {found}; expected sigma, or exactly one parameter that is a factor of the whole link"
     )

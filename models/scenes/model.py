@@ -328,9 +328,7 @@ def as_topology(value: object) -> Topology:
     return graph
 
 
-def as_layers(
-    links: object, coupling: Coupling | None, graph: object
-) -> tuple[tuple[Coupling | None, Topology], ...]:
+def as_layers(links: object, coupling: Coupling | None, graph: object) -> tuple[tuple[Coupling | None, Topology], ...]:
     """Return the layers of links of a scene.
 
     Parameters

@@ -63,11 +63,9 @@ def execute(arguments: Namespace) -> int:
 
     with wrong_use():
         scene = _scene(arguments)
-        check_probe(scene.topology, scene.topology.spectrum)
+        check_probe(scene.topology, scene.spectrum)
         if not scene.model.linked:
-            raise WrongUse(
-                "the scene has no coupling; expected a coupled network; choose another --scene"
-            )
+            raise WrongUse("the scene has no coupling; expected a coupled network; choose another --scene")
         kernel_source(scene)
         criterion = Criterion(**_effort(arguments))
     warn(scene.warnings)

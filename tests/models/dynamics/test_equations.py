@@ -258,4 +258,3 @@ def test_equations_refuse(arguments: tuple, message: str) -> None:
 
 def test_a_name_is_taken_only_where_the_network_reaches_it() -> None:
     assert Equations.of_equal_nodes(NAMED_LIKE_A_STATE, None, 1).state == ("x_1", "v_1")
-
