@@ -232,7 +232,7 @@ class Equations(_Cached):
     @property
     def forced(self) -> bool:
         """True if time occurs explicitly."""
-        return any(template.forced for template in (*self.nodes, *self.edges))
+        return any(node.forced for node in self.nodes) or any(edge.forced for edge in self.edges)
 
     @property
     def sticks(self) -> bool:
