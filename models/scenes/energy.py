@@ -7,21 +7,22 @@ Source: Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. (Addison-Wesley, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import sympy as sp
 
 from ..dynamics.equations import Equations
 from ..graphs.links import Link
+from ..graphs.topology import Topology
 from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Edge
-from ..mechanics.coupling import LagrangianCoupling, Potential
+from ..mechanics.coupling import Coupling, LagrangianCoupling, Potential
 from ..mechanics.ends import Pair, Terms
 from ..mechanics.friction import ContactModel
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
-from ..mechanics.oscillator import Field, Oscillator
+from ..mechanics.oscillator import Field
 from .model import NodeKind
 from .scene import a_scene
 
@@ -96,7 +97,17 @@ def energy(scene: Scene) -> Energy:
     if equations.sticks:
         raise ValueError("energy: set-valued friction does work that is no function of the state; use contact 'atan'")
     nodes = tuple(_of_node(kind, scene.contact) for kind in kinds)
-    return Energy(equations, nodes, _of_links(scene, [kind.oscillator for kind in kinds]))
+    links, layers = [], []
+    for (coupling, graph), layer in zip(scene.model.linked, equations.layers, strict=True):
+        _check(coupling, graph)
+        edges = []
+        for (a, b), edge in layer.edge_of:
+            pair = Pair((equations.nodes[a], equations.nodes[b]), (kinds[a].oscillator, kinds[b].oscillator))
+            share, joint = _of_link(edge, pair, coupling.terms(pair), equations.varied)
+            links.append(share)
+            edges.append(((a, b), joint))
+        layers.append(replace(layer, edge_of=tuple(edges)))
+    return Energy(replace(equations, layers=tuple(layers)), nodes, tuple(links))
 
 
 def _of_node(kind: NodeKind, contact: ContactModel) -> Share:
@@ -110,35 +121,29 @@ def _of_node(kind: NodeKind, contact: ContactModel) -> Share:
     return Share(_of_lagrangian(lagrangian, system.velocities), power)
 
 
-def _of_links(scene: Scene, oscillators: Sequence[Oscillator]) -> tuple[Share, ...]:
-    """Energy and power of one link of each edge."""
-    equations = scene.equations
-    if not equations.edges:
-        return ()
-    couplings = []
-    for coupling, graph in scene.model.layers:
-        if not isinstance(coupling, LagrangianCoupling | Potential):
-            raise ValueError(f"energy: the coupling '{coupling}' has none; expected a spring or damper by its name")
-        if coupling.forced:
-            raise ValueError(f"energy: the coupling '{coupling}' depends on time; expected one that does not")
-        if not graph.symmetric:
-            raise ValueError(f"energy: {graph.name}({scene.n}) has one-way links; expected links both ways")
-        couplings.append(coupling)
-    found = []
-    for coupling, layer in zip(couplings, equations.layers, strict=True):
-        for (a, b), edge in layer.edge_of if layer.links else ():
-            pair = Pair((equations.nodes[a], equations.nodes[b]), (oscillators[a], oscillators[b]))
-            own = {s: of for s, of in pair.theirs.items() if s not in dict(edge.theirs)}  # what all nodes share
-            found.append(_of_link(edge, coupling.terms(pair), own))
-    return tuple(found)
+def _check(coupling: Coupling, graph: Topology) -> None:
+    """Raise ValueError for links without an energy."""
+    if not isinstance(coupling, LagrangianCoupling | Potential):
+        raise ValueError(f"energy: the coupling '{coupling}' has none; expected a spring or damper by its name")
+    if coupling.forced:
+        raise ValueError(f"energy: the coupling '{coupling}' depends on time; expected one that does not")
+    if not graph.symmetric:
+        raise ValueError(f"energy: {graph.name}({graph.n}) has one-way links; expected links both ways")
 
 
-def _of_link(edge: Edge, terms: Terms, own: Mapping[sp.Symbol, sp.Symbol]) -> Share:
-    """The energy of a link, and the power it feeds in: minus v dR/dv at either end."""
-    velocities = (*edge.here[len(edge.here) // 2 :], *edge.there[len(edge.there) // 2 :])
-    kinetic, potential, dissipation = (e.xreplace(own) for e in (terms.kinetic, terms.potential, terms.dissipation))
-    lost = sp.Add(*(v * derivative(dissipation, v) for v in velocities))
-    return Share(potential if kinetic == 0 else _of_lagrangian(kinetic - potential, velocities), -lost)
+def _of_link(edge: Edge, pair: Pair, terms: Terms, varied: tuple[str, ...]) -> tuple[Share, Edge]:
+    """The energy of a link, and the power it feeds in: minus v dR/dv at either end.
+
+    The edge gets the parameters of its nodes that the energy uses, though its forces may not.
+    """
+    shared = {s: own for s, own in pair.theirs.items() if own.name not in varied}
+    kinetic, potential, dissipation = (e.xreplace(shared) for e in (terms.kinetic, terms.potential, terms.dissipation))
+    lost = sp.Add(*(v * derivative(dissipation, v) for v in pair.velocities))
+    share = Share(potential if kinetic == 0 else _of_lagrangian(kinetic - potential, pair.velocities), -lost)
+    used = share.energy.free_symbols | share.power.free_symbols
+    more = tuple(s for s in pair.nodes[0].parameters if s in used and s not in edge.parameters)
+    theirs = tuple((s, own) for s, own in pair.theirs.items() if s in used)
+    return share, replace(edge, parameters=(*edge.parameters, *more), theirs=theirs)
 
 
 def _of_lagrangian(lagrangian: sp.Expr, velocities: Sequence[sp.Symbol]) -> sp.Expr:
