@@ -112,10 +112,42 @@ def case(make: Callable[[int], tuple[Scene, Rhs]], n: int) -> tuple[Scene, np.nd
     return scene.replace(transient=0.0, window=4.0, time_unit="time", record=(), rtol=1e-12, atol=1e-13), end
 
 
-@pytest.mark.parametrize("integrator", ["taylor", "rodas5p"])
-@pytest.mark.parametrize("n", [3, 9])
-@pytest.mark.parametrize("make", [kuramoto, neurons, bodies])
+LONG = pytest.mark.long
+
+
+@pytest.mark.parametrize(
+    ("make", "n", "integrator"),
+    [
+        (kuramoto, 3, "rodas5p"),
+        (kuramoto, 9, "taylor"),
+        (neurons, 3, "taylor"),
+        (neurons, 9, "rodas5p"),
+        (bodies, 3, "taylor"),
+        pytest.param(kuramoto, 3, "taylor", marks=LONG),
+        pytest.param(kuramoto, 9, "rodas5p", marks=LONG),
+        pytest.param(neurons, 3, "rodas5p", marks=LONG),
+        pytest.param(neurons, 9, "taylor", marks=LONG),
+        pytest.param(bodies, 3, "rodas5p", marks=LONG),
+        pytest.param(bodies, 9, "taylor", marks=LONG),
+        pytest.param(bodies, 9, "rodas5p", marks=LONG),
+        pytest.param(bodies, 9, "dop853", marks=LONG),
+    ],
+)
 def test_links_against_dop853(make: Callable[[int], tuple[Scene, Rhs]], n: int, integrator: str) -> None:
     scene, end = case(make, n)
     found = run(scene.replace(integrator=integrator)).data.end.values
     assert np.abs(found - end).max() < 2e-11 * np.abs(end).max()
+
+
+@pytest.mark.parametrize("n", [3, pytest.param(9, marks=LONG)])
+def test_time_in_links_costs_a_rosenbrock_method_no_steps(n: int) -> None:
+    """With the exact derivative by time its steps are those of the same motion with time as a state."""
+    scene, _ = case(kuramoto, n)
+    clock = Oscillator("clocked", PHASE.parameters, Field(("theta", "s"), (P, sp.S.One)))
+    i, j, w = ends(clock)
+    pumped = (1 + 0.5 * sp.cos(OMEGA * i.s)) * K * w * sp.sin(j.theta - i.theta - LAG)
+    given = {"oscillator": clock, "coupling": Rates({i.theta: pumped}, {K: 1.3, LAG: 0.2, OMEGA: 2})}
+    start = {"theta": scene.initial["theta"], "s": 0.0}
+    told = scene.replace(**given, initial=start, parameters={"p": list(np.linspace(-0.5, 0.5, n))})
+    steps = [int(run(made.replace(integrator="rodas5p", rtol=1e-9)).data.steps) for made in (scene, told)]
+    assert abs(steps[0] - steps[1]) <= 1
