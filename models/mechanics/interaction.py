@@ -7,12 +7,21 @@ from __future__ import annotations
 
 import keyword
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
-from ..inputs.checks import check_number, check_table, short_repr, suggestion, typed_repr
+from ..inputs.checks import (
+    check_flag,
+    check_keys,
+    check_number,
+    check_table,
+    check_text,
+    short_repr,
+    suggestion,
+    typed_repr,
+)
 from ..inputs.frozen import Frozen
 from .components import TIME, Node
 from .ends import WEIGHT, Pair, Terms
@@ -261,10 +270,25 @@ def _parameters(what: str, given: Mapping[sp.Symbol | str, object] | None) -> Fr
             raise ValueError(f"{what}: the parameter {name!r} has the name of {meaning}; rename it")
         if name in found:
             raise ValueError(f"{what}: the parameter {name!r} is given twice; expected it once")
-        if not isinstance(value, Parameter):
-            value = Parameter(check_number(f"{what}: parameter {name}", value), "1", "parameter of a link")
-        found[name] = value
+        found[name] = value if isinstance(value, Parameter) else _parameter(f"{what}: parameter {name}", value)
     return Frozen(sorted(found.items(), key=lambda item: item[0]))
+
+
+def _parameter(what: str, value: object) -> Parameter:
+    """The parameter of a default, or of a table with its default, unit, meaning and range."""
+    if not isinstance(value, Mapping):
+        return _plain(check_number(what, value))
+    names = [f.name for f in fields(Parameter) if f.name != "scale"]
+    check_keys(what, value, names)
+    if "default" not in value:
+        raise ValueError(f"{what}: 'default' is missing; expected a number")
+    given = {"unit": "1", "meaning": "parameter of a link", **value}
+    for name in {"default", "minimum", "maximum"} & set(given):
+        given[name] = check_number(f"{what}: {name}", given[name])
+    for name in ("unit", "meaning"):
+        given[name] = check_text(f"{what}: {name}", given[name])
+    given["positive"] = check_flag(f"{what}: positive", given.get("positive", False))
+    return Parameter(**given)
 
 
 def _placed(coupling: Rates | Potential, e: sp.Expr, pair: Pair) -> sp.Expr:
@@ -290,8 +314,19 @@ def _written(e: sp.Expr) -> str:
     return str(e.xreplace({WEIGHT: sp.Symbol(_WEIGHT)}))
 
 
-def _numbers(parameters: Mapping[str, Parameter]) -> dict[str, float]:
-    return {name: parameter.default for name, parameter in parameters.items()}
+def _numbers(parameters: Mapping[str, Parameter]) -> dict[str, object]:
+    """Parameters as a table has them: a number, or a table of its own for one that has a unit, a meaning or a range."""
+    return {name: own.default if own == _plain(own.default) else _table(own) for name, own in parameters.items()}
+
+
+def _plain(default: float) -> Parameter:
+    return Parameter(default, "1", "parameter of a link")
+
+
+def _table(parameter: Parameter) -> dict[str, object]:
+    """A parameter without what is as it is by default."""
+    written = {f.name: getattr(parameter, f.name) for f in fields(Parameter) if f.name != "scale"}
+    return {name: value for name, value in written.items() if value is not None and value is not False}
 
 
 def from_table(what: str, given: Mapping[object, object]) -> Rates | Potential:

@@ -129,7 +129,10 @@ def test_nodes_that_do_not_fit_are_refused_by_the_scene(coupling: Any, oscillato
 # -- tables of scene files -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("coupling", [KURAMOTO, GRAVITY])
+RANGED = Rates({TARGET.theta: K * W}, {K: Parameter(0.5, "N", "push", minimum=0, positive=True)})
+
+
+@pytest.mark.parametrize("coupling", [KURAMOTO, GRAVITY, RANGED])
 def test_a_table_is_the_same_coupling(coupling: Rates | Potential) -> None:
     assert from_table("coupling", coupling.as_dict()) == coupling
 
@@ -181,6 +184,12 @@ def test_a_scene_with_a_table_goes_to_a_dictionary_and_back() -> None:
         ({"parameters": {}}, "expected either 'rates' or 'potential'"),
         ({"rates": {"x": "W*x_j"}, "strength": 1}, "found 'rates', 'strength'; expected either"),
         ({"rates": {"x": 1}}, "coupling: rate of x: found 1"),
+        (
+            {"rates": {"x": "K*W"}, "parameters": {"K": {"value": 1}}},
+            "parameter K: unknown key 'value'; known: default",
+        ),
+        ({"rates": {"x": "K*W"}, "parameters": {"K": {"unit": "N"}}}, "parameter K: 'default' is missing"),
+        ({"rates": {"x": "K*W"}, "parameters": {"K": {"default": 1, "unit": 3}}}, "parameter K: unit: found 3"),
     ],
 )
 def test_wrong_tables_are_refused(given: dict[str, Any], message: str) -> None:
