@@ -36,7 +36,8 @@ def synchronous_node(equations: Equations) -> Node:
     Raises
     ------
     NoSynchrony
-        If a link acts between equal states and the sums of weights differ from node to node.
+        If a link acts between equal states and the sums of weights differ from node to node, and if a link has no value
+        between equal states.
     ValueError
         For nodes that differ.
     """
@@ -72,6 +73,11 @@ def _with_links(node: Node, layer: Layer, edge: Edge, n: int) -> Node:
         weights[target].append(weight)
     equal = dict(zip((*edge.here, *edge.there), node.state * 2, strict=True))
     felt = [e.xreplace(equal) for e in edge.rhs]
+    if any(e.has(sp.nan, sp.zoo, sp.oo, -sp.oo) for e in felt):
+        raise NoSynchrony(
+            f"a link {', '.join(map(str, edge.rhs))} has no value between equal states, so complete synchronisation is no "
+            "solution of this network"
+        )
     unit = {edge.weight: sp.S.One}
     if all(sp.expand(e - edge.weight * e.xreplace(unit)) == 0 for e in felt):
         weights = [[sum(own, Fraction(0))] for own in weights]

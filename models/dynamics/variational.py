@@ -130,8 +130,8 @@ def mode(equations: Equations, plane: bool = False) -> Variation:
     ----------
     Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998).
     """
-    slope = source_slope(equations)
     node = synchronous_node(equations)
+    slope = source_slope(equations)
     if node is not equations.node and (equations.inertial or equations.sticks):
         raise ValueError(
             "a link acts between equal states; expected links without inertia between nodes without set-valued friction"

@@ -104,13 +104,12 @@ def _without_synchrony(model: Model) -> str:
         return ""
     try:
         synchronous_node(model.equations())
-    except NoSynchrony:
+    except NoSynchrony as problem:
         pairs = zip(model.linked, model.equations().edges, strict=True)
         names = dict.fromkeys(f"'{coupling}'" for (coupling, _), edge in pairs if not edge.diffusive)
         return (
-            f"coupling {' and '.join(names)} does not vanish between oscillators in equal states, and the sums of weights "
-            "differ from node to node, so that equal motion of all is no solution: there is no complete synchronisation; "
-            "make it a function of differences, or give all nodes one sum of weights"
+            f"coupling {' and '.join(names)} does not vanish between oscillators in equal states: {problem}; expected a "
+            "function of differences, or one sum of weights at all nodes"
         )
     return ""
 

@@ -72,7 +72,9 @@ def test_the_synchronous_motion_solves_the_network() -> None:
 def test_unequal_sums_of_weights_have_no_synchronous_motion() -> None:
     with pytest.raises(NoSynchrony, match="the sums of weights differ from node to node"):
         mode(scene(chain(3)).equations)
-    assert any("does not vanish between oscillators in equal states" in words for words in scene(chain(3)).warnings)
+    assert any(
+        "no solution of this network; expected a function of differences" in words for words in scene(chain(3)).warnings
+    )
     assert not any("equal states" in words for words in scene(ring(3)).warnings)
 
 
@@ -101,3 +103,10 @@ def test_links_in_layers_move_the_synchronous_motion_together() -> None:
     node = synchronous_node(layered.equations)
     alone = synchronous_node(scene(ring(4)).equations)
     assert sp.simplify(node.rhs[2] - alone.rhs[2] - 3 * sp.Symbol("q", real=True) * sp.Symbol("x", real=True)) == 0
+
+
+def test_a_link_without_a_value_between_equal_states_has_no_synchronous_motion() -> None:
+    gravity = Rates({TARGET.x: G * W / (SOURCE.x - TARGET.x)}, {G: 0.3})
+    with pytest.raises(NoSynchrony, match="has no value between equal states"):
+        mode(scene(complete(3), gravity).equations)
+    assert any("has no value between equal states" in words for words in scene(complete(3), gravity).warnings)
