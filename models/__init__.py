@@ -12,7 +12,8 @@ kind          Nodes of one kind have the same oscillator, friction law and conta
 topology      Nodes and weighted links; adjacency minus degree is the connectivity matrix G.
 family        A rule that makes the topology of any number of nodes: chain, ring, star.
 spectrum      The exact eigenvalues γ of G with their multiplicities; largest first, the first is 0.
-coupling      Energy or dissipation of a link, or a matrix between states; its strength is σ.
+coupling      What a link adds: an energy, a matrix between states, or any rates of its target.
+layer         The links of one coupling on one graph; a network may have several.
 contact       How friction jumps at rest: smoothed ("atan", steepness κ), or "set-valued".
 slip state    Of a node with set-valued contact: +1 or -1 while it slips, 0 while it sticks.
 quotient      The network of classes of nodes that move alike, which has fewer equations.
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
     from .graphs.topology import Topology, from_matrix, read_matrix
     from .inputs.options import integer_option, integers_option, probability_option
     from .inputs.plugins import allow_code
+    from .mechanics.ends import ends
+    from .mechanics.interaction import Potential, Rates
     from .mechanics.parameter import Parameter
     from .presentation.equations import latex, text
     from .scenes.axis import Axis
@@ -45,6 +48,8 @@ if TYPE_CHECKING:
 _HOMES = {
     "Axis": "scenes.axis",
     "Parameter": "mechanics.parameter",
+    "Potential": "mechanics.interaction",
+    "Rates": "mechanics.interaction",
     "Scene": "scenes.scene",
     "Section": "scenes.section",
     "Spectrum": "spectra.spectrum",
@@ -52,6 +57,7 @@ _HOMES = {
     "allow_code": "inputs.plugins",
     "cartesian": "graphs.products",
     "complement": "graphs.products",
+    "ends": "mechanics.ends",
     "from_edges": "graphs.readers",
     "from_graph": "graphs.readers",
     "from_matrix": "graphs.topology",
@@ -76,6 +82,8 @@ _HOMES = {
 __all__ = [
     "Axis",
     "Parameter",
+    "Potential",
+    "Rates",
     "Scene",
     "Section",
     "Spectrum",
@@ -83,6 +91,7 @@ __all__ = [
     "allow_code",
     "cartesian",
     "complement",
+    "ends",
     "from_edges",
     "from_graph",
     "from_matrix",

@@ -48,7 +48,8 @@ def parameters(
     coupling: str | Coupling | None = None,
 ) -> dict[str, Parameter]:
     law = None if friction is None else law_of(friction)
-    return network.parameters(oscillator_of(oscillator), law, contact, as_coupling(coupling))
+    joined = as_coupling(coupling)
+    return network.parameters(oscillator_of(oscillator), law, contact, () if joined is None else (joined,))
 
 
 def edge(coupling: str | Coupling, single: Node, oscillator: str | Oscillator | None = None) -> Edge:

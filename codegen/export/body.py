@@ -18,7 +18,7 @@ from ..program.lowering import Library, number
 from ..program.statements import Statement, let
 
 __all__ = [
-    "LARGEST_UNROLLED", "Body", "Place", "Storing", "check_inertia", "is_unrolled", "link_body", "link_places",
+    "LARGEST_UNROLLED", "Body", "Linked", "Place", "Storing", "check_inertia", "is_unrolled", "link_body", "link_places",
     "mass_body", "node_body", "node_places", "own_parameters", "parameters", "rate_symbols", "weights", "wrapped",
 ]  # fmt: skip
 
@@ -29,6 +29,9 @@ Place = tuple[int, int]
 """(row, column) of an entry in the block of one node or link, by component of the state."""
 
 Block: TypeAlias = tuple[tuple[sp.Expr, ...], ...]
+
+Linked: TypeAlias = tuple[Link, Edge]
+"""A link with its template."""
 
 Storing: TypeAlias = Callable[[Any, Expression], Statement]
 """Makes the statement that stores a value at a component or place."""
@@ -68,7 +71,7 @@ def node_places(equations: Equations, i: int = 0) -> dict[Place, sp.Expr]:
     return _places(equations.node_at(i).jacobian())
 
 
-def link_places(equations: Equations, link: Link | None = None) -> tuple[dict[Place, sp.Expr], dict[Place, sp.Expr]]:
+def link_places(equations: Equations, link: Linked | None = None) -> tuple[dict[Place, sp.Expr], dict[Place, sp.Expr]]:
     """The entries that a link adds to the block of its target, and those in the block (target, source)."""
     edge = _edge(equations, link)
     if edge is None:
@@ -94,21 +97,21 @@ def _at_rates(edge: Edge, block: Block, states: tuple[sp.Symbol, ...]) -> Block:
     )
 
 
-def mass_body(equations: Equations, link: Link | None = None) -> Body:
+def mass_body(equations: Equations, link: Linked | None = None) -> Body:
     """What a link adds to M in M d(state)/dt = rhs, ((False or True for there, place) -> value)."""
     edge = _edge(equations, link)
     if edge is None:
         return Body((), ())
-    weight = {} if link is None else {edge.weight: sp.Rational(link[2].numerator, link[2].denominator)}
-    blocks = enumerate(edge.inertia)
+    weight, blocks = _weight(link), enumerate(edge.inertia)
     return _body(
         {(bool(end), place): e.xreplace(weight) for end, block in blocks for place, e in _places(block).items()}
     )
 
 
 def is_unrolled(equations: Equations) -> bool:
-    """True if every node is written out."""
-    return equations.mixed or equations.n <= LARGEST_UNROLLED
+    """True if every node is written out: few nodes, nodes of several kinds, and links of several layers."""
+    plain = not equations.mixed and len(equations.layers) < 2 and not any(edge.theirs for edge in equations.edges)
+    return not plain or equations.n <= LARGEST_UNROLLED
 
 
 def check_inertia(equations: Equations, language: str) -> None:
@@ -122,13 +125,21 @@ def check_inertia(equations: Equations, language: str) -> None:
         )
 
 
-def _edge(equations: Equations, link: Link | None) -> Edge | None:
+def _edge(equations: Equations, link: Linked | None) -> Edge | None:
     if link is None:
         return equations.edge if equations.links else None
-    return equations.edge_at(link)
+    return link[1]
 
 
-def link_body(equations: Equations, link: Link | None = None, jacobian: bool = False) -> Body:
+def _weight(link: Linked | None) -> dict[sp.Symbol, sp.Expr]:
+    """The weight of a link as a number; that of any link stays a symbol."""
+    if link is None:
+        return {}
+    (_, _, weight), edge = link
+    return {edge.weight: sp.Rational(weight.numerator, weight.denominator)}
+
+
+def link_body(equations: Equations, link: Linked | None = None, jacobian: bool = False) -> Body:
     """What a link adds to its target (component -> value), or to the Jacobian ((False or True for there, place) -> value).
 
     Without a `link` the weight stays a symbol.
@@ -141,10 +152,7 @@ def link_body(equations: Equations, link: Link | None = None, jacobian: bool = F
         table = {
             (there, place): e for there in (False, True) for place, e in link_places(equations, link)[there].items()
         }
-    if link is not None:
-        weight = {edge.weight: sp.Rational(link[2].numerator, link[2].denominator)}
-        table = {place: e.xreplace(weight) for place, e in table.items()}
-    return _body(table)
+    return _body({place: e.xreplace(_weight(link)) for place, e in table.items()})
 
 
 def parameters(equations: Equations, bodies: Iterable[Body]) -> list[int]:

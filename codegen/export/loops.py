@@ -11,12 +11,12 @@ from typing import Any, TypeAlias
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.graphs.links import Link
 
 from ..program.expressions import Expression, Load, Name, Number, plus
 from ..program.statements import Accumulate, Identity, Loop, Statement, Store, Titled, let, whole
 from .body import (
     Body,
+    Linked,
     Storing,
     is_unrolled,
     link_body,
@@ -64,7 +64,7 @@ def jacobian_statements(equations: Equations, reads: bool = True) -> list[Statem
             storing = _entry("matrix", Store, at, at)
             found.append(Titled(title, tuple(node_body(equations, True, i).statements(loads, storing))))
 
-        def link_jacobian(equations: Equations, link: Link) -> Body:
+        def link_jacobian(equations: Equations, link: Linked) -> Body:
             return link_body(equations, link, True)
 
         return found + list(_of_links(equations, link_jacobian, _either_end("matrix"), reads))
@@ -101,16 +101,17 @@ def place_of(block: int, size: str, index: str) -> Expression:
 
 def _of_links(
     equations: Equations,
-    body_of: Callable[[Equations, Link], Body],
+    body_of: Callable[[Equations, Linked], Body],
     storing: Callable[[Places, Places], Storing],
     reads: bool,
 ) -> Iterator[Titled]:
     """One block for each link; `storing` is made of the places of its target and of its source."""
     places = equations.places
-    for link in equations.links:
-        at, other = _literal(places[link[0]]), _literal(places[link[1]])
+    for link in equations.linked():
+        target, source, _ = link[0]
+        at, other = _literal(places[target]), _literal(places[source])
         body = body_of(equations, link).statements(_pair(equations, at, other, link, reads), storing(at, other))
-        yield Titled(f"oscillator {link[0] + 1} feels oscillator {link[1] + 1}", tuple(body))
+        yield Titled(f"oscillator {target + 1} feels oscillator {source + 1}", tuple(body))
 
 
 def _to(array: str, statement: type[Store] | type[Accumulate], at: Places) -> Storing:
@@ -133,7 +134,7 @@ def _either_end(array: str) -> Callable[[Places, Places], Storing]:
 def _parameters(equations: Equations, jacobian: bool) -> list[Statement]:
     """Read the parameters that are used from `numbers`."""
     firsts = {kind: i for i, kind in enumerate(equations.kind_of)}.values()
-    ends = {equations.ends(link): link for link in equations.links}.values()
+    ends = {edge: (link, edge) for link, edge in equations.linked()}.values()
     bodies = [node_body(equations, jacobian, i) for i in firsts]
     bodies += [link_body(equations, link, jacobian) for link in ends]
     bodies += [mass_body(equations, link) for link in ends]
@@ -154,10 +155,10 @@ def _loads(equations: Equations, i: int | None, at: Places, reads: bool) -> dict
 
 
 def _pair(
-    equations: Equations, here: Places, there: Places, link: Link | None = None, reads: bool = True
+    equations: Equations, here: Places, there: Places, link: Linked | None = None, reads: bool = True
 ) -> dict[sp.Symbol, Expression]:
-    """Where the states at both ends of a link are, the parameters of its target, and the rates."""
-    edge = equations.edge if link is None else equations.edge_at(link)
+    """Where the states at both ends of a link are, the parameters of its ends, and the rates."""
+    edge = equations.edge if link is None else link[1]
     if edge is None:
         return {}
     places = [*map(here, range(len(edge.here))), *map(there, range(len(edge.there)))]
@@ -165,8 +166,11 @@ def _pair(
         s: _at("state", place) for s, place in zip((*edge.here, *edge.there), places, strict=True)
     }
     if link is not None:  # a mass of the target that differs from node to node
-        for s, k in own_parameters(equations, link[0]).items():
-            found[s] = _at("numbers", Number(k)) if reads else Name(equations.parameters[k])
+        (target, source, _), names = link[0], equations.parameters
+        own = own_parameters(equations, target)
+        own |= {s: names.index(f"{of.name}_{source + 1}") for s, of in edge.theirs}
+        for s, k in own.items():
+            found[s] = _at("numbers", Number(k)) if reads else Name(names[k])
     return found | {s: _at("rates", place) for s, place in zip(rate_symbols(edge), places, strict=True)}
 
 

@@ -46,6 +46,9 @@ AUTO = "rodas5p"
 LARGEST_UNROLLED = 8
 """Nodes up to which a step is written out by default; larger networks are stepped through in loops."""
 
+MOST_OF_LINKS = 1000
+"""Operations of all links up to which a step is written out: more take minutes to compile."""
+
 
 @dataclass(frozen=True, slots=True)
 class KernelSource:
@@ -123,7 +126,8 @@ def emit(
     multiplicity
         How many oscillators each node stands for in the synchronisation error; by default one.
     unroll
-        Nodes up to which a step is written out; the steps of a larger network run in loops.
+        Nodes up to which a step is written out; the steps of a larger network, or of more than MOST_OF_LINKS operations in
+        its links, run in loops.
     fill
         Entries of the exact factors for each entry of the matrix, above which loops use incomplete factors.
 
@@ -154,7 +158,7 @@ def emit(
         raise ValueError("the record 'sync_error' compares states of one name, and these nodes have none in common")
     if weights is not None and len(weights) != equations.n:
         raise ValueError(f"multiplicity has {len(weights)} entries; expected one for each of {equations.n} nodes")
-    looped = equations.n > unroll
+    looped = equations.n > unroll or (not method.inexact and _of_links(equations) > MOST_OF_LINKS)
     if looped:
         method = _for_many(method, equations, unroll)
     elimination = program(equations, fill) if looped else None
@@ -191,6 +195,12 @@ def default_width(equations: Equations, method: Integrator) -> int:
     most = 2 if method.implicit else 6
     moving = sum(len(equations.nodes[kind].continuous) for kind in equations.kind_of[: most + 1])
     return lanes.native_width(2 if moving <= most else 1)
+
+
+def _of_links(equations: Equations) -> int:
+    """The number of operations that the right-hand sides of all links take."""
+    size = {edge: sum(int(sp.count_ops(e)) for e in edge.rhs) for edge in equations.edges}
+    return sum(size[edge] for _, edge in equations.linked()) if equations.n <= LARGEST_UNROLLED else 0
 
 
 def _series(

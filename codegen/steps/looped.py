@@ -22,7 +22,7 @@ from .mass import momentum_slopes
 from .names import NAMES
 from .places import Joint, Kind, link_ends, named, places, span
 from .program import Program
-from .step import Block, Step, lane, time_term
+from .step import NOW, Block, Step, lane, time_term
 from .unrolled import entry
 
 __all__ = ["Looped"]
@@ -80,23 +80,28 @@ class Looped(Step):
             found.append(store("dense", plus(Name(out), self.places.place(c)), value))
         self.put(kind.span.over(found))
 
-    def links(self, base: str, out: str, jacobian: bool = False) -> None:
-        """Add what each link contributes to the slopes, where `out` says where, and on demand to the matrix."""
+    def links(self, base: str, out: str, start: bool = False, jacobian: bool = False) -> None:
+        """Add what each link contributes to the slopes, where `out` says where, in a stage or at the `start` of the step,
+        and on demand to the matrix and to the time slopes.
+        """
         for joint in self.places.joints:
             edge = joint.edge
             inertia = [e for block in edge.inertia for row in block for e in row] if jacobian else []
-            found = self.link(joint, base, (*edge.rhs, *inertia))
+            found, swap = self.link(joint, base, (*edge.rhs, *inertia)), named(joint) | ({} if start else NOW)
             for c, e in enumerate(edge.rhs if out else ()):
                 if e != 0:
-                    found.append(self.add(out, self.places.place(c), lower(e.xreplace(named(joint)))))
+                    found.append(self.add(out, self.places.place(c), lower(e.xreplace(swap))))
             if jacobian:
                 found += self.matrix_of_link(joint)
+                slopes = ((c, e) for c, e in enumerate(edge.time_derivative()) if e != 0)
+                found += [self.add("TIME_SLOPE", self.places.place(c), lower(e.xreplace(swap))) for c, e in slopes]
             self.put(joint.span.over(found))
 
     def link(self, joint: Joint, base: str, used: tuple[sp.Expr, ...], states: bool = True) -> list[Statement]:
         """The ends of a link, its weight, the parameters that `used` uses, and the states of both ends."""
-        read = self.places.read
-        found = link_ends(joint.edge) + self.places.own(Body((), used))
+        read, body = self.places.read, Body((), used)
+        found = link_ends(joint.edge) + self.places.own(body)
+        found += [let(name, load) for name, load in self.places.of_source(joint.edge, body.symbols)]
         if states:
             found += read(joint.target, base, "_here", "i") + read(joint.source, base, "_there", "j")
         return found
@@ -139,10 +144,11 @@ class Looped(Step):
         self.timed("t", self.wanted([blocks.linear for blocks in self.kinds]))
         self.put(*filled("MATRIX", Name("shift")))
         slopes = [self.kinds[kind.number].linear.results[-len(kind.node.state) :] for kind in kinds]
+        slopes += [joint.edge.time_derivative() for joint in self.places.joints]
         self.timed_rows = {self.places.row_of(c) for own in slopes for c, e in enumerate(own) if e != 0}
         for kind in kinds:
             self.node_linear(kind)
-        self.links("y", "" if self.mass.at_start() else "SLOPE", jacobian=True)
+        self.links("y", "" if self.mass.at_start() else "SLOPE", start=True, jacobian=True)
         self.mass.factorise()
 
     def node_linear(self, kind: Kind) -> None:
@@ -300,7 +306,7 @@ class LoopMass:
         if self.constant:
             return False
         w = self.writer
-        w.links("y", "SLOPE")
+        w.links("y", "SLOPE", start=True)
         self.assemble("y", "MASS")
         copied = store("dense", Name("RATES") + "k", Load("dense", Name("SLOPE") + "k"))
         w.put(span("k", "DIMENSION").over([copied]))

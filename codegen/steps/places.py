@@ -7,7 +7,8 @@ c*NODES + i where state c of node i stands, and in further rows which parameters
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
@@ -55,6 +56,11 @@ def span(index: str, stop: Value, start: Value = 0) -> Span:
     return Span(index, as_expression(start), as_expression(stop))
 
 
+def parts(index: str, counts: Sequence[int]) -> list[Span]:
+    """Parts of a numbering of these lengths, one after another."""
+    return [span(index, b, a) for a, b in pairwise(accumulate(counts, initial=0))]
+
+
 @dataclass(frozen=True, slots=True)
 class Kind:
     """The nodes of one kind: their template, its number, and where they stand in the numbering."""
@@ -84,16 +90,14 @@ class Places:
         counts = [equations.kind_of.count(k) for k in range(len(equations.nodes))]
         parts = zip(equations.nodes, self.spans("i", "NODES", counts), strict=True)
         self.kinds = tuple(Kind(node, k, part) for k, (node, part) in enumerate(parts))
-        self.joints: tuple[Joint, ...] = ()
-        if equations.links:
-            numbers, nodes = joint_numbers(equations), equations.nodes
-            shares = [numbers.count(k) for k in range(len(equations.edge_of))]
-            ends = zip(equations.edge_of, self.spans("e", "target.size", shares), strict=True)
-            self.joints = tuple(Joint(edge, nodes[a], nodes[b], part) for ((a, b), edge), part in ends)
+        numbers, nodes = Counter(joint_numbers(equations)), equations.nodes
+        shares = [numbers[k] for k in range(len(equations.edge_of))]
+        ends = zip(equations.edge_of, self.spans("e", "target.size", shares), strict=True)
+        self.joints = tuple(Joint(edge, nodes[a], nodes[b], part) for ((a, b), edge), part in ends)
 
     def spans(self, index: str, stop: str, counts: Sequence[int]) -> list[Span]:
-        """The parts of a numbering that have one template each: here one part."""
-        return [span(index, stop)]
+        """The parts of a numbering that have one template each, one after another; a single part is the whole."""
+        return [span(index, stop)] if len(counts) == 1 else parts(index, counts)
 
     @property
     def rows(self) -> list[tuple[Span, Expression]]:
@@ -108,9 +112,9 @@ class Places:
         """Where state c of a node stands."""
         return c * Name("NODES") + index
 
-    def parameter(self, number: int) -> Expression:
+    def parameter(self, number: int, index: str = "i") -> Expression:
         """Where a node has its own value of one of the parameters that differ."""
-        return Number(self.slots[f"{self.varied[number]}_1"]) + "i"
+        return Number(self.slots[f"{self.varied[number]}_1"]) + index
 
     def read(self, node: Node, base: str, suffix: str = "", index: str = "i", prefix: str = "") -> list[Statement]:
         """Load the states of one node from an array or a part of the workspace."""
@@ -123,6 +127,15 @@ class Places:
         used = {s.name for s in body.symbols}
         return [let(name, Load("p", self.parameter(k))) for k, name in enumerate(self.varied) if name in used]
 
+    def of_source(self, edge: Edge, used: Container[sp.Symbol], index: str = "j") -> list[tuple[str, Expression]]:
+        """What the parameters are called that a link takes of its source, those `used`, and where they are."""
+        known = {name: k for k, name in enumerate(self.varied)}
+        return [
+            (f"{own.name}_there", Load("p", self.parameter(known[own.name], index)))
+            for s, own in edge.theirs
+            if s in used
+        ]
+
     def entry(self, slot: str, a: int, b: int) -> Expression:
         """Where an entry of a node's or a link's block stands in a matrix, by the array of its slots."""
         length, index = ("NODES", "i") if slot == "node_slot" else ("target.size", "e")
@@ -134,7 +147,7 @@ class MixedPlaces(Places):
 
     def spans(self, index: str, stop: str, counts: Sequence[int]) -> list[Span]:
         """Parts that follow each other through a numbering."""
-        return [span(index, b, a) for a, b in pairwise(accumulate(counts, initial=0))]
+        return parts(index, counts)
 
     @property
     def rows(self) -> list[tuple[Span, Expression]]:
@@ -149,9 +162,9 @@ class MixedPlaces(Places):
         """Where state c of a node stands."""
         return Load("where", super().place(c, index), None)
 
-    def parameter(self, number: int) -> Expression:
+    def parameter(self, number: int, index: str = "i") -> Expression:
         """Where a node has its own value of one of the parameters that differ."""
-        return self.place(self.size + number)
+        return self.place(self.size + number, index)
 
 
 def places(equations: Equations) -> Places:
@@ -166,19 +179,24 @@ def link_ends(edge: Edge) -> list[Statement]:
 
 
 def named(joint: Joint) -> dict[sp.Symbol, sp.Symbol]:
-    """Return what the states at both ends of a link are called in its loop."""
+    """Return what the states at both ends of a link, and parameters of its source, are called in its loop."""
     ends = ((joint.edge.here, joint.target, "_here"), (joint.edge.there, joint.source, "_there"))
-    return {
+    states = {
         s: sp.Symbol(f"{own.name}{suffix}", real=True)
         for symbols, node, suffix in ends
         for s, own in zip(symbols, node.state, strict=True)
     }
+    return states | {s: sp.Symbol(f"{own.name}_there", real=True) for s, own in joint.edge.theirs}
 
 
 def joint_numbers(equations: Equations) -> list[int]:
     """Return which joint each link is of, by its number."""
-    number = {ends: k for k, (ends, _) in enumerate(equations.edge_of)}
-    return [number[equations.ends(link)] for link in equations.links]
+    found, first = list[int](), 0
+    for layer in (layer for layer in equations.layers if layer.links):
+        number = {ends: k for k, (ends, _) in enumerate(layer.edge_of, start=first)}
+        found += [number[equations.ends(link)] for link in layer.links]
+        first += len(number)
+    return found
 
 
 def by_kind(equations: Equations) -> list[int]:

@@ -17,10 +17,13 @@ from ..program.passes import Body
 from ..program.statements import Assign, Comment, Function, Return, Statement, let
 from .blocks import NodeBlocks
 
-__all__ = ["PAIR", "SCALED", "Block", "Step", "function_name", "lane", "node_function", "prefix", "time_term"]
+__all__ = ["NOW", "PAIR", "SCALED", "Block", "Step", "function_name", "lane", "node_function", "prefix", "time_term"]
 
 Block = tuple[tuple[sp.Expr, ...], ...]
 """Entries of a matrix that belong to one node or to one end of a link."""
+
+NOW = {TIME: sp.Symbol("now", real=True)}
+"""What the time of a stage is called in the expressions of links."""
 
 PAIR = '''
 @njit(error_model="numpy", forceinline=True)

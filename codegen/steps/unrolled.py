@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import sympy as sp
 
@@ -15,7 +15,7 @@ from ..program.statements import If, Return, let, store
 from .blocks import NodeBlocks
 from .elimination import Entries, plan, write_factors, write_solve
 from .mass import Mass
-from .step import Step, lane, prefix, time_term
+from .step import NOW, Step, lane, prefix, time_term
 
 __all__ = ["Unrolled", "entry", "stage_state"]
 
@@ -62,13 +62,13 @@ class Unrolled(Step):
                     self.let(target, lane(lower(e.xreplace(names))))
         self.links(base, out)
 
-    def links(self, base: str, out: str) -> None:
-        """Add what the links contribute to the right-hand side."""
+    def links(self, base: str, out: str, at: Mapping[sp.Symbol, sp.Symbol] = NOW) -> None:
+        """Add what the links contribute to the right-hand side, `at` the time of a stage or at that of the start."""
         eq, terms = self.equations, dict[str, list[Expression]]()
-        staged = {sp.Symbol(n, real=True): sp.Symbol(prefix(base) + n, real=True) for n in self.state}
-        for link in eq.links:
-            for s, e in zip(eq.node_at(link[0]).state, eq.edge_at(link).rhs, strict=True):
-                term = e.xreplace(eq.at_link(link)).xreplace(staged)
+        staged = {sp.Symbol(n, real=True): sp.Symbol(prefix(base) + n, real=True) for n in self.state} | dict(at)
+        for link, edge in eq.linked():
+            for s, e in zip(eq.node_at(link[0]).state, edge.rhs, strict=True):
+                term = e.xreplace(eq.at_link(link, edge)).xreplace(staged)
                 if term != 0:
                     terms.setdefault(f"{prefix(out)}{s.name}_{link[0] + 1}", []).append(lower(term))
         for target, parts in terms.items():
@@ -93,6 +93,8 @@ class Unrolled(Step):
             for i, places in enumerate(self.equations.places)
             for k, s in zip(places, self.equations.node_at(i).state, strict=True)
         }
+        for k, e in self.equations.link_time_derivative():
+            self.time_slopes[k] = lower(e) if self.time_slopes[k] == ZERO else plus(self.time_slopes[k], lower(e))
 
     def linear_nodes(self) -> list[dict[str, sp.Expr]]:
         """Write right-hand side and Jacobian at the start, and the time derivative where the method wants it.
@@ -118,7 +120,7 @@ class Unrolled(Step):
                     self.let(name, lower(e.xreplace(at)))
                 found[word] = (e.xreplace(at) if plain else sp.Symbol(name, real=True)).xreplace(kept)
             own.append(found)
-        self.links("y", "f")
+        self.links("y", "f", {})
         return own
 
     def keep_times(self) -> dict[sp.Symbol, sp.Symbol]:

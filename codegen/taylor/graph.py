@@ -64,7 +64,7 @@ def is_linear(equations: Equations) -> bool:
     """True if the rates are sums of states with constant coefficients and of terms of time."""
     blocks = [(node.jacobian(), {TIME, *node.state}) for node in equations.nodes]
     for edge in equations.edges:
-        blocks += [(block, {*edge.here, *edge.there}) for block in (edge.jacobian_here(), edge.jacobian_there())]
+        blocks += [(block, {TIME, *edge.here, *edge.there}) for block in (edge.jacobian_here(), edge.jacobian_there())]
     return not any(e.free_symbols & moving for block, moving in blocks for row in block for e in row)
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.mechanics.components import TIME, Node
+from synchain.models.mechanics.components import TIME, Edge, Node
 
 from ..program.passes import Body, Hoist, Names
 from ..program.printers import LANES
@@ -25,6 +25,10 @@ from .step import TaylorStep, called, finished
 from .terms import ZERO, Assign, Expr, Name, Number, add, show, statement
 
 __all__ = ["write_looped"]
+
+
+Hoisted = tuple[list[sp.Expr], dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]
+"""Rates, the series of their names for what depends on time, and the constants behind their other names."""
 
 
 @dataclass(slots=True)
@@ -175,12 +179,14 @@ class LoopWriter:
         self.names = Names(taken)
         self.time = Time(name="t")
         self.waves = Section(Graph(self.names), "", "", 1)
-        read = [self.hoisted(kind) for kind in self.places.kinds]
+        kinds, joints = self.places.kinds, self.places.joints
+        nodes = [self.hoisted(kind.node.rhs, [*kind.node.state, *self.varied()]) for kind in kinds]
+        links = [self.of_links(joint.edge) for joint in joints]
         self.waves.graph.settle([s for _, s in self.waves.rates])
         if self.waves.rates:
             self.waves.waves[self.time] = self.waves
-        self.sections = [self.node(kind, *found) for kind, found in zip(self.places.kinds, read, strict=True)]
-        self.sections += [self.link(joint) for joint in self.places.joints]
+        self.sections = [self.node(kind, *found) for kind, found in zip(kinds, nodes, strict=True)]
+        self.sections += [self.link(joint, *found) for joint, found in zip(joints, links, strict=True)]
 
     # -- sections ---------------------------------------------------------------------------------------------
 
@@ -210,14 +216,27 @@ class LoopWriter:
         section.rates = [(self.place(c), rate) for c, rate in enumerate(found)]
         return section
 
-    def link(self, joint: Joint) -> Section:
+    def of_links(self, edge: Edge) -> Hoisted:
+        """The rates of links, parted like those of nodes if time enters them."""
+        if not edge.forced:
+            return list(edge.rhs), {}, {}
+        own = (edge.weight, *edge.here, *edge.there, *(s for s, _ in edge.theirs), *self.varied())
+        return self.hoisted(edge.rhs, own)
+
+    def link(
+        self,
+        joint: Joint,
+        rates: Sequence[sp.Expr],
+        waves: Mapping[sp.Symbol, Series],
+        constants: Mapping[sp.Symbol, sp.Expr],
+    ) -> Section:
         """What the links of a joint add."""
         edge = joint.edge
         section = Section(Graph(self.names), head_of(joint.span), "e", len(self.equations.links), adds=True)
         weight = self.called[edge.weight.name]
         section.before += ["i, j_there = target[e], source[e]", f"{weight} = weights[e]"]
         moving: dict[sp.Symbol, Series] = {}
-        swap: dict[sp.Symbol, sp.Expr] = {}
+        swap: dict[sp.Symbol, sp.Expr] = dict(constants)
         used = {s for e in edge.rhs for s in e.free_symbols}
         for symbols, node, suffix, index in (
             (edge.here, joint.target, "_here", "i"),
@@ -234,7 +253,12 @@ class LoopWriter:
                     swap[s] = sp.Symbol(name, real=True)
                     section.before.append(f"{name} = load(y, {self.place(c, index)}, WIDTH)")
         section.before += self.own(edge.rhs, [], joint.target, "i", "_here")
-        found = self.read(section, edge.rhs, moving, swap)
+        for name, load in self.places.of_source(edge, used, "j_there"):
+            section.before.append(f"{name} = {LANES.text(load)}")
+        swap |= {s: sp.Symbol(f"{own.name}_there", real=True) for s, own in edge.theirs}
+        seen: dict[sp.Symbol, Series] = {symbol: State(name=series.name) for symbol, series in waves.items()}
+        section.waves = dict.fromkeys(seen.values(), self.waves)
+        found = self.read(section, rates, {**moving, **seen}, swap)
         section.rates = [(self.place(c), rate) for c, rate in enumerate(found)]
         return section
 
@@ -264,12 +288,12 @@ class LoopWriter:
             lines.append(f"{self.called[name]} = {rest}")
         return lines
 
-    def hoisted(self, kind: Kind) -> tuple[list[sp.Expr], dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]:
-        """The rates of a node with names for what depends on time and parameters, series for what depends on time, and
-        the rest, which depends on parameters alone.
+    def hoisted(self, given: Sequence[sp.Expr], moving: Sequence[sp.Symbol]) -> Hoisted:
+        """Some rates with names for what depends on time and parameters, series for what depends on time, and the rest,
+        which depends on parameters alone.
         """
-        hoist = Hoist(frozenset([*kind.node.state, *self.varied()]), self.names.fresh("wave_"), frozenset({TIME}))
-        rates = [hoist.apply(e) for e in kind.node.rhs]
+        hoist = Hoist(frozenset(moving), self.names.fresh("wave_"), frozenset({TIME}))
+        rates = [hoist.apply(e) for e in given]
         waves: dict[sp.Symbol, Series] = {}
         constants: dict[sp.Symbol, sp.Expr] = {}
         for e, symbol in hoist.table.items():

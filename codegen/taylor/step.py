@@ -163,12 +163,12 @@ class StepWriter:
         eq, terms = self.equations, dict[int, list[tuple[Expr, Series]]]()
         shared = self.supply.fresh("shared_")
         nodes = [Template.of(node.rhs, (TIME, *node.state), shared) for node in eq.nodes]
-        edges = {edge: Template.of(edge.rhs, (*edge.here, *edge.there), shared) for edge in eq.edges}
+        edges = {edge: Template.of(edge.rhs, (TIME, *edge.here, *edge.there), shared) for edge in eq.edges}
         for i, places in enumerate(eq.places):
             found = self.graph.read(nodes[eq.kind_of[i]], *self.parted({TIME: self.time}, eq.at_node(i)))
             terms |= {slot: [(ONE, rate)] for slot, rate in zip(places, found, strict=True)}
-        for link in eq.links:
-            found = self.graph.read(edges[eq.edge_at(link)], *self.parted({}, eq.at_link(link)))
+        for link, edge in eq.linked():
+            found = self.graph.read(edges[edge], *self.parted({TIME: self.time}, eq.at_link(link, edge)))
             for slot, rate in zip(eq.places[link[0]], found, strict=True):
                 terms[slot].append((ONE, rate))
         return [self.graph.sum(terms[slot]) for slot in self.states]
@@ -297,9 +297,9 @@ class StepWriter:
 def moving_states(equations: Equations, i: int) -> tuple[bool, ...]:
     """Which states of node i move; one at rest, such as the mode of a contact, is a constant of the step."""
     rates = list(equations.node_at(i).rhs)
-    for link in equations.links:
+    for link, edge in equations.linked():
         if link[0] == i:
-            rates = [a if b == 0 else b for a, b in zip(rates, equations.edge_at(link).rhs, strict=True)]
+            rates = [a if b == 0 else b for a, b in zip(rates, edge.rhs, strict=True)]
     return tuple(rate != 0 for rate in rates)
 
 

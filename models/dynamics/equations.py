@@ -17,7 +17,7 @@ from ..graphs.links import Link
 from ..mechanics.components import Edge, Node
 from ..mechanics.friction import Contact
 
-__all__ = ["Ends", "Equations", "check"]
+__all__ = ["Ends", "Equations", "Layer", "check"]
 
 Ends = tuple[int, int]
 """The kinds of a link's target and source."""
@@ -29,6 +29,26 @@ Block = tuple[tuple[sp.Expr, ...], ...]
 
 class _Cached:
     """Gives a value with slots a dictionary for its cached properties, which pickles do not hold."""
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """The links of one coupling on one graph.
+
+    Parameters
+    ----------
+    edge_of : tuple of ((int, int), Edge)
+        The templates of the links, by the kinds of their targets and sources.
+    links : tuple of (int, int, Fraction)
+        Target and source (0-based) and weight of each link.
+    """
+
+    edge_of: tuple[tuple[Ends, Edge], ...]
+    links: tuple[Link, ...]
+
+    def map(self, change: Callable[[Edge], Edge]) -> Layer:
+        """The same links with changed templates."""
+        return replace(self, edge_of=tuple((ends, change(edge)) for ends, edge in self.edge_of))
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,24 +64,21 @@ class Equations(_Cached):
         The templates of the nodes, by kind.  A network of equal nodes has one.
     kind_of : tuple of int
         The kind of each node; its length is the number of nodes n.
-    edge_of : tuple of ((int, int), Edge)
-        The templates of the links, by the kinds of their targets and sources.
-    links : tuple of (int, int, Fraction)
-        Target and source (0-based) and weight of each link.
+    layers : tuple of Layer
+        The links, coupling by coupling.
     varied : tuple of str
         Parameters of nodes that have one value for each node: a_1 … a_n.
 
     Raises
     ------
     ValueError
-        If a link is repeated, has no template, joins a node to itself or leaves the network, if
+        If a link is repeated in its layer, has no template, joins a node to itself or leaves the network, if
         templates and kinds do not fit together, or if one name stands for two things.
     """
 
     nodes: tuple[Node, ...]
     kind_of: tuple[int, ...]
-    edge_of: tuple[tuple[Ends, Edge], ...] = ()
-    links: tuple[Link, ...] = ()
+    layers: tuple[Layer, ...] = ()
     varied: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -84,7 +101,9 @@ class Equations(_Cached):
         links, varied
             As in `Equations`.
         """
-        return cls((node,), (0,) * n, () if edge is None else (((0, 0), edge),), links, varied)
+        if edge is None and links:
+            raise ValueError(f"{len(links)} links but no edge equations; give a coupling")
+        return cls((node,), (0,) * n, () if edge is None else (Layer((((0, 0), edge),), links),), varied)
 
     @property
     def n(self) -> int:
@@ -108,16 +127,31 @@ class Equations(_Cached):
         """The template of the links between equal nodes, None without any; else ValueError."""
         if self.mixed:
             raise ValueError("the template of all links: found nodes of several kinds; expected equal nodes")
-        return self.edge_of[0][1] if self.edge_of else None
+        if len(self.layers) > 1:
+            raise ValueError(f"the template of all links: found {len(self.layers)} layers of links; expected one")
+        return self.layers[0].edge_of[0][1] if self.layers else None
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """Target, source and weight of each link, layer by layer."""
+        return self.layers[0].links if len(self.layers) == 1 else tuple(k for own in self.layers for k in own.links)
+
+    @cached_property
+    def edge_of(self) -> tuple[tuple[Ends, Edge], ...]:
+        """The templates that links use, with the kinds of their ends, layer by layer."""
+        return tuple(pair for layer in self.layers if layer.links for pair in layer.edge_of)
 
     @property
     def edges(self) -> tuple[Edge, ...]:
         """The templates that links use."""
-        return tuple(edge for _, edge in self.edge_of) if self.links else ()
+        return tuple(edge for _, edge in self.edge_of)
 
-    @cached_property
-    def _edges_by_ends(self) -> dict[Ends, Edge]:
-        return dict(self.edge_of)
+    def linked(self) -> Iterator[tuple[Link, Edge]]:
+        """Yield each link with its template, layer by layer."""
+        for layer in self.layers:
+            known = dict(layer.edge_of)
+            for link in layer.links:
+                yield link, known[self.ends(link)]
 
     def node_at(self, i: int) -> Node:
         """The template of node `i` (0-based)."""
@@ -126,13 +160,6 @@ class Equations(_Cached):
     def ends(self, link: Link) -> Ends:
         """The kinds of the target and the source of a link."""
         return self.kind_of[link[0]], self.kind_of[link[1]]
-
-    def edge_at(self, link: Link) -> Edge:
-        """The template of a link; ValueError if there is none."""
-        edge = self._edges_by_ends.get(self.ends(link))
-        if edge is None:
-            raise ValueError("these equations have no edge")
-        return edge
 
     def map_templates(
         self,
@@ -161,12 +188,14 @@ class Equations(_Cached):
         return replace(
             self,
             nodes=nodes,
-            edge_of=tuple((ends, of_edge(edge)) for ends, edge in self.edge_of),
+            layers=tuple(layer.map(of_edge) for layer in self.layers),
             varied=tuple(name for name in varied if name in names),
         )
 
-    def expect_alike(self, what: str, *, varied_too: bool = False, inertia_too: bool = False) -> None:
-        """Raise ValueError unless the nodes are equal and the links have no inertia.
+    def expect_alike(
+        self, what: str, *, varied_too: bool = False, inertia_too: bool = False, layers_too: bool = False
+    ) -> None:
+        """Raise ValueError unless the nodes are equal and the links are of one layer and have no inertia.
 
         Parameters
         ----------
@@ -176,15 +205,19 @@ class Equations(_Cached):
             Allow parameters that differ from node to node.
         inertia_too : bool
             Allow links with inertia.
+        layers_too : bool
+            Allow several layers of links.
         """
         problems = {
             "nodes of several kinds": self.mixed,
             f"nodes that differ in {', '.join(self.varied)}": bool(self.varied) and not varied_too,
             "links with inertia": self.inertial and not inertia_too,
+            f"{len(self.layers)} layers of links": len(self.layers) > 1 and not layers_too,
         }
         found = next((words for words, holds in problems.items() if holds), None)
         if found is not None:
-            raise ValueError(f"{what}: found {found}; expected equal nodes with links that have no inertia")
+            expected = "links of one layer" if found.endswith("layers of links") else "links that have no inertia"
+            raise ValueError(f"{what}: found {found}; expected equal nodes with {expected}")
 
     @cached_property
     def inertial(self) -> bool:
@@ -199,7 +232,7 @@ class Equations(_Cached):
     @property
     def forced(self) -> bool:
         """True if time occurs explicitly."""
-        return any(node.forced for node in self.nodes)
+        return any(node.forced for node in self.nodes) or any(edge.forced for edge in self.edges)
 
     @property
     def sticks(self) -> bool:
@@ -267,14 +300,14 @@ class Equations(_Cached):
         states = dict(zip(node.state, self.symbols(i), strict=True))
         return states | {s: _numbered(s, i) for s in node.parameters if s.name in self.varied}
 
-    def at_link(self, link: Link) -> dict[sp.Symbol, sp.Expr]:
-        """The substitution that turns the edge template into one link."""
+    def at_link(self, link: Link, edge: Edge) -> dict[sp.Symbol, sp.Expr]:
+        """The substitution that turns an edge template into one link."""
         target, source, weight = link
-        edge = self.edge_at(link)
         here = dict(zip(edge.here, self.symbols(target), strict=True))
         there = dict(zip(edge.there, self.symbols(source), strict=True))
         own = {s: _numbered(s, target) for s in edge.parameters if s.name in self.varied}
-        return {**here, **there, **own, edge.weight: sp.Rational(weight.numerator, weight.denominator)}
+        theirs = {s: _numbered(of, source) for s, of in edge.theirs}
+        return {**here, **there, **own, **theirs, edge.weight: sp.Rational(weight.numerator, weight.denominator)}
 
     def contact_at(self, i: int) -> Contact | None:
         """The conditions of stick and slip of node `i` under the forces of its links, if it has a contact."""
@@ -283,8 +316,8 @@ class Equations(_Cached):
             return None
         velocity, mode = self.symbols(i)[1:3]
         own = contact.map(lambda e: e.xreplace(self.at_node(i)))
-        links = [link for link in self.links if link[0] == i]
-        force = sp.Add(*(self.edge_at(link).rhs[1].xreplace(self.at_link(link)) for link in links))
+        links = [pair for pair in self.linked() if pair[0][0] == i]
+        force = sp.Add(*(edge.rhs[1].xreplace(self.at_link(link, edge)) for link, edge in links))
         return own.under(force.xreplace({mode: sp.S.One, velocity: own.speed}))
 
     def rhs(self) -> tuple[sp.Expr, ...]:
@@ -293,9 +326,9 @@ class Equations(_Cached):
         for i, places in enumerate(self.places):
             for k, e in zip(places, self.node_at(i).rhs, strict=True):
                 rates[k] = e.xreplace(self.at_node(i))
-        for link in self.links:
-            values = self.at_link(link)
-            for k, e in zip(self.places[link[0]], self.edge_at(link).rhs, strict=True):
+        for link, edge in self.linked():
+            values = self.at_link(link, edge)
+            for k, e in zip(self.places[link[0]], edge.rhs, strict=True):
                 rates[k] += e.xreplace(values)
         return tuple(rates)
 
@@ -305,9 +338,9 @@ class Equations(_Cached):
             return {}
         places = self.places
         entries: dict[tuple[int, int], sp.Expr] = {(k, k): sp.S.One for k in range(self.dimension)}
-        for link in self.links:
-            inertia, values = self.edge_at(link).inertia, self.at_link(link)
-            for block, end in zip(inertia, link[:2], strict=False):
+        for link, edge in self.linked():
+            values = self.at_link(link, edge)
+            for block, end in zip(edge.inertia, link[:2], strict=False):
                 for key, e in _block(block, places[link[0]], places[end], values):
                     entries[key] = entries.get(key, sp.S.Zero) + e
         return {key: entries[key] for key in sorted(entries) if entries[key] != 0}
@@ -326,9 +359,9 @@ class Equations(_Cached):
         """Yield ((row, column), entry) for what each link adds to the Jacobian; keys repeat."""
         places = self.places
         blocks = {edge: (edge.jacobian_here(), edge.jacobian_there()) for edge in self.edges}
-        for link in self.links:
-            here, there = blocks[self.edge_at(link)]
-            values = self.at_link(link)
+        for link, edge in self.linked():
+            here, there = blocks[edge]
+            values = self.at_link(link, edge)
             yield from _block(here, places[link[0]], places[link[0]], values)
             yield from _block(there, places[link[0]], places[link[1]], values)
 
@@ -339,7 +372,17 @@ class Equations(_Cached):
         for i, places in enumerate(self.places):
             for k, e in zip(places, slopes[self.kind_of[i]], strict=True):
                 rates[k] = e.xreplace(self.at_node(i))
+        for k, e in self.link_time_derivative():
+            rates[k] += e
         return tuple(rates)
+
+    def link_time_derivative(self) -> Iterator[tuple[int, sp.Expr]]:
+        """Yield (place, entry) for what each link adds to the partial derivative by time; places repeat."""
+        slopes = {edge: edge.time_derivative() for edge in self.edges if edge.forced}
+        for link, edge in self.linked() if slopes else ():
+            for k, e in zip(self.places[link[0]], slopes.get(edge, ()), strict=False):
+                if e != 0:
+                    yield k, e.xreplace(self.at_link(link, edge))
 
     @cached_property
     def digest(self) -> str:
@@ -351,10 +394,12 @@ class Equations(_Cached):
         parts += [f"varied {' '.join(self.varied)}"] if self.varied else []
         if others:  # a single kind adds nothing
             parts += [repr(self.kind_of), *(_text(node.state, node.rhs, node.parameters) for node in others)]
-            parts += [repr(ends) for ends, _ in self.edge_of]
+            parts += [repr(ends) for layer in self.layers for ends, _ in layer.edge_of]
+        parts += [f"layers {[len(layer.links) for layer in self.layers]}"] if len(self.layers) > 1 else []
         for edge in self.edges:
             parts.append(_text((*edge.here, *edge.there, edge.weight), edge.rhs, edge.parameters))
             parts += [sp.srepr(sp.Matrix(block)) for block in edge.inertia]
+            parts += [f"theirs {edge.theirs}"] if edge.theirs else []
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
@@ -394,24 +439,32 @@ def _check_kinds(eq: Equations) -> None:
         )
     if eq.sticks and eq.inertial:
         raise ValueError("links with inertia: found set-valued friction; expected a smooth contact; use contact 'atan'")
-    for (target, source), edge in eq.edge_of:
+    if eq.sticks and (len(eq.layers) > 1 or any(edge.forced or edge.theirs for edge in eq.edges)):
+        found = "several layers" if len(eq.layers) > 1 else "time, or a parameter of the source that differs,"
+        raise ValueError(
+            f"links with set-valued friction: found {found}; expected one layer of links of the states; use contact 'atan'"
+        )
+    for (target, source), edge in (pair for layer in eq.layers for pair in layer.edge_of):
         for end, symbols in ((target, edge.here), (source, edge.there)):
             states = len(eq.nodes[end].state)
             if len(symbols) != states:
                 raise ValueError(f"the edge joins nodes of {len(symbols)} states, the node has {states}")
+        for s, own in edge.theirs:
+            if own.name not in eq.varied:
+                raise ValueError(f"the edge takes {own.name!r} of its source as {s.name!r}, but all nodes share it")
 
 
 def _check_links(eq: Equations) -> None:
-    seen = set()
-    for link in eq.links:
-        target, source, _ = link
-        if not (0 <= target < eq.n and 0 <= source < eq.n) or target == source:
-            raise ValueError(f"link {target} <- {source}: expected two different nodes of 0 … {eq.n - 1}")
-        if (target, source) in seen:
-            raise ValueError(f"link {target} <- {source} occurs twice; add the weights up")
-        seen.add((target, source))
-    if {eq.ends(link) for link in eq.links} - {ends for ends, _ in eq.edge_of}:
-        raise ValueError(f"{len(eq.links)} links but no edge equations; give a coupling")
+    for layer in eq.layers:
+        seen = set()
+        for target, source, _ in layer.links:
+            if not (0 <= target < eq.n and 0 <= source < eq.n) or target == source:
+                raise ValueError(f"link {target} <- {source}: expected two different nodes of 0 … {eq.n - 1}")
+            if (target, source) in seen:
+                raise ValueError(f"link {target} <- {source} occurs twice; add the weights up")
+            seen.add((target, source))
+        if {eq.ends(link) for link in layer.links} - {ends for ends, _ in layer.edge_of}:
+            raise ValueError(f"{len(layer.links)} links but no edge equations; give a coupling")
 
 
 def _check_names(eq: Equations) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sympy as sp
 
+from ..mechanics.link import strength
 from .equations import Equations
 
 __all__ = ["effective_slope", "inertia_of_modes"]
@@ -46,7 +47,7 @@ def inertia_of_modes(equations: Equations) -> tuple[sp.Matrix, sp.Expr]:
             "a link has inertia between nodes that move alike, so complete synchronisation is no solution of this network; "
             "expected inertia of differences, as an inerter has"
         )
-    sigma = sp.Symbol("sigma", real=True)
+    sigma = strength(edge, node.parameters)
     equal = dict(zip((*edge.here, *edge.there), node.state * 2, strict=True))
     own = here.xreplace(equal)
     b_matrix = own.xreplace({edge.weight: sp.S.One}).diff(sigma)

@@ -23,20 +23,20 @@ from ..mechanics.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCou
 from ..mechanics.definition import FRICTION_LAW
 from ..mechanics.friction import KAPPA, SLIP, ContactModel, FrictionLaw, set_valued
 from ..mechanics.lagrangian import Mechanics
-from ..mechanics.link import check_coupling, edge, is_oriented
+from ..mechanics.link import edge
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
 from ..mechanics.oscillator import Field, Oscillator
 from ..mechanics.parameter import Parameter
-from .equations import Equations
+from .equations import Equations, Layer
 
-__all__ = ["check_coupling", "connectivity", "edge", "mixed_network", "network", "node", "oriented_links", "parameters"]
+__all__ = ["Layers", "connectivity", "edge", "layered_network", "network", "node", "oriented_links", "parameters"]
 
 
 def parameters(
     oscillator: Oscillator,
     friction: FrictionLaw | None = None,
     contact: str = ContactModel.ATAN,
-    coupling: Coupling | None = None,
+    couplings: Sequence[Coupling] = (),
 ) -> dict[str, Parameter]:
     """Return every parameter with default, unit, meaning and range, in the order of Equations.parameters.
 
@@ -48,8 +48,8 @@ def parameters(
         Its friction law.
     contact : str
         How a jump of the law at rest is treated, a `ContactModel`.
-    coupling : Coupling, optional
-        What joins the nodes.
+    couplings : sequence of Coupling
+        What joins the nodes, layer by layer.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def parameters(
         _join(table, friction.parameters, f"friction law {friction.name!r}")
         if contact == ContactModel.ATAN and friction.force.has(sp.sign):
             _join(table, {"kappa": KAPPA}, f"contact {str(contact)!r}")
-    if coupling is not None:
+    for coupling in couplings:
         _join(table, coupling.parameters, f"coupling {str(coupling)!r}")
     return {name: replace(p, scale=str(scale(oscillator, p.unit))) for name, p in table.items()}
 
@@ -124,6 +124,10 @@ def _check_parts(oscillator: Oscillator, friction: FrictionLaw | None, contact: 
         raise ValueError(f"oscillator {oscillator.name!r} takes no friction law, found {friction.name!r}; leave it out")
 
 
+Layers = Sequence[tuple[Coupling, Topology]]
+"""Couplings with their graphs."""
+
+
 def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str, ...] = ()) -> Equations:
     """Return the equations of equal nodes that the links of a graph join.
 
@@ -143,52 +147,57 @@ def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str,
     If a link tells its ends apart, its weight becomes the sign of its direction
     (`synchain.models.mechanics.link`).
     """
-    if link is None:
-        return Equations.of_equal_nodes(single, None, graph.n, (), varied)
-    oriented = graph.links and is_oriented(link)
-    links = oriented_links(graph) if oriented else graph.links
-    return Equations.of_equal_nodes(single, link, graph.n, links, varied)
+    apart = Equations.of_equal_nodes(single, None, graph.n, (), varied)
+    return apart if link is None else replace(apart, layers=(_layer(link, graph, varied),))
 
 
-def mixed_network(
+def _layer(link: Edge, graph: Topology, varied: tuple[str, ...]) -> Layer:
+    """The links of a graph between equal nodes."""
+    links = oriented_links(graph) if graph.links and link.oriented else graph.links
+    return Layer((((0, 0), link.with_shared(varied)),), links)
+
+
+def layered_network(
     oscillators: Sequence[Oscillator],
     singles: Sequence[Node],
     kinds: Sequence[int],
-    coupling: Coupling | None,
-    graph: Topology,
+    layers: Layers,
     varied: tuple[str, ...] = (),
 ) -> Equations:
-    """Return the equations of nodes of several kinds that the links of a graph join.
+    """Return the equations of nodes of one or several kinds that layers of links join.
 
     Parameters
     ----------
-    oscillators : sequence of str
-        Names of the oscillators, by kind.
+    oscillators : sequence of Oscillator
+        The oscillators, by kind.
     singles : sequence of Node
         Their templates.
     kinds : sequence of int
         The kind of each node.
-    coupling : str or None
-        The coupling, from which every pair of kinds that a link joins gets its own edge; None leaves
-        the nodes uncoupled.
-    graph : Topology
-        The graph.
+    layers : sequence of (Coupling, Topology)
+        Couplings and their graphs.  Of a coupling every pair of kinds that a link joins gets its own edge.
     varied : tuple of str
         Parameters of nodes that have one value for each node.
 
     Raises
     ------
     ValueError
-        If the coupling does not fit a pair of kinds.
+        If a coupling does not fit a pair of kinds.
     """
-    apart = Equations(tuple(singles), tuple(kinds), (), (), varied)
-    if coupling is None:
-        return apart
-    pairs = sorted({apart.ends(link) for link in graph.links})
+    apart = Equations(tuple(singles), tuple(kinds), (), varied)
+    if not apart.mixed:
+        edges = ((edge(coupling, singles[0], oscillators[0]), graph) for coupling, graph in layers)
+        return replace(apart, layers=tuple(_layer(link, graph, varied) for link, graph in edges))
+    return replace(apart, layers=tuple(_mixed_layer(apart, oscillators, *layer) for layer in layers))
+
+
+def _mixed_layer(apart: Equations, oscillators: Sequence[Oscillator], coupling: Coupling, graph: Topology) -> Layer:
+    """The links of a graph between nodes of several kinds."""
+    singles, pairs = apart.nodes, sorted({apart.ends(link) for link in graph.links})
     edges = tuple(((a, b), edge(coupling, singles[a], oscillators[a], singles[b], oscillators[b])) for a, b in pairs)
-    if any(a == b and is_oriented(link) for (a, b), link in edges):
+    if any(a == b and link.oriented for (a, b), link in edges):
         raise ValueError(f"coupling {str(coupling)!r} tells the ends of a link apart; expected nodes of one kind")
-    return replace(apart, links=graph.links, edge_of=edges)
+    return Layer(tuple((ends, link.with_shared(apart.varied)) for ends, link in edges), graph.links)
 
 
 def connectivity(coupling: Coupling, graph: Topology) -> tuple[tuple[Fraction, ...], ...]:
@@ -202,8 +211,10 @@ def connectivity(coupling: Coupling, graph: Topology) -> tuple[tuple[Fraction, .
     """
     if isinstance(coupling, MatrixCoupling):
         diagonal, aside = Fraction(-1), Fraction(1)
-    else:
+    elif isinstance(coupling, LagrangianCoupling):
         diagonal, aside = _hessian(coupling)
+    else:
+        raise ValueError(f"coupling {str(coupling)!r}: found any function of two ends; expected one linear difference")
     rows = [[Fraction(0)] * graph.n for _ in range(graph.n)]
     for target, source, factor in graph.links:
         rows[target][target] += factor * diagonal

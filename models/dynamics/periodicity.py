@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import sympy as sp
 
-from ..mechanics.components import TIME, Node
+from ..mechanics.components import TIME, Edge, Node
 from .equations import Equations
 
 __all__ = ["Drive", "angular_frequency", "as_function", "drive_of", "names_in", "period_of"]
@@ -37,24 +37,24 @@ class Drive:
 
 def angular_frequency(equations: Equations) -> sp.Expr | None:
     """Return the angular frequency of the drive, None if no period is known (see `Drive`)."""
-    return drive_of(equations.nodes, equations.varied).frequency
+    return drive_of((*equations.nodes, *equations.edges), equations.varied).frequency
 
 
 @lru_cache(maxsize=64)
-def drive_of(nodes: tuple[Node, ...], varied: tuple[str, ...] = ()) -> Drive:
-    """Return the drive of a network; links do not depend on time.
+def drive_of(templates: tuple[Node | Edge, ...], varied: tuple[str, ...] = ()) -> Drive:
+    """Return the drive of a network.
 
     Parameters
     ----------
-    nodes : tuple of Node
-        The templates of the nodes.
+    templates : tuple of Node or Edge
+        The templates of the nodes and links.
     varied : tuple of str
         Names of parameters that differ from node to node.
     """
-    if not any(node.forced for node in nodes):
+    if not any(template.forced for template in templates):
         return Drive(problem="is not driven")
     waves: set[sp.Expr] = set()
-    rest = [_without_waves(e, node, waves) for node in nodes for e in node.rhs]
+    rest = [_without_waves(e, _local(template), waves) for template in templates for e in template.rhs]
     found = tuple(sorted(waves, key=sp.default_sort_key))
     if any(e.has(TIME) for e in rest):
         return Drive(found, problem="depends on time other than by sines and cosines of a t + b, a constant")
@@ -69,9 +69,15 @@ def drive_of(nodes: tuple[Node, ...], varied: tuple[str, ...] = ()) -> Drive:
     return Drive(found, share * found[0])
 
 
-def _without_waves(e: sp.Expr, node: Node, found: set[sp.Expr]) -> sp.Expr:
+def _local(template: Node | Edge) -> set[sp.Symbol]:
+    """What is no constant of a whole network: the states, and what differs from link to link."""
+    if isinstance(template, Node):
+        return set(template.state)
+    return {*template.here, *template.there, template.weight, *(s for s, _ in template.theirs)}
+
+
+def _without_waves(e: sp.Expr, states: set[sp.Symbol], found: set[sp.Expr]) -> sp.Expr:
     """Replace each sine and cosine of a t + b by a symbol; collect the frequencies a."""
-    states = set(node.state)
 
     def note(wave: sp.Expr) -> sp.Expr:
         phase = wave.args[0]

@@ -67,11 +67,14 @@ def substitute_constants(equations: Equations, values: Mapping[str, int | Fracti
             raise ValueError(f"fold: a right-hand side of the {what} is undefined at {at}; leave it a parameter")
         return value
 
+    linked = {s for edge in equations.edges for s in (*edge.parameters, *(own for _, own in edge.theirs))}
+    kept = {s for s in linked if s.name in equations.varied}
     reduced = equations.map_templates(
-        lambda node: node.map(partial(change, "node")).without_unused_parameters(),
+        lambda node: node.map(partial(change, "node")).without_unused_parameters(kept),
         lambda edge: edge.map(partial(change, "edge")).without_unused_parameters(),
     )
-    return reduced if any(edge.acts for edge in reduced.edges) else replace(reduced, edge_of=(), links=())
+    acting = tuple(layer for layer in reduced.layers if any(edge.acts for _, edge in layer.edge_of))
+    return replace(reduced, layers=acting)
 
 
 def _check_constants(equations: Equations, values: Mapping[str, int | Fraction]) -> None:
@@ -112,8 +115,19 @@ def quotient(equations: Equations, colours: Sequence[Hashable]) -> tuple[Equatio
     ValueError
         If there is not one colour for each node.
     """
-    classes = coarsest_balanced(equations.n, equations.links, colours)
+    classes = _balanced(equations, colours)
     return collapse(equations, classes), classes
+
+
+def _balanced(equations: Equations, colours: Sequence[Hashable]) -> tuple[int, ...]:
+    """The coarsest partition with classes of one colour that is balanced in every layer."""
+    found = coarsest_balanced(equations.n, (), colours)
+    while True:
+        before = found
+        for layer in equations.layers:
+            found = coarsest_balanced(equations.n, layer.links, found)
+        if found == before or len(equations.layers) < 2:
+            return found
 
 
 def collapse(equations: Equations, classes: Sequence[int]) -> Equations:
@@ -150,8 +164,8 @@ def collapse(equations: Equations, classes: Sequence[int]) -> Equations:
         raise NoQuotient("quotient: nodes of several kinds or links with inertia are stepped one by one")
     for edge in equations.edges:
         _check_coupling(edge)
-    links = class_links(equations.n, equations.links, classes)
-    return replace(equations, kind_of=(0,) * count, edge_of=equations.edge_of if links else (), links=links)
+    layers = (replace(own, links=class_links(equations.n, own.links, classes)) for own in equations.layers)
+    return replace(equations, kind_of=(0,) * count, layers=tuple(own for own in layers if own.links))
 
 
 @lru_cache(maxsize=64)

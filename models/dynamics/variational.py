@@ -14,10 +14,12 @@ import sympy as sp
 
 from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Edge, Node
+from ..mechanics.link import strength
 from .equations import Equations
 from .mode_inertia import effective_slope
 from .reduction import collapse
 from .saltation import Entry, Events, of_blocks, of_mode, of_network
+from .synchrony import synchronous_node
 
 if TYPE_CHECKING:
     from ..graphs.clusters import Block, Clusters
@@ -29,10 +31,10 @@ __all__ = [
     "STRENGTH",
     "Variation",
     "clustered",
-    "coupling_slope",
     "mode",
     "network_variation",
     "phase_shifted",
+    "source_slope",
     "with_volume",
 ]
 
@@ -100,10 +102,11 @@ class Variation:
 def mode(equations: Equations, plane: bool = False) -> Variation:
     """Return the variational equation of one transversal mode along the synchronous orbit.
 
-    If links vanish between equal states, a deviation along an eigenvector of G with eigenvalue gamma
-    obeys d' = (J - alpha H) d, alpha = -sigma gamma; J is the Jacobian of one node and H is
-    `coupling_slope`.  For links with inertia the strength is tau = alpha/(1 + b alpha)
-    (`synchain.models.dynamics.mode_inertia`).
+    A deviation along an eigenvector of G with eigenvalue gamma obeys d' = (J - alpha H) d, alpha = -sigma gamma; J is
+    the Jacobian of one node and H is `source_slope`.  For links with inertia the strength is tau = alpha/(1 + b alpha)
+    (`synchain.models.dynamics.mode_inertia`).  Links h(s, s) that act between equal states move the synchronous orbit,
+    s' = F(s) + sigma k h(s, s) with k the sum of weights at every node, and J is the Jacobian of that: the deviation obeys
+    d' = (DF + sigma k D1h + sigma lambda D2h) d with the eigenvalue lambda = gamma + k of the matrix of weights.
 
     Parameters
     ----------
@@ -120,14 +123,21 @@ def mode(equations: Equations, plane: bool = False) -> Variation:
     Raises
     ------
     ValueError
-        As `coupling_slope`.
+        As `source_slope` and `synchronous_node`, and for links that act between equal states and have inertia, or join
+        nodes with set-valued friction.
 
     References
     ----------
     Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998).
     """
-    slope = coupling_slope(equations)
-    node = equations.node
+    node = synchronous_node(equations)
+    slope = source_slope(equations)
+    if node is not equations.node and (equations.inertial or equations.sticks):
+        raise ValueError(
+            "a link acts between equal states; expected links without inertia between nodes without set-valued friction"
+        )
+    more = {s for e in slope for s in e.free_symbols} - {*node.state, *node.parameters}
+    node = replace(node, parameters=(*node.parameters, *sorted(more, key=lambda s: s.name)))
     orbit = Equations.of_equal_nodes(node, None, 1)
     here = orbit.at_node(0)
     size = len(node.continuous)
@@ -159,7 +169,7 @@ def network_variation(equations: Equations) -> Variation:
     ValueError
         For nodes of several kinds and for links with inertia.
     """
-    equations.expect_alike("variational equation of the whole network", varied_too=True)
+    equations.expect_alike("variational equation of the whole network", varied_too=True, layers_too=True)
     size = equations.n * len(equations.node.continuous)
     matrix = tuple((key, e) for key, e in equations.jacobian().items() if max(key) < size)
     return Variation(equations, size, matrix, (), of_network(equations))
@@ -187,7 +197,7 @@ def clustered(equations: Equations, found: Clusters) -> Variation:
     Raises
     ------
     ValueError
-        As `coupling_slope`, for a link whose derivative depends on the state, and for a partition
+        As `source_slope`, for links that act between equal states, for a link whose derivative depends on the state, and for a partition
         that is not balanced.
 
     References
@@ -224,8 +234,12 @@ def _of_block(block: Block, orbit: Equations, slope: sp.Matrix) -> Iterator[tupl
 
 def _constant_slope(equations: Equations) -> sp.Matrix:
     """H of a link that is linear in the difference of the states it joins."""
-    slope = coupling_slope(equations)
     edge = equations.edge
+    if edge is not None and not edge.diffusive:
+        raise ValueError(
+            "a link acts between equal states, which cluster states do not allow yet; expected links that vanish there"
+        )
+    slope = source_slope(equations)
     if edge is None:
         raise ValueError("these equations have no coupling; differences within clusters need links")
     size = len(equations.node.continuous)
@@ -251,7 +265,10 @@ def phase_shifted(variation: Variation) -> Variation:
         known = replace(node, parameters=(*node.parameters, PHASE))
         return known.map(later)
 
-    orbit = variation.orbit.map_templates(shifted, lambda edge: edge)
+    def linked(edge: Edge) -> Edge:
+        return replace(edge, parameters=(*edge.parameters, PHASE)).map(later) if edge.forced else edge
+
+    orbit = variation.orbit.map_templates(shifted, linked)
     matrix = tuple((key, later(e)) for key, e in variation.matrix)
     events = None if variation.events is None else variation.events.map(later)
     return replace(variation, orbit=orbit, matrix=matrix, events=events)
@@ -271,7 +288,7 @@ def with_volume(equations: Equations) -> Equations:
     """
     if equations.sticks:
         raise ValueError("volumes of states: found set-valued friction, whose stick makes them zero")
-    equations.expect_alike("volumes of states", varied_too=True)
+    equations.expect_alike("volumes of states", varied_too=True, layers_too=True)
     return equations.map_templates(_node_with_volume, _edge_with_volume)
 
 
@@ -285,7 +302,7 @@ def _edge_with_volume(edge: Edge) -> Edge:
     """The edge between such nodes."""
     share = sp.Add(*(derivative(e, s) for e, s in zip(edge.rhs, edge.here, strict=True)))
     here, there = (sp.Symbol(f"{LOG_VOLUME}_{end}", real=True) for end in ("here", "there"))
-    return Edge((*edge.here, here), (*edge.there, there), edge.weight, (*edge.rhs, share), edge.parameters)
+    return replace(edge, here=(*edge.here, here), there=(*edge.there, there), rhs=(*edge.rhs, share))
 
 
 def _entries(matrix: sp.Matrix) -> tuple[Entry, ...]:
@@ -293,8 +310,10 @@ def _entries(matrix: sp.Matrix) -> tuple[Entry, ...]:
     return tuple(((r, c), matrix[r, c]) for r in range(rows) for c in range(columns) if matrix[r, c] != 0)
 
 
-def coupling_slope(equations: Equations) -> sp.Matrix:
-    """Return H, the derivative of a link of weight 1 by the state at its source, over sigma.
+def source_slope(equations: Equations) -> sp.Matrix:
+    """Return H, the derivative of a link of weight 1 by the state at its source, over the strength of the links.
+
+    The strength is sigma, or the one parameter that is a factor of the whole link.
 
     Parameters
     ----------
@@ -309,26 +328,24 @@ def coupling_slope(equations: Equations) -> sp.Matrix:
     Raises
     ------
     ValueError
-        If nodes differ, there is no coupling, a link does not vanish between equal states, so that
-        the synchronous state is no solution, or links are not proportional to sigma.
+        If nodes differ, there is no coupling, or links are not proportional to their weight and to one strength.
     """
     equations.expect_alike("transversal modes of complete synchronisation", inertia_too=True)
-    edge = equations.edge
+    edge, node = equations.edge, equations.node
     if edge is None:
         raise ValueError("these equations have no coupling; a transversal mode needs links")
-    if not edge.diffusive:
-        raise ValueError("a link acts between equal states, so complete synchronisation is no solution of this network")
-    strength = next((s for s in edge.parameters if s.name == "sigma"), None)
-    if strength is None:
-        raise ValueError(f"links depend on {', '.join(s.name for s in edge.parameters)}; expected sigma alone")
-    equal = dict(zip((*edge.here, *edge.there), equations.node.state * 2, strict=True))
-    matrix = sp.Matrix(edge.jacobian_there()).xreplace({edge.weight: sp.S.One}).xreplace(equal)
-    slope = matrix.diff(strength)
-    if (matrix - strength * slope).applyfunc(sp.simplify) != sp.zeros(*matrix.shape):
-        raise ValueError("links are not proportional to sigma; a mode has no single strength alpha")
-    more = {s.name for s in slope.free_symbols} - {s.name for s in (*equations.node.state, *equations.node.parameters)}
-    if more:
+    sigma = strength(edge, node.parameters)
+    equal = {**dict(zip((*edge.here, *edge.there), node.state * 2, strict=True)), **dict(edge.theirs)}
+    weighted = sp.Matrix(edge.jacobian_there()).xreplace(equal)
+    matrix = weighted.xreplace({edge.weight: sp.S.One})
+    zero = sp.zeros(*matrix.shape)
+    if not edge.oriented and (weighted - edge.weight * matrix).applyfunc(sp.simplify) != zero:
         raise ValueError(
-            f"between equal states links depend on {', '.join(sorted(more))} as well; expected sigma alone"
+            "links are not proportional to their weight; the modes of the graph are no modes of the network"
         )
+    slope = matrix.diff(sigma)
+    if (matrix - sigma * slope).applyfunc(sp.simplify) != zero:
+        raise ValueError(f"links are not proportional to {sigma}; a mode has no single strength alpha")
+    if slope.has(TIME):
+        raise ValueError("between equal states links depend on time; expected on states and parameters alone")
     return effective_slope(equations, slope)

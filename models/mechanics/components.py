@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, field, replace
 
 import sympy as sp
@@ -91,9 +91,10 @@ class Node:
         contact = None if self.contact is None else self.contact.map(change)
         return Node(state, rhs, tuple(p for p in parameters if p.is_Symbol), contact)
 
-    def without_unused_parameters(self) -> Node:
-        """The same without the parameters that do not occur."""
-        return replace(self, parameters=_occurring(self.parameters, self.expressions))
+    def without_unused_parameters(self, kept: Container[sp.Symbol] = ()) -> Node:
+        """The same without the parameters that do not occur, but those that are `kept` for the links."""
+        used = set(_occurring(self.parameters, self.expressions))
+        return replace(self, parameters=tuple(p for p in self.parameters if p in used or p in kept))
 
     def jacobian(self) -> tuple[tuple[sp.Expr, ...], ...]:
         """d(rhs)/d(state), one-sided at kinks (see `synchain.models.mechanics.calculus`)."""
@@ -106,11 +107,12 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """What one link adds to the right-hand side of its target: rhs(here, there; weight, parameters).
+    """What one link adds to the right-hand side of its target: rhs(here, there, t; weight, parameters).
 
     `here` are the state symbols of the target, `there` those of the source, both in the order of Node.state.  `inertia` is
     empty, or two blocks, rows those of the target: what the link adds to M in M d(state)/dt = rhs by the rates of the target
-    and by those of the source.
+    and by those of the source.  Parameters of the target go by their own names; `theirs` are symbols for parameters of the
+    source, each with the parameter that it is.  The weight of an `oriented` edge is the sign of the link's direction.
     """
 
     here: tuple[sp.Symbol, ...]
@@ -119,11 +121,14 @@ class Edge:
     rhs: tuple[sp.Expr, ...]
     parameters: tuple[sp.Symbol, ...]
     inertia: tuple[tuple[tuple[sp.Expr, ...], ...], ...] = ()
+    theirs: tuple[tuple[sp.Symbol, sp.Symbol], ...] = ()
+    oriented: bool = False
 
     def __post_init__(self) -> None:
-        _differ("edge", (TIME, self.weight, *self.here, *self.there, *self.parameters))
+        sources = tuple(s for s, _ in self.theirs)
+        _differ("edge", (TIME, self.weight, *self.here, *self.there, *self.parameters, *sources))
         known = {self.weight, *self.here, *self.there, *self.parameters}
-        _check("edge", self.rhs, len(self.here), known)
+        _check("edge", self.rhs, len(self.here), {TIME, *known, *sources})
         for block in self.inertia:
             for row in block:
                 _check("edge inertia", row, len(row), known)
@@ -135,6 +140,15 @@ class Edge:
     def jacobian_there(self) -> tuple[tuple[sp.Expr, ...], ...]:
         """d(rhs)/d(there)."""
         return tuple(tuple(derivative(e, s) for s in self.there) for e in self.rhs)
+
+    def time_derivative(self) -> tuple[sp.Expr, ...]:
+        """The partial derivative of rhs with respect to time."""
+        return tuple(derivative(e, TIME) for e in self.rhs)
+
+    @property
+    def forced(self) -> bool:
+        """True if time occurs explicitly."""
+        return any(e.has(TIME) for e in self.rhs)
 
     @property
     def expressions(self) -> tuple[sp.Expr, ...]:
@@ -172,16 +186,37 @@ class Edge:
         inertia = tuple(tuple(tuple(map(change, row)) for row in block) for block in self.inertia)
         if not any(e != 0 for block in inertia for row in block for e in row):
             inertia = ()
-        return Edge(here, there, change(self.weight), rhs, tuple(p for p in parameters if p.is_Symbol), inertia)
+        return replace(
+            self,
+            here=here,
+            there=there,
+            weight=change(self.weight),
+            rhs=rhs,
+            parameters=tuple(p for p in parameters if p.is_Symbol),
+            inertia=inertia,
+            theirs=tuple((change(a), change(b)) for a, b in self.theirs),
+        )
 
     def without_unused_parameters(self) -> Edge:
         """The same without the parameters that do not occur."""
-        return replace(self, parameters=_occurring(self.parameters, self.expressions))
+        used = _occurring(tuple(s for s, _ in self.theirs), self.expressions)
+        theirs = tuple(pair for pair in self.theirs if pair[0] in used)
+        return replace(self, parameters=_occurring(self.parameters, self.expressions), theirs=theirs)
+
+    def with_shared(self, varied: Iterable[str]) -> Edge:
+        """The same with one symbol for a parameter of both ends, but those of `varied`, which differ from node to node."""
+        shared = {s: own for s, own in self.theirs if own.name not in varied}
+        if not shared:
+            return self
+        more = tuple(own for own in shared.values() if own not in self.parameters)
+        theirs = tuple(pair for pair in self.theirs if pair[0] not in shared)
+        rhs = tuple(e.xreplace(shared) for e in self.rhs)
+        return replace(self, rhs=rhs, parameters=(*self.parameters, *more), theirs=theirs)
 
     @property
     def diffusive(self) -> bool:
         """True if the link vanishes between equal states, so that synchronous motion solves the network."""
-        equal = dict(zip(self.there, self.here, strict=True))
+        equal = {**dict(zip(self.there, self.here, strict=True)), **dict(self.theirs)}
         return all(sp.simplify(e.xreplace(equal)) == 0 for e in self.rhs)
 
 

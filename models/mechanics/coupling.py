@@ -1,4 +1,7 @@
-"""What a link between two nodes adds, as a value: entries of a matrix, or energies of two ends.
+"""What a link between two nodes adds, as a value: entries of a matrix, energies of two ends, or any rates or potential.
+
+Every coupling has parameters, checks the nodes that it joins (`check_ends`), and turns the two ends of a link into what
+the link adds there (`terms`); `synchain.models.mechanics.link` derives the equations from that.
 
 The text "y->x" lets the difference of y between two nodes enter the rate of x.  A link of weight w from node j to
 node i adds sigma w H (s_j - s_i) to the rates of the states s_i, so the entry "1/2 y->x" is 1/2 in the row of x and
@@ -8,7 +11,7 @@ the column of y.  H is the matrix of the master stability function (Pecora & Car
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -16,15 +19,32 @@ import sympy as sp
 
 from ..inputs.checks import check_text, short_repr, suggestion
 from ..inputs.frozen import Frozen
+from .components import Node
+from .ends import WEIGHT, Pair, Terms
+from .interaction import Potential, Rates, from_table
 from .parameter import Parameter
 
-__all__ = ["STRENGTH", "WEIGHT", "Coupling", "LagrangianCoupling", "MatrixCoupling", "split"]
+__all__ = [
+    "COUPLINGS",
+    "STRENGTH",
+    "WEIGHT",
+    "Coupling",
+    "LagrangianCoupling",
+    "MatrixCoupling",
+    "Potential",
+    "Rates",
+    "from_table",
+    "split",
+]
 
 STRENGTH = Frozen({"sigma": Parameter(0.0, "1", "strength of the coupling")})
 """The parameters of every coupling by components; sigma may be negative."""
 
-WEIGHT = sp.Symbol("weight", real=True)
-"""The weight of a link in the energies of a coupling."""
+_POSITIONS = sp.symbols("q_i q_j", real=True)
+"""The coordinates of the two ends in the energies of a coupling."""
+
+_SPEEDS = sp.symbols("v_i v_j", real=True)
+"""Their velocities."""
 
 _NUMBER = r"[0-9]{1,9}(?:/[0-9]{1,9}|\.[0-9]{1,9})?"
 
@@ -79,6 +99,35 @@ class MatrixCoupling:
         """The strength alone."""
         return STRENGTH
 
+    @property
+    def forced(self) -> bool:
+        """False: time does not occur."""
+        return False
+
+    def check_ends(self, single: Node, other: Node | None = None) -> None:
+        """Raise ValueError for components that nodes of one kind do not have."""
+        if other is None:
+            self.check(tuple(s.name for s in single.state))
+
+    def terms(self, pair: Pair) -> Terms:
+        """Return sigma weight H (there - here), each difference a factor of its own: a sum over all would feel round-off.
+
+        Between nodes of two kinds the entries apply whose components there are.
+        """
+        own, others = pair.names
+        rates = [sp.S.Zero] * len(own)
+        fitting = [(a, b, factor) for a, b, factor in self.entries if {a, b} <= set(own) and a in others]
+        if not fitting:
+            raise ValueError(
+                f"coupling {str(self)!r} joins nothing between nodes of {', '.join(own)} and {', '.join(others)}"
+            )
+        strength = sp.Symbol("sigma", real=True) * WEIGHT
+        for source, target, factor in fitting:
+            share = sp.Rational(factor.numerator, factor.denominator)
+            gap = pair.there[others.index(source)] - pair.here[own.index(source)]
+            rates[own.index(target)] += sp.Mul(share, *strength.args, gap)
+        return Terms(rates=tuple(rates))
+
     def check(self, state: tuple[str, ...]) -> None:
         """Raise ValueError for components outside `state`, the names of a node's states."""
         for name in (name for source, target, _ in self.entries for name in (source, target)):
@@ -117,7 +166,7 @@ class LagrangianCoupling:
     name : str
         What messages and scene files call it.
     parameters : mapping of str to Parameter
-        Parameters, "sigma" among them.
+        Its parameters.
     potential, dissipation, kinetic : Expr
         The energy stored, Rayleigh's function and the kinetic energy of a link.
     between : (str, str), optional
@@ -179,12 +228,93 @@ class LagrangianCoupling:
         joined = None if len(places) == len(coordinates) else tuple(coordinates[k] for k in places)
         return replace(self, coordinates=joined)
 
+    @property
+    def forced(self) -> bool:
+        """False: time does not occur."""
+        return False
+
+    def check_ends(self, single: Node, other: Node | None = None) -> None:
+        """Raise ValueError for nodes without velocities, and for nodes of one kind if it joins two."""
+        for node in (single,) if other is None else (single, other):
+            half = len(node.state) // 2
+            if self.between is not None and other is None:
+                raise ValueError(f"coupling {str(self)!r} joins {' and '.join(self.between)}; found nodes of one kind")
+            if node.contact is None and node.rhs[:half] != node.state[half:]:
+                name = node.state[0].name
+                raise ValueError(
+                    f"coupling {str(self)!r} joins coordinates with velocities; found a node of {node.state} without "
+                    f"them; name the components that a link joins, e.g. coupling = '{name}->{name}'"
+                )
+            if other is None:
+                self.places(tuple(s.name for s in node.state)[: max(half, 1)])
+
+    def terms(self, pair: Pair) -> Terms:
+        """Return the energies of a link, summed over the coordinates that it joins."""
+        if self.between is not None:
+            return self._between(self.between, pair)
+        known = [str(p)[:-2] for p, _ in pair.alike if p in pair.here[: pair.halves[0]]]
+        if not known:
+            raise ValueError(
+                f"coupling {str(self)!r}: {pair.described} have no coordinate of one name; nothing is joined"
+            )
+        kinetic = potential = dissipation = sp.S.Zero
+        oriented = False
+        for name in (known[k] for k in self.places(tuple(known))):
+            a, b = (names.index(name) for names in pair.names)
+            half, other = pair.halves
+            coordinates = dict(zip(_POSITIONS, (pair.here[a], pair.there[b]), strict=True))
+            speeds = dict(zip(_SPEEDS, (pair.here[half + a], pair.there[other + b]), strict=True))
+            kinetic += _link_energy(self.kinetic, speeds)
+            potential += _link_energy(self.potential, coordinates)
+            dissipation += _link_energy(self.dissipation, speeds)
+            for energy, at in ((self.kinetic, speeds), (self.potential, coordinates), (self.dissipation, speeds)):
+                oriented |= not _symmetric(energy, at)
+        return Terms(kinetic, potential, dissipation, oriented=oriented)
+
+    def _between(self, kinds: tuple[str, str], pair: Pair) -> Terms:
+        """The energies of a coupling that joins two named kinds of oscillator, in the names of their states."""
+        if set(map(str, pair.oscillators)) != set(kinds):
+            wanted = " and ".join(kinds)
+            raise ValueError(f"coupling {str(self)!r} joins {wanted}; found a link between {pair.described}")
+        symbols = dict(zip(pair.nodes[0].state, pair.here, strict=True))
+        symbols |= dict(zip(pair.nodes[1].state, pair.there, strict=True))
+        kinetic, potential, dissipation = (
+            e.xreplace(symbols) for e in (self.kinetic, self.potential, self.dissipation)
+        )
+        return Terms(kinetic, potential, dissipation)
+
     def __str__(self) -> str:
         return self.name if self.coordinates is None else f"{self.name} on {', '.join(self.coordinates)}"
 
 
-Coupling = MatrixCoupling | LagrangianCoupling
+Coupling = MatrixCoupling | LagrangianCoupling | Rates | Potential
 """What joins the nodes of a network."""
+
+COUPLINGS = (MatrixCoupling, LagrangianCoupling, Rates, Potential)
+"""The types of couplings."""
+
+
+def _turned(energy: sp.Expr, at: Mapping[sp.Symbol, sp.Symbol]) -> tuple[sp.Expr, sp.Expr]:
+    """The energy in the symbols of a link, and with its ends exchanged."""
+    first, second = at
+    return energy.xreplace(dict(at)), energy.xreplace({first: at[second], second: at[first]})
+
+
+def _symmetric(energy: sp.Expr, at: Mapping[sp.Symbol, sp.Symbol]) -> bool:
+    """True if an energy does not change in the exchange of the ends."""
+    here, there = _turned(energy, at)
+    return bool(sp.expand(here - there) == 0)
+
+
+def _link_energy(energy: sp.Expr, at: Mapping[sp.Symbol, sp.Symbol]) -> sp.Expr:
+    """The energy (or Rayleigh function) of one link, in the symbols `at` its two ends, target first.
+
+    One that changes in the exchange of the ends is W^2 V_even + W V_odd (`synchain.models.mechanics.link`).
+    """
+    if _symmetric(energy, at):
+        return energy.xreplace(dict(at))
+    here, there = (e.xreplace({WEIGHT: sp.S.One}) for e in _turned(energy, at))
+    return sp.expand(WEIGHT**2 * (here + there) / 2 + WEIGHT * (here - there) / 2)
 
 
 def split(words: str) -> tuple[str, tuple[str, ...] | None]:

@@ -224,8 +224,6 @@ def check_coupling(module: ModuleType, where: str, text: bytes) -> None:
     file.check_values()
     file.check_parameters()
     names = file.get("PARAMETERS")
-    if "sigma" not in names:
-        raise file.wrong("PARAMETERS", "PARAMETERS has no 'sigma'; expected the strength of the coupling by that name")
     functions = [name for name in ("potential", "dissipation", "kinetic") if file.has(name)]
     if not functions:
         file.need("potential, dissipation or kinetic")

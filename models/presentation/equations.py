@@ -14,7 +14,6 @@ import sympy as sp
 
 from ..dynamics.equations import Equations
 from ..mechanics.components import SLIDING, TIME, Edge, Node
-from ..mechanics.link import is_oriented
 from ..mechanics.nondimensional import FRICTION
 from .writer import Latex, Style, Text, Writer
 
@@ -23,7 +22,11 @@ __all__ = ["as_dict", "latex", "text"]
 LARGEST = 6
 """Networks of more nodes are written once, for node i, instead of node by node."""
 
-WEIGHT = sp.Symbol("G_ij", real=True)
+
+def _weights(equations: Equations) -> list[tuple[Edge, str]]:
+    """The templates of links between equal nodes, and what their weights are called: G, of several layers G_1, G_2, …"""
+    edges = equations.edges
+    return [(edge, "G" if len(edges) == 1 else f"G_{k}") for k, edge in enumerate(edges, start=1)]
 
 
 def latex(equations: Equations) -> str:
@@ -127,9 +130,11 @@ def _lines(equations: Equations, style: Style) -> Iterator[str]:
     if sticks:
         yield style.words("at zero sliding velocity f is what holds the body, up to the static coefficient")
     if generic:
-        count, weights = len(equations.links), style.letter("G", "ij")
-        meaning = f", {weights}" + style.words(f" the weights of the {count} links") if count else ""
-        if any(map(is_oriented, equations.edges)):
+        count, meaning = len(equations.links), ""
+        layers = (layer for layer in equations.layers if layer.links)
+        for layer, (_, name) in zip(layers, _weights(equations), strict=True):
+            meaning += f", {style.letter(name, 'ij')}" + style.words(f" the weights of the {len(layer.links)} links")
+        if any(edge.oriented for edge in equations.edges):
             meaning += style.words(", -1 where a link runs from j to i")
         yield ("i, j" if count else "i") + f" = 1, {style.dots}, {equations.n}{meaning}"
 
@@ -175,10 +180,10 @@ def _at_node(equations: Equations, named: tuple[_Named, ...], style: Style, i: i
         index = str(j + 1) if equations.n > 1 else ""
         letters |= _letters(equations, named[equations.kind_of[j]], style, equations.symbols(j), index, j)
     writer = Writer(style, letters, frozenset((*letters, TIME)))
-    links = [link for link in equations.links if link[0] == i]
+    links = [(link, edge) for link, edge in equations.linked() if link[0] == i]
     for c in _shown(equations, i):
         terms = [term.xreplace(here) for term in _ordered(own.rhs[c], node)]
-        parts = (equations.edge_at(link).rhs[c].xreplace(equations.at_link(link)) for link in links)
+        parts = (edge.rhs[c].xreplace(equations.at_link(link, edge)) for link, edge in links)
         felt = sp.factor_terms(sp.Add(*parts))
         terms += [term for term in sp.Add.make_args(felt) if term != 0]
         yield f"{_left(equations, writer, c, i)} = {writer.total(terms)}"
@@ -192,10 +197,10 @@ def _left(equations: Equations, writer: Writer, c: int, i: int) -> str:
     own = writer.write(equations.symbols(i)[c]) + "'"
     rates: dict[sp.Symbol, str] = {}
     terms: list[sp.Expr] = []
-    for link in equations.links if equations.inertial else ():
+    for link, edge in equations.linked() if equations.inertial else ():
         if link[0] == i:
-            for block, end in zip(equations.edge_at(link).inertia, link[:2], strict=False):
-                values = equations.at_link(link)
+            for block, end in zip(edge.inertia, link[:2], strict=False):
+                values = equations.at_link(link, edge)
                 for symbol, e in zip(equations.symbols(end), block[c], strict=True):
                     rate = sp.Symbol(f"{symbol.name}'", real=True)
                     rates[rate] = writer.write(symbol) + "'"
@@ -210,28 +215,36 @@ def _left(equations: Equations, writer: Writer, c: int, i: int) -> str:
 
 def _generic(equations: Equations, named: _Named, style: Style) -> Iterator[str]:
     """The equations of node i, its links as a sum over j."""
-    node, edge = equations.node, equations.edge if equations.links else None
+    node, joints = equations.node, _weights(equations)
     own = tuple(sp.Symbol(f"{s.name}_i", real=True) for s in node.state)
     here = dict(zip(node.state, own, strict=True))
     letters = _letters(equations, named, style, own, "i")
     letters |= {s: style.letter(s.name, "i") for s in _varied(equations)}
-    if edge is not None:
+    for edge, name in joints:
         letters |= _letters(equations, named, style, edge.here, "i")
         letters |= _letters(equations, named, style, edge.there, "j")
-        letters[WEIGHT] = style.letter("G", "ij")
-    writer = Writer(style, letters, frozenset({TIME, *letters} - {WEIGHT}))
+        letters |= {s: style.letter(of.name, "j") for s, of in edge.theirs}
+        letters[_weight(name)] = style.letter(name, "ij")
+    writer = Writer(style, letters, frozenset({TIME, *letters} - {_weight(name) for _, name in joints}))
     for c in _shown(equations):
         line = writer.total([term.xreplace(here) for term in _ordered(named.rhs[c], node)])
-        if edge is not None and edge.rhs[c] != 0:
-            summed = _sum_over_links(edge, c, writer)
-            line = line + summed if line != "0" else summed.removeprefix(" + ").lstrip()
+        for edge, name in joints:
+            if edge.rhs[c] != 0:
+                summed = _sum_over_links(edge, _weight(name), c, writer)
+                line = line + summed if line != "0" else summed.removeprefix(" + ").lstrip()
         left = writer.write(here[node.state[c]]) + "'"
-        if edge is not None and edge.inertia:
-            left += _summed_inertia(edge, c, writer)
+        for edge, name in joints:
+            if edge.inertia:
+                left += _summed_inertia(edge, _weight(name), c, writer)
         yield f"{left} = {line}"
 
 
-def _summed_inertia(edge: Edge, c: int, writer: Writer) -> str:
+def _weight(name: str) -> sp.Symbol:
+    """The symbol of the weights of a layer."""
+    return sp.Symbol(f"{name}_ij", real=True)
+
+
+def _summed_inertia(edge: Edge, weight: sp.Symbol, c: int, writer: Writer) -> str:
     """What the links of node i add to the left side of component c: masses times rates."""
     ends = (*edge.here, *edge.there)
     rates = {sp.Symbol(f"{s.name}'", real=True): writer.write(s) + "'" for s in ends}
@@ -239,13 +252,14 @@ def _summed_inertia(edge: Edge, c: int, writer: Writer) -> str:
     term = sp.factor(sp.Add(*(e * rate for e, rate in zip(masses, rates, strict=True))))
     if term == 0:
         return ""
-    full = Writer(writer.style, {**writer.letters, **rates}, frozenset((*writer.letters, *rates, TIME)) - {WEIGHT})
-    return _summed(term.xreplace({edge.weight: WEIGHT}), (WEIGHT, *ends, *rates), full)
+    full = Writer(writer.style, {**writer.letters, **rates}, frozenset((*writer.letters, *rates, TIME)) - {weight})
+    return _summed(term.xreplace({edge.weight: weight}), (weight, *ends, *rates), full)
 
 
-def _sum_over_links(edge: Edge, c: int, writer: Writer) -> str:
+def _sum_over_links(edge: Edge, weight: sp.Symbol, c: int, writer: Writer) -> str:
     """The links of node i: what all of them share stands before the sum sign."""
-    return _summed(edge.rhs[c].xreplace({edge.weight: WEIGHT}), (WEIGHT, *edge.here, *edge.there), writer)
+    sources = (s for s, _ in edge.theirs)
+    return _summed(edge.rhs[c].xreplace({edge.weight: weight}), (weight, *edge.here, *edge.there, *sources), writer)
 
 
 def _summed(term: sp.Expr, inside: tuple[sp.Symbol, ...], writer: Writer) -> str:
@@ -267,7 +281,7 @@ def _pairs(equations: Equations, i: int = 0) -> dict[int, int]:
     The rate of such a component is that state alone: links add nothing.
     """
     node, kind = equations.node_at(i), equations.kind_of[i]
-    edges = [edge for (target, _), edge in equations.edge_of if target == kind] if equations.links else []
+    edges = [edge for (target, _), edge in equations.edge_of if target == kind]
     found: dict[int, int] = {}
     for c, rate in enumerate(node.rhs):
         free = all(edge.rhs[c] == 0 for edge in edges)

@@ -15,7 +15,7 @@ from ..mechanics.friction import ContactModel, FrictionLaw
 from ..mechanics.oscillator import Field
 from ..mechanics.physics import check_masses, check_power
 from .axis import Axis
-from .model import Model, NodeKind, as_coupling, as_groups, as_law, as_oscillator, as_topology
+from .model import Model, NodeKind, as_coupling, as_groups, as_law, as_layers, as_oscillator
 from .parameters import at_nodes, drive, parameters
 from .section import Section
 from .start import SEED_LIMIT, chosen_start, default_start
@@ -86,18 +86,22 @@ def _model(given: Mapping[str, Any]) -> dict[str, Any]:
     """The parts of the model, and the model."""
     oscillator = as_oscillator(given["oscillator"])
     contact = ContactModel.parse("contact", given["contact"])
-    graph = as_topology(given["topology"])
+    if given["links"] is not None and given["coupling"] not in (None, "spring"):
+        raise ValueError("links: found a coupling beside it; expected each layer with its own coupling; leave one out")
+    coupling = as_coupling(given["coupling"]) if given["links"] is None else None
+    layers = as_layers(given["links"], coupling, given["topology"])
     friction = as_law(given["friction"], oscillator)
-    groups = as_groups(given["nodes"], graph.n)
-    coupling = as_coupling(given["coupling"])
-    model = Model.of(NodeKind(oscillator, friction), groups, contact, coupling, graph)
+    groups = as_groups(given["nodes"], layers[0][1].n)
+    model = Model.of(NodeKind(oscillator, friction), groups, contact, layers)
+    single = len(layers) == 1
     return {
         "oscillator": oscillator,
         "contact": contact,
-        "topology": graph,
+        "topology": model.topology,
         "friction": friction,
         "nodes": groups,
-        "coupling": model.coupling,
+        "coupling": model.layers[0][0] if single else None,
+        "links": None if single else model.layers,
         "model": model,
     }
 

@@ -10,7 +10,7 @@ from ..graphs.families import family, names, topology
 from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import check_integer, check_keys, check_table, check_text, short_repr
 from ..inputs.plugins import part
-from ..mechanics.coupling import split
+from ..mechanics.coupling import Coupling, Potential, Rates, split
 from .parameters import collected
 
 __all__ = ["arguments", "as_dict"]
@@ -53,6 +53,8 @@ def arguments(values: object, keywords: Iterable[str], folder: Path | None = Non
     for name in ("oscillator", "friction", "coupling"):
         if name in given:
             given[name] = _placed(given[name], folder)
+    if isinstance(given.get("links"), list):
+        given["links"] = [_layer(f"links {k}", entry, folder) for k, entry in enumerate(given["links"], start=1)]
     if isinstance(given.get("nodes"), list):
         given["nodes"] = [_placed_group(group, folder) for group in given["nodes"]]
     return given
@@ -63,6 +65,16 @@ def _placed(name: object, folder: Path | None) -> object:
     if not isinstance(name, str) or folder is None or not split(name)[0].endswith(".py"):
         return name
     return str(folder / name)
+
+
+def _layer(what: str, given: object, folder: Path | None) -> tuple[object, Topology]:
+    """A layer of links, {coupling = …, topology = …}."""
+    table = check_table(what, given)
+    check_keys(what, table, ("coupling", "topology"))
+    for key in ("coupling", "topology"):
+        if key not in table:
+            raise ValueError(f"{what}: {key!r} is missing; expected a coupling and its graph")
+    return _placed(table["coupling"], folder), _topology(check_table(f"{what}: topology", table["topology"]), folder)
 
 
 def _placed_group(group: object, folder: Path | None) -> object:
@@ -119,15 +131,25 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
     written = dict(values)
     for name in ("oscillator", "contact", "time_unit", "continuation", "section"):
         written[name] = str(values[name])
-    for name in ("friction", "coupling"):
-        written[name] = "none" if values[name] is None else str(values[name])
-    written["topology"] = _graph(values["topology"])
+    written["friction"] = "none" if values["friction"] is None else str(values["friction"])
+    written["coupling"], written["topology"] = _coupling(values["coupling"]), _graph(values["topology"])
+    layers = written.pop("links")
+    if layers is not None:
+        del written["coupling"], written["topology"]
+        written["links"] = [{"coupling": _coupling(own), "topology": _graph(graph)} for own, graph in layers]
     written["nodes"] = [group.as_dict() for group in values["nodes"]]
     written["parameters"] = collected(values["parameters"], varied)
     written["initial"] = {name: list(states) for name, states in values["initial"].items()}
     written["record"] = [str(record) for record in values["record"]]
     written["sweep"] = {axis.name: list(axis.values) for axis in written.pop("axes")}
     return written
+
+
+def _coupling(coupling: Coupling | None) -> object:
+    """A coupling by its name, or as a table of expressions."""
+    if isinstance(coupling, Rates | Potential):
+        return coupling.as_dict()
+    return "none" if coupling is None else str(coupling)
 
 
 def _graph(graph: Topology) -> dict[str, object]:

@@ -8,20 +8,21 @@ Source: Goldstein, Poole & Safko, Classical Mechanics, 3rd ed. (Addison-Wesley, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import sympy as sp
 
 from ..dynamics.equations import Equations
 from ..graphs.links import Link
+from ..graphs.topology import Topology
 from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Edge
-from ..mechanics.coupling import MatrixCoupling
+from ..mechanics.coupling import Coupling, LagrangianCoupling, Potential
+from ..mechanics.ends import Pair, Terms
 from ..mechanics.friction import ContactModel
-from ..mechanics.link import link_energies
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
-from ..mechanics.oscillator import Field, Oscillator
+from ..mechanics.oscillator import Field
 from .model import NodeKind
 from .scene import a_scene
 
@@ -52,19 +53,22 @@ class Energy:
     links: tuple[Share, ...]
 
     @property
-    def pairs(self) -> tuple[Link, ...]:
-        """One link (target, source, weight) of each pair, the one whose target has the smaller number."""
-        return tuple(link for link in self.equations.links if link[0] < link[1])
+    def pairs(self) -> tuple[tuple[Link, int], ...]:
+        """One link (target, source, weight) of each pair, the one whose target has the smaller number, and its edge.
+
+        An edge goes by its number in equations.edges.
+        """
+        eq, found, first = self.equations, list[tuple[Link, int]](), 0
+        for layer in (layer for layer in eq.layers if layer.links):
+            numbers = {ends: k for k, (ends, _) in enumerate(layer.edge_of, start=first)}
+            first += len(numbers)
+            found += [(link, numbers[eq.ends(link)]) for link in layer.links if link[0] < link[1]]
+        return tuple(found)
 
     @property
     def conservative(self) -> bool:
         """True if no power is fed in or lost, for all values of the parameters."""
         return all(share.power == 0 for share in (*self.nodes, *self.links))
-
-    def of_link(self, link: Link) -> int:
-        """Return which edge a link is of, its number in equations.edges."""
-        eq = self.equations
-        return [ends for ends, _ in eq.edge_of].index(eq.ends(link))
 
     def whole(self) -> tuple[sp.Expr, sp.Expr]:
         """Return energy and power of the whole network in its state symbols (algebra grows with n: meant for small n)."""
@@ -72,7 +76,7 @@ class Energy:
         placed = [(self.nodes[eq.kind_of[i]], eq.at_node(i)) for i in range(eq.n)]
         shares: list[tuple[Share, dict[sp.Symbol, sp.Expr]]] = [
             *placed,
-            *((self.links[self.of_link(p)], eq.at_link(p)) for p in self.pairs),
+            *((self.links[k], eq.at_link(link, eq.edges[k])) for link, k in self.pairs),
         ]
         found = sp.Add(*(share.energy.xreplace(values) for share, values in shares))
         return found, sp.Add(*(share.power.xreplace(values) for share, values in shares))
@@ -93,7 +97,17 @@ def energy(scene: Scene) -> Energy:
     if equations.sticks:
         raise ValueError("energy: set-valued friction does work that is no function of the state; use contact 'atan'")
     nodes = tuple(_of_node(kind, scene.contact) for kind in kinds)
-    return Energy(equations, nodes, _of_links(scene, [kind.oscillator for kind in kinds]))
+    links, layers = [], []
+    for (coupling, graph), layer in zip(scene.model.linked, equations.layers, strict=True):
+        _check(coupling, graph)
+        edges = []
+        for (a, b), edge in layer.edge_of:
+            pair = Pair((equations.nodes[a], equations.nodes[b]), (kinds[a].oscillator, kinds[b].oscillator))
+            share, joint = _of_link(edge, pair, coupling.terms(pair), equations.varied)
+            links.append(share)
+            edges.append(((a, b), joint))
+        layers.append(replace(layer, edge_of=tuple(edges)))
+    return Energy(replace(equations, layers=tuple(layers)), nodes, tuple(links))
 
 
 def _of_node(kind: NodeKind, contact: ContactModel) -> Share:
@@ -107,29 +121,29 @@ def _of_node(kind: NodeKind, contact: ContactModel) -> Share:
     return Share(_of_lagrangian(lagrangian, system.velocities), power)
 
 
-def _of_links(scene: Scene, oscillators: Sequence[Oscillator]) -> tuple[Share, ...]:
-    """Energy and power of one link of each edge."""
-    equations = scene.equations
-    if not equations.edges or scene.coupling is None:
-        return ()
-    if isinstance(scene.coupling, MatrixCoupling):
-        raise ValueError(
-            f"energy: the coupling {str(scene.coupling)!r} has none; expected a spring or damper by its name"
-        )
-    if not scene.topology.symmetric:
-        raise ValueError(f"energy: {scene.topology.name}({scene.n}) has one-way links; expected links both ways")
-    found = []
-    for (a, b), edge in equations.edge_of:
-        nodes = (equations.nodes[a], equations.nodes[b])
-        found.append(_of_link(edge, *link_energies(scene.coupling, edge, nodes, (oscillators[a], oscillators[b]))))
-    return tuple(found)
+def _check(coupling: Coupling, graph: Topology) -> None:
+    """Raise ValueError for links without an energy."""
+    if not isinstance(coupling, LagrangianCoupling | Potential):
+        raise ValueError(f"energy: the coupling '{coupling}' has none; expected a spring or damper by its name")
+    if coupling.forced:
+        raise ValueError(f"energy: the coupling '{coupling}' depends on time; expected one that does not")
+    if not graph.symmetric:
+        raise ValueError(f"energy: {graph.name}({graph.n}) has one-way links; expected links both ways")
 
 
-def _of_link(edge: Edge, kinetic: sp.Expr, potential: sp.Expr, dissipation: sp.Expr) -> Share:
-    """The energy of a link, and the power it feeds in: minus v dR/dv at either end."""
-    velocities = (*edge.here[len(edge.here) // 2 :], *edge.there[len(edge.there) // 2 :])
-    lost = sp.Add(*(v * derivative(dissipation, v) for v in velocities))
-    return Share(potential if kinetic == 0 else _of_lagrangian(kinetic - potential, velocities), -lost)
+def _of_link(edge: Edge, pair: Pair, terms: Terms, varied: tuple[str, ...]) -> tuple[Share, Edge]:
+    """The energy of a link, and the power it feeds in: minus v dR/dv at either end.
+
+    The edge gets the parameters of its nodes that the energy uses, though its forces may not.
+    """
+    shared = {s: own for s, own in pair.theirs.items() if own.name not in varied}
+    kinetic, potential, dissipation = (e.xreplace(shared) for e in (terms.kinetic, terms.potential, terms.dissipation))
+    lost = sp.Add(*(v * derivative(dissipation, v) for v in pair.velocities))
+    share = Share(potential if kinetic == 0 else _of_lagrangian(kinetic - potential, pair.velocities), -lost)
+    used = share.energy.free_symbols | share.power.free_symbols
+    more = tuple(s for s in pair.nodes[0].parameters if s in used and s not in edge.parameters)
+    theirs = tuple((s, own) for s, own in pair.theirs.items() if s in used)
+    return share, replace(edge, parameters=(*edge.parameters, *more), theirs=theirs)
 
 
 def _of_lagrangian(lagrangian: sp.Expr, velocities: Sequence[sp.Symbol]) -> sp.Expr:

@@ -1,9 +1,10 @@
-"""What a scene's equations are made of: oscillators by kind, their friction laws, a coupling and a graph."""
+"""What a scene's equations are made of: oscillators by kind, their friction laws, couplings and their graphs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import lru_cache
 from itertools import islice
 
@@ -16,9 +17,8 @@ from ..inputs.checks import check_integer, check_keys, check_number, check_table
 from ..inputs.frozen import Frozen
 from ..inputs.node_name import NodeName
 from ..inputs.plugins import part
-from ..mechanics.coupling import Coupling, LagrangianCoupling, MatrixCoupling
+from ..mechanics.coupling import COUPLINGS, Coupling, from_table
 from ..mechanics.friction import ContactModel, FrictionLaw
-from ..mechanics.link import check_coupling
 from ..mechanics.loader import load_friction_law, load_oscillator, read_coupling
 from ..mechanics.oscillator import Oscillator
 from ..mechanics.parameter import Parameter
@@ -30,6 +30,7 @@ __all__ = [
     "as_coupling",
     "as_groups",
     "as_law",
+    "as_layers",
     "as_oscillator",
     "as_topology",
     "in_range",
@@ -72,17 +73,15 @@ class Model:
         The kind of each node.
     contact : ContactModel
         How the jump of a friction law at rest is treated.
-    coupling : Coupling, optional
-        What joins the nodes.
-    topology : Topology
-        The graph.
+    layers : tuple of (Coupling or None, Topology)
+        Couplings and their graphs, at least one, all of as many nodes.
 
     Attributes
     ----------
     unlinked : Equations
         The equations of the nodes without their links.
     parameters : mapping of str to Parameter
-        The parameters of all kinds, and those of the coupling if the graph has links; a name has the default of the
+        The parameters of all kinds, and those of the couplings whose graphs have links; a name has the default of the
         first kind that has it.
 
     Raises
@@ -94,19 +93,17 @@ class Model:
     kinds: tuple[NodeKind, ...]
     kind_of: tuple[int, ...]
     contact: ContactModel
-    coupling: Coupling | None
-    topology: Topology
+    layers: tuple[tuple[Coupling | None, Topology], ...]
     unlinked: Equations = field(init=False, repr=False, compare=False)
     parameters: Frozen[Parameter] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        apart = _unlinked(self.kinds, self.kind_of, self.contact, self.topology)
-        object.__setattr__(self, "unlinked", apart)
-        coupling = self.coupling if self.topology.links else None
-        object.__setattr__(self, "parameters", _parameters(self.kinds, self.contact, coupling))
+        object.__setattr__(self, "unlinked", _unlinked(self.kinds, self.kind_of, self.contact))
+        couplings = tuple(coupling for coupling, _ in self.linked)
+        object.__setattr__(self, "parameters", _parameters(self.kinds, self.contact, couplings))
 
     def __reduce__(self) -> tuple[type[Model], tuple[object, ...]]:
-        return Model, (self.kinds, self.kind_of, self.contact, self.coupling, self.topology)
+        return Model, (self.kinds, self.kind_of, self.contact, self.layers)
 
     @classmethod
     def of(
@@ -114,10 +111,9 @@ class Model:
         kind: NodeKind,
         groups: tuple[Group, ...],
         contact: ContactModel,
-        coupling: Coupling | None,
-        graph: Topology,
+        layers: tuple[tuple[Coupling | None, Topology], ...],
     ) -> Model:
-        """Return the model of nodes of one kind, apart from those of some groups, with its coupling in one spelling.
+        """Return the model of nodes of one kind, apart from those of some groups, with its couplings in one spelling.
 
         Parameters
         ----------
@@ -125,35 +121,53 @@ class Model:
             The kind of all nodes that no group names.
         groups : tuple of Group
             Nodes of other kinds.
-        contact, coupling, graph
+        contact, layers
             As in `Model`.
 
         Raises
         ------
         ValueError
-            As `Model` does, and if the coupling is missing or cannot join the nodes.
+            As `Model` does, and if a coupling is missing or cannot join the nodes.
         """
-        nodes = [kind] * graph.n
+        nodes = [kind] * layers[0][1].n
         for group in groups:
             for i in group.at:
                 nodes[i - 1] = NodeKind(group.oscillator, group.friction)
         kinds = tuple(dict.fromkeys(nodes))
         numbers = {own: k for k, own in enumerate(kinds)}
-        model = cls(kinds, tuple(numbers[own] for own in nodes), contact, None, graph)
-        if coupling is not None:
-            model = replace(model, coupling=coupling.canonical(model.components, model.coordinates))
-        elif graph.links:
-            raise ValueError(
-                f"coupling: found none for {graph.name}({graph.n}), which has links; "
-                "expected the name of a coupling, e.g. 'spring'"
-            )
+        model = cls(kinds, tuple(numbers[own] for own in nodes), contact, tuple((None, graph) for _, graph in layers))
+        spelt = []
+        for coupling, graph in layers:
+            if coupling is None and graph.links:
+                raise ValueError(
+                    f"coupling: found none for {graph.name}({graph.n}), which has links; "
+                    "expected the name of a coupling, e.g. 'spring'"
+                )
+            own = None if coupling is None else coupling.canonical(model.components, model.coordinates)
+            spelt.append((own, graph))
+        model = replace(model, layers=tuple(spelt))
         model.check_links()
         return model
 
     @property
     def n(self) -> int:
         """Number of oscillators."""
-        return self.topology.n
+        return len(self.kind_of)
+
+    @property
+    def linked(self) -> tuple[tuple[Coupling, Topology], ...]:
+        """The layers that have links."""
+        return tuple((coupling, graph) for coupling, graph in self.layers if coupling is not None and graph.links)
+
+    @property
+    def topology(self) -> Topology:
+        """The graph of a single layer; of several layers the union of their graphs, which nodes feel which at all."""
+        return self.layers[0][1] if len(self.layers) == 1 else _union(tuple(graph for _, graph in self.layers))
+
+    @property
+    def forced(self) -> bool:
+        """True if time occurs explicitly in the equations."""
+        return any(node.forced for node in self.unlinked.nodes) or any(coupling.forced for coupling, _ in self.linked)
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -170,13 +184,12 @@ class Model:
         return _equations(self, varied)
 
     def check_links(self) -> None:
-        """Raise ValueError if the coupling cannot join the oscillators of a graph with links."""
-        if not self.topology.links or self.coupling is None:
-            return
-        if len(self.kinds) > 1:
+        """Raise ValueError if a coupling cannot join the oscillators of a graph with links."""
+        if self.linked and len(self.kinds) > 1:
             self.equations()
-        else:
-            check_coupling(self.coupling, self.unlinked.node)
+            return
+        for coupling, _ in self.linked:
+            coupling.check_ends(self.unlinked.node)
 
     def holders(self, name: str) -> tuple[int, ...]:
         """Return the nodes (counted from 0) that have a parameter, none for one of the links."""
@@ -185,7 +198,7 @@ class Model:
 
     def defaults(self, name: str) -> list[float]:
         """Return the default of a parameter at each node that has it, in that node's kind."""
-        tables = [_kind_parameters(kind, self.contact, None) for kind in self.kinds]
+        tables = [_kind_parameters(kind, self.contact, ()) for kind in self.kinds]
         return [float(tables[self.kind_of[i]][name].default) for i in self.holders(name)]
 
     def node_parameter(self, name: str) -> NodeName | None:
@@ -200,13 +213,13 @@ class Model:
 
     def unknown(self, name: str, what: str, known: Iterable[str]) -> str:
         """Return the sentence that refuses a name; a parameter of the coupling without links has its own."""
-        graph, known = self.topology, tuple(known)
-        idle = () if graph.links or self.coupling is None else _parameters(self.kinds, self.contact, self.coupling)
-        if name in idle:
-            return (
-                f"{what} {name!r} couples oscillators, but {graph.name}({graph.n}) has no links: "
-                f"there is nothing to couple; leave it out or take at least two oscillators, e.g. chain(2)"
-            )
+        known = tuple(known)
+        for coupling, graph in self.layers:
+            if not graph.links and coupling is not None and name in coupling.parameters:
+                return (
+                    f"{what} {name!r} couples oscillators, but {graph.name}({graph.n}) has no links: "
+                    f"there is nothing to couple; leave it out or take at least two oscillators, e.g. chain(2)"
+                )
         return f"unknown {what} {short_repr(name)}; known: {', '.join(known)}{suggestion(name, known)}"
 
     def check_state(self, name: str, what: str) -> None:
@@ -219,39 +232,39 @@ class Model:
 
 
 @lru_cache(maxsize=64)
-def _unlinked(
-    kinds: tuple[NodeKind, ...], kind_of: tuple[int, ...], contact: ContactModel, graph: Topology
-) -> Equations:
+def _unlinked(kinds: tuple[NodeKind, ...], kind_of: tuple[int, ...], contact: ContactModel) -> Equations:
     """The equations of nodes without links."""
     nodes = [network.node(kind.oscillator, kind.friction, contact) for kind in kinds]
-    if len(kinds) > 1:
-        return network.mixed_network([kind.oscillator for kind in kinds], nodes, kind_of, None, graph)
-    return network.network(nodes[0], None, graph)
+    return network.layered_network([kind.oscillator for kind in kinds], nodes, kind_of, ())
+
+
+@lru_cache(maxsize=64)
+def _union(graphs: tuple[Topology, ...]) -> Topology:
+    """The union of graphs: a link of weight 1 wherever one of them has a link."""
+    pairs = sorted({link[:2] for graph in graphs for link in graph.links})
+    return Topology(" and ".join(graph.name for graph in graphs), graphs[0].n, tuple((*p, Fraction(1)) for p in pairs))
 
 
 @lru_cache(maxsize=64)
 def _equations(model: Model, varied: tuple[str, ...]) -> Equations:
     """The equations of a whole network."""
-    graph, nodes = model.topology, model.unlinked.nodes
-    coupling = model.coupling if graph.links else None
     oscillators = [kind.oscillator for kind in model.kinds]
-    if len(nodes) > 1:
-        return network.mixed_network(oscillators, nodes, model.kind_of, coupling, graph, varied)
-    edge = None if coupling is None else network.edge(coupling, nodes[0], oscillators[0])
-    return network.network(nodes[0], edge, graph, varied)
+    return network.layered_network(oscillators, model.unlinked.nodes, model.kind_of, model.linked, varied)
 
 
 @lru_cache(maxsize=64)
-def _kind_parameters(kind: NodeKind, contact: ContactModel, coupling: Coupling | None) -> Frozen[Parameter]:
+def _kind_parameters(kind: NodeKind, contact: ContactModel, couplings: tuple[Coupling, ...]) -> Frozen[Parameter]:
     """Every parameter of nodes of one kind with its default, unit and range."""
-    return Frozen(network.parameters(kind.oscillator, kind.friction, contact, coupling))
+    return Frozen(network.parameters(kind.oscillator, kind.friction, contact, couplings))
 
 
 @lru_cache(maxsize=64)
-def _parameters(kinds: tuple[NodeKind, ...], contact: ContactModel, coupling: Coupling | None) -> Frozen[Parameter]:
-    """The parameters of all kinds, each with the default of the first kind that has it, then those of the coupling."""
+def _parameters(
+    kinds: tuple[NodeKind, ...], contact: ContactModel, couplings: tuple[Coupling, ...]
+) -> Frozen[Parameter]:
+    """The parameters of all kinds, each with the default of the first kind that has it, then those of the couplings."""
     known: dict[str, Parameter] = {}
-    for joined in (None, coupling):
+    for joined in ((), couplings):
         for kind in kinds:
             for name, parameter in _kind_parameters(kind, contact, joined).items():
                 known.setdefault(name, parameter)
@@ -297,9 +310,11 @@ def as_law(value: object, oscillator: Oscillator) -> FrictionLaw | None:
 
 
 def as_coupling(value: object) -> Coupling | None:
-    """Return a coupling as it is, or read the one of a text; None for None and "none"."""
-    if value is None or isinstance(value, MatrixCoupling | LagrangianCoupling):
+    """Return a coupling as it is, or read the one of a text or of a table of expressions; None for None and "none"."""
+    if value is None or isinstance(value, COUPLINGS):
         return value
+    if isinstance(value, Mapping):
+        return from_table("coupling", value)
     words = part("coupling", value)
     return None if words == "none" else read_coupling(words)
 
@@ -307,6 +322,42 @@ def as_coupling(value: object) -> Coupling | None:
 def as_topology(value: object) -> Topology:
     """Return the graph that a value is or stands for, one node alone for None."""
     return topology("chain", 1) if value is None else readers.as_topology("topology", value)
+
+
+def as_layers(links: object, coupling: Coupling | None, graph: object) -> tuple[tuple[Coupling | None, Topology], ...]:
+    """Return the layers of links of a scene.
+
+    Parameters
+    ----------
+    links : object
+        A list of pairs (coupling, graph); None for a single layer.
+    coupling : Coupling, optional
+        The coupling of a single layer.
+    graph : object
+        Its graph.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If `links` is no list of pairs, if graphs have different numbers of nodes, and if a graph is given twice.
+    """
+    if links is None:
+        return ((coupling, as_topology(graph)),)
+    if graph is not None:
+        raise ValueError("links: found a topology beside it; expected each layer with its own graph; leave one out")
+    if isinstance(links, str | bytes | Mapping) or not isinstance(links, Iterable):
+        raise TypeError(f"links: found {short_repr(links)}; expected pairs, e.g. [('spring', ring(4))]")
+    found: list[tuple[Coupling | None, Topology]] = []
+    for k, entry in enumerate(islice(links, MOST), start=1):
+        if not isinstance(entry, tuple | list) or len(entry) != 2:
+            raise TypeError(f"links {k}: found {short_repr(entry)}; expected a pair (coupling, graph)")
+        found.append((as_coupling(entry[0]), as_topology(entry[1])))
+    if not found:
+        raise ValueError("links: found no layer; expected one at least, e.g. [('spring', ring(4))]")
+    sizes = sorted({graph.n for _, graph in found})
+    if len(sizes) > 1:
+        raise ValueError(f"links: found graphs of {', '.join(map(str, sizes))} nodes; expected one number of nodes")
+    return tuple(found)
 
 
 def as_groups(value: object, n: int) -> tuple[Group, ...]:

@@ -119,7 +119,9 @@ def at_nodes(model: Model, values: Mapping[str, T]) -> Iterator[tuple[NodeKind, 
 
 def drive(model: Model, values: Mapping[str, float]) -> Drive:
     """Return at which frequencies time enters the equations of a model whose parameters have these values."""
-    return drive_of(model.unlinked.nodes, varied(values, model.parameters))
+    timed = any(coupling.forced for coupling, _ in model.linked)
+    own = varied(values, model.parameters)
+    return drive_of((*model.unlinked.nodes, *(model.equations(own).edges if timed else ())), own)
 
 
 def without(model: Model, values: Mapping[object, object], names: Iterable[str]) -> dict[object, object]:

@@ -18,6 +18,7 @@ from ..inputs.frozen import Frozen
 from ..inputs.node_name import NodeName
 from ..mechanics.coupling import Coupling
 from ..mechanics.friction import SLIP, ContactModel, FrictionLaw
+from ..mechanics.link import strength
 from ..mechanics.oscillator import Oscillator
 from .axis import Axis
 from .complete import TimeUnit, complete
@@ -52,11 +53,13 @@ class Scene:
     contact : str
         How the jump of a law at rest is treated: "atan", "sign" or "set-valued".
     coupling : Coupling or str, optional
-        What joins the nodes: a name ("spring", "spring on x") or components ("x->x, 1/2 y->z").
+        What joins the nodes: a name ("spring", "spring on x"), components ("x->x, 1/2 y->z"), `Rates` or a `Potential`.
     nodes : iterable of Group or tables, optional
         Nodes of other kinds.
     topology : Topology, optional
-        The graph; one node alone if left out.
+        The graph; one node alone if left out.  Of several layers of links it is the union of their graphs.
+    links : iterable of (Coupling or str, Topology), optional
+        Several layers of links, each with its own graph, in place of `coupling` and `topology`.
     parameters : mapping, optional
         Values of parameters: a number, or a list with one number for each node.
     initial : mapping, optional
@@ -106,6 +109,7 @@ class Scene:
     coupling: Coupling | None
     nodes: tuple[Group, ...]
     topology: Topology
+    links: tuple[tuple[Coupling | None, Topology], ...] | None
     parameters: Frozen[float]
     initial: Frozen[tuple[float, ...]]
     record: tuple[Record, ...]
@@ -135,6 +139,7 @@ class Scene:
         coupling: Coupling | str | None = "spring",
         nodes: Iterable[Group | Mapping[str, object]] | None = None,
         topology: Topology | None = None,
+        links: Iterable[tuple[Coupling | str, Topology]] | None = None,
         parameters: Mapping[str, object] | None = None,
         initial: Mapping[str, object] | None = None,
         record: Iterable[str] | None = None,
@@ -180,13 +185,31 @@ class Scene:
 
     @property
     def spectrum(self) -> Spectrum:
-        """The exact eigenvalues of the connectivity matrix."""
+        """The exact eigenvalues of the connectivity matrix; ValueError for several layers of links."""
+        if self.links is not None:
+            raise ValueError(
+                f"spectrum: found {len(self.links)} layers of links; expected one; take the graph of a layer, scene.links"
+            )
         return _spectrum(self.topology)
+
+    @property
+    def strength(self) -> str:
+        """Name of the parameter that is the strength of the links: sigma, or the only one that is a factor of a link.
+
+        Raises ValueError for several layers of links, without links, and if no parameter or more than one is a factor.
+        """
+        if len(self.model.linked) != 1:
+            raise ValueError(f"strength of the links: found {len(self.model.linked)} layers of links; expected one")
+        equations = self.equations
+        names = {strength(edge, equations.nodes[a].parameters).name for (a, _), edge in equations.edge_of}
+        if len(names) > 1:
+            raise ValueError(f"strength of the links: found {', '.join(sorted(names))}; expected one for all links")
+        return names.pop()
 
     @property
     def forced(self) -> bool:
         """True if time occurs explicitly in the equations."""
-        return any(node.forced for node in self.model.unlinked.nodes)
+        return self.model.forced
 
     @property
     def drive(self) -> Drive:
@@ -257,17 +280,19 @@ class Scene:
         if changes.get("topology") is not None:
             changes["topology"] = as_topology(changes["topology"])
         given = {**self.given, "initial": self._kept_start(changes), **changes}
+        if given["links"] is not None:  # coupling and graph of a single layer give way
+            given |= {"coupling": None, "topology": None} | changes
         if given["parameters"] is not None or single:
             numbers = {} if given["parameters"] is None else check_table("parameters", given["parameters"])
             given["parameters"] = {**without(self.model, numbers, single), **single}
-        if self.varied and "parameters" not in changes and getattr(given["topology"], "n", None) != self.n:
+        if self.varied and "parameters" not in changes and _nodes(given) != self.n:
             raise ValueError(f"{self.varied[0]} has values for {self.n} nodes; give `parameters` for another number")
         return Scene(**given)
 
     def _kept_start(self, changes: Mapping[str, object]) -> Mapping[str, object] | None:
         """The initial states that were given, if they fit a scene with other keywords."""
         other = "oscillator" in changes and as_oscillator(changes["oscillator"]) != self.oscillator
-        if other or "nodes" in changes or getattr(changes.get("topology", self.topology), "n", None) != self.n:
+        if other or "nodes" in changes or _nodes({"links": None, "topology": self.topology, **changes}) != self.n:
             return None
         start: Mapping[str, object] | None = self.given["initial"]
         if start and ("contact" in changes or "friction" in changes):
@@ -303,7 +328,7 @@ class Scene:
     def __repr__(self) -> str:
         oscillators = " and ".join(dict.fromkeys(kind.oscillator.name for kind in self.model.kinds))
         laws = " and ".join(dict.fromkeys(kind.friction.name for kind in self.model.kinds if kind.friction))
-        names = [oscillators, laws, str(self.coupling) if self.topology.links and self.coupling else None]
+        names = [oscillators, laws, *(str(coupling) for coupling, _ in self.model.linked)]
         words = [repr(self.title)] if self.title else []
         words += [
             "/".join(name for name in names if name),
@@ -311,6 +336,15 @@ class Scene:
             *map(repr, self.axes),
         ]
         return f"Scene({', '.join(words)})"
+
+
+def _nodes(given: Mapping[str, Any]) -> int | None:
+    """The number of nodes of given links or of a given graph."""
+    try:
+        graph = given["topology"] if given["links"] is None else given["links"][0][1]
+    except (TypeError, LookupError):
+        return None
+    return getattr(graph, "n", None)
 
 
 @lru_cache(maxsize=64)

@@ -6,9 +6,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from ..dynamics.synchrony import NoSynchrony, synchronous_node
 from ..graphs.topology import Topology
 from ..inputs.node_name import NodeName
-from ..mechanics.coupling import LagrangianCoupling
+from ..mechanics.coupling import MatrixCoupling
 from .model import Model
 
 __all__ = ["warnings", "zero_multiplicity"]
@@ -50,14 +51,15 @@ def warnings(model: Model, varied: tuple[str, ...], values: Mapping[str, Any], d
         Non-dimensional time from the start to the end of the window.
     """
     graph = model.topology
-    vanishing = not graph.links or _vanishes(model, varied)
+    alike = not varied and len(model.kinds) == 1
+    asynchronous = _without_synchrony(model) if len(model.kinds) == 1 else ""
     sentences = (
         _in_parts(graph),
-        _negative_weights(graph),
+        *(_negative_weights(own) for _, own in model.linked),
         _different_nodes(graph, varied),
-        "" if vanishing else _without_synchrony(model),
+        asynchronous,
         _stiff_springs(model, values, duration),
-        _equal_starts(values) if vanishing and not varied and len(model.kinds) == 1 else "",
+        _equal_starts(values) if alike and not asynchronous else "",
     )
     return tuple(filter(None, sentences))
 
@@ -96,19 +98,20 @@ def _different_nodes(graph: Topology, varied: tuple[str, ...]) -> str:
     )
 
 
-def _vanishes(model: Model, varied: tuple[str, ...]) -> bool:
-    """True unless the coupling acts between equal states."""
-    if not isinstance(model.coupling, LagrangianCoupling) or len(model.kinds) > 1:
-        return True
-    return all(edge.diffusive for edge in model.equations(varied).edges)
-
-
 def _without_synchrony(model: Model) -> str:
-    """The sentence for a coupling that acts between equal states."""
-    return (
-        f"coupling {str(model.coupling)!r} does not vanish between oscillators in equal states, so that equal motion of "
-        "all is no solution: there is no complete synchronisation; make it a function of differences"
-    )
+    """A sentence if equal motion of all nodes is no solution, because couplings act between equal states."""
+    if all(isinstance(coupling, MatrixCoupling) for coupling, _ in model.linked):
+        return ""
+    try:
+        synchronous_node(model.equations())
+    except NoSynchrony as problem:
+        pairs = zip(model.linked, model.equations().edges, strict=True)
+        names = dict.fromkeys(f"'{coupling}'" for (coupling, _), edge in pairs if not edge.diffusive)
+        return (
+            f"coupling {' and '.join(names)} does not vanish between oscillators in equal states: {problem}; expected a "
+            "function of differences, or one sum of weights at all nodes"
+        )
+    return ""
 
 
 def _stiff_springs(model: Model, values: Mapping[str, Any], duration: float) -> str:
@@ -116,7 +119,7 @@ def _stiff_springs(model: Model, values: Mapping[str, Any], duration: float) -> 
 
     The frequency of the fastest mode is at most sqrt(1 + 2 sigma d), d the largest weight at a node (Gershgorin).
     """
-    if str(model.coupling) != "spring" or not model.topology.links:
+    if [str(coupling) for coupling, _ in model.linked] != ["spring"]:
         return ""
     swept = (value for axis in values["axes"] if axis.name == "sigma" for value in axis.values)
     sigma = max([values["parameters"]["sigma"], *swept])

@@ -116,9 +116,9 @@ def _blocks(equations: Equations, values: Mapping[str, float]) -> list[np.ndarra
     """The blocks of the Jacobian of the first nodes, with twice what their links add."""
     nodes = range(min(equations.n, NODES))
     blocks = [_value(equations.node_at(i).jacobian(), equations.at_node(i), values) for i in nodes]
-    for link in islice(equations.links, LINKS):
+    for link, edge in islice(equations.linked(), LINKS):
         if link[0] < len(blocks):
-            found = _value(equations.edge_at(link).jacobian_here(), equations.at_link(link), values)
+            found = _value(edge.jacobian_here(), equations.at_link(link, edge), values)
             blocks[link[0]] = blocks[link[0]] + 2.0 * found
     return blocks
 

@@ -158,7 +158,7 @@ def periods(equations: Equations, numbers: np.ndarray) -> np.ndarray:
     """
     if len(numbers) == 0:
         return np.zeros(0)
-    frequency = drive_of(equations.nodes, equations.varied).frequency
+    frequency = drive_of((*equations.nodes, *equations.edges), equations.varied).frequency
     if frequency is None:
         return np.zeros(len(numbers))
     with np.errstate(divide="ignore"):
@@ -183,7 +183,7 @@ def half_swing(equations: Equations, values: Mapping[str, np.ndarray]) -> float:
     No step may be longer, so that none can miss a whole swing of the drive.
     """
     rows = max((len(column) for column in values.values()), default=1)
-    waves = drive_of(equations.nodes, equations.varied).waves
+    waves = drive_of((*equations.nodes, *equations.edges), equations.varied).waves
     fastest = max((float(np.max(_sizes(wave, values, rows), initial=0.0)) for wave in waves), default=0.0)
     return math.pi / fastest if fastest > 0.0 else math.inf
 

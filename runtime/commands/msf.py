@@ -128,7 +128,7 @@ def _check(scene: Scene, network: bool, arguments: Namespace) -> None:
     from ..prediction.synchronisability import windows
     from ..stability.orbits import Orbits
 
-    if scene.coupling is None:
+    if scene.coupling is None and not scene.model.linked:
         raise WrongUse("the scene has no coupling, by which modes differ; expected one, e.g. coupling = 'spring'")
     one = scene if scene.topology.links else scene.replace(topology=topology("chain", 2))
     strength = np.zeros(1, dtype=float if arguments.beta is None else complex)

@@ -63,11 +63,9 @@ def execute(arguments: Namespace) -> int:
 
     with wrong_use():
         scene = _scene(arguments)
-        check_probe(scene.topology, scene.topology.spectrum)
-        if "sigma" not in scene.parameters:
-            raise WrongUse(
-                "the scene has no coupling constant sigma; expected a coupled network; choose another --scene"
-            )
+        check_probe(scene.topology, scene.spectrum)
+        if not scene.model.linked:
+            raise WrongUse("the scene has no coupling; expected a coupled network; choose another --scene")
         kernel_source(scene)
         criterion = Criterion(**_effort(arguments))
     warn(scene.warnings)
@@ -113,10 +111,10 @@ def report(result: Thresholds, criterion: Criterion) -> str:
     steepest = max(abs(value) for value in scene.topology.spectrum.values)
     unit = "drive periods" if scene.time_unit == "period" else "units of time"
     rows = [
-        ("sigma, simulated", _written(result.direct.intervals, end)),
-        ("sigma, predicted by the probe", _written(result.predicted, min(end, reach / steepest))),
+        (f"{scene.strength}, simulated", _written(result.direct.intervals, end)),
+        (f"{scene.strength}, predicted by the probe", _written(result.predicted, min(end, reach / steepest))),
         *_wu_chua(result),
-        ("alpha = sigma |gamma|, probe", _written(result.probe.intervals, reach)),
+        (f"alpha = {scene.strength} |gamma|, probe", _written(result.probe.intervals, reach)),
     ]
     wide = max(len(name) for name, _ in rows)
     return "\n".join(
@@ -144,7 +142,7 @@ def _wu_chua(result: Thresholds) -> list[tuple[str, str]]:
     if low > 0.0 or high >= result.probe.x[-1]:
         return []
     end = wu_chua(high / 2.0, topology("chain", 2).spectrum, result.scene.topology.spectrum)
-    return [("sigma, Wu-Chua conjecture", _written([(0.0, end)], float("inf")))]
+    return [(f"{result.scene.strength}, Wu-Chua conjecture", _written([(0.0, end)], float("inf")))]
 
 
 def _written(ranges: Sequence[Interval], end: float) -> str:

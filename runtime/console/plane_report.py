@@ -85,7 +85,8 @@ class PlaneReport:
         def draw(axes: Axes) -> None:
             draw_plane(axes, self.plane)
             if self.network:
-                draw_rays(axes, self.plane, self.plane.scene.parameters.get("sigma") or None)
+                scene = self.plane.scene
+                draw_rays(axes, self.plane, (scene.parameters[scene.strength] if scene.model.linked else 0.0) or None)
 
         return write_files(folder, "plane", table(self.plane), draw)
 

@@ -105,14 +105,14 @@ def energy_function(scene: Scene) -> EnergyFunction:
         states = list(np.array([places[i] for i in members]).T)
         names = _names(equations, node.parameters, members)
         groups.append(_Group(_compiled(share, (TIME, *node.state, *node.parameters)), None, states, names))
-    numbers = [exact.of_link(pair) for pair in exact.pairs]
     for kind, (share, edge) in enumerate(zip(exact.links, equations.edges, strict=True)):
-        pairs = [pair for number, pair in zip(numbers, exact.pairs, strict=True) if number == kind]
+        pairs = [pair for pair, number in exact.pairs if number == kind]
         if pairs:
             here, there = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
             states = [s for end in (here, there) for s in np.array([places[i] for i in end]).T]
-            names = _names(equations, edge.parameters, here)
-            formulas = _compiled(share, (edge.weight, *edge.here, *edge.there, *edge.parameters))
+            sources, own = [s for s, _ in edge.theirs], [s for _, s in edge.theirs]
+            names = _names(equations, edge.parameters, here) + _names(equations, own, there)
+            formulas = _compiled(share, (edge.weight, *edge.here, *edge.there, *edge.parameters, *sources))
             groups.append(_Group(formulas, np.array([float(pair[2]) for pair in pairs]), states, names))
     return EnergyFunction(scene, exact, tuple(groups))
 

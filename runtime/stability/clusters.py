@@ -202,7 +202,7 @@ def _integrator(scene: Scene, partition: Clusters, variation: Variation, seed: i
     components = _deviating(variation)
     parts = list(_parts(partition, components))
     integrator = VariationalIntegrator.make(
-        scene, variation, state, numbers, np.full((1, len(parts)), scene.parameters["sigma"]), 1
+        scene, variation, state, numbers, np.full((1, len(parts)), scene.parameters[scene.strength]), 1
     )
     random = np.random.default_rng(seed)
     deviations = np.zeros((1, variation.size, len(parts)))

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.families import topology
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene, a_scene
@@ -202,8 +203,11 @@ def coupled_cell(function: Callable[..., object], scene: Scene, rtol: float, par
     parameters : dict of str to float
         Parameters to set.
     """
-    graph = scene.topology if a_scene(scene).topology.links else topology("chain", 2)
-    coupled = scene.replace(topology=graph, axes=(), zipped=False, continuation="none")
+    if a_scene(scene).model.linked:
+        coupled = scene.replace(axes=(), zipped=False, continuation="none")
+    else:
+        coupled = scene.replace(topology=topology("chain", 2), axes=(), zipped=False, continuation="none")
+        expect_vanishing("a lone oscillator gets a partner", coupled.equations)
     return single_cell(function, coupled, rtol, parameters)
 
 

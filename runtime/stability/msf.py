@@ -14,7 +14,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from synchain.models.scenes.scene import Scene
+from synchain.models.dynamics.synchrony import expect_vanishing
+from synchain.models.scenes.scene import Scene, a_scene
 
 from ..prediction.intervals import Interval
 from ..prediction.synchronisability import Window, windows
@@ -237,6 +238,7 @@ def msf(
     FloatingPointError
         If an integration fails.
     """
+    expect_vanishing("msf", a_scene(scene).equations)
     line = row("alpha", alpha, 2, rising=True)
     fine = np.union1d(line, np.linspace(line[0], line[-1], FINE))
     fine_exponents = exponents(
@@ -297,6 +299,7 @@ def plane(
     FloatingPointError
         If an integration fails.
     """
+    expect_vanishing("plane", a_scene(scene).equations)
     across, up = row("alpha", alpha, 2, rising=True), row("beta", beta, 2, rising=True)
     heights, place = np.unique(np.abs(up), return_inverse=True)
     half_plane = exponents(

@@ -31,7 +31,7 @@ MOST = 10**7
 def certify(scene: Scene, *, precision: float = 2e-3, periods: float = 2000, workers: int | None = None) -> Certificate:
     """Return the exponents of every cell's synchronous state.
 
-    Cells that differ only in sigma and starts share one orbit.  Of several kinds of attractor found
+    Cells that differ only in the strength of their links and starts share one orbit, if links vanish between equal states.  Of several kinds of attractor found
     by four starts the least stable counts.
 
     Parameters
@@ -49,8 +49,9 @@ def certify(scene: Scene, *, precision: float = 2e-3, periods: float = 2000, wor
     check_certifiable(scene)
     gamma = _transversal_eigenvalues(scene)
     columns = Planner(scene).columns(np.arange(scene.cells))
-    own = [name for name in columns if name in scene.parameters and name != "sigma"]
-    sigma = np.broadcast_to(columns.get("sigma", np.array(scene.parameters["sigma"])), (scene.cells,))
+    strength, vanishing = scene.strength, all(edge.diffusive for edge in scene.equations.edges)
+    own = [name for name in columns if name in scene.parameters and not (vanishing and name == strength)]
+    sigma = np.broadcast_to(columns.get(strength, np.array(scene.parameters[strength])), (scene.cells,))
     groups: dict[tuple[float, ...], list[int]] = defaultdict(list)
     for cell in range(scene.cells):
         groups[tuple(float(columns[name][cell]) for name in own)].append(cell)

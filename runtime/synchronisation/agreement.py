@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 
@@ -142,6 +143,7 @@ def agreement(
     """
     fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ()}
     scene = with_parameters(agreement, scene, parameters, **fixed)
+    expect_vanishing("agreement", scene.equations)
     check_probe(scene.topology, scene.spectrum)
     scene = scene.replace(record=("sync_error",))
     grid = np.atleast_1d(np.asarray(sigma, dtype=float))

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.families import topology
 from synchain.models.mechanics.components import Edge
+from synchain.models.mechanics.link import strength
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.plan import Plan, Planner, control_of
@@ -141,40 +142,32 @@ def ring_of_three(equations: Equations) -> Equations:
     edge = equations.edge
     if edge is None:
         raise ValueError("these equations have no coupling; the probe needs links")
-    _check_coupling(edge)
+    sigma = strength(edge, equations.node.parameters)
+    _check_coupling(edge, sigma)
     taken = {s.name for s in (*equations.node.state, *equations.node.parameters, *edge.parameters)}
     for symbol in (MODE_ALPHA, MODE_BETA):
         if symbol.name in taken:
             raise ValueError(f"the name {symbol.name!r} is needed for the probe; rename it in the model")
-    strength = MODE_ALPHA / 3 + edge.weight * MODE_BETA / sp.sqrt(3)
-    unit = {edge.weight: sp.S.One, _sigma(edge): sp.S.One}
-    others = tuple(s for s in edge.parameters if s != _sigma(edge))
-    rates = tuple(strength * e.xreplace(unit) for e in edge.rhs)
+    factor = MODE_ALPHA / 3 + edge.weight * MODE_BETA / sp.sqrt(3)
+    unit = {edge.weight: sp.S.One, sigma: sp.S.One}
+    others = tuple(s for s in edge.parameters if s != sigma)
+    rates = tuple(factor * e.xreplace(unit) for e in edge.rhs)
     turned = Edge(edge.here, edge.there, edge.weight, rates, (*others, MODE_ALPHA, MODE_BETA))
     there = [(i, (i + 1) % 3, Fraction(1)) for i in range(3)]
     back = [(i, (i + 2) % 3, Fraction(-1)) for i in range(3)]
     return Equations.of_equal_nodes(equations.node, turned, 3, (*there, *back))
 
 
-def _check_coupling(edge: Edge) -> None:
-    """Prove that a link is sigma times its weight times a function that is zero between equal
+def _check_coupling(edge: Edge, sigma: sp.Symbol) -> None:
+    """Prove that a link is its strength times its weight times a function that is zero between equal
     states.
     """
-    strength = _sigma(edge)
     if not edge.diffusive:
         raise ValueError("a link acts between equal states, so complete synchronisation is no solution of this network")
     for e in edge.rhs:
-        unit = e.xreplace({edge.weight: sp.S.One, strength: sp.S.One})
-        if sp.simplify(e - strength * edge.weight * unit) != 0:
-            raise ValueError(f"the coupling {e} is not proportional to sigma and the weight; a mode has no strength")
-
-
-def _sigma(edge: Edge) -> sp.Symbol:
-    found = [s for s in edge.parameters if s.name == "sigma"]
-    if not found:
-        names = ", ".join(s.name for s in edge.parameters) or "nothing"
-        raise ValueError(f"links depend on {names}; expected sigma, the strength of a coupling")
-    return found[0]
+        unit = e.xreplace({edge.weight: sp.S.One, sigma: sp.S.One})
+        if sp.simplify(e - sigma * edge.weight * unit) != 0:
+            raise ValueError(f"the coupling {e} is not proportional to {sigma} and the weight; a mode has no strength")
 
 
 def _broadcast(alpha: ArrayLike, beta: ArrayLike) -> tuple[np.ndarray, np.ndarray]:

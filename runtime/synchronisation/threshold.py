@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology
 from synchain.models.inputs.checks import check_instance, check_integer, check_number, check_positive
@@ -172,6 +173,7 @@ def thresholds(
         nodes and for links with inertia.
     """
     a_scene(scene).equations.expect_alike("thresholds")
+    expect_vanishing("thresholds", scene.equations)
     fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ()}
     scene = with_parameters(thresholds, scene, parameters, **fixed)
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
@@ -315,7 +317,7 @@ def offsets(criterion: Criterion) -> np.ndarray:
 def cells_of(scene: Scene, sigma: np.ndarray, criterion: Criterion) -> Scene:
     """Return the scene with a cell for every sigma and start of a criterion, the starts fastest."""
     position, moves = scene.components[0], offsets(criterion)
-    axes: dict[str, np.ndarray] = {"sigma": np.repeat(sigma, len(moves))}
+    axes: dict[str, np.ndarray] = {scene.strength: np.repeat(sigma, len(moves))}
     for i, x0 in enumerate(scene.initial[position]):
         axes[f"{position}_{i + 1}"] = np.tile(x0 + moves, len(sigma))
     return scene.replace(

@@ -179,12 +179,13 @@ def test_different_equations_have_different_digests() -> None:
         *MODELS.values(),
         chain,
         replace(chain, kind_of=(0, 0, 0)),
-        replace(chain, links=((0, 1, ONE),)),
-        replace(chain, links=((0, 1, HALF), (1, 0, ONE))),
+        network_of(SPRING, ((0, 1, ONE),)),
+        network_of(SPRING, ((0, 1, HALF), (1, 0, ONE))),
+        replace(chain, layers=chain.layers * 2),
         replace(chain, nodes=(Node((X, V), (V, -2 * X), ()),)),
         replace(chain, nodes=(Node((X, W), (W, -X), ()),)),
         replace(chain, nodes=(Node((X, V), (V, -X), (A,)),)),
-        replace(chain, edge_of=(((0, 0), replace(SPRING, rhs=(sp.S.Zero, SIGMA * WEIGHT * (X_I - X_J)))),)),
+        network_of(replace(SPRING, rhs=(sp.S.Zero, SIGMA * WEIGHT * (X_I - X_J))), chain.links),
     ]
     assert len({e.digest for e in others}) == len(others)
 
@@ -224,7 +225,7 @@ def test_a_node_refuses(given: dict, message: str) -> None:
     [
         ({"there": (X_I, V_J)}, "edge: the name 'x_i' stands for two things"),
         ({"rhs": (sp.S.Zero,)}, "edge: 1 equations for 2 states"),
-        ({"rhs": (sp.S.Zero, TIME * X_I)}, r"edge: undeclared symbol 't' in t\*x_i"),
+        ({"rhs": (sp.S.Zero, A * X_I)}, r"edge: undeclared symbol 'a' in a\*x_i"),
         ({"rhs": (sp.S.Zero, X_I * 0.1)}, "edge: floating-point number 0.1"),
         ({"parameters": (WEIGHT,)}, "edge: the name 'weight' stands for two things"),
     ],
@@ -257,8 +258,3 @@ def test_equations_refuse(arguments: tuple, message: str) -> None:
 
 def test_a_name_is_taken_only_where_the_network_reaches_it() -> None:
     assert Equations.of_equal_nodes(NAMED_LIKE_A_STATE, None, 1).state == ("x_1", "v_1")
-
-
-def test_equations_without_an_edge_have_no_link_to_put_in() -> None:
-    with pytest.raises(ValueError, match="these equations have no edge"):
-        Equations.of_equal_nodes(HARMONIC, None, 2).at_link((0, 1, ONE))

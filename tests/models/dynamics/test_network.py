@@ -21,7 +21,6 @@ from synchain.models.mechanics.components import TIME, Node
 from synchain.models.mechanics.coupling import Coupling
 from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.mechanics.friction import ContactModel
-from synchain.models.mechanics.link import is_oriented
 from synchain.models.mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, static_coefficient
 from synchain.models.mechanics.oscillator import Oscillator
 
@@ -188,7 +187,7 @@ def test_couplings_are_symmetric_and_called_sigma(coupling: str) -> None:
     module = load(COUPLING, coupling)
     assert next(iter(module.PARAMETERS)) == "sigma"
     single = node("harmonic")
-    assert is_oriented(edge(coupling, single, "harmonic")) == (coupling == "fput")
+    assert edge(coupling, single, "harmonic").oriented == (coupling == "fput")
     if coupling == "fput":
         return
     p, q, weight = sp.symbols("p q weight", real=True)

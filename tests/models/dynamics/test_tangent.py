@@ -12,6 +12,7 @@ from parts import edge, node
 from variational_reference import ALPHA, deviation_names, tangent_equations, transversal_equations
 
 from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.variational import mode
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.mechanics.components import Edge, Node
@@ -164,7 +165,12 @@ def with_link(change) -> Equations:  # type: ignore[no-untyped-def]
     """The harmonic pair with another force along its links."""
     spring = edge("spring", node("harmonic", None, "atan"), "harmonic")
     symbols = {s.name: s for s in (*spring.here, *spring.there, *spring.parameters, spring.weight)}
-    return replace(PAIR, edge_of=(((0, 0), replace(spring, rhs=(sp.S.Zero, change(symbols)))),))
+    return relinked(replace(spring, rhs=(sp.S.Zero, change(symbols))))
+
+
+def relinked(edge: Edge) -> Equations:
+    """The harmonic pair with another edge."""
+    return Equations.of_equal_nodes(PAIR.node, edge, 2, PAIR.links)
 
 
 def test_a_mode_needs_links() -> None:
@@ -173,8 +179,10 @@ def test_a_mode_needs_links() -> None:
 
 
 def test_a_mode_needs_a_synchronous_state() -> None:
-    with pytest.raises(ValueError, match="between equal states, so complete synchronisation is no solution"):
-        transversal_equations(with_link(lambda s: s["sigma"] * s["weight"] * s["x_j"]))
+    pushed = with_link(lambda s: s["sigma"] * s["weight"] * s["x_j"]).edge
+    unequal = Equations.of_equal_nodes(PAIR.node, pushed, 3, topology("chain", 3).links)
+    with pytest.raises(ValueError, match="sums of weights differ from node to node, so complete synchronisation is no"):
+        mode(unequal)
 
 
 def test_a_mode_needs_one_strength() -> None:
@@ -184,8 +192,10 @@ def test_a_mode_needs_one_strength() -> None:
     spring = with_link(lambda s: s["weight"] * (s["x_j"] - s["x_i"])).edge
     assert spring is not None
     renamed = Edge(spring.here, spring.there, spring.weight, (sp.S.Zero, other * spring.rhs[1]), (other,))
-    with pytest.raises(ValueError, match="links depend on strength; expected sigma alone"):
-        transversal_equations(replace(PAIR, edge_of=(((0, 0), renamed),)))
+    assert mode(relinked(renamed)) == mode(PAIR)
+    twice = Edge(spring.here, spring.there, spring.weight, (sp.S.Zero, other**2 * spring.rhs[1]), (other,))
+    with pytest.raises(ValueError, match="strength of the links: found strength; expected sigma, or exactly one"):
+        mode(relinked(twice))
 
 
 @pytest.mark.parametrize("name", ["d_x", "d_v"])

@@ -500,7 +500,6 @@ def test_what_would_be_ignored_is_refused(kind: str, text: str, words: str, tmp_
         ("friction", RUB + "ORDER = (('c', 'd'),)\n", "line 9: ORDER is (('c', 'd'),); expected pairs of parameters"),
         ("friction", RUB.replace("True", "'yes'"), "line 5: ODD is 'yes'; expected True or False"),
         ("friction", RUB.replace('"s/m"', "1"), "line 6: TypeError: unit 1 is a int; expected text such as 'N/m'"),
-        ("coupling", PULL.replace("sigma", "k"), "line 5: PARAMETERS has no 'sigma'"),
         ("coupling", PULL.replace("weight *", "weight * x_i *"), "line 7: NameError: name 'x_i' is not defined"),
         ("topology", FAMILY.partition("def settle")[0], "part.py: found no settle; expected a topology file"),
         ("topology", FAMILY + "def count(n):\n    return n\n", "line 10: count lacks the option 'step' of edges"),

@@ -12,6 +12,7 @@ from differences import made
 from parts import edge, is_lagrangian, node, oscillator_of
 from variational_reference import tangent_equations, transversal_equations
 
+from synchain.models import Rates, Scene, ring, star
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
@@ -313,3 +314,17 @@ def test_the_keys_of_the_jacobian() -> None:
         "v_2,x_1": "sigma",
         "v_2,x_2": "-sigma - 1",
     }
+
+
+def test_layers_of_links_have_weights_of_their_own_and_masses_of_the_source_its_index() -> None:
+    x_i, x_j = sp.symbols("x_i x_j")
+    k, w = sp.Symbol("k"), sp.Symbol("weight", real=True)
+    pull = Rates({x_i: k * w * (x_j - x_i)}, {k: 1})
+    lines = text(Scene(oscillator="rossler", links=[(pull, ring(9)), ("y->y", star(9))]).equations).splitlines()
+    assert "k Σ_j G_1_ij (x_j - x_i)" in lines[0]
+    assert "σ Σ_j G_2_ij (y_j - y_i)" in lines[1]
+    assert lines[-1] == "i, j = 1, …, 9, G_1_ij the weights of the 18 links, G_2_ij the weights of the 16 links"
+    push = Rates({sp.Symbol("v_i"): w * sp.Symbol("beta_j") * x_j})
+    beta = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]
+    equations = Scene(oscillator="duffing", coupling=push, topology=ring(7), parameters={"beta": beta}).equations
+    assert "Σ_j G_ij β_j x_j" in text(equations)

@@ -9,12 +9,14 @@ import sympy as sp
 from mechanics_proof import vanishes
 from parts import is_lagrangian, oscillator_of
 
-from synchain.models import chain, ring
+from synchain.models import Parameter, Potential, Rates, chain, complete, ends, ring
 from synchain.models.graphs.topology import from_matrix
+from synchain.models.inputs.frozen import Frozen
 from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.definition import COUPLING, OSCILLATOR
 from synchain.models.mechanics.lagrangian import total_derivative
+from synchain.models.mechanics.oscillator import Coordinate, Lagrangian, Oscillator
 from synchain.models.scenes.energy import energy
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
@@ -169,3 +171,22 @@ def test_a_ring_of_fput_springs_keeps_what_its_report_keeps() -> None:
     r = np.roll(y[:6], -1) - y[:6]
     written = (y[6:] ** 2 / 2).sum() + (r**2 / 2 + r**3 / 12).sum()
     assert energy_function(scene)(y) == pytest.approx(written, rel=1e-14)
+
+
+def test_bodies_of_different_masses_have_an_energy_and_rates_have_none() -> None:
+    """The masses cancel in the forces, not in the energy: its exact derivative along the motion vanishes."""
+    m, u, v, g = sp.symbols("m u v g", real=True)
+    model = Lagrangian((Coordinate("x", "u"), Coordinate("y", "v")), m * (u**2 + v**2) / 2, sp.S.Zero, (sp.S.Zero,) * 2)
+    body = Oscillator("body", Frozen({"m": Parameter(1.0, "1", "mass", positive=True)}), model)
+    i, j, w = ends(body)
+    gravity = Potential(-g * w * i.m * j.m / sp.sqrt((i.x - j.x) ** 2 + (i.y - j.y) ** 2), {g: 1})
+    for masses in ([1.0, 2.0, 3.0], 1.0):
+        scene = Scene(oscillator=body, coupling=gravity, topology=complete(3), parameters={"m": masses})
+        found, power = energy(scene).whole()
+        states = [sp.Symbol(name, real=True) for name in scene.equations.state]
+        drift = sum(found.diff(s) * rate for s, rate in zip(states, scene.equations.rhs(), strict=True))
+        numbers = {s: sp.Rational(3 * k + 1, 7) for k, s in enumerate(sorted(drift.free_symbols, key=str))}
+        assert power == 0
+        assert abs(sp.N(drift.xreplace(numbers), 30)) < 1e-25
+    with pytest.raises(ValueError, match="energy: the coupling 'rates of u' has none"):
+        energy(scene.replace(coupling=Rates({i.u: w * j.x}), parameters=None))

@@ -72,7 +72,7 @@ def test_a_model_knows_the_kind_of_each_node() -> None:
     assert model.node_parameter("beta_3") == NodeName("beta", 2)
     assert model.node_parameter("beta_2") is None
     assert model == pickle.loads(pickle.dumps(model))
-    one = Model((NodeKind(as_oscillator("harmonic"), None),), (0, 0), ContactModel.ATAN, None, chain(2))
+    one = Model((NodeKind(as_oscillator("harmonic"), None),), (0, 0), ContactModel.ATAN, ((None, chain(2)),))
     assert dict(one.parameters) == {}
 
 

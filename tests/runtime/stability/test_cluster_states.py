@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import mpmath
 import numpy as np
 import pytest
@@ -153,7 +151,7 @@ def test_a_coupling_with_a_state_in_its_derivative_is_refused() -> None:
     push = edge.parameters[0] * edge.weight * (gap + gap**3)
     bent = Edge(edge.here, edge.there, edge.weight, (sp.S.Zero, push), edge.parameters)
     with pytest.raises(ValueError, match="has a derivative that depends on the states it joins"):
-        clustered(replace(equations, edge_of=(((0, 0), bent),)), clusters(PAIR, (0, 0)))
+        clustered(Equations.of_equal_nodes(equations.node, bent, 2, equations.links), clusters(PAIR, (0, 0)))
     with pytest.raises(ValueError, match="these equations have no coupling"):
         clustered(Equations.of_equal_nodes(equations.node, None, 2), clusters(PAIR, (0, 0)))
 

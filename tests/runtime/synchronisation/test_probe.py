@@ -186,7 +186,7 @@ def test_nonlinear_couplings_keep_their_form():
         (model("sigma**2*weight*(x_j - x_i)"), "not proportional to sigma"),
         (model("sigma*weight**2*(x_j - x_i)"), "not proportional to sigma"),
         (model("sigma*weight*x_j"), "acts between equal states"),
-        (model("weight*(x_j - x_i)"), "depend on nothing; expected sigma"),
+        (model("weight*(x_j - x_i)"), "found no parameter; expected sigma"),
         (model(node_parameters=("mode_beta",)), "'mode_beta' is needed for the probe"),
         (Scene(oscillator="harmonic").equations, "no coupling"),
     ],

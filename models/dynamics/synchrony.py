@@ -1,0 +1,93 @@
+"""Complete synchronisation as a solution: the motion of one node while all nodes are equal."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import sympy as sp
+
+from ..mechanics.components import Edge, Node
+from .equations import Equations, Layer
+
+__all__ = ["NoSynchrony", "expect_vanishing", "synchronous_node"]
+
+
+class NoSynchrony(ValueError):
+    """Equal motion of all nodes is no solution of a network."""
+
+
+def synchronous_node(equations: Equations) -> Node:
+    """Return the equations of each node while all are equal, s' = F(s) + sum of the links h(s, s).
+
+    Links that vanish between equal states add nothing.  Others add k h(s, s), k the sum of weights at a node, which must
+    be that of every other node.
+
+    Parameters
+    ----------
+    equations : Equations
+        Equations of a network of equal nodes.
+
+    Returns
+    -------
+    Node
+        Its parameters are those of the nodes, and those of links that act between equal states.
+
+    Raises
+    ------
+    NoSynchrony
+        If a link acts between equal states and the sums of weights differ from node to node, and if a link has no value
+        between equal states.
+    ValueError
+        For nodes that differ.
+    """
+    equations.expect_alike("complete synchronisation", inertia_too=True, layers_too=True)
+    node = equations.node
+    for layer in equations.layers:
+        ((_, edge),) = layer.edge_of
+        if layer.links and not edge.diffusive:
+            node = _with_links(node, layer, edge, equations.n)
+    return node
+
+
+def expect_vanishing(what: str, equations: Equations) -> None:
+    """Raise ValueError if a link acts between equal states or is not proportional to its weight.
+
+    `what` needs one synchronous motion for all strengths, and modes that are those of the graph.
+    """
+    if not all(edge.diffusive for edge in equations.edges):
+        raise ValueError(
+            f"{what}: a link acts between equal states, so that the synchronous motion changes with its strength; expected "
+            "links that vanish there; `exponents` takes one strength of the links at a time"
+        )
+    for edge in equations.edges:
+        unit = {edge.weight: sp.S.One}
+        if not edge.oriented and any(sp.expand(e - edge.weight * e.xreplace(unit)) != 0 for e in edge.rhs):
+            raise ValueError(f"{what}: a link is not proportional to its weight; expected the weight as a factor")
+
+
+def _with_links(node: Node, layer: Layer, edge: Edge, n: int) -> Node:
+    """The node with what its links add between equal states."""
+    weights: list[list[Fraction]] = [[] for _ in range(n)]
+    for target, _, weight in layer.links:
+        weights[target].append(weight)
+    equal = dict(zip((*edge.here, *edge.there), node.state * 2, strict=True))
+    felt = [e.xreplace(equal) for e in edge.rhs]
+    if any(e.has(sp.nan, sp.zoo, sp.oo, -sp.oo) for e in felt):
+        raise NoSynchrony(
+            f"a link {', '.join(map(str, edge.rhs))} has no value between equal states, so complete synchronisation is no "
+            "solution of this network"
+        )
+    unit = {edge.weight: sp.S.One}
+    if all(sp.expand(e - edge.weight * e.xreplace(unit)) == 0 for e in felt):
+        weights = [[sum(own, Fraction(0))] for own in weights]
+    if len({tuple(sorted(own)) for own in weights}) > 1:
+        raise NoSynchrony(
+            "a link acts between equal states and the sums of weights differ from node to node, so complete synchronisation "
+            "is no solution of this network"
+        )
+    values = [{edge.weight: sp.Rational(w.numerator, w.denominator)} for w in weights[0]]
+    rates = tuple(rate + sp.Add(*(e.xreplace(w) for w in values)) for rate, e in zip(node.rhs, felt, strict=True))
+    used = {s for e in felt for s in e.free_symbols}
+    more = tuple(s for s in edge.parameters if s in used and s not in node.parameters)
+    return replace(node, rhs=rates, parameters=(*node.parameters, *more))

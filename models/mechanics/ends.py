@@ -1,0 +1,162 @@
+"""The two ends of a link: target i and source j, the symbols of their states and parameters, and what a link adds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import sympy as sp
+
+from ..inputs.checks import check_instance, suggestion
+from .components import TIME, Node
+from .oscillator import Field, Oscillator
+
+__all__ = ["WEIGHT", "End", "Pair", "Terms", "ends"]
+
+WEIGHT = sp.Symbol("weight", real=True)
+"""The weight of a link in the expressions of a coupling."""
+
+Symbols = tuple[sp.Symbol, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """One end of a link: its attributes are the symbols of the states and parameters of the node there."""
+
+    _letter: str
+    _states: tuple[str, ...]
+    _parameters: tuple[str, ...]
+
+    def __getattr__(self, name: str) -> sp.Symbol:
+        if name.startswith("_"):  # what pickle and copy look for
+            raise AttributeError(name)
+        known = (*self._states, *self._parameters)
+        if name not in known:
+            raise AttributeError(
+                f"end {self._letter} of a link: unknown {name!r}; known: {', '.join(known)}{suggestion(name, known)}"
+            )
+        return sp.Symbol(f"{name}_{self._letter}", real=True)
+
+    def __dir__(self) -> list[str]:
+        return [*self._states, *self._parameters]
+
+
+def ends(node: Oscillator, source: Oscillator | None = None) -> tuple[End, End, sp.Symbol]:
+    """Return the two ends of a link and its weight, from which the expressions of a coupling are made.
+
+    Parameters
+    ----------
+    node : Oscillator
+        The oscillator at the target, and at the source if there is no `source`.
+    source : Oscillator, optional
+        The oscillator at the source of a link between two kinds.
+
+    Returns
+    -------
+    i, j : End
+        Target and source: `i.x` is the state x of the target, `j.m` the parameter m of the source.
+    W : Symbol
+        The weight of the link.
+
+    Raises
+    ------
+    TypeError
+        If a node is no Oscillator.
+
+    Examples
+    --------
+    >>> from synchain.models import ends
+    >>> from synchain.models.mechanics.loader import load_oscillator
+    >>> i, j, W = ends(load_oscillator("harmonic"))
+    >>> W * (j.x - i.x)
+    weight*(-x_i + x_j)
+    """
+    made = []
+    for letter, own in (("i", node), ("j", node if source is None else source)):
+        model = check_instance("ends", own, Oscillator, "an Oscillator").model
+        states = (
+            model.state
+            if isinstance(model, Field)
+            else (*(c.name for c in model.coordinates), *(c.velocity for c in model.coordinates))
+        )
+        made.append(End(letter, tuple(states), tuple(own.parameters)))
+    return made[0], made[1], WEIGHT
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """What one link adds: energies in the symbols of both ends, or rates of the states of its target.
+
+    `oriented` is True if an energy changes in the exchange of the ends (`synchain.models.mechanics.link`).
+    """
+
+    kinetic: sp.Expr = sp.S.Zero
+    potential: sp.Expr = sp.S.Zero
+    dissipation: sp.Expr = sp.S.Zero
+    rates: tuple[sp.Expr, ...] = ()
+    oriented: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """The nodes at both ends of a link, target first, and the symbols of their states.
+
+    Parameters
+    ----------
+    nodes : pair of Node
+        The templates of target and source.
+    oscillators : pair of Oscillator
+        Their models; None for nodes whose masses are 1.
+    """
+
+    nodes: tuple[Node, Node]
+    oscillators: tuple[Oscillator | None, Oscillator | None]
+    here: Symbols = field(init=False)
+    there: Symbols = field(init=False)
+
+    def __post_init__(self) -> None:
+        for name, letter, node in zip(("here", "there"), "ij", self.nodes, strict=True):
+            object.__setattr__(self, name, tuple(sp.Symbol(f"{s.name}_{letter}", real=True) for s in node.state))
+
+    @property
+    def halves(self) -> tuple[int, int]:
+        """The numbers of coordinates of two nodes of coordinates and velocities."""
+        return len(self.here) // 2, len(self.there) // 2
+
+    @property
+    def coordinates(self) -> Symbols:
+        """The coordinates of both ends."""
+        a, b = self.halves
+        return (*self.here[:a], *self.there[:b])
+
+    @property
+    def velocities(self) -> Symbols:
+        """The velocities of both ends."""
+        a, b = self.halves
+        return (*self.here[a:], *self.there[b:])
+
+    @property
+    def names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """The names of the states of either node."""
+        first, second = (tuple(s.name for s in node.state) for node in self.nodes)
+        return first, second
+
+    @property
+    def alike(self) -> list[tuple[sp.Symbol, sp.Symbol]]:
+        """The states of one name at both ends."""
+        there = dict(zip(self.names[1], self.there, strict=True))
+        return [(s, there[name]) for name, s in zip(self.names[0], self.here, strict=True) if name in there]
+
+    @property
+    def described(self) -> str:
+        """The two nodes in words."""
+        return " and ".join(str(own or node.state) for own, node in zip(self.oscillators, self.nodes, strict=True))
+
+    @property
+    def theirs(self) -> dict[sp.Symbol, sp.Symbol]:
+        """Symbols for the parameters of the source, and those of its node."""
+        return {sp.Symbol(f"{s.name}_j", real=True): s for s in self.nodes[1].parameters}
+
+    def known(self) -> dict[sp.Symbol, sp.Symbol]:
+        """What the symbols of `ends` are in the equations of a link: a parameter of the target has its own name."""
+        own = {sp.Symbol(f"{s.name}_i", real=True): s for s in self.nodes[0].parameters}
+        return {**{s: s for s in (*self.here, *self.there, *self.theirs, WEIGHT, TIME)}, **own}

@@ -1,0 +1,153 @@
+"""Networks of any links against SciPy's DOP853, with right-hand sides that were written by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.integrate import solve_ivp
+
+from synchain.models import Potential, Rates, Scene, Topology, complete, ends, ring, star
+from synchain.models.inputs.frozen import Frozen
+from synchain.models.mechanics.oscillator import Coordinate, Field, Lagrangian, Oscillator
+from synchain.models.mechanics.parameter import Parameter
+from synchain.runtime import run
+
+K, LAG, OMEGA, G, VS, LAM, TH, GE = sp.symbols("K lag Omega g V_s lam Theta g_el")
+THETA, P, X, Y, Z, U, V, M = sp.symbols("theta p x y z u v m", real=True)
+
+Rhs = Callable[[float, np.ndarray], np.ndarray]
+
+
+def number(default: float) -> Parameter:
+    return Parameter(default, "1", "a number")
+
+
+PHASE = Oscillator("phase", Frozen({"p": number(0.3)}), Field(("theta",), (P,)))
+
+NEURON = Oscillator(
+    "hindmarsh_rose",
+    Frozen({}),
+    Field(
+        ("x", "y", "z"),
+        (
+            Y - X**3 + 3 * X**2 - Z + sp.Rational(16, 5),
+            1 - 5 * X**2 - Y,
+            (4 * (X + sp.Rational(8, 5)) - Z) * sp.Rational(6, 1000),
+        ),
+    ),
+)
+
+BODY = Oscillator(
+    "body",
+    Frozen({"m": Parameter(1.0, "1", "mass", positive=True)}),
+    Lagrangian((Coordinate("x", "u"), Coordinate("y", "v")), M * (U**2 + V**2) / 2, sp.S.Zero, (sp.S.Zero,) * 2),
+)
+
+
+def weights(graph: Topology) -> np.ndarray:
+    found = np.zeros((graph.n, graph.n))
+    for target, source, weight in graph.links:
+        found[target, source] = float(weight)
+    return found
+
+
+def kuramoto(n: int) -> tuple[Scene, Rhs]:
+    """Phases with a lag, whose coupling is pumped: rates of first order, not reciprocal, of time."""
+    i, j, w = ends(PHASE)
+    pumped = (1 + 0.5 * sp.cos(OMEGA * sp.Symbol("t"))) * K * w * sp.sin(j.theta - i.theta - LAG)
+    coupling = Rates({i.theta: pumped}, {K: 1.3, LAG: 0.2, OMEGA: 2})
+    own, felt = np.linspace(-0.5, 0.5, n), weights(ring(n))
+
+    def rhs(t: float, y: np.ndarray) -> np.ndarray:
+        return own + 1.3 * (1 + 0.5 * np.cos(2 * t)) * (felt * np.sin(y[None] - y[:, None] - 0.2)).sum(1)
+
+    return Scene(oscillator=PHASE, coupling=coupling, topology=ring(n), parameters={"p": list(own)}), rhs
+
+
+def neurons(n: int) -> tuple[Scene, Rhs]:
+    """Hindmarsh-Rose neurons with electrical links on a ring and chemical synapses on a star."""
+    i, j, w = ends(NEURON)
+    electrical = Rates({i.x: GE * w * (j.x - i.x)}, {GE: 0.1})
+    chemical = Rates({i.x: -G * w * (i.x - VS) / (1 + sp.exp(-LAM * (j.x - TH)))}, {G: 0.2, VS: 2, LAM: 10, TH: -0.25})
+    first, second = weights(ring(n)), weights(star(n))
+    start = {"x": np.linspace(-1, 1, n), "y": np.linspace(-0.5, 0.2, n), "z": np.linspace(2.8, 3.2, n)}
+
+    def rhs(t: float, state: np.ndarray) -> np.ndarray:
+        x, y, z = state.reshape(3, -1)
+        firing = 1 / (1 + np.exp(-10 * (x + 0.25)))
+        push = 0.1 * (first @ x - first.sum(1) * x) - 0.2 * (x - 2) * (second @ firing)
+        return np.concatenate([y - x**3 + 3 * x**2 - z + 3.2 + push, 1 - 5 * x**2 - y, 0.006 * (4 * (x + 1.6) - z)])
+
+    layers = [(electrical, ring(n)), (chemical, star(n))]
+    return Scene(oscillator=NEURON, links=layers, initial={name: list(values) for name, values in start.items()}), rhs
+
+
+def bodies(n: int) -> tuple[Scene, Rhs]:
+    """Bodies of different masses in the plane under their gravity: forces of several coordinates and of parameters."""
+    i, j, w = ends(BODY)
+    gravity = Potential(-G * w * i.m * j.m / sp.sqrt((i.x - j.x) ** 2 + (i.y - j.y) ** 2), {G: 1})
+    mass, angle = np.linspace(1.0, 2.0, n), 2 * np.pi * np.arange(n) / n
+    start = {"x": 5 * np.cos(angle), "y": 5 * np.sin(angle), "u": -0.5 * np.sin(angle), "v": 0.5 * np.cos(angle)}
+
+    def rhs(t: float, state: np.ndarray) -> np.ndarray:
+        x, y, u, v = state.reshape(4, -1)
+        dx, dy = x[None] - x[:, None], y[None] - y[:, None]
+        cube = (dx**2 + dy**2) ** 1.5
+        np.fill_diagonal(cube, 1.0)
+        return np.concatenate([u, v, (mass * dx / cube).sum(1), (mass * dy / cube).sum(1)])
+
+    initial = {name: list(values) for name, values in start.items()}
+    given = {"oscillator": BODY, "coupling": gravity, "topology": complete(n), "initial": initial}
+    return Scene(**given, parameters={"m": list(mass)}), rhs
+
+
+@cache
+def case(make: Callable[[int], tuple[Scene, Rhs]], n: int) -> tuple[Scene, np.ndarray]:
+    scene, rhs = make(n)
+    end = solve_ivp(rhs, (0.0, 4.0), scene.y0, method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
+    return scene.replace(transient=0.0, window=4.0, time_unit="time", record=(), rtol=1e-12, atol=1e-13), end
+
+
+LONG = pytest.mark.long
+
+
+@pytest.mark.parametrize(
+    ("make", "n", "integrator"),
+    [
+        (kuramoto, 3, "rodas5p"),
+        (kuramoto, 9, "taylor"),
+        (neurons, 3, "taylor"),
+        (neurons, 9, "rodas5p"),
+        (bodies, 3, "taylor"),
+        pytest.param(kuramoto, 3, "taylor", marks=LONG),
+        pytest.param(kuramoto, 9, "rodas5p", marks=LONG),
+        pytest.param(neurons, 3, "rodas5p", marks=LONG),
+        pytest.param(neurons, 9, "taylor", marks=LONG),
+        pytest.param(bodies, 3, "rodas5p", marks=LONG),
+        pytest.param(bodies, 9, "taylor", marks=LONG),
+        pytest.param(bodies, 9, "rodas5p", marks=LONG),
+        pytest.param(bodies, 9, "dop853", marks=LONG),
+    ],
+)
+def test_links_against_dop853(make: Callable[[int], tuple[Scene, Rhs]], n: int, integrator: str) -> None:
+    scene, end = case(make, n)
+    found = run(scene.replace(integrator=integrator)).data.end.values
+    assert np.abs(found - end).max() < 2e-11 * np.abs(end).max()
+
+
+@pytest.mark.parametrize("n", [3, pytest.param(9, marks=LONG)])
+def test_time_in_links_costs_a_rosenbrock_method_no_steps(n: int) -> None:
+    """With the exact derivative by time its steps are those of the same motion with time as a state."""
+    scene, _ = case(kuramoto, n)
+    clock = Oscillator("clocked", PHASE.parameters, Field(("theta", "s"), (P, sp.S.One)))
+    i, j, w = ends(clock)
+    pumped = (1 + 0.5 * sp.cos(OMEGA * i.s)) * K * w * sp.sin(j.theta - i.theta - LAG)
+    given = {"oscillator": clock, "coupling": Rates({i.theta: pumped}, {K: 1.3, LAG: 0.2, OMEGA: 2})}
+    start = {"theta": scene.initial["theta"], "s": 0.0}
+    told = scene.replace(**given, initial=start, parameters={"p": list(np.linspace(-0.5, 0.5, n))})
+    steps = [int(run(made.replace(integrator="rodas5p", rtol=1e-9)).data.steps) for made in (scene, told)]
+    assert abs(steps[0] - steps[1]) <= 1
