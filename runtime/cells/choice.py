@@ -14,7 +14,7 @@ import sympy as sp
 from synchain.codegen.driver.columns import Count, Sum
 from synchain.codegen.integrators import Integrator, integrator
 from synchain.codegen.kernels.sweep import AUTO, KernelSource
-from synchain.codegen.taylor import is_linear, kink, order_for
+from synchain.codegen.taylor import is_linear, jump, order_for
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
@@ -49,7 +49,7 @@ def chosen_integrator(reduction: Reduction) -> Integrator:
         return _taylor(scene, equations)
     if scene.integrator != "auto":
         return integrator(scene.integrator)
-    if not equations.inertial and kink(equations) is None and (equations.sticks or stiffness(scene) < STIFF):
+    if not equations.inertial and jump(equations) is None and (equations.sticks or stiffness(scene) < STIFF):
         return _taylor(scene, equations)
     if equations.sticks:
         return integrator("dop853")
