@@ -338,7 +338,7 @@ class Kink(Series):
         if isinstance(self.base, Linear):
             parts = [times(factor, at.start(series)) for factor, series in self.base.terms]
             parts += [] if self.base.constant == ZERO else [self.base.constant]
-        self.size = at.keep(f"size_{self.name}", add(*(Call("absolute", (e,)) for e in parts)))
+        self.size = at.keep(f"size_{self.name}", add(*map(_absolute, parts)))
         return Call("side_of", (at.start(self.base), Name(f"ROUNDING*{self.size}")))
 
     def coefficient(self, at: Order) -> Expr:
@@ -365,6 +365,10 @@ class Choice(Series):
 
     def coefficient(self, at: Order) -> Expr:
         return _chosen(at.of(self.kink), at.of(self.above), at.of(self.below))
+
+
+def _absolute(e: Expr) -> Expr:
+    return Number(abs(e.value)) if isinstance(e, Number) else Call("absolute", (e,))
 
 
 def _chosen(side: Expr, above: Expr, below: Expr) -> Expr:

@@ -38,12 +38,19 @@ REFERENCE = (1e-14, 1e-16)
 _EXACT: dict[str, object] = {"contact": "set-valued", "initial": {"x": 0.3, "v": 0.0}}
 _LINKED: dict[str, object] = {"sigma": 0.1}
 _LINEAR: dict[str, object] = {"beta": 0.0, "delta": 0.0, **_LINKED}
+_SMOOTHED: dict[str, float] = {"kappa": 10.0, "sigma": 0.1}
+"""The smoothed law has a kink, |w|; over the slow belt each oscillator passes it twice a period."""
+_APART: dict[str, object] = {"x": (0.3, 0.4), "v": (0.0, 0.05)}
 
 CASES: dict[str, tuple[str, int, dict[str, object], int]] = {
     "linear, driven, n = 4": ("chain", 4, {"oscillator": "duffing", "parameters": _LINEAR}, 200),
     "Duffing, driven, n = 2": ("chain", 2, {"oscillator": "duffing", "parameters": _LINKED}, 20),
     "pendulum, n = 2": ("chain", 2, {"oscillator": "pendulum", "parameters": _LINKED}, 200),
     "FPUT ring, n = 8": ("ring", 8, {"oscillator": "mass", "coupling": "fput"}, 50),
+    "friction, kappa = 10, n = 2": ("chain", 2, {"parameters": _SMOOTHED, "initial": _APART}, 50),
+    "friction, kappa = 10, slow belt, n = 2": (
+        "chain", 2, {"parameters": {**_SMOOTHED, "theta_b": 0.02}, "initial": _APART}, 50,
+    ),
     "van der Pol, n = 2": ("chain", 2, {"oscillator": "van_der_pol", "parameters": _LINKED}, 50),
     "exact law, n = 1": ("chain", 1, _EXACT, 20),
     "exact law, n = 2": ("chain", 2, {"parameters": _LINKED, **_EXACT}, 20),
