@@ -27,19 +27,19 @@ def passage(side, size, dense, first, stride, degree, ratio):
     from below by a parabola, whose zero lies before its own, so that the first passage is found whatever comes later; the
     zeros converge like those of Newton's method. A passage counts once it has gone a small part of the way that the series
     goes in the step, and more than rounding of `size`; the step ends there. What is neglected is of the order of that part
-    squared.
+    squared.  Products are added by `fma`, so that every width has the same bits.
     """
     bend, spread = 0.0*ratio, 0.0*ratio
     for k in range(degree, 1, -1):
         part = absolute(load(dense, first + k*stride, WIDTH))
-        bend, spread = k*(k - 1.0)*part + bend*ratio, part + spread*ratio
-    spread = (absolute(load(dense, first + stride, WIDTH)) + spread*ratio)*ratio
-    unit = side/maximum(spread + 1e-4*size, 1e-300)
+        bend, spread = fma(bend, ratio, k*(k - 1.0)*part), fma(spread, ratio, part)
+    spread = fma(spread, ratio, absolute(load(dense, first + stride, WIDTH)))*ratio
+    unit = side/maximum(fma(0.0*ratio + 1e-4, size, spread), 1e-300)
     bend = absolute(unit)*bend
-    value, slope = unit*load(dense, first, WIDTH) + 0.75*PASSED, unit*load(dense, first + stride, WIDTH)
+    value, slope = fma(unit, load(dense, first, WIDTH), 0.75*PASSED), unit*load(dense, first + stride, WIDTH)
     active, place = absolute(side) > 0.5, select(absolute(side) > 0.5, 0.0, ratio)
     for _ in range(60):
-        root = sqrt(slope*slope + 2.0*bend*value)
+        root = sqrt(fma(slope, slope, 2.0*bend*value))
         reach = select(slope > 0.0, (slope + root)/bend, 2.0*value/(root - slope))
         place = select(active, minimum(place + reach, ratio), place)
         active = active & (place < ratio)
@@ -48,8 +48,8 @@ def passage(side, size, dense, first, stride, degree, ratio):
         value, slope = 0.0*ratio, 0.0*ratio
         for k in range(degree, 0, -1):
             part = load(dense, first + k*stride, WIDTH)
-            value, slope = part + value*place, k*part + slope*place
-        value, slope = unit*(load(dense, first, WIDTH) + value*place) + 0.75*PASSED, unit*slope
+            value, slope = fma(value, place, part), fma(slope, place, 1.0*k*part)
+        value, slope = fma(unit, fma(value, place, load(dense, first, WIDTH)), 0.75*PASSED), unit*slope
         active = active & (value > 0.25*PASSED)
     return minimum(maximum(place, NEAREST*ratio), ratio)
 '''.strip()

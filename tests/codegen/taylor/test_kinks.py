@@ -209,8 +209,8 @@ def test_dense_output_ends_at_the_kink():
     step = compiled(alone([X, V], [V, -X - 8 * sp.Max(X, 0)]), 20, dense=True)
     length, new, dense = step.step([-0.05, 1.0], NONE, rtol=1e-13, atol=1e-14)
     passage = math.atan(0.05)
-    assert length[0] == pytest.approx(passage, abs=2e-10)
-    assert 0.0 < new[0, 0] < 1e-10
+    assert length[0] == pytest.approx(passage, abs=1e-9)
+    assert 0.0 < new[0, 0] < 1e-9
     for theta in (0.5, 1.0):
         value = -0.05 + sum(theta ** (k + 1) * row[0, 0] for k, row in enumerate(dense))
         assert value == pytest.approx(math.sin(theta * length[0]) - 0.05 * math.cos(theta * length[0]), abs=1e-15)
