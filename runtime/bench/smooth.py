@@ -49,7 +49,10 @@ CASES: dict[str, tuple[str, int, dict[str, object], int]] = {
     "FPUT ring, n = 8": ("ring", 8, {"oscillator": "mass", "coupling": "fput"}, 50),
     "friction, kappa = 10, n = 2": ("chain", 2, {"parameters": _SMOOTHED, "initial": _APART}, 50),
     "friction, kappa = 10, slow belt, n = 2": (
-        "chain", 2, {"parameters": {**_SMOOTHED, "theta_b": 0.02}, "initial": _APART}, 50,
+        "chain",
+        2,
+        {"parameters": {**_SMOOTHED, "theta_b": 0.02}, "initial": _APART},
+        50,
     ),
     "van der Pol, n = 2": ("chain", 2, {"oscillator": "van_der_pol", "parameters": _LINKED}, 50),
     "exact law, n = 1": ("chain", 1, _EXACT, 20),

@@ -41,8 +41,8 @@ TURNING = (sp.atan, sp.tanh, sp.erf, sp.Abs)
 def chosen_integrator(reduction: Reduction) -> Integrator:
     """Return the integrator of a scene, the fastest at equal error where the scene says "auto".
 
-    Power series where all functions are analytic and the start is not stiff, in the extreme cells of
-    the sweep; between the events of set-valued friction too.  Otherwise Rosenbrock steps, or a
+    Power series where all functions are continuous, and analytic between kinks, and the equations are
+    not stiff, in the extreme cells of the sweep; between the events of set-valued friction too.  Otherwise Rosenbrock steps, or a
     switching pair of methods for two oscillators at a tight tolerance.
 
     Parameters

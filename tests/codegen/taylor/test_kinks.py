@@ -142,7 +142,7 @@ def test_joint_kinks_end_one_step():
     y, w = sp.symbols("y w", real=True)
     rates = [V, -X - 8 * sp.Max(X, 0), w, -y - 8 * sp.Max(y, 0)]
     pair = compiled(alone([X, V, y, w], rates), 20)
-    one, steps = springs().run([0.0, 1.0], [3.0], 30.0, 1e-12)
+    _, steps = springs().run([0.0, 1.0], [3.0], 30.0, 1e-12)
     both, count = pair.run([0.0, 1.0, 0.0, 1.0], NONE, 30.0, 1e-12)
     assert count == steps
     assert both[0, :2].tolist() == both[0, 2:].tolist()
@@ -201,7 +201,9 @@ def test_equal_oscillators_keep_equal_bits(looped):
     step = compiled(ring, 16, looped=looped)
     state, _ = step.run([1.0, -0.5, 1.0, -0.5, 0.0, 0.2, 0.0, 0.2], [0.3, 0.1], 40.0, 1e-11)
     assert state[0, [0, 1, 4, 5]].tolist() == state[0, [2, 3, 6, 7]].tolist()
-    other = compiled(ring, 16, looped=not looped).run([1.0, -0.5, 1.0, -0.5, 0.0, 0.2, 0.0, 0.2], [0.3, 0.1], 40.0, 1e-11)
+    other = compiled(ring, 16, looped=not looped).run(
+        [1.0, -0.5, 1.0, -0.5, 0.0, 0.2, 0.0, 0.2], [0.3, 0.1], 40.0, 1e-11
+    )
     assert np.abs(other[0] - state).max() < 1e-9
 
 
@@ -273,7 +275,9 @@ def test_the_pair_of_springs_is_that_of_runge_and_kutta():
         a = -x - np.abs(v) * v / 5 - 5.0 * np.maximum(x - 1 / 3, 0) + np.cos(2 * t)
         rate = [v.copy(), a]
         for i, j, w in links:
-            for c, value in enumerate(edge(x[i], v[i], x[j], v[j], w, *[0.4] * len(pair.equations.edges[0].parameters))):
+            for c, value in enumerate(
+                edge(x[i], v[i], x[j], v[j], w, *[0.4] * len(pair.equations.edges[0].parameters))
+            ):
                 rate[c][i] += value
         return np.concatenate(rate)
 

@@ -255,7 +255,25 @@ def test_links_with_inertia_are_refused():
 
 
 @pytest.mark.parametrize(
-    "name", ["scale", "ratio", "passed", "side_of", "size_kink0", "tan", "erf", "power", "r3", "w_x_1", "i_b", "n_", "raised", "x_1_4", "shared_0", "exp0"]
+    "name",
+    [
+        "scale",
+        "ratio",
+        "passed",
+        "side_of",
+        "size_kink0",
+        "tan",
+        "erf",
+        "power",
+        "r3",
+        "w_x_1",
+        "i_b",
+        "n_",
+        "raised",
+        "x_1_4",
+        "shared_0",
+        "exp0",
+    ],
 )
 def test_words_of_the_step_are_free_for_symbols(name):
     """The same motion whatever a parameter is called."""
