@@ -121,7 +121,7 @@ def compiled(equations: Equations, order: int, width: int = 1, dense: bool = Fal
         length = np.zeros(width)
         found = step(broadcast(t, width), broadcast(h, width), broadcast(scale, width), y, y, y_new, work, rtol, atol)
         if kinks:
-            store(length, 0, found[0])
+            store(length, 0, select(found[1] > 0.0, found[0], found[1]))
         else:
             store(length, 0, found)
         return length

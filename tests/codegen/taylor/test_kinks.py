@@ -220,7 +220,7 @@ def test_dense_output_ends_at_the_kink():
 
 def test_states_that_are_no_numbers_give_no_length():
     for start in ([math.nan, 0.0], [1.0, math.inf]):
-        assert not springs().step(start, [3.0])[0][0] > 0.0 or math.isnan(springs().step(start, [3.0])[1]).any()
+        assert math.isnan(springs().step(start, [3.0])[0][0])
 
 
 # -- what is refused --------------------------------------------------------------------------------------------------
