@@ -76,7 +76,7 @@ def signatures(driver: Driver) -> dict[str, Any]:
         lane, sizes = Lane(driver.width), _sizes(Dimensions)
         times = (lane, lane, lane) if driver.series else (lane, lane)
         step = (*times, *[ADDRESS] * 4, types.float64, types.float64, *more)
-        result = types.UniTuple(lane, 2) if driver.switching else lane
+        result = types.UniTuple(lane, 2) if driver.switching or driver.kinks else lane
         known = {
             "step": result(*step),
             "step_smooth": result(*step),

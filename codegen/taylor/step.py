@@ -17,17 +17,18 @@ from synchain.models.mechanics.components import TIME
 
 from ..program.passes import Names
 from .graph import STARTS, Graph, Template
+from .passage import PASSAGE
 from .series import Constant, Series, State, Time
 from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
 
-__all__ = ["TaylorStep", "called", "finished", "write_step"]
+__all__ = ["TaylorStep", "called", "ended", "finished", "lane", "returned", "write_step"]
 
 FARTHEST = 16.0
 """How many times longer than `scale` a step may be."""
 
 WORDS = frozenset(
     {"scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
-     "slope_scale", *STARTS.values()}
+     "slope_scale", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", *STARTS.values()}
 )  # fmt: skip
 PREFIXES = ("i_", "e_", "half_", "w_", "n_", "size_", "odd_")
 """Names of the step; a user's symbol of that name is called otherwise within the step."""
@@ -39,13 +40,14 @@ COUNTED = re.compile(r"[rs]\d+$")
 class TaylorStep:
     """The text of the function `step` and what a kernel must know of it.
 
-    order: that of the series, and the number of rows of the dense output; workspace: the groups of memory that a looped
-    step needs behind the dense output.
+    order: that of the series, and the number of rows of the dense output; workspace: the groups of memory that it needs
+    behind the dense output; kinks: True if it ends at kinks, and so returns how far its series reach too.
     """
 
     text: str
     order: int
     workspace: int = 0
+    kinks: bool = False
 
     @property
     def operations(self) -> int:
@@ -54,14 +56,18 @@ class TaylorStep:
         return sum(body.count(sign) for sign in (" + ", " - ", "*", "/"))
 
     @classmethod
-    def of(cls, lines: Sequence[str], order: int, workspace: int = 0, more: str = "") -> TaylorStep:
+    def of(
+        cls, lines: Sequence[str], order: int, workspace: int = 0, more: str = "", kinks: bool = False
+    ) -> TaylorStep:
         """The step of some statements."""
+        returned = "its length and that of its series" if kinks else "the length of the step"
         head = [
+            *([PASSAGE, "", ""] if kinks else []),
             "@njit(error_model='numpy', cache=True)",
             f"def step(t, h, scale, y, p, y_new, dense, rtol, atol{more}):",
-            '    """One step from (t, y): writes y_new and the dense output, returns the length of the step."""',
+            f'    """One step from (t, y): writes y_new and the dense output, returns {returned}."""',
         ]
-        return cls("\n".join([*head, *(f"    {line}" for line in lines)]), order, workspace)
+        return cls("\n".join([*head, *(f"    {line}" for line in lines)]), order, workspace, kinks)
 
 
 @dataclass(slots=True)
@@ -98,6 +104,10 @@ class Written:
     def start(self, series: Series) -> Expr:
         """Coefficient 0 of a series."""
         return self.at(series, 0)
+
+    def before(self, series: Series) -> Expr:
+        """Coefficient k - 1 of a series."""
+        return self.at(series, self.k - 1)
 
     def sum(self, left: Series, right: Series, first: int, last: int) -> Expr:
         """Sum of left_j * right_(k-j) for j = first … k + last.
@@ -203,6 +213,7 @@ class StepWriter:
         for k in range(1, self.order + 1):
             self.coefficients(k)
         self.length()
+        self.passages()
         self.closing()
         return self.lines
 
@@ -222,17 +233,16 @@ class StepWriter:
         self.flush()
 
     def coefficients(self, k: int) -> None:
-        """Coefficients k of the states, and of all series but in the last order."""
+        """Coefficients k of the states, and of all series; in the last order of those alone that kinks need."""
         at = self.at
         self.put(f"# order {k}", f"r{k} = scale" if k == 1 else f"r{k} = {1.0 / k!r}*scale")
         slopes = [at.at(rate, k - 1) for rate in self.rates]
         at.k = k
         for state, slope in zip(self.states.values(), slopes, strict=True):
             at.put(state, times(Name(f"r{k}"), slope))
-        if k < self.order:
-            at.values[self.time, k] = Name("scale") if k == 1 else ZERO
-            for s in self.graph.series:
-                at.put(s, s.coefficient(at), s in self.graph.inline)
+        at.values[self.time, k] = Name("scale") if k == 1 else ZERO
+        for s in self.graph.series if k < self.order else self.graph.behind(self.graph.kinks):
+            at.put(s, s.coefficient(at), s in self.graph.inline)
         self.flush()
 
     def state_at(self, slot: int, k: int) -> Expr:
@@ -263,6 +273,20 @@ class StepWriter:
             reaches = [Name("-log(0.0*scale)")]
         self.put(*statement(Assign("reach", _extreme("minimum", reaches))), *finished(p))
 
+    def passages(self) -> None:
+        """End the step where a series passes a kink."""
+        kinks = self.graph.kinks
+        if not kinks:
+            return
+        first = self.order * self.equations.dimension
+        self.put("# first passage of a kink", "passed = ratio")
+        for kink in kinks:
+            for k in range(self.order + 1):
+                self.put(f"store(dense, {first + k}, {lane(self.at.at(kink.base, k))})")
+            side = show(self.at.at(kink, self.order))
+            self.put(f"passed = passage({side}, {kink.size}, dense, {first}, 1, {self.order}, passed)")
+        self.put(*ended())
+
     def horner(self, name: str, coefficients: Sequence[Expr]) -> Expr:
         """A polynomial in ratio**2: two of half the degree are ready sooner than one."""
         known = list(coefficients)
@@ -291,7 +315,7 @@ class StepWriter:
                 e = self.state_at(slot, k)
                 value = "0.0*raised" if e == ZERO else show(times(e, Name("raised")))
                 self.put(f"    store(dense, {(k - 1) * eq.dimension + slot}, {value})")
-        self.put("return length + 0.0*total  # NaN where any coefficient is infinite or NaN")
+        self.put(returned(bool(self.graph.kinks)))
 
 
 def moving_states(equations: Equations, i: int) -> tuple[bool, ...]:
@@ -322,7 +346,9 @@ def write_step(equations: Equations, order: int) -> TaylorStep:
         raise ValueError(f"taylor: found order {order}; expected at least 6")
     if equations.inertial:
         raise ValueError("taylor: found links with inertia; expected an identity mass matrix; use dop853 or rodas5p")
-    return TaylorStep.of(StepWriter(equations, order).write(), order)
+    writer = StepWriter(equations, order)
+    lines, kinks = writer.write(), bool(writer.graph.kinks)
+    return TaylorStep.of(lines, order, order + 1 if kinks else 0, kinks=kinks)
 
 
 def finished(order: int) -> list[str]:
@@ -334,6 +360,24 @@ def finished(order: int) -> list[str]:
         "length = minimum(length, h)",
         "ratio = length/scale",
     ]
+
+
+def ended() -> list[str]:
+    """The end of a step at the place `passed`, where a series has passed a kink."""
+    return ["until = select(passed < ratio, passed*scale, length)", "ratio = passed"]
+
+
+def returned(kinks: bool) -> str:
+    """What a step returns."""
+    length = "length + 0.0*total"
+    return f"return {'until, ' if kinks else ''}{length}  # NaN where any coefficient is infinite or NaN"
+
+
+def lane(value: Expr) -> str:
+    """The text of a value that is stored: numbers become lanes."""
+    if isinstance(value, Number):
+        return f"broadcast({show(value)}, WIDTH)"
+    return show(value)
 
 
 def _largest(values: Iterable[Expr]) -> Expr:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from itertools import islice
 
@@ -14,7 +14,7 @@ import sympy as sp
 from synchain.codegen.driver.columns import Count, Sum
 from synchain.codegen.integrators import Integrator, integrator
 from synchain.codegen.kernels.sweep import AUTO, KernelSource
-from synchain.codegen.taylor import is_linear, kink, order_for
+from synchain.codegen.taylor import is_linear, jump, order_for
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
@@ -31,12 +31,18 @@ STIFF = 30.0
 NODES, LINKS = 50, 5000
 """Nodes of a large network that are looked at, and links."""
 
+LAYER = 0.1
+"""Part of its stiffness with which the layer of a smoothed jump counts: motion is not always inside."""
+
+TURNING = (sp.atan, sp.tanh, sp.erf, sp.Abs)
+"""Functions that are steep, or turn sharply, where their argument is zero: the layer of a smoothed jump."""
+
 
 def chosen_integrator(reduction: Reduction) -> Integrator:
     """Return the integrator of a scene, the fastest at equal error where the scene says "auto".
 
-    Power series where all functions are analytic and the start is not stiff, in the extreme cells of
-    the sweep; between the events of set-valued friction too.  Otherwise Rosenbrock steps, or a
+    Power series where all functions are continuous, and analytic between kinks, and the equations are
+    not stiff, in the extreme cells of the sweep; between the events of set-valued friction too.  Otherwise Rosenbrock steps, or a
     switching pair of methods for two oscillators at a tight tolerance.
 
     Parameters
@@ -49,7 +55,7 @@ def chosen_integrator(reduction: Reduction) -> Integrator:
         return _taylor(scene, equations)
     if scene.integrator != "auto":
         return integrator(scene.integrator)
-    if not equations.inertial and kink(equations) is None and (equations.sticks or stiffness(scene) < STIFF):
+    if not equations.inertial and jump(equations) is None and (equations.sticks or stiffness(scene) < STIFF):
         return _taylor(scene, equations)
     if equations.sticks:
         return integrator("dop853")
@@ -66,10 +72,13 @@ def stiffness(scene: Scene) -> float:
 
     The rate is the real part of an eigenvalue of a node's own block of the Jacobian, with twice what
     its links add, which bounds that of a network of springs; it is compared with the imaginary
-    parts and one.
+    parts and one.  The layers of smoothed jumps are looked at too, although the start lies outside.
     """
-    rows = Planner(scene).extremes()
-    found = (_rates(scene.equations, *row) for row in zip(rows.start, rows.numbers, strict=True))
+    rows, equations = Planner(scene).extremes(), scene.equations
+    cells = list(zip(rows.start, rows.numbers, strict=True))
+    found = [_rates(equations, *cell) for cell in cells]
+    layers = [_spread(_layers(equations, _named(equations, *cell))) for cell in cells]
+    found += [(LAYER * fastest, LAYER * turning) for fastest, turning in layers]
     return max((fastest / max(1.0, turning) for fastest, turning in found), default=0.0)
 
 
@@ -106,8 +115,17 @@ def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[
 
 def _rates(equations: Equations, state: np.ndarray, numbers: np.ndarray) -> tuple[float, float]:
     """The fastest decay or growth at a state, and the fastest turning; 0 where there are no numbers."""
-    values = dict(zip(equations.state, state, strict=True)) | dict(zip(equations.parameters, numbers, strict=True))
-    blocks = [block for block in _blocks(equations, values) if np.all(np.isfinite(block))]
+    return _spread(_blocks(equations, _named(equations, state, numbers)))
+
+
+def _named(equations: Equations, state: np.ndarray, numbers: np.ndarray) -> dict[str, float]:
+    """States and parameters by name."""
+    return dict(zip(equations.state, state, strict=True)) | dict(zip(equations.parameters, numbers, strict=True))
+
+
+def _spread(blocks: Iterable[np.ndarray]) -> tuple[float, float]:
+    """The largest real part of an eigenvalue of some blocks, and the largest imaginary one."""
+    blocks = [block for block in blocks if np.all(np.isfinite(block))]
     rates = np.concatenate([np.linalg.eigvals(block) for block in blocks]) if blocks else np.zeros(0)
     return float(np.abs(rates.real).max(initial=0.0)), float(np.abs(rates.imag).max(initial=0.0))
 
@@ -121,6 +139,41 @@ def _blocks(equations: Equations, values: Mapping[str, float]) -> list[np.ndarra
             found = _value(edge.jacobian_here(), equations.at_link(link, edge), values)
             blocks[link[0]] = blocks[link[0]] + 2.0 * found
     return blocks
+
+
+def _layers(equations: Equations, values: Mapping[str, float]) -> Iterator[np.ndarray]:
+    """The blocks of the nodes and of the links in the layers of their turning functions, one state moved there."""
+    for i in range(min(equations.n, NODES)):
+        node = equations.node_at(i)
+        yield from _turned(node.rhs, node.state, node.jacobian(), equations.at_node(i), values)
+    for link, edge in islice(equations.linked(), LINKS):
+        for block in _turned(edge.rhs, edge.here, edge.jacobian_here(), equations.at_link(link, edge), values):
+            yield 2.0 * block
+
+
+def _turned(
+    rates: tuple[sp.Expr, ...],
+    states: tuple[sp.Symbol, ...],
+    jacobian: tuple[tuple[sp.Expr, ...], ...],
+    at: Mapping[sp.Symbol, sp.Expr],
+    values: Mapping[str, float],
+) -> Iterator[np.ndarray]:
+    """A block where the argument of a turning function is zero, and close by on either side."""
+    for state, place in _turns(rates, states):
+        ((there,),) = _value(((place,),), at, values)
+        for shift in (-1e-9, 0.0, 1e-9):
+            yield _value(jacobian, at, {**values, at[state].name: there + shift * (1.0 + abs(there))})
+
+
+@lru_cache(maxsize=64)
+def _turns(rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...]) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
+    """For each turning function a state, and the value of it at which the argument is zero."""
+    gaps = {part.args[0] for e in rates for part in e.atoms(*TURNING)}
+    found = []
+    for gap in sorted(gaps, key=sp.default_sort_key):
+        slopes = ((s, gap.diff(s)) for s in states)
+        found += [(s, s - gap / slope) for s, slope in slopes if slope != 0 and not slope.has(s)][:1]
+    return tuple(found)
 
 
 def _value(

@@ -38,6 +38,9 @@ def _driven() -> Oscillator:
 
 
 _LINKED = {"parameters": {"sigma": 0.1}}
+_SMOOTHED = {"kappa": 10.0, "sigma": 0.1}
+"""The smoothed law has a kink, |w|; over the slow belt each oscillator passes it twice a period."""
+_APART: dict[str, Any] = {"initial": {"x": (0.3, 0.4), "v": (0.0, 0.05)}}
 _SCALED: dict[str, Any] = {"coupling": "x->x", **_LINKED}
 
 SMOOTH: dict[str, tuple[str, int, dict[str, Any], int]] = {
@@ -45,6 +48,7 @@ SMOOTH: dict[str, tuple[str, int, dict[str, Any], int]] = {
     "Duffing, n = 2": ("chain", 2, {"oscillator": "duffing", **_LINKED}, 20),
     "pendulum, n = 2": ("chain", 2, {"oscillator": "pendulum", **_LINKED}, 200),
     "FPUT ring, n = 8": ("ring", 8, {"oscillator": "mass", "coupling": "fput"}, 50),
+    "slow belt, κ = 10, n = 2": ("chain", 2, {"parameters": {**_SMOOTHED, "theta_b": 0.02}, **_APART}, 50),
     "van der Pol, n = 2": ("chain", 2, {"oscillator": "van_der_pol", **_LINKED}, 50),
     "Lorenz, n = 2": ("chain", 2, {"oscillator": "lorenz", **_SCALED}, 1),
     "Rössler, n = 3": ("ring", 3, {"oscillator": "rossler", **_SCALED}, 10),

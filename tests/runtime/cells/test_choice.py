@@ -25,7 +25,12 @@ def method(scene: Scene) -> tuple[str, int]:
         (Scene(oscillator="van_der_pol", topology=chain(2), parameters={"mu": 1.0}), "taylor"),
         (Scene(oscillator="van_der_pol", topology=chain(2), parameters={"mu": 200.0}), "rodas5p"),
         (Scene(topology=chain(2), contact="set-valued"), "taylor"),
-        (Scene(topology=chain(3)), "rodas5p"),  # the smoothed law has a kink
+        (Scene(topology=chain(2), parameters={"kappa": 10.0}), "taylor"),  # the smoothed law has a kink
+        (Scene(topology=chain(20), parameters={"kappa": 10.0}), "taylor"),
+        (Scene(topology=chain(3)), "rodas5p"),  # its layer is steep, although the start lies outside
+        (Scene(topology=chain(3), friction="coulomb"), "rodas5p"),
+        (Scene(topology=chain(3), contact="sign"), "rodas5p"),  # it jumps
+        (Scene(oscillator="chua", coupling="x->x", topology=chain(2)), "taylor"),
         (Scene(topology=chain(2), rtol=1e-10, parameters={"sigma": 0.1}), "switching"),
     ],
 )
@@ -52,11 +57,16 @@ def test_linear_equations_take_the_highest_order():
     assert method(scene.replace(rtol=1e-2))[1] < 24
 
 
-def test_what_is_not_analytic_is_refused():
-    with pytest.raises(
-        ValueError, match=r"taylor: a function that is not analytic; found Abs\(.*use integrator dop853"
-    ):
-        kernel_source(Scene(topology=chain(2), integrator="taylor"))
+def test_what_jumps_is_refused():
+    with pytest.raises(ValueError, match=r"taylor: a function that jumps; found sign\(.*use integrator dop853"):
+        kernel_source(Scene(topology=chain(2), contact="sign", integrator="taylor"))
+
+
+def test_the_layer_of_a_smoothed_jump_is_seen_from_a_start_outside():
+    scene = Scene(topology=chain(2), friction="coulomb", parameters={"kappa": 1e5})
+    assert stiffness(scene) > STIFF > stiffness(scene.replace(parameters={"kappa": 10.0}))
+    link = Scene(oscillator="duffing", coupling="friction_damper", topology=chain(2), initial={"v": (0.0, 1.0)})
+    assert stiffness(link.replace(parameters={"sigma": 1e4})) > STIFF > stiffness(link)
 
 
 def test_stiffness_is_that_of_the_extreme_cells():
