@@ -6,5 +6,6 @@ from .graph import is_linear, kink
 from .looped import write_looped
 from .order import order_for
 from .step import TaylorStep, write_step
+from .tangent import TangentStep, write_tangent
 
-__all__ = ["TaylorStep", "is_linear", "kink", "order_for", "write_looped", "write_step"]
+__all__ = ["TangentStep", "TaylorStep", "is_linear", "kink", "order_for", "write_looped", "write_step", "write_tangent"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from itertools import islice
 
@@ -16,6 +16,7 @@ from synchain.codegen.integrators import Integrator, integrator
 from synchain.codegen.kernels.sweep import AUTO, KernelSource
 from synchain.codegen.taylor import is_linear, kink, order_for
 from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
 
@@ -23,7 +24,7 @@ from .buffers import Buffers
 from .plan import Plan, Planner
 from .reduce import Reduction
 
-__all__ = ["STIFF", "chosen_integrator", "stiffness", "warn_of_stiffness"]
+__all__ = ["STIFF", "chosen_for_modes", "chosen_integrator", "mode_stiffness", "stiffness", "warn_of_stiffness"]
 
 STIFF = 30.0
 """Stiffness from which Rosenbrock steps are faster than Taylor steps at equal error."""
@@ -57,6 +58,34 @@ def chosen_integrator(reduction: Reduction) -> Integrator:
     return integrator("switching" if pair else AUTO)
 
 
+def chosen_for_modes(
+    scene: Scene, variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray
+) -> Integrator:
+    """Return the integrator of orbits with deviations along them, Taylor or Rosenbrock steps: modes have no others.
+
+    Power series where all functions are analytic, and neither the orbit nor the strongest mode is stiff at the start.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its integrator, and the tolerances that the order follows.
+    variation : Variation
+        Orbit with its variational equation.
+    state : ndarray, shape (cells, dimension)
+        Initial states.
+    numbers : ndarray, shape (cells, parameters)
+        Values of the parameters of the orbit.
+    strengths : ndarray, shape (number of strengths, modes)
+        Strengths of the modes.
+    """
+    if scene.integrator == "taylor":
+        return _taylor(scene, variation.orbit)
+    smooth = scene.integrator == "auto" and kink(variation.orbit) is None
+    if smooth and mode_stiffness(variation, state, numbers, strengths) < STIFF:
+        return _taylor(scene, variation.orbit)
+    return integrator(AUTO)
+
+
 def _taylor(scene: Scene, equations: Equations) -> Integrator:
     return integrator("taylor", order_for(scene.rtol, scene.atol, is_linear(equations)))
 
@@ -69,8 +98,31 @@ def stiffness(scene: Scene) -> float:
     parts and one.
     """
     rows = Planner(scene).extremes()
-    found = (_rates(scene.equations, *row) for row in zip(rows.start, rows.numbers, strict=True))
-    return max((fastest / max(1.0, turning) for fastest, turning in found), default=0.0)
+    return _stiffest(_rates(scene.equations, *row) for row in zip(rows.start, rows.numbers, strict=True))
+
+
+def mode_stiffness(variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray) -> float:
+    """Return how much faster deviations decay or grow at the start than they turn: the largest of the first orbits.
+
+    Of the strengths none and the largest are looked at; parameters as for `chosen_for_modes`.
+    """
+    count = len(variation.parameters)
+    largest = strengths[:, np.argmax(np.hypot.reduce(strengths, axis=0))] if strengths.size else np.zeros(count)
+    table = [[sp.S.Zero] * variation.size for _ in range(variation.size)]
+    for (row, column), e in variation.matrix:
+        table[row][column] = e
+    entries, orbit = tuple(map(tuple, table)), variation.orbit
+    names = (*orbit.state, *orbit.parameters, *(s.name for s in variation.parameters))
+    found = []
+    for cell in zip(state[:NODES], numbers[:NODES], strict=True):
+        for strong in (0.0 * largest, largest):
+            values = dict(zip(names, np.concatenate([*cell, strong]), strict=True))
+            found.append(_eigenvalue_parts([_value(entries, {}, values)]))
+    return _stiffest(found)
+
+
+def _stiffest(rates: Iterable[tuple[float, float]]) -> float:
+    return max((fastest / max(1.0, turning) for fastest, turning in rates), default=0.0)
 
 
 def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[[np.ndarray], Plan]) -> None:
@@ -107,7 +159,12 @@ def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[
 def _rates(equations: Equations, state: np.ndarray, numbers: np.ndarray) -> tuple[float, float]:
     """The fastest decay or growth at a state, and the fastest turning; 0 where there are no numbers."""
     values = dict(zip(equations.state, state, strict=True)) | dict(zip(equations.parameters, numbers, strict=True))
-    blocks = [block for block in _blocks(equations, values) if np.all(np.isfinite(block))]
+    return _eigenvalue_parts(_blocks(equations, values))
+
+
+def _eigenvalue_parts(blocks: Iterable[np.ndarray]) -> tuple[float, float]:
+    """The largest real and the largest imaginary part of the eigenvalues of some blocks; 0 where there are no numbers."""
+    blocks = [block for block in blocks if np.all(np.isfinite(block))]
     rates = np.concatenate([np.linalg.eigvals(block) for block in blocks]) if blocks else np.zeros(0)
     return float(np.abs(rates.real).max(initial=0.0)), float(np.abs(rates.imag).max(initial=0.0))
 

@@ -14,11 +14,13 @@ from functools import lru_cache
 import numpy as np
 
 from synchain.codegen.driver.columns import Control
+from synchain.codegen.integrators import Integrator
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.modes import emit_modes
 from synchain.models.dynamics.variational import Variation
 from synchain.models.scenes.scene import Scene
 
+from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import local_clock
 from ..cells.plan import control_array, half_swing, periods, tolerances
 from ..support.status import Status
@@ -76,6 +78,7 @@ class VariationalIntegrator:
         strengths: np.ndarray,
         workers: int | None = None,
         looseness: float = 1.0,
+        method: Integrator | None = None,
     ) -> VariationalIntegrator:
         """Prepare the kernel and the arrays; tolerances and the step budget are those of the scene.
 
@@ -95,8 +98,11 @@ class VariationalIntegrator:
             Number of threads; all cores by default.
         looseness : float
             Ratio of the tolerance of the deviations to that of the orbit.
+        method : Integrator, optional
+            Method of the steps; by default the one that suits these strengths.
         """
-        kernel = _kernel(variation)
+        method = chosen_for_modes(scene, variation, state, numbers, strengths) if method is None else method
+        kernel = _kernel(variation, method)
         width, count = kernel.origin.width, strengths.shape[1]
         order = np.argsort(np.hypot.reduce(strengths, axis=0) if len(strengths) else np.zeros(count), kind="stable")
         padded = -(-count // width) * width
@@ -190,8 +196,11 @@ class VariationalIntegrator:
         if len(bad):
             status = Status(int(counts[bad[0], 0]))
             raise FloatingPointError(f"the orbit with its deviations cannot be integrated: {status.message}")
+        taken = int(counts[:, 1:3].sum())
+        if self.kernel.origin.method.series:  # a Taylor step of any scale has its own length, so only the first few gain
+            self.control[Control.FIRST_STEP] = float(np.broadcast_to(length, cells).sum()) / max(taken, 1)
         self.state = end
-        self.steps += int(counts[:, 1:3].sum())
+        self.steps += taken
         return growth[:, self.order]
 
     def _share(self, cuts: np.ndarray, rest: tuple[np.ndarray, ...]) -> None:
@@ -207,6 +216,6 @@ class VariationalIntegrator:
 
 
 @lru_cache(maxsize=64)
-def _kernel(variation: Variation) -> Kernel:
+def _kernel(variation: Variation, method: Integrator) -> Kernel:
     """Compiled kernel of a variational equation."""
-    return load(emit_modes(variation))
+    return load(emit_modes(variation, method))
