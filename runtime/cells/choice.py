@@ -24,7 +24,7 @@ from .buffers import Buffers
 from .plan import Plan, Planner
 from .reduce import Reduction
 
-__all__ = ["STIFF", "chosen_for_modes", "chosen_integrator", "mode_stiffness", "stiffness", "warn_of_stiffness"]
+__all__ = ["STIFF", "chosen_for_modes", "chosen_for_rows", "chosen_integrator", "mode_stiffness", "stiffness", "warn_of_stiffness"]
 
 STIFF = 30.0
 """Stiffness from which Rosenbrock steps are faster than Taylor steps at equal error."""
@@ -45,12 +45,30 @@ def chosen_integrator(reduction: Reduction) -> Integrator:
     reduction : Reduction
         What is left of the scene to integrate.
     """
-    scene, equations = reduction.scene, reduction.equations
+    return _chosen(reduction.scene, reduction.equations, lambda: stiffness(reduction.scene))
+
+
+def chosen_for_rows(scene: Scene, equations: Equations, rows: Plan) -> Integrator:
+    """Return the integrator of equations whose cells come as rows; otherwise as `chosen_integrator`.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its integrator and its tolerances.
+    equations : Equations
+        What is integrated.
+    rows : Plan
+        The extreme cells.
+    """
+    return _chosen(scene, equations, lambda: _stiffness(equations, rows))
+
+
+def _chosen(scene: Scene, equations: Equations, stiffness_of: Callable[[], float]) -> Integrator:
     if scene.integrator == "taylor":
         return _taylor(scene, equations)
     if scene.integrator != "auto":
         return integrator(scene.integrator)
-    if not equations.inertial and kink(equations) is None and (equations.sticks or stiffness(scene) < STIFF):
+    if not equations.inertial and kink(equations) is None and (equations.sticks or stiffness_of() < STIFF):
         return _taylor(scene, equations)
     if equations.sticks:
         return integrator("dop853")
@@ -97,8 +115,11 @@ def stiffness(scene: Scene) -> float:
     its links add, which bounds that of a network of springs; it is compared with the imaginary
     parts and one.
     """
-    rows = Planner(scene).extremes()
-    return _stiffest(_rates(scene.equations, *row) for row in zip(rows.start, rows.numbers, strict=True))
+    return _stiffness(scene.equations, Planner(scene).extremes())
+
+
+def _stiffness(equations: Equations, rows: Plan) -> float:
+    return _stiffest(_rates(equations, *row) for row in zip(rows.start, rows.numbers, strict=True))
 
 
 def mode_stiffness(variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray) -> float:
