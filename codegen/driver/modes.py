@@ -3,7 +3,7 @@
 A deviation grows or shrinks by any factor, so it is scaled by a power of two every few steps, which is
 exact; the powers are counted.  Step sizes follow the errors of the orbit and of the modes in the
 first and the last register: callers sort modes by the size of their strength, so that the fastest
-modes are watched.
+modes are watched.  Taylor steps follow the series of the orbit and of all modes.
 """
 
 # ruff: noqa: I001  (the long lists of names stay short)
@@ -150,7 +150,25 @@ def attempt(
     t, clock, y, y_new, dense, middle, out, steering, shared, strengths, old, new, registers, tolerance, dims, step, carry,
     pushes,
 ):  # fmt: skip
-    """One step of the orbit and its modes, which may be rejected; returns its length and whether it is accepted."""
+    """One step of the orbit and its modes; returns its length and whether it is accepted.
+
+    A Taylor step is as long as the series of the orbit and of all modes allow, or ends at the first event; it is rejected
+    if a coefficient overflows.
+    """
+    if SERIES:
+        limit = minimum(load(clock, STOP, WIDTH) - t, steering[MAX_STEP])
+        own = step(t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, steering[RTOL], steering[ATOL], shared)
+        h, good = own, own > 0.0
+        if any_lane(good):
+            if CONTACTS:
+                own = stop_at_event(good, t, own, clock, y, y_new, dense, middle, out, (), dims, pushes)
+                limit = minimum(limit, own)
+            store(shared, LENGTH, own)
+            h = broadcast(carry(shared, strengths, old, new, registers, tolerance), WIDTH)
+            if any_lane(h < own):
+                for c in range(dims.dimension):
+                    store(y_new, c, inside(h / own, c, y, y_new, dense, dims))
+        return h, accept_series(clock, h, limit)
     h = aim(clock, steering)
     error = step(t, h, y, y, y_new, dense, steering[RTOL], steering[ATOL], shared)
     if any_lane(error <= 1.0):
@@ -164,30 +182,6 @@ def attempt(
     if any_lane(accept):
         carry(shared, strengths, old, new, 1, registers - 1)
     return h, accept
-
-
-@njit(error_model="numpy", forceinline=True)
-def attempt_series(
-    t, clock, y, y_new, dense, middle, out, steering, shared, strengths, old, new, registers, tolerance, dims, step, carry,
-    pushes,
-):  # fmt: skip
-    """One Taylor step of the orbit and its modes, as long as all of their series allow, or up to the first event.
-
-    Returns its length and whether it is accepted: always, unless a coefficient overflows.
-    """
-    limit = minimum(load(clock, STOP, WIDTH) - t, steering[MAX_STEP])
-    own = step(t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, steering[RTOL], steering[ATOL], shared)
-    h, good = own, own > 0.0
-    if any_lane(good):
-        if CONTACTS:
-            own = stop_at_event(good, t, own, clock, y, y_new, dense, middle, out, (), dims, pushes)
-            limit = minimum(limit, own)
-        store(shared, LENGTH, own)
-        h = broadcast(carry(shared, strengths, old, new, registers, tolerance), WIDTH)
-        if any_lane(h < own):
-            for c in range(dims.dimension):
-                store(y_new, c, inside(h / own, c, y, y_new, dense, dims))
-    return h, accept_series(clock, h, limit)
 
 
 @njit(error_model="numpy", nogil=True, cache=True)
@@ -233,16 +227,10 @@ def march(
         status, taken = outcome(0, clock, y, control, dims), 0
         while status == 0:
             t = load(clock, TIME, WIDTH)
-            if SERIES:
-                h, accept = attempt_series(
-                    t, clock, y, y_new, dense, middle, out, steering, shared, strong, old, new, registers, tolerance, dims,
-                    step, carry, pushes,
-                )  # fmt: skip
-            else:
-                h, accept = attempt(
-                    t, clock, y, y_new, dense, middle, out, steering, shared, strong, old, new, registers, tolerance, dims,
-                    step, carry, pushes,
-                )  # fmt: skip
+            h, accept = attempt(
+                t, clock, y, y_new, dense, middle, out, steering, shared, strong, old, new, registers, tolerance, dims, step,
+                carry, pushes,
+            )  # fmt: skip
             t_new = arrive(clock, t, h)
             if any_lane(accept):
                 old, new = new, old

@@ -152,7 +152,7 @@ class ModeWriter:
                     terms.append((strength, self.graph.product(series, self.deviations[c])))
                 else:
                     fixed = add(fixed, times(strength, self.at.start(series)))
-            if not isinstance(fixed, Number | Name):
+            if not isinstance(fixed, Number | Name):  # what each order multiplies by is made once
                 self.lines.append(f"g{r}_{c} = {show(fixed)}")
                 fixed = Name(f"g{r}_{c}")
             if fixed != ZERO:
@@ -166,8 +166,8 @@ class ModeWriter:
     def write(self) -> str:
         """The function `mode_step`."""
         size, strengths, head = self.variation.size, self.variation.parameters, [f"scale = {_shared(0)}"]
-        head += [f"{s.name} = load(strengths, {len(strengths)}*which + {k}, LANES)" for k, s in enumerate(strengths)]
-        head += [f"d{c}_0 = load(old, {size}*which + {c}, LANES)" for c in range(size)]
+        head += [f"{s.name} = load(strengths, {_place(len(strengths), k)}, LANES)" for k, s in enumerate(strengths)]
+        head += [f"d{c}_0 = load(old, {_place(size, c)}, LANES)" for c in range(size)]
         head += [f"{name} = {_shared(place)}" for name, place in self.orbit.places.items()]
         self.lines = [*head, *self.lines, "# order 0"]
         self.at.values |= {(d, 0): Name(f"{d.name}_0") for d in self.deviations}
@@ -180,7 +180,7 @@ class ModeWriter:
         self.lines += ["# new deviation", "square = ratio*ratio"]
         for c, s in enumerate(self.deviations):
             self.lines += polynomial(s.name, [self.at.at(s, k) for k in range(self.order + 1)])
-            self.lines.append(f"store(new, {size}*which + {c}, n_{s.name})")
+            self.lines.append(f"store(new, {_place(size, c)}, n_{s.name})")
         self.lines.append(f"total = {' + '.join(f'absolute(n_{s.name})' for s in self.deviations)}")
         self.lines.append("return math.nan if any_lane(~(total < math.inf)) else length")
         return "\n".join([*HEADING, *(f"    {line}" for line in self.lines)])
@@ -193,7 +193,7 @@ class ModeWriter:
     def coefficients(self, k: int) -> None:
         """Coefficients k of the deviations, and of all series but in the last order."""
         at = self.at
-        self.lines += [f"# order {k}", f"r{k} = {1.0 / k!r}*scale"]
+        self.lines += [f"# order {k}", f"r{k} = {show(times(Number(1.0 / k), Name('scale')))}"]
         slopes = [at.at(rate, k - 1) for rate in self.rates]
         at.k = k
         for d, slope in zip(self.deviations, slopes, strict=True):
@@ -215,7 +215,7 @@ class ModeWriter:
                 reaches.append(times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))))
         if reaches:
             self.lines.append(f"lengths = truncated(scale*exp({show(extreme('minimum', reaches))}))")
-            self.lines.append(f"length = common_length(lengths, longest, new, {self.variation.size}*which)")
+            self.lines.append(f"length = common_length(lengths, longest, new, {_place(self.variation.size, 0)})")
         else:
             self.lines.append("length = longest")
         self.lines.append("ratio = length/scale")
@@ -254,6 +254,12 @@ def _parted(variation: Variation, e: sp.Expr) -> Iterator[tuple[sp.Expr, Expr]]:
 
 def _sizes(values: Iterable[Expr]) -> list[Expr]:
     return [Call("absolute", (e,)) for e in values]
+
+
+def _place(size: int, k: int) -> str:
+    """Number k of the registers of one group of modes, which fill `size` registers of an array."""
+    group = "which" if size == 1 else f"{size}*which"
+    return f"{group} + {k}" if k else group
 
 
 def _shared(place: int) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from itertools import islice
 
@@ -24,7 +24,16 @@ from .buffers import Buffers
 from .plan import Plan, Planner
 from .reduce import Reduction
 
-__all__ = ["STIFF", "chosen_for_modes", "chosen_for_rows", "chosen_integrator", "mode_stiffness", "stiffness", "warn_of_stiffness"]
+__all__ = [
+    "STIFF",
+    "chosen_for_modes",
+    "chosen_for_rows",
+    "chosen_integrator",
+    "mode_stiffness",
+    "stiffness",
+    "warn_of_stiff_modes",
+    "warn_of_stiffness",
+]
 
 STIFF = 30.0
 """Stiffness from which Rosenbrock steps are faster than Taylor steps at equal error."""
@@ -123,23 +132,50 @@ def _stiffness(equations: Equations, rows: Plan) -> float:
 
 
 def mode_stiffness(variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray) -> float:
-    """Return how much faster deviations decay or grow at the start than they turn: the largest of the first orbits.
+    """Return how much faster deviations decay or grow at some states than they turn: the largest of the first orbits.
 
     Of the strengths none and the largest are looked at; parameters as for `chosen_for_modes`.
     """
-    count = len(variation.parameters)
-    largest = strengths[:, np.argmax(np.hypot.reduce(strengths, axis=0))] if strengths.size else np.zeros(count)
+    return _stiffest(_mode_rates(variation, state, numbers, strengths))
+
+
+def warn_of_stiff_modes(
+    variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray, step: float
+) -> None:
+    """Warn if Taylor steps with deviations were short, `step` in the mean, because they are stiff where they ended.
+
+    The other parameters are those of `chosen_for_modes`.
+    """
+    if step * STIFF >= 1.0:
+        return
+    for fastest, turning in _mode_rates(variation, state, numbers, strengths):
+        if fastest * step > 1.0 and fastest > STIFF * max(1.0, turning):
+            warnings.warn(
+                f"stiff modes: found a rate of {fastest:.3g} beside slow motion, and Taylor steps of {step:.2g}; "
+                "expected longer ones; integrator = 'rodas5p' takes them",
+                RuntimeWarning,
+                stacklevel=4,
+            )
+            return
+
+
+def _mode_rates(
+    variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray
+) -> Iterator[tuple[float, float]]:
+    """The fastest growth and turning of deviations without a strength and with the largest, of the first orbits."""
+    strengths = strengths[: len(variation.parameters)]
+    largest = (
+        strengths[:, np.argmax(np.hypot.reduce(strengths, axis=0))] if strengths.size else np.zeros(len(strengths))
+    )
     table = [[sp.S.Zero] * variation.size for _ in range(variation.size)]
     for (row, column), e in variation.matrix:
         table[row][column] = e
     entries, orbit = tuple(map(tuple, table)), variation.orbit
     names = (*orbit.state, *orbit.parameters, *(s.name for s in variation.parameters))
-    found = []
     for cell in zip(state[:NODES], numbers[:NODES], strict=True):
         for strong in (0.0 * largest, largest):
             values = dict(zip(names, np.concatenate([*cell, strong]), strict=True))
-            found.append(_eigenvalue_parts([_value(entries, {}, values)]))
-    return _stiffest(found)
+            yield _eigenvalue_parts([_value(entries, {}, values)])
 
 
 def _stiffest(rates: Iterable[tuple[float, float]]) -> float:

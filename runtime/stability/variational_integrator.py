@@ -20,7 +20,7 @@ from synchain.codegen.kernels.modes import emit_modes
 from synchain.models.dynamics.variational import Variation
 from synchain.models.scenes.scene import Scene
 
-from ..cells.choice import chosen_for_modes
+from ..cells.choice import chosen_for_modes, warn_of_stiff_modes
 from ..cells.initial_modes import local_clock
 from ..cells.plan import control_array, half_swing, periods, tolerances
 from ..support.status import Status
@@ -35,8 +35,10 @@ class VariationalIntegrator:
 
     Parameters
     ----------
+    variation : Variation
+        Orbit with its variational equation.
     kernel : Kernel
-        Compiled variational equation.
+        The same, compiled.
     state : ndarray, shape (cells, dimension)
         States of the orbits.
     numbers : ndarray, shape (cells, parameters)
@@ -57,6 +59,7 @@ class VariationalIntegrator:
         Steps taken so far.
     """
 
+    variation: Variation
     kernel: Kernel
     state: np.ndarray
     numbers: np.ndarray
@@ -117,6 +120,7 @@ class VariationalIntegrator:
         kept = np.ascontiguousarray(strengths[:, columns], dtype=float)
         kept = kept if len(kept) else np.zeros((1, padded))
         return cls(
+            variation=variation,
             kernel=kernel,
             state=np.ascontiguousarray(state, dtype=float).copy(),
             numbers=np.ascontiguousarray(numbers, dtype=float),
@@ -197,8 +201,12 @@ class VariationalIntegrator:
             status = Status(int(counts[bad[0], 0]))
             raise FloatingPointError(f"the orbit with its deviations cannot be integrated: {status.message}")
         taken = int(counts[:, 1:3].sum())
-        if self.kernel.origin.method.series:  # a Taylor step of any scale has its own length, so only the first few gain
-            self.control[Control.FIRST_STEP] = float(np.broadcast_to(length, cells).sum()) / max(taken, 1)
+        if self.kernel.origin.method.series and taken:
+            step = float(np.broadcast_to(length, cells).sum()) / taken
+            self.control[Control.FIRST_STEP] = (
+                step  # a Taylor step of any scale finds its length, only the first few gain
+            )
+            warn_of_stiff_modes(self.variation, end, self.numbers, self.strengths, step)
         self.state = end
         self.steps += taken
         return growth[:, self.order]
