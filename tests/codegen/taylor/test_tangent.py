@@ -105,6 +105,15 @@ def test_volumes_shrink_as_liouville_says() -> None:
     assert found == pytest.approx(-2 * 0.2 * s.period, abs=1e-11)
 
 
+def test_all_multipliers_of_a_linear_chain_have_the_size_of_its_damping() -> None:
+    """d'' = -delta d' - (1 + sigma L) d: all six exponents are -delta/2."""
+    s = scene("duffing", "spring", 3, parameters={"sigma": 0.4, "delta": 0.2, "beta": 0.0})
+    c = carried(s, network_variation(s.equations), [1.0, 0.7, 0.3, 0.1, -0.2, 0.0], np.zeros((0, 6)), TAYLOR, 1e-12)
+    c.set_deviations(np.eye(6)[None])
+    propagator = (np.exp(c.advance(s.period))[:, None] * c.deviations)[0]
+    np.testing.assert_allclose(np.log(np.abs(np.linalg.eigvals(propagator))) / s.period, -0.1, rtol=0, atol=1e-12)
+
+
 def test_one_step_suits_the_modes_between_the_first_and_the_last() -> None:
     """d' = fast d, sorted by the size of (fast, slow): the fast ones stand in the middle, where nobody looks first."""
     orbit = Equations.of_equal_nodes(Node((X,), (-X,), ()), None, 1)
