@@ -105,7 +105,7 @@ def common_drivers() -> list[Driver]:
     ways = ((False, False), (False, True), (True, True))  # contacts, series
     return [
         *(Driver(KernelKind.SWEEP, width, r, contacts=c, series=s) for c, s in ways for r in records),
-        *(Driver(KernelKind.MODES, width, contacts=contacts) for contacts in (False, True)),
+        *(Driver(KernelKind.MODES, width, contacts=c, series=s) for c, s in ways),
     ]
 
 

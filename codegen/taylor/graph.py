@@ -65,6 +65,14 @@ def jump(equations: Equations) -> sp.Expr | None:
     return next((part for rhs, moving in templates for part in _jumps(rhs, moving)), None)
 
 
+def is_analytic(equations: Equations) -> bool:
+    """True if no rate has a jump or a kink in the states or in time."""
+    parts = (*JUMPING, *KINKED, Piecewise)
+    nodes = [(node.rhs, {TIME, *node.state}) for node in equations.nodes]
+    edges = [(edge.rhs, {TIME, *edge.here, *edge.there}) for edge in equations.edges]
+    return not any(part.free_symbols & moving for rhs, moving in nodes + edges for e in rhs for part in e.atoms(*parts))
+
+
 def is_linear(equations: Equations) -> bool:
     """True if the rates are sums of states with constant coefficients and of terms of time."""
     blocks = [(node.jacobian(), {TIME, *node.state}) for node in equations.nodes]

@@ -21,7 +21,21 @@ from .passage import PASSAGE
 from .series import Constant, Series, State, Time
 from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
 
-__all__ = ["TaylorStep", "called", "ended", "finished", "lane", "returned", "write_step"]
+__all__ = [
+    "StepWriter",
+    "TaylorStep",
+    "Written",
+    "called",
+    "check_order",
+    "ended",
+    "extreme",
+    "finished",
+    "lane",
+    "largest",
+    "polynomial",
+    "returned",
+    "write_step",
+]
 
 FARTHEST = 16.0
 """How many times longer than `scale` a step may be."""
@@ -164,8 +178,9 @@ class StepWriter:
         }
         self.states = dict(sorted(self.states.items()))
         self.graph = Graph(self.supply)
+        self.noted: list[Series] = []
         self.rates = self.read()
-        self.graph.settle(self.rates)
+        self.graph.settle([*self.rates, *self.noted])
         self.at = Written({}, {}, [])
 
     def read(self) -> list[Series]:
@@ -260,18 +275,18 @@ class StepWriter:
             last = {k: e for k in sizes if (e := self.state_at(slot, k)) != ZERO}
             if not last:
                 continue
-            size = _largest(Call("absolute", (e,)) for k in range(3) if (e := self.state_at(slot, k)) != ZERO)
+            size = largest(Call("absolute", (e,)) for k in range(3) if (e := self.state_at(slot, k)) != ZERO)
             self.put(f"w_{state.name} = 1.0/(atol + rtol*{show(size)})")
             for k, e in last.items():
                 sizes[k].append(times(Call("absolute", (e,)), Name(f"w_{state.name}")))
         reaches: list[Expr] = []
         for k, found in sizes.items():
             if found:
-                self.put(*statement(Assign(f"size_{k}", _largest(found))))
+                self.put(*statement(Assign(f"size_{k}", largest(found))))
                 reaches.append(times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))))
         if not reaches:
             reaches = [Name("-log(0.0*scale)")]
-        self.put(*statement(Assign("reach", _extreme("minimum", reaches))), *finished(p))
+        self.put(*statement(Assign("reach", extreme("minimum", reaches))), *finished(p))
 
     def passages(self) -> None:
         """End the step where a series passes a kink."""
@@ -287,27 +302,14 @@ class StepWriter:
             self.put(f"passed = passage({side}, {kink.size}, dense, {first}, 1, {self.order}, passed)")
         self.put(*ended())
 
-    def horner(self, name: str, coefficients: Sequence[Expr]) -> Expr:
-        """A polynomial in ratio**2: two of half the degree are ready sooner than one."""
-        known = list(coefficients)
-        while known and known[-1] == ZERO:
-            known.pop()
-        if not known:
-            return ZERO
-        self.put(f"{name} = {show(known.pop())}")
-        for e in reversed(known):
-            self.put(f"{name} = {show(add(times(Name(name), Name('square')), e))}")
-        return Name(name)
-
     def closing(self) -> None:
         """The new state, the dense output, and the length of the step."""
         p, eq = self.order, self.equations
         self.put("# new state", "square = ratio*ratio")
         for slot, name in enumerate(self.names):
-            start, *known = [self.state_at(slot, k) for k in range(p + 1)]
-            odd, even = self.horner(f"odd_{name}", known[::2]), self.horner(f"n_{name}", known[1::2])
-            slope = add(times(even, Name("ratio")), odd)
-            self.put(f"n_{name} = {show(add(times(slope, Name('ratio')), start))}", f"store(y_new, {slot}, n_{name})")
+            self.put(
+                *polynomial(name, [self.state_at(slot, k) for k in range(p + 1)]), f"store(y_new, {slot}, n_{name})"
+            )
         self.put(f"total = {' + '.join(f'n_{name}' for name in self.names)}", "if DENSE:")
         for k in range(1, p + 1):
             self.put(f"    raised = {'ratio' if k == 1 else 'raised*ratio'}")
@@ -316,6 +318,27 @@ class StepWriter:
                 value = "0.0*raised" if e == ZERO else show(times(e, Name("raised")))
                 self.put(f"    store(dense, {(k - 1) * eq.dimension + slot}, {value})")
         self.put(returned(bool(self.graph.kinks)))
+
+
+def polynomial(name: str, coefficients: Sequence[Expr]) -> list[str]:
+    """The lines for n_<name>, a polynomial in `ratio`: two in ratio**2 of half the degree are ready sooner than one."""
+    start, *known = coefficients
+    lines: list[str] = []
+    odd, even = _horner(lines, f"odd_{name}", known[::2]), _horner(lines, f"n_{name}", known[1::2])
+    slope = add(times(even, Name("ratio")), odd)
+    return [*lines, f"n_{name} = {show(add(times(slope, Name('ratio')), start))}"]
+
+
+def _horner(lines: list[str], name: str, coefficients: Sequence[Expr]) -> Expr:
+    """A polynomial in ratio**2, its lines appended."""
+    known = list(coefficients)
+    while known and known[-1] == ZERO:
+        known.pop()
+    if not known:
+        return ZERO
+    lines.append(f"{name} = {show(known.pop())}")
+    lines += [f"{name} = {show(add(times(Name(name), Name('square')), e))}" for e in reversed(known)]
+    return Name(name)
 
 
 def moving_states(equations: Equations, i: int) -> tuple[bool, ...]:
@@ -340,15 +363,20 @@ def write_step(equations: Equations, order: int) -> TaylorStep:
     Raises
     ------
     ValueError
-        For an order that is too small, functions that are not analytic, and links with inertia.
+        For an order that is too small, functions that jump, and links with inertia.
     """
+    check_order(equations, order)
+    writer = StepWriter(equations, order)
+    lines, kinks = writer.write(), bool(writer.graph.kinks)
+    return TaylorStep.of(lines, order, order + 1 if kinks else 0, kinks=kinks)
+
+
+def check_order(equations: Equations, order: int) -> None:
+    """Raise ValueError for an order that is too small, and for links with inertia."""
     if order < 6:
         raise ValueError(f"taylor: found order {order}; expected at least 6")
     if equations.inertial:
         raise ValueError("taylor: found links with inertia; expected an identity mass matrix; use dop853 or rodas5p")
-    writer = StepWriter(equations, order)
-    lines, kinks = writer.write(), bool(writer.graph.kinks)
-    return TaylorStep.of(lines, order, order + 1 if kinks else 0, kinks=kinks)
 
 
 def finished(order: int) -> list[str]:
@@ -380,16 +408,17 @@ def lane(value: Expr) -> str:
     return show(value)
 
 
-def _largest(values: Iterable[Expr]) -> Expr:
-    return _extreme("maximum", list(values))
+def largest(values: Iterable[Expr]) -> Expr:
+    """The largest of some values."""
+    return extreme("maximum", list(values))
 
 
-def _extreme(function: str, values: Sequence[Expr]) -> Expr:
+def extreme(function: str, values: Sequence[Expr]) -> Expr:
     """Nested calls of a function of two values."""
     if len(values) == 1:
         return values[0]
     half = len(values) // 2
-    return Call(function, (_extreme(function, values[:half]), _extreme(function, values[half:])))
+    return Call(function, (extreme(function, values[:half]), extreme(function, values[half:])))
 
 
 def called(name: str, taken: set[str]) -> str:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import warnings
 
+import numpy as np
 import pytest
 
 from synchain.models import Scene, chain
 from synchain.runtime import run
-from synchain.runtime.cells.choice import STIFF, stiffness
+from synchain.runtime.cells.choice import STIFF, chosen_for_rows, stiffness
 from synchain.runtime.cells.kernels import kernel_source
+from synchain.runtime.cells.plan import Plan
+from synchain.runtime.stability.orbits import Orbits
+from synchain.runtime.synchronisation.probe import ring_of_three
 
 
 def method(scene: Scene) -> tuple[str, int]:
@@ -77,6 +81,49 @@ def test_stiffness_is_that_of_the_extreme_cells():
     assert kernel_source(swept).integrator == "rodas5p"
 
 
+def of_modes(scene: Scene, alpha: list[float] | list[complex]) -> str:
+    state = np.array([[values[0] for values in scene.initial.values()]])
+    return Orbits.make(scene, np.array(alpha), state, 1).method.name
+
+
+@pytest.mark.parametrize(
+    ("scene", "alpha", "expected"),
+    [
+        (Scene(oscillator="pendulum", coupling="damper", topology=chain(2)), [0.0, 5.0], "taylor"),
+        (Scene(oscillator="pendulum", coupling="damper", topology=chain(2)), [0.0, -200.0, 5.0], "rodas5p"),
+        (Scene(oscillator="pendulum", coupling="damper", topology=chain(2)), [0.0, 200.0 + 1j], "rodas5p"),
+        (Scene(oscillator="van_der_pol", topology=chain(2), parameters={"mu": 200.0}), [0.0], "rodas5p"),
+        (Scene(topology=chain(2), contact="set-valued"), [0.0, 1.0], "taylor"),
+        (Scene(topology=chain(2)), [0.0, 1.0], "rodas5p"),  # the smoothed law has a kink
+        (
+            Scene(oscillator="pendulum", topology=chain(2), integrator="dop853"),
+            [0.0],
+            "rodas5p",
+        ),  # modes have no dop853
+    ],
+)
+def test_auto_for_modes_looks_at_the_strongest(scene, alpha, expected):
+    assert of_modes(scene, alpha) == expected
+
+
+def test_a_named_integrator_is_taken_for_modes_too():
+    scene = Scene(oscillator="pendulum", coupling="damper", topology=chain(2), integrator="taylor")
+    assert of_modes(scene, [200.0]) == "taylor"
+    assert of_modes(scene.replace(integrator="rodas5p"), [0.0]) == "rodas5p"
+
+
+def test_the_probe_looks_at_its_strongest_ring():
+    scene = Scene(oscillator="pendulum", coupling="damper", topology=chain(2), record=())
+    equations = ring_of_three(scene.equations)
+
+    def method(alpha: float) -> str:
+        values = {**scene.parameters, "mode_alpha": alpha, "mode_beta": 0.0}
+        numbers = np.array([[values[name] for name in equations.parameters]])
+        return chosen_for_rows(scene, equations, Plan(np.full((1, 6), 0.1), numbers, np.zeros((1, 4)))).name
+
+    assert (method(1.0), method(-100.0)) == ("taylor", "rodas5p")
+
+
 def test_stiffness_that_appears_is_said():
     scene = Scene(
         oscillator="van_der_pol",
@@ -92,3 +139,15 @@ def test_stiffness_that_appears_is_said():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         run(scene, mu=[1.0, 2.0], show_progress=False)
+
+
+def test_modes_that_become_stiff_are_said():
+    """Van der Pol from the middle of a jump, where it is not stiff yet, onto the slow branch."""
+    scene = Scene(oscillator="van_der_pol", topology=chain(2), parameters={"mu": 200.0}, integrator="taylor")
+    orbits = Orbits.make(scene, np.array([0.0]), np.array([[0.0, 1.0]]), 1)
+    with pytest.warns(RuntimeWarning, match=r"stiff modes: found a rate of .*integrator = 'rodas5p'"):
+        orbits.integrator_of(orbits.strengths).advance(2.0)
+    easy = Orbits.make(scene.replace(parameters={"mu": 1.0}), np.array([0.0]), np.array([[0.0, 1.0]]), 1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        easy.integrator_of(easy.strengths).advance(20.0)
