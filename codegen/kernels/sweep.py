@@ -204,6 +204,7 @@ def _stages(
     steps = _steps(plain, blocks, method, elimination)
     looped = elimination is not None
     functions = [f for k in range(len(blocks)) for f in node_functions(list(steps.values()), blocks[k], k)]
+    functions += dict.fromkeys(f for writer in steps.values() for f in writer.functions)
     stepping = [_step(name, writer, looped) for name, writer in steps.items()]
     made = [*map(LANES.function, functions), SCALED, *([PAIR, driver.text("sparse")] if looped else [])]
     scratch = workspace(steps["step"], elimination) if elimination is not None else 0

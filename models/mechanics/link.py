@@ -112,7 +112,11 @@ def edge(
     if isinstance(coupling, MatrixCoupling):
         sigma = sp.Symbol("sigma", real=True)
         rates = _entry_rates(coupling, (single, other or single), sigma * WEIGHT, here, there)
-        return Edge(here, there, WEIGHT, rates, (sigma,))
+        if single.inertia:  # the entries are rates, and M multiplies them
+            own = sp.Matrix(single.inertia).xreplace(dict(zip(single.state, here, strict=True)))
+            rates = tuple(own * sp.Matrix(rates))
+        used = {s for e in rates for s in e.free_symbols}
+        return Edge(here, there, WEIGHT, rates, (sigma, *(s for s in single.parameters if s in used)))
     half = len(single.state) // 2
     strengths = tuple(sp.Symbol(name, real=True) for name in coupling.parameters)
     ends = _Ends(single, other or single, oscillator, partner or oscillator, here, there)
@@ -130,7 +134,7 @@ def _by_lagrange(
     coordinates, moving, half, speeds = ends.coordinates, ends.velocities, ends.halves[0], ends.here[ends.halves[0] :]
     forces = tuple(-dissipation.diff(v) for v in moving)
     rest, masses = balance(kinetic, potential, forces, coordinates, moving)
-    own = _masses(oscillator, ends.nodes[0], ends.here)
+    own = sp.eye(half) if ends.nodes[0].inertia else _masses(oscillator, ends.nodes[0], ends.here)
     rates = solve_masses(own, [_in_differences(e, ends.pairs, ends.here) for e in rest[:half]], speeds)
     if all(e == 0 for e in masses):
         return rates, ()
