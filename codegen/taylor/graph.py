@@ -28,15 +28,17 @@ from .series import (
     Product,
     QuotientIntegral,
     Ratio,
+    Row,
     Series,
     Slope,
     Square,
     SquareRoot,
+    Unknown,
 )  # fmt: skip
 from .terms import ONE, ZERO, Expr, Name, Number, add, times
 from .terms import Product as Factors
 
-__all__ = ["STARTS", "Graph", "Template", "is_linear", "kink"]
+__all__ = ["STARTS", "Graph", "Template", "is_linear", "kink", "split"]
 
 STARTS: dict[type[sp.Expr], str] = {
     sp.exp: "exp", sp.log: "log", sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.sinh: "sinh", sp.cosh: "cosh",
@@ -370,7 +372,7 @@ def _negative(e: Expr) -> bool:
 
 def _words() -> tuple[str, ...]:
     """What names of series begin with."""
-    kinds = (Linear, Power, Product, Ratio, Slope, Square, SquareRoot)
+    kinds = (Linear, Power, Product, Ratio, Row, Slope, Square, SquareRoot, Unknown)
     return (*(kind.__name__.lower() for kind in kinds), *STARTS.values())
 
 

@@ -13,18 +13,30 @@ from dataclasses import dataclass, field
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.mechanics.components import TIME, Node
+from synchain.models.mechanics.components import TIME, Block, Node
 
 from ..program.passes import Body, Hoist, Names
 from ..program.printers import LANES
 from ..steps.names import NAMES
 from ..steps.places import Joint, Kind, Span, places
 from .graph import Graph, Template
+from .masses import solved
 from .series import Constant, Series, State, Time
 from .step import TaylorStep, called, finished
 from .terms import ZERO, Assign, Expr, Name, Number, add, show, statement
 
 __all__ = ["write_looped"]
+
+CONVOLUTION = '''
+@njit(error_model='numpy')
+def convolution(dense, left, left_step, right, right_step, k, first, end):
+    """Sum of left_j*right_(k-j) for j = first … end - 1; the coefficients of a series stand a step apart."""
+    total = broadcast(0.0, WIDTH)
+    for j in range(first, end):
+        total = total + load(dense, left + j*left_step, WIDTH)*load(dense, right + (k - j)*right_step, WIDTH)
+    return total
+'''.strip()
+"""Loops of its own in each sum would take most of the time of a compilation."""
 
 
 @dataclass(slots=True)
@@ -76,11 +88,8 @@ class Section:
         total = f"s{self.sums}"
         self.sums += 1
         end = {0: "k + 1", -1: "k"}[last]
-        self.lines += [
-            f"{total} = 0.0*scale",
-            f"for j in range({first}, {end}):",
-            f"    {total} = {total} + {self.load(left, 'j')}*{self.load(right, '(k - j)')}",
-        ]
+        ends = f"{self.row(left)}, {self.row(right)}"
+        self.lines.append(f"{total} = convolution(dense, {ends}, k, {first}, {end})")
         return Name(total)
 
     def square(self, base: Series, first: int) -> Expr:
@@ -95,6 +104,13 @@ class Section:
         return what
 
     # -- places ---------------------------------------------------------------------------------------------------
+
+    def row(self, series: Series) -> str:
+        """Where the coefficients of a series begin, and how far apart they stand."""
+        if series in self.places:
+            return f"at_states + {self.places[series]}, DIMENSION"
+        owner = self.waves.get(series, self)
+        return f"{owner.slot(series.name, '0')}, {({'i': 'NODES', 'e': 'LINKS'}).get(owner.index, '1')}"
 
     def slot(self, name: str, order: str) -> str:
         """Where a coefficient of a series of this section stands."""
@@ -206,7 +222,7 @@ class LoopWriter:
         section.places = {state: self.place(component[s]) for s, state in moving.items()}
         seen: dict[sp.Symbol, Series] = {symbol: State(name=series.name) for symbol, series in waves.items()}
         section.waves = dict.fromkeys(seen.values(), self.waves)
-        found = self.read(section, rates, {**moving, **seen}, constants)
+        found = self.read(section, rates, {**moving, **seen}, constants, kind.node.inertia)
         section.rates = [(self.place(c), rate) for c, rate in enumerate(found)]
         return section
 
@@ -287,11 +303,15 @@ class LoopWriter:
         rates: Sequence[sp.Expr],
         moving: Mapping[sp.Symbol, Series],
         swap: Mapping[sp.Symbol, sp.Expr],
+        inertia: Block = (),
     ) -> list[Series]:
         """The series of a section, and the constants that each of its turns computes."""
         graph = section.graph
-        template = Template.of(rates, moving, self.names.fresh("shared_"))
+        template = Template.of([*rates, *(e for row in inertia for e in row)], moving, self.names.fresh("shared_"))
         found = graph.read(template, moving, {**self.swap, **swap})
+        size = len(rates)
+        found, masses = found[:size], {divmod(k, size): e for k, e in enumerate(found[size:])}
+        found = list((solved(graph, masses, dict(enumerate(found))) if masses else dict(enumerate(found))).values())
         graph.settle(found)
         section.before += [f"{name} = {text}" for name, text in graph.constants.items()]
         return found
@@ -389,6 +409,15 @@ class LoopWriter:
 
 
 def write_looped(equations: Equations, order: int) -> TaylorStep:
-    """Return the looped Taylor step of some order; see `write_step`."""
+    """Return the looped Taylor step of some order; see `write_step`.
+
+    Raises
+    ------
+    ValueError
+        As `write_step`, and for a mass matrix beside links: the loop over nodes solves before links are added.
+    """
+    if equations.inertial and equations.links:
+        found = "links with inertia" if equations.inertial_links else "links of nodes with a mass matrix"
+        raise ValueError(f"taylor: found {found} in a network that is stepped in loops; use dop853 or rodas5p")
     lines, size = LoopWriter(equations, order).write()
-    return TaylorStep.of(lines, order, size, ", graph, weights")
+    return TaylorStep.of(lines, order, size, ", graph, weights", CONVOLUTION)

@@ -17,6 +17,7 @@ from synchain.models.mechanics.components import TIME
 
 from ..program.passes import Names
 from .graph import STARTS, Graph, Template
+from .masses import solved
 from .series import Constant, Series, State, Time
 from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
 
@@ -27,7 +28,7 @@ FARTHEST = 16.0
 
 WORDS = frozenset(
     {"scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
-     "slope_scale", *STARTS.values()}
+     "slope_scale", "convolution", *STARTS.values()}
 )  # fmt: skip
 PREFIXES = ("i_", "e_", "half_", "w_", "n_", "size_", "odd_")
 """Names of the step; a user's symbol of that name is called otherwise within the step."""
@@ -54,9 +55,10 @@ class TaylorStep:
         return sum(body.count(sign) for sign in (" + ", " - ", "*", "/"))
 
     @classmethod
-    def of(cls, lines: Sequence[str], order: int, workspace: int = 0, more: str = "") -> TaylorStep:
-        """The step of some statements."""
+    def of(cls, lines: Sequence[str], order: int, workspace: int = 0, more: str = "", before: str = "") -> TaylorStep:
+        """The step of some statements, behind a function that they call."""
         head = [
+            *([before, "", ""] if before else []),
             "@njit(error_model='numpy', cache=True)",
             f"def step(t, h, scale, y, p, y_new, dense, rtol, atol{more}):",
             '    """One step from (t, y): writes y_new and the dense output, returns the length of the step."""',
@@ -171,7 +173,28 @@ class StepWriter:
             found = self.graph.read(edges[eq.edge_at(link)], *self.parted({}, eq.at_link(link)))
             for slot, rate in zip(eq.places[link[0]], found, strict=True):
                 terms[slot].append((ONE, rate))
-        return [self.graph.sum(terms[slot]) for slot in self.states]
+        right = {slot: self.graph.sum(terms[slot]) for slot in self.states}
+        return list((solved(self.graph, self.masses(), right) if eq.inertial else right).values())
+
+    def masses(self) -> dict[tuple[int, int], Series]:
+        """The entries of M."""
+        eq, terms = self.equations, dict[tuple[int, int], list[tuple[Expr, Series]]]()
+        shared = self.supply.fresh("shared_")
+        nodes = [Template.of([e for row in node.inertia for e in row], node.state, shared) for node in eq.nodes]
+        ends = {edge: (*edge.here, *edge.there) for edge in eq.edges}
+        edges = {e: Template.of([x for b in e.inertia for r in b for x in r], ends[e], shared) for e in eq.edges}
+        for i, own in enumerate(eq.places):
+            keys = [(r, c) for r in own for c in own] if eq.node_at(i).inertia else []
+            found = self.graph.read(nodes[eq.kind_of[i]], *self.parted({}, eq.at_node(i)))
+            terms |= {key: [(ONE, e)] for key, e in zip(keys, found, strict=True)} or {(k, k): [(ONE, Constant(ONE))] for k in own}
+        for link in eq.links:
+            edge = eq.edge_at(link)
+            rows, columns = eq.places[link[0]], [eq.places[end] for end in link[:2]]
+            keys = [(r, c) for own in columns for r in rows for c in own] if edge.inertia else []
+            found = self.graph.read(edges[edge], *self.parted({}, eq.at_link(link)))
+            for key, e in zip(keys, found, strict=True):
+                terms.setdefault(key, []).append((ONE, e))
+        return {key: self.graph.sum(parts) for key, parts in terms.items()}
 
     def parted(
         self, known: dict[sp.Symbol, Series], values: Mapping[sp.Symbol, sp.Expr]
@@ -316,12 +339,10 @@ def write_step(equations: Equations, order: int) -> TaylorStep:
     Raises
     ------
     ValueError
-        For an order that is too small, functions that are not analytic, and links with inertia.
+        For an order that is too small, and for functions that are not analytic.
     """
     if order < 6:
         raise ValueError(f"taylor: found order {order}; expected at least 6")
-    if equations.inertial:
-        raise ValueError("taylor: found links with inertia; expected an identity mass matrix; use dop853 or rodas5p")
     return TaylorStep.of(StepWriter(equations, order).write(), order)
 
 
