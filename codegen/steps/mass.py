@@ -14,16 +14,29 @@ from functools import cached_property
 import sympy as sp
 
 from synchain.models.mechanics.calculus import derivative
-from synchain.models.mechanics.components import Edge
+from synchain.models.mechanics.components import Block, Edge, Node
 
 from ..program.expressions import Expression, Name, Product, call
 from ..program.lowering import lower
 from ..program.passes import Names
 from ..program.statements import Assign, Function, Return, Statement, let
 from .elimination import Entries, Entry, Factors, Plan, plan, write_elimination, write_solve
-from .step import Block, Step, function_of, prefix
+from .step import Step, function_of, prefix
 
-__all__ = ["Mass", "momentum_slopes"]
+__all__ = ["Mass", "added_masses", "momentum_slopes", "turned_masses"]
+
+
+def added_masses(node: Node) -> Block:
+    """Return M - 1 of one node, empty where M is the identity."""
+    return tuple(tuple(e - sp.Integer(r == c) for c, e in enumerate(row)) for r, row in enumerate(node.inertia))
+
+
+def turned_masses(node: Node, rates: Sequence[sp.Symbol]) -> Block:
+    """Return d(M F)/dy of one node at fixed rates F, by its states; empty where M depends on none."""
+    if node.constant_inertia:
+        return ()
+    carried = [sp.Add(*(e * f for e, f in zip(row, rates, strict=True))) for row in node.inertia]
+    return tuple(tuple(derivative(e, s) for s in node.state) for e in carried)
 
 
 def momentum_slopes(edge: Edge, here: Sequence[sp.Symbol], there: Sequence[sp.Symbol]) -> tuple[Block, Block]:

@@ -20,7 +20,6 @@ from .blocks import NodeBlocks
 __all__ = [
     "PAIR",
     "SCALED",
-    "Block",
     "Step",
     "function_name",
     "function_of",
@@ -32,9 +31,6 @@ __all__ = [
 
 LARGEST_INLINED = 400
 """Operations of a function up to which its body stands in each stage; copies of longer ones take long to compile."""
-
-Block = tuple[tuple[sp.Expr, ...], ...]
-"""Entries of a matrix that belong to one node or to one end of a link."""
 
 PAIR = '''
 @njit(error_model="numpy", forceinline=True)
