@@ -154,7 +154,7 @@ def emit(
         raise ValueError("the record 'sync_error' compares states of one name, and these nodes have none in common")
     if weights is not None and len(weights) != equations.n:
         raise ValueError(f"multiplicity has {len(weights)} entries; expected one for each of {equations.n} nodes")
-    looped = equations.n > unroll
+    looped = equations.n > unroll or (method.series and equations.inertial and not equations.links)
     if looped:
         method = _for_many(method, equations, unroll)
     elimination = program(equations, fill) if looped else None

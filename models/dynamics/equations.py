@@ -179,7 +179,7 @@ class Equations(_Cached):
             "nodes of several kinds": self.mixed,
             f"nodes that differ in {', '.join(self.varied)}": bool(self.varied) and not varied_too,
             "links with inertia": self.inertial_links and not inertia_too,
-            "nodes with a mass matrix of their own": any(node.inertia for node in self.nodes),
+            "nodes with a mass matrix (more than three coupled coordinates)": any(node.inertia for node in self.nodes),
         }
         found = next((words for words, holds in problems.items() if holds), None)
         if found is not None:

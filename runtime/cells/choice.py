@@ -14,6 +14,7 @@ import sympy as sp
 from synchain.codegen.driver.columns import Count, Sum
 from synchain.codegen.integrators import Integrator, integrator
 from synchain.codegen.kernels.sweep import AUTO, KernelSource
+from synchain.codegen.steps.mass import turned_masses
 from synchain.codegen.taylor import is_linear, kink, order_for
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
@@ -36,8 +37,10 @@ def chosen_integrator(reduction: Reduction) -> Integrator:
     """Return the integrator of a scene, the fastest at equal error where the scene says "auto".
 
     Power series where all functions are analytic and the start is not stiff, in the extreme cells of
-    the sweep; between the events of set-valued friction too.  Otherwise Rosenbrock steps, or a
-    switching pair of methods for two oscillators at a tight tolerance.
+    the sweep; between the events of set-valued friction too.  Nodes with a mass matrix take explicit
+    steps in their place: the recurrences of a dense matrix take longer to compile than most runs.
+    Otherwise Rosenbrock steps, or a switching pair of methods for two oscillators at a tight
+    tolerance.
 
     Parameters
     ----------
@@ -49,8 +52,8 @@ def chosen_integrator(reduction: Reduction) -> Integrator:
         return _taylor(scene, equations)
     if scene.integrator != "auto":
         return integrator(scene.integrator)
-    if not equations.inertial and kink(equations) is None and (equations.sticks or stiffness(scene) < STIFF):
-        return _taylor(scene, equations)
+    if not equations.inertial_links and kink(equations) is None and (equations.sticks or stiffness(scene) < STIFF):
+        return integrator("dop853") if equations.inertial else _taylor(scene, equations)
     if equations.sticks:
         return integrator("dop853")
     pair = equations.n == 2 and not (equations.mixed or equations.inertial) and scene.rtol <= 1e-9
@@ -115,12 +118,26 @@ def _rates(equations: Equations, state: np.ndarray, numbers: np.ndarray) -> tupl
 def _blocks(equations: Equations, values: Mapping[str, float]) -> list[np.ndarray]:
     """The blocks of the Jacobian of the first nodes, with twice what their links add."""
     nodes = range(min(equations.n, NODES))
-    blocks = [_value(equations.node_at(i).jacobian(), equations.at_node(i), values) for i in nodes]
+    masses = {i: _value(node.inertia, equations.at_node(i), values) for i in nodes if (node := equations.node_at(i)).inertia}
+    blocks = [_block(equations, i, values, masses.get(i)) for i in nodes]
     for link in islice(equations.links, LINKS):
         if link[0] < len(blocks):
             found = _value(equations.edge_at(link).jacobian_here(), equations.at_link(link), values)
             blocks[link[0]] = blocks[link[0]] + 2.0 * found
-    return blocks
+    return [np.linalg.solve(masses[i], block) if i in masses else block for i, block in enumerate(blocks)]
+
+
+def _block(equations: Equations, i: int, values: Mapping[str, float], mass: np.ndarray | None) -> np.ndarray:
+    """The Jacobian of a node's right-hand side less that of M F at fixed rates F."""
+    node, at = equations.node_at(i), equations.at_node(i)
+    found = _value(node.jacobian(), at, values)
+    if mass is None or node.constant_inertia:
+        return found
+    size = len(node.state)
+    forces = _value(tuple((e,) * size for e in node.rhs), at, values)[:, 0]
+    rates = [sp.Dummy(s.name, real=True) for s in node.state]
+    known = dict(zip(rates, map(sp.Float, np.linalg.solve(mass, forces)), strict=True))
+    return found - _value(turned_masses(node, rates), {**at, **known}, values)
 
 
 def _value(
