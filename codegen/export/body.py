@@ -138,9 +138,7 @@ def check_inertia(equations: Equations, language: str) -> None:
             return
         what = "nodes with a mass matrix" if own else "links with inertia"
         other = "" if own or language == "python" else "; export Python, which has sparse solvers"
-        raise ValueError(
-            f"{what} in {language}: expected at most {LARGEST_UNROLLED} nodes, found {equations.n}{other}"
-        )
+        raise ValueError(f"{what} in {language}: expected at most {LARGEST_UNROLLED} nodes, found {equations.n}{other}")
 
 
 def _edge(equations: Equations, link: Link | None) -> Edge | None:

@@ -274,7 +274,9 @@ class LoopMass:
         w.put(*filled(matrix, 1.0 + 0.0 * Name("h")))
         for kind in self.heavy:
             added = added_masses(kind.node)
-            w.put(kind.span.over([*self.node(kind, added, base), *w.entries(added, "node_slot", {}, lambda e: e, matrix)]))
+            w.put(
+                kind.span.over([*self.node(kind, added, base), *w.entries(added, "node_slot", {}, lambda e: e, matrix)])
+            )
         for joint in self.joints:
             found = self.link(joint, base)
             for block, slot in zip(joint.edge.inertia, SLOTS, strict=True):

@@ -186,7 +186,9 @@ class StepWriter:
         for i, own in enumerate(eq.places):
             keys = [(r, c) for r in own for c in own] if eq.node_at(i).inertia else []
             found = self.graph.read(nodes[eq.kind_of[i]], *self.parted({}, eq.at_node(i)))
-            terms |= {key: [(ONE, e)] for key, e in zip(keys, found, strict=True)} or {(k, k): [(ONE, Constant(ONE))] for k in own}
+            terms |= {key: [(ONE, e)] for key, e in zip(keys, found, strict=True)} or {
+                (k, k): [(ONE, Constant(ONE))] for k in own
+            }
         for link in eq.links:
             edge = eq.edge_at(link)
             rows, columns = eq.places[link[0]], [eq.places[end] for end in link[:2]]

@@ -73,10 +73,14 @@ class Node:
             raise ValueError("node: found set-valued friction beside a mass matrix; expected one coordinate")
         size = len(self.state)
         if len(self.inertia) != size:
-            raise ValueError(f"node: found a mass matrix of {len(self.inertia)} rows; expected one for each of {size} states")
+            raise ValueError(
+                f"node: found a mass matrix of {len(self.inertia)} rows; expected one for each of {size} states"
+            )
         for row in self.inertia:
             if any(e.has(TIME) for e in row):
-                raise ValueError(f"node: the masses {row} depend on time; expected a mass matrix of states and parameters")
+                raise ValueError(
+                    f"node: the masses {row} depend on time; expected a mass matrix of states and parameters"
+                )
             _check("node inertia", row, size, known)
 
     @property

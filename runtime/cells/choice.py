@@ -118,7 +118,9 @@ def _rates(equations: Equations, state: np.ndarray, numbers: np.ndarray) -> tupl
 def _blocks(equations: Equations, values: Mapping[str, float]) -> list[np.ndarray]:
     """The blocks of the Jacobian of the first nodes, with twice what their links add."""
     nodes = range(min(equations.n, NODES))
-    masses = {i: _value(node.inertia, equations.at_node(i), values) for i in nodes if (node := equations.node_at(i)).inertia}
+    masses = {
+        i: _value(node.inertia, equations.at_node(i), values) for i in nodes if (node := equations.node_at(i)).inertia
+    }
     blocks = [_block(equations, i, values, masses.get(i)) for i in nodes]
     for link in islice(equations.links, LINKS):
         if link[0] < len(blocks):

@@ -1,0 +1,70 @@
+"""Taylor steps of equations M d(state)/dt = r: one factorisation at order 0 for the coefficients of all orders."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+from march import compiled, step_of
+from pendula import ByHand, pendulum
+from samples import clocks, inertial
+from scipy.integrate import solve_ivp
+
+from synchain.codegen.steps.names import tidy
+from synchain.codegen.taylor import write_looped
+from synchain.models import chain
+from synchain.models.dynamics.equations import Equations
+from synchain.models.scenes.scene import Scene
+
+LINKS = 4
+START = np.array([0.5, -0.3, 0.8, 0.1, 0.2, -0.4, 0.3, 0.6])
+
+
+def alone(links: int) -> Equations:
+    return Scene(oscillator=pendulum(links), coupling=None, record=()).equations
+
+
+def rates_of(equations: Equations, numbers: list[float]):
+    """The rates by SymPy's M and r, solved by NumPy."""
+    symbols = [sp.Symbol(s, real=True) for s in (*equations.state, *equations.parameters)]
+    size = equations.dimension
+    mass = sp.lambdify(symbols, sp.Matrix(sp.SparseMatrix(size, size, equations.mass())))
+    time = sp.Symbol("t", real=True)
+    forces = sp.lambdify([time, *symbols], list(equations.rhs()))
+    return lambda t, y: np.linalg.solve(mass(*y, *numbers), np.array(forces(t, *y, *numbers), float))
+
+
+@pytest.mark.parametrize("looped", [False, True], ids=["written out", "looped"])
+def test_a_pendulum_of_many_links_moves_as_its_matrices_say(looped):
+    lanes = compiled(alone(LINKS), 8, looped=looped)
+    found, _ = lanes.run(START, [1.3, 0.2], 0.5, 1e-13)
+    expected = solve_ivp(ByHand(LINKS, 1.3, 0.2).rates, (0, 0.5), START, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    assert np.abs(found[0] - expected).max() < 2e-13
+
+
+@pytest.mark.parametrize("equations", [clocks(), inertial()], ids=["masses of the state", "constant masses"])
+def test_links_with_inertia_take_series_too(equations):
+    start = np.linspace(-0.4, 0.6, equations.dimension)
+    numbers = list(np.linspace(0.3, 0.9, len(equations.parameters)))
+    found, _ = compiled(equations, 12).run(start, numbers, 0.5, 1e-13)
+    expected = solve_ivp(rates_of(equations, numbers), (0, 0.5), start, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    assert np.abs(found[0] - expected).max() < 2e-13
+
+
+def test_a_matrix_is_factorised_once_and_a_symmetric_one_by_half_the_operations():
+    lines = step_of(alone(LINKS), 8).text.splitlines()
+    divisions = [line for line in lines if " = 1.0/" in line and line.strip().startswith("i_row")]
+    lower = [line for line in lines if line.strip().startswith("l_row")]
+    assert (len(divisions), len(lower)) == (LINKS, LINKS * (LINKS - 1) // 2)
+    assert all("u_row" in line or "product" in line or "linear" in line for line in lower)
+
+
+def test_loops_over_links_of_a_mass_matrix_are_refused():
+    network = Scene(oscillator=pendulum(4), coupling="spring on q1", topology=chain(9), record=()).equations
+    with pytest.raises(
+        ValueError, match="taylor: found links of nodes with a mass matrix in a network that is stepped in"
+    ):
+        write_looped(tidy(network), 8)
+    inerters = Scene(oscillator="duffing", coupling="inerter", topology=chain(9), record=()).equations
+    with pytest.raises(ValueError, match="taylor: found links with inertia in a network"):
+        write_looped(tidy(inerters), 8)
