@@ -198,7 +198,7 @@ class Equations(_Cached):
     @cached_property
     def constant_mass(self) -> bool:
         """True if M depends on parameters alone."""
-        return all(part.constant_inertia for part in (*self.nodes, *self.edges))
+        return all(node.constant_inertia for node in self.nodes) and all(edge.constant_inertia for edge in self.edges)
 
     @property
     def forced(self) -> bool:

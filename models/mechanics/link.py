@@ -112,11 +112,12 @@ def edge(
     if isinstance(coupling, MatrixCoupling):
         sigma = sp.Symbol("sigma", real=True)
         rates = _entry_rates(coupling, (single, other or single), sigma * WEIGHT, here, there)
+        masses: tuple[sp.Symbol, ...] = ()
         if single.inertia:  # the entries are rates, and M multiplies them
             own = sp.Matrix(single.inertia).xreplace(dict(zip(single.state, here, strict=True)))
             rates = tuple(own * sp.Matrix(rates))
-        used = {s for e in rates for s in e.free_symbols}
-        return Edge(here, there, WEIGHT, rates, (sigma, *(s for s in single.parameters if s in used)))
+            masses = tuple(s for s in single.parameters if any(e.has(s) for e in rates))
+        return Edge(here, there, WEIGHT, rates, (sigma, *masses))
     half = len(single.state) // 2
     strengths = tuple(sp.Symbol(name, real=True) for name in coupling.parameters)
     ends = _Ends(single, other or single, oscillator, partner or oscillator, here, there)
