@@ -12,6 +12,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import sympy as sp
+from pendula import pendulum, telescope
 
 from synchain.codegen import driver
 from synchain.codegen.kernels.compile import Kernel, load
@@ -150,6 +151,19 @@ def clocks(n: int = 2) -> Equations:
     return Scene(oscillator="clock", nodes=beam, coupling="hanging", topology=star(n + 1)).equations
 
 
+def pendula() -> Equations:
+    """Two nodes whose masses couple four coordinates and depend on them, one with more damping than the other."""
+    unequal = {"delta": [0.1, 0.2]}
+    return Scene(
+        oscillator=pendulum(4), coupling="spring on q1", topology=chain(2), parameters=unequal, record=()
+    ).equations
+
+
+def telescopes() -> Equations:
+    """Two nodes whose masses couple four coordinates by constants, and an inerter."""
+    return Scene(oscillator=telescope(4), coupling="inerter on q2", topology=chain(2), record=()).equations
+
+
 def two_kinds() -> Equations:
     """Nodes of two and of three states that share a name, some with parameters of their own."""
     kinds = [{"oscillator": "lorenz", "at": [2, 3]}]
@@ -158,7 +172,8 @@ def two_kinds() -> Equations:
 
 
 UNEQUAL: dict[str, Equations] = {
-    "varied": varied(), "inertial": inertial(), "clocks": clocks(), "two kinds": two_kinds(),
+    "varied": varied(), "inertial": inertial(), "clocks": clocks(), "two kinds": two_kinds(), "pendula": pendula(),
+    "telescopes": telescopes(),
 }  # fmt: skip
 """Networks whose nodes differ or whose links have inertia."""
 

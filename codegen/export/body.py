@@ -11,7 +11,7 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.links import Link
 from synchain.models.mechanics.calculus import derivative
-from synchain.models.mechanics.components import Edge
+from synchain.models.mechanics.components import Block, Edge, Node
 
 from ..program.expressions import Expression
 from ..program.lowering import Library, number
@@ -19,7 +19,8 @@ from ..program.statements import Statement, let
 
 __all__ = [
     "LARGEST_UNROLLED", "Body", "Linked", "Place", "Storing", "check_inertia", "is_unrolled", "link_body", "link_places",
-    "mass_body", "node_body", "node_places", "own_parameters", "parameters", "rate_symbols", "weights", "wrapped",
+    "mass_body", "node_body", "node_mass_body", "node_places", "node_rate_symbols", "own_parameters", "parameters",
+    "rate_symbols", "weights", "wrapped",
 ]  # fmt: skip
 
 LARGEST_UNROLLED = 8
@@ -27,8 +28,6 @@ LARGEST_UNROLLED = 8
 
 Place = tuple[int, int]
 """(row, column) of an entry in the block of one node or link, by component of the state."""
-
-Block: TypeAlias = tuple[tuple[sp.Expr, ...], ...]
 
 Linked: TypeAlias = tuple[Link, Edge]
 """A link with its template."""
@@ -67,8 +66,24 @@ def node_body(equations: Equations, jacobian: bool = False, i: int = 0) -> Body:
 
 
 def node_places(equations: Equations, i: int = 0) -> dict[Place, sp.Expr]:
-    """The entries of a node's own block of the Jacobian that are not zero."""
-    return _places(equations.node_at(i).jacobian())
+    """The entries of a node's own block of d(rhs)/d(state) - d(M rates)/d(state) at fixed rates that are not zero."""
+    node = equations.node_at(i)
+    if not node.inertia:
+        return _places(node.jacobian())
+    push = sp.Matrix(node.inertia) * sp.Matrix(node_rate_symbols(node))
+    return _places(_less(node.jacobian(), push, node.state))
+
+
+def node_mass_body(equations: Equations, i: int = 0) -> Body:
+    """The entries of a node's block of M that are not those of the identity (place -> value)."""
+    block = equations.node_at(i).inertia
+    table = {(r, c): e for r, row in enumerate(block) for c, e in enumerate(row) if e != sp.Integer(r == c)}
+    return _body(table, every=True)
+
+
+def node_rate_symbols(node: Node) -> tuple[sp.Symbol, ...]:
+    """Symbols for the rates of the states of a node."""
+    return tuple(sp.Symbol(f"rate_i{k}", real=True) for k in range(len(node.state)))
 
 
 def link_places(equations: Equations, link: Linked | None = None) -> tuple[dict[Place, sp.Expr], dict[Place, sp.Expr]]:
@@ -91,7 +106,11 @@ def _at_rates(edge: Edge, block: Block, states: tuple[sp.Symbol, ...]) -> Block:
     if not edge.inertia:
         return block
     masses = sp.Matrix.hstack(*(sp.Matrix(part) for part in edge.inertia))
-    push = masses * sp.Matrix(rate_symbols(edge))
+    return _less(block, masses * sp.Matrix(rate_symbols(edge)), states)
+
+
+def _less(block: Block, push: sp.Matrix, states: tuple[sp.Symbol, ...]) -> Block:
+    """A block less the derivatives of M rates by some states."""
     return tuple(
         tuple(e - derivative(push[r], s) for e, s in zip(row, states, strict=True)) for r, row in enumerate(block)
     )
@@ -117,12 +136,12 @@ def is_unrolled(equations: Equations) -> bool:
 def check_inertia(equations: Equations, language: str) -> None:
     """Raise ValueError where a source text of many nodes cannot solve for the rates."""
     if equations.inertial and not is_unrolled(equations):
-        if language == "python" and equations.constant_mass:
+        own = any(node.inertia for node in equations.nodes)
+        if language == "python" and equations.constant_mass and not own:
             return
-        other = "" if language == "python" else "; export Python, which has sparse solvers"
-        raise ValueError(
-            f"links with inertia in {language}: expected at most {LARGEST_UNROLLED} nodes, found {equations.n}{other}"
-        )
+        what = "nodes with a mass matrix" if own else "links with inertia"
+        other = "" if own or language == "python" else "; export Python, which has sparse solvers"
+        raise ValueError(f"{what} in {language}: expected at most {LARGEST_UNROLLED} nodes, found {equations.n}{other}")
 
 
 def _edge(equations: Equations, link: Linked | None) -> Edge | None:

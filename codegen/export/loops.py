@@ -23,7 +23,9 @@ from .body import (
     link_places,
     mass_body,
     node_body,
+    node_mass_body,
     node_places,
+    node_rate_symbols,
     own_parameters,
     parameters,
     rate_symbols,
@@ -90,8 +92,16 @@ def jacobian_statements(equations: Equations, reads: bool = True) -> list[Statem
 
 def mass_statements(equations: Equations, reads: bool = True) -> list[Statement]:
     """The statements that build the mass matrix, for networks that are written out."""
-    blocks = _of_links(equations, mass_body, _either_end("mass_"), reads)
+    blocks = [*_of_nodes(equations, reads), *_of_links(equations, mass_body, _either_end("mass_"), reads)]
     return [Identity("mass_", Name("DIMENSION")), *(block for block in blocks if block.body)]
+
+
+def _of_nodes(equations: Equations, reads: bool) -> Iterator[Titled]:
+    """The mass matrix of each node."""
+    for i, title in enumerate(_nodes(equations)):
+        at = _literal(equations.places[i])
+        storing = _entry("mass_", Store, at, at)
+        yield Titled(title, tuple(node_mass_body(equations, i).statements(_loads(equations, i, at, reads), storing)))
 
 
 def place_of(block: int, size: str, index: str) -> Expression:
@@ -138,6 +148,7 @@ def _parameters(equations: Equations, jacobian: bool) -> list[Statement]:
     bodies = [node_body(equations, jacobian, i) for i in firsts]
     bodies += [link_body(equations, link, jacobian) for link in ends]
     bodies += [mass_body(equations, link) for link in ends]
+    bodies += [node_mass_body(equations, i) for i in firsts]
     return [let(equations.parameters[k], _at("numbers", Number(k))) for k in parameters(equations, bodies)]
 
 
@@ -151,7 +162,7 @@ def _loads(equations: Equations, i: int | None, at: Places, reads: bool) -> dict
     for s, k in own_parameters(equations, i or 0).items():
         place = Number(k) + "i_" if i is None else Number(k)
         found[s] = _at("numbers", place) if reads else Name(equations.parameters[k])
-    return found
+    return found | {s: _at("rates", at(c)) for c, s in enumerate(node_rate_symbols(equations.node_at(i or 0)))}
 
 
 def _pair(

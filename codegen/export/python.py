@@ -189,7 +189,7 @@ def _tables(model: Equations, small: bool) -> list[str]:
 
 def _small_places(model: Equations) -> list[tuple[int, int]]:
     """Where jac can differ from zero: in whole rows where rates are solved for, each depends on all that its row couples."""
-    heavy = {row for row, column in model.mass() if row != column}
+    heavy = {row for (row, column), e in model.mass().items() if e != sp.Integer(row == column)}
     return sorted(set(model.jacobian()) | {(row, column) for row in heavy for column in range(model.dimension)})
 
 

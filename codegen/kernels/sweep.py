@@ -159,6 +159,7 @@ def emit(
     if weights is not None and len(weights) != equations.n:
         raise ValueError(f"multiplicity has {len(weights)} entries; expected one for each of {equations.n} nodes")
     looped = equations.n > unroll or (not method.inexact and _of_links(equations) > MOST_OF_LINKS)
+    looped = looped or (method.series and equations.inertial and not equations.links)
     if looped:
         method = _for_many(method, equations, unroll)
     elimination = program(equations, fill) if looped else None
@@ -222,6 +223,7 @@ def _stages(
     steps = _steps(plain, blocks, method, elimination)
     looped = elimination is not None
     functions = [f for k in range(len(blocks)) for f in node_functions(list(steps.values()), blocks[k], k)]
+    functions += dict.fromkeys(f for writer in steps.values() for f in writer.functions)
     stepping = [_step(name, writer, looped) for name, writer in steps.items()]
     made = [*map(LANES.function, functions), SCALED, *([PAIR, driver.text("sparse")] if looped else [])]
     scratch = workspace(steps["step"], elimination) if elimination is not None else 0

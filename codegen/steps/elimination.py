@@ -115,12 +115,13 @@ def write_factors(
 def write_elimination(
     steps: Plan, matrix: Mapping[Entry, sp.Expr], taken: Mapping[Entry, sp.Expr], labels: tuple[str, ...]
 ) -> Factors:
-    """Write the elimination of `matrix` minus `taken`."""
+    """Write the elimination of `matrix` minus `taken`; a symmetric matrix alone takes half the operations, L D L^T."""
     writer = _Writer(labels)
     entries = {key: lower(matrix.get(key, sp.S.Zero) - taken.get(key, sp.S.Zero)) for key in sorted({*matrix, *taken})}
     value = {
         key: writer.atomic(writer.entry("m", *key), e) for key, e in entries.items() if key[0] != key[1] and e != ZERO
     }
+    symmetric = not taken and all(entries.get((c, r), ZERO) == e for (r, c), e in entries.items())
     diagonal = {k: entries[k, k] for k in steps.order}
     below: dict[Entry, Expression] = {}
     inverse: dict[int, Expression] = {}
@@ -134,6 +135,8 @@ def write_elimination(
                 new = less(old, below[r, k], value[k, c])
                 if r == c:
                     diagonal[r] = new
+                elif symmetric and c < r:
+                    value[r, c] = value[c, r]
                 else:
                     value[r, c] = writer.let(writer.entry("m", r, c) + f"_{k}", new)
     upper = {(k, c): value[k, c] for k, right in zip(steps.order, steps.after, strict=True) for c in right}

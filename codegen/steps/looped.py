@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import Block
 
 from ..integrators import Integrator
 from ..program.expressions import Expression, Load, Name, Product, Value, call, linear, negative, plus, scaled
@@ -18,11 +19,11 @@ from ..program.lowering import lower
 from ..program.passes import Body
 from ..program.statements import Assign, Do, If, Return, Statement, accumulate, let, store, whole
 from .blocks import NodeBlocks
-from .mass import momentum_slopes
+from .mass import added_masses, momentum_slopes, turned_masses
 from .names import NAMES
 from .places import Joint, Kind, link_ends, named, places, span
 from .program import Program
-from .step import NOW, Block, Step, lane, time_term
+from .step import NOW, Step, lane, time_term
 from .unrolled import entry
 
 __all__ = ["Looped"]
@@ -149,6 +150,7 @@ class Looped(Step):
         for kind in kinds:
             self.node_linear(kind)
         self.links("y", "" if self.mass.at_start() else "SLOPE", start=True, jacobian=True)
+        self.mass.turn()
         self.mass.factorise()
 
     def node_linear(self, kind: Kind) -> None:
@@ -166,7 +168,9 @@ class Looped(Step):
                 slope = lane(lower(named[size + size * size + c]))
                 found.append(store("dense", plus(Name("TIME_SLOPE"), place(c)), slope))
         block = tuple(tuple(named[size + a * size : size + (a + 1) * size]) for a in range(size))
-        self.put(kind.span.over(found + self.entries(block, "node_slot", {})))
+        found += self.entries(block, "node_slot", {})
+        found += self.entries(added_masses(kind.node), "node_slot", {}, lambda e: scaled("shift", e))
+        self.put(kind.span.over(found))
 
     # -- stages -----------------------------------------------------------------------------------------------
 
@@ -243,6 +247,7 @@ class LoopMass:
         self.writer, self.equations = writer, writer.equations
         self.inertial, self.constant = self.equations.inertial, self.equations.constant_mass
         self.joints = [joint for joint in writer.places.joints if joint.edge.inertia]
+        self.heavy = [kind for kind in writer.places.kinds if kind.node.inertia]
 
     def bases(self, before: int) -> dict[str, Expression]:
         """Where a Rosenbrock step keeps the rates at its start and M in a stage, behind so many vectors and the matrix."""
@@ -273,6 +278,11 @@ class LoopMass:
         """M at a state, factorised; STATE is lost."""
         w = self.writer
         w.put(*filled(matrix, 1.0 + 0.0 * Name("h")))
+        for kind in self.heavy:
+            added = added_masses(kind.node)
+            w.put(
+                kind.span.over([*self.node(kind, added, base), *w.entries(added, "node_slot", {}, lambda e: e, matrix)])
+            )
         for joint in self.joints:
             found = self.link(joint, base)
             for block, slot in zip(joint.edge.inertia, SLOTS, strict=True):
@@ -284,6 +294,12 @@ class LoopMass:
         """What the inertia of a link is made of."""
         used = tuple(e for block in joint.edge.inertia for row in block for e in row)
         return self.writer.link(joint, base, used, states=not self.constant)
+
+    def node(self, kind: Kind, used: Block, base: str) -> list[Statement]:
+        """What some masses of a node are made of: its states and its own parameters."""
+        w, results = self.writer, tuple(e for row in used for e in row)
+        states = [] if kind.node.constant_inertia else w.places.read(kind.node, base)
+        return states + w.places.own(Body((), results))
 
     # -- explicit methods -------------------------------------------------------------------------------------
 
@@ -312,6 +328,16 @@ class LoopMass:
         w.put(span("k", "DIMENSION").over([copied]))
         self.solve("RATES", "K1", "MASS")
         return True
+
+    def turn(self) -> None:
+        """Add d(M F)/dy of the nodes at fixed F to the matrix."""
+        w = self.writer
+        for kind in self.heavy:
+            rates = [sp.Symbol(f"g_{s.name}", real=True) for s in kind.node.state]
+            turned = turned_masses(kind.node, rates)
+            if turned:
+                found = [*self.node(kind, turned, "y"), *w.places.read(kind.node, "RATES", prefix="g_")]
+                w.put(kind.span.over(found + w.entries(turned, "node_slot", {}, lambda e: e)))
 
     def rates_of_link(self, joint: Joint) -> list[Statement]:
         """Load the rates at both ends of a link whose inertia depends on them."""
@@ -361,17 +387,26 @@ class LoopMass:
 
     def carried(self, i: int) -> None:
         """Add (M - 1) s to stage i, s what `known` has left in STATE, times the rate where that is a sum of stages."""
-        w, rate = self.writer, [Name("rate")] if self.constant else []
+        w, out = self.writer, f"K{i + 1}"
+        for kind in self.heavy:
+            added = added_masses(kind.node)
+            w.put(kind.span.over([*self.node(kind, added, "y"), *self.pushed(added, {}, "i", out)]))
         for joint in self.joints:
             found = self.link(joint, "y")
             for block, index in zip(joint.edge.inertia, "ij", strict=True):
-                for a, row in enumerate(block):
-                    for b, e in enumerate(row):
-                        if e != 0:
-                            load = Load("dense", plus(Name("STATE"), w.places.place(b, index)))
-                            value = Product((*rate, lower(e.xreplace(named(joint))), load))
-                            found.append(w.add(f"K{i + 1}", w.places.place(a), value))
+                found += self.pushed(block, named(joint), index, out)
             w.put(joint.span.over(found))
+
+    def pushed(self, block: Block, swap: dict[sp.Symbol, sp.Symbol], index: str, out: str) -> list[Statement]:
+        """Statements that add the product of a block and what stands in STATE, times the rate where M is constant."""
+        w, rate = self.writer, [Name("rate")] if self.constant else []
+        found = []
+        for a, row in enumerate(block):
+            for b, e in enumerate(row):
+                if e != 0:
+                    load = Load("dense", plus(Name("STATE"), w.places.place(b, index)))
+                    found.append(w.add(out, w.places.place(a), Product((*rate, lower(e.xreplace(swap)), load))))
+        return found
 
 
 def filled(matrix: str, diagonal: Expression) -> list[Statement]:

@@ -1,4 +1,4 @@
-"""The mass matrix of a network whose links have inertia: M d(state)/dt = f, solved by a sparse elimination, never inverted.
+"""The mass matrix of a network whose nodes or links have inertia: M d(state)/dt = f, solved by a sparse elimination.
 
 A Rosenbrock step for y' = F = M^-1 f solves (shift M - J) k = M (F(u) + rate sum c_j k_j) + d h f_t with M at the start of
 the step and J = df/dy - d(M F)/dy at fixed F: that is the exact Jacobian, multiplied by M.  Where M is constant, M F(u) is
@@ -14,15 +14,29 @@ from functools import cached_property
 import sympy as sp
 
 from synchain.models.mechanics.calculus import derivative
-from synchain.models.mechanics.components import Edge
+from synchain.models.mechanics.components import Block, Edge, Node
 
-from ..program.expressions import Expression, Name, Product
+from ..program.expressions import Expression, Name, Product, call
 from ..program.lowering import lower
-from ..program.statements import let
-from .elimination import Entries, Entry, Factors, plan, write_elimination, write_solve
-from .step import Block, Step, prefix
+from ..program.passes import Names
+from ..program.statements import Assign, Function, Return, Statement, let
+from .elimination import Entries, Entry, Factors, Plan, plan, write_elimination, write_solve
+from .step import Step, function_of, prefix
 
-__all__ = ["Mass", "momentum_slopes"]
+__all__ = ["Mass", "added_masses", "momentum_slopes", "turned_masses"]
+
+
+def added_masses(node: Node) -> Block:
+    """Return M - 1 of one node, empty where M is the identity."""
+    return tuple(tuple(e - sp.Integer(r == c) for c, e in enumerate(row)) for r, row in enumerate(node.inertia))
+
+
+def turned_masses(node: Node, rates: Sequence[sp.Symbol]) -> Block:
+    """Return d(M F)/dy of one node at fixed rates F, by its states; empty where M depends on none."""
+    if node.constant_inertia:
+        return ()
+    carried = [sp.Add(*(e * f for e, f in zip(row, rates, strict=True))) for row in node.inertia]
+    return tuple(tuple(derivative(e, s) for s in node.state) for e in carried)
 
 
 def momentum_slopes(edge: Edge, here: Sequence[sp.Symbol], there: Sequence[sp.Symbol]) -> tuple[Block, Block]:
@@ -42,7 +56,6 @@ class Mass:
 
     def __init__(self, writer: Step) -> None:
         self.writer, self.equations = writer, writer.equations
-        self.factors: Factors | None = None
 
     @cached_property
     def entries(self) -> dict[Entry, sp.Expr]:
@@ -67,43 +80,75 @@ class Mass:
     def refuse(self, what: str) -> None:
         """Raise ValueError where M is not the identity."""
         if self.equations.inertial:
-            raise ValueError(f"{what}: found links with inertia; expected none; use integrator 'rodas5p' or 'dop853'")
+            found = "links with inertia" if self.equations.inertial_links else "nodes with a mass matrix"
+            raise ValueError(f"{what}: found {found}; expected none; use integrator 'rodas5p' or 'dop853'")
 
-    def factorise(self, base: str) -> None:
-        """Write the elimination of M at a vector of states."""
-        w, rows = self.writer, self.rows
-        at = {sp.Symbol(n, real=True): sp.Symbol(prefix(base) + n, real=True) for n in w.state}
-        place = {row: k for k, row in enumerate(rows)}
-        matrix = {
-            (place[r], place[c]): e.xreplace(at) for (r, c), e in self.entries.items() if r in place and c in place
-        }
-        self.steps = plan(len(rows), set(matrix))
-        self.factors = write_elimination(self.steps, matrix, {}, tuple(f"mass_{w.state[row]}" for row in rows))
-        w.note("factors of M")
-        w.put(*self.factors.statements)
+    @property
+    def names(self) -> list[str]:
+        """The states whose rates M couples."""
+        return [self.writer.state[row] for row in self.rows]
 
-    def solve(self, source: str, out: str) -> None:
-        """Write out = M^-1 source for the rows that M couples, by the factors at hand."""
-        if self.factors is None:
-            raise RuntimeError("the mass matrix has not been factorised; this is a mistake in the program")
-        w, names = self.writer, [self.writer.state[row] for row in self.rows]
-        w.put(*(let(f"r_{name}", f"{source}_{name}") for name in names))
-        rights = {k: f"r_{name}" for k, name in enumerate(names)}
-        w.put(*write_solve(self.steps, self.factors, rights, {k: f"{out}_{name}" for k, name in enumerate(names)}))
+    def elimination(self, matrix: Mapping[Entry, sp.Expr]) -> tuple[Plan, Factors]:
+        """The elimination of the coupled rows of M, whose entries may have been given names."""
+        place = {row: k for k, row in enumerate(self.rows)}
+        inner = {(place[r], place[c]): e for (r, c), e in matrix.items() if r in place and c in place}
+        steps = plan(len(place), set(inner))
+        return steps, write_elimination(steps, inner, {}, tuple(f"mass_{name}" for name in self.names))
 
-    def explicit(self, base: str, out: str, first: bool) -> None:
+    def solution(self, steps: Plan, factors: Factors, out: str) -> list[Statement]:
+        """Statements that solve for the right-hand sides r_x, …, which are overwritten."""
+        numbered = list(enumerate(self.names))
+        return write_solve(steps, factors, {k: f"r_{s}" for k, s in numbered}, {k: f"{out}{s}" for k, s in numbered})
+
+    @cached_property
+    def factors(self) -> tuple[Plan, Factors]:
+        """The factors of a constant M, written where they are asked for first."""
+        found = self.elimination(self.entries)
+        self.writer.note("factors of M")
+        self.writer.put(*found[1].statements)
+        return found
+
+    @cached_property
+    def function(self) -> Function:
+        """The function that solves M rates = r where M depends on the state; stages call it."""
+        known = [*self.writer.state, *self.equations.parameters]
+        waves = sorted({f for e in self.entries.values() for f in e.atoms(sp.Function)}, key=sp.default_sort_key)
+        once = dict(zip(waves, Names(known).fresh("z"), strict=False))
+        steps, factors = self.elimination({key: e.xreplace(once) for key, e in self.entries.items()})
+        statements: list[Statement] = [let(s.name, lower(e)) for e, s in once.items()]
+        statements += [*factors.statements, *self.solution(steps, factors, "g_")]
+        found = Return(tuple(Name(f"g_{name}") for name in self.names))
+        used = {s.name for e in self.entries.values() for s in e.free_symbols}
+        arguments = [name for name in known if name in used]
+        about = "Rates of the states that the mass matrix couples: M rates = r."
+        made = function_of(
+            "solve_masses", (*arguments, *(f"r_{name}" for name in self.names)), about, (*statements, found)
+        )
+        self.writer.functions.append(made)
+        return made
+
+    def solve(self, base: str, source: str, out: str) -> None:
+        """Write out = M^-1 source for the rows that M couples, M at a vector of states."""
+        w = self.writer
+        if self.constant:
+            steps, factors = self.factors
+            w.put(*(let(f"r_{name}", f"{source}_{name}") for name in self.names))
+            w.put(*self.solution(steps, factors, f"{out}_"))
+            return
+        at = {name: prefix(base) + name for name in w.state} | {f"r_{name}": f"{source}_{name}" for name in self.names}
+        rates = call(self.function.name, *(at.get(name, name) for name in self.function.arguments))
+        w.put(Assign(tuple(f"{out}_{name}" for name in self.names), rates))
+
+    def explicit(self, base: str, out: str) -> None:
         """Turn the right-hand sides `out` of a stage into rates; a constant M is factorised in the first stage alone."""
         if self.entries:
-            if first or not self.constant:
-                self.factorise(base)
-            self.solve(out, out)
+            self.solve(base, out, out)
 
     def at_start(self, jacobian: Entries) -> Entries:
         """J = df/dy - d(M F)/dy at fixed F, from the entries of df/dy."""
         if not self.entries or self.constant:
             return jacobian
-        self.factorise("y")
-        self.solve("f", "g")
+        self.solve("y", "f", "g")
         found, rows, names = dict(jacobian), set(self.rows), self.writer.state
         states = [sp.Symbol(name, real=True) for name in names]
         for (row, column), e in self.entries.items():
@@ -120,8 +165,7 @@ class Mass:
         w, rate = self.writer, Name("rate")
         names = {row: w.state[row] for row in self.rows}
         if not self.constant:
-            self.factorise("u")
-            self.solve("f", "g")
+            self.solve("u", "f", "g")
         found = {}
         for name in names.values():
             change = sums[name] if self.constant else Name(f"g_{name}") + Product((rate, sums[name]))

@@ -20,10 +20,10 @@ import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.links import Link
-from synchain.models.mechanics.components import Edge
+from synchain.models.mechanics.components import Edge, Node
 
 from .elimination import Entry, Plan
-from .mass import momentum_slopes
+from .mass import added_masses, momentum_slopes, turned_masses
 from .places import by_joint, by_kind, joint_numbers, table
 from .step import Step
 
@@ -65,7 +65,7 @@ def program(equations: Equations, fill: float = FILL_LIMIT) -> Program:
     unless they would have more than `fill` entries for each entry of the matrix.
     """
     size = max(len(node.state) for node in equations.nodes)
-    own = tuple(block_pattern(node.jacobian()) for node in equations.nodes)
+    own = tuple(_node_pattern(node) for node in equations.nodes)
     joined = tuple(tuple(tuple(sorted(pattern)) for pattern in _link_patterns(edge)) for edge in equations.edges)
     where = tuple(table(equations).tolist()) if equations.mixed else ()
     numbers = {i: k for k, i in enumerate(by_kind(equations))}
@@ -73,6 +73,12 @@ def program(equations: Equations, fill: float = FILL_LIMIT) -> Program:
     counts = tuple(map(equations.kind_of.count, range(len(own))))
     shares = tuple(map(joint_numbers(equations).count, range(len(joined))))
     return _program(equations.n, size, own, joined, links, fill, counts, shares, where)
+
+
+def _node_pattern(node: Node) -> Pattern:
+    """Where a node has entries of shift M - J."""
+    turned = turned_masses(node, [sp.Dummy(real=True) for _ in node.state])
+    return tuple(sorted({*block_pattern(node.jacobian()), *block_pattern(added_masses(node)), *block_pattern(turned)}))
 
 
 def _link_patterns(edge: Edge) -> tuple[set[Entry], set[Entry]]:

@@ -14,13 +14,24 @@ from ..integrators import Integrator
 from ..program.expressions import Expression, Load, Name, Negation, Number, Product, Value, call, linear
 from ..program.lowering import lower
 from ..program.passes import Body
-from ..program.statements import Assign, Comment, Function, Return, Statement, let
+from ..program.statements import Assign, Comment, Function, Return, Statement, let, operations
 from .blocks import NodeBlocks
 
-__all__ = ["NOW", "PAIR", "SCALED", "Block", "Step", "function_name", "lane", "node_function", "prefix", "time_term"]
+__all__ = [
+    "NOW",
+    "PAIR",
+    "SCALED",
+    "Step",
+    "function_name",
+    "function_of",
+    "lane",
+    "node_function",
+    "prefix",
+    "time_term",
+]
 
-Block = tuple[tuple[sp.Expr, ...], ...]
-"""Entries of a matrix that belong to one node or to one end of a link."""
+LARGEST_INLINED = 400
+"""Operations of a function up to which its body stands in each stage; copies of longer ones take long to compile."""
 
 NOW = {TIME: sp.Symbol("now", real=True)}
 """What the time of a stage is called in the expressions of links."""
@@ -48,7 +59,12 @@ def function_name(name: str, kind: int) -> str:
 def node_function(name: str, about: str, body: Body, arguments: Sequence[str], results: Sequence[sp.Expr]) -> Function:
     """A small inlined function of lanes: statements first, results last."""
     statements = [let(s.name, lower(e)) for s, e in body.statements]
-    return Function(name, tuple(arguments), about, (*statements, Return(tuple(map(lower, results)))))
+    return function_of(name, arguments, about, [*statements, Return(tuple(map(lower, results)))])
+
+
+def function_of(name: str, arguments: Sequence[str], about: str, body: Sequence[Statement]) -> Function:
+    """A function of lanes that the stages of a step call; each of them takes over the body of a small one."""
+    return Function(name, tuple(arguments), about, tuple(body), inline=operations(body) <= LARGEST_INLINED)
 
 
 def lane(e: Expression, width: str = "WIDTH") -> Expression:
@@ -83,6 +99,7 @@ class Step(ABC):
         self.equations, self.kinds, self.method, self.bounded = equations, tuple(kinds), method, bounded
         self.state = equations.state
         self.statements: list[Statement] = []
+        self.functions: list[Function] = []
 
     def put(self, *statements: Statement) -> None:
         """Append statements."""

@@ -206,7 +206,7 @@ class Unrolled(Step):
         """Turn the slopes of stage i into its rates."""
         m = self.method
         if not m.implicit:
-            self.mass.explicit("u" if i else "y", f"k{i + 1}", first=i == 0)
+            self.mass.explicit("u" if i else "y", f"k{i + 1}")
             return
         rights, results = {}, {}
         sums = {name: linear(m.big_c[i], self.stages(name, i)) for name in self.state} if i > 0 else {}

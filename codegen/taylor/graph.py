@@ -30,15 +30,17 @@ from .series import (
     Product,
     QuotientIntegral,
     Ratio,
+    Row,
     Series,
     Slope,
     Square,
     SquareRoot,
+    Unknown,
 )  # fmt: skip
 from .terms import ONE, ZERO, Expr, Name, Number, add, times
 from .terms import Product as Factors
 
-__all__ = ["STARTS", "Graph", "Template", "is_linear", "jump"]
+__all__ = ["STARTS", "Graph", "Template", "is_analytic", "is_linear", "jump", "split"]
 
 STARTS: dict[type[sp.Expr], str] = {
     sp.exp: "exp", sp.log: "log", sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.sinh: "sinh", sp.cosh: "cosh",
@@ -60,17 +62,21 @@ JUMPING = (sp.sign, sp.floor, sp.ceiling, sp.Heaviside)
 
 def jump(equations: Equations) -> sp.Expr | None:
     """Return a part of some equations that is not continuous in the states or in time, None if there is none."""
-    templates = [(node.rhs, {TIME, *node.state}) for node in equations.nodes]
-    templates += [(edge.rhs, {TIME, *edge.here, *edge.there}) for edge in equations.edges]
-    return next((part for rhs, moving in templates for part in _jumps(rhs, moving)), None)
+    return next((part for own, moving in _templates(equations) for part in _jumps(own, moving)), None)
 
 
 def is_analytic(equations: Equations) -> bool:
     """True if no rate has a jump or a kink in the states or in time."""
-    parts = (*JUMPING, *KINKED, Piecewise)
-    nodes = [(node.rhs, {TIME, *node.state}) for node in equations.nodes]
-    edges = [(edge.rhs, {TIME, *edge.here, *edge.there}) for edge in equations.edges]
-    return not any(part.free_symbols & moving for rhs, moving in nodes + edges for e in rhs for part in e.atoms(*parts))
+    parts, known = (*JUMPING, *KINKED, Piecewise), _templates(equations)
+    return not any(part.free_symbols & moving for own, moving in known for e in own for part in e.atoms(*parts))
+
+
+def _templates(equations: Equations) -> Iterator[tuple[Sequence[sp.Expr], set[sp.Symbol]]]:
+    """Right-hand sides and masses of each kind of node and link, and what moves in them."""
+    for node in equations.nodes:
+        yield (*node.rhs, *(e for row in node.inertia for e in row)), {TIME, *node.state}
+    for edge in equations.edges:
+        yield edge.expressions, {TIME, *edge.here, *edge.there}
 
 
 def is_linear(equations: Equations) -> bool:
@@ -78,7 +84,8 @@ def is_linear(equations: Equations) -> bool:
     blocks = [(node.jacobian(), {TIME, *node.state}) for node in equations.nodes]
     for edge in equations.edges:
         blocks += [(block, {TIME, *edge.here, *edge.there}) for block in (edge.jacobian_here(), edge.jacobian_there())]
-    return not any(e.free_symbols & moving for block, moving in blocks for row in block for e in row)
+    fixed = not any(e.free_symbols & moving for block, moving in blocks for row in block for e in row)
+    return fixed and equations.constant_mass
 
 
 def _jumps(expressions: Sequence[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
@@ -445,7 +452,7 @@ def _negative(e: Expr) -> bool:
 
 def _words() -> tuple[str, ...]:
     """What names of series begin with."""
-    kinds = (Choice, Kink, Linear, Power, Product, Ratio, Slope, Square, SquareRoot)
+    kinds = (Choice, Kink, Linear, Power, Product, Ratio, Row, Slope, Square, SquareRoot, Unknown)
     return (*(kind.__name__.lower() for kind in kinds), *STARTS.values())
 
 

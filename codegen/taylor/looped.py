@@ -13,19 +13,30 @@ from dataclasses import dataclass, field
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.mechanics.components import TIME, Edge, Node
+from synchain.models.mechanics.components import TIME, Block, Edge, Node
 
 from ..program.passes import Body, Hoist, Names
 from ..program.printers import LANES
 from ..steps.names import NAMES
 from ..steps.places import Joint, Kind, Span, places
 from .graph import Graph, Template
+from .masses import moved, solved
 from .series import Constant, Series, State, Time
 from .step import TaylorStep, called, ended, finished, lane, returned
 from .terms import ZERO, Assign, Expr, Name, Number, add, show, statement
 
 __all__ = ["write_looped"]
 
+CONVOLUTION = '''
+@njit(error_model='numpy')
+def convolution(dense, left, left_step, right, right_step, k, first, end):
+    """Sum of left_j*right_(k-j) for j = first … end - 1; the coefficients of a series stand a step apart."""
+    total = broadcast(0.0, WIDTH)
+    for j in range(first, end):
+        total = total + load(dense, left + j*left_step, WIDTH)*load(dense, right + (k - j)*right_step, WIDTH)
+    return total
+'''.strip()
+"""Loops of its own in each sum would take most of the time of a compilation."""
 
 Hoisted = tuple[list[sp.Expr], dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]
 """Rates, the series of their names for what depends on time, and the constants behind their other names."""
@@ -84,11 +95,8 @@ class Section:
         total = f"s{self.sums}"
         self.sums += 1
         end = {0: "k + 1", -1: "k"}[last]
-        self.lines += [
-            f"{total} = 0.0*scale",
-            f"for j in range({first}, {end}):",
-            f"    {total} = {total} + {self.load(left, 'j')}*{self.load(right, '(k - j)')}",
-        ]
+        ends = ", ".join(f"{self.where(s, '0')}, {self.stride(s)}" for s in (left, right))
+        self.lines.append(f"{total} = convolution(dense, {ends}, k, {first}, {end})")
         return Name(total)
 
     def square(self, base: Series, first: int) -> Expr:
@@ -118,7 +126,8 @@ class Section:
     def where(self, series: Series, order: str) -> str:
         """Where a coefficient of a series stands."""
         if series in self.places:
-            return f"at_states + {order}*DIMENSION + {self.places[series]}"
+            behind = "" if order == "0" else f"{order}*DIMENSION + "
+            return f"at_states + {behind}{self.places[series]}"
         return self.waves.get(series, self).slot(series.name, order)
 
     def stride(self, series: Series) -> str:
@@ -227,13 +236,14 @@ class LoopWriter:
         states = [s for s, moving in zip(kind.node.state, moves, strict=True) if moving]
         fixed = [s for s in kind.node.state if s not in states]
         section = Section(Graph(self.names), head_of(kind.span), "i", self.equations.n)
-        section.setting += self.own(kind.node.rhs, fixed, kind.node, "i", "")
+        used = (*kind.node.rhs, *(e for row in kind.node.inertia for e in row))
+        section.setting += self.own(used, fixed, kind.node, "i", "")
         moving = {s: State(name=self.swap[s].name) for s in states}
         component = {s: c for c, s in enumerate(kind.node.state)}
         section.places = {state: self.place(component[s]) for s, state in moving.items()}
         seen: dict[sp.Symbol, Series] = {symbol: State(name=series.name) for symbol, series in waves.items()}
         section.waves = dict.fromkeys(seen.values(), self.waves)
-        found = self.read(section, rates, {**moving, **seen}, constants)
+        found = self.read(section, rates, {**moving, **seen}, constants, kind.node.inertia)
         section.rates = [(self.place(c), rate) for c, rate in enumerate(found)]
         return section
 
@@ -289,11 +299,8 @@ class LoopWriter:
 
     def moves(self, node: Node) -> tuple[bool, ...]:
         """Which states of a node move: one at rest, such as the mode of a contact, is a constant of the step."""
-        rates = [e != 0 for e in node.rhs]
-        for joint in self.places.joints:
-            if joint.target == node:
-                rates = [a or e != 0 for a, e in zip(rates, joint.edge.rhs, strict=True)]
-        return tuple(rates)
+        found = [moved(node)] + [moved(joint.edge) for joint in self.places.joints if joint.target == node]
+        return tuple(map(any, zip(*found, strict=True)))
 
     def own(
         self, used: Sequence[sp.Expr], fixed: Sequence[sp.Symbol], node: Node, index: str, suffix: str
@@ -332,11 +339,15 @@ class LoopWriter:
         rates: Sequence[sp.Expr],
         moving: Mapping[sp.Symbol, Series],
         swap: Mapping[sp.Symbol, sp.Expr],
+        inertia: Block = (),
     ) -> list[Series]:
         """The series of a section, and the constants that each of its turns computes."""
         graph = section.graph
-        template = Template.of(rates, moving, self.names.fresh("shared_"))
+        template = Template.of([*rates, *(e for row in inertia for e in row)], moving, self.names.fresh("shared_"))
         found = graph.read(template, moving, {**self.swap, **swap})
+        size = len(rates)
+        found, masses = found[:size], {divmod(k, size): e for k, e in enumerate(found[size:])}
+        found = list((solved(graph, masses, dict(enumerate(found))) if masses else dict(enumerate(found))).values())
         graph.settle(found)
         section.setting += [f"{name} = {text}" for name, text in graph.constants.items()]
         return found
@@ -439,7 +450,16 @@ class LoopWriter:
 
 
 def write_looped(equations: Equations, order: int) -> TaylorStep:
-    """Return the looped Taylor step of some order; see `write_step`."""
+    """Return the looped Taylor step of some order; see `write_step`.
+
+    Raises
+    ------
+    ValueError
+        As `write_step`, and for a mass matrix beside links: the loop over nodes solves before links are added.
+    """
+    if equations.inertial and equations.links:
+        found = "links with inertia" if equations.inertial_links else "links of nodes with a mass matrix"
+        raise ValueError(f"taylor: found {found} in a network that is stepped in loops; use dop853 or rodas5p")
     writer = LoopWriter(equations, order)
     lines, size = writer.write()
-    return TaylorStep.of(lines, order, size, ", graph, weights", writer.kinks)
+    return TaylorStep.of(lines, order, size, ", graph, weights", writer.kinks, CONVOLUTION)

@@ -12,13 +12,14 @@ Evaluating Derivatives (2nd ed., SIAM, 2008), section 13.2.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
 from .terms import ONE, ZERO, Call, Expr, Name, Number, add, over, show, times
 
 __all__ = ["Choice", "Constant", "Integral", "Kink", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
-           "Series", "Slope", "Square", "SquareRoot", "State", "Time"]  # fmt: skip
+           "Row", "Series", "Slope", "Square", "SquareRoot", "State", "Time", "Unknown"]  # fmt: skip
 
 
 class Order(Protocol):
@@ -377,3 +378,87 @@ def _chosen(side: Expr, above: Expr, below: Expr) -> Expr:
     if above == times(Number(-1.0), below):
         return times(side, above)
     return Call("select", (Name(f"{show(side)} > 0.0"), above, below))
+
+
+@dataclass(eq=False, slots=True)
+class Row(Series):
+    """One row of L y = r - (M - M_0) a, a the solution of M a = r, with the rows of L and U of M_0 = L U.
+
+    M_0 a_k = r_k - sum of M_j a_(k-j) for j = 1 … k: the factors of M_0 serve all orders.  `entries` are factor and series
+    of the row of M by column, rows and columns in the order of elimination.  A symmetric matrix takes half the operations.
+    `unknowns`, the whole solution, is set after all rows were made.
+    """
+
+    right: Series
+    entries: dict[int, tuple[Expr, Series]]
+    before: tuple[Row, ...]
+    symmetric: bool
+    unknowns: tuple[Unknown, ...] = ()
+    lower: dict[int, Expr] = field(default_factory=dict)
+    upper: dict[int, Expr] = field(default_factory=dict)
+    inverse: Expr = ONE
+
+    @property
+    def linear(self) -> tuple[Series, ...]:
+        return self.right, *self.before
+
+    @property
+    def moving(self) -> list[tuple[Expr, Series, Unknown]]:
+        """The entries that change within a step, each with the unknown that it multiplies."""
+        pairs = [(factor, series, self.unknowns[c]) for c, (factor, series) in self.entries.items()]
+        return [found for found in pairs if not isinstance(found[1], Constant)]
+
+    @property
+    def convolved(self) -> tuple[Series, ...]:
+        return tuple(s for _, series, unknown in self.moving for s in (series, unknown))
+
+    def begin(self, at: Start) -> Expr:
+        self.factorise(at)
+        return add(at.start(self.right), *self.known(at.start))
+
+    def coefficient(self, at: Order) -> Expr:
+        pushed = (times(Number(-1.0), factor, at.sum(series, a, 1, 0)) for factor, series, a in self.moving)
+        return add(at.of(self.right), *pushed, *self.known(at.of))
+
+    def known(self, value: Callable[[Series], Expr]) -> list[Expr]:
+        """What earlier rows take off."""
+        return [times(Number(-1.0), e, value(self.before[k])) for k, e in self.lower.items()]
+
+    def factorise(self, at: Start) -> None:
+        """Compute the row of L, that of U, and the inverse of its pivot."""
+        i = len(self.before)
+        row = {c: times(factor, at.start(series)) for c, (factor, series) in self.entries.items()}
+        for k, other in enumerate(self.before):
+            left = row.pop(k, ZERO)
+            left = other.upper.get(i, ZERO) if self.symmetric else left
+            if left == ZERO:
+                continue
+            self.lower[k] = Name(at.keep(f"l_{self.name}_{k}", times(left, other.inverse)))
+            for c, e in other.upper.items():
+                if c >= i or not self.symmetric:
+                    row[c] = add(row.get(c, ZERO), times(Number(-1.0), self.lower[k], e))
+        self.inverse = Name(at.keep(f"i_{self.name}", over(ONE, row.pop(i))))
+        self.upper = {c: Name(at.keep(f"u_{self.name}_{c}", e)) for c, e in row.items() if e != ZERO}
+
+
+@dataclass(eq=False, slots=True)
+class Unknown(Series):
+    """One unknown a of U a = y; `after` are those of later rows by their columns."""
+
+    row: Row
+    after: dict[int, Unknown]
+
+    @property
+    def linear(self) -> tuple[Series, ...]:
+        return self.row, *self.after.values()
+
+    def begin(self, at: Start) -> Expr:
+        return self.value(at.start)
+
+    def coefficient(self, at: Order) -> Expr:
+        return self.value(at.of)
+
+    def value(self, of: Callable[[Series], Expr]) -> Expr:
+        """One coefficient, from those of the others."""
+        known = (times(Number(-1.0), e, of(self.after[c])) for c, e in self.row.upper.items())
+        return times(add(of(self.row), *known), self.row.inverse)

@@ -17,6 +17,7 @@ from synchain.models.mechanics.components import TIME
 
 from ..program.passes import Names
 from .graph import STARTS, Graph, Template
+from .masses import moved, solved
 from .passage import PASSAGE
 from .series import Constant, Series, State, Time
 from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
@@ -42,7 +43,7 @@ FARTHEST = 16.0
 
 WORDS = frozenset(
     {"scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
-     "slope_scale", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", *STARTS.values()}
+     "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", *STARTS.values()}
 )  # fmt: skip
 PREFIXES = ("i_", "e_", "half_", "w_", "n_", "size_", "odd_")
 """Names of the step; a user's symbol of that name is called otherwise within the step."""
@@ -71,12 +72,19 @@ class TaylorStep:
 
     @classmethod
     def of(
-        cls, lines: Sequence[str], order: int, workspace: int = 0, more: str = "", kinks: bool = False
+        cls,
+        lines: Sequence[str],
+        order: int,
+        workspace: int = 0,
+        more: str = "",
+        kinks: bool = False,
+        before: str = "",
     ) -> TaylorStep:
-        """The step of some statements."""
+        """The step of some statements, behind a function that they call."""
         returned = "its length and that of its series" if kinks else "the length of the step"
         head = [
             *([PASSAGE, "", ""] if kinks else []),
+            *([before, "", ""] if before else []),
             "@njit(error_model='numpy', cache=True)",
             f"def step(t, h, scale, y, p, y_new, dense, rtol, atol{more}):",
             f'    """One step from (t, y): writes y_new and the dense output, returns {returned}."""',
@@ -196,7 +204,29 @@ class StepWriter:
             found = self.graph.read(edges[edge], *self.parted({TIME: self.time}, eq.at_link(link, edge)))
             for slot, rate in zip(eq.places[link[0]], found, strict=True):
                 terms[slot].append((ONE, rate))
-        return [self.graph.sum(terms[slot]) for slot in self.states]
+        right = {slot: self.graph.sum(terms[slot]) for slot in self.states}
+        return list((solved(self.graph, self.masses(), right) if eq.inertial else right).values())
+
+    def masses(self) -> dict[tuple[int, int], Series]:
+        """The entries of M."""
+        eq, terms = self.equations, dict[tuple[int, int], list[tuple[Expr, Series]]]()
+        shared = self.supply.fresh("shared_")
+        nodes = [Template.of([e for row in node.inertia for e in row], node.state, shared) for node in eq.nodes]
+        ends = {edge: (*edge.here, *edge.there) for edge in eq.edges}
+        edges = {e: Template.of([x for b in e.inertia for r in b for x in r], ends[e], shared) for e in eq.edges}
+        for i, own in enumerate(eq.places):
+            keys = [(r, c) for r in own for c in own] if eq.node_at(i).inertia else []
+            found = self.graph.read(nodes[eq.kind_of[i]], *self.parted({}, eq.at_node(i)))
+            terms |= {key: [(ONE, e)] for key, e in zip(keys, found, strict=True)} or {
+                (k, k): [(ONE, Constant(ONE))] for k in own
+            }
+        for link, edge in eq.linked():
+            rows, columns = eq.places[link[0]], [eq.places[end] for end in link[:2]]
+            keys = [(r, c) for own in columns for r in rows for c in own] if edge.inertia else []
+            found = self.graph.read(edges[edge], *self.parted({}, eq.at_link(link, edge)))
+            for key, e in zip(keys, found, strict=True):
+                terms.setdefault(key, []).append((ONE, e))
+        return {key: self.graph.sum(parts) for key, parts in terms.items()}
 
     def parted(
         self, known: dict[sp.Symbol, Series], values: Mapping[sp.Symbol, sp.Expr]
@@ -343,11 +373,8 @@ def _horner(lines: list[str], name: str, coefficients: Sequence[Expr]) -> Expr:
 
 def moving_states(equations: Equations, i: int) -> tuple[bool, ...]:
     """Which states of node i move; one at rest, such as the mode of a contact, is a constant of the step."""
-    rates = list(equations.node_at(i).rhs)
-    for link, edge in equations.linked():
-        if link[0] == i:
-            rates = [a if b == 0 else b for a, b in zip(rates, edge.rhs, strict=True)]
-    return tuple(rate != 0 for rate in rates)
+    found = [moved(equations.node_at(i))] + [moved(edge) for link, edge in equations.linked() if link[0] == i]
+    return tuple(map(any, zip(*found, strict=True)))
 
 
 def write_step(equations: Equations, order: int) -> TaylorStep:
@@ -363,20 +390,18 @@ def write_step(equations: Equations, order: int) -> TaylorStep:
     Raises
     ------
     ValueError
-        For an order that is too small, functions that jump, and links with inertia.
+        For an order that is too small, and for functions that jump.
     """
-    check_order(equations, order)
+    check_order(order)
     writer = StepWriter(equations, order)
     lines, kinks = writer.write(), bool(writer.graph.kinks)
     return TaylorStep.of(lines, order, order + 1 if kinks else 0, kinks=kinks)
 
 
-def check_order(equations: Equations, order: int) -> None:
-    """Raise ValueError for an order that is too small, and for links with inertia."""
+def check_order(order: int) -> None:
+    """Raise ValueError for an order that is too small."""
     if order < 6:
         raise ValueError(f"taylor: found order {order}; expected at least 6")
-    if equations.inertial:
-        raise ValueError("taylor: found links with inertia; expected an identity mass matrix; use dop853 or rodas5p")
 
 
 def finished(order: int) -> list[str]:

@@ -234,14 +234,16 @@ def write_tangent(variation: Variation, order: int) -> TangentStep:
     Raises
     ------
     ValueError
-        As `write_step`, and for equations with kinks.
+        As `write_step`, and for equations with kinks or with a mass matrix.
     """
+    if variation.orbit.inertial:
+        raise ValueError("taylor: found a mass matrix beside deviations along an orbit; expected the identity")
     if not is_analytic(variation.orbit):
         raise ValueError(
             "taylor: found a kink beside deviations along an orbit; expected analytic functions; use rodas5p"
         )
     wanted = dict.fromkeys(c for _, e in variation.matrix for c, _ in _parted(variation, e))
-    check_order(variation.orbit, order)
+    check_order(order)
     orbit = OrbitWriter(variation.orbit, order, list(wanted))
     step = TaylorStep.of(orbit.write(), order, more=", shared")
     return TangentStep(step, (COMMON, ModeWriter(variation, orbit).write(), CARRY), HEAD + len(orbit.places))

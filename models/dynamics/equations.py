@@ -14,7 +14,7 @@ from functools import cached_property
 import sympy as sp
 
 from ..graphs.links import Link
-from ..mechanics.components import Edge, Node
+from ..mechanics.components import Block, Edge, Node
 from ..mechanics.friction import Contact
 
 __all__ = ["Ends", "Equations", "Layer", "check"]
@@ -23,8 +23,6 @@ Ends = tuple[int, int]
 """The kinds of a link's target and source."""
 
 Entry = tuple[tuple[int, int], sp.Expr]
-
-Block = tuple[tuple[sp.Expr, ...], ...]
 
 
 class _Cached:
@@ -55,7 +53,7 @@ class Layer:
 class Equations(_Cached):
     """The equations of motion of a network, M d(state)/dt = rhs.
 
-    M is the identity unless links have inertia.  The state is ordered by components, x_1 … x_n,
+    M is the identity unless nodes or links have inertia.  The state is ordered by components, x_1 … x_n,
     v_1 … v_n; components that all kinds of nodes have come first.
 
     Parameters
@@ -195,7 +193,7 @@ class Equations(_Cached):
     def expect_alike(
         self, what: str, *, varied_too: bool = False, inertia_too: bool = False, layers_too: bool = False
     ) -> None:
-        """Raise ValueError unless the nodes are equal and the links are of one layer and have no inertia.
+        """Raise ValueError unless the nodes are equal, the links are of one layer and M is the identity.
 
         Parameters
         ----------
@@ -211,7 +209,8 @@ class Equations(_Cached):
         problems = {
             "nodes of several kinds": self.mixed,
             f"nodes that differ in {', '.join(self.varied)}": bool(self.varied) and not varied_too,
-            "links with inertia": self.inertial and not inertia_too,
+            "links with inertia": self.inertial_links and not inertia_too,
+            "nodes with a mass matrix (more than three coupled coordinates)": any(node.inertia for node in self.nodes),
             f"{len(self.layers)} layers of links": len(self.layers) > 1 and not layers_too,
         }
         found = next((words for words, holds in problems.items() if holds), None)
@@ -221,13 +220,18 @@ class Equations(_Cached):
 
     @cached_property
     def inertial(self) -> bool:
-        """True if links have inertia, so that M is not the identity."""
+        """True if nodes or links have inertia, so that M is not the identity."""
+        return self.inertial_links or any(node.inertia for node in self.nodes)
+
+    @cached_property
+    def inertial_links(self) -> bool:
+        """True if links have inertia, so that M couples nodes."""
         return any(edge.inertia for edge in self.edges)
 
     @cached_property
     def constant_mass(self) -> bool:
         """True if M depends on parameters alone."""
-        return all(edge.constant_inertia for edge in self.edges)
+        return all(node.constant_inertia for node in self.nodes) and all(edge.constant_inertia for edge in self.edges)
 
     @property
     def forced(self) -> bool:
@@ -337,7 +341,10 @@ class Equations(_Cached):
         if not self.inertial:
             return {}
         places = self.places
-        entries: dict[tuple[int, int], sp.Expr] = {(k, k): sp.S.One for k in range(self.dimension)}
+        entries: dict[tuple[int, int], sp.Expr] = {}
+        for i, own in enumerate(places):
+            inertia = self.node_at(i).inertia
+            entries |= _block(inertia, own, own, self.at_node(i)) if inertia else {(k, k): sp.S.One for k in own}
         for link, edge in self.linked():
             values = self.at_link(link, edge)
             for block, end in zip(edge.inertia, link[:2], strict=False):
@@ -391,6 +398,7 @@ class Equations(_Cached):
         parts = [_text(first.state, first.rhs, first.parameters), str(self.n), repr(self.links)]
         if first.contact is not None:
             parts.append("; ".join(map(sp.srepr, first.contact.expressions)))
+        parts += [sp.srepr(sp.Matrix(node.inertia)) for node in self.nodes if node.inertia]
         parts += [f"varied {' '.join(self.varied)}"] if self.varied else []
         if others:  # a single kind adds nothing
             parts += [repr(self.kind_of), *(_text(node.state, node.rhs, node.parameters) for node in others)]

@@ -17,12 +17,12 @@ import sympy as sp
 from ..graphs.links import Link
 from ..graphs.topology import Topology
 from ..inputs.plugins import names
-from ..mechanics.calculus import cancelled
-from ..mechanics.components import SLIDING, Edge, Node
+from ..mechanics.calculus import cancelled, expanded
+from ..mechanics.components import SLIDING, Block, Edge, Node
 from ..mechanics.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling
 from ..mechanics.definition import FRICTION_LAW
 from ..mechanics.friction import KAPPA, SLIP, ContactModel, FrictionLaw, set_valued
-from ..mechanics.lagrangian import Mechanics
+from ..mechanics.lagrangian import LARGEST_BY_MINORS, Mechanics, check_regular, coupled, solve_masses
 from ..mechanics.link import edge
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
 from ..mechanics.oscillator import Field, Oscillator
@@ -80,15 +80,25 @@ def node(oscillator: Oscillator, friction: FrictionLaw | None = None, contact: s
             tuple(sp.Symbol(name, real=True) for name in oscillator.model.state), oscillator.model.rates, symbols
         )
     system = nondimensional(oscillator)
-    found = cancelled(system.accelerations())
+    found, inertia = _motion(system)
     state = (*system.coordinates, *system.velocities)
     if friction is None:
-        return Node(state, (*system.velocities, *found), symbols)
+        return Node(state, (*system.velocities, *found), symbols, inertia=inertia)
     if contact == ContactModel.SET_VALUED and friction.jumps:
         return _sticking(system, found, friction, symbols)
     coefficient = friction_coefficient(friction, contact)
     rates = (e.replace(FRICTION, coefficient) for e in found)
-    return Node(state, (*system.velocities, *rates), symbols, law=coefficient(SLIDING))
+    return Node(state, (*system.velocities, *rates), symbols, law=coefficient(SLIDING), inertia=inertia)
+
+
+def _motion(system: Mechanics) -> tuple[tuple[sp.Expr, ...], Block]:
+    """The accelerations; of many coupled coordinates r and the masses of M dv/dt = r, with rows for coordinates too."""
+    forces, masses = system.balance()
+    if len(coupled(masses, system.velocities)) <= LARGEST_BY_MINORS:
+        return cancelled(solve_masses(masses, forces, system.velocities)), ()
+    check_regular(masses, system.velocities)
+    whole = sp.diag(sp.eye(masses.rows), masses)
+    return expanded(forces), tuple(map(expanded, whole.tolist()))
 
 
 def _sticking(

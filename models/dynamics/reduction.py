@@ -160,7 +160,7 @@ def collapse(equations: Equations, classes: Sequence[int]) -> Equations:
         raise ValueError(f"partition: found the classes {sorted(set(classes))}; expected 0 … {count - 1}")
     if count == equations.n and list(classes) == list(range(count)):
         return equations
-    if equations.mixed or equations.inertial:
+    if equations.mixed or equations.inertial_links:
         raise NoQuotient("quotient: nodes of several kinds or links with inertia are stepped one by one")
     for edge in equations.edges:
         _check_coupling(edge)

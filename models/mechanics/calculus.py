@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import sympy as sp
 
-__all__ = ["cancelled", "derivative", "operations"]
+__all__ = ["cancelled", "derivative", "expanded", "operations"]
 
 LARGEST_CANCELLED = 200
 """Operations of an expression up to which it is cancelled: longer ones are products of minors, which grow by it."""
@@ -28,6 +28,11 @@ def cancelled(expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
         return tuple(expressions)
     found = tuple(map(sp.cancel, expressions))
     return found if operations(found) < operations(expressions) else tuple(expressions)
+
+
+def expanded(expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
+    """The expressions multiplied out, each that gets shorter by it."""
+    return tuple(min(e, sp.expand(e), key=sp.count_ops) for e in expressions)
 
 
 def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:

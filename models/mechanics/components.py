@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 import sympy as sp
 
 from .calculus import derivative
 from .friction import SLIP, Contact
 
-__all__ = ["SLIDING", "TIME", "Edge", "Node"]
+__all__ = ["SLIDING", "TIME", "Block", "Edge", "Node"]
 
 TIME = sp.Symbol("t", real=True)
 """Non-dimensional time, the one time symbol of all equations."""
+
+Block: TypeAlias = tuple[tuple[sp.Expr, ...], ...]
+"""The entries of a matrix that belong to one node or to one end of a link, row by row."""
 
 SLIDING = sp.Symbol("w", real=True)
 """The sliding velocity, the argument of a friction law."""
@@ -21,26 +25,29 @@ SLIDING = sp.Symbol("w", real=True)
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """One uncoupled oscillator: d(state)/dt = rhs(state, t; parameters).
+    """One uncoupled oscillator: M d(state)/dt = rhs(state, t; parameters).
 
     Parameters
     ----------
     state : tuple of Symbol
         The states.  With set-valued friction the third state is the mode, which only events change.
     rhs : tuple of Expr
-        The rate of each state.
+        The right-hand side of each state: its rate where M is the identity.
     parameters : tuple of Symbol
         The parameters.
     contact : Contact, optional
         What decides between stick and slip.
     law : Expr, optional
         The friction coefficient as a function of `SLIDING`; it is for printing alone.
+    inertia : tuple of tuple of Expr, optional
+        M(state; parameters), a row and a column for each state; empty if M is the identity.
 
     Raises
     ------
     ValueError
         If a rate uses a symbol that is not declared or contains a floating-point number (numbers are parameters or
-        rationals), if there is not one rate for each state, and if two names are the same.
+        rationals), if there is not one rate for each state, if two names are the same, and for an M that depends on time
+        or belongs to a node with a contact.
     """
 
     state: tuple[sp.Symbol, ...]
@@ -48,6 +55,7 @@ class Node:
     parameters: tuple[sp.Symbol, ...]
     contact: Contact | None = None
     law: sp.Expr | None = field(default=None, compare=False)
+    inertia: Block = ()
 
     def __post_init__(self) -> None:
         _differ("node", (TIME, *self.state, *self.parameters))
@@ -57,6 +65,23 @@ class Node:
             if self.state[2:3] != (SLIP,):
                 raise ValueError(f"a node with set-valued friction has the states x, v, slip, …; found {self.state}")
             _check("contact", self.contact.expressions, len(self.contact.expressions), known)
+        if self.inertia:
+            self._check_inertia(known - {TIME})
+
+    def _check_inertia(self, known: set[sp.Symbol]) -> None:
+        if self.contact is not None:
+            raise ValueError("node: found set-valued friction beside a mass matrix; expected one coordinate")
+        size = len(self.state)
+        if len(self.inertia) != size:
+            raise ValueError(
+                f"node: found a mass matrix of {len(self.inertia)} rows; expected one for each of {size} states"
+            )
+        for row in self.inertia:
+            if any(e.has(TIME) for e in row):
+                raise ValueError(
+                    f"node: the masses {row} depend on time; expected a mass matrix of states and parameters"
+                )
+            _check("node inertia", row, size, known)
 
     @property
     def forced(self) -> bool:
@@ -70,8 +95,14 @@ class Node:
 
     @property
     def expressions(self) -> tuple[sp.Expr, ...]:
-        """The right-hand side and the conditions of the contact."""
-        return self.rhs if self.contact is None else (*self.rhs, *self.contact.expressions)
+        """The right-hand side, the conditions of the contact and the entries of M."""
+        contact = () if self.contact is None else self.contact.expressions
+        return (*self.rhs, *contact, *(e for row in self.inertia for e in row))
+
+    @property
+    def constant_inertia(self) -> bool:
+        """True if M depends on parameters alone."""
+        return not any(e.free_symbols & set(self.state) for row in self.inertia for e in row)
 
     def map(self, change: Callable[[sp.Expr], sp.Expr]) -> Node:
         """Return the node with every symbol and expression changed.
@@ -89,7 +120,8 @@ class Node:
         """
         state, rhs, parameters = (tuple(map(change, part)) for part in (self.state, self.rhs, self.parameters))
         contact = None if self.contact is None else self.contact.map(change)
-        return Node(state, rhs, tuple(p for p in parameters if p.is_Symbol), contact)
+        inertia = tuple(tuple(map(change, row)) for row in self.inertia)
+        return Node(state, rhs, tuple(p for p in parameters if p.is_Symbol), contact, inertia=inertia)
 
     def without_unused_parameters(self, kept: Container[sp.Symbol] = ()) -> Node:
         """The same without the parameters that do not occur, but those that are `kept` for the links."""
@@ -120,7 +152,7 @@ class Edge:
     weight: sp.Symbol
     rhs: tuple[sp.Expr, ...]
     parameters: tuple[sp.Symbol, ...]
-    inertia: tuple[tuple[tuple[sp.Expr, ...], ...], ...] = ()
+    inertia: tuple[Block, ...] = ()
     theirs: tuple[tuple[sp.Symbol, sp.Symbol], ...] = ()
     oriented: bool = False
 

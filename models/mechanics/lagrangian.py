@@ -11,8 +11,11 @@ from .calculus import derivative
 from .components import TIME
 
 __all__ = [
+    "LARGEST_BY_MINORS",
     "Mechanics",
     "balance",
+    "check_regular",
+    "coupled",
     "energy_rate",
     "equations_of_motion",
     "mass_matrix",
@@ -38,6 +41,10 @@ class Mechanics:
 
     def __post_init__(self) -> None:
         _one_each(self.coordinates, self.velocities, self.forces)
+
+    def balance(self) -> tuple[list[sp.Expr], sp.Matrix]:
+        """The equations of motion before they are solved; see `balance`."""
+        return balance(self.kinetic, self.potential, self.forces, self.coordinates, self.velocities)
 
     def accelerations(self) -> tuple[sp.Expr, ...]:
         """The equations of motion, solved for the accelerations."""
@@ -127,7 +134,38 @@ def _one_each(q: Symbols, v: Symbols, forces: Sequence[sp.Expr]) -> None:
 
 
 LARGEST_BY_MINORS = 3
-"""Rows up to which minors are shorter than the fractions within fractions that elimination leaves."""
+"""Coupled rows up to which M is inverted in the equations: its minors are short.
+
+Beyond, elimination leaves fractions within fractions, and kernels solve M dv/dt = r.
+"""
+
+
+def coupled(masses: sp.Matrix, velocities: Sequence[sp.Symbol]) -> tuple[int, ...]:
+    """Return the rows of a symmetric mass matrix that have more than their diagonal entry.
+
+    Raises ValueError if another row is zero: its velocity, one of `velocities`, then has no kinetic energy.
+    """
+    rows = range(masses.rows)
+    alone = [i for i in rows if all(masses[i, j] == 0 for j in rows if j != i)]
+    idle = [str(velocities[i]) for i in alone if masses[i, i] == 0]
+    if idle:
+        raise ValueError(f"no kinetic energy in the velocity {idle[0]}; expected T to grow with every velocity")
+    return tuple(i for i in rows if i not in alone)
+
+
+def check_regular(masses: sp.Matrix, velocities: Sequence[sp.Symbol]) -> None:
+    """Raise ValueError if a mass matrix is singular: if its determinant vanishes at three places."""
+    symbols = sorted(masses.free_symbols, key=str)
+    for k in range(3):
+        numbers = masses.xreplace(_place(symbols, k)).evalf(60)
+        if abs(numbers.det()) > sp.Float("1e-40") * abs(sp.prod(numbers.diagonal())):
+            return
+    raise ValueError(f"the mass matrix of {', '.join(map(str, velocities))} is singular; expected an invertible one")
+
+
+def _place(symbols: Sequence[sp.Symbol], k: int) -> dict[sp.Basic, sp.Basic]:
+    """Place number k at which expressions are looked at."""
+    return {s: sp.Rational(7 * i + 3 * k + 5, 11 + 2 * i) for i, s in enumerate(symbols)}
 
 
 def solve_masses(masses: sp.Matrix, forces: Sequence[sp.Expr], velocities: Sequence[sp.Symbol]) -> tuple[sp.Expr, ...]:
@@ -135,26 +173,21 @@ def solve_masses(masses: sp.Matrix, forces: Sequence[sp.Expr], velocities: Seque
 
     Raises ValueError if the matrix is singular: some velocity then has no kinetic energy.
     """
-    size = len(forces)
-    alone = [i for i in range(size) if all(masses[i, j] == 0 for j in range(size) if j != i)]
-    idle = [str(velocities[i]) for i in alone if masses[i, i] == 0]
-    if idle:
-        raise ValueError(f"no kinetic energy in the velocity {idle[0]}; expected T to grow with every velocity")
-    found = {i: forces[i] / masses[i, i] for i in alone}
-    rest = [i for i in range(size) if i not in found]
+    rows = range(len(forces))
+    rest = coupled(masses, velocities)
+    found = {i: forces[i] / masses[i, i] for i in rows if i not in rest}
     if rest:
-        block = masses.extract(rest, rest)
+        block = masses.extract(list(rest), list(rest))
         names = ", ".join(str(velocities[i]) for i in rest)
         found |= dict(zip(rest, _block(block, [forces[i] for i in rest], names), strict=True))
-    return tuple(found[i] for i in range(size))
+    return tuple(found[i] for i in rows)
 
 
 def _vanishes(e: sp.Expr) -> bool:
     """True if an expression is zero everywhere; a value that differs from zero at one place proves the contrary."""
     symbols = sorted(e.free_symbols, key=str)
     for k in range(3):
-        place = {s: sp.Rational(7 * i + 3 * k + 5, 11 + 2 * i) for i, s in enumerate(symbols)}
-        value = e.subs(place).evalf(30)
+        value = e.subs(_place(symbols, k)).evalf(30)
         if value.is_number and value.is_finite and abs(value) > sp.Float("1e-15"):
             return False
     return bool(e.equals(0))

@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import sympy as sp
 
-from .components import TIME, Edge, Node
+from .components import TIME, Block, Edge, Node
 from .coupling import WEIGHT, Coupling
 from .ends import Pair, Terms
 from .friction import SLIP
@@ -71,7 +71,7 @@ def edge(
     coupling.check_ends(single, other)
     pair = Pair((single, other or single), (oscillator, partner or oscillator))
     terms = coupling.terms(pair)
-    rates, inertia = (terms.rates, ()) if terms.rates else _by_lagrange(pair, terms)
+    rates, inertia = (_carried(pair, terms.rates), ()) if terms.rates else _by_lagrange(pair, terms)
     used = {s for e in (*rates, *(e for block in inertia for row in block for e in row)) for s in e.free_symbols}
     strengths = tuple(sp.Symbol(name, real=True) for name in coupling.parameters)
     symbols = tuple(s for s in single.parameters if s not in strengths and s in used)
@@ -112,13 +112,21 @@ def _is_factor(s: sp.Symbol, e: sp.Expr) -> bool:
     return slope != 0 and not sp.expand(slope).has(s) and sp.expand(e - s * slope) == 0
 
 
-def _by_lagrange(pair: Pair, terms: Terms) -> tuple[tuple[sp.Expr, ...], tuple[tuple[tuple[sp.Expr, ...], ...], ...]]:
+def _carried(pair: Pair, rates: tuple[sp.Expr, ...]) -> tuple[sp.Expr, ...]:
+    """M rates of the target: what is added to its right-hand sides."""
+    node = pair.nodes[0]
+    if not node.inertia:
+        return rates
+    return tuple(sp.Matrix(node.inertia).xreplace(dict(zip(node.state, pair.here, strict=True))) * sp.Matrix(rates))
+
+
+def _by_lagrange(pair: Pair, terms: Terms) -> tuple[tuple[sp.Expr, ...], tuple[Block, ...]]:
     """Rates of the target by the energies of a link alone, and the blocks of its inertia, empty without one."""
     coordinates, moving, half = pair.coordinates, pair.velocities, pair.halves[0]
     speeds = pair.here[half:]
     forces = tuple(-terms.dissipation.diff(v) for v in moving)
     rest, masses = balance(terms.kinetic, terms.potential, forces, coordinates, moving)
-    own = _masses(pair.oscillators[0], pair.nodes[0], pair.here)
+    own = sp.eye(half) if pair.nodes[0].inertia else _masses(pair.oscillators[0], pair.nodes[0], pair.here)
     rates = solve_masses(own, [_in_differences(e, pair.alike, pair.here) for e in rest[:half]], speeds)
     rates = (*[sp.S.Zero] * half, *rates)
     if all(e == 0 for e in masses):
@@ -127,7 +135,7 @@ def _by_lagrange(pair: Pair, terms: Terms) -> tuple[tuple[sp.Expr, ...], tuple[t
     return rates, _inertia(pair, sp.Matrix(columns).T)
 
 
-def _inertia(pair: Pair, masses: sp.Matrix) -> tuple[tuple[tuple[sp.Expr, ...], ...], ...]:
+def _inertia(pair: Pair, masses: sp.Matrix) -> tuple[Block, ...]:
     """The blocks of a link's mass matrix, with rows and columns for coordinates too."""
     a, b = pair.halves
     blocks = []

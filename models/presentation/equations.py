@@ -7,7 +7,7 @@ displacement and tau for the time.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -195,6 +195,9 @@ def _left(equations: Equations, writer: Writer, c: int, i: int) -> str:
     The rate is written chi'' if the component is the velocity of chi.
     """
     own = writer.write(equations.symbols(i)[c]) + "'"
+    row = [e.xreplace(equations.at_node(i)) for e in _masses(equations.node_at(i), c)]
+    if row:
+        own = _massive(row, equations.symbols(i), writer)
     rates: dict[sp.Symbol, str] = {}
     terms: list[sp.Expr] = []
     for link, edge in equations.linked() if equations.inertial else ():
@@ -211,6 +214,19 @@ def _left(equations: Equations, writer: Writer, c: int, i: int) -> str:
     full = Writer(writer.style, {**writer.letters, **rates}, frozenset((*writer.letters, *rates, TIME)))
     more = full.total([sp.factor_terms(term) for term in sp.Add.make_args(added)])
     return f"{own} {'- ' + more[1:] if more.startswith('-') else '+ ' + more}"
+
+
+def _masses(node: Node, c: int) -> tuple[sp.Expr, ...]:
+    """Row c of the mass matrix of a node, empty if it is a row of the identity."""
+    row = node.inertia[c] if node.inertia else ()
+    return () if all(e == sp.Integer(k == c) for k, e in enumerate(row)) else row
+
+
+def _massive(row: Sequence[sp.Expr], states: Sequence[sp.Symbol], writer: Writer) -> str:
+    """A row of masses times rates."""
+    rates = {sp.Symbol(f"{s.name}'", real=True): writer.write(s) + "'" for s in states}
+    full = Writer(writer.style, {**writer.letters, **rates}, frozenset((*writer.letters, *rates, TIME)))
+    return full.total([e * rate for e, rate in zip(row, rates, strict=True) if e != 0])
 
 
 def _generic(equations: Equations, named: _Named, style: Style) -> Iterator[str]:
@@ -232,7 +248,8 @@ def _generic(equations: Equations, named: _Named, style: Style) -> Iterator[str]
             if edge.rhs[c] != 0:
                 summed = _sum_over_links(edge, _weight(name), c, writer)
                 line = line + summed if line != "0" else summed.removeprefix(" + ").lstrip()
-        left = writer.write(here[node.state[c]]) + "'"
+        row = [e.xreplace(here) for e in _masses(node, c)]
+        left = _massive(row, own, writer) if row else writer.write(here[node.state[c]]) + "'"
         for edge, name in joints:
             if edge.inertia:
                 left += _summed_inertia(edge, _weight(name), c, writer)

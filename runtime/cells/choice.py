@@ -14,6 +14,7 @@ import sympy as sp
 from synchain.codegen.driver.columns import Count, Sum
 from synchain.codegen.integrators import Integrator, integrator
 from synchain.codegen.kernels.sweep import AUTO, KernelSource
+from synchain.codegen.steps.mass import turned_masses
 from synchain.codegen.taylor import is_analytic, is_linear, jump, order_for
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
@@ -52,8 +53,9 @@ def chosen_integrator(reduction: Reduction) -> Integrator:
     """Return the integrator of a scene, the fastest at equal error where the scene says "auto".
 
     Power series where all functions are continuous, and analytic between kinks, and the equations are
-    not stiff, in the extreme cells of the sweep; between the events of set-valued friction too.  Otherwise Rosenbrock steps, or a
-    switching pair of methods for two oscillators at a tight tolerance.
+    not stiff, in the extreme cells of the sweep; between the events of set-valued friction too.  Nodes with a mass matrix
+    take explicit steps in their place: the recurrences of a dense matrix take longer to compile than most runs.  Otherwise
+    Rosenbrock steps, or a switching pair of methods for two oscillators at a tight tolerance.
 
     Parameters
     ----------
@@ -83,8 +85,8 @@ def _chosen(scene: Scene, equations: Equations, stiffness_of: Callable[[], float
         return _taylor(scene, equations)
     if scene.integrator != "auto":
         return integrator(scene.integrator)
-    if not equations.inertial and jump(equations) is None and (equations.sticks or stiffness_of() < STIFF):
-        return _taylor(scene, equations)
+    if not equations.inertial_links and jump(equations) is None and (equations.sticks or stiffness_of() < STIFF):
+        return integrator("dop853") if equations.inertial else _taylor(scene, equations)
     if equations.sticks:
         return integrator("dop853")
     pair = equations.n == 2 and not (equations.mixed or equations.inertial) and scene.rtol <= 1e-9
@@ -241,37 +243,61 @@ def _eigenvalue_parts(blocks: Iterable[np.ndarray]) -> tuple[float, float]:
 
 def _blocks(equations: Equations, values: Mapping[str, float]) -> list[np.ndarray]:
     """The blocks of the Jacobian of the first nodes, with twice what their links add."""
-    nodes = range(min(equations.n, NODES))
-    blocks = [_value(equations.node_at(i).jacobian(), equations.at_node(i), values) for i in nodes]
+    blocks = [_block(equations, i, values) for i in range(min(equations.n, NODES))]
     for link, edge in islice(equations.linked(), LINKS):
         if link[0] < len(blocks):
             found = _value(edge.jacobian_here(), equations.at_link(link, edge), values)
             blocks[link[0]] = blocks[link[0]] + 2.0 * found
-    return blocks
+    return [_by_masses(equations, i, values, block) for i, block in enumerate(blocks)]
+
+
+def _block(equations: Equations, i: int, values: Mapping[str, float]) -> np.ndarray:
+    """The Jacobian of a node's right-hand side less that of M F at fixed rates F."""
+    node, at = equations.node_at(i), equations.at_node(i)
+    found = _value(node.jacobian(), at, values)
+    if node.constant_inertia:
+        return found
+    size = len(node.state)
+    forces = _value(tuple((e,) * size for e in node.rhs), at, values)[:, :1]
+    rates = [sp.Dummy(s.name, real=True) for s in node.state]
+    known = dict(zip(rates, map(sp.Float, _by_masses(equations, i, values, forces)[:, 0]), strict=True))
+    return found - _value(turned_masses(node, rates), {**at, **known}, values)
+
+
+def _by_masses(equations: Equations, i: int, values: Mapping[str, float], right: np.ndarray) -> np.ndarray:
+    """M^-1 right, M the mass matrix of a node; NaN where it is singular."""
+    inertia = equations.node_at(i).inertia
+    if not inertia:
+        return right
+    try:
+        return np.linalg.solve(_value(inertia, equations.at_node(i), values), right)
+    except np.linalg.LinAlgError:
+        return np.full(right.shape, math.nan)
 
 
 def _bends(equations: Equations, values: Mapping[str, float]) -> Iterator[np.ndarray]:
     """The blocks of the nodes and of the links in the layers of their turning functions, one state moved there."""
     for i in range(min(equations.n, NODES)):
         node = equations.node_at(i)
-        yield from _turned(node.rhs, node.state, node.jacobian(), equations.at_node(i), values)
+        for moved in _turned(node.rhs, node.state, equations.at_node(i), values):
+            yield _by_masses(equations, i, moved, _block(equations, i, moved))
     for link, edge in islice(equations.linked(), LINKS):
-        for block in _turned(edge.rhs, edge.here, edge.jacobian_here(), equations.at_link(link, edge), values):
-            yield 2.0 * block
+        at = equations.at_link(link, edge)
+        for moved in _turned(edge.rhs, edge.here, at, values):
+            yield 2.0 * _by_masses(equations, link[0], moved, _value(edge.jacobian_here(), at, moved))
 
 
 def _turned(
     rates: tuple[sp.Expr, ...],
     states: tuple[sp.Symbol, ...],
-    jacobian: tuple[tuple[sp.Expr, ...], ...],
     at: Mapping[sp.Symbol, sp.Expr],
     values: Mapping[str, float],
-) -> Iterator[np.ndarray]:
-    """A block where the argument of a turning function is zero, and close by on either side."""
+) -> Iterator[dict[str, float]]:
+    """Values at which the argument of a turning function is zero, and close by on either side."""
     for state, place in _turns(rates, states):
         ((there,),) = _value(((place,),), at, values)
         for shift in (-1e-9, 0.0, 1e-9):
-            yield _value(jacobian, at, {**values, at[state].name: there + shift * (1.0 + abs(there))})
+            yield {**values, at[state].name: there + shift * (1.0 + abs(there))}
 
 
 @lru_cache(maxsize=64)

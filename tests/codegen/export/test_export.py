@@ -16,7 +16,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
-from samples import CASES, real
+from samples import CASES, pendula, real, telescopes
 
 from synchain.codegen.export.c import to_c
 from synchain.codegen.export.names import RESERVED, portable
@@ -147,6 +147,8 @@ NETWORKS: dict[str, Equations] = {
         parameters={"a": [0.1 * i for i in range(7)]},
     ).equations,
     **{f"inertial {n}": inertial(n) for n in (3, 9)},
+    "pendula": pendula(),
+    "telescopes": telescopes(),
     "alone 9": Equations.of_equal_nodes(Node((sp.Symbol("x", real=True),), (sp.S.One,), ()), None, 9),
 }
 

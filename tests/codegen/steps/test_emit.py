@@ -163,7 +163,8 @@ def refused(eq: Equations, m: integrators.Integrator, looped: bool) -> str:
     """What a kernel says that cannot step a network; empty where it can."""
     if not eq.inertial or looped:
         return ""
-    return "found links with inertia" if m.inexact or m.smooth is not None else ""
+    what = "links with inertia" if eq.inertial_links else "nodes with a mass matrix"
+    return f"found {what}" if m.inexact or m.smooth is not None else ""
 
 
 @pytest.mark.parametrize("looped", [False, True], ids=["written out", "looped"])

@@ -248,12 +248,6 @@ def test_set_valued_slip_is_that_of_the_equations():
 # -- refusals, names, orders -----------------------------------------------------------------------------------
 
 
-def test_links_with_inertia_are_refused():
-    scene = Scene(oscillator="harmonic", coupling="inerter", topology=chain(2))
-    with pytest.raises(ValueError, match="taylor: found links with inertia"):
-        step_of(scene.equations, 8)
-
-
 @pytest.mark.parametrize(
     "name",
     [
