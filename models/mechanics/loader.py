@@ -19,7 +19,7 @@ from .components import SLIDING, TIME
 from .coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling, split
 from .definition import COUPLING, FRICTION_LAW, OSCILLATOR, coordinates_of, lagrangian_symbols
 from .friction import FrictionLaw
-from .oscillator import Coordinate, Field, Lagrangian, Oscillator, Scaling
+from .oscillator import Coordinate, FieldModel, LagrangianModel, Oscillator, Scaling
 
 __all__ = ["load_friction_law", "load_oscillator", "read_coupling"]
 
@@ -88,19 +88,19 @@ def _oscillator(name: str, module: ModuleType) -> Oscillator:
     )
 
 
-def _field(module: ModuleType) -> Field:
+def _field(module: ModuleType) -> FieldModel:
     """The vector field that a module defines."""
     rates = call(module.field, {**_symbols((*module.PARAMETERS, *module.STATE)), TIME.name: TIME})
-    return Field(tuple(module.STATE), tuple(map(sp.sympify, rates)))
+    return FieldModel(tuple(module.STATE), tuple(map(sp.sympify, rates)))
 
 
-def _lagrangian(module: ModuleType) -> Lagrangian:
+def _lagrangian(module: ModuleType) -> LagrangianModel:
     """The Lagrangian that a module defines."""
     table = coordinates_of(module)
     coordinates = tuple(Coordinate(name, velocity, unit) for name, (velocity, unit) in table.items())
     given = lagrangian_symbols(module)
     force = call(module.force, given) if hasattr(module, "force") else (sp.S.Zero,) * len(coordinates)
-    return Lagrangian(
+    return LagrangianModel(
         coordinates,
         sp.sympify(call(module.kinetic, given)),
         sp.sympify(call(module.potential, given)),

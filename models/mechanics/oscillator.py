@@ -46,7 +46,7 @@ class Scaling:
 
 
 @dataclass(frozen=True, slots=True)
-class Lagrangian:
+class LagrangianModel:
     """A mechanical system: energies and forces as expressions, `FRICTION` for a friction law.
 
     Coordinates, velocities and parameters are real symbols.  With a `scaling` all quantities are physical and the
@@ -80,7 +80,7 @@ class Lagrangian:
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class FieldModel:
     """A first-order vector field: the names of the states and an expression for the rate of each."""
 
     state: tuple[str, ...]
@@ -112,7 +112,7 @@ class Oscillator:
 
     name: str
     parameters: Frozen[Parameter]
-    model: Lagrangian | Field
+    model: LagrangianModel | FieldModel
     initial: Mapping[str, Any] | None = None
     summary: str = field(default="", compare=False)
     source: str = field(default="", compare=False)
@@ -128,4 +128,4 @@ class Oscillator:
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the coordinates, none of a vector field."""
-        return tuple(c.name for c in self.model.coordinates) if isinstance(self.model, Lagrangian) else ()
+        return tuple(c.name for c in self.model.coordinates) if isinstance(self.model, LagrangianModel) else ()

@@ -12,7 +12,7 @@ from ..inputs.checks import check_choice, check_integer, check_number, check_tex
 from ..inputs.frozen import Frozen
 from ..inputs.words import Word
 from ..mechanics.friction import ContactModel, FrictionLaw
-from ..mechanics.oscillator import Field
+from ..mechanics.oscillator import FieldModel
 from ..mechanics.physics import check_masses, check_power
 from .axis import Axis
 from .model import Model, NodeKind, as_coupling, as_groups, as_law, as_oscillator, as_topology
@@ -145,7 +145,7 @@ def _records(model: Model, given: object) -> tuple[Record, ...]:
 def _section(model: Model, given: object) -> Section:
     """The section: unless it is given, a velocity of the first node falls through 0, or the state of a vector field."""
     own = tuple(s.name for s in model.unlinked.node_at(0).state)
-    crossed = own[0] if isinstance(model.kinds[model.kind_of[0]].oscillator.model, Field) else own[-1]
+    crossed = own[0] if isinstance(model.kinds[model.kind_of[0]].oscillator.model, FieldModel) else own[-1]
     default = f"{'v' if 'v' in own else crossed}_1 falling"
     section = Section.parse(default if given is None else given)
     model.check_state(section.variable, "section variable")

@@ -21,7 +21,7 @@ from ..mechanics.coupling import MatrixCoupling
 from ..mechanics.friction import ContactModel
 from ..mechanics.link import link_energies
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
-from ..mechanics.oscillator import Field, Oscillator
+from ..mechanics.oscillator import FieldModel, Oscillator
 from .model import NodeKind
 from .scene import a_scene
 
@@ -86,7 +86,7 @@ def energy(scene: Scene) -> Energy:
     """
     kinds = a_scene(scene).model.kinds
     for kind in kinds:
-        if isinstance(kind.oscillator.model, Field):
+        if isinstance(kind.oscillator.model, FieldModel):
             name = kind.oscillator.name
             raise ValueError(f"energy: oscillator {name!r} is a vector field; expected one with a Lagrangian")
     equations = scene.equations
