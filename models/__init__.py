@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     from .graphs.topology import Topology, from_matrix, read_matrix
     from .inputs.options import integer_option, integers_option, probability_option
     from .inputs.plugins import allow_code
+    from .mechanics.friction import FrictionLaw
+    from .mechanics.inline import Field, Lagrangian, friction_law
+    from .mechanics.oscillator import Oscillator, friction
     from .mechanics.parameter import Parameter
     from .presentation.equations import latex, text
     from .scenes.axis import Axis
@@ -43,6 +46,10 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Axis": "scenes.axis",
+    "Field": "mechanics.inline",
+    "FrictionLaw": "mechanics.friction",
+    "Lagrangian": "mechanics.inline",
+    "Oscillator": "mechanics.oscillator",
     "Parameter": "mechanics.parameter",
     "Scene": "scenes.scene",
     "Section": "scenes.section",
@@ -51,6 +58,8 @@ _HOMES = {
     "allow_code": "inputs.plugins",
     "cartesian": "graphs.products",
     "complement": "graphs.products",
+    "friction": "mechanics.oscillator",
+    "friction_law": "mechanics.inline",
     "from_edges": "graphs.readers",
     "from_graph": "graphs.readers",
     "from_matrix": "graphs.topology",
@@ -74,6 +83,10 @@ _HOMES = {
 
 __all__ = [
     "Axis",
+    "Field",
+    "FrictionLaw",
+    "Lagrangian",
+    "Oscillator",
     "Parameter",
     "Scene",
     "Section",
@@ -82,6 +95,8 @@ __all__ = [
     "allow_code",
     "cartesian",
     "complement",
+    "friction",
+    "friction_law",
     "from_edges",
     "from_graph",
     "from_matrix",

@@ -23,6 +23,9 @@ from .oscillator import Coordinate, FieldModel, LagrangianModel, Oscillator, Sca
 
 __all__ = ["load_friction_law", "load_oscillator", "read_coupling"]
 
+USUAL_LAW = "exponential"
+"""The friction law of an oscillator whose file says that it takes one."""
+
 
 def load_oscillator(name: str) -> Oscillator:
     """Return the oscillator of a plug-in.
@@ -83,8 +86,9 @@ def _oscillator(name: str, module: ModuleType) -> Oscillator:
         Frozen(module.PARAMETERS),
         _field(module) if hasattr(module, "field") else _lagrangian(module),
         None if initial is None else Frozen(initial),
-        _text(module, "SUMMARY"),
-        _text(module, "SOURCE"),
+        load_friction_law(USUAL_LAW) if module.FRICTION else None,
+        summary=_text(module, "SUMMARY"),
+        source=_text(module, "SOURCE"),
     )
 
 
@@ -97,7 +101,10 @@ def _field(module: ModuleType) -> FieldModel:
 def _lagrangian(module: ModuleType) -> LagrangianModel:
     """The Lagrangian that a module defines."""
     table = coordinates_of(module)
-    coordinates = tuple(Coordinate(name, velocity, unit) for name, (velocity, unit) in table.items())
+    scaling = _scaling(module)
+    coordinates = tuple(
+        Coordinate(name, velocity, "1" if scaling is None else unit) for name, (velocity, unit) in table.items()
+    )
     given = lagrangian_symbols(module)
     force = call(module.force, given) if hasattr(module, "force") else (sp.S.Zero,) * len(coordinates)
     return LagrangianModel(
@@ -106,7 +113,7 @@ def _lagrangian(module: ModuleType) -> LagrangianModel:
         sp.sympify(call(module.potential, given)),
         tuple(map(sp.sympify, force if isinstance(force, tuple | list) else (force,))),
         sp.sympify(call(module.dissipation, given)) if hasattr(module, "dissipation") else sp.S.Zero,
-        _scaling(module),
+        scaling,
     )
 
 

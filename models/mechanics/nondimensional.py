@@ -131,7 +131,7 @@ def friction_coefficient(law: FrictionLaw, contact: str) -> Callable[[sp.Expr], 
     """Return f(w), the friction coefficient as a function of the non-dimensional sliding velocity.
 
     The parameters of a law have units too, so they scale with the rest: a rate of decay a = 2.5 of unit s/m decays
-    with 2.5 |w| only when w is measured in L/T.
+    with 2.5 |w| only when w is measured in L/T.  If none has a unit, w is a number as they are.
 
     Parameters
     ----------
@@ -147,7 +147,8 @@ def friction_coefficient(law: FrictionLaw, contact: str) -> Callable[[sp.Expr], 
     """
     treatment = ContactModel.parse("contact", contact)
     w = sp.Dummy("w", real=True)
-    amounts = {SLIDING: w * magnitude("m/s"), **_amounts(law.parameters)}
+    pure = all(parameter.unit == "1" for parameter in law.parameters.values())
+    amounts = {SLIDING: w if pure else w * magnitude("m/s"), **_amounts(law.parameters)}
     value = _cancel(law.force.xreplace(amounts), f"friction law {law}")
     if treatment == ContactModel.ATAN:
         value = regularise(value, sp.Symbol("kappa", real=True))

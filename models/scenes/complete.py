@@ -15,7 +15,7 @@ from ..mechanics.friction import ContactModel, FrictionLaw
 from ..mechanics.oscillator import FieldModel
 from ..mechanics.physics import check_masses, check_power
 from .axis import Axis
-from .model import Model, NodeKind, as_coupling, as_groups, as_law, as_oscillator, as_topology
+from .model import Model, NodeKind, as_contact, as_coupling, as_groups, as_law, as_oscillator, as_topology
 from .parameters import at_nodes, drive, parameters
 from .section import Section
 from .start import SEED_LIMIT, chosen_start, default_start
@@ -85,10 +85,10 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
 def _model(given: Mapping[str, Any]) -> dict[str, Any]:
     """The parts of the model, and the model."""
     oscillator = as_oscillator(given["oscillator"])
-    contact = ContactModel.parse("contact", given["contact"])
     graph = as_topology(given["topology"])
     friction = as_law(given["friction"], oscillator)
     groups = as_groups(given["nodes"], graph.n)
+    contact = as_contact(given["contact"], (oscillator, *(group.oscillator for group in groups)))
     coupling = as_coupling(given["coupling"])
     model = Model.of(NodeKind(oscillator, friction), groups, contact, coupling, graph)
     return {

@@ -43,20 +43,20 @@ class Scene:
 
     Parameters
     ----------
-    title : str
-        What the scene is called.
     oscillator : Oscillator or str
-        The nodes, by value or by name.
-    friction : FrictionLaw or str, optional
-        Their friction law; "default" is "exponential" if the oscillator takes a law, else None.
-    contact : str
-        How the jump of a law at rest is treated: "atan", "sign" or "set-valued".
+        The nodes, by value (`Lagrangian`, `Field`) or by name.
     coupling : Coupling or str, optional
         What joins the nodes: a name ("spring", "spring on x") or components ("x->x, 1/2 y->z").
-    nodes : iterable of Group or tables, optional
-        Nodes of other kinds.
     topology : Topology, optional
         The graph; one node alone if left out.
+    title : str
+        What the scene is called.
+    friction : FrictionLaw or str, optional
+        Their friction law; "default" is the one that the oscillator brings, None for none.
+    contact : str, optional
+        How the jump of a law at rest is treated: "atan", "sign" or "set-valued"; that of the oscillator if left out.
+    nodes : iterable of Group or tables, optional
+        Nodes of other kinds.
     parameters : mapping, optional
         Values of parameters: a number, or a list with one number for each node.
     initial : mapping, optional
@@ -127,14 +127,14 @@ class Scene:
 
     def __init__(
         self,
+        oscillator: Oscillator | str = "friction",
+        coupling: Coupling | str | None = "spring",
+        topology: Topology | None = None,
         *,
         title: str = "",
-        oscillator: Oscillator | str = "friction",
         friction: FrictionLaw | str | None = "default",
-        contact: str = "atan",
-        coupling: Coupling | str | None = "spring",
+        contact: str | None = None,
         nodes: Iterable[Group | Mapping[str, object]] | None = None,
-        topology: Topology | None = None,
         parameters: Mapping[str, object] | None = None,
         initial: Mapping[str, object] | None = None,
         record: Iterable[str] | None = None,
@@ -319,7 +319,7 @@ def _spectrum(graph: Topology) -> Spectrum:
 KEYWORDS = tuple(own.name for own in fields(Scene) if own.compare)
 """The keywords of a scene, which are the keys of a scene file."""
 
-_FOLLOWING = {"friction": "default", "record": None, "section": None, "time_unit": None, "atol": None}
+_FOLLOWING = {"friction": "default", "contact": None, "record": None, "section": None, "time_unit": None, "atol": None}
 """Keywords whose default depends on other keywords, with the value that stands for it."""
 
 
