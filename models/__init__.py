@@ -1,6 +1,7 @@
 """From a Lagrangian and a graph to exact equations and exact spectra.
 
-Names are loaded on first use, so that importing this package costs next to nothing. Every file of
+Names are loaded on first use, so that importing this package costs next to nothing; `__init__.pyi`
+says to editors what they are. Every file of
 the folder `topologies` is offered as a function of the number of nodes and of its options:
 ``circulant(10, offsets=(1, 3))`` is ``topology("circulant", 10, offsets=(1, 3))``.
 
@@ -23,26 +24,7 @@ cell          One point of the axes of a scene: one initial-value problem.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from .graphs.families import topology
-    from .graphs.products import cartesian, complement, kronecker, union, weighted
-    from .graphs.readers import from_edges, from_graph, from_sparse, read_edges, read_graphml
-    from .graphs.symbolic import from_symbols
-    from .graphs.topology import Topology, from_matrix, read_matrix
-    from .inputs.options import integer_option, integers_option, probability_option
-    from .inputs.plugins import allow_code
-    from .mechanics.friction import FrictionLaw
-    from .mechanics.inline import Field, Lagrangian, friction_law
-    from .mechanics.oscillator import Oscillator, friction
-    from .mechanics.parameter import Parameter
-    from .presentation.equations import latex, text
-    from .scenes.axis import Axis
-    from .scenes.file import load_scene, scene_names
-    from .scenes.scene import Scene
-    from .scenes.section import Section
-    from .spectra.spectrum import Spectrum
+from typing import Any
 
 _HOMES = {
     "Axis": "scenes.axis",

@@ -98,6 +98,18 @@ TOPOLOGY = Kind(
 """Graph families: the files of the folder `topologies`."""
 
 
+class _Signature:
+    """The signature of a family, in which its options are keywords with defaults."""
+
+    def __get__(self, own: Family | None, kind: type) -> inspect.Signature:
+        if own is None:
+            raise AttributeError("__signature__")
+        size = inspect.Parameter("n", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation="int")
+        given = inspect.signature(own.edges).parameters.values()
+        options = [parameter for parameter in given if parameter.kind is inspect.Parameter.KEYWORD_ONLY]
+        return inspect.Signature([size, *options], return_annotation="Topology")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Family:
     """A family of graphs: a function of the number of nodes and of the options of the family.
@@ -158,6 +170,8 @@ class Family:
     formula: Callable[..., Any] | None = None
     sides: Callable[[int], tuple[int, ...]] | None = None
     link_limit: int = LINK_LIMIT
+
+    __signature__ = _Signature()
 
     def __call__(self, n: int, **options: object) -> Topology:
         """Return the graph of `n` nodes; see `topology`."""

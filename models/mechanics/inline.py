@@ -8,7 +8,7 @@ assumed; a parameter that was assumed positive or nonnegative has that range.
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from keyword import iskeyword
@@ -130,7 +130,9 @@ def Lagrangian(
     for keyword, value in (("friction", law), ("contact", contact)):
         if value is not None and not rubs:
             raise ValueError(f"{what}: found {keyword} {str(value)!r}, but no force has friction(…); leave it out")
-    own = _own_parameters(what, (*energies, *acting), law if isinstance(friction, sp.Expr | int | float) else None, defaults)
+    own = _own_parameters(
+        what, (*energies, *acting), law if isinstance(friction, sp.Expr | int | float) else None, defaults
+    )
     model = LagrangianModel(
         tuple(Coordinate(c, speed, "1") for c, speed in table.items()), kinetic, potential, acting, dissipation
     )
@@ -418,8 +420,9 @@ def _parameter(value: object) -> Parameter:
     check_keys("parameter", value, [own.name for own in fields(Parameter)])
     if "default" not in value:
         raise ValueError(f"found {short_repr(dict(value))}; expected a table with a default")
-    checks = {"unit": check_text, "meaning": check_text, "scale": check_text, "positive": check_flag}
-    return Parameter(**{str(key): checks.get(str(key), check_number)(str(key), entry) for key, entry in value.items()})
+    checks: dict[str, Callable[[str, object], Any]] = {own.name: check_number for own in fields(Parameter)}
+    checks |= {"unit": check_text, "meaning": check_text, "scale": check_text, "positive": check_flag}
+    return Parameter(**{str(key): checks[str(key)](str(key), entry) for key, entry in value.items()})
 
 
 def _value(what: str, value: object) -> float:

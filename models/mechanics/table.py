@@ -120,6 +120,8 @@ def _texts(what: str, table: object) -> dict[str, Any]:
 def as_name_or_table(part: Oscillator | FrictionLaw) -> str | dict[str, Any]:
     """Return the name of an oscillator or friction law that is a plug-in's, else its table.
 
+    A file outside the package that has changed since is named only if it has scales, which no table has.
+
     Raises
     ------
     ValueError
@@ -131,7 +133,8 @@ def as_name_or_table(part: Oscillator | FrictionLaw) -> str | dict[str, Any]:
         same = load(part.name) == part
     except (ValueError, TypeError):
         same = False
-    if same:
+    scaled = isinstance(part, Oscillator) and isinstance(part.model, LagrangianModel) and part.model.scaling is not None
+    if same or (scaled and part.name.endswith(".py")):
         return str(part.name)
     return _oscillator_table(part) if isinstance(part, Oscillator) else _law_table(part)
 
@@ -158,14 +161,15 @@ def _oscillator_table(node: Oscillator) -> dict[str, Any]:
 def _lagrangian_table(model: LagrangianModel, texts: _Texts) -> dict[str, Any]:
     if model.scaling is not None:
         raise ValueError(f"{texts.what}: found scales of its quantities and no file; expected a non-dimensional model")
-    forces = {c.name: texts.write(e) for c, e in zip(model.coordinates, model.forces, strict=True) if e != 0}
-    return {
+    table: dict[str, Any] = {
         "coordinates": {c.name: c.velocity for c in model.coordinates},
         "kinetic": texts.write(model.kinetic),
         "potential": texts.write(model.potential),
-        "forces": forces,
-        "dissipation": texts.write(model.dissipation),
+        "forces": {c.name: texts.write(e) for c, e in zip(model.coordinates, model.forces, strict=True) if e != 0},
     }
+    if model.dissipation != 0:
+        table["dissipation"] = texts.write(model.dissipation)
+    return table
 
 
 def _law_table(law: FrictionLaw) -> dict[str, Any]:

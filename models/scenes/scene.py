@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import lru_cache
@@ -22,6 +23,7 @@ from ..mechanics.oscillator import Oscillator
 from .axis import Axis
 from .complete import TimeUnit, complete
 from .dictionary import arguments, as_dict
+from .file import save_scene
 from .model import Group, Model, as_oscillator
 from .parameters import drive, varied, without
 from .section import Section
@@ -279,6 +281,21 @@ class Scene:
     def as_dict(self) -> dict[str, object]:
         """Return the whole scene in JSON types; `Scene.from_dict` makes an equal scene of it."""
         return as_dict(self._values(), self.varied)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the whole scene to a TOML file; `load_scene` makes an equal scene of it.
+
+        Parameters
+        ----------
+        path : str or path
+            The file, whose name ends in .toml.  A file of this name is replaced.
+
+        Raises
+        ------
+        ValueError
+            For another ending, more than a megabyte, and parts that no file can say.
+        """
+        save_scene(self, path)
 
     @classmethod
     def from_dict(cls, values: Mapping[str, object], folder: Path | None = None) -> Scene:

@@ -52,7 +52,9 @@ def test_equal_contents_are_one_part_and_others_are_not() -> None:
     assert hash(again) == hash(SLIDER)
     assert replace(SLIDER, model=replace(DUMB, potential=k * x**4)) != SLIDER
     assert as_oscillator("duffing") == as_oscillator("duffing")
-    assert as_law("default", SLIDER) == as_law("exponential", SLIDER)
+    assert as_law("default", as_oscillator("friction")) == as_law("exponential", SLIDER)
+    assert as_law("default", replace(SLIDER, friction=LAW)) == LAW
+    assert as_law("default", SLIDER) is None
 
 
 def test_an_oscillator_and_its_law_go_together() -> None:
