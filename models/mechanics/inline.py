@@ -39,6 +39,9 @@ from .parameter import Parameter
 
 __all__ = ["Field", "Lagrangian", "friction_law"]
 
+NAME = 4096
+"""Most characters of a name, which may be the path of a file."""
+
 Expression: TypeAlias = "sp.Expr | float | str"
 """An expression of SymPy, a number, or text that is parsed and not run."""
 
@@ -110,7 +113,7 @@ def Lagrangian(
     >>> node.states
     ('x', 'v')
     """
-    what = f"oscillator {check_text('name', name)!r}"
+    what = f"oscillator {check_text('name', name, NAME)!r}"
     forces = dict(check_table(f"{what}: Q", {} if Q is None else Q))
     moving = _functions(what, [T, V, R, *forces, *forces.values()])
     table = _coordinates(what, coordinates, moving)
@@ -180,7 +183,7 @@ def Field(
     >>> node.y
     y
     """
-    what = f"oscillator {check_text('name', name)!r}"
+    what = f"oscillator {check_text('name', name, NAME)!r}"
     given = dict(check_table(f"{what}: rates", rates))
     if not given:
         raise ValueError(f"{what}: found no rates; expected one for each state")
@@ -238,7 +241,7 @@ def friction_law(
     >>> friction_law("mu*sign(w)/(1 + abs(w))", {"mu": 0.3}).jumps
     True
     """
-    what = f"friction law {check_text('name', name)!r}"
+    what = f"friction law {check_text('name', name, NAME)!r}"
     defaults = _parameters(what, parameters)
     names = _Names.of_law(what, defaults)
     coefficient = names.expression("force", force)

@@ -1,7 +1,7 @@
-"""The front door: the names of the models and of the runtime in one place, each loaded when it is first used.
+"""The front door: all names of the models and of the runtime, each loaded when it is first used.
 
-``import synchain`` is this file.  It knows the two packages and nothing of their rooms; `__init__.pyi` says to
-editors what it offers.
+``import synchain`` is this file.  It knows the two packages and nothing of their rooms;
+`__init__.pyi` says to editors what it offers.
 """
 
 from __future__ import annotations
