@@ -280,6 +280,9 @@ def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
         found = algebra.value(expression.evaluate(algebra))
     except NoMeaning as error:
         raise ValueError(f"{what}: {error.reason}; expected a value") from None
+    except (TypeError, ArithmeticError, RecursionError) as error:  # of SymPy, which compares or expands in vain
+        reason = " ".join(str(error).split())[:200]
+        raise ValueError(f"{what}: {short_repr(text)} has no value: {reason or type(error).__name__}") from None
     if found.has(sp.I):
         raise ValueError(f"{what}: found the complex {short_repr(found)}; expected a real value")
     steep = [e for e in found.atoms(sp.Pow) if e.exp.is_number and not abs(e.exp) <= EXPONENT]

@@ -8,7 +8,7 @@ assumed; a parameter that was assumed positive or nonnegative has that range.
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from keyword import iskeyword
@@ -119,7 +119,7 @@ def Lagrangian(
     table = _coordinates(what, coordinates, moving)
     defaults = _parameters(what, parameters)
     names = _Names.of(what, table, moving, defaults)
-    on = {names.coordinate("Q", key): value for key, value in forces.items()}
+    on = {names.state("Q", key, table): value for key, value in forces.items()}
     acting = tuple(names.expression(f"force on {c}", on.get(c, 0)) for c in table)
     energies = [names.expression(about, e) for about, e in (("T", T), ("V", V), ("R", R))]
     for about, energy in zip("TVR", energies, strict=True):
@@ -247,8 +247,8 @@ def friction_law(
     coefficient = names.expression("force", force)
     holding = None if static is None else names.expression("static", static)
     used = (coefficient,) if holding is None else (coefficient, holding)
-    if coefficient.has(FRICTION, TIME) or (holding is not None and holding.has(FRICTION, TIME, SLIDING)):
-        raise ValueError(f"{what}: found the time, friction(…), or w in static; expected a function of w alone")
+    if any(e.has(FRICTION) for e in used) or (holding is not None and holding.has(SLIDING)):
+        raise ValueError(f"{what}: found friction(…), or w in static; expected a force of w and a static coefficient")
     pairs = tuple((str(low), str(high)) for low, high in order)
     for name_of in (entry for pair in pairs for entry in pair):
         if name_of not in defaults:
@@ -321,21 +321,19 @@ class _Names:
                 raise ValueError(
                     f"{about}: found the symbol {symbol} beside functions of time; expected one of the two"
                 )
-        plain = value.xreplace(self.moving)
-        unknown = [e for e in plain.atoms(AppliedUndef, sp.Derivative) if e.func != FRICTION]
+        unknown = [e for e in value.atoms(AppliedUndef, sp.Derivative) if e.func != FRICTION and e not in self.moving]
         if unknown:
             found = min(map(str, unknown))
             raise ValueError(f"{about}: found {found}; expected {', '.join(map(str, self.moving)) or 'plain symbols'}")
-        return exact(about, plain, self.symbols)
+        return exact(about, value.xreplace(self.moving), self.symbols)
 
-    def coordinate(self, about: str, key: object) -> str:
-        """The name of a coordinate or state that is a key of a mapping."""
+    def state(self, about: str, key: object, known: Collection[str]) -> str:
+        """The name of a state out of some that is a key of a mapping."""
         symbol = self.moving.get(key)
         name = symbol.name if symbol is not None else _name(self.what, about, key)
-        if name not in self.states:
-            raise ValueError(
-                f"{self.what}: {about} has the key {name!r}; expected {', '.join(self.states)}{suggestion(name, self.states)}"
-            )
+        if name not in known:
+            expected = f"{', '.join(known)}{suggestion(name, known)}"
+            raise ValueError(f"{self.what}: {about} has the key {short_repr(key)}; expected {expected}")
         return name
 
     def initial(self, given: Given | None) -> Frozen[float] | None:
@@ -344,7 +342,7 @@ class _Names:
             return None
         table = check_table(f"{self.what}: initial", given)
         return Frozen(
-            {self.coordinate("initial", key): _value(f"initial {key}", value) for key, value in table.items()}
+            {self.state("initial", key, self.states): _value(f"initial {key}", value) for key, value in table.items()}
         )
 
 
