@@ -8,7 +8,7 @@ a model keeps, wherever it comes from.
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NoReturn
@@ -198,19 +198,24 @@ def _row(terms: Sequence[tuple[str, str]]) -> str:
 
 
 def _product(e: sp.Mul) -> tuple[str, int]:
-    if _is_negative(e):
-        return f"-{_inside(_negated(e), _PRODUCT)}", _SUM
+    """Factors and divisions from left to right; a number stays behind a sum, which would take it in."""
     number, rest = e.as_coeff_Mul()
     if not isinstance(number, sp.Rational):
         raise ValueError(f"found {number}; expected rational numbers, decimals and pi")
-    above = [str(number.p)] if number.p != 1 else []
-    below = [str(number.q)] if number.q != 1 else []
-    for factor in rest.as_ordered_factors():
-        if isinstance(factor, sp.Pow) and factor.exp.is_Rational and factor.exp < 0:
-            below.append(_inside(1 / factor, _POWER))
-        else:
-            above.append(_inside(factor, _POWER))
-    return "/".join([_factors(above) if above else "1", *below]), _PRODUCT
+    if number < 0:
+        text = _inside(_negated(e), _PRODUCT)
+        return (f"-({text})" if text.startswith("(") else f"-{text}"), _SUM
+    factors = rest.as_ordered_factors()
+    below = [factor for factor in factors if isinstance(factor, sp.Pow) and factor.exp.is_Rational and factor.exp < 0]
+    above = [_inside(factor, _POWER) for factor in factors if factor not in below]
+    divisors = [_inside(1 / factor, _POWER) for factor in below]
+    last = any(isinstance(factor, sp.Add) for factor in factors)
+    if number.p != 1 and not last:
+        above.insert(0, str(number.p))
+    text = "/".join([_factors(above) if above else "1", *divisors])
+    if number.p != 1 and last:
+        text += f"*{number.p}"
+    return (text if number.q == 1 else f"{text}/{number.q}"), _PRODUCT
 
 
 def _factors(factors: Sequence[str]) -> str:
@@ -292,31 +297,8 @@ def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
 
 
 @dataclass(frozen=True, slots=True)
-class _Piece:
-    """What is put together in one go: the terms of a sum, the factors of a product, the cases of a choice.
-
-    SymPy makes other expressions of (2*a)*b than of 2, a and b at once if a is a sum.
-    """
-
-    put: Callable[..., sp.Basic]
-    parts: tuple[Any, ...]
-
-    def whole(self) -> sp.Basic:
-        """The expression."""
-        return self.put(*self.parts)
-
-
-def _same(e: sp.Basic) -> sp.Basic:
-    return e
-
-
-def _one(e: sp.Basic) -> _Piece:
-    return _Piece(_same, (e,))
-
-
-@dataclass(frozen=True, slots=True)
-class _Expressions(Algebra[_Piece]):
-    """Expressions of some symbols; constants are checked after every operation, so that none grows."""
+class _Expressions(Algebra[sp.Basic]):
+    """Expressions of some symbols as SymPy makes them; operands are checked, so that no constant grows."""
 
     what: str
     names: Mapping[str, sp.Symbol]
@@ -332,43 +314,45 @@ class _Expressions(Algebra[_Piece]):
     def _known(self) -> str:
         return f"pi, + - * / **, {' '.join(FUNCTIONS)} friction, a if x > 0 else b, and {', '.join(self.names)}"
 
-    def number(self, value: int | float) -> _Piece:
+    def number(self, value: int | float) -> sp.Basic:
         if not abs(value) <= (DIGITS if isinstance(value, int) else MAGNITUDE):
             raise ValueError(f"{self.what}: found {short_repr(value)}; expected numbers up to {MAGNITUDE:g}")
-        return _one(sp.Integer(value) if isinstance(value, int) else sp.Rational(repr(value)))
+        return sp.Integer(value) if isinstance(value, int) else sp.Rational(repr(value))
 
-    def name(self, name: str) -> _Piece:
+    def name(self, name: str) -> sp.Basic:
         if name in self.names:
-            return _one(self.names[name])
+            return self.names[name]
         if name == "pi":
-            return _one(sp.pi)
+            return sp.pi
         raise ValueError(f"{self.what}: {_undeclared(name, self.names)}")
 
-    def positive(self, value: _Piece) -> _Piece:
+    def positive(self, value: sp.Basic) -> sp.Basic:
         return value
 
-    def negative(self, value: _Piece) -> _Piece:
-        return _Piece(sp.Mul, (*self._parts(sp.Mul, value), sp.S.NegativeOne))
+    def negative(self, value: sp.Basic) -> sp.Basic:
+        return -self.value(value)
 
-    def add(self, a: _Piece, b: _Piece) -> _Piece:
-        return _Piece(sp.Add, (*self._parts(sp.Add, a), *self._parts(sp.Add, b)))
+    def add(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        return self.value(a) + self.value(b)
 
-    def multiply(self, a: _Piece, b: _Piece) -> _Piece:
-        return _Piece(sp.Mul, (*self._parts(sp.Mul, a), *self._parts(sp.Mul, b)))
+    def subtract(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        return self.value(a) - self.value(b)
 
-    def divide(self, a: _Piece, b: _Piece) -> _Piece:
-        below = self.value(b)
-        if below == 0:
+    def multiply(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        return self.value(a) * self.value(b)
+
+    def divide(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        if b == 0:
             raise ValueError(f"{self.what}: found a division by zero; expected finite real numbers")
-        return _Piece(sp.Mul, (*self._parts(sp.Mul, a), 1 / below))
+        return self.value(a) / self.value(b)
 
-    def power(self, base: _Piece, exponent: _Piece) -> _Piece:
+    def power(self, base: sp.Basic, exponent: sp.Basic) -> sp.Basic:
         lower, upper = self.value(base), self.value(exponent)
         if upper.is_number and not abs(upper) <= EXPONENT:
             raise ValueError(f"{self.what}: found the exponent {short_repr(upper)}; expected at most {EXPONENT}")
-        return _one(lower**upper)
+        return lower**upper
 
-    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[_Piece]]:
+    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Basic]]:
         known = {*FUNCTIONS, FRICTION_NAME}
         if function not in known:
             close = suggestion(function, known)
@@ -378,31 +362,27 @@ class _Expressions(Algebra[_Piece]):
             raise NoMeaning(f"{function} has {count} arguments; expected {wanted or 'at least 2'}")
         return (self,) * count
 
-    def call(self, function: str, arguments: Sequence[_Piece], options: Mapping[str, str]) -> _Piece:
-        values = [self.value(argument) for argument in arguments]
-        return _one((FRICTION if function == FRICTION_NAME else FUNCTIONS[function])(*values))
+    def call(self, function: str, arguments: Sequence[sp.Basic], options: Mapping[str, str]) -> sp.Basic:
+        return (FRICTION if function == FRICTION_NAME else FUNCTIONS[function])(*map(self.value, arguments))
 
-    def compare(self, sign: str, a: _Piece, b: _Piece) -> _Piece:
-        return _one(_RELATIONS[sign](self.value(a), self.value(b)))
+    def compare(self, sign: str, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        return _RELATIONS[sign](self.value(a), self.value(b))
 
-    def junction(self, word: str, conditions: Sequence[_Piece]) -> _Piece:
-        found = [self._condition(condition) for condition in conditions]
-        return _one((sp.And if word == "and" else sp.Or)(*found))
+    def junction(self, word: str, conditions: Sequence[sp.Basic]) -> sp.Basic:
+        return (sp.And if word == "and" else sp.Or)(*map(self.condition, conditions))
 
-    def contrary(self, condition: _Piece) -> _Piece:
-        return _one(sp.Not(self._condition(condition)))
+    def contrary(self, condition: sp.Basic) -> sp.Basic:
+        return sp.Not(self.condition(condition))
 
-    def choice(self, condition: _Piece, value: _Piece, otherwise: _Piece) -> _Piece:
-        case = (self.value(value), self._condition(condition))
-        last = otherwise.parts if otherwise.put is sp.Piecewise else ((self.value(otherwise), sp.true),)
-        return _Piece(sp.Piecewise, (case, *last))
+    def choice(self, condition: sp.Basic, value: sp.Basic, otherwise: sp.Basic) -> sp.Basic:
+        last = otherwise.args if isinstance(otherwise, sp.Piecewise) else ((self.value(otherwise), sp.true),)
+        return sp.Piecewise((self.value(value), self.condition(condition)), *last)
 
-    def value(self, piece: _Piece) -> sp.Expr:
-        """The expression of a piece: no condition, and with finite real constants that are not too large."""
-        found = piece.whole()
-        if not isinstance(found, sp.Expr):
-            raise NoMeaning(f"found the condition {short_repr(found)}, which is no value")
-        for number in _constants(found):
+    def value(self, e: sp.Basic) -> sp.Expr:
+        """The expression, if it is no condition and its constants are finite, real and not too large."""
+        if not isinstance(e, sp.Expr):
+            raise NoMeaning(f"found the condition {short_repr(e)}, which is no value")
+        for number in _constants(e):
             if number.is_Rational:
                 large = max(abs(number.p), number.q) > DIGITS
             else:
@@ -411,17 +391,13 @@ class _Expressions(Algebra[_Piece]):
             if large:
                 shown = short_repr(number)
                 raise ValueError(f"{self.what}: found {shown}; expected finite real numbers up to {MAGNITUDE:g}")
-        return found
+        return e
 
-    def _parts(self, put: Callable[..., sp.Basic], piece: _Piece) -> tuple[sp.Expr, ...]:
-        """The parts of a piece of some kind; a piece of another kind is one part."""
-        return piece.parts if piece.put is put else (self.value(piece),)
-
-    def _condition(self, piece: _Piece) -> Boolean:
-        found = piece.whole()
-        if not isinstance(found, Boolean) or isinstance(found, sp.Expr):
-            raise NoMeaning(f"found {short_repr(found)}, which is no condition")
-        return found
+    def condition(self, e: sp.Basic) -> Boolean:
+        """The condition, if it is one."""
+        if not isinstance(e, Boolean) or isinstance(e, sp.Expr):
+            raise NoMeaning(f"found {short_repr(e)}, which is no condition")
+        return e
 
 
 def _constants(e: sp.Expr) -> Iterator[sp.Expr]:
