@@ -137,7 +137,7 @@ def check_masses_exist(masses: sp.Matrix, velocities: Sequence[sp.Symbol]) -> No
     idle = [str(velocities[i]) for i in range(masses.rows) if i not in rest and masses[i, i] == 0]
     if idle:
         raise ValueError(f"no kinetic energy in the velocity {idle[0]}; expected T to grow with every velocity")
-    if rest and _vanishes(_determinant(masses.extract(rest, rest))):
+    if rest and _is_singular(masses.extract(rest, rest)):
         names = ", ".join(str(velocities[i]) for i in rest)
         raise ValueError(f"the mass matrix of {names} is singular; expected an invertible one")
 
@@ -166,15 +166,15 @@ def _determinant(masses: sp.Matrix) -> sp.Expr:
     return masses.det(method="berkowitz")
 
 
-def _vanishes(e: sp.Expr) -> bool:
-    """True if an expression is zero everywhere; a value that differs from zero at one place proves the contrary."""
-    symbols = sorted(e.free_symbols, key=str)
+def _is_singular(masses: sp.Matrix) -> bool:
+    """True if the determinant is zero everywhere; a value that differs from zero at one place proves the contrary."""
+    symbols = sorted(masses.free_symbols, key=str)
     for k in range(3):
         place = {s: sp.Rational(7 * i + 3 * k + 5, 11 + 2 * i) for i, s in enumerate(symbols)}
-        value = e.subs(place).evalf(30)
+        value = _determinant(masses.subs(place).evalf(30))
         if value.is_number and value.is_finite and abs(value) > sp.Float("1e-15"):
             return False
-    return bool(e.equals(0))
+    return bool(_determinant(masses).equals(0))
 
 
 def _block(masses: sp.Matrix, forces: Sequence[sp.Expr]) -> list[sp.Expr]:
