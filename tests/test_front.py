@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import doctest
 import importlib
 import inspect
+import re
 import subprocess
 import sys
 import zipfile
@@ -114,6 +116,26 @@ def test_a_star_import_brings_the_contract() -> None:
     code = f"from synchain import *; print(*[n for n in {CONTRACT!r} if n not in globals()]); print(chain(3).n)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     assert done.stdout.split() == ["3"]
+
+
+@pytest.mark.parametrize("name", ["mechanics.inline", "mechanics.oscillator"])
+def test_examples_of_docstrings_run(name: str) -> None:
+    found = doctest.testmod(importlib.import_module(f"synchain.models.{name}"))
+    assert found.attempted > 3
+    assert found.failed == 0
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/inline.md"])
+def test_the_models_of_the_docs_can_be_made(page: str) -> None:
+    """All but what runs them, which other tests do."""
+    blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / page).read_text("utf-8"), re.MULTILINE | re.DOTALL)
+    inline = [block for block in blocks if "sc." in block]
+    known: dict[str, object] = {}
+    for block in inline:
+        lines = [line for line in block.splitlines() if "sc.run(" not in line and not line.startswith("result")]
+        exec("\n".join(lines), known)
+    assert isinstance(known["scene"], synchain.Scene)
+    assert len(inline) == (1 if page == "README.md" else 3)
 
 
 @pytest.mark.long
