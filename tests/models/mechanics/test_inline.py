@@ -263,6 +263,20 @@ def test_hostile_text_is_refused_in_one_line(text: str) -> None:
     assert "\n" not in str(found.value)
 
 
+x_, v_, k_ = NAMES["x"], NAMES["v"], NAMES["k"]
+AS_THEY_ARE = [
+    2 * ((x_ + 1) * (v_ + 1)), -((x_ + 1) * (v_ + 1)), x_ - 3 * (x_ + 1) * (v_ + 1) / 2, -(x_ + 1) * v_, (x_ + 1) / (2 * v_),
+    2 * (x_ + 1) ** 2 / (v_ + 1), 1 / (2 * x_ + 2), sp.sqrt(x_ + 1) ** -3, x_**-k_, -(x_**2), sp.sqrt(2) * x_ / 2,
+    sp.Add(*(x_**i * v_ for i in range(17))), sp.Mul(*(sp.sin(i * x_) for i in range(1, 20))), sp.exp(1) * x_ - sp.pi,
+    sp.Piecewise((x_, x_ > 0), (v_, sp.And(v_ < 1, x_ < 2)), (-1, True)), sp.Max(x_, v_, k_) * sp.Abs(x_),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("e", AS_THEY_ARE, ids=str)
+def test_an_expression_keeps_its_form(e: sp.Expr) -> None:
+    assert exact("e", e, NAMES) == e
+
+
 leaves = st.sampled_from([*NAMES.values(), sp.Integer(2), sp.Rational(-3, 7), sp.pi, sp.Integer(-1), sp.Float(0.3)])
 
 
