@@ -283,9 +283,11 @@ def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     algebra = _Expressions(what, names)
     try:
         found = algebra.value(expression.evaluate(algebra))
+    except _Refusal:
+        raise
     except NoMeaning as error:
         raise ValueError(f"{what}: {error.reason}; expected a value") from None
-    except (TypeError, ArithmeticError, RecursionError) as error:  # of SymPy, which compares or expands in vain
+    except Exception as error:  # of SymPy, which compares in vain
         reason = " ".join(str(error).split())[:200]
         raise ValueError(f"{what}: {short_repr(text)} has no value: {reason or type(error).__name__}") from None
     if found.has(sp.I):
@@ -294,6 +296,10 @@ def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     if steep:
         raise ValueError(f"{what}: found the power {short_repr(steep[0])}; expected exponents up to {EXPONENT}")
     return found
+
+
+class _Refusal(ValueError):
+    """An error in the words of this module."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,17 +312,17 @@ class _Expressions(Algebra[sp.Basic]):
 
     def refuse(self, node: ast.expr, reason: str) -> NoReturn:
         piece = short_repr(ast.unparse(node))
-        raise ValueError(f"{self.what}: {reason or f'found {piece}; expected numbers, {self._known()}'}")
+        raise _Refusal(f"{self.what}: {reason or f'found {piece}; expected numbers, {self._known()}'}")
 
     def refuse_depth(self) -> NoReturn:
-        raise ValueError(f"{self.what}: more than {DEPTH} nested operations; expected fewer; add parentheses")
+        raise _Refusal(f"{self.what}: more than {DEPTH} nested operations; expected fewer; add parentheses")
 
     def _known(self) -> str:
         return f"pi, + - * / **, {' '.join(FUNCTIONS)} friction, a if x > 0 else b, and {', '.join(self.names)}"
 
     def number(self, value: int | float) -> sp.Basic:
         if not abs(value) <= (DIGITS if isinstance(value, int) else MAGNITUDE):
-            raise ValueError(f"{self.what}: found {short_repr(value)}; expected numbers up to {MAGNITUDE:g}")
+            raise _Refusal(f"{self.what}: found {short_repr(value)}; expected numbers up to {MAGNITUDE:g}")
         return sp.Integer(value) if isinstance(value, int) else sp.Rational(repr(value))
 
     def name(self, name: str) -> sp.Basic:
@@ -324,7 +330,7 @@ class _Expressions(Algebra[sp.Basic]):
             return self.names[name]
         if name == "pi":
             return sp.pi
-        raise ValueError(f"{self.what}: {_undeclared(name, self.names)}")
+        raise _Refusal(f"{self.what}: {_undeclared(name, self.names)}")
 
     def positive(self, value: sp.Basic) -> sp.Basic:
         return value
@@ -343,13 +349,13 @@ class _Expressions(Algebra[sp.Basic]):
 
     def divide(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
         if b == 0:
-            raise ValueError(f"{self.what}: found a division by zero; expected finite real numbers")
+            raise _Refusal(f"{self.what}: found a division by zero; expected finite real numbers")
         return self.value(a) / self.value(b)
 
     def power(self, base: sp.Basic, exponent: sp.Basic) -> sp.Basic:
         lower, upper = self.value(base), self.value(exponent)
         if upper.is_number and not abs(upper) <= EXPONENT:
-            raise ValueError(f"{self.what}: found the exponent {short_repr(upper)}; expected at most {EXPONENT}")
+            raise _Refusal(f"{self.what}: found the exponent {short_repr(upper)}; expected at most {EXPONENT}")
         return lower**upper
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Basic]]:
@@ -390,7 +396,7 @@ class _Expressions(Algebra[sp.Basic]):
                 large = not (size.is_real and size.is_finite and abs(size) <= MAGNITUDE)
             if large:
                 shown = short_repr(number)
-                raise ValueError(f"{self.what}: found {shown}; expected finite real numbers up to {MAGNITUDE:g}")
+                raise _Refusal(f"{self.what}: found {shown}; expected finite real numbers up to {MAGNITUDE:g}")
         return e
 
     def condition(self, e: sp.Basic) -> Boolean:

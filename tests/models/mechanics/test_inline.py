@@ -252,7 +252,7 @@ HOSTILE = [
     "sqrt(-1)*x", "1e400", "x = 1", "x; k", "", "(" * 300, "-" * 300 + "x", "x+" * 3000 + "x", "x" * 30000, "t()", "True",
     "x > 0", "x and k", "x < k < 1", "sin(x, k)", "sin(x=1)", "sin(*x)", "max(x)", "eval(x)", "x == k", "'x'", "1j*x",
     "friction()", "sin", "exp(10**99)", "atan2(x)", "\x00", "x\n+k)", "10**16**16", "asin(2)", "0**-1", "...", "x[0]",
-    "abs(x > 0)", "not x", "1 if 2 > 1", "k if x > 0 and 1 else 2",
+    "x if exp(log(x)) > (-1 if -1 > friction(pi) else friction(pi)) else 1", "abs(x > 0)", "not x", "1 if 2 > 1", "k if x > 0 and 1 else 2",
 ]  # fmt: skip
 
 
