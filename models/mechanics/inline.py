@@ -485,4 +485,4 @@ def _try(what: str, action: Any) -> Any:
     try:
         return action()
     except (ValueError, TypeError) as error:
-        raise type(error)(f"{what}: {error}") from None
+        raise type(error)(f"{what}: {' '.join(str(error).split())}") from None
