@@ -39,9 +39,6 @@ from .parameter import Parameter
 
 __all__ = ["Field", "Lagrangian", "friction_law"]
 
-NAME = 4096
-"""Most characters of a name, which may be the path of a file."""
-
 Expression: TypeAlias = "sp.Expr | float | str"
 """An expression of SymPy, a number, or text that is parsed and not run."""
 
@@ -113,7 +110,7 @@ def Lagrangian(
     >>> node.states
     ('x', 'v')
     """
-    what = f"oscillator {check_text('name', name, NAME)!r}"
+    what = f"oscillator {_called(name)!r}"
     forces = dict(check_table(f"{what}: Q", {} if Q is None else Q))
     moving = _functions(what, [T, V, R, *forces, *forces.values()])
     table = _coordinates(what, coordinates, moving)
@@ -183,7 +180,7 @@ def Field(
     >>> node.y
     y
     """
-    what = f"oscillator {check_text('name', name, NAME)!r}"
+    what = f"oscillator {_called(name)!r}"
     given = dict(check_table(f"{what}: rates", rates))
     if not given:
         raise ValueError(f"{what}: found no rates; expected one for each state")
@@ -241,7 +238,7 @@ def friction_law(
     >>> friction_law("mu*sign(w)/(1 + abs(w))", {"mu": 0.3}).jumps
     True
     """
-    what = f"friction law {check_text('name', name, NAME)!r}"
+    what = f"friction law {_called(name)!r}"
     defaults = _parameters(what, parameters)
     names = _Names.of_law(what, defaults)
     coefficient = names.expression("force", force)
@@ -255,6 +252,14 @@ def friction_law(
             raise ValueError(f"{what}: order names {name_of!r}; expected parameters: {', '.join(defaults) or 'none'}")
     own = _own_parameters(what, used, None, defaults)
     return FrictionLaw(name, own, coefficient, holding, pairs, check_flag("self_exciting", self_exciting))
+
+
+def _called(name: object) -> str:
+    """The name of a model: a short text, and no path of a file of code."""
+    words = check_text("name", name)
+    if words.endswith(".py"):
+        raise ValueError(f"name: found {words!r}, which names a file of code; expected another name")
+    return words
 
 
 # -- names -------------------------------------------------------------------------------------------------------

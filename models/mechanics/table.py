@@ -120,7 +120,7 @@ def _texts(what: str, table: object) -> dict[str, Any]:
 def as_name_or_table(part: Oscillator | FrictionLaw) -> str | dict[str, Any]:
     """Return the name of an oscillator or friction law that is a plug-in's, else its table.
 
-    A file outside the package that has changed since is named only if it has scales, which no table has.
+    A file outside the package is a plug-in too, named by its path.
 
     Raises
     ------
@@ -128,13 +128,14 @@ def as_name_or_table(part: Oscillator | FrictionLaw) -> str | dict[str, Any]:
         For what no table can say: an oscillator with scales that is no plug-in's, and expressions in a form that no
         text has.
     """
+    if part.name.endswith(".py"):
+        return str(part.name)
     load = load_oscillator if isinstance(part, Oscillator) else load_friction_law
     try:
         same = load(part.name) == part
     except (ValueError, TypeError):
         same = False
-    scaled = isinstance(part, Oscillator) and isinstance(part.model, LagrangianModel) and part.model.scaling is not None
-    if same or (scaled and part.name.endswith(".py")):
+    if same:
         return str(part.name)
     return _oscillator_table(part) if isinstance(part, Oscillator) else _law_table(part)
 

@@ -221,6 +221,7 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "no rates": (lambda: Field({}), "found no rates"),
     "same state": (lambda: Field({X: 1, "x": 2}), "two keys are the same state"),
     "condition": (lambda: Field({X: sp.Piecewise((1, X > 0))}), "has no value where no condition holds"),
+    "name of a file": (lambda: Field({"x": "-x"}, name="a.py"), "name: found 'a.py', which names a file of code"),
     "steep after all": (lambda: Field({"x": "x**16*x"}), "found the power x**17; expected exponents up to 16"),
     "steep": (lambda: Field({X: X**17}), "found the exponent 17; expected at most 16"),
 }
