@@ -3,7 +3,8 @@
 Names are loaded on first use, so that importing this package costs next to nothing; `__init__.pyi`
 says to editors what they are. Every file of
 the folder `topologies` is offered as a function of the number of nodes and of its options:
-``circulant(10, offsets=(1, 3))`` is ``topology("circulant", 10, offsets=(1, 3))``.
+``circulant(10, offsets=(1, 3))`` is ``topology("circulant", 10, offsets=(1, 3))``.  Families whose
+name in networkx is another have that one too: ``path(4) == chain(4)``, ``cycle(5) == ring(5)``.
 
 Glossary
 --------
@@ -121,5 +122,7 @@ def __dir__() -> list[str]:
 def _families() -> set[str]:
     from pkgutil import iter_modules
 
+    from .graphs.families import TOPOLOGY
+
     found = iter_modules(import_module(".topologies", __name__).__path__)
-    return {module.name for module in found if not module.name.startswith("_")}
+    return {module.name for module in found if not module.name.startswith("_")}.union(TOPOLOGY.also)

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import family_sizes
 import llvmlite.binding as llvm
 import numba
 import numpy as np
@@ -741,7 +742,7 @@ def _() -> Quantities:
     seen: Quantities = {}
     for name in names(TOPOLOGY):
         make = getattr(models, name)
-        seen |= {f"{name} {n}": exact(make(n)) for n in (5, 8, 12)}
+        seen |= {f"{name} {n}": exact(make(n)) for n in (family_sizes.size(name, n) for n in (5, 8, 12))}
         if name in FAMILIES:
             size = math.prod(FAMILIES[name].get("shape", (10,)))
             seen[f"{name} with options"] = exact(make(size, **FAMILIES[name]))
@@ -846,7 +847,7 @@ def _() -> Quantities:
 def _() -> Quantities:
     seen: Quantities = {}
     for name in names(TOPOLOGY):
-        for n in (6, 12):
+        for n in (family_sizes.size(name, n) for n in (6, 12)):
             given = Scene(oscillator="harmonic", topology=getattr(models, name)(n))
             seen |= {f"{name} {n} {key}": value for key, value in written(given).items()}
     return seen

@@ -15,6 +15,7 @@ from dataclasses import is_dataclass
 from pathlib import Path
 
 import pytest
+from family_sizes import size
 
 import synchain.models
 
@@ -238,7 +239,7 @@ def test_the_package_offers_its_names_on_first_use() -> None:
     assert families
     assert families | set(synchain.models.__all__) <= set(dir(synchain.models))
     for name in families:
-        assert getattr(synchain.models, name)(6).name == name
+        assert getattr(synchain.models, name)(size(name, 6)).name == name
     with pytest.raises(AttributeError, match="no attribute 'chian'"):
         _ = synchain.models.chian
 

@@ -136,28 +136,39 @@ def cut(counted, t, h, y, y_new, dense, cell, counts, points, direction, dims, s
 
 @njit(error_model="numpy")
 def sample(clock, y, t_new, h, accepted, y_new, dense, cell, spans, samples, dims):
-    """Write the trajectory at the sample times inside the step."""
-    ends, lengths = np.empty(WIDTH), np.empty(WIDTH)
-    store(ends, 0, t_new)
+    """Write the trajectory at the sample times inside the step, the next one of each lane at once."""
+    reached, lengths, thetas = np.empty(WIDTH), np.empty(WIDTH), np.empty(WIDTH)
+    due, still = np.empty(WIDTH, np.int64), np.empty(WIDTH, np.int64)
+    store(reached, 0, t_new)
     store(lengths, 0, h)
     place = np.empty(dims.dimension * WIDTH)
     for which in range(WIDTH):
+        end, at_end = spans[cell[which], 1], reached[which] >= clock[END * WIDTH + which]
+        reached[which] += clock[BASE * WIDTH + which]
+        if at_end or reached[which] >= end - 4e-16 * abs(end):  # the end of the last period
+            reached[which] = end
         if not (accepted >> which) & 1:
-            continue
-        begin, end = spans[cell[which], 0], spans[cell[which], 1]
-        reached = clock[BASE * WIDTH + which] + ends[which]
-        if ends[which] >= clock[END * WIDTH + which] or reached >= end - 4e-16 * abs(end):  # the end of the last period
-            reached = end
-        gap = clock[SAMPLE_GAP * WIDTH + which]
-        while clock[NEXT_SAMPLE * WIDTH + which] <= reached:
+            reached[which] = -math.inf
+    while True:
+        any_due = False
+        for which in range(WIDTH):
+            thetas[which], due[which] = 1.0, -1
             wanted = clock[NEXT_SAMPLE * WIDTH + which]
+            if wanted > reached[which]:
+                continue
+            begin, end, gap = spans[cell[which], 0], spans[cell[which], 1], clock[SAMPLE_GAP * WIDTH + which]
             k = round((wanted - begin) / gap) if gap > 0.0 else 0
             if k >= samples.shape[1]:
-                break
-            theta = max(0.0, 1.0 - (reached - wanted) / lengths[which])
+                continue
+            any_due = True
+            thetas[which], due[which] = max(0.0, 1.0 - (reached[which] - wanted) / lengths[which]), k
             following = begin + (k + 1) * gap if k + 2 != samples.shape[1] else end
-            still = samples.shape[1] if following <= wanted else k + 1  # a window without length: all samples are equal
-            for c in range(dims.dimension):
-                store(place, c, inside(broadcast(theta, WIDTH), c, y, y_new, dense, dims))
-                samples[cell[which], k:still, c] = place[c * WIDTH + which]
-            clock[NEXT_SAMPLE * WIDTH + which] = following if still < samples.shape[1] else math.inf
+            still[which] = samples.shape[1] if following <= wanted else k + 1  # all samples of a window without length
+            clock[NEXT_SAMPLE * WIDTH + which] = following if still[which] < samples.shape[1] else math.inf
+        if not any_due:
+            return
+        for c in range(dims.dimension):
+            store(place, c, inside(load(thetas, 0, WIDTH), c, y, y_new, dense, dims))
+            for which in range(WIDTH):
+                if due[which] >= 0:
+                    samples[cell[which], due[which] : still[which], c] = place[c * WIDTH + which]

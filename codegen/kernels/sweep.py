@@ -147,7 +147,7 @@ def emit(
         raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(Record)}")
     if "section" in records and section is None:
         raise ValueError("the record 'section' needs a section function, for example v_1")
-    width = default_width(equations) if width is None else width
+    width = default_width(equations, method) if width is None else width
     ordered = tuple(r for r in Record if r in records)
     weights = tuple(multiplicity) if multiplicity is not None and "sync_error" in ordered else None
     if "sync_error" in ordered and not equations.common:
@@ -183,9 +183,14 @@ def emit(
     return KernelSource(text, equations, method, chosen, sizes, weights or (1,) * equations.n, elimination)
 
 
-def default_width(equations: Equations) -> int:
-    """Lanes that suit the processor; a small system does not keep its pipelines busy with one register and gets two."""
-    return lanes.native_width(2 if equations.dimension <= 2 else 1)
+def default_width(equations: Equations, method: Integrator) -> int:
+    """Lanes that suit the processor; a small system does not keep its pipelines busy with one register and gets two.
+
+    The steps of implicit methods are chains that use all registers earlier: two lanes slow them down beyond two states.
+    """
+    most = 2 if method.implicit else 6
+    moving = sum(len(equations.nodes[kind].continuous) for kind in equations.kind_of[: most + 1])
+    return lanes.native_width(2 if moving <= most else 1)
 
 
 def _series(

@@ -277,7 +277,8 @@ def closed_form(name: str, **options: object) -> ClosedForm:
     ValueError
         If the family has no closed form with symbols, or not with these options.
     """
-    formula = family(name).formula
+    made = family(name)
+    name, formula = made.name, made.formula
     if formula is None:
         raise ValueError(f"topology {name}: no closed form with symbols; known for {', '.join(formulas())}")
     known = tuple(inspect.signature(formula).parameters)

@@ -23,8 +23,9 @@ from ..algebra.rationals import to_flint
 from ..inputs.checks import typed_repr
 from ..spectra.eigenvalue import ProofError
 from .partitions import class_links, join
+from .readers import as_topology
 from .symmetry import automorphisms
-from .topology import Topology, a_graph
+from .topology import Topology
 
 __all__ = ["Block", "Clusters", "check", "clusters", "orbital_partitions"]
 
@@ -105,7 +106,8 @@ def orbital_partitions(
     ValueError
         On more than NODE_LIMIT nodes, `limit` automorphisms or `partition_limit` partitions.
     """
-    if a_graph("orbital_partitions", graph).n > NODE_LIMIT:
+    graph = as_topology("orbital_partitions", graph)
+    if graph.n > NODE_LIMIT:
         raise ValueError(
             f"{graph.name}({graph.n}): expected at most {NODE_LIMIT} nodes to look for symmetries; describe single "
             "partitions with `clusters`"
@@ -139,7 +141,7 @@ def clusters(graph: Topology, classes: Sequence[int]) -> Clusters:
     ValueError
         If the partition is not balanced, or has not one class for each node.
     """
-    a_graph("clusters", graph)
+    graph = as_topology("clusters", graph)
     if not isinstance(classes, Collection) or isinstance(classes, Set | Mapping):
         raise TypeError(f"partition: found {typed_repr(classes)}; expected the cluster of each node, e.g. [0, 0, 1]")
     if len(classes) != graph.n:

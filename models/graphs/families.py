@@ -64,10 +64,12 @@ def check_topology(module: ModuleType, where: str, text: bytes) -> None:
     for name, value in options.items():
         if value is inspect.Parameter.empty:
             raise file.wrong("edges", f"the option {name!r} of edges has no default; expected one, such as {name}=1")
-    if not options:
-        file.idle(("settle",), "without options, which are keyword-only parameters of edges")
-        return
-    file.need("settle")
+    if options:
+        file.need("settle")
+    for function in file.defined(("settle", "count", "expected", "spectrum")):
+        strange = [name for name in list(inspect.signature(file.get(function)).parameters)[1:] if name not in options]
+        if strange:
+            raise file.wrong(function, f"{function} asks for {strange[0]!r}, which is no option of edges")
     for function in file.defined(("settle", "count", "expected", "spectrum")):
         missing = [name for name in options if name not in inspect.signature(file.get(function)).parameters]
         if missing:
@@ -79,35 +81,42 @@ TOPOLOGY = Kind(
     "topologies",
     check_topology,
     also={
+        "cycle": "ring",
+        "generalized_petersen": "petersen",
+        "gnp_random": "erdos_renyi",
+        "path": "chain",
+        "prism": "circular_ladder",
+        "watts_strogatz": "small_world",
+    },
+    near={
         "all_to_all": "complete",
         "biclique": "complete_bipartite",
+        "cayley": "cayley_abelian",
         "clique": "complete",
         "cubic": "random_cubic",
-        "cycle": "ring",
         "gilbert": "erdos_renyi",
         "gnp": "erdos_renyi",
-        "hamming": "hypercube",
         "lattice": "grid",
         "line": "chain",
         "newman_watts": "small_world",
         "open_chain": "chain",
-        "path": "chain",
-        "watts_strogatz": "small_world",
+        "rook": "hamming",
+        "triangular": "johnson",
+        "turan": "complete_multipartite",
     },
 )
 """Graph families: the files of the folder `topologies`."""
 
 
 class _Signature:
-    """The signature of a family, in which its options are keywords with defaults."""
+    """The signature of a call of a family: n, and its options with their defaults; the class has its own."""
 
-    def __get__(self, own: Family | None, kind: type) -> inspect.Signature:
-        if own is None:
+    def __get__(self, made: Family | None, owner: type[Family]) -> inspect.Signature:
+        if made is None:
             raise AttributeError("__signature__")
-        size = inspect.Parameter("n", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation="int")
-        given = inspect.signature(own.edges).parameters.values()
-        options = [parameter for parameter in given if parameter.kind is inspect.Parameter.KEYWORD_ONLY]
-        return inspect.Signature([size, *options], return_annotation="Topology")
+        kind = inspect.Parameter
+        options = (kind(name, kind.KEYWORD_ONLY, default=value) for name, value in made.options.items())
+        return inspect.Signature([kind("n", kind.POSITIONAL_OR_KEYWORD, annotation=int), *options])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -139,7 +148,8 @@ class Family:
     options : mapping, optional
         The options with their defaults; None if an option is not stored unless it is set.
     settle : callable, optional
-        ``settle(n, **options)`` checks the options and returns them as they are stored.
+        ``settle(n, **options)`` checks the options, and n if the family has not all numbers of
+        nodes, and returns the options as they are stored.
     count, expected : callable, optional
         ``count(n, **options)`` is the number of edges; ``expected(n, **options)`` is their mean
         number if chance decides.
@@ -170,7 +180,6 @@ class Family:
     formula: Callable[..., Any] | None = None
     sides: Callable[[int], tuple[int, ...]] | None = None
     link_limit: int = LINK_LIMIT
-
     __signature__ = _Signature()
 
     def __call__(self, n: int, **options: object) -> Topology:

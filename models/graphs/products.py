@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from ..inputs.rationals import rational
 from .links import LINK_LIMIT
-from .topology import Rule, Topology, a_graph
+from .readers import as_topology
+from .topology import Rule, Topology
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from ..algebra.cosine_sums import AngleSum
     from .links import Link
 
-__all__ = ["cartesian", "complement", "factors", "kronecker", "union", "weighted"]
+__all__ = ["cartesian", "complement", "factors", "kronecker", "listed", "one_degree", "union", "weighted", "written"]
 
 Listed: TypeAlias = "list[tuple[AngleSum, int]]"
 Closed: TypeAlias = "list[tuple[sp.Expr, int]] | None"
@@ -40,8 +41,7 @@ def cartesian(first: Topology, second: Topology) -> Topology:
     ValueError
         On more than LINK_LIMIT links.
     """
-    a_graph("cartesian: first", first)
-    a_graph("cartesian: second", second)
+    first, second = as_topology("cartesian: first", first), as_topology("cartesian: second", second)
     return _made(f"cartesian({_named(first)}, {_named(second)})", first.n * second.n, Cartesian(first, second))
 
 
@@ -56,8 +56,7 @@ def kronecker(first: Topology, second: Topology) -> Topology:
     ValueError
         On more than LINK_LIMIT links.
     """
-    a_graph("kronecker: first", first)
-    a_graph("kronecker: second", second)
+    first, second = as_topology("kronecker: first", first), as_topology("kronecker: second", second)
     return _made(f"kronecker({_named(first)}, {_named(second)})", first.n * second.n, Kronecker(first, second))
 
 
@@ -69,8 +68,7 @@ def union(first: Topology, second: Topology) -> Topology:
     ValueError
         On more than LINK_LIMIT links.
     """
-    a_graph("union: first", first)
-    a_graph("union: second", second)
+    first, second = as_topology("union: first", first), as_topology("union: second", second)
     return _made(f"union({_named(first)}, {_named(second)})", first.n + second.n, Union(first, second))
 
 
@@ -82,7 +80,7 @@ def complement(graph: Topology) -> Topology:
     ValueError
         If a link is one-way or has a weight other than 1, or on more than LINK_LIMIT links.
     """
-    a_graph("complement", graph)
+    graph = as_topology("complement", graph)
     name, rule = f"complement({_named(graph)})", Complement(graph)
     _small(name, rule.link_count)
     odd = next((link for link in graph.links if link[2] != 1), None)
@@ -100,7 +98,7 @@ def weighted(graph: Topology, factor: object) -> Topology:
     ValueError
         If the factor is 0.
     """
-    a_graph("weighted", graph)
+    graph = as_topology("weighted", graph)
     by = rational(factor, "factor")
     if not by:
         raise ValueError(f"weighted({_named(graph)}): factor = 0; expected another number: no link would be left")
@@ -127,7 +125,7 @@ class _OfTwo:
 
     def spectra(self) -> tuple[Listed, Listed] | None:
         """The closed spectra of both graphs; None if one of them has none."""
-        a, b = _listed(self.first), _listed(self.second)
+        a, b = listed(self.first), listed(self.second)
         return None if a is None or b is None else (a, b)
 
 
@@ -150,7 +148,7 @@ class Cartesian(_OfTwo):
     def eigenvalues(self) -> Closed:
         """List the sums of the eigenvalues."""
         known = self.spectra()
-        return None if known is None else _written([(x + y, m * k) for (x, m), (y, k) in product(*known)])
+        return None if known is None else written([(x + y, m * k) for (x, m), (y, k) in product(*known)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,11 +170,11 @@ class Kronecker(_OfTwo):
         """List (a + d)(b + e) - d e, d and e the in-degrees."""
         from ..algebra.cosine_sums import AngleSum
 
-        first, second = _degree(self.first), _degree(self.second)
+        first, second = one_degree(self.first), one_degree(self.second)
         if first is None or second is None or (known := self.spectra()) is None:
             return None
         d, e = AngleSum.rational(first), AngleSum.rational(second)
-        return _written([((x + d) * (y + e) + -(d * e), m * k) for (x, m), (y, k) in product(*known)])
+        return written([((x + d) * (y + e) + -(d * e), m * k) for (x, m), (y, k) in product(*known)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,7 +194,7 @@ class Union(_OfTwo):
     def eigenvalues(self) -> Closed:
         """List the eigenvalues of both."""
         known = self.spectra()
-        return None if known is None else _written([*known[0], *known[1]])
+        return None if known is None else written([*known[0], *known[1]])
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,12 +222,12 @@ class Complement:
         """List 0 and the numbers -(n + γ)."""
         from ..algebra.cosine_sums import AngleSum
 
-        known = _listed(self.graph)
+        known = listed(self.graph)
         if known is None:
             return None
         whole = AngleSum.rational(-self.graph.n)
         others = [(whole + -a, times - a.vanishes()) for a, times in known]
-        return _written([(AngleSum.rational(0), 1), *((a, times) for a, times in others if times)])
+        return written([(AngleSum.rational(0), 1), *((a, times) for a, times in others if times)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,8 +255,8 @@ class Weighted:
         """List the eigenvalues times the factor."""
         from ..algebra.cosine_sums import AngleSum
 
-        known = _listed(self.graph)
-        return None if known is None else _written([(AngleSum.rational(self.factor) * a, times) for a, times in known])
+        known = listed(self.graph)
+        return None if known is None else written([(AngleSum.rational(self.factor) * a, times) for a, times in known])
 
 
 def _named(graph: Topology) -> str:
@@ -276,16 +274,16 @@ def _made(name: str, n: int, rule: Rule) -> Topology:
     return Topology(name, n, rule=rule)
 
 
-def _degree(graph: Topology) -> Fraction | None:
-    """The sum of weights that every node feels; None if it is not one for all."""
+def one_degree(graph: Topology) -> Fraction | None:
+    """Return the sum of weights that every node feels; None if it is not one for all."""
     sums = [Fraction(0)] * graph.n
     for target, _, weight in graph.links:
         sums[target] += weight
     return sums[0] if len(set(sums)) == 1 else None
 
 
-def _listed(graph: Topology) -> Listed | None:
-    """The closed spectrum of a graph, or that of a small matrix, as sums of cosines; else None."""
+def listed(graph: Topology) -> Listed | None:
+    """Return the closed spectrum of a graph, or that of a small matrix, as sums of cosines; else None."""
     from ..algebra.cosine_sums import read
 
     rule = graph.closed_form()
@@ -297,8 +295,8 @@ def _listed(graph: Topology) -> Listed | None:
     return None if any(a is None for a, _ in found) else [(a, times) for a, times in found if a is not None]
 
 
-def _written(numbers: Listed) -> Closed:
-    """Equal numbers merged, written as SymPy expressions."""
+def written(numbers: Listed) -> Closed:
+    """Return the numbers as SymPy expressions, equal ones merged."""
     from ..algebra.cosine_sums import expression, merged
 
     return [(expression(a), times) for a, times in merged(numbers)]

@@ -16,11 +16,42 @@ from xml.etree import ElementTree
 from ..inputs.checks import check_flag, check_integer, check_printable, short_repr, typed_repr
 from ..inputs.rationals import file_text, rational
 from .links import LINK_LIMIT
-from .topology import Topology
+from .topology import Topology, from_matrix
 
-__all__ = ["from_edges", "from_graph", "from_sparse", "parsed", "read_edges", "read_graphml"]
+__all__ = ["as_topology", "from_edges", "from_graph", "from_sparse", "parsed", "read_edges", "read_graphml"]
 
 Weights = dict[tuple[int, int], Fraction]
+
+
+def as_topology(what: str, value: object) -> Topology:
+    """Return the graph that a value is, or stands for.
+
+    Parameters
+    ----------
+    what : str
+        The subject of the error.
+    value : Topology, networkx graph, SciPy sparse matrix, NumPy array or SymPy matrix
+        A matrix is the connectivity matrix G, every row of which sums to zero.
+
+    Raises
+    ------
+    TypeError
+        If the value is nothing of these.
+    ValueError
+        On what `from_graph`, `from_sparse` and `from_matrix` refuse.
+    """
+    if isinstance(value, Topology):
+        return value
+    if _is_graph(value):
+        return from_graph(value)
+    if hasattr(value, "tocoo"):
+        return from_sparse(value)
+    if hasattr(value, "tolist") and hasattr(value, "shape"):
+        return from_matrix(value.tolist())
+    raise TypeError(
+        f"{what}: found {typed_repr(value)}; expected a graph, e.g. chain(4), a networkx graph or a connectivity "
+        "matrix; make one of a list with from_edges or from_matrix"
+    )
 
 
 def from_edges(
@@ -80,7 +111,7 @@ def from_graph(graph: Any, weight: str = "weight", name: str = "graph") -> Topol
     ValueError
         On loops and on weights that are not rational.
     """
-    if not all(hasattr(graph, need) for need in ("nodes", "edges", "is_directed")):
+    if not _is_graph(graph):
         raise TypeError(f"{name} is a {type(graph).__name__}; expected a networkx graph (nodes, edges, is_directed)")
     nodes = list(graph.nodes())
     place = {node: k for k, node in enumerate(nodes)}
@@ -90,6 +121,11 @@ def from_graph(graph: Any, weight: str = "weight", name: str = "graph") -> Topol
         value = rational(data.get(weight, 1), f"{name}: weight of edge {u!r} - {v!r}")
         _put(weights, place[v], place[u], value, graph.is_directed(), called, many)
     return _graph(name, len(nodes), weights)
+
+
+def _is_graph(value: object) -> bool:
+    """True for a graph of networkx."""
+    return all(hasattr(value, need) for need in ("nodes", "edges", "is_directed"))
 
 
 def from_sparse(matrix: object, adjacency: bool = False, name: str = "matrix") -> Topology:

@@ -10,8 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from importlib import import_module
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ..inputs.checks import check_instance, check_integer, check_printable, short_repr, typed_repr
 from ..inputs.options import Options
@@ -21,10 +24,12 @@ from .partitions import join
 if TYPE_CHECKING:
     import sympy as sp
 
+    from ..spectra.eigenspaces import Eigenspace
     from ..spectra.spectrum import Spectrum
     from .links import Link
+    from .matrices import GraphMatrix
 
-__all__ = ["Rule", "Topology", "a_graph", "from_matrix", "read_matrix"]
+__all__ = ["Rule", "Topology", "dense", "from_matrix", "read_matrix", "sympy_matrix"]
 
 
 class Rule(Protocol):
@@ -166,22 +171,25 @@ class Topology:
         return len(starts(reversed(starts(range(self.n)))))
 
     @property
+    def diagonalisable(self) -> bool:
+        """True if G is known to have a basis of eigenvectors, being symmetric."""
+        return self.undirected
+
+    @property
+    def entries(self) -> tuple[tuple[int, int, Fraction], ...]:
+        """The entries of G other than 0 as (row, column, entry): the links, then the diagonal."""
+        felt = ((i, total(weight for _, _, weight in row)) for i, row in groupby(self.links, itemgetter(0)))
+        return (*self.links, *((i, i, -degree) for i, degree in felt if degree))
+
+    @property
     def rows(self) -> tuple[tuple[Fraction, ...], ...]:
         """G as n rows of n fractions."""
-        zero = Fraction(0)
-        table = [[zero] * self.n for _ in range(self.n)]
-        for target, source, weight in self.links:
-            table[target][source] = weight
-            table[target][target] -= weight
-        return tuple(tuple(row) for row in table)
+        return dense(self.n, self.entries)
 
     @property
     def matrix(self) -> sp.ImmutableDenseMatrix:
         """G as an immutable SymPy matrix, n x n."""
-        import sympy as sp
-
-        entries = [[sp.Rational(x.numerator, x.denominator) for x in row] for row in self.rows]
-        return sp.ImmutableDenseMatrix(entries)
+        return sympy_matrix(self.rows)
 
     @property
     def spectrum(self) -> Spectrum:
@@ -189,6 +197,88 @@ class Topology:
         from ..spectra.solve import spectrum
 
         return spectrum(self)
+
+    @property
+    def eigenspaces(self) -> tuple[Eigenspace, ...]:
+        """The exact eigenvectors of G (see `synchain.models.spectra.eigenspaces`)."""
+        from ..spectra.eigenspaces import eigenspaces
+
+        return eigenspaces(self)
+
+    @property
+    def adjacency(self) -> GraphMatrix:
+        """The weights W, without a diagonal: row i feels column j."""
+        return self._other("ADJACENCY")
+
+    @property
+    def laplacian(self) -> GraphMatrix:
+        """The Laplacian D - W, which is -G, with the row sums D of W."""
+        return self._other("LAPLACIAN")
+
+    @property
+    def signless_laplacian(self) -> GraphMatrix:
+        """The signless Laplacian D + W; ValueError if links are one-way."""
+        return self._other("SIGNLESS")
+
+    @property
+    def random_walk_laplacian(self) -> GraphMatrix:
+        """The random-walk Laplacian 1 - W/D; ValueError if links are one-way or a degree is not positive.
+
+        It has the eigenvalues of the normalised Laplacian 1 - D^(-1/2) W D^(-1/2), to which it is
+        similar, and rational entries.
+        """
+        return self._other("RANDOM_WALK")
+
+    def _other(self, kind: str) -> GraphMatrix:
+        from .matrices import GraphMatrix, MatrixKind
+
+        return GraphMatrix(self, MatrixKind[kind])
+
+    @property
+    def spanning_trees(self) -> Fraction:
+        """The number of spanning trees, each counted with the product of its weights.
+
+        See `synchain.models.graphs.trees`.
+        """
+        from .trees import spanning_trees
+
+        return spanning_trees(self)
+
+    @property
+    def kirchhoff_index(self) -> Fraction:
+        """The sum of the resistances between all pairs of nodes; see `synchain.models.graphs.trees`."""
+        from .trees import kirchhoff_index
+
+        return kirchhoff_index(self)
+
+    def to_networkx(self) -> Any:
+        """Return the graph as one of networkx, which must be installed.
+
+        Returns
+        -------
+        networkx.Graph or networkx.DiGraph
+            Nodes 0 … n - 1; the edge attribute `weight` is an int, or a Fraction.  A graph that is
+            not symmetric is directed: an edge from j to i means that i feels j.  `from_graph` makes
+            the same links of it.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            If networkx is not installed.
+        """
+        try:
+            networkx = import_module("networkx")
+        except ModuleNotFoundError:
+            raise ModuleNotFoundError(
+                'to_networkx needs the package networkx; install it: python -m pip install "synchain[graphs]"'
+            ) from None
+        both = self.symmetric
+        graph = networkx.Graph(name=self.name) if both else networkx.DiGraph(name=self.name)
+        graph.add_nodes_from(range(self.n))
+        for target, source, weight in self.links:
+            if not both or source < target:
+                graph.add_edge(source, target, weight=int(weight) if weight.denominator == 1 else weight)
+        return graph
 
     def __repr__(self) -> str:
         more = "".join(f", {key}={value!r}" for key, value in self.options)
@@ -261,13 +351,20 @@ def read_matrix(path: str | Path) -> Topology:
     return from_matrix(parse_rows(text, name), name)
 
 
-def a_graph(what: str, value: object) -> Topology:
-    """Return the value if it is a Topology, else raise TypeError."""
-    if all(hasattr(value, need) for need in ("nodes", "edges", "is_directed")):
-        raise TypeError(
-            f"{what}: found {typed_repr(value)}; expected a graph such as chain(4); make it with from_graph"
-        )
-    return check_instance(what, value, Topology, "a graph, e.g. chain(4)")
+def dense(n: int, entries: Iterable[tuple[int, int, Fraction]]) -> tuple[tuple[Fraction, ...], ...]:
+    """Return n rows of n fractions with some entries and zeros."""
+    zero = Fraction(0)
+    table = [[zero] * n for _ in range(n)]
+    for i, j, number in entries:
+        table[i][j] = number
+    return tuple(map(tuple, table))
+
+
+def sympy_matrix(rows: Iterable[Iterable[Fraction]]) -> sp.ImmutableDenseMatrix:
+    """Return rows of fractions as an immutable SymPy matrix."""
+    import sympy as sp
+
+    return sp.ImmutableDenseMatrix([[sp.Rational(x.numerator, x.denominator) for x in row] for row in rows])
 
 
 def _check_size(name: object, n: object) -> None:

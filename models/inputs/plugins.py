@@ -62,7 +62,10 @@ class Kind:
         Called with the module of a file from outside, its name in messages and its text; raises ValueError if the
         module is not what the kind must be.
     also : mapping of str to str
-        Other names of the field for shipped files; they serve suggestions only.
+        Other names of shipped files: what they name is what the file's own name names, unless there
+        is a file of that name.
+    near : mapping of str to str
+        Names of other things that are close to a shipped file; they serve suggestions only.
     otherwise : str
         What a name can be besides that of a file, for the message that refuses a name.
     """
@@ -71,6 +74,7 @@ class Kind:
     folder: str
     check: Callable[[ModuleType, str, bytes], None] = field(compare=False, repr=False)
     also: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
+    near: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
     otherwise: str = field(default="", compare=False, repr=False)
 
 
@@ -145,12 +149,12 @@ def allowed_code() -> tuple[str, ...]:
 
 
 def named(kind: Kind, name: str) -> str:
-    """Return the name of a plug-in as it is; that of a file outside the package as an `OwnFile` of its present text.
+    """Return the own name of a plug-in; of a file outside the package an `OwnFile` of its present text.
 
     What is an `OwnFile` already stays what it is, whatever has become of its file.
     """
     if isinstance(name, OwnFile) or not (isinstance(name, str) and name.endswith(".py")):
-        return name
+        return name if name not in kind.also or name in names(kind) else kind.also[name]
     place = Path(name).resolve()
     text = _text(kind, name, place)
     own = OwnFile(name, str(place), hashlib.sha256(text).hexdigest())
@@ -175,16 +179,16 @@ def load(kind: Kind, name: str) -> ModuleType:
         If there is no such plug-in, with the known names; if a file is not what its kind must be, with the line; and if
         the text of an `OwnFile` is neither known nor in the file.
     """
-    if name in _own(kind):
-        return import_module(f"{PACKAGE}.{kind.folder}.{name}")
     own = named(kind, name)
+    if own in _own(kind):
+        return import_module(f"{PACKAGE}.{kind.folder}.{own}")
     if isinstance(own, OwnFile):
         return _module(kind, own)
     entries = _entry_points(kind)
     if name in entries:
         return _entry(kind, name)
     known = names(kind)
-    hint = suggestion(name, known, kind.also)
+    hint = suggestion(name, known, {**kind.near, **kind.also})
     raise ValueError(f"unknown {kind.name} {short_repr(name)}; known: {', '.join(known)}{kind.otherwise}{hint}")
 
 

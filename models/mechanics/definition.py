@@ -250,7 +250,7 @@ def _asked(function: Callable[..., Any]) -> tuple[str, ...]:
     return tuple(inspect.signature(function).parameters)
 
 
-OSCILLATOR = Kind("oscillator", "oscillators", check_oscillator, also={"roessler": "rossler", "vdp": "van_der_pol"})
+OSCILLATOR = Kind("oscillator", "oscillators", check_oscillator, near={"roessler": "rossler", "vdp": "van_der_pol"})
 """Oscillators: the files of the folder `oscillators`."""
 
 FRICTION_LAW = Kind("friction", "frictions", check_friction)
@@ -260,7 +260,7 @@ COUPLING = Kind(
     "coupling",
     "couplings",
     check_coupling,
-    also={"dashpot": "damper"},
+    near={"dashpot": "damper"},
     otherwise=", or components such as 'x->x'",
 )
 """Couplings: the files of the folder `couplings`."""

@@ -9,6 +9,7 @@ from itertools import islice
 
 from ..dynamics import network
 from ..dynamics.equations import Equations
+from ..graphs import readers
 from ..graphs.families import topology
 from ..graphs.topology import Topology
 from ..inputs.checks import check_integer, check_keys, check_number, check_table, short_repr, suggestion
@@ -324,13 +325,8 @@ def as_coupling(value: object) -> Coupling | None:
 
 
 def as_topology(value: object) -> Topology:
-    """Return a graph as it is, one node alone for None; TypeError for any other value."""
-    graph = topology("chain", 1) if value is None else value
-    if not isinstance(graph, Topology):
-        raise TypeError(
-            f"topology: found {short_repr(graph)} ({type(graph).__name__}); expected a graph, e.g. chain(4)"
-        )
-    return graph
+    """Return the graph that a value is or stands for, one node alone for None."""
+    return topology("chain", 1) if value is None else readers.as_topology("topology", value)
 
 
 def as_groups(value: object, n: int) -> tuple[Group, ...]:

@@ -24,7 +24,7 @@ from .axis import Axis
 from .complete import TimeUnit, complete
 from .dictionary import arguments, as_dict
 from .file import save_scene
-from .model import Group, Model, as_oscillator
+from .model import Group, Model, as_oscillator, as_topology
 from .parameters import drive, varied, without
 from .section import Section
 from .sweep import Continuation
@@ -256,6 +256,8 @@ class Scene:
             raise TypeError(
                 f"unknown parameter or keyword {strange!r}; known: {', '.join(names)}{suggestion(strange, names)}"
             )
+        if changes.get("topology") is not None:
+            changes["topology"] = as_topology(changes["topology"])
         given = {**self.given, "initial": self._kept_start(changes), **changes}
         if given["parameters"] is not None or single:
             numbers = {} if given["parameters"] is None else check_table("parameters", given["parameters"])

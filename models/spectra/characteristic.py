@@ -36,12 +36,10 @@ Branch: TypeAlias = tuple[Polynomial, Polynomial]
 
 def characteristic(graph: Matrix) -> fmpq_poly:
     """Return the exact characteristic polynomial det(z - G)."""
-    scale = lcm(*(weight.denominator for _, _, weight in graph.links))
+    given = graph.entries
+    scale = lcm(*(number.denominator for _, _, number in given))
     entries = {(i, i): 0 for i in range(graph.n)}
-    for target, source, weight in graph.links:
-        whole = weight.numerator * (scale // weight.denominator)
-        entries[target, source] = whole
-        entries[target, target] -= whole
+    entries |= {(i, j): number.numerator * (scale // number.denominator) for i, j, number in given}
     polynomial = sparse(graph.n, entries, fmpz_poly)
     if polynomial is None:
         rows = [[entries.get((i, j), 0) for j in range(graph.n)] for i in range(graph.n)]

@@ -1,4 +1,4 @@
-"""Jordan blocks of a connectivity matrix by exact ranks, with nothing rounded.
+"""Jordan blocks of a rational matrix by exact ranks, with nothing rounded.
 
 The nullity of p(G)**k, over the degree of p, is the sum of min(size, k) over the blocks of an
 eigenvalue with the minimal polynomial p (F. R. Gantmacher, The Theory of Matrices 1, Chelsea,
@@ -17,7 +17,7 @@ from ..algebra.minimal_polynomials import minimal_polynomial
 from .eigenvalue import Blocks, Eigenvalue
 from .matrix import Matrix
 
-__all__ = ["blocks", "geometric_multiplicity", "nullity"]
+__all__ = ["blocks", "geometric_multiplicity", "nullity", "value_at"]
 
 
 def blocks(graph: Matrix, polynomial: fmpq_poly, multiplicity: int) -> Blocks:
@@ -37,9 +37,9 @@ def blocks(graph: Matrix, polynomial: fmpq_poly, multiplicity: int) -> Blocks:
     tuple of (int, int)
         Sizes and numbers of blocks, the largest size first.
     """
-    if multiplicity == 1 or graph.undirected:
+    if multiplicity == 1 or graph.diagonalisable:
         return ((1, multiplicity),)
-    first = power = _value(graph, polynomial)
+    first = power = value_at(graph, polynomial)
     sums, longer = [0], [multiplicity]  # of min(size, k); number of blocks longer than k
     while sums[-1] < multiplicity:
         sums.append((graph.n - int(power.rank())) // polynomial.degree())
@@ -60,19 +60,21 @@ def blocks(graph: Matrix, polynomial: fmpq_poly, multiplicity: int) -> Blocks:
 
 def nullity(graph: Matrix, polynomial: fmpq_poly) -> int:
     """Return the dimension of the null space of p(G), p a polynomial with rational coefficients."""
-    return graph.n - int(_value(graph, polynomial).rank())
+    return graph.n - int(value_at(graph, polynomial).rank())
 
 
 @lru_cache(maxsize=4)
 def _whole(graph: Matrix) -> tuple[fmpz_mat, int]:
-    """G times the common denominator of its weights, and that denominator."""
-    scale = lcm(*(weight.denominator for _, _, weight in graph.links))
-    rows = [[int(x * scale) for x in row] for row in graph.rows]
-    return fmpz_mat(rows), scale
+    """G times the common denominator of its entries, and that denominator."""
+    scale = lcm(*(number.denominator for _, _, number in graph.entries))
+    whole = fmpz_mat(graph.n, graph.n)
+    for i, j, number in graph.entries:
+        whole[i, j] = int(number * scale)
+    return whole, scale
 
 
-def _value(graph: Matrix, polynomial: fmpq_poly) -> fmpz_mat:
-    """A multiple of p(G) with whole entries."""
+def value_at(graph: Matrix, polynomial: fmpq_poly) -> fmpz_mat:
+    """Return a multiple of p(G) with whole entries, p a polynomial with rational coefficients."""
     g, scale = _whole(graph)
     whole = polynomial.numer()
     d, n = whole.degree(), graph.n
@@ -89,7 +91,7 @@ def geometric_multiplicity(graph: Matrix, eigenvalue: Eigenvalue) -> int:
 
     All roots of the minimal polynomial p share it: the nullity of p(G) over the degree of p.
     """
-    if eigenvalue.multiplicity == 1 or graph.undirected:
+    if eigenvalue.multiplicity == 1 or graph.diagonalisable:
         return eigenvalue.multiplicity
     p = minimal_polynomial(eigenvalue.number)
     return nullity(graph, p) // int(p.degree())

@@ -1,4 +1,4 @@
-"""What the spectra know of a connectivity matrix, whatever made it."""
+"""What the spectra know of a matrix, whatever made it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Matrix"]
 
 
 class Matrix(Hashable, Protocol):
-    """A square rational matrix G with zero row sums, as links (target, source, weight)."""
+    """A square rational matrix, as its entries other than 0."""
 
     @property
     def name(self) -> str:
@@ -28,20 +28,16 @@ class Matrix(Hashable, Protocol):
         """What distinguishes matrices of one name and size."""
 
     @property
-    def links(self) -> tuple[tuple[int, int, Fraction], ...]:
-        """The entries outside the diagonal, sorted."""
+    def entries(self) -> tuple[tuple[int, int, Fraction], ...]:
+        """The entries other than 0 as (row, column, entry), each once."""
 
     @property
     def link_count(self) -> int:
         """The number of entries outside the diagonal."""
 
     @property
-    def rows(self) -> tuple[tuple[Fraction, ...], ...]:
-        """All entries."""
-
-    @property
-    def undirected(self) -> bool:
-        """True if G is known to be symmetric."""
+    def diagonalisable(self) -> bool:
+        """True if it is known that eigenvectors are a basis, as those of a symmetric matrix are."""
 
     def closed_form(self) -> Sequence[tuple[sp.Expr, int]] | None:
         """List the eigenvalues with multiplicities, each once; None without a closed form."""

@@ -20,6 +20,7 @@ from flint import fmpz, nmod_mat, nmod_poly
 
 from ..algebra import cosines
 from ..algebra.cosine_sums import read
+from ..algebra.rationals import to_fraction
 from .characteristic import pairwise_product, sparse
 from .eigenvalue import ProofError
 from .matrix import Matrix
@@ -31,6 +32,9 @@ PRIMES = 3
 
 BITS = 61
 """Primes lie between 2**BITS and twice that."""
+
+LONGEST = 10_000
+"""Most terms of a square root as a sum of roots of unity."""
 
 Powers = tuple[Fraction, tuple[tuple[Fraction, Fraction], ...]]
 """shift + Σ b exp(2πit) as (shift, ((t, b), …))."""
@@ -84,6 +88,9 @@ def _powers(number: sp.Expr) -> Powers | None:
     real = read(number)
     if real is not None:
         return real.shift, tuple((turn, b) for t, b in real.terms for turn in (t, 1 - t))
+    surd = _surd(number)
+    if surd is not None:
+        return surd
     re, im = number.as_real_imag()  # radicals of short angles: a + b I with a, b real sums
     first, second, quarter = read(re), read(sp.expand(im)), Fraction(1, 4)
     if first is None or second is None:
@@ -91,6 +98,18 @@ def _powers(number: sp.Expr) -> Powers | None:
     terms = [(turn, b) for t, b in first.terms for turn in (t, 1 - t)]
     terms += [((turn + quarter) % 1, b) for t, b in second.terms for turn in (t, 1 - t)]
     return first.shift, (*terms, (quarter, second.shift))
+
+
+def _surd(number: sp.Expr) -> Powers | None:
+    """a + b √c, c = 1 mod 4, by the sum Σ exp(2πik²/c) = √c of Gauss (Washington 1997, chapter 6); else None."""
+    a, rest = number.as_coeff_Add()
+    b, root = rest.as_coeff_Mul()
+    if not (a.is_Rational and b.is_Rational and root.is_Pow and root.exp == sp.S.Half and root.base.is_Integer):
+        return None
+    c, factor = int(root.base), to_fraction(b)
+    if c % 4 != 1 or not 0 < c <= LONGEST:
+        return None
+    return to_fraction(a), tuple((Fraction(k * k % c, c), factor) for k in range(c))
 
 
 def _primes(m: int, seed: str) -> Iterator[int]:
@@ -130,14 +149,12 @@ def _claimed(numbers: Sequence[tuple[Powers, int]], m: int, p: int) -> nmod_poly
 def _characteristic(graph: Matrix, p: int) -> nmod_poly:
     """det(z - G) modulo p."""
     residues: dict[Fraction, int] = {}
-    entries, sums = dict[tuple[int, int], int](), [0] * graph.n
-    for target, source, weight in graph.links:
-        value = residues.get(weight)
+    entries = {(i, i): 0 for i in range(graph.n)}
+    for row, column, number in graph.entries:
+        value = residues.get(number)
         if value is None:
-            value = residues[weight] = _residue(weight, p)
-        entries[target, source] = value
-        sums[target] -= value
-    entries.update({(i, i): total % p for i, total in enumerate(sums)})
+            value = residues[number] = _residue(number, p)
+        entries[row, column] = value
     polynomial = sparse(graph.n, entries, lambda c: nmod_poly([x % p for x in c], p))
     if polynomial is not None:
         return polynomial
@@ -150,10 +167,10 @@ def _characteristic(graph: Matrix, p: int) -> nmod_poly:
 def _error_probability(graph: Matrix, numbers: Sequence[tuple[Powers, int]], m: int) -> float:
     """About the largest share of primes that divide the norm of a coefficient of the difference."""
     parts = [x for (a, terms), _ in numbers for x in (a, *(b for _, b in terms))]
-    scale = lcm(*{x.denominator for x in (*parts, *(w for _, _, w in graph.links))})
+    scale = lcm(*{x.denominator for x in (*parts, *(w for _, _, w in graph.entries))})
     rows = [0.0] * graph.n
-    for target, _, weight in graph.links:
-        rows[target] += 2.0 * abs(weight.numerator) / weight.denominator
+    for row, _, number in graph.entries:
+        rows[row] += abs(number.numerator) / number.denominator
     largest = max(*rows, *(float(abs(a) + sum(abs(b) for _, b in c)) for (a, c), _ in numbers))
     units = int(fmpz(m).euler_phi())
     bad = units * (graph.n * log2(1 + scale * largest) + 1) / BITS

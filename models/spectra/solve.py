@@ -1,4 +1,4 @@
-"""Exact eigenvalues of a connectivity matrix, proved by its characteristic polynomial.
+"""Exact eigenvalues of a rational matrix, proved by its characteristic polynomial.
 
 The closed form is used if the family or operation that made the graph has one.  The eigenvalues of
 any other rational matrix are the roots of the irreducible factors of its exact characteristic
@@ -54,12 +54,12 @@ class Proof(StrEnum):
 
 @lru_cache(maxsize=32)
 def spectrum(graph: Matrix, proof: Proof | None = None) -> Spectrum:
-    """Return the exact spectrum of a graph's connectivity matrix.
+    """Return the exact spectrum of a rational matrix.
 
     Parameters
     ----------
     graph : Matrix
-        A `Topology`, or any other rational matrix with zero row sums.
+        A `Topology` for its connectivity matrix, a `GraphMatrix`, or any other rational matrix.
     proof : Proof, optional
         How a closed form is proved; ``Proof.of_size(n)`` without, which takes about a second at
         most.  Eigenvalues without a closed form are always proved over the rationals.
@@ -119,7 +119,7 @@ def _unverified(graph: Matrix, pairs: Sequence[tuple[sp.Expr, int]], error_proba
     if isinstance(pairs, LazyEigenvalues):
         lazy = LazyEigenvalues(len(pairs), pairs.n, lambda k: _candidate(pairs[k], True))
         return Spectrum(lazy, error_probability=error_probability)
-    simple = graph.undirected
+    simple = graph.diagonalisable
     candidates = [_candidate(pair, simple) for pair in pairs]
     return Spectrum(ordered(candidates), error_probability=error_probability)
 
@@ -132,8 +132,8 @@ def _candidate(pair: tuple[sp.Expr, int], simple: bool) -> Eigenvalue:
 def _with_blocks(graph: Matrix, pair: tuple[sp.Expr, int]) -> Eigenvalue:
     """An eigenvalue of a closed form with its Jordan blocks."""
     number, count = sp.sympify(pair[0]), pair[1]
-    if count == 1 or graph.undirected:
-        return _candidate(pair, graph.undirected)
+    if count == 1 or graph.diagonalisable:
+        return _candidate(pair, graph.diagonalisable)
     return Eigenvalue(number, count, blocks(graph, minimal_polynomial(number), count))
 
 

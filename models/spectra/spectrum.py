@@ -23,7 +23,7 @@ SHOWN = 1000
 
 @dataclass(frozen=True, slots=True)
 class Spectrum:
-    """The distinct eigenvalues from 0 downwards by real part, conjugates side by side.
+    """The distinct eigenvalues downwards by real part (of G from 0), conjugates side by side.
 
     Parameters
     ----------

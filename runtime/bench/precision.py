@@ -1,11 +1,14 @@
 """Work and precision: time per drive period and core against the error of the state, for this
 program and its peers.
 
-The cases are those of `_cases.py`; the error is the largest over all components of the state at the
-case's times, half of them at period boundaries and half at spread phases. "cash_karp" at 1e-12 and
-1e-15 is the source paper's method and tolerances through this program's own kernel; one lane is the
-scalar kernel. Peers are the files of `peers/`; one that is not installed is named and left out.
-Times are CPU times of one core, per drive period and trajectory, compilation apart.
+The cases are those of `kit/cases.py` and `kit/computed.py`; the unit of time is the drive's period,
+or 2 pi without a drive.  The error is the largest over all components of the state at the case's
+times; the exact law of friction is measured against its own solution.  Timed runs have one reading
+time at their end and are long, so that calls and restarts are no part of the times; reading many
+times is another table, `dense`.  "cash_karp" at 1e-12 and 1e-15 is the source paper's method and
+tolerances through this program's own kernel; one lane is the scalar kernel. Peers are the files of
+`peers/`; one that is not installed is named and left out, and none has events. Times are CPU times
+of one core, per period and trajectory, compilation apart.
 """
 
 from __future__ import annotations
@@ -16,18 +19,21 @@ from dataclasses import dataclass
 import numpy as np
 from tqdm import tqdm
 
-from synchain.codegen.simd.lane_types import native_width
+from synchain.codegen.taylor import kink
 
 from . import peers
-from .kit.cases import CASES, Case, read_case
+from .kit.cases import CASES as STORED
+from .kit.cases import Case, read_case
 from .kit.clock import Point, curve
-from .kit.own_program import REFILLS, Own, prepare
+from .kit.computed import EXACT, SMOOTH, computed_case
+from .kit.own_program import REFILLS, Own, full_width, prepare
 
 __all__ = [
     "CASES",
     "COLUMNS",
     "METHODS",
     "Method",
+    "case_of",
     "draw",
     "measure",
     "notes",
@@ -36,6 +42,9 @@ __all__ = [
     "row",
     "summary",
 ]
+
+CASES = (*STORED, *SMOOTH, *EXACT)
+"""Names of the cases."""
 
 COLUMNS = (
     "case",
@@ -50,41 +59,50 @@ COLUMNS = (
     "compile seconds",
     "remark",
 )
-LADDER = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
+LADDER = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
 PAPER = (1e-12, 1e-15)
 """The source paper's (rtol, atol) of Cash-Karp."""
 
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """Rows of the benchmark: an integrator of this program with full lanes or one, on stiff cases
-    or on all.
+    """Rows of the benchmark: an integrator of this program with full lanes or one.
+
+    `longest` are the periods beyond which its error is not compared.
     """
 
     integrator: str
     full: bool
     tolerances: tuple[tuple[float, float], ...]
     longest: int = 100
-    stiff: bool = True
 
     def width(self, case: Case) -> int:
         """Number of lanes on this processor: that of a sweep, or one."""
-        return native_width(2 if len(case.scene.y0) <= 2 else 1) if self.full else 1
+        return full_width(case, self.integrator) if self.full else 1
+
+    def suits(self, case: Case) -> bool:
+        """False where the method is not to the point.
+
+        Stability holds explicit methods back on stiff cases; implicit ones and the paper's serve
+        the smoothed law; power series need analytic functions between events.
+        """
+        if self.integrator in EXPLICIT:
+            return not case.stiff and (self.integrator != "taylor" or kink(case.scene.equations) is None)
+        return case.smoothed
 
 
+EXPLICIT = ("dop853", "taylor")
 TOLERANCES = tuple((rtol, 0.1 * rtol) for rtol in LADDER)
 METHODS = (
     Method("cash_karp", False, (PAPER,), longest=10),
-    Method("rodas5p", False, TOLERANCES),
-    Method("rodas5p", True, TOLERANCES),
-    Method("switching", False, TOLERANCES),
-    Method("switching", True, TOLERANCES),
-    Method("dop853", False, TOLERANCES, stiff=False),
-    Method("dop853", True, TOLERANCES, stiff=False),
+    *(Method(name, full, TOLERANCES) for name in ("rodas5p", "switching", *EXPLICIT) for full in (False, True)),
 )
-"""This program's rows; `stiff` False leaves out the cases in which stability holds an explicit
-method back.
-"""
+"""This program's rows."""
+
+
+def case_of(name: str) -> Case:
+    """Return the case of that name; ValueError for an unknown one."""
+    return computed_case(name) if name in (*SMOOTH, *EXACT) else read_case(name)
 
 
 def notes() -> list[str]:
@@ -99,12 +117,13 @@ def measure(quick: bool = False) -> list[tuple[object, ...]]:
     rows: list[tuple[object, ...]] = []
     with tqdm(total=len(CASES) * (1 + len(present)), unit="curve", disable=None) as bar:
         for name in CASES:
-            case = read_case(name)
+            case = case_of(name)
             bar.set_description_str(name)
             rows += [row(case, point) for point in own_points(case, quick)]
             bar.update()
             for peer in present:
-                rows += [row(case, point) for point in curve(peer, case, quick)]
+                if name not in EXACT:
+                    rows += [row(case, point) for point in curve(peer, case, quick)]
                 bar.update()
     return rows
 
@@ -112,7 +131,7 @@ def measure(quick: bool = False) -> list[tuple[object, ...]]:
 def own_points(case: Case, quick: bool) -> Iterator[Point]:
     """Yield this program's points of a case."""
     for method in METHODS:
-        if case.stiff and not method.stiff:
+        if not method.suits(case):
             continue
         lanes, periods = method.width(case), min(case.periods, method.longest)
         own = Own.compiled(case, method.integrator, lanes, REFILLS * lanes if method.full else 1, periods)

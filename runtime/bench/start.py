@@ -4,7 +4,8 @@ cache.
 Every row is the time of one stage inside a fresh process; the cache of kernels is a temporary
 folder, empty at the first process and filled at the second. The very first scene compiles the
 driver, too, which later scenes share. Importing Numba alone is listed for
-comparison: it is part of `import`.
+comparison: it is part of `import`.  The rows of peers that compile are the seconds from the same
+equations to the end of a first period, with their modules imported.
 """
 
 from __future__ import annotations
@@ -14,13 +15,25 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from statistics import median
 
-__all__ = ["COLUMNS", "SIZES", "measure", "stages"]
+import numpy as np
+
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
+
+from ..stability.orbits import unit_of_time
+from . import peers
+from .peers._problem import Problem
+
+__all__ = ["COLUMNS", "SIZES", "measure", "notes", "stages"]
 
 COLUMNS = ("stage", "oscillators", "seconds")
 SIZES = (2, 4)
 REPEATS = 5
+COMPILING = ("heyoka_batch", "jitcode_lsoda", "numbalsoda_lsoda", "diffrax_kvaerno5")
+"""Peers that compile what they integrate."""
 STAGES = ("import the models", "derive", "import the runtime", "emit", "load the driver", "load")
 
 CHILD = """
@@ -53,6 +66,12 @@ print(json.dumps([[time.perf_counter() - begin], False]))
 """
 
 
+def notes() -> list[str]:
+    """A line for each peer that cannot run here, with the reason and the remedy."""
+    found = [(peer.NAME, peers.absent(peer)) for peer in map(peers.load, COMPILING)]
+    return [f"skipped: {name} ({why})" for name, why in found if why]
+
+
 def measure(quick: bool = False) -> list[tuple[object, ...]]:
     """Return the rows of the table, in the order of COLUMNS: medians of five processes, of one
     where `quick`.
@@ -70,7 +89,21 @@ def measure(quick: bool = False) -> list[tuple[object, ...]]:
         rows.append(("compile, nothing in the cache", n, cold[-2] + cold[-1]))
         rows.append(("compile, the driver in the cache", n, cold[-1]))
         rows.append(("load from the cache", n, median(times[-2] + times[-1] for times in warm)))
+        rows += [(f"compile, {peer}", n, seconds) for peer, seconds in peer_times(n)]
     return rows
+
+
+def peer_times(n: int) -> list[tuple[str, float]]:
+    """Return name and seconds to the end of a first period of each peer that can run."""
+    scene = Scene(topology=topology("chain", n))
+    end = np.array([unit_of_time(scene)])
+    found = []
+    for peer in map(peers.load, COMPILING):
+        if not peers.absent(peer):
+            begin = time.perf_counter()
+            peer.prepare(Problem(scene))(*peer.TOLERANCES[0], end)
+            found.append((peer.NAME, time.perf_counter() - begin))
+    return found
 
 
 def stages(n: int, folder: str, cached: bool) -> list[float]:

@@ -61,7 +61,7 @@ def write_kernel(reduction: Reduction, width: int | None = None) -> KernelSource
     if "section" in scene.record:
         section = sp.Symbol(reduction.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
     method = chosen_integrator(reduction)
-    width = default_width(reduction.equations) if width is None else width
+    width = default_width(reduction.equations, method) if width is None else width
     return _emitted(reduction.equations, method, reduction.records, section, width, reduction.multiplicity)
 
 

@@ -59,8 +59,9 @@ def _check(kind: str, name: str) -> None:
     from synchain.models.inputs import plugins
     from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 
-    known = plugins.names({own.name: own for own in (TOPOLOGY, OSCILLATOR, FRICTION_LAW, COUPLING)}[kind])
-    if name in known:
+    made = {own.name: own for own in (TOPOLOGY, OSCILLATOR, FRICTION_LAW, COUPLING)}[kind]
+    known = plugins.names(made)
+    if name in {*known, *made.also}:
         raise WrongUse(f"{kind} {name!r} exists already; choose another name; known: {', '.join(known)}")
 
 

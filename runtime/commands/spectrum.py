@@ -17,6 +17,7 @@ EXAMPLES = (
     "synchain spectrum chain 4",
     "synchain spectrum star 6 --json",
     "synchain spectrum circulant 10 --option offsets=1,3",
+    "synchain spectrum petersen 10 --of adjacency",
     "synchain spectrum 'cartesian(chain(4), ring(5))'",
     "synchain spectrum torus --symbolic --option shape=pxqxr",
     "synchain spectrum 'cartesian(chain, star)' --symbolic",
@@ -30,6 +31,9 @@ PROVED = 500
 
 SHOWN = 200
 """Distinct eigenvalues in a table without --all."""
+
+OTHERS = ("adjacency", "laplacian", "signless_laplacian", "random_walk_laplacian")
+"""The matrices of `--of`: attributes of a graph."""
 
 CHECKED = 1000
 """Up to so many nodes they are multiplied out modulo primes; this takes some seconds."""
@@ -56,6 +60,12 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument("--edges", metavar="FILE", help="a text file of edges, one a line: two nodes, perhaps a weight")
     parser.add_argument("--directed", action="store_true", help="edges of the file act on their second node only")
     parser.add_argument("--graphml", metavar="FILE", help="a GraphML file; weights as 'weight' of its edges")
+    parser.add_argument(
+        "--of",
+        metavar="MATRIX",
+        choices=OTHERS,
+        help=f"another matrix than the connectivity matrix G: {', '.join(OTHERS)}",
+    )
     add_allow_code(parser)
     parser.add_argument(
         "--symbolic", action="store_true", help="the closed form of a family, or of a --matrix of letters"
@@ -81,11 +91,14 @@ def execute(arguments: Namespace) -> int:
     from synchain.models.spectra.spectrum import table
 
     if arguments.symbolic:
+        if arguments.of is not None:
+            raise WrongUse("found --of with --symbolic; closed forms with symbols are those of G: give a size instead")
         return _symbolic(arguments)
     with wrong_use():
         graph = named_graph(arguments)
-        eigenvalues = spectrum(graph, Proof.of_size(graph.n, PROVED, CHECKED))
-    if eigenvalues.zeros > 1:
+        matrix = graph if arguments.of is None else getattr(graph, arguments.of)
+        eigenvalues = spectrum(matrix, Proof.of_size(graph.n, PROVED, CHECKED))
+    if arguments.of is None and eigenvalues.zeros > 1:
         warn([f"zero is an eigenvalue of multiplicity {eigenvalues.zeros}: {_reason(graph)}"])
     if arguments.json:
         print_json(eigenvalues.as_dict())

@@ -32,6 +32,8 @@ SIZE = (COLUMN, 2.5)
 OMEGA, SIGMA, NODES = 1.40, 0.13, 4
 TOP = 0.6
 """Largest imaginary part."""
+FINE = 161
+"""Real parts of the full grid."""
 FAR = 100.0
 """Largest coupling of the rays, beyond every plane of interest."""
 RAY: dict[str, Any] = {"color": BLACK, "linestyle": "--", "linewidth": 0.8}
@@ -83,7 +85,8 @@ def uneven_ring(n: int, back: Fraction = Fraction(1, 2)) -> Topology:
 def compute(name: str, runs: FigureRuns) -> Rays:
     """Compute the function at one frequency; the lower half of the plane mirrors the upper."""
     scene = Scene(topology=uneven_ring(NODES), parameters={"omega": OMEGA})
-    count = min(runs.quality.grid or 161, 161)
+    grid = runs.quality.grid
+    count = FINE if grid is None else min(grid // 2 + 1, FINE)  # the square of a line's effort
     alpha, beta = np.linspace(0.0, HIGHEST, count), np.linspace(0.0, TOP, count // 2 + 1)
     return Rays(plane(scene, alpha, beta, **effort(runs)), SIGMA)
 

@@ -64,7 +64,12 @@ class Case:
     def stiff(self) -> bool:
         """True where the smoothed jump of friction holds explicit methods back by stability."""
         values = self.scene.parameters
-        return values["mu_s"] * values["kappa"] > 1e3
+        return values.get("mu_s", 0.0) * values.get("kappa", 0.0) > 1e3
+
+    @property
+    def smoothed(self) -> bool:
+        """True for friction without a jump, of any size."""
+        return "kappa" in self.scene.parameters
 
     def within(self, periods: int) -> Case:
         """The same case, shortened to its first periods."""

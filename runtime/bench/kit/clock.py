@@ -12,13 +12,15 @@ import numpy as np
 from ..peers._problem import Problem, Solve
 from .cases import Case
 
-__all__ = ["LONGEST", "SHORTEST", "Point", "best_time", "curve"]
+__all__ = ["LONGEST", "SHORTEST", "Point", "best_time", "curve", "timed_periods"]
 
 SHORTEST = 0.2
 """A timed run lasts at least this many seconds of CPU time, by repetition."""
 LONGEST = 1.0
 """A slower run than this is shortened to fewer periods, down to FEWEST, and not repeated."""
 FEWEST = 5
+MOST = 10_000
+"""Periods of the longest timed run; more would not change the share of what one call costs."""
 GIVE_UP = 2.0
 """A peer that needs more seconds of CPU time for one period is not tried at tighter tolerances."""
 
@@ -55,6 +57,21 @@ def best_time(run: Callable[[], object], quick: bool) -> float:
     return min(first, *(_seconds(run, repetitions) for _ in range(3)))
 
 
+def timed_periods(cost: float, periods: int, quick: bool) -> int:
+    """Return the length of a timed run: the work of SHORTEST seconds, so that calls do not count.
+
+    Parameters
+    ----------
+    cost : float
+        CPU seconds of one period.
+    periods : int
+        The least length.
+    quick : bool
+        Whether the least length will do.
+    """
+    return periods if quick else max(periods, min(MOST, int(np.ceil(SHORTEST / max(cost, 1e-9)))))
+
+
 def _seconds(run: Callable[[], object], repetitions: int) -> float:
     begin = time.process_time()
     for _ in range(repetitions):
@@ -62,9 +79,9 @@ def _seconds(run: Callable[[], object], repetitions: int) -> float:
     return (time.process_time() - begin) / repetitions
 
 
-def curve(peer: ModuleType, case: Case, quick: bool) -> Iterator[Point]:
+def curve(peer: ModuleType, case: Case, quick: bool, read_all: bool = False) -> Iterator[Point]:
     """Yield a point for each tolerance of a peer, loose first; a failure is a point with NaN and a
-    remark.
+    remark.  The timed run has one end, or with `read_all` all times of the case.
     """
     lanes = getattr(peer, "CELLS", 1)
     tolerances = peer.TOLERANCES[:: max(2, len(peer.TOLERANCES) // 2)] if quick else peer.TOLERANCES
@@ -80,7 +97,7 @@ def curve(peer: ModuleType, case: Case, quick: bool) -> Iterator[Point]:
         try:
             cost = _pilot(solve, rtol, atol, case.period)
             compiled = prepared + max(0.0, time.perf_counter() - begin - 2.0 * cost)
-            periods, error, seconds = _measure(solve, rtol, atol, case, cost, quick)
+            periods, error, seconds = _measure(solve, rtol, atol, case, cost, quick, read_all)
         except Exception as problem:
             yield _failed(peer.NAME, lanes, (rtol, atol), prepared, problem)
             continue
@@ -97,9 +114,11 @@ def _pilot(solve: Solve, rtol: float, atol: float, period: float) -> float:
     return _seconds(lambda: solve(rtol, atol, one), 1)
 
 
-def _measure(solve: Solve, rtol: float, atol: float, case: Case, cost: float, quick: bool) -> tuple[int, float, float]:
-    """Periods run, error and CPU seconds a period; the timed run has one end, as the pilot had, for
-    which JAX compiled.
+def _measure(
+    solve: Solve, rtol: float, atol: float, case: Case, cost: float, quick: bool, read_all: bool
+) -> tuple[int, float, float]:
+    """Periods compared, error and CPU seconds a period; a timed run with one end is like the pilot,
+    for which JAX compiled, and goes on beyond the reference if that is short.
     """
     longest = 0.1 * LONGEST if quick else LONGEST
     fewest = max(
@@ -110,9 +129,10 @@ def _measure(solve: Solve, rtol: float, atol: float, case: Case, cost: float, qu
     states = solve(rtol, atol, part.times)
     if states.shape != part.states.shape or not np.isfinite(states).all():
         raise RuntimeError(f"states {states.shape} that are not all finite; expected {part.states.shape}")
-    end = np.array([periods * case.period])
-    seconds = best_time(lambda: solve(rtol, atol, end), quick)
-    return periods, float(np.abs(states - part.states).max()), seconds / periods
+    length = periods if read_all else timed_periods(cost, periods, quick)
+    ends = part.times if read_all else np.array([length * case.period])
+    seconds = best_time(lambda: solve(rtol, atol, ends), quick)
+    return periods, float(np.abs(states - part.states).max()), seconds / length
 
 
 def _failed(name: str, lanes: int, tolerances: tuple[float, float], compiled: float, problem: Exception) -> Point:

@@ -10,16 +10,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from synchain.codegen.integrators import integrator as method_of
 from synchain.codegen.kernels.compile import Kernel
+from synchain.codegen.kernels.sweep import default_width
 
 from ...cells.buffers import Buffers
 from ...cells.initial_modes import with_modes
 from ...cells.kernels import kernel
 from ...cells.plan import control_array, longest_step
 from .cases import Case
-from .clock import Point, best_time
+from .clock import Point, best_time, timed_periods
 
-__all__ = ["REFILLS", "Own", "prepare"]
+__all__ = ["REFILLS", "Own", "full_width", "prepare"]
 
 Ends = tuple[np.ndarray, np.ndarray]
 """States at the ends (m, dimension) and counts (m, …) of the kernel."""
@@ -31,14 +33,20 @@ in a sweep.
 """
 
 
-def prepare(case: Case, integrator: str, width: int) -> Integrate:
-    """Compile or load the kernel of a case; returns solve(rtol, atol, ends) -> (states (m,
-    dimension), counts).
+def full_width(case: Case, integrator: str) -> int:
+    """Return the lanes in which a sweep of the case runs on this processor."""
+    return default_width(case.scene.equations, method_of(integrator))
+
+
+def prepare(case: Case, integrator: str, width: int, readings: int = 0) -> Integrate:
+    """Compile or load the kernel of a case; returns solve(rtol, atol, ends) -> (states, counts).
 
     `solve` integrates one cell to each of the end times and raises RuntimeError where a cell did
-    not reach its end.
+    not reach its end; its states are those at the ends (m, dimension), or at evenly spaced times
+    from the start to the ends (m, readings, dimension) if there are readings.
     """
-    chosen = case.scene.replace(integrator=integrator)
+    record = ("trajectory",) if readings else ()
+    chosen = case.scene.replace(integrator=integrator, record=record, samples=readings)
     made: dict[tuple[float, float], Kernel] = {}
     longest = longest_step(case.scene)
     one = np.array([case.scene.parameters[name] for name in case.scene.equations.parameters])
@@ -53,11 +61,11 @@ def prepare(case: Case, integrator: str, width: int) -> Integrate:
             made[rtol, atol] = kernel(chosen.replace(rtol=rtol, atol=atol), width, reduce=False)
         compiled = made[rtol, atol]
         control = control_array(rtol, atol, longest, 1e12, jumps=False)
-        buffers = Buffers.empty(cells, len(y0), room=0, samples=0)
+        buffers = Buffers.empty(cells, len(y0), room=0, samples=readings)
         compiled.drive(0, cells, np.tile(y0, (cells, 1)), np.tile(one, (cells, 1)), spans, control, *buffers.arrays())
         if not np.isfinite(buffers.end).all():
             raise RuntimeError(f"{integrator}: a cell did not finish at rtol = {rtol:g}")
-        return buffers.end, buffers.counts
+        return buffers.samples if readings else buffers.end, buffers.counts
 
     return solve
 
@@ -88,9 +96,12 @@ class Own:
         case, periods = self.case, self.periods
         part = case.within(periods)
         states, _ = self.solve(rtol, atol, part.times)
-        ends = np.full(self.cells, periods * case.period)
+        begin = time.process_time()
+        self.solve(rtol, atol, np.full(self.cells, periods * case.period))
+        length = timed_periods((time.process_time() - begin) / periods, periods, quick)
+        ends = np.full(self.cells, length * case.period)
         _, counts = self.solve(rtol, atol, ends)
-        seconds = best_time(lambda: self.solve(rtol, atol, ends), quick) / (periods * self.cells)
-        error, steps = float(np.abs(states - part.states).max()), float(counts[0, 1] + counts[0, 2]) / periods
+        seconds = best_time(lambda: self.solve(rtol, atol, ends), quick) / (length * self.cells)
+        error, steps = float(np.abs(states - part.states).max()), float(counts[0, 1] + counts[0, 2]) / length
         remark = "" if periods == case.periods else f"{periods} of {case.periods} periods"
         return Point(self.integrator, self.lanes, rtol, atol, error, seconds, periods, self.compile, steps, remark)

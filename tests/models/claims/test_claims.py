@@ -11,6 +11,7 @@ import pytest
 import sympy as sp
 from claim_files import verdicts
 from effort import effort
+from family_sizes import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -19,7 +20,7 @@ from synchain.models.algebra.equality import equal
 from synchain.models.claims.language import read_claims
 from synchain.models.claims.number_text import exact_number, whole_number
 from synchain.models.claims.verdict import verify
-from synchain.models.graphs.families import names, topology
+from synchain.models.graphs.families import topology
 from synchain.runtime.cli import main
 
 REFUSAL = 15_000
@@ -95,8 +96,7 @@ def test_a_family_is_wrong_only_where_it_is(tmp_path: Path) -> None:
     assert [v.claim.n for v in found if v.right] == [4]
 
 
-@pytest.mark.parametrize("name", names())
-@pytest.mark.parametrize("n", [6, 8, 12])
+@pytest.mark.parametrize(("name", "n"), cases(6, 8, 12))
 def test_the_expected_spectrum_is_a_right_claim(name: str, n: int, tmp_path: Path) -> None:
     (first,) = verdicts(tmp_path, f"{name} {n}: 17")
     assert not first.right

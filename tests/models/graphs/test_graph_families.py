@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import pickle
 from collections import Counter
 from fractions import Fraction
@@ -13,15 +14,30 @@ import numpy as np
 import pytest
 import sympy as sp
 from effort import effort
+from family_sizes import size, sizes
 
-from synchain.models.graphs.families import family, names, topology
+from synchain import models
+from synchain.models.graphs.closed_forms import closed_form
+from synchain.models.graphs.families import TOPOLOGY, family, names, topology
 from synchain.models.graphs.topology import Topology
+from synchain.models.scenes.scene import Scene
 from synchain.models.spectra.solve import Proof, spectrum
 
 fresh = spectrum.__wrapped__
 
 CLOSED = [name for name in names() if family(name).spectrum]
+THOUSAND = {"hamming": 1024, "hypercube": 1024, "johnson": 990, "kneser": 990, "paley": 1009}
+"""The numbers of nodes near a thousand of families that have no graph of a thousand nodes, or a dull one."""
+
 COUNTED = [name for name in names() if family(name).count]
+
+
+def shrikhande() -> nx.Graph:
+    """The graph of S. S. Shrikhande, Ann. Math. Stat. 30, 781 (1959): Z4 x Z4 joined along 1,0, 0,1 and 1,1."""
+    nodes = [(a, b) for a in range(4) for b in range(4)]
+    steps = [(1, 0), (0, 1), (1, 1)]
+    return nx.Graph([((a, b), ((a + c) % 4, (b + d) % 4)) for a, b in nodes for c, d in steps])
+
 
 SAME = [
     (("complete_bipartite", 9), nx.complete_bipartite_graph(4, 5)),
@@ -43,6 +59,33 @@ SAME = [
     (("erdos_renyi", 6, {"p": 1}), nx.complete_graph(6)),
     (("erdos_renyi", 6, {"p": 0}), nx.empty_graph(6)),
     (("random_regular", 6, {"degree": 5}), nx.complete_graph(6)),
+    (("path", 5), nx.path_graph(5)),
+    (("cycle", 6), nx.cycle_graph(6)),
+    (("prism", 12), nx.circular_ladder_graph(6)),
+    (("kneser", 10), nx.petersen_graph()),
+    (("kneser", 35, {"k": 3}), nx.kneser_graph(7, 3)),
+    (("kneser", 6), nx.kneser_graph(4, 2)),
+    (("johnson", 10), nx.complement(nx.petersen_graph())),
+    (("johnson", 15), nx.line_graph(nx.complete_graph(6))),
+    (("hamming", 16), nx.line_graph(nx.complete_bipartite_graph(4, 4))),
+    (("hamming", 16, {"d": 4}), nx.hypercube_graph(4)),
+    (("hamming", 7, {"d": 1}), nx.complete_graph(7)),
+    (("paley", 13), nx.circulant_graph(13, [1, 3, 4])),
+    (("paley", 9), nx.line_graph(nx.complete_bipartite_graph(3, 3))),
+    (("complete_multipartite", 9, {"parts": (2, 3, 4)}), nx.complete_multipartite_graph(2, 3, 4)),
+    (("complete_multipartite", 8), nx.turan_graph(8, 3)),
+    (("petersen", 10), nx.petersen_graph()),
+    (("petersen", 16, {"step": 3}), nx.moebius_kantor_graph()),
+    (("petersen", 20, {"step": 2}), nx.dodecahedral_graph()),
+    (("petersen", 20, {"step": 3}), nx.desargues_graph()),
+    (("cayley_abelian", 12, {"shape": (3, 4)}), nx.grid_graph([4, 3], periodic=True)),
+    (("cayley_abelian", 10, {"generators": [1, 3, 5]}), nx.circulant_graph(10, [1, 3, 5])),
+    (("cayley_abelian", 16, {"shape": (4, 4), "generators": "1,0,0,1,1,1"}), shrikhande()),
+    (("cayley_abelian", 8, {"shape": "2x2x2"}), nx.hypercube_graph(3)),
+    (("cayley_dihedral", 12), nx.circular_ladder_graph(6)),
+    (("cayley_dihedral", 12, {"rotations": (), "reflections": (0, 1)}), nx.cycle_graph(12)),
+    (("cayley_dihedral", 14, {"rotations": (), "reflections": "0,1,3"}), nx.heawood_graph()),
+    (("cayley_dihedral", 12, {"rotations": "1,2,3", "reflections": "0,1,2,3,4,5"}), nx.complete_graph(12)),
 ]
 
 
@@ -92,7 +135,7 @@ def test_one_way_graphs_by_hand() -> None:
 
 @pytest.mark.parametrize("name", COUNTED)
 def test_counts_are_those_of_the_edges(name: str) -> None:
-    for n in range(family(name).minimum, 31):
+    for n in sizes(name, range(1, 31)):
         graph = topology(name, n)
         promised = graph.link_count
         assert len(graph.links) == promised, n
@@ -100,7 +143,7 @@ def test_counts_are_those_of_the_edges(name: str) -> None:
 
 @pytest.mark.parametrize("name", CLOSED)
 def test_closed_forms_of_a_thousand_nodes_cost_little_a_node(name: str) -> None:
-    graph = topology(name, 1024 if name == "hypercube" else 1000)
+    graph = topology(name, THOUSAND.get(name, 1000))
     counts, calls = effort(lambda: fresh(graph).multiplicities)
     assert sum(counts) == graph.n
     assert calls < (6_500 if name == "grid" else 2_700) * graph.n
@@ -237,7 +280,16 @@ def test_options_are_stored_in_one_form() -> None:
     assert topology("grid", 12).options == ()
     assert topology("grid", 12, shape="3x4") != topology("grid", 12)
     assert topology("circulant", 9).options == (("offsets", (1, 2)),)
+    by_text = topology("cayley_abelian", 12, shape="3x4", generators="2,1,0,2")
+    assert by_text.options == (("generators", (0, 2, 1, 3)), ("shape", (3, 4)))
+    assert topology("cayley_abelian", 12, shape=[3, 4], generators=[(0, 2), (1, 3), (2, 1)]) == by_text
+    assert topology("cayley_dihedral", 12, rotations=[5, 7], reflections=6).options == (
+        ("reflections", (0,)),
+        ("rotations", (1,)),
+    )
     for name, options in [
+        ("cayley_abelian", {"shape": (3, 3), "generators": (1, 0, 1, 1)}),
+        ("hamming", {"d": 2}),
         ("circulant", {"offsets": (1, 4)}),
         ("torus", {"shape": (3, 3)}),
         ("small_world", {"p": "1/3"}),
@@ -375,3 +427,69 @@ def test_long_spectra_are_printed_in_part() -> None:
 def test_a_graph_without_links_has_no_slowest_eigenvalue() -> None:
     with pytest.raises(ValueError, match="all eigenvalues are 0"):
         topology("chain", 1).spectrum.slowest  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("name", "n", "options", "words"),
+    [
+        ("johnson", 11, {}, "n = 11 with k = 2; expected a number of 2-subsets, such as 10 (of a set of 5) or 15 (of"),
+        ("johnson", 10, {"k": 0}, "k = 0; expected at least 1"),
+        ("johnson", 10, {"k": "two"}, "k = 'two'; expected a whole number"),
+        ("kneser", 10, {"k": 3}, "3-subsets of a set of 5: no two are disjoint; expected n >= 20"),
+        ("hamming", 10, {}, "n = 10 with d = 2; expected a whole number to the power 2, such as 9 (words of 2 of 3"),
+        ("hamming", 10, {"d": 10**9}, "such as 2^1000000000 or more"),
+        ("paley", 11, {}, "n = 11; expected a prime power that leaves 1 on division by 4, such as 9 or 13"),
+        ("paley", 45, {}, "such as 41 or 49"),
+        ("complete_multipartite", 6, {"parts": (2, 3)}, "parts = (2, 3) are 2 of 5 nodes; expected two or more of n = 6"),
+        ("complete_multipartite", 6, {"parts": 6}, "parts = (6,) are 1 of 6 nodes"),
+        ("complete_multipartite", 6, {"parts": (6, 0)}, "parts = 0; expected at least 1"),
+        ("circular_ladder", 7, {}, "n = 7; expected an even number, such as 6 or 8"),
+        ("petersen", 12, {"step": 3}, "step = 3; expected at most 2"),
+        ("cayley_abelian", 12, {"shape": (3, 5)}, "shape = (3, 5) has 15 elements; expected n = 12"),
+        ("cayley_abelian", 12, {"shape": (3, 4), "generators": "1,2,3"}, "generators = (1, 2, 3); expected 2 numbers for each"),
+        ("cayley_abelian", 12, {"shape": (3, 4), "generators": "3,4"}, "found (3, 4), which joins nodes to themselves"),
+        ("cayley_abelian", 12, {"shape": (3, 4), "generators": [(1, 0), 2]}, "found 2; expected 2 numbers"),
+        ("cayley_abelian", 12, {"generators": []}, "generators is empty; expected at least one"),
+        ("cayley_abelian", 12, {"generators": 5.5}, "generators = 5.5; expected a list"),
+        ("cayley_dihedral", 12, {"rotations": 6}, "joins nodes to themselves; leave it out"),
+        ("cayley_dihedral", 12, {"rotations": (), "reflections": ""}, "found neither rotations nor reflections"),
+    ],
+)  # fmt: skip
+def test_options_that_make_no_graph_are_refused_in_one_line(
+    name: str, n: int, options: dict[str, object], words: str
+) -> None:
+    with pytest.raises((ValueError, TypeError)) as caught:
+        topology(name, n, **options)
+    assert str(caught.value).startswith(f"topology {name}: ")
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("n", [5, 9, 13, 25, 27 + 2, 49, 81])
+def test_paley_graphs_are_strongly_regular_and_their_own_complements(n: int) -> None:
+    """All pairs that are joined have (n - 5)/4 common neighbours, all others (n - 1)/4."""
+    graph = undirected(topology("paley", n))
+    near = {i: set(graph[i]) for i in graph}
+    for i in graph:
+        for j in range(i):
+            assert len(near[i] & near[j]) == ((n - 5) // 4 if j in near[i] else (n - 1) // 4)
+
+
+def test_the_names_of_networkx_make_equal_graphs() -> None:
+    for other, name in TOPOLOGY.also.items():
+        n = size(name, 10)
+        assert topology(other, n) == topology(name, n)
+        assert topology(other, n).name == name
+        assert getattr(models, other)(n) == getattr(models, name)(n)
+        assert other in dir(models)
+        assert other not in names()
+    assert {"path": "chain", "cycle": "ring"}.items() <= TOPOLOGY.also.items()
+    assert Scene(topology=models.path(3)) == Scene(topology=models.chain(3))
+    assert closed_form("path").text == closed_form("chain").text
+
+
+def test_editors_see_the_options_of_a_family() -> None:
+    assert str(inspect.signature(models.circulant)) == "(n: int, *, offsets=(1, 2))"
+    assert str(inspect.signature(models.small_world)) == "(n: int, *, neighbours=4, p='1/10', seed=0)"
+    assert str(inspect.signature(models.path)) == "(n: int)"
+    assert "name" in inspect.signature(type(models.circulant)).parameters

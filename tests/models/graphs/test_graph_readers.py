@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,13 @@ import pytest
 import scipy.sparse
 import sympy as sp
 
+from synchain.models.graphs.clusters import orbital_partitions
 from synchain.models.graphs.families import topology
-from synchain.models.graphs.readers import from_edges, from_graph, from_sparse, read_edges, read_graphml
+from synchain.models.graphs.products import cartesian, complement, weighted
+from synchain.models.graphs.readers import as_topology, from_edges, from_graph, from_sparse, read_edges, read_graphml
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.inputs.rationals import FILE_LIMIT
+from synchain.models.scenes.scene import Scene
 
 ONE = Fraction(1)
 
@@ -251,3 +255,63 @@ def test_utf_16_hides_no_document_type(tmp_path: Path) -> None:
     path.write_bytes(f'<?xml version="1.0" encoding="UTF-16"?>{BOMB}{HEAD}<graph/></graphml>'.encode("utf-16"))
     with pytest.raises(ValueError, match="is not UTF-8"):
         read_graphml(path)
+
+
+# ---- one door for all of them ----
+
+
+def test_everything_that_stands_for_a_graph_is_taken_where_a_graph_is() -> None:
+    chain = topology("chain", 3)
+    rows = [[-1, 1, 0], [1, -2, 1], [0, 1, -1]]
+    given = [
+        nx.path_graph(3),
+        scipy.sparse.csr_array(np.array(rows)),
+        scipy.sparse.lil_matrix(np.array(rows)),
+        np.array(rows),
+        np.array(rows, float),
+        np.matrix(rows),
+        sp.Matrix(rows),
+        sp.ImmutableMatrix(rows),
+    ]
+    assert as_topology("graph", chain) is chain
+    for value in given:
+        assert as_topology("graph", value).links == chain.links
+        assert Scene(topology=value).topology.links == chain.links
+        assert cartesian(value, chain).links == cartesian(chain, chain).links
+        assert complement(value).links == complement(chain).links
+        assert weighted(value, 3).links == weighted(chain, 3).links
+        assert len(orbital_partitions(value)) == len(orbital_partitions(chain))
+    pair = Scene(topology=chain, oscillator="harmonic", initial={"x": [0.1, 0.2, 0.3], "v": 0.0})
+    kept = pair.replace(topology=nx.cycle_graph(3))
+    assert kept.topology.links == topology("ring", 3).links
+    assert kept.initial == pair.initial  # as many nodes as before
+
+
+@pytest.mark.parametrize("value", [None, 3, "chain", [(0, 1)], [[-1, 1], [1, -1]], {0: [1]}])
+def test_what_stands_for_no_graph_is_refused(value: object) -> None:
+    with pytest.raises(TypeError, match=r"^graph: found .*; expected a graph, e\.g\. chain\(4\), a networkx graph or"):
+        as_topology("graph", value)
+
+
+def test_an_adjacency_matrix_is_no_connectivity_matrix() -> None:
+    for value in (np.array([[0, 1], [1, 0]]), scipy.sparse.csr_array([[0, 1], [1, 0]])):
+        with pytest.raises(ValueError, match="row 1 sums to 1; expected 0"):
+            Scene(topology=value)
+
+
+def test_graphs_go_to_networkx_and_back() -> None:
+    for graph in (topology("petersen", 10), topology("feed_forward", 4), weighted(topology("ring", 5), "2/3")):
+        made = graph.to_networkx()
+        assert made.is_directed() != graph.symmetric
+        assert list(made) == list(range(graph.n))
+        assert from_graph(made).links == graph.links
+    assert Topology("lonely", 3, ()).to_networkx().number_of_nodes() == 3
+    assert {type(data["weight"]) for _, _, data in topology("chain", 3).to_networkx().edges(data=True)} == {int}
+    one_way = from_edges([(0, 1)], directed=True).to_networkx()
+    assert list(one_way.edges) == [(0, 1)]  # 1 feels 0
+
+
+def test_without_networkx_the_remedy_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "networkx", None)
+    with pytest.raises(ModuleNotFoundError, match=r'install it: python -m pip install "synchain\[graphs\]"'):
+        topology("chain", 3).to_networkx()

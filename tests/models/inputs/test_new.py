@@ -8,6 +8,7 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +62,13 @@ def test_the_starting_files_conform(placed: str) -> None:
         test_topologies.test_every_family_gives_a_connected_graph_with_zero_row_sums(placed, n)
 
 
+def test_a_file_of_ones_own_comes_before_the_other_name_of_another(placed: str) -> None:
+    own = replace(TOPOLOGY, also={placed: "ring", "loop": "ring", "elsewhere": placed})
+    assert plugins.named(own, placed) == placed
+    assert plugins.named(own, "loop") == "ring"
+    assert plugins.load(own, "elsewhere") is plugins.load(TOPOLOGY, placed)
+
+
 def test_the_starting_files_work_together(placed: str) -> None:
     graph = topology(placed, 5)
     assert placed in names()
@@ -102,6 +110,7 @@ def test_nothing_is_overwritten(kind: str, tmp_path: Path, capsys: pytest.Captur
         ("friction", "none", "neither"),
         ("friction", "coulomb", "exists already"),
         ("topology", "chain", "exists already"),
+        ("topology", "path", "exists already"),
         ("oscillator", "lorenz", "exists already"),
         ("coupling", "spring", "exists already"),
         ("graph", "x", "invalid"),
@@ -436,7 +445,11 @@ FAMILY = (
             WELL + "def force(v, friction):\n    return friction(v)\n",
             "FRICTION is False, but a function uses",
         ),
-        ("topology", FAMILY.replace(", *, step=1", "", 1).replace("step", "1", 2), "found settle without options"),
+        (
+            "topology",
+            FAMILY.replace(", *, step=1", "", 1).replace("step", "1", 2),
+            "settle asks for 'step', which is no option of edges",
+        ),
     ],
 )
 def test_what_would_be_ignored_is_refused(kind: str, text: str, words: str, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from math import lcm
 
 import pytest
 import sympy as sp
+from family_sizes import size, sizes
 
 from synchain.models import chain, one_way_ring, ring, star
 from synchain.models.graphs.families import family, names, topology
@@ -37,14 +38,20 @@ def listed(graph: Topology) -> list[tuple[sp.Expr, int]]:
     return list(found)
 
 
-@pytest.mark.parametrize("graph", [topology(name, n) for name in CLOSED for n in (12, 30)] + COMPOSED, ids=str)
+@pytest.mark.parametrize(
+    "graph",
+    [topology(name, n) for name in CLOSED for n in (size(name, 12), sizes(name, range(31))[-1])] + COMPOSED,
+    ids=str,
+)
 def test_closed_forms_agree(graph: Topology) -> None:
     chance = check_modulo(graph, listed(graph))
     assert chance is not None
     assert 0 < chance < 1e-40
 
 
-@pytest.mark.parametrize("graph", [ring(12), one_way_ring(9), topology("torus", 30), *COMPOSED], ids=str)
+@pytest.mark.parametrize(
+    "graph", [ring(12), one_way_ring(9), topology("torus", 30), topology("paley", 37), *COMPOSED], ids=str
+)
 def test_any_small_mistake_shows(graph: Topology) -> None:
     right = listed(graph)
     (first, count), (second, other) = right[0], right[-1]

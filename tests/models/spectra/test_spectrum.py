@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from effort import effort
+from family_sizes import size, sizes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -75,7 +76,7 @@ def test_the_first_lines_a_user_types() -> None:
 
 @pytest.mark.parametrize("name", names())
 def test_closed_forms_agree_with_the_characteristic_polynomial_route(name: str) -> None:
-    for n in range(family(name).minimum, 31):
+    for n in sizes(name, range(1, 31)):
         closed = topology(name, n)
         other = anonymous(closed).spectrum
         assert closed.spectrum.verified
@@ -87,7 +88,7 @@ def test_closed_forms_agree_with_the_characteristic_polynomial_route(name: str) 
 
 @pytest.mark.parametrize("name", names())
 def test_closed_forms_agree_with_numpy(name: str) -> None:
-    for n in (5, 40):
+    for n in (size(name, 5), size(name, 40)):
         graph = topology(name, n)
         numbers = np.linalg.eigvalsh(floats(graph)) if graph.symmetric else np.linalg.eigvals(floats(graph))
         found = np.array(expanded(graph.spectrum), complex)

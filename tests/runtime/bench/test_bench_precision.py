@@ -14,9 +14,10 @@ import pytest
 
 from synchain.codegen.simd.lane_types import native_width
 from synchain.runtime import bench
-from synchain.runtime.bench import peers, precision
+from synchain.runtime.bench import dense, peers, precision
+from synchain.runtime.bench.kit import computed
 from synchain.runtime.bench.kit.cases import CASES, normal_modes, read_case
-from synchain.runtime.bench.kit.clock import curve
+from synchain.runtime.bench.kit.clock import MOST, SHORTEST, curve, timed_periods
 from synchain.runtime.bench.kit.compare import table, time_at
 from synchain.runtime.bench.peers import _numbalsoda
 from synchain.runtime.bench.peers._problem import Problem
@@ -68,6 +69,48 @@ def test_normal_modes_solve_the_equations(omega):
     for t, y, rate in zip(times, states, rates, strict=True):
         rhs(t, y, out)
         assert np.abs(out - rate).max() < 1e-8
+
+
+def test_the_exact_law_is_another_problem_near_the_smoothed_one():
+    smooth = read_case("friction, n = 1")
+    case = precision.case_of("exact law, n = 1")
+    assert "kappa" not in case.scene.parameters
+    assert case.states.shape == (len(case.times), 3)
+    gap = np.abs(case.states[:, :2] - smooth.states).max()
+    assert 1e-6 < gap < 0.1
+    assert set(case.states[:, 2]) <= {-1.0, 0.0, 1.0}
+
+
+def test_the_exact_law_needs_fewer_steps_and_is_as_right_as_its_tolerance():
+    smooth, exact = precision.case_of("friction, n = 1"), precision.case_of("exact law, n = 1")
+    steps = {}
+    for case, integrator in ((smooth, "rodas5p"), (exact, "taylor"), (exact, "dop853")):
+        states, counts = precision.prepare(case, integrator, 1)(1e-10, 1e-11, case.times)
+        assert np.abs(states - case.states).max() < 1e-9, integrator
+        steps[integrator] = counts[-1, 1]
+    assert steps["taylor"] < steps["dop853"] < 0.2 * steps["rodas5p"]
+
+
+def test_methods_are_left_out_where_they_are_not_to_the_point():
+    taylor, rodas5p = (precision.Method(name, True, precision.TOLERANCES) for name in ("taylor", "rodas5p"))
+    friction, pendulum = read_case("friction, n = 2"), computed.computed_case("pendulum, n = 2")
+    assert (taylor.suits(friction), rodas5p.suits(friction)) == (False, True)
+    assert (taylor.suits(pendulum), rodas5p.suits(pendulum)) == (True, False)
+
+
+def test_timed_runs_are_long_enough_that_a_call_does_not_count():
+    assert timed_periods(cost=1e-3, periods=20, quick=False) == round(SHORTEST / 1e-3)
+    assert timed_periods(cost=1e-9, periods=20, quick=False) == MOST
+    assert timed_periods(cost=1.0, periods=20, quick=False) == 20
+    assert timed_periods(cost=1e-3, periods=20, quick=True) == 20
+
+
+@pytest.mark.long
+def test_dense_rows_are_right_at_every_reading():
+    case = dense.case_of("pendulum, n = 2", periods=4)
+    assert case.states.shape == (80, 4)
+    for point in dense.own_points(case, quick=True):
+        assert point.error < 100 * point.rtol, point
 
 
 def test_normal_modes_need_a_scene_without_friction():
@@ -241,7 +284,7 @@ def test_every_case_runs_and_its_table_and_figure_are_written(monkeypatch, tmp_p
     monkeypatch.setattr(precision, "METHODS", methods)
     monkeypatch.setattr(peers, "names", lambda: ("scipy_lsoda",))
     rows = precision.measure(quick=True)
-    assert {row[0] for row in rows} == set(CASES)
+    assert {row[0] for row in rows} == {*CASES, *computed.SMOOTH}
     assert {row[1] for row in rows} == {"rodas5p", "SciPy LSODA (odeint)"}
     assert all(len(row) == len(precision.COLUMNS) for row in rows)
     ours = [row for row in rows if row[1] == "rodas5p"]

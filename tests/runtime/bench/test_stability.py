@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from family_sizes import size
 
 from synchain.models.graphs.families import names, topology
 from synchain.models.scenes.scene import Scene
@@ -98,7 +99,7 @@ def test_equal_starts_stay_equal_to_the_last_bit(name: str) -> None:
     """At a coupling at which the synchronous state is unstable, on every graph, as `run` integrates
     it.
     """
-    graph = topology(name, 8)
+    graph = topology(name, size(name, 8))
     scene = Scene(
         topology=graph,
         initial={"x": 0.3, "v": 0.0},
@@ -109,7 +110,7 @@ def test_equal_starts_stay_equal_to_the_last_bit(name: str) -> None:
     )
     for width in (1, 8):
         found = run(scene, width=width, show_progress=False)
-        x, v = found.end.values.reshape(2, 8)
+        x, v = found.end.values.reshape(2, graph.n)
         assert (x == x[0]).all(), "positions"
         assert (v == v[0]).all(), "velocities"
         assert float(found.sync_error_max) == 0.0

@@ -1,0 +1,168 @@
+"""The other matrices of a graph: adjacency, Laplacians; their spectra are proved as that of G is.
+
+F. R. K. Chung, Spectral Graph Theory (American Mathematical Society, 1997), chapter 1; A. E. Brouwer,
+W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from fractions import Fraction
+from itertools import groupby
+from operator import itemgetter
+from typing import TYPE_CHECKING
+
+from ..inputs.rationals import total
+from .products import listed, one_degree, written
+from .topology import Topology, dense, sympy_matrix
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from ..spectra.eigenspaces import Eigenspace
+    from ..spectra.spectrum import Spectrum
+
+__all__ = ["GraphMatrix", "MatrixKind"]
+
+
+class MatrixKind(StrEnum):
+    """Matrices of a graph with the weights W, in which row i feels column j, and their row sums D."""
+
+    ADJACENCY = "adjacency matrix"
+    """W."""
+    LAPLACIAN = "Laplacian"
+    """D - W, which is -G."""
+    SIGNLESS = "signless Laplacian"
+    """D + W; of undirected graphs."""
+    RANDOM_WALK = "random-walk Laplacian"
+    """1 - W/D, with a row of zeros for a node without links; of undirected graphs.  It is similar to
+    the normalised Laplacian 1 - D^(-1/2) W D^(-1/2), whose entries are roots: it has its
+    eigenvalues, and D^(1/2) times its eigenvectors are those of the other.
+    """
+
+
+@dataclass(frozen=True, slots=True)
+class GraphMatrix:
+    """A matrix of a graph beside its connectivity matrix G.
+
+    Parameters
+    ----------
+    graph : Topology
+        The graph.
+    kind : MatrixKind
+        The matrix.
+
+    Raises
+    ------
+    ValueError
+        If the matrix is one of undirected graphs and the graph is not, and if a node has links of
+        both signs so that its degree, by which the random-walk Laplacian is divided, is not
+        positive.
+    """
+
+    graph: Topology
+    kind: MatrixKind
+
+    def __post_init__(self) -> None:
+        if self.kind in (MatrixKind.ADJACENCY, MatrixKind.LAPLACIAN):
+            return
+        if not self.graph.symmetric:
+            raise ValueError(f"{self.name}: found one-way links; expected an undirected graph")
+        if self.kind is MatrixKind.RANDOM_WALK:
+            wrong = next(((i, d) for i, d in self._degrees.items() if d <= 0), None)
+            if wrong is not None:
+                raise ValueError(f"{self.name}: node {wrong[0]} has the degree {wrong[1]}; expected a positive one")
+
+    @property
+    def name(self) -> str:
+        """What messages call the matrix."""
+        return f"{self.graph.name}, {self.kind}"
+
+    @property
+    def n(self) -> int:
+        """Number of rows."""
+        return self.graph.n
+
+    @property
+    def options(self) -> tuple[tuple[str, object], ...]:
+        """The options of the graph."""
+        return self.graph.options
+
+    @property
+    def link_count(self) -> int:
+        """The number of entries outside the diagonal."""
+        return self.graph.link_count
+
+    @property
+    def diagonalisable(self) -> bool:
+        """True if it is known that eigenvectors are a basis: the matrix, or one similar to it, is symmetric."""
+        return self.graph.undirected
+
+    @property
+    def _degrees(self) -> dict[int, Fraction]:
+        """The sum of the weights that a node feels, of each node that feels one."""
+        return {i: total(weight for _, _, weight in row) for i, row in groupby(self.graph.links, itemgetter(0))}
+
+    @property
+    def entries(self) -> tuple[tuple[int, int, Fraction], ...]:
+        """The entries other than 0 as (row, column, entry), each once."""
+        links, degrees = self.graph.links, self._degrees
+        if self.kind is MatrixKind.ADJACENCY:
+            return links
+        if self.kind is MatrixKind.RANDOM_WALK:
+            walks = ((i, j, -weight / degrees[i]) for i, j, weight in links)
+            return (*walks, *((i, i, Fraction(1)) for i in degrees))
+        sign = 1 if self.kind is MatrixKind.SIGNLESS else -1
+        return (*((i, j, sign * weight) for i, j, weight in links), *((i, i, d) for i, d in degrees.items() if d))
+
+    @property
+    def rows(self) -> tuple[tuple[Fraction, ...], ...]:
+        """The matrix as n rows of n fractions."""
+        return dense(self.n, self.entries)
+
+    @property
+    def matrix(self) -> sp.ImmutableDenseMatrix:
+        """The matrix as an immutable SymPy matrix, n x n."""
+        return sympy_matrix(self.rows)
+
+    def closed_form(self) -> Sequence[tuple[sp.Expr, int]] | None:
+        """List the eigenvalues with multiplicities, each once, if they follow from those of G; else None."""
+        from ..algebra.cosine_sums import AngleSum
+
+        map_of_gamma = self._map
+        known = None if map_of_gamma is None or self.graph.closed_form() is None else listed(self.graph)
+        if map_of_gamma is None or known is None:
+            return None
+        factor, shift = (AngleSum.rational(x) for x in map_of_gamma)
+        return written([(factor * gamma + shift, times) for gamma, times in known])
+
+    @property
+    def _map(self) -> tuple[Fraction, Fraction] | None:
+        """(a, b) if the matrix is a G + b; None of any other."""
+        if self.kind is MatrixKind.LAPLACIAN:
+            return Fraction(-1), Fraction(0)
+        d = one_degree(self.graph)
+        if d is None:
+            return None
+        if self.kind is MatrixKind.RANDOM_WALK:
+            return (-1 / d if d else Fraction(0)), Fraction(0)
+        return Fraction(1), d if self.kind is MatrixKind.ADJACENCY else 2 * d
+
+    @property
+    def spectrum(self) -> Spectrum:
+        """The exact eigenvalues with multiplicities, the largest first (see `synchain.models.spectra.solve`)."""
+        from ..spectra.solve import spectrum
+
+        return spectrum(self)
+
+    @property
+    def eigenspaces(self) -> tuple[Eigenspace, ...]:
+        """The exact eigenvectors (see `synchain.models.spectra.eigenspaces`)."""
+        from ..spectra.eigenspaces import eigenspaces
+
+        return eigenspaces(self)
+
+    def __repr__(self) -> str:
+        return f"GraphMatrix({self.graph!r}, {str(self.kind)!r})"

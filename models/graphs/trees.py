@@ -1,0 +1,62 @@
+"""Spanning trees and resistances of a graph, from the characteristic polynomial of G: no eigenvalue is computed.
+
+With det(z - G) = z^n + … + c_2 z² + c_1 z the product of the nonzero eigenvalues μ of -G is c_1, and
+the sum of their reciprocals is c_2 / c_1 (A. E. Brouwer, W. H. Haemers, Spectra of Graphs, Springer,
+2012, section 1.3.5).
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from ..algebra.rationals import to_fraction
+from ..spectra.characteristic import characteristic
+from ..spectra.solve import DENSE_LIMIT
+from .topology import Topology
+
+__all__ = ["kirchhoff_index", "spanning_trees"]
+
+
+def spanning_trees(graph: Topology) -> Fraction:
+    """Return the sum over all spanning trees of the products of their weights, by the matrix-tree theorem.
+
+    Of a graph with weights of 1 it is the number of its spanning trees; it is 0 if the graph falls
+    into parts.
+
+    Raises
+    ------
+    ValueError
+        If the graph has one-way links, or more than DENSE_LIMIT nodes.
+    """
+    first, _ = _lowest(graph, "spanning trees")
+    return first / graph.n
+
+
+def kirchhoff_index(graph: Topology) -> Fraction:
+    """Return the sum of the resistances between all pairs of nodes, weights taken for conductances.
+
+    It is n Σ 1/μ over the nonzero eigenvalues μ of -G (D. J. Klein, M. Randić, J. Math. Chem. 12,
+    81, 1993; I. Gutman, B. Mohar, J. Chem. Inf. Comput. Sci. 36, 982, 1996).
+
+    Raises
+    ------
+    ValueError
+        If the graph has one-way links, falls into parts, or has more than DENSE_LIMIT nodes.
+    """
+    first, second = _lowest(graph, "Kirchhoff index")
+    if not first:
+        raise ValueError(
+            f"Kirchhoff index: found {graph.name} with {graph.n} nodes, on which 0 is a multiple eigenvalue; expected a "
+            "connected graph: some resistances are infinite"
+        )
+    return graph.n * second / first
+
+
+def _lowest(graph: Topology, what: str) -> tuple[Fraction, Fraction]:
+    """The coefficients of z and z² of det(z - G)."""
+    if not graph.symmetric:
+        raise ValueError(f"{what}: found one-way links in {graph.name}; expected an undirected graph")
+    if graph.n > DENSE_LIMIT:
+        raise ValueError(f"{what}: found {graph.n} nodes; expected at most {DENSE_LIMIT}")
+    polynomial = characteristic(graph)
+    return to_fraction(polynomial[1]), to_fraction(polynomial[2])

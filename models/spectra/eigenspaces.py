@@ -1,0 +1,206 @@
+"""Exact eigenvectors of a rational matrix.
+
+An eigenvalue γ with the minimal polynomial p has eigenvectors with entries in Q(γ), which are
+polynomials in γ with rational coefficients.  Let v be a rational vector with p(G) v = 0.  Then
+w = Σ γ^k b_k with b_(d-1) = v and b_(k-1) = G b_k + p_k v is one: (G - γ) w = p(G) v - p(γ) v = 0.
+Vectors v that are independent over Q(γ) give independent w, and all roots of p share the b_k.
+
+Each w is proved by G b_k = b_(k-1) - p_k b_(d-1), entry by entry; their number by that of the Jordan
+blocks, and that they are independent by the rank of all b_k (F. R. Gantmacher, The Theory of
+Matrices 1, Chelsea, New York, 1959, chapter VII).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial, reduce
+from math import gcd, lcm
+from typing import TypeAlias
+
+import sympy as sp
+from flint import arb, fmpq, fmpq_mat, fmpq_poly, fmpz_mat
+
+from ..algebra.balls import Ball, accurate, nearest, precision
+from ..algebra.minimal_polynomials import minimal_polynomial
+from ..algebra.rationals import to_flint
+from .eigenvalue import Eigenvalue, ProofError
+from .jordan import value_at
+from .matrix import Matrix
+from .solve import spectrum
+
+__all__ = ["LARGEST", "Eigenspace", "check", "eigenspaces"]
+
+LARGEST = 100
+"""Most nodes of a graph whose eigenvectors are computed: a few seconds if no eigenvalue is rational."""
+
+Entry: TypeAlias = tuple[int, ...]
+"""A number of Q(γ): whole coefficients of 1, γ, γ² …, as many as the degree of γ."""
+
+Vector: TypeAlias = tuple[Entry, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Eigenspace:
+    """All eigenvectors of one eigenvalue.
+
+    Parameters
+    ----------
+    eigenvalue : Eigenvalue
+        The eigenvalue γ.
+    basis : tuple of tuple of tuple of int
+        Independent eigenvectors; each entry is the coefficients of 1, γ, γ² …
+    """
+
+    eigenvalue: Eigenvalue
+    basis: tuple[Vector, ...]
+
+    @property
+    def dimension(self) -> int:
+        """Number of independent eigenvectors."""
+        return len(self.basis)
+
+    @property
+    def vectors(self) -> tuple[sp.ImmutableDenseMatrix, ...]:
+        """The eigenvectors as SymPy columns, n x 1, entries in powers of the exact eigenvalue."""
+        gamma = self.eigenvalue.exact
+        powers = [sp.expand(gamma**k) for k in range(len(self.basis[0][0]))]
+
+        def number(entry: Entry) -> sp.Expr:
+            return sp.expand(sp.Add(*(c * power for c, power in zip(entry, powers, strict=True))))
+
+        return tuple(sp.ImmutableDenseMatrix([[number(entry)] for entry in vector]) for vector in self.basis)
+
+    @property
+    def values(self) -> tuple[tuple[float | complex, ...], ...]:
+        """The eigenvectors as nearest floats, scaled such that the first of their largest entries is 1."""
+        return tuple(tuple(self._floats(vector)) for vector in self.basis)
+
+    def _floats(self, vector: Vector) -> Iterator[float | complex]:
+        top: Entry | None = None
+        for entry in filter(any, vector):
+            if top is None or self._size(entry) > self._size(top):
+                top = entry
+        for entry in vector:
+            yield nearest(partial(self._ratio, entry, top)) if any(entry) and top is not None else 0.0
+
+    def _size(self, entry: Entry) -> Ball:
+        """The modulus of a number of Q(γ) other than 0, to 64 bits."""
+        return abs(accurate(partial(self._ratio, entry, None), 64))
+
+    def _ratio(self, entry: Entry, other: Entry | None, bits: int) -> Ball:
+        """A ball around the quotient of two numbers of Q(γ), or around the first."""
+        gamma = self.eigenvalue.enclosure(bits)
+        with precision(bits):
+            above, below = (
+                reduce(lambda value, c: value * gamma + c, reversed(x), arb(0)) for x in (entry, other or (1,))
+            )
+            return above / below
+
+
+def eigenspaces(matrix: Matrix) -> tuple[Eigenspace, ...]:
+    """Return the eigenspaces of a matrix in the order of its spectrum.
+
+    Parameters
+    ----------
+    matrix : Matrix
+        A `Topology` for its connectivity matrix, a `GraphMatrix`, or any other rational matrix.
+
+    Returns
+    -------
+    tuple of Eigenspace
+        One for each distinct eigenvalue.  Those of a defective matrix have fewer vectors than it
+        has rows.
+
+    Raises
+    ------
+    ValueError
+        On more than LARGEST nodes.
+    ProofError
+        If a vector is no eigenvector, or if some are missing.
+    """
+    if matrix.n > LARGEST:
+        raise ValueError(f"eigenspaces of {matrix.name}: found {matrix.n} nodes; expected at most {LARGEST}")
+    found: dict[tuple[fmpq, ...], tuple[Vector, ...]] = {}
+    spaces = []
+    for eigenvalue in spectrum(matrix):
+        polynomial = minimal_polynomial(eigenvalue.number)
+        key = tuple(polynomial.coeffs())
+        if key not in found:
+            found[key] = _basis(matrix, polynomial)
+            check(matrix, polynomial, found[key])
+            if eigenvalue.geometric not in (None, len(found[key])):
+                raise ProofError(
+                    f"eigenspaces of {matrix.name}: found {len(found[key])} eigenvectors of {eigenvalue}; expected "
+                    f"{eigenvalue.geometric}"
+                )
+        spaces.append(Eigenspace(eigenvalue, found[key]))
+    return tuple(spaces)
+
+
+def _basis(matrix: Matrix, polynomial: fmpq_poly) -> tuple[Vector, ...]:
+    """Eigenvectors that every root of a monic irreducible polynomial has."""
+    given, kernel = _rational(matrix), _kernel(value_at(matrix, polynomial))
+    degree, span, basis = int(polynomial.degree()), list[list[fmpq]](), list[Vector]()
+    for start in kernel:
+        if degree > 1 and fmpq_mat([*span, start]).rank() == len(span):
+            continue
+        parts = [fmpq_mat(matrix.n, 1, start)]
+        for k in range(degree - 1, 0, -1):
+            parts.append(given * parts[-1] + parts[0] * polynomial[k])
+        columns = [[part[i, 0] for i in range(matrix.n)] for part in reversed(parts)]
+        span += columns
+        basis.append(_whole(columns))
+    return tuple(basis)
+
+
+def _rational(matrix: Matrix) -> fmpq_mat:
+    """The matrix in the numbers of FLINT."""
+    rows = fmpq_mat(matrix.n, matrix.n)
+    for i, j, number in matrix.entries:
+        rows[i, j] = to_flint(number)
+    return rows
+
+
+def _kernel(whole: fmpz_mat) -> list[list[fmpq]]:
+    """A basis of the vectors that a matrix turns to 0: each is 1 at a column of its own without a pivot."""
+    reduced, below, rank = whole.rref()
+    n, pivots = whole.ncols(), list[int]()
+    for i in range(rank):
+        start = pivots[-1] + 1 if pivots else 0
+        pivots.append(next(j for j in range(start, n) if reduced[i, j]))
+    basis = []
+    for free in sorted(set(range(n)).difference(pivots)):
+        vector = [fmpq(int(j == free)) for j in range(n)]
+        for i, pivot in enumerate(pivots):
+            vector[pivot] = fmpq(-reduced[i, free], below)
+        basis.append(vector)
+    return basis
+
+
+def _whole(columns: Sequence[Sequence[fmpq]]) -> Vector:
+    """Entries from the coefficients of 1, γ …, multiplied to whole numbers without a common factor."""
+    numbers = [number for column in columns for number in column]
+    below = lcm(*(int(number.q) for number in numbers))
+    above = gcd(*(int(number.p) * (below // int(number.q)) for number in numbers))
+    return tuple(
+        tuple(int(number.p) * (below // int(number.q)) // above for number in entry)
+        for entry in zip(*columns, strict=True)
+    )
+
+
+def check(matrix: Matrix, polynomial: fmpq_poly, basis: Sequence[Vector]) -> None:
+    """Raise ProofError if vectors are no independent eigenvectors of the roots of a monic polynomial."""
+    given, degree = _rational(matrix), int(polynomial.degree())
+    for vector in basis:
+        found = given * fmpq_mat([list(map(fmpq, entry)) for entry in vector])
+        for i, entry in enumerate(vector):
+            for k in range(degree):
+                expected = (entry[k - 1] if k else 0) - polynomial[k] * entry[-1]
+                if found[i, k] != expected:
+                    raise ProofError(
+                        f"eigenspaces of {matrix.name}: entry {i} of G v and of γ v differ for the roots γ of {polynomial}"
+                    )
+    parts = [[entry[k] for entry in vector] for vector in basis for k in range(degree)]
+    if int(fmpz_mat(parts).rank()) != len(parts):
+        raise ProofError(f"eigenspaces of {matrix.name}: eigenvectors of the roots of {polynomial} are dependent")

@@ -1,0 +1,110 @@
+"""Cayley graph of an abelian group: a product of cyclic groups, each element joined along generators."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from itertools import product
+from math import lcm, prod
+from typing import TYPE_CHECKING
+
+from ..inputs.options import integers_option
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+SUMMARY = (
+    "Cayley graph of a product of cyclic groups (shape: their orders; one of order n); generators: their numbers one after "
+    "another (the unit of each group)"
+)
+MINIMUM = 2
+SOURCE = "L. Lovász, Period. Math. Hung. 6, 191 (1975); L. Babai, J. Comb. Theory B 27, 180 (1979)"
+
+CONNECTED = False
+
+_Element = tuple[int, ...]
+
+
+def settle(n: int, shape: object, generators: object) -> dict[str, object]:
+    """Orders of 2 or more, n in all; elements other than the neutral one, no inverse of another."""
+    orders = (n,) if shape is None else integers_option("shape", shape, 2)
+    if prod(orders) != n:
+        raise ValueError(f"shape = {orders} has {prod(orders)} elements; expected n = {n}")
+    found: dict[str, object] = {} if shape is None else {"shape": orders}
+    if generators is None:
+        return found
+    chosen: dict[_Element, None] = {}
+    for element in _elements(generators, orders):
+        reduced = tuple(g % order for g, order in zip(element, orders, strict=True))
+        if not any(reduced):
+            raise ValueError(f"generators: found {element}, which joins nodes to themselves; leave it out")
+        inverse = _inverse(reduced, orders)
+        chosen[min(reduced, inverse)] = None
+    return found | {"generators": tuple(g for element in sorted(chosen) for g in element)}
+
+
+def _elements(given: object, orders: _Element) -> list[_Element]:
+    """The elements of a list of them, or of their numbers one after another, one number for each cyclic group."""
+    if isinstance(given, list | tuple) and any(isinstance(part, list | tuple) for part in given):
+        wrong = next((part for part in given if not isinstance(part, list | tuple) or len(part) != len(orders)), None)
+        if wrong is not None:
+            raise ValueError(
+                f"generators: found {wrong}; expected {len(orders)} numbers, one for each order in {orders}"
+            )
+        given = [number for part in given for number in part]
+    numbers, rank = integers_option("generators", given, 0), len(orders)
+    if len(numbers) % rank:
+        raise ValueError(f"generators = {numbers}; expected {rank} numbers for each, one for each order in {orders}")
+    return [numbers[k : k + rank] for k in range(0, len(numbers), rank)]
+
+
+def _inverse(element: _Element, orders: _Element) -> _Element:
+    return tuple(-g % order for g, order in zip(element, orders, strict=True))
+
+
+def _group(n: int, shape: _Element | None, generators: tuple[int, ...] | None) -> tuple[_Element, list[_Element]]:
+    """The orders, and the generators, one of each pair of inverses."""
+    orders = shape or (n,)
+    if generators is None:
+        return orders, [tuple(int(i == k) for i in range(len(orders))) for k in range(len(orders))]
+    return orders, _elements(generators, orders)
+
+
+def edges(
+    n: int, *, shape: tuple[int, ...] | None = None, generators: tuple[int, ...] | None = None
+) -> Iterator[tuple[int, int, int]]:
+    """Each element and its sums with the generators; the last number varies fastest."""
+    orders, chosen = _group(n, shape, generators)
+    steps = [(g, g == _inverse(g, orders)) for g in chosen]
+    for i, here in enumerate(product(*map(range, orders))):
+        for g, involution in steps:
+            j = 0
+            for a, b, order in zip(here, g, orders, strict=True):
+                j = j * order + (a + b) % order
+            if i < j or not involution:
+                yield min(i, j), max(i, j), 1
+
+
+def count(n: int, *, shape: tuple[int, ...] | None = None, generators: tuple[int, ...] | None = None) -> int:
+    """Number of edges: n for each generator, half of it for one that is its own inverse."""
+    orders, chosen = _group(n, shape, generators)
+    return sum(n // 2 if g == _inverse(g, orders) else n for g in chosen)
+
+
+def spectrum(
+    n: int, *, shape: tuple[int, ...] | None = None, generators: tuple[int, ...] | None = None
+) -> list[tuple[sp.Expr, int]]:
+    """Sums over the generators g of -4 sin²(π Σ k g/m) over the orders m, half of it for g = -g."""
+    from ..algebra.cosine_sums import AngleSum, expression, merged
+
+    orders, chosen = _group(n, shape, generators)
+    whole = lcm(*orders)
+    weights = [(g, Fraction(1, 2) if g == _inverse(g, orders) else Fraction(1)) for g in chosen]
+    numbers = []
+    for character in product(*map(range, orders)):
+        total = AngleSum.rational(0)
+        for g, weight in weights:
+            turn = sum(k * a * (whole // m) for k, a, m in zip(character, g, orders, strict=True))
+            total += AngleSum.cosine(-2 * weight, weight, turn % whole, whole)
+        numbers.append((total, 1))
+    return [(expression(number), times) for number, times in merged(numbers)]

@@ -1,0 +1,84 @@
+"""Cayley graph of a dihedral group: the motions of a polygon, joined along rotations and reflections."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from ..inputs.options import integers_option
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+SUMMARY = (
+    "Cayley graph of the dihedral group of a polygon with n/2 corners; generators: rotations (1) and reflections (0), each "
+    "by its number of corners"
+)
+MINIMUM = 4
+SOURCE = "L. Babai, J. Comb. Theory B 27, 180 (1979); J.-P. Serre, Linear Representations of Finite Groups (Springer, 1977), section 5.3"
+
+CONNECTED = False
+
+
+def settle(n: int, rotations: object, reflections: object) -> dict[str, object]:
+    """An even number of nodes; rotations of 1 … n/4 corners, reflections of 0 … n/2 - 1, each once."""
+    if n % 2:
+        raise ValueError(f"found n = {n}; expected an even number, such as {n - 1} or {n + 1}")
+    m, turns, mirrors = n // 2, _numbers("rotations", rotations), _numbers("reflections", reflections)
+    if any(a % m == 0 for a in turns):
+        raise ValueError(
+            f"rotations = {turns}: one of them by {m} corners or none joins nodes to themselves; leave it out"
+        )
+    if not turns and not mirrors:
+        raise ValueError("found neither rotations nor reflections; expected at least one generator")
+    return {
+        "rotations": tuple(sorted({min(a % m, -a % m) for a in turns})),
+        "reflections": tuple(sorted({b % m for b in mirrors})),
+    }
+
+
+def _numbers(what: str, given: object) -> tuple[int, ...]:
+    """Whole numbers from 0 on; none of an empty list or text."""
+    return () if isinstance(given, str | list | tuple) and not given else integers_option(what, given, 0)
+
+
+def edges(
+    n: int, *, rotations: tuple[int, ...] = (1,), reflections: tuple[int, ...] = (0,)
+) -> Iterator[tuple[int, int, int]]:
+    """Node i is the rotation by i corners, node n/2 + i the same before the first reflection."""
+    m = n // 2
+    for start in (0, m):
+        for a in rotations:
+            for i in range(m // 2 if 2 * a == m else m):
+                j = (i + a) % m
+                yield start + min(i, j), start + max(i, j), 1
+    yield from ((i, m + (i + b) % m, 1) for i in range(m) for b in reflections)
+
+
+def count(n: int, *, rotations: tuple[int, ...] = (1,), reflections: tuple[int, ...] = (0,)) -> int:
+    """Number of edges: n for each rotation, half of it for one by half a turn and for each reflection."""
+    return sum(n // 2 if 4 * a == n else n for a in rotations) + n // 2 * len(reflections)
+
+
+def spectrum(
+    n: int, *, rotations: tuple[int, ...] = (1,), reflections: tuple[int, ...] = (0,)
+) -> list[tuple[sp.Expr, int]] | None:
+    """Sums of -4 sin²(πka/m) over the rotations, less r, plus or minus |Σ exp(2πikb/m)| over the r reflections, m = n/2.
+
+    The modulus is a cosine for two reflections; for more the characteristic polynomial is factored.
+    """
+    from ..algebra.cosine_sums import AngleSum, expression, merged
+
+    if len(reflections) > 2:
+        return None
+    m, numbers = n // 2, []
+    gap = abs(reflections[-1] - reflections[0]) if len(reflections) == 2 else 0
+    half = Fraction(len(reflections), 2)
+    for k in range(m):
+        value = AngleSum.rational(-len(reflections))
+        for a in rotations:
+            weight = Fraction(1, 2) if 2 * a == m else Fraction(1)
+            value += AngleSum.cosine(-2 * weight, weight, k * a % m, m)
+        numbers += [(value + AngleSum.cosine(0, sign * half, k * gap, 2 * m), 1) for sign in (1, -1)]
+    return [(expression(number), times) for number, times in merged(numbers)]

@@ -1,0 +1,58 @@
+"""Circular ladder: two rings, the rails, joined by rungs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from ..graphs.closed_forms import ClosedForm
+
+SUMMARY = "circular ladder, or prism: two rings joined node by node (n is even)"
+MINIMUM = 6
+SOURCE = (
+    "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.6 (Cartesian product of a cycle and a "
+    "path)"
+)
+
+
+def settle(n: int) -> dict[str, object]:
+    """An even number of nodes."""
+    if n % 2:
+        raise ValueError(f"found n = {n}; expected an even number, such as {n - 1} or {n + 1}")
+    return {}
+
+
+def edges(n: int) -> Iterator[tuple[int, int, int]]:
+    """Nodes 0, 2, 4 … are one rail, 1, 3, 5 … the other."""
+    for i in range(n):
+        j = (i + 2) % n
+        yield min(i, j), max(i, j), 1
+        if i % 2 == 0:
+            yield i, i + 1, 1
+
+
+def count(n: int) -> int:
+    """Number of edges."""
+    return n + n // 2
+
+
+def spectrum(n: int) -> Sequence[tuple[sp.Expr, int]]:
+    """-4 sin²(2kπ/n) and that less 2, k = 0 … n/2 - 1."""
+    from ..algebra.cosine_sums import box
+
+    return box((2, n // 2), (False, True))
+
+
+def formula() -> ClosedForm:
+    """-4 sin²(kπ/p), and 2 less; both rails move alike, or against each other."""
+    from sympy import I, Integer, S, exp, floor, pi, sin
+
+    from ..graphs.closed_forms import NODE, ClosedForm, K, P, Term
+
+    value, rungs = -4 * sin(pi * K / P) ** 2, ((K, S.Zero, P - 1),)
+    wave = exp(2 * pi * I * K * floor(NODE / 2) / P)
+    terms = (Term(value, S.One, rungs, wave), Term(value - 2, S.One, rungs, (-1) ** NODE * wave))
+    return ClosedForm(terms, 2 * P, note="p rungs", degree=Integer(3), lowest={P: 3})

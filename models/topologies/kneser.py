@@ -1,0 +1,79 @@
+"""Kneser graph: the k-subsets of a set; two are joined if they have no common element."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from math import comb
+from typing import TYPE_CHECKING
+
+from ..graphs.subsets import ground_set, multiplicity, numbered, size
+from ..inputs.options import integer_option
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from ..graphs.closed_forms import ClosedForm
+
+SUMMARY = (
+    "Kneser graph: the subsets of k (2) elements of a set, joined if they are disjoint (n = 10: the Petersen graph)"
+)
+MINIMUM = 6
+SOURCE = (
+    "C. Godsil, G. Royle, Algebraic Graph Theory (Springer, 2001), section 9.4; L. Lovász, IEEE Trans. Inf. Theory 25, 1 "
+    "(1979)"
+)
+
+CONNECTED = False
+
+
+def settle(n: int, k: object) -> dict[str, object]:
+    """A number of k-subsets of a set of 2k or more."""
+    chosen = integer_option("k", k, 1)
+    m = ground_set(n, chosen)
+    if m < 2 * chosen:
+        least = comb(2 * chosen, chosen)
+        raise ValueError(f"found n = {n}, {chosen}-subsets of a set of {m}: no two are disjoint; expected n >= {least}")
+    return {"k": chosen}
+
+
+def edges(n: int, *, k: int = 2) -> Iterator[tuple[int, int, int]]:
+    """Each subset and the later ones that have none of its elements."""
+    m = ground_set(n, k)
+    place = numbered(m, k)
+    for subset, i in place.items():
+        # In the order of the dictionary the later ones of all disjoint subsets begin with a larger element.
+        rest = [e for e in range(subset[0] + 1, m) if e not in subset]
+        yield from ((i, place[other], 1) for other in combinations(rest, k))
+
+
+def count(n: int, *, k: int = 2) -> int:
+    """Number of edges: each subset has C(m - k, k) neighbours."""
+    return n * comb(ground_set(n, k) - k, k) // 2
+
+
+def spectrum(n: int, *, k: int = 2) -> list[tuple[sp.Expr, int]]:
+    """(-1)^j C(m - k - j, k - j) - C(m - k, k), C(m, j) - C(m, j - 1) times, j = 0 … k."""
+    from sympy import Integer
+
+    m = ground_set(n, k)
+    counts: dict[int, int] = {}
+    for j in range(k + 1):
+        value = (-1) ** j * comb(m - k - j, k - j) - comb(m - k, k)
+        counts[value] = counts.get(value, 0) + comb(m, j) - (comb(m, j - 1) if j else 0)
+    return [(Integer(value), times) for value, times in sorted(counts.items(), reverse=True)]
+
+
+def formula(k: object = 2) -> ClosedForm:
+    """(-1)^j C(p - k - j, k - j) - C(p - k, k), j = 0 … k, for the k-subsets of p elements; k is a number."""
+    from sympy import Integer, S, binomial
+
+    from ..graphs.closed_forms import ClosedForm, J, P, Term
+
+    chosen = integer_option("k", k, 1)
+    degree = binomial(P - chosen, chosen)
+    value = (-1) ** J * binomial(P - chosen - J, chosen - J) - degree
+    term = Term(value, multiplicity(), ((J, S.Zero, Integer(chosen)),))
+    note = f"the subsets of {chosen} of p elements"
+    lowest = {P: MINIMUM if chosen == 1 else 2 * chosen}
+    return ClosedForm((term,), size(chosen), {"k": Integer(chosen)}, note=note, degree=degree, lowest=lowest)
