@@ -13,7 +13,7 @@ from ..inputs.plugins import part
 from ..mechanics.coupling import split
 from .parameters import collected
 
-__all__ = ["arguments", "as_dict"]
+__all__ = ["arguments", "as_dict", "graph_of", "graph_table"]
 
 NODES = 100_000
 """Largest number of oscillators that a scene file may ask for."""
@@ -40,7 +40,7 @@ def arguments(values: object, keywords: Iterable[str], folder: Path | None = Non
     check_keys("scene", found, ["sweep" if name == "axes" else name for name in keywords])
     given: dict[str, Any] = {str(key): value for key, value in found.items()}
     if "topology" in given:
-        given["topology"] = _topology(check_table("topology", given["topology"]), folder)
+        given["topology"] = graph_of(check_table("topology", given["topology"]), folder)
     if "sweep" in given:
         sweep = dict(check_table("sweep", given.pop("sweep")))
         if "zipped" in sweep and "zipped" in given:
@@ -72,7 +72,8 @@ def _placed_group(group: object, folder: Path | None) -> object:
     return {key: _placed(value, folder) if key in ("oscillator", "friction") else value for key, value in group.items()}
 
 
-def _topology(given: Mapping[object, Any], folder: Path | None) -> Topology:
+def graph_of(given: Mapping[object, Any], folder: Path | None = None) -> Topology:
+    """Return the graph of a table in a scene file; relative paths in it start at `folder`."""
     name = _placed(given.get("name"), folder)
     known = isinstance(name, str) and "matrix" not in given and (name in names() or name.endswith(".py"))
     options = family(str(name)).options if known else {}
@@ -121,7 +122,7 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
         written[name] = str(values[name])
     for name in ("friction", "coupling"):
         written[name] = "none" if values[name] is None else str(values[name])
-    written["topology"] = _graph(values["topology"])
+    written["topology"] = graph_table(values["topology"])
     written["nodes"] = [group.as_dict() for group in values["nodes"]]
     written["parameters"] = collected(values["parameters"], varied)
     written["initial"] = {name: list(states) for name, states in values["initial"].items()}
@@ -130,7 +131,8 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
     return written
 
 
-def _graph(graph: Topology) -> dict[str, object]:
+def graph_table(graph: Topology) -> dict[str, object]:
+    """Return a graph in JSON types: its family and options, or its matrix; `graph_of` reads it."""
     try:
         same = topology(graph.name, graph.n, **dict(graph.options)) == graph
     except (ValueError, TypeError):

@@ -13,6 +13,7 @@ from ..algebra.balls import precision
 from ..algebra.lazy import LazyEigenvalues
 from ..algebra.roots import Root, coefficient_text
 from ..inputs.checks import check_instance
+from ..inputs.shown import Written
 from .eigenvalue import Eigenvalue, decimal
 
 __all__ = ["Spectrum", "table"]
@@ -22,7 +23,7 @@ SHOWN = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class Spectrum:
+class Spectrum(Written):
     """The distinct eigenvalues from 0 downwards by real part, conjugates side by side.
 
     Parameters

@@ -21,7 +21,7 @@ from synchain.runtime import commands
 from synchain.runtime.cells import kernels
 from synchain.runtime.cli import main
 from synchain.runtime.console.outcome import print_json
-from synchain.runtime.results.open import open_result
+from synchain.runtime.opening.open import open_result
 from synchain.runtime.sweeps import job, stream
 from synchain.runtime.synchronisation import threshold
 
@@ -233,7 +233,7 @@ def test_run_writes_a_result_and_a_figure(scene: str, tmp_path: Path, capsys: py
     assert result.scene.rtol == 1e-6
     assert result.scene.parameters["omega"] == 1.4
     assert result.data.sigma.values.tolist() == [0.0, 0.25, 0.5]
-    assert float(result.end[0, 0]) != float(result.end[1, 0])
+    assert float(result.states()[0, 0]) != float(result.states()[1, 0])
 
 
 @pytest.mark.usefixtures("compiled")
