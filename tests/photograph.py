@@ -228,7 +228,7 @@ def simulated(given: Scene, **options: Any) -> Quantities:
     for name, values in found.data.data_vars.items():
         rows = found.states(str(name)) if "component" in values.dims else values.values
         seen[str(name)] = Counts(rows) if name in counts else rows
-    times = {"time": "trajectory_time", "section_time": "section_time"}
+    times = {"time": "trajectory_time", "section_time": "section_time", "end_time": "end_time"}
     seen |= {old: found.data[name].values for name, old in times.items() if name in found.data.coords}
     return seen | written(found.scene, options.get("reduce", True))
 

@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "COUNTS",
+    "DRIVE_PHASE",
+    "END_TIME",
     "MEANINGS",
+    "STATE",
     "SUMS",
     "States",
     "Variable",
@@ -43,7 +46,10 @@ Variable = tuple[str, tuple[str, ...], np.ndarray]
 STATE = ("component", "node")
 """The dimensions of a state."""
 
-TIMES = ("time", "section_time")
+END_TIME, DRIVE_PHASE = "end_time", "drive_phase"
+"""Coordinates of each cell: when it stopped, and how far into a period of the drive that was."""
+
+TIMES = ("time", "section_time", END_TIME, DRIVE_PHASE)
 """Variables that are coordinates of others."""
 
 TOLD = ("scene", "title", "equations", "kernel", "versions")
@@ -59,6 +65,7 @@ MEANINGS = {
     "periods_skipped": "periods of the drive jumped over in a cell that repeats itself",
     "end": "state at the end of the window",
     "end_time": "non-dimensional time at which the cell stopped",
+    "drive_phase": "part of a drive period that had passed at end_time; NaN if the drive has no period, 0 without drive",
     "section_count": "number of section points in the window",
     "section_time": "times of the section points",
     "section": "states at the section points, NaN where there are fewer",
@@ -147,7 +154,8 @@ def variables(
         yield name, (), buffers.counts[:, COUNTS[name]].astype(np.int32)
     states = States.of(scene)
     yield "end", STATE, states.table(buffers.end)
-    yield "end_time", (), buffers.sums[:, Sum.STOPPED_AT]
+    yield END_TIME, (), buffers.sums[:, Sum.STOPPED_AT]
+    yield DRIVE_PHASE, (), _drive_phase(scene, spans, buffers.sums[:, Sum.STOPPED_AT])
     if "sync_error" in scene.record:
         for name in ("sync_error", "sync_error_max", "sync_error_end"):
             yield name, (), buffers.sums[:, SUMS[name]]
@@ -166,6 +174,14 @@ def variables(
         start, end = spans[:, Span.START, None], spans[:, Span.END, None]
         yield "time", ("sample",), start + (end - start) * parts
         yield "trajectory", ("sample", *STATE), states.table(buffers.samples)
+
+
+def _drive_phase(scene: Scene, spans: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """How far (cells,) into a period of the drive each cell stopped, from 0 to 1."""
+    if not scene.forced:
+        return np.zeros(len(time))
+    period = np.where(spans[:, Span.PERIOD] > 0.0, spans[:, Span.PERIOD], np.nan)
+    return np.asarray(np.mod(time / period, 1.0))
 
 
 def dimensions(scene: Scene) -> tuple[str, ...]:

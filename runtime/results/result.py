@@ -19,7 +19,7 @@ from ..support.files import understood
 from ..support.status import Status
 from .certificate import Certificate
 from .labelled import Labelled
-from .labels import COUNTS, SUMS, States, alike, changed, dimensions, labelled, scene_of, variables
+from .labels import COUNTS, STATE, SUMS, States, alike, changed, dimensions, labelled, scene_of, variables
 from .store import read_data, write_data
 
 if TYPE_CHECKING:
@@ -209,6 +209,8 @@ def result_of(data: xr.Dataset, path: Path) -> Result:
         if status is None or status.dims != dimensions(scene) or status.shape != scene.shape:
             raise ValueError("its variables are not those of its scene")
         list(map(Status, np.unique(status.values).tolist()))
+        if "end" not in data or data.end.dims[-2:] != STATE:
+            raise ValueError("an earlier version wrote it, with states in one row; run its scene again")
     return Result(data, scene)
 
 
