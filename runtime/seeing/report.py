@@ -38,6 +38,13 @@ img,svg,table,math{break-inside:avoid}details{display:none}}
 """
 
 
+POLICY = (
+    '<meta http-equiv="Content-Security-Policy" '
+    "content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">"
+)
+"""Tells the browser to run no script and to load nothing."""
+
+
 @dataclass(frozen=True, slots=True)
 class Effort:
     """How much a report computes.
@@ -98,7 +105,7 @@ def report(
     if scene.axes:
         parts += [_section("Sweep", _sweep(scene, effort, workers, show_progress))]
     parts += [_section("Provenance", _provenance(scene))]
-    head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>'
+    head = f'<meta charset="utf-8">{POLICY}<meta name="viewport" content="width=device-width"><title>{title}</title>'
     content = "\n".join(parts)
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head>{head}<style>{STYLE}{PAGE}</style></head>\n'
