@@ -20,7 +20,7 @@ import xarray as xr
 from ..support.files import netcdf_data, whole_file
 from ..support.netcdf import DIGEST, seal, unsealed
 
-__all__ = ["attributes_of", "read_data", "write_data"]
+__all__ = ["CHOICES", "attributes_of", "read_data", "write_data"]
 
 PARTS = ("real", "imaginary")
 """The values of the dimension `part`, by which complex numbers are stored as pairs of real ones."""

@@ -27,7 +27,7 @@ from ..results.labelled import Labelled
 from ..results.labels import alike, changed, scene_of
 from ..results.partial import certificate_of, describe_sweep, layout_of, partial_path, write_result
 from ..results.result import Result, read_result
-from ..results.store import attributes_of
+from ..results.store import CHOICES, attributes_of
 from ..support.files import check_replaceable, drop_leftovers, netcdf_data, understood
 from ..support.status import Status
 from .errors import SweepFailed, SweepInterrupted
@@ -178,6 +178,8 @@ def claim(
         check_flag(name, value)
     target = check_path("path", path)
     partial = partial_path(target)
+    if target.suffix.lower() in CHOICES:
+        raise ValueError(f"path: found {str(target)!r}; expected another ending: stream writes netCDF-3; end it in .nc")
     if target.suffix.lower() == partial.suffix:
         raise ValueError(
             f"path: found {str(target)!r}, the name of an unfinished run; expected that of a result; end it in .nc"
