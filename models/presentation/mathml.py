@@ -40,6 +40,12 @@ SIGNS = {
 SPACES = ("\\left", "\\right", "\\:", "\\,", "\\;", "\\ ", "\\quad", "&")
 """What MathML spaces by itself."""
 
+NO_BREAK = "\u00a0"
+"""The space that stands at the ends of words too."""
+
+GAP = '<mspace width="0.14em"/>'
+"""What sets names of several letters apart from their neighbours in a product."""
+
 LETTERS = {
     **{f"\\{name}": letter for name, letter in greek_unicode.items()},
     **{latex: letter for latex, letter in VARIANTS.values()},
@@ -86,7 +92,7 @@ class _Reader:
             "\\sqrt": lambda: f"<msqrt>{self.atom()}</msqrt>",
             "\\mathrm": lambda: f'<mi mathvariant="normal">{self.words()}</mi>',
             "\\operatorname": lambda: _function(self.words()),
-            "\\text": lambda: f"<mtext>{self.words()}</mtext>",
+            "\\text": lambda: f"<mtext>{self.words().replace(' ', NO_BREAK)}</mtext>",
             "\\begin": self.cases,
             **{f"\\{name}": partial(_function, name) for name in LATEX_FUNCTIONS},
         }
@@ -101,6 +107,12 @@ class _Reader:
 
     def scripted(self) -> str:
         """An atom with what stands below and above it."""
+        gap = GAP if self.tokens[self.at] == "\\mathrm" else ""
+        made = self.raised()
+        return f"<mrow>{gap}{made}{gap}</mrow>" if gap else made
+
+    def raised(self) -> str:
+        """An atom with its index, its primes and its exponent."""
         base, below, above, primes = self.atom(), "", "", ""
         while self.at < len(self.tokens) and self.tokens[self.at] in ("_", "^", "'"):
             token = self.tokens[self.at]
@@ -180,4 +192,4 @@ class _Reader:
 
 def _function(name: str) -> str:
     """The name of a function, a little apart from what stands before it."""
-    return f'<mspace width="0.17em"/><mi mathvariant="normal">{name}</mi>'
+    return f'<mrow>{GAP}<mi mathvariant="normal">{name}</mi></mrow>'

@@ -17,7 +17,7 @@ from ..bifurcation.skeleton import Skeleton
 from ..figures.exponent import draw_exponent, finite
 from ..figures.plane import draw_plane
 from ..figures.result_plot import draw_result
-from ..figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, bands, symbol
+from ..figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, bands, note, symbol
 from ..results.result import Result
 from ..stability.clusters import BlockVerdict, ClusterExponents
 from ..stability.exponents import Exponents
@@ -83,7 +83,10 @@ def _(value: Exponents, axes: Axes) -> Axes:
         axes.errorbar(value.alpha, finite(value.exponent), 2 * finite(value.stderr), color=BLUE)
         axes.set(xlabel=r"strength of a mode $\alpha$", ylabel=r"exponent $\Lambda$ per unit of $\tau$")
         return axes
-    dots = axes.scatter(value.alpha.real, value.alpha.imag, c=finite(value.exponent), cmap="RdBu_r", s=6.0)
+    colour = finite(value.exponent)
+    top = float(np.nanmax(np.abs(colour), initial=0.0)) or 1.0
+    places = value.alpha.real, value.alpha.imag
+    dots = axes.scatter(*places, c=colour, cmap="RdBu_r", vmin=-top, vmax=top, s=14.0, edgecolors=BLACK, linewidths=0.3)
     axes.set(xlabel=r"$\alpha$", ylabel=r"$\beta$")
     axes.figure.colorbar(dots, ax=axes, label=r"exponent $\Lambda$ per unit of $\tau$")
     return axes
@@ -120,6 +123,8 @@ def _(value: Lyapunov, axes: Axes) -> Axes:
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
     axes.errorbar(number, finite(value.exponent), 2 * value.stderr, color=BLUE, **DOTS)
     axes.set(xlabel="number", ylabel="Lyapunov exponent per unit of time")
+    lost = int((~value.resolved).sum())
+    note(axes, f"{lost} of {len(number)} decay too fast to be followed" if lost else "")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     return axes
 
@@ -194,8 +199,9 @@ def _branches(branches: tuple[Branch, ...], axes: Axes) -> Axes:
 def _(value: Probe, axes: Axes) -> Axes:
     """Strengths in the complex plane: filled if synchronous, open if not."""
     good = value.synchronous
-    axes.plot(value.alpha[good], value.beta[good], **DOTS, color=BLUE, label="synchronous")
-    axes.plot(value.alpha[~good], value.beta[~good], linestyle="none", marker="x", color=ORANGE, label="not")
+    axes.plot(value.alpha[good], value.beta[good], **DOTS, markersize=7.0, color=BLUE, label="synchronous")
+    crosses: dict[str, Any] = {"linestyle": "none", "marker": "x", "markersize": 5.0}
+    axes.plot(value.alpha[~good], value.beta[~good], **crosses, color=ORANGE, label="not")
     axes.set(xlabel=r"$\alpha$", ylabel=r"$\beta$")
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return axes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,8 +29,11 @@ NEGATIVE = "#D55E00"
 SVG_NODES, SVG_LINES = 300, 3000
 """Most nodes and lines of an SVG; a larger graph is described in words."""
 
-NUMBERED = 40
-"""Most nodes that carry their numbers."""
+NUMBERED = 0.05
+"""Least radius of nodes that carry their numbers."""
+
+POINTS = 60.0
+"""Points of a new figure for each unit of the places."""
 
 THIN, THICK = 0.7, 3.2
 """Widths of lines, in points."""
@@ -94,7 +97,12 @@ class Picture:
     @property
     def radius(self) -> float:
         """Radius of a node in the units of the places."""
-        return float(np.clip(0.42 / np.sqrt(max(len(self.place), 1)), 0.015, 0.11))
+        count = len(self.place)
+        nearest = 2.0 / np.sqrt(count)
+        if 1 < count <= SVG_NODES:
+            apart = np.linalg.norm(self.place[:, None] - self.place[None], axis=2)
+            nearest = float((apart + np.diag(np.full(count, np.inf))).min())
+        return float(np.clip(0.4 * nearest, 0.012, 0.11))
 
 
 def graph_of(value: Drawn) -> Topology:
@@ -170,15 +178,25 @@ def draw_graph(value: Drawn, ax: Axes | None = None) -> Axes:
 def _nodes(axes: Axes, picture: Picture) -> None:
     """Draw the nodes with their colours and numbers, and name several kinds."""
     place, kind = picture.place, np.array(picture.kind)
-    few = len(place) <= NUMBERED
-    size = 110.0 if few else max(4000.0 / len(place), 2.0)
+    size = (2.0 * POINTS * picture.radius) ** 2
     for k, name in enumerate(picture.names):
         own = kind == k
         colour = COLOURS[k % len(COLOURS)]
         axes.scatter(place[own, 0], place[own, 1], s=size, color=colour, zorder=2, label=name, linewidths=0.0)
-    if few:
+    if picture.radius >= NUMBERED:
+        style: dict[str, Any] = {"color": "white", "ha": "center", "va": "center_baseline", "zorder": 3}
+        style["fontsize"] = min(POINTS * picture.radius, 7.0)
         for i, (x, y) in enumerate(place.tolist()):
-            axes.text(x, y, str(i + 1), color="white", ha="center", va="center_baseline", fontsize=6.0, zorder=3)
+            axes.text(
+                x,
+                y,
+                str(i + 1),
+                color="white",
+                ha="center",
+                va="center_baseline",
+                fontsize=min(POINTS * picture.radius, 7.0),
+                zorder=3,
+            )
     if len(picture.names) > 1:
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
     low, high = place.min(axis=0) - 0.2, place.max(axis=0) + 0.2
@@ -201,13 +219,13 @@ def svg(value: Drawn, width: int = 300) -> str:
     low, high = picture.place.min(axis=0), picture.place.max(axis=0)
     margin = picture.radius + 0.14
     (left, bottom), (across, up) = low - margin, high - low + 2 * margin
-    scale = width / across
+    scale = width / max(across, up)
     body = [_svg_line(picture, line, scale) for line in picture.lines]
     body += [_svg_node(picture, i, scale) for i in range(len(picture.place))]
     box = f"{scale * left:.1f} {-scale * (bottom + up):.1f} {scale * across:.1f} {scale * up:.1f}"
     label = escape(f"{graph.name} of {graph.n} nodes", quote=True)
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{label}" width="{width}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{label}" width="{scale * across:.0f}" '
         f'height="{scale * up:.0f}" viewBox="{box}">{"".join(body)}</svg>'
     )
 
@@ -237,7 +255,7 @@ def _svg_node(picture: Picture, i: int, scale: float) -> str:
     title = f"<title>{escape(f'node {i + 1}' + (f', {name}' if name else ''))}</title>"
     colour = COLOURS[k % len(COLOURS)]
     dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{picture.radius * scale:.1f}" fill="{colour}">{title}</circle>'
-    if len(picture.place) > NUMBERED:
+    if picture.radius < NUMBERED:
         return dot
     size = min(picture.radius * scale * 1.1, 12.0)
     return dot + (

@@ -19,7 +19,7 @@ from synchain.models.graphs.topology import Topology
 from synchain.models.presentation.equations import latex as latex_of
 from synchain.models.presentation.equations import lines
 from synchain.models.presentation.mathml import formula
-from synchain.models.presentation.writer import Latex, Writer
+from synchain.models.presentation.writer import Latex, Text, Writer
 from synchain.models.scenes.scene import Scene
 from synchain.models.spectra.eigenvalue import Eigenvalue, decimal
 from synchain.models.spectra.spectrum import Spectrum
@@ -47,6 +47,9 @@ vertical-align:middle}
 
 LINES, ROWS = 14, 12
 """Most lines of equations, and most rows of a table."""
+
+LONG = 400
+"""Characters of LaTeX from which on an equation is plain text, whose lines break."""
 
 EXACT = 40
 """Largest graph without a closed form whose spectrum is computed to be shown."""
@@ -82,7 +85,8 @@ def body(value: object) -> str:
 
 @body.register
 def _(value: Equations) -> str:
-    written = [formula(line, display=True) for line in islice(lines(value, Latex()), LINES)]
+    pairs = islice(zip(lines(value, Latex()), lines(value, Text()), strict=True), LINES)
+    written = [formula(line, display=True) if len(line) < LONG else f"<p>{escape(text)}</p>" for line, text in pairs]
     more = "" if _short(value) else '<p class="quiet">… and so on for the other nodes</p>'
     return f'<div class="formulae">{"".join(written)}</div>{more}'
 

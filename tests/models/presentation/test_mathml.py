@@ -9,7 +9,7 @@ from collections import Counter
 import pytest
 import sympy as sp
 
-from synchain.models.presentation.mathml import formula, mathml
+from synchain.models.presentation.mathml import GAP, formula, mathml
 from synchain.models.presentation.writer import Latex, Writer
 from synchain.models.scenes.file import load_scene, scene_names
 
@@ -34,8 +34,9 @@ def flat(latex: str) -> str:
         ("x_1^2", "<msubsup><mi>x</mi><mn>1</mn><mn>2</mn></msubsup>"),
         ("x^2_1", "<msubsup><mi>x</mi><mn>1</mn><mn>2</mn></msubsup>"),
         (r"\vartheta_b", "<msub><mi>ϑ</mi><mi>b</mi></msub>"),
-        (r"\mathrm{end}", '<mi mathvariant="normal">end</mi>'),
-        (r"\text{of node 1}", "<mtext>of node 1</mtext>"),
+        (r"\mathrm{end}", f'<mrow>{GAP}<mi mathvariant="normal">end</mi>{GAP}</mrow>'),
+        (r"\sin^2", f'<msup><mrow>{GAP}<mi mathvariant="normal">sin</mi></mrow><mn>2</mn></msup>'),
+        (r"\text{ of 1}", "<mtext>\u00a0of\u00a01</mtext>"),
         ("a < b", "<mi>a</mi><mo>&lt;</mo><mi>b</mi>"),
         ("-x", '<mo form="prefix">−</mo><mi>x</mi>'),
         ("a - x", "<mi>a</mi><mo>−</mo><mi>x</mi>"),
