@@ -18,7 +18,7 @@ from .eigenvalue import Eigenvalue, decimal
 
 __all__ = ["Spectrum", "table"]
 
-SHOWN = 1000
+SHOWN = 24
 """The text of a spectrum leaves out the middle of more eigenvalues than this."""
 
 

@@ -91,12 +91,13 @@ def test_data_have_words_and_a_file_opens_in_xarray(name: str, tmp_path: Path) -
 
 
 def test_states_of_a_basin_have_labels() -> None:
-    assert KINDS["Basin"].data.initial.sel(component="v", node=2).values.tolist() == [3.0, 7.0, 11.0]
+    assert KINDS["Basin"].data.initial.sel(component="v", node=1).values.tolist() == [2.0, 6.0, 10.0]
 
 
 @pytest.fixture(scope="module")
 def result() -> Any:
-    scene = PAIR.replace(topology=topology("chain", 3), transient=2.0, window=2.0, record=("trajectory",), samples=5)
+    scene = PAIR.replace(topology=topology("chain", 3), transient=0.0, window=2.0, record=("trajectory",), samples=5)
+    scene = scene.replace(initial={"x": [0.1, 0.2, 0.3], "v": [0.0, 0.05, 0.06]})
     return run(scene, sigma=[0.1, 0.2, 0.3], show_progress=False)
 
 
@@ -104,6 +105,9 @@ def test_states_have_the_dimensions_component_and_node(result: Any) -> None:
     assert result.end.dims == ("sigma", "component", "node")
     assert result.trajectory.dims == ("sigma", "sample", "component", "node")
     assert result.data.time.dims == ("sigma", "sample")
+    first = result.trajectory.isel(sigma=0, sample=0)
+    assert first.sel(component="x").values.tolist() == [0.1, 0.2, 0.3]
+    assert first.sel(component="v").values.tolist() == [0.0, 0.05, 0.06]
     names = result.scene.equations.state
     for k, name in enumerate(names):
         component, node = name.split("_")

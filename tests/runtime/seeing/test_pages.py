@@ -57,6 +57,15 @@ def test_spectra_are_exact_and_cut_in_the_middle() -> None:
     assert len(topology("ring", 1000).spectrum._repr_latex_()) < 2000
 
 
+def test_large_networks_are_short_in_a_terminal() -> None:
+    graph = topology("chain", 1000)
+    scene = Scene(topology=graph)
+    for value in (graph, scene, scene.equations):
+        assert len(repr(value)) < 200
+    assert len(repr(graph.spectrum)) < 2000
+    assert repr(scene.equations) == "Equations(1000 nodes, 1998 links, states x, v, 9 parameters)"
+
+
 def test_latex() -> None:
     assert topology("star", 6).spectrum._repr_latex_().splitlines()[3:6] == [r"0 & 1 \\", r"-1 & 4 \\", "-6 & 1"]
     scene = load_scene("figure_4a")
