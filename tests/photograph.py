@@ -269,7 +269,9 @@ def exact(graph: Any) -> str:
     """The exact spectrum of a graph, with Jordan blocks and whether it is proved."""
     found = graph.spectrum
     rows = [f"{e.text}: {e.multiplicity} {e.blocks}" for e in found.eigenvalues]
-    return "\n".join([repr(graph), repr(found), *rows, f"verified {found.verified}, chance {found.error_probability}"])
+    return "\n".join(
+        [repr(graph), found.text(1000), *rows, f"verified {found.verified}, chance {found.error_probability}"]
+    )
 
 
 def printed(*words: str) -> str:

@@ -71,7 +71,7 @@ class MSF(Labelled):
                 "interval": (("range", "end"), np.reshape(self.intervals, (-1, 2)), "alpha with a negative exponent"),
                 "interval_error": (("range", "end"), np.reshape(self.uncertainties, (-1, 2)), "standard errors"),
                 "window": (
-                    ("window", "end"),
+                    ("window_number", "end"),
                     np.reshape([(w.low, w.high) for w in self._known_windows], (-1, 2)),
                     "sigma at which every mode of the network dies out",
                 ),

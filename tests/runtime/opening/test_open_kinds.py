@@ -131,6 +131,8 @@ def test_a_streamed_result_has_data_and_is_saved_elsewhere(result: Any, tmp_path
     made.save(tmp_path / "b.nc")
     assert open_result(tmp_path / "b.nc").data.identical(result.data)
     assert "a.nc" in repr(made)
+    with pytest.raises(ValueError, match=r"expected another ending: stream writes netCDF-3; end it in \.nc"):
+        stream(result.scene, tmp_path / "a.nc4")
 
 
 @pytest.mark.parametrize("ending", FORMS)
