@@ -107,7 +107,7 @@ def test_a_pair_out_of_phase_follows_its_mode() -> None:
     orbits.block, orbits.integrator = 2.0, orbits.integrator_of(orbits.strengths)
     found = orbits.propagators()[0, 0][:, 0]
     d = 1e-6
-    end = run(scene, reduce=False, show_progress=False, x_1=0.1 + d, x_2=0.1 - d).end.values
+    end = run(scene, reduce=False, show_progress=False, x_1=0.1 + d, x_2=0.1 - d).states("end")
     np.testing.assert_allclose(found, (end[[0, 2]] - end[[1, 3]]) / (2 * d), rtol=1e-4)
 
 

@@ -49,7 +49,7 @@ def _position(s: Scene, state: np.ndarray, length: float) -> float:
     one = s.replace(
         topology=topology("chain", 1), transient=0.0, window=length, time_unit="time", record=(), rtol=1e-12
     )
-    return float(run(one, x_1=float(state[0]), v_1=float(state[1]), show_progress=False).end.values[0])
+    return float(run(one, x_1=float(state[0]), v_1=float(state[1]), show_progress=False).states("end")[0])
 
 
 def test_a_linear_oscillator_has_the_multipliers_of_its_damping() -> None:

@@ -21,7 +21,7 @@ from synchain.runtime import commands
 from synchain.runtime.cells import kernels
 from synchain.runtime.cli import main
 from synchain.runtime.console.outcome import print_json
-from synchain.runtime.results.open import open_result
+from synchain.runtime.opening.open import open_result
 from synchain.runtime.sweeps import job, stream
 from synchain.runtime.synchronisation import threshold
 
@@ -233,7 +233,7 @@ def test_run_writes_a_result_and_a_figure(scene: str, tmp_path: Path, capsys: py
     assert result.scene.rtol == 1e-6
     assert result.scene.parameters["omega"] == 1.4
     assert result.data.sigma.values.tolist() == [0.0, 0.25, 0.5]
-    assert float(result.end[0, 0]) != float(result.end[1, 0])
+    assert float(result.states()[0, 0]) != float(result.states()[1, 0])
 
 
 @pytest.mark.usefixtures("compiled")
@@ -486,7 +486,7 @@ WRONG = [
     ("spectrum chain 0", "n = 0; expected at least 1"),
     ("spectrum chain -3", "n = -3; expected at least 1"),
     ("spectrum ring 2", "n = 2; expected at least 3"),
-    ("spectrum rnig 4", "unknown topology 'rnig'; known: chain, circulant, complete"),
+    ("spectrum rnig 4", "unknown topology 'rnig'; known: cayley_abelian, cayley_dihedral, chain"),
     ("spectrum chain 4.0", "expected a whole number"),
     ("spectrum chain 1_000", "expected a whole number"),
     ("spectrum chain 99999999999", "expected at most 100000"),
