@@ -34,7 +34,7 @@ class TimeUnit(Word):
 METHODS = Path(__file__).parents[2] / "codegen" / "integrators"
 """The folder of the integrators, one file each; it is listed here, and read by the code generator alone."""
 
-LIMITS = {
+LIMITS: Mapping[str, tuple[Any, Any]] = {
     "transient": (0.0, 1e9),
     "window": (0.0, 1e9),
     "rtol": (1e-15, 0.1),

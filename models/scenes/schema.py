@@ -143,11 +143,11 @@ def _graphs() -> list[Table]:
 
 def _family(graphs: Family) -> Table:
     """The table of one family, its options by the types of their defaults."""
-    options = {
+    options: dict[str, Table] = {
         name: {"type": OPTIONS.get(type(default), ["array", "integer", "string"])}
         for name, default in graphs.options.items()
     }
-    own = {"name": {"enum": [graphs.name]}, "n": {**WHOLE, "minimum": graphs.minimum}, **options}
+    own: dict[str, Table] = {"name": {"enum": [graphs.name]}, "n": {**WHOLE, "minimum": graphs.minimum}, **options}
     return {"description": graphs.summary, **_table(own, "name", "n")}
 
 
