@@ -109,7 +109,9 @@ def _of_type(name: str, kind: Any) -> Table:
         low, high = LIMITS[name]
         span = {"minimum": low, "maximum": high}
         return {"type": "integer", **span} if kind is int else {"anyOf": [{"type": "number", **span}, TEXT]}
-    return {bool: {"type": "boolean"}, str: TEXT}[kind]
+    if kind not in (bool, str):
+        raise TypeError(f"keyword {name!r}: its type {kind} does not tell its form in a file; expected a row in _rows")
+    return {"type": "boolean"} if kind is bool else TEXT
 
 
 def _table(properties: Mapping[str, Table], *required: str) -> Table:

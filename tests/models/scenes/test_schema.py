@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -12,16 +13,17 @@ from typing import Any
 import pytest
 from jsonschema import Draft4Validator, Draft7Validator
 
-from synchain.models import Scene, load_scene, scene_names
+from synchain.models import Scene, Topology, load_scene, scene_names
 from synchain.models.graphs.families import family, names
 from synchain.models.scenes.axis import Axis
+from synchain.models.scenes.model import Group
 from synchain.models.scenes.scene import KEYWORDS
-from synchain.models.scenes.schema import schema
+from synchain.models.scenes.schema import _of_type, schema
 
 SCHEMA = schema()
 DRAFTS = [Draft4Validator(SCHEMA), Draft7Validator(SCHEMA)]
 LIBRARY = resources.files("synchain.models.scenes.library")
-DOCS = (Path(__file__).parents[3] / "docs" / "scenes.md").read_text("utf-8")
+DOCS = sorted((Path(__file__).parents[3] / "docs").glob("*.md"))
 
 
 def problems(values: object) -> list[str]:
@@ -48,24 +50,33 @@ def test_library_scenes_are_valid_as_they_stand_and_written_in_full(name: str) -
 
 
 def test_scenes_of_the_documentation_are_valid() -> None:
-    blocks = re.findall(r"^```toml\n(.*?)^```", DOCS, re.MULTILINE | re.DOTALL)
+    pages = "".join(page.read_text("utf-8") for page in DOCS)
+    blocks = re.findall(r"^```toml\n(.*?)^```", pages, re.MULTILINE | re.DOTALL)
     assert len(blocks) >= 4
     for block in blocks:
         assert problems(tomllib.loads(block)) == []
 
 
-def options_of(name: str) -> dict[str, Any]:
-    """The options of a graph of 12 nodes as a scene file has them."""
-    table: dict[str, Any] = Scene(topology=family(name)(12)).as_dict()["topology"]  # type: ignore[assignment]
-    return table
+def a_graph(name: str) -> Topology:
+    """The first graph of a family with 12 nodes or more."""
+    for n in range(12, 40):
+        with suppress(ValueError):
+            return family(name)(n)
+    raise AssertionError(f"no graph of {name} with 12 to 39 nodes")
 
 
 @pytest.mark.parametrize("name", names())
 def test_graphs_of_every_family_are_valid_and_unknown_options_are_not(name: str) -> None:
-    table = options_of(name)
+    table: dict[str, Any] = Scene(topology=a_graph(name)).as_dict()["topology"]  # type: ignore[assignment]
+    assert table["name"] == name
     assert problems({"topology": table}) == []
     assert problems({"topology": {**table, "sides": 3}}) != []
     assert problems({"topology": {"name": name, "n": family(name).minimum - 1}}) != []
+
+
+def test_a_keyword_of_an_unknown_type_needs_a_row() -> None:
+    with pytest.raises(TypeError, match="keyword 'nodes': its type .* expected a row in _rows"):
+        _of_type("nodes", tuple[Group] | None)
 
 
 @pytest.mark.parametrize(
