@@ -75,7 +75,7 @@ def test_graphs_of_every_family_are_valid_and_unknown_options_are_not(name: str)
 
 
 def test_a_keyword_of_an_unknown_type_needs_a_row() -> None:
-    with pytest.raises(TypeError, match="keyword 'nodes': its type .* expected a row in _rows"):
+    with pytest.raises(TypeError, match=r"keyword 'nodes': its type .* expected a row in _rows"):
         _of_type("nodes", tuple[Group] | None)
 
 
