@@ -17,6 +17,7 @@ import sympy as sp
 from synchain.models import chain
 from synchain.models.graphs.families import names as families
 from synchain.models.scenes.file import load_scene, scene_names
+from synchain.models.scenes.schema import schema
 from synchain.runtime import commands
 from synchain.runtime.cells import kernels
 from synchain.runtime.cli import main
@@ -106,6 +107,7 @@ def loaded_after(words: str) -> set[str]:
         ("spectrum star 6 --json", {"numpy", "numba", "matplotlib", "scipy", "xarray"}),
         ("equations figure_4a", {"numpy", "numba", "matplotlib", "scipy", "xarray"}),
         ("scenes", {"sympy", "numpy", "numba", "matplotlib"}),
+        ("schema", {"numpy", "numba", "matplotlib", "scipy", "xarray"}),
         ("topologies", {"sympy", "numpy", "numba", "matplotlib"}),
         ("--version", {"sympy", "numpy", "numba", "matplotlib", "argparse.py"}),
     ],
@@ -180,6 +182,11 @@ def test_scenes_and_topologies_list_what_there_is(capsys: pytest.CaptureFixture[
     listed = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
     assert {"chain", "complete", "ring", "star"} <= set(listed)
     assert "3 or more" in listed["ring"]
+
+
+def test_the_schema_is_printed_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema"]) == 0
+    assert json.loads(capsys.readouterr().out) == schema()
 
 
 def test_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
