@@ -75,6 +75,7 @@ def test_loops_do_what_the_written_statements_do(case: str, method: str) -> None
     assert np.abs(np.array(ends[0]) - y).max() > 0.1
 
 
+@pytest.mark.long
 def test_forty_nodes_of_two_kinds_move_as_their_exported_equations_say() -> None:
     """And from equal starts the nodes of a kind stay equal bit for bit, though each adds up its own links."""
     random = np.random.default_rng(1)

@@ -81,6 +81,7 @@ def test_clocks_on_a_beam_by_lagranges_method() -> None:
         assert sp.simplify((found[name] - e).subs(sigma, 1)) == 0
 
 
+@pytest.mark.long
 def test_clocks_on_a_beam_by_kanes_method() -> None:
     """Kane's equations from the positions of the bobs: no Lagrangian and no kinetic energy."""
     equations, names, thetas, rates = pendulums(1)
@@ -179,6 +180,7 @@ def test_nodes_may_feel_the_inertia_of_one_that_feels_nobody(name: str, integrat
     np.testing.assert_allclose(found.states(), known.y[:, -1], atol=1e-7)
 
 
+@pytest.mark.long
 def test_frictionless_clocks_keep_their_energy_and_their_momentum() -> None:
     """Without escapement, drag and spring energy and the momentum along the beam are constant; swings are large here."""
     free = {"escapement": 0, "drag": 0, "mass": 3}

@@ -111,12 +111,14 @@ def test_exponents_of_the_exact_law_are_the_limit_of_the_smooth_one() -> None:
     assert abs(zeros[1] - zeros[2]) < 3e-7
 
 
+@pytest.mark.long
 def test_starts_on_the_ground_stick_or_slip_by_their_load() -> None:
     cells = run(scene(window=1e-6, time_unit="time", parameters={"u": 0.0}), x_1=[0.0, 0.59, 0.61, -0.61], v_1=0.1,
                 show_progress=False)  # fmt: skip
     assert list(cells.states("end")[:, 2]) == [0.0, 0.0, 1.0, -1.0]
 
 
+@pytest.mark.long
 def test_slip_that_begins_slower_than_a_step_can_tell_does_not_chatter() -> None:
     """The load passes its limit by 9e-6 where the drive turns: the sliding velocity grows from zero at that rate."""
     s = scene(integrator="rodas5p", rtol=1e-6, window=4.0, parameters={"omega": 1.4}, record=())

@@ -95,6 +95,7 @@ def test_van_der_pol() -> None:
     assert sp.expand(node("van_der_pol").rhs[1] - (MU * (1 - X**2) * V - X + U * sp.cos(OMEGA * TIME))) == 0
 
 
+@pytest.mark.long
 def test_van_der_pol_has_its_limit_cycle() -> None:
     """mu = 1: amplitude 2.008619860874843, period 6.663286859323130, Amore, Physica D 435, 133279 (2022)."""
     scene = Scene(oscillator="van_der_pol", transient=60, window=40, time_unit="time", record=("section",), rtol=1e-11)

@@ -39,6 +39,7 @@ def copies() -> np.ndarray:
     return np.array([run(alone.replace(transient=t), show_progress=False).states("end") for t in (400.0, 401.0)])
 
 
+@pytest.mark.long
 def test_two_copies_of_one_cycle_are_not_synchronous_though_the_state_is_stable(copies: np.ndarray) -> None:
     assert np.abs(copies[0] - copies[1]).max() > 0.05
     near = [copies[0], copies[0] + [1e-3, 0.0]]
@@ -71,6 +72,7 @@ def test_equal_oscillators_stay_equal_and_are_not_called_stable() -> None:
     assert VERDICTS[found[1].verdict.item()] == "not synchronous, the state is unstable"
 
 
+@pytest.mark.long
 def test_a_mismatch_bursts_near_the_loss_of_stability() -> None:
     """Bubbling: at sigma = 0.295 the exponent is surely negative, and yet a mismatch of 1e-6 bursts to 1e-2.
 

@@ -682,6 +682,7 @@ def test_a_result_is_not_saved_over_a_device(tmp_path):
         run(PAIR, show_progress=False).save(tmp_path / "a.nc")
 
 
+@pytest.mark.long
 def test_the_command_says_that_there_is_nothing_to_do(tmp_path, capsys):
     from synchain.runtime.cli import main
 
