@@ -9,7 +9,7 @@ import numpy as np
 import sympy as sp
 
 from synchain.models.inputs.frozen import Frozen
-from synchain.models.mechanics.oscillator import Coordinate, Lagrangian, Oscillator
+from synchain.models.mechanics.oscillator import Coordinate, LagrangianModel, Oscillator
 from synchain.models.mechanics.parameter import Parameter
 
 
@@ -20,7 +20,7 @@ def real(prefix: str, count: int) -> tuple[sp.Symbol, ...]:
 def of_energies(name: str, links: int, kinetic: sp.Expr, potential: sp.Expr, lost: sp.Expr, *names: str) -> Oscillator:
     """An oscillator with coordinates q1 …, velocities w1 … and parameters of the value 1."""
     coordinates = tuple(Coordinate(f"q{k + 1}", f"w{k + 1}", "1") for k in range(links))
-    model = Lagrangian(coordinates, kinetic, potential, (sp.S.Zero,) * links, lost)
+    model = LagrangianModel(coordinates, kinetic, potential, (sp.S.Zero,) * links, lost)
     return Oscillator(name, Frozen({s: Parameter(1.0, "1", "a number") for s in names}), model)
 
 

@@ -22,10 +22,10 @@ from ..mechanics.components import SLIDING, Block, Edge, Node
 from ..mechanics.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling
 from ..mechanics.definition import FRICTION_LAW
 from ..mechanics.friction import KAPPA, SLIP, ContactModel, FrictionLaw, set_valued
-from ..mechanics.lagrangian import LARGEST_BY_MINORS, Mechanics, check_regular, coupled, solve_masses
+from ..mechanics.lagrangian import LARGEST_BY_MINORS, Mechanics, check_masses_exist, coupled, solve_masses
 from ..mechanics.link import edge
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
-from ..mechanics.oscillator import Field, Oscillator
+from ..mechanics.oscillator import FieldModel, Oscillator
 from ..mechanics.parameter import Parameter
 from .equations import Equations, Layer
 
@@ -75,7 +75,7 @@ def node(oscillator: Oscillator, friction: FrictionLaw | None = None, contact: s
     Raises ValueError as `parameters` does.
     """
     symbols = tuple(sp.Symbol(name, real=True) for name in parameters(oscillator, friction, contact))
-    if isinstance(oscillator.model, Field):
+    if isinstance(oscillator.model, FieldModel):
         return Node(
             tuple(sp.Symbol(name, real=True) for name in oscillator.model.state), oscillator.model.rates, symbols
         )
@@ -94,9 +94,9 @@ def node(oscillator: Oscillator, friction: FrictionLaw | None = None, contact: s
 def _motion(system: Mechanics) -> tuple[tuple[sp.Expr, ...], Block]:
     """The accelerations; of many coupled coordinates r and the masses of M dv/dt = r, with rows for coordinates too."""
     forces, masses = system.balance()
-    if len(coupled(masses, system.velocities)) <= LARGEST_BY_MINORS:
+    if len(coupled(masses)) <= LARGEST_BY_MINORS:
         return cancelled(solve_masses(masses, forces, system.velocities)), ()
-    check_regular(masses, system.velocities)
+    check_masses_exist(masses, system.velocities)
     whole = sp.diag(sp.eye(masses.rows), masses)
     return expanded(forces), tuple(map(expanded, whole.tolist()))
 

@@ -14,7 +14,7 @@ __all__ = [
     "LARGEST_BY_MINORS",
     "Mechanics",
     "balance",
-    "check_regular",
+    "check_masses_exist",
     "coupled",
     "energy_rate",
     "equations_of_motion",
@@ -140,32 +140,21 @@ Beyond, elimination leaves fractions within fractions, and kernels solve M dv/dt
 """
 
 
-def coupled(masses: sp.Matrix, velocities: Sequence[sp.Symbol]) -> tuple[int, ...]:
-    """Return the rows of a symmetric mass matrix that have more than their diagonal entry.
+def coupled(masses: sp.Matrix) -> list[int]:
+    """Return the rows of a mass matrix with entries beside the diagonal."""
+    size = masses.rows
+    return [i for i in range(size) if any(masses[i, j] != 0 for j in range(size) if j != i)]
 
-    Raises ValueError if another row is zero: its velocity, one of `velocities`, then has no kinetic energy.
-    """
-    rows = range(masses.rows)
-    alone = [i for i in rows if all(masses[i, j] == 0 for j in rows if j != i)]
-    idle = [str(velocities[i]) for i in alone if masses[i, i] == 0]
+
+def check_masses_exist(masses: sp.Matrix, velocities: Sequence[sp.Symbol]) -> None:
+    """Raise ValueError if a symmetric mass matrix is singular: some velocity, which names it, has no kinetic energy."""
+    rest = coupled(masses)
+    idle = [str(velocities[i]) for i in range(masses.rows) if i not in rest and masses[i, i] == 0]
     if idle:
         raise ValueError(f"no kinetic energy in the velocity {idle[0]}; expected T to grow with every velocity")
-    return tuple(i for i in rows if i not in alone)
-
-
-def check_regular(masses: sp.Matrix, velocities: Sequence[sp.Symbol]) -> None:
-    """Raise ValueError if a mass matrix is singular: if its determinant vanishes at three places."""
-    symbols = sorted(masses.free_symbols, key=str)
-    for k in range(3):
-        numbers = masses.xreplace(_place(symbols, k)).evalf(60)
-        if abs(numbers.det()) > sp.Float("1e-40") * abs(sp.prod(numbers.diagonal())):
-            return
-    raise ValueError(f"the mass matrix of {', '.join(map(str, velocities))} is singular; expected an invertible one")
-
-
-def _place(symbols: Sequence[sp.Symbol], k: int) -> dict[sp.Basic, sp.Basic]:
-    """Place number k at which expressions are looked at."""
-    return {s: sp.Rational(7 * i + 3 * k + 5, 11 + 2 * i) for i, s in enumerate(symbols)}
+    if rest and _is_singular(masses.extract(rest, rest)):
+        names = ", ".join(str(velocities[i]) for i in rest)
+        raise ValueError(f"the mass matrix of {names} is singular; expected an invertible one")
 
 
 def solve_masses(masses: sp.Matrix, forces: Sequence[sp.Expr], velocities: Sequence[sp.Symbol]) -> tuple[sp.Expr, ...]:
@@ -173,32 +162,36 @@ def solve_masses(masses: sp.Matrix, forces: Sequence[sp.Expr], velocities: Seque
 
     Raises ValueError if the matrix is singular: some velocity then has no kinetic energy.
     """
-    rows = range(len(forces))
-    rest = coupled(masses, velocities)
-    found = {i: forces[i] / masses[i, i] for i in rows if i not in rest}
+    check_masses_exist(masses, velocities)
+    rest = coupled(masses)
+    found = {i: forces[i] / masses[i, i] for i in range(masses.rows) if i not in rest}
     if rest:
-        block = masses.extract(list(rest), list(rest))
-        names = ", ".join(str(velocities[i]) for i in rest)
-        found |= dict(zip(rest, _block(block, [forces[i] for i in rest], names), strict=True))
-    return tuple(found[i] for i in rows)
+        block = masses.extract(rest, rest)
+        found |= dict(zip(rest, _block(block, [forces[i] for i in rest]), strict=True))
+    return tuple(found[i] for i in range(len(forces)))
 
 
-def _vanishes(e: sp.Expr) -> bool:
-    """True if an expression is zero everywhere; a value that differs from zero at one place proves the contrary."""
-    symbols = sorted(e.free_symbols, key=str)
+def _determinant(masses: sp.Matrix) -> sp.Expr:
+    return masses.det(method="berkowitz")
+
+
+def _is_singular(masses: sp.Matrix) -> bool:
+    """True if the determinant is zero at three places, beside the product of the diagonal; without numbers, everywhere."""
+    symbols, found = sorted(masses.free_symbols, key=str), False
     for k in range(3):
-        value = e.subs(_place(symbols, k)).evalf(30)
-        if value.is_number and value.is_finite and abs(value) > sp.Float("1e-15"):
-            return False
-    return bool(e.equals(0))
+        place = {s: sp.Rational(7 * i + 3 * k + 5, 11 + 2 * i) for i, s in enumerate(symbols)}
+        numbers = masses.subs(place).evalf(60)
+        value, size = _determinant(numbers), sp.prod(numbers.diagonal())
+        if value.is_number and value.is_finite:
+            if abs(value) > sp.Float("1e-40") * abs(size):
+                return False
+            found = True
+    return found or bool(_determinant(masses).equals(0))
 
 
-def _block(masses: sp.Matrix, forces: Sequence[sp.Expr], names: str) -> list[sp.Expr]:
+def _block(masses: sp.Matrix, forces: Sequence[sp.Expr]) -> list[sp.Expr]:
     """Cramer's rule for a small block, elimination for a large one."""
-    determinant = masses.det(method="berkowitz")
-    if _vanishes(determinant):
-        raise ValueError(f"the mass matrix of {names} is singular; expected an invertible one")
     if masses.rows > LARGEST_BY_MINORS:
         return list(masses.LUsolve(sp.Matrix(forces)))
-    minors = masses.adjugate()
+    minors, determinant = masses.adjugate(), _determinant(masses)
     return [sp.Add(*(minors[i, j] * force for j, force in enumerate(forces))) / determinant for i in range(masses.rows)]

@@ -16,7 +16,7 @@ from synchain.models import chain
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import node
 from synchain.models.inputs.frozen import Frozen
-from synchain.models.mechanics.oscillator import Coordinate, Lagrangian, Oscillator
+from synchain.models.mechanics.oscillator import Coordinate, LagrangianModel, Oscillator
 from synchain.models.mechanics.parameter import Parameter
 from synchain.models.scenes.scene import Scene
 
@@ -60,7 +60,7 @@ def tubes(*forces: sp.Expr) -> Oscillator:
     q, w, mass = real("q", LINKS), real("w", LINKS), sp.Symbol("mass", real=True)
     kinetic = mass * sp.Add(*(sp.Add(*w[:k]) ** 2 for k in range(1, LINKS + 1))) / 2
     coordinates = tuple(Coordinate(a.name, b.name, "1") for a, b in zip(q, w, strict=True))
-    model = Lagrangian(coordinates, kinetic, sp.Add(*(a**2 for a in q[1:])) / 2, forces, sp.S.Zero)
+    model = LagrangianModel(coordinates, kinetic, sp.Add(*(a**2 for a in q[1:])) / 2, forces, sp.S.Zero)
     return Oscillator("tubes", Frozen({"mass": Parameter(1.0, "1", "a number")}), model)
 
 

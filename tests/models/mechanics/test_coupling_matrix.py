@@ -25,7 +25,7 @@ from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.components import Node
 from synchain.models.mechanics.coupling import MatrixCoupling
 from synchain.models.mechanics.definition import OSCILLATOR
-from synchain.models.mechanics.oscillator import Field
+from synchain.models.mechanics.oscillator import FieldModel
 from synchain.models.presentation.equations import text
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
@@ -202,7 +202,7 @@ def test_the_parameter() -> None:
 def test_a_field_of_positions_and_velocities_takes_a_spring() -> None:
     """Mass 1: no kinetic energy is asked for."""
     x, v = sp.symbols("x v", real=True)
-    rossler = replace(oscillator_of("rossler"), model=Field(("x", "v"), (v, -x)))
+    rossler = replace(oscillator_of("rossler"), model=FieldModel(("x", "v"), (v, -x)))
     assert edge("spring", Node((x, v), (v, -x), ()), rossler).rhs[1] == SIGMA * WEIGHT * GAP["x"]
 
 
@@ -278,5 +278,5 @@ def test_a_run_agrees_with_a_network_written_by_hand(n: int) -> None:
     expected = solve_ivp(rates, (0, 2), scene.y0, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
     result = run(scene, workers=1, show_progress=False)
     assert result.success
-    assert np.abs(result.end.values - expected).max() < 1e-6
+    assert np.abs(result.states("end") - expected).max() < 1e-6
     assert expected.reshape(3, n).std(axis=1).max() > 1e-2, "the nodes differ, so that links matter"
