@@ -15,6 +15,7 @@ coupling      Energy or dissipation of a link, or a matrix between states; its s
 contact       How friction jumps at rest: smoothed ("atan", steepness κ), or "set-valued".
 slip state    Of a node with set-valued contact: +1 or -1 while it slips, 0 while it sticks.
 quotient      The network of classes of nodes that move alike, which has fewer equations.
+observable    A value of the states, reduced over the nodes and then over the window of a cell.
 record        What a scene keeps: "sync_error", "section" or "trajectory".
 scene         Model, numbers, start, records and axes: everything that a run needs.
 cell          One point of the axes of a scene: one initial-value problem.
@@ -26,6 +27,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .dynamics.observable import Observable, end, maximum, mean, minimum, nodes, rate, variance
     from .graphs.families import topology
     from .graphs.products import cartesian, complement, kronecker, union, weighted
     from .graphs.readers import from_edges, from_graph, from_sparse, read_edges, read_graphml
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Axis": "scenes.axis",
+    "Observable": "dynamics.observable",
     "Parameter": "mechanics.parameter",
     "Scene": "scenes.scene",
     "Section": "scenes.section",
@@ -51,6 +54,7 @@ _HOMES = {
     "allow_code": "inputs.plugins",
     "cartesian": "graphs.products",
     "complement": "graphs.products",
+    "end": "dynamics.observable",
     "from_edges": "graphs.readers",
     "from_graph": "graphs.readers",
     "from_matrix": "graphs.topology",
@@ -59,7 +63,12 @@ _HOMES = {
     "kronecker": "graphs.products",
     "latex": "presentation.equations",
     "load_scene": "scenes.file",
+    "maximum": "dynamics.observable",
+    "mean": "dynamics.observable",
+    "minimum": "dynamics.observable",
+    "nodes": "dynamics.observable",
     "probability_option": "inputs.options",
+    "rate": "dynamics.observable",
     "read_edges": "graphs.readers",
     "read_graphml": "graphs.readers",
     "read_matrix": "graphs.topology",
@@ -67,6 +76,7 @@ _HOMES = {
     "text": "presentation.equations",
     "topology": "graphs.families",
     "union": "graphs.products",
+    "variance": "dynamics.observable",
     "weighted": "graphs.products",
     "integer_option": "inputs.options",
     "integers_option": "inputs.options",
@@ -74,6 +84,7 @@ _HOMES = {
 
 __all__ = [
     "Axis",
+    "Observable",
     "Parameter",
     "Scene",
     "Section",
@@ -82,6 +93,7 @@ __all__ = [
     "allow_code",
     "cartesian",
     "complement",
+    "end",
     "from_edges",
     "from_graph",
     "from_matrix",
@@ -92,7 +104,12 @@ __all__ = [
     "kronecker",
     "latex",
     "load_scene",
+    "maximum",
+    "mean",
+    "minimum",
+    "nodes",
     "probability_option",
+    "rate",
     "read_edges",
     "read_graphml",
     "read_matrix",
@@ -100,6 +117,7 @@ __all__ = [
     "text",
     "topology",
     "union",
+    "variance",
     "weighted",
 ]
 

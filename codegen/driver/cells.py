@@ -19,6 +19,7 @@ from ..simd.lanes import one_lane
 from ..simd.lanes import select
 from ..simd.lanes import store
 from .names import CONTACTS
+from .names import OBSERVED
 from .names import SECTION
 from .names import SYNC_ERROR
 from .names import TRAJECTORY
@@ -77,6 +78,8 @@ from .recording import spread
 # What must repeat for the future to repeat, saved behind state and parameters: the state and these of the clock.
 REPEATING = (STEP, MODE, SYNC)
 LONGEST_CYCLE = 32.0
+# True if every step of the window counts: nothing in it can be left out.
+WHOLE = SECTION or TRAJECTORY or OBSERVED
 
 
 @njit(error_model="numpy")
@@ -154,7 +157,7 @@ def turn_over(which, cell, spans, control, clock, y, dims):
         if clock[CYCLE * WIDTH + which] > 0.0:
             jump(which, cell, spans, clock)
     begin(which, cell, spans, clock)
-    if SYNC_ERROR and not SECTION and not TRAJECTORY and clock[SYNC * WIDTH + which] < spans[cell, 3]:
+    if SYNC_ERROR and not WHOLE and clock[SYNC * WIDTH + which] < spans[cell, 3]:
         settle_down(which, cell, spans, clock)
 
 
@@ -213,7 +216,7 @@ def jump(which, cell, spans, clock):
     start, end = spans[cell, 0], spans[cell, 1]
     if now * period < start:
         leap(which, math.floor((start / period - now) / cycle + 1e-9) * cycle, clock)
-    elif not SECTION and not TRAJECTORY:
+    elif not WHOLE:
         left = clock[LEFT * WIDTH + which]
         if left < 0.0:
             put(clock, LEFT, which, cycle)

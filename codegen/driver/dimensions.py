@@ -25,6 +25,8 @@ class Dimensions(NamedTuple):
     """That of the explicit step of a switching integrator; 0 if there is none."""
     repeats: int
     """1 if the right-hand side is periodic in time, so that a computation can repeat itself, else 0."""
+    observed: int
+    """Values that are observed."""
 
 
 class ModeDimensions(NamedTuple):

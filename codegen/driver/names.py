@@ -18,6 +18,7 @@ SERIES = False
 SYNC_ERROR = False
 SECTION = False
 TRAJECTORY = False
+OBSERVED = False
 """Records of this driver; what is False costs nothing."""
 
 LANES = 1

@@ -27,7 +27,7 @@ class Driver:
     """What the text of a driver depends on; scenes that agree in it share its machine code.
 
     `width` is the number of cells in a register, or of modes in one; `series` is True for Taylor steps, which choose
-    their length.
+    their length; `observes` is True if values of the scene are observed.
     """
 
     kind: KernelKind
@@ -37,9 +37,10 @@ class Driver:
     switching: bool = False
     contacts: bool = False
     series: bool = False
+    observes: bool = False
 
     def __str__(self) -> str:
-        traits = [name for name in ("looped", "switching", "contacts") if getattr(self, name)]
+        traits = [name for name in ("looped", "switching", "contacts", "observes") if getattr(self, name)]
         subject = "orbits and their modes" if self.kind is KernelKind.MODES else "sweeps"
         records = ", ".join(("final state", *self.records))
         lanes = f"{self.width} lane{'s' * (self.width != 1)}"
@@ -49,7 +50,8 @@ class Driver:
     def functions(self) -> tuple[str, ...]:
         """The functions of a scene, in the order in which the driver takes them; `step` stands for those not called."""
         wanted: tuple[tuple[str, bool], ...] = (
-            ("step_smooth", self.switching), ("section", Record.SECTION in self.records), ("pushes", self.contacts),
+            ("step_smooth", self.switching), ("section", Record.SECTION in self.records),
+            ("values", self.observes), ("pushes", self.contacts),
         )  # fmt: skip
         if self.kind is KernelKind.MODES:
             wanted = (("carry", True), ("pushes", self.contacts), ("release", self.contacts))
@@ -68,6 +70,7 @@ class Driver:
             "WIDTH": 1 if modes else self.width,
             **({"LANES": self.width} if modes else {}),
             **{name.upper(): name in self.records for name in Record},
+            "OBSERVED": self.observes,
             "CONTACTS": self.contacts,
             "SWITCHING": self.switching,
             "LOOPED": self.looped,
@@ -78,7 +81,8 @@ class Driver:
     def text(self) -> str:
         """The module."""
         last = "modes" if self.kind is KernelKind.MODES else "sweep"
-        pieces = ("dense", "recording", "cells", "control", *(("contacts",) if self.contacts else ()), last)
+        chosen = [name for name, called in (("contacts", self.contacts), ("observing", self.observes)) if called]
+        pieces = ("dense", "recording", "cells", "control", *chosen, last)
         lines = [
             f'"""Driver of {"orbits and their modes" if last == "modes" else "sweeps"}, {self.width} lanes.',
             "",

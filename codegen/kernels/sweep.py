@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.observable import Rate
 from synchain.models.dynamics.periodicity import angular_frequency
 from synchain.models.dynamics.record import Record
 
@@ -30,6 +31,7 @@ from ..steps.step import PAIR, SCALED, Step, function_name, node_function
 from ..steps.unrolled import Unrolled
 from ..taylor import write_looped, write_step
 from .driver import Driver, KernelKind, imports
+from .observed import count_values, rule_of, values_function
 
 __all__ = [
     "KernelSource",
@@ -53,7 +55,7 @@ class KernelSource:
 
     `marks` says of each node how many oscillators it stands for, or of each component of a mode which contact's velocity
     it is (-1: none).  `elimination` holds the integer arrays that a kernel of loops runs through; None if its steps are
-    written out.
+    written out.  `rule` has the points and weights by which observed values are integrated over a step.
     """
 
     text: str = field(repr=False)
@@ -63,6 +65,7 @@ class KernelSource:
     dimensions: Dimensions | ModeDimensions = field(repr=False)
     marks: tuple[int, ...] = field(repr=False)
     elimination: Program | None = field(default=None, repr=False, compare=False)
+    rule: tuple[float, ...] = field(default=(), repr=False)
 
     @property
     def integrator(self) -> str:
@@ -103,6 +106,7 @@ def emit(
     width: int | None = None,
     multiplicity: Sequence[int] | None = None,
     *,
+    observed: Sequence[sp.Expr] = (),
     unroll: int = LARGEST_UNROLLED,
     fill: float = FILL_LIMIT,
 ) -> KernelSource:
@@ -122,6 +126,8 @@ def emit(
         Cells that one register holds; by default what suits the processor.
     multiplicity
         How many oscillators each node stands for in the synchronisation error; by default one.
+    observed
+        Values that the kernel tallies over the window (`synchain.models.dynamics.observable`).
     unroll
         Nodes up to which a step is written out; the steps of a larger network run in loops.
     fill
@@ -162,25 +168,32 @@ def emit(
     weight = [edge.weight.name for edge in plain.edges]
     states = [s.name for node in plain.nodes for s in node.state]
     names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
-    chosen = Driver(KernelKind.SWEEP, width, ordered, looped, method.smooth is not None, plain.sticks, method.series)
+    traits = (looped, method.smooth is not None, plain.sticks, method.series, bool(observed))
+    chosen = Driver(KernelKind.SWEEP, width, ordered, *traits)
     functions, scratch, count = (_series if method.series else _stages)(plain, method, names, elimination)
     events = [
         *push_functions(plain, names, looped),
         *_section(equations, plain, section if "section" in ordered else None),
     ]
-    if "section" in ordered:
+    if observed:
+        events.append(values_function(equations, plain, observed))
+    if "section" in ordered or observed:
         functions.append(driver.text("dense"))
+    if any(e.has(Rate) for e in observed):
+        functions.append(driver.text("slope"))
     text = "\n\n\n".join([*functions, *map(LANES.function, events)]) + "\n"
-    constants = {"WIDTH": width, "DENSE": bool(ordered) or plain.sticks, "SERIES": method.series}
+    constants = {"WIDTH": width, "DENSE": bool(ordered or observed) or plain.sticks, "SERIES": method.series}
     if elimination is not None:
         solves = method.implicit or plain.inertial
         constants |= {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": method.dense_rows}
         constants |= {"ENTRIES": elimination.entries if solves else 0}
-    head = describe(equations, plain, method, ordered, count)
+    watched = count_values(equations, observed)
+    head = describe(equations, plain, method, (*ordered, *([f"{watched} observed values"] * bool(watched))), count)
     named = "\n".join(f"{name} = {value!r}" for name, value in constants.items())
     text = "\n\n\n".join([head, imports(text), named, text])
-    sizes = _dimensions(plain, method, scratch)
-    return KernelSource(text, equations, method, chosen, sizes, weights or (1,) * equations.n, elimination)
+    sizes = _dimensions(plain, method, scratch)._replace(observed=watched)
+    rule = rule_of(method) if observed else ()
+    return KernelSource(text, equations, method, chosen, sizes, weights or (1,) * equations.n, elimination, rule)
 
 
 def default_width(equations: Equations) -> int:
@@ -222,6 +235,7 @@ def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimension
         error_order=method.error_order,
         smooth_error_order=0 if method.smooth is None else method.smooth.error_order,
         repeats=int(angular_frequency(plain) is not None),
+        observed=0,
     )
 
 

@@ -16,6 +16,7 @@ from ..mechanics.oscillator import Field
 from ..mechanics.physics import check_masses, check_power
 from .axis import Axis
 from .model import Model, NodeKind, as_coupling, as_groups, as_law, as_oscillator, as_topology
+from .observables import observables
 from .parameters import at_nodes, drive, parameters
 from .section import Section
 from .start import SEED_LIMIT, chosen_start, default_start
@@ -70,11 +71,13 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     values["initial"] = _start(model, given["initial"], values["seed"])
     values["record"] = _records(model, given["record"])
     values["section"] = _section(model, given["section"])
+    values["observe"] = observables(model, numbers, given["observe"])
     values |= _times(model, numbers, given)
     for name in ("transient", "window"):
         values[name] = check_number(name, given[name], 0.0, TIME_LIMIT)
-    if values["record"] and values["window"] == 0.0:
-        raise ValueError(f"window: found 0, in which {values['record'][0]!r} has nothing to record; give a window > 0")
+    recorded = (*values["record"], *values["observe"])
+    if recorded and values["window"] == 0.0:
+        raise ValueError(f"window: found 0, in which {str(recorded[0])!r} has nothing to record; give a window > 0")
     values |= _numerics(given, values["record"])
     values["continuation"] = check_sweep(model, values)
     _check_friction(model, numbers, axes, values["zipped"])

@@ -47,7 +47,7 @@ def arguments(values: object, keywords: Iterable[str], folder: Path | None = Non
             raise ValueError("zipped is given twice, in [sweep] and above; expected it once; remove one")
         given["zipped"] = sweep.pop("zipped", given.get("zipped", False))
         given["axes"] = sweep
-    for name in ("parameters", "initial"):
+    for name in ("parameters", "initial", "observe"):
         if name in given:
             check_table(name, given[name])
     for name in ("oscillator", "friction", "coupling"):
@@ -126,6 +126,9 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
     written["parameters"] = collected(values["parameters"], varied)
     written["initial"] = {name: list(states) for name, states in values["initial"].items()}
     written["record"] = [str(record) for record in values["record"]]
+    written["observe"] = {name: str(observable) for name, observable in values["observe"].items()}
+    if not written["observe"]:
+        del written["observe"]
     written["sweep"] = {axis.name: list(axis.values) for axis in written.pop("axes")}
     return written
 

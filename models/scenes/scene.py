@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..dynamics.equations import Equations
+from ..dynamics.observable import Observable
 from ..dynamics.periodicity import Drive, as_function, names_in, period_of
 from ..dynamics.record import Record
 from ..graphs.topology import Topology
@@ -63,6 +64,9 @@ class Scene:
         Initial states: a number, one number for each node, or {low, high, seed} for random ones.
     record : iterable of str, optional
         What each cell records: "sync_error", "section", "trajectory".
+    observe : mapping of str to Observable or str, optional
+        What each cell observes over the window, by the names of the results' variables: `mean`, `maximum`, `minimum`,
+        `end` or `variance` of an expression of the states, such as ``"mean(nodes.mean(v**2/2))"``.
     section : Section or str, optional
         When section points are taken, such as "v_1 falling".
     transient, window : float
@@ -109,6 +113,7 @@ class Scene:
     parameters: Frozen[float]
     initial: Frozen[tuple[float, ...]]
     record: tuple[Record, ...]
+    observe: Frozen[Observable]
     section: Section
     transient: float
     window: float
@@ -138,6 +143,7 @@ class Scene:
         parameters: Mapping[str, object] | None = None,
         initial: Mapping[str, object] | None = None,
         record: Iterable[str] | None = None,
+        observe: Mapping[str, Observable | str] | None = None,
         section: Section | str | None = None,
         transient: float = 300.0,
         window: float = 100.0,

@@ -16,9 +16,9 @@ IN_MEMORY = 10**9
 """Numbers of the largest result that is kept in memory, 8 GB."""
 
 
-def numbers_of_a_cell(dimension: int, room: int, samples: int) -> int:
+def numbers_of_a_cell(dimension: int, room: int, samples: int, observed: int = 0) -> int:
     """Return how many numbers the buffers hold for each cell."""
-    return dimension * (1 + samples) + (Point.STATE + dimension) * room + len(Sum) + len(Count)
+    return dimension * (1 + samples) + (Point.STATE + dimension) * room + len(Sum) + observed + len(Count)
 
 
 @dataclass(slots=True)
@@ -30,8 +30,8 @@ class Buffers:
     ----------
     end : ndarray, shape (cells, dimension)
         States at which the cells stopped.
-    sums : ndarray, shape (cells, len(Sum))
-        Synchronisation errors and the time at which each cell stopped.
+    sums : ndarray, shape (cells, len(Sum) + observed)
+        Synchronisation errors, the time at which each cell stopped, and what was observed.
     counts : ndarray of int64, shape (cells, len(Count))
         Status, steps and numbers of section points.
     points : ndarray, shape (cells, room, 1 + dimension)
@@ -47,11 +47,11 @@ class Buffers:
     samples: np.ndarray
 
     @classmethod
-    def empty(cls, cells: int, dimension: int, room: int, samples: int) -> Buffers:
+    def empty(cls, cells: int, dimension: int, room: int, samples: int, observed: int = 0) -> Buffers:
         """Return buffers of cells that have not run: numbers NaN, counts zero."""
         return cls(
             end=np.full((cells, dimension), np.nan),
-            sums=np.full((cells, len(Sum)), np.nan),
+            sums=np.full((cells, len(Sum) + observed), np.nan),
             counts=np.zeros((cells, len(Count)), np.int64),
             points=np.full((cells, room, Point.STATE + dimension), np.nan),
             samples=np.full((cells, samples, dimension), np.nan),

@@ -24,6 +24,7 @@ from synchain.models.scenes.scene import Scene, a_scene
 
 from ..support.status import Status
 from .buffers import IN_MEMORY, Buffers, numbers_of_a_cell
+from .observed import Observed
 from .plan import Plan
 
 __all__ = ["NodeMerge", "Reduction", "as_reduction", "explain", "reduce_scene"]
@@ -129,10 +130,15 @@ class Reduction:
         """Points of a trajectory; 0 if none is recorded."""
         return self.scene.samples if "trajectory" in self.scene.record else 0
 
+    @property
+    def observed(self) -> Observed:
+        """What the scene observes."""
+        return Observed(self.scene)
+
     def check_memory(self) -> None:
         """Raise ValueError if the results of all cells do not fit into memory."""
         cells = self.scene.cells
-        numbers = cells * numbers_of_a_cell(len(self.merge.places), 0, self.samples)
+        numbers = cells * numbers_of_a_cell(len(self.merge.places), 0, self.samples, self.observed.numbers)
         if numbers > IN_MEMORY:
             raise ValueError(
                 f"sweep: found {cells} cells, {numbers * 8 / 1e9:.0f} GB in memory; expected at most "
@@ -243,7 +249,7 @@ def _fixed(scene: Scene) -> dict[str, float]:
 
 def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> Equations:
     """Fold parameters one after the other, and say what each of them took along."""
-    equations, fixed = scene.equations, _fixed(scene)
+    equations, fixed, observed = scene.equations, _fixed(scene), _observed_parameters(scene)
     for name, value in fixed.items():
         if name not in equations.parameters or (value != 0.0 and not fold_all):
             continue
@@ -252,9 +258,20 @@ def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> 
         except ValueError as problem:
             kept.append(str(problem))
             continue
+        seen = sorted(observed & (set(equations.parameters) - set(made.parameters)))
+        if seen:
+            kept.append(f"parameter: {name} = {value:g} in every cell, but {', '.join(seen)} is observed")
+            continue
         skipped.append(_consequence(equations, made, name, value))
         equations = made
     return equations
+
+
+def _observed_parameters(scene: Scene) -> set[str]:
+    """The parameters that occur in observables."""
+    names = {s.name for observable in scene.observe.values() for s in observable.value.free_symbols}
+    of_nodes = {str(NodeName(name, i)) for name in scene.varied if name in names for i in range(scene.n)}
+    return (names | of_nodes) & set(scene.parameters)
 
 
 def _present(scene: Scene, equations: Equations) -> list[str]:
@@ -288,6 +305,9 @@ def _merge(
     n, alone = scene.n, tuple(range(scene.n))
     if equations.mixed:
         kept.append("quotient: nodes of several kinds are stepped one by one")
+        return equations, alone
+    if scene.observe:
+        kept.append(f"quotient: the {n} oscillators are observed one by one")
         return equations, alone
     colours = _colours(scene)
     different = len(set(colours))

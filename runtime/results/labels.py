@@ -11,6 +11,7 @@ import numpy as np
 from synchain.codegen.driver.columns import Count, Point, Span, Sum
 from synchain.models.scenes.scene import Scene
 
+from ..cells.observed import Observed
 from ..support.status import Status
 from .certificate import VERDICTS, Certificate
 
@@ -28,6 +29,7 @@ __all__ = [
     "changed",
     "coordinates",
     "dimensions",
+    "meaning",
     "provenance",
     "scene_of",
     "variables",
@@ -100,6 +102,9 @@ def variables(
     if "sync_error" in scene.record:
         for name in ("sync_error", "sync_error_max", "sync_error_end"):
             yield name, (), buffers.sums[:, SUMS[name]]
+    for name, rows, columns in Observed(scene).columns():
+        values = buffers.sums[:, columns]
+        yield name, ("node",) if rows else (), values if rows else values[:, 0]
     if certificate is not None:
         for name, values in _certified(scene, spans, buffers, certificate).items():
             yield name, (), values
@@ -115,6 +120,11 @@ def variables(
         start, end = spans[:, Span.START, None], spans[:, Span.END, None]
         yield "trajectory_time", ("sample",), start + (end - start) * parts
         yield "trajectory", ("sample", "state"), buffers.samples
+
+
+def meaning(scene: Scene, name: str) -> str:
+    """Return what a variable of a result holds, in words; of an observable its expression."""
+    return str(scene.observe[name]) if name in scene.observe else MEANINGS[name]
 
 
 def dimensions(scene: Scene) -> tuple[str, ...]:
@@ -134,8 +144,10 @@ def _certified(scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: C
 
 
 def coordinates(scene: Scene) -> dict[str, Any]:
-    """Return the coordinates of a result: the axes and the names of the states."""
+    """Return the coordinates of a result: the axes, the names of the states, and the numbers of nodes that are observed."""
     coords: dict[str, Any] = {"state": list(scene.equations.state)}
+    if any(rows for _, rows, _ in Observed(scene).columns()):
+        coords["node"] = np.arange(1, scene.n + 1)
     for axis in scene.axes:
         coords[axis.name] = ("cell" if scene.zipped else axis.name, np.array(axis.values))
     return coords

@@ -23,7 +23,7 @@ from ..support.files import understood, whole_file
 from ..support.netcdf import Sheet, seal, unsealed
 from .block_log import BlockLog, Description
 from .certificate import VERDICTS, Certificate
-from .labels import MEANINGS, Variable, coordinates, dimensions, scene_of, variables
+from .labels import Variable, coordinates, dimensions, meaning, scene_of, variables
 from .result import Result, gather
 
 __all__ = ["certificate_of", "describe_sweep", "layout_of", "partial_path", "read_partial", "write_result"]
@@ -41,6 +41,7 @@ def describe_sweep(
         "size": layout.size,
         "dimension": reduction.dimension,
         "samples": reduction.samples,
+        "observed": reduction.observed.numbers,
         "merged": [merge.states.tolist(), merge.places.tolist()] if merge.merges else None,
         "together": merge.together,
         "certificate": None if exponents is None else [part.tolist() for part in exponents],
@@ -109,13 +110,14 @@ def _so_far(reader: _Reader) -> Result:
     """The blocks that a log holds, as a result."""
     log, scene = reader.log, reader.scene
     dimension, samples = len(reader.merge.places), int(log.about["samples"])
-    numbers = scene.cells * numbers_of_a_cell(dimension, log.most, samples)
+    observed = int(log.about["observed"])
+    numbers = scene.cells * numbers_of_a_cell(dimension, log.most, samples, observed)
     if numbers > IN_MEMORY:
         raise ValueError(
             f"found a sweep of {numbers * 8 / 1e9:.0f} GB; expected at most {IN_MEMORY * 8 / 1e9:.0f} GB in "
             "memory; finish it with resume (--resume), and open parts of the result with xarray"
         )
-    buffers = Buffers.empty(scene.cells, dimension, log.most, samples)
+    buffers = Buffers.empty(scene.cells, dimension, log.most, samples, observed)
     for block in np.flatnonzero(log.done).tolist():
         buffers.put(reader.layout.rows(block), reader.buffers(block))
     spans = reader.planner.spans(np.arange(scene.cells))
@@ -159,7 +161,7 @@ def _template(reader: _Reader) -> xr.Dataset:
     first = Buffers(*(array[:1] for array in reader.buffers(0).arrays()))
     dims, ones = dimensions(scene), (1,) * len(scene.shape)
     data = {
-        name: ((*dims, *more), values[:1].reshape((*ones, *values.shape[1:])), {"long_name": MEANINGS[name]})
+        name: ((*dims, *more), values[:1].reshape((*ones, *values.shape[1:])), {"long_name": meaning(scene, name)})
         for name, more, values in reader.variables(one, first)
     }
     coords = coordinates(scene)

@@ -17,11 +17,12 @@ from synchain.models.inputs.checks import check_instance
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.buffers import Buffers
+from ..cells.observed import Observed
 from ..support.files import netcdf_data, understood, whole_file
 from ..support.netcdf import DIGEST, seal, unsealed
 from ..support.status import Status
 from .certificate import Certificate
-from .labels import COUNTS, MEANINGS, SUMS, alike, changed, coordinates, dimensions, scene_of, variables
+from .labels import COUNTS, SUMS, alike, changed, coordinates, dimensions, meaning, scene_of, variables
 
 if TYPE_CHECKING:
     from synchain.models.dynamics.equations import Equations
@@ -143,6 +144,8 @@ class Result:
             for name, column in columns.items():
                 if name in data:
                     table[:, column] = data[name].values.reshape(cells)
+        for name, _, place in Observed(self.scene).columns():
+            buffers.sums[:, place] = data[name].values.reshape(cells, -1)
         if "section" in data:
             points = np.concatenate([data.section_time.values[..., None], data.section.values], axis=-1)
             points = points.reshape(cells, -1, points.shape[-1])
@@ -202,7 +205,7 @@ def gather(
     """
     dims, shape = dimensions(scene), scene.shape
     data = {
-        name: ((*dims, *more), values.reshape((*shape, *values.shape[1:])), {"long_name": MEANINGS[name]})
+        name: ((*dims, *more), values.reshape((*shape, *values.shape[1:])), {"long_name": meaning(scene, name)})
         for name, more, values in variables(scene, spans, buffers, certificate, buffers.most_points)
     }
     return Result(xr.Dataset(data, coordinates(scene), dict(attributes)), scene)

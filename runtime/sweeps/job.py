@@ -209,8 +209,10 @@ class SweepJob:
 
     def _drive(self, rows: Plan, room: int) -> Buffers:
         """Run rows with room for so many section points of each."""
-        buffers = Buffers.empty(len(rows), self.reduction.dimension, room, self.reduction.samples)
+        observed = self.reduction.observed
+        buffers = Buffers.empty(len(rows), self.reduction.dimension, room, self.reduction.samples, observed.tallies)
         _drive(self.kernel, rows, self.control, buffers)
+        buffers.sums = observed.summary(buffers.sums)
         return buffers
 
 

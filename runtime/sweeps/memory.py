@@ -33,10 +33,10 @@ class Memory:
     def of(cls, prepared: PreparedRun, earlier: Result | None) -> Memory:
         """Return arrays for all cells, with those of an earlier result that finished."""
         reduction = prepared.reduction
-        cells, samples = reduction.scene.cells, reduction.samples
+        cells, samples, observed = reduction.scene.cells, reduction.samples, reduction.observed.numbers
         if earlier is None:
-            return cls(prepared, prepared.layout(), Buffers.empty(cells, reduction.dimension, 0, samples))
-        whole = Buffers.empty(cells, len(reduction.scene.y0), 0, samples)
+            return cls(prepared, prepared.layout(), Buffers.empty(cells, reduction.dimension, 0, samples, observed))
+        whole = Buffers.empty(cells, len(reduction.scene.y0), 0, samples, observed)
         earlier.restore(reduction.scene, whole, reduction.equations)
         return cls(prepared, prepared.layout(), reduction.merge.contract(whole))
 

@@ -1,0 +1,82 @@
+"""The observables of a scene, checked against its model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import sympy as sp
+
+from ..dynamics.observable import AtNode, Observable, Rate
+from ..dynamics.observable_text import as_observable
+from ..inputs.checks import check_table, check_text, short_repr, suggestion
+from ..inputs.frozen import Frozen
+from ..mechanics.components import TIME
+from .model import Model
+from .parameters import varied
+
+__all__ = ["TAKEN", "observables"]
+
+TAKEN = frozenset(
+    {"cell", "component", "data", "end", "end_time", "ended_early", "kind", "link", "message", "name", "names", "node",
+     "periods_skipped", "plot", "point", "realisation", "rejected", "sample", "save", "scene", "section",
+     "section_count", "section_time", "state", "status", "steps", "success", "sync_error", "sync_error_end",
+     "sync_error_max", "trajectory", "trajectory_time", "transversal_exponent", "transversal_stderr", "verdict"}
+)  # fmt: skip
+"""What results have under these names already."""
+
+
+def observables(model: Model, numbers: Mapping[str, float], given: object) -> Frozen[Observable]:
+    """Return the observables of a scene by their names.
+
+    Parameters
+    ----------
+    model : Model
+    numbers : mapping of str to float
+        The parameters of the scene; a_1 … a_n of one that has a value for each node.
+    given : object
+        A mapping of names to observables or their texts; None for none.
+
+    Raises
+    ------
+    ValueError, TypeError
+        For names that results have for other things, and for whatever `as_observable` and the model refuse.
+    """
+    if given is None:
+        return Frozen()
+    found: dict[str, Observable] = {}
+    for key, value in check_table("observe", given).items():
+        name = check_text("observe", key)
+        if not name.isidentifier() or name.startswith("_"):
+            raise ValueError(f"observe: found the name {short_repr(name)}; expected letters, digits and _")
+        taken = TAKEN | set(model.parameters) | set(numbers) | set(model.unlinked.state)
+        if name in taken:
+            raise ValueError(f"observe: found the name {name!r}, which results have for something else; rename it")
+        found[name] = as_observable(f"observe {name}", value)
+        _check_names(f"observe {name}", found[name].value, model, numbers)
+    return Frozen(found)
+
+
+def _check_names(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, float]) -> None:
+    """Refuse symbols that are no state, parameter or t, and states that some nodes lack."""
+    apart, everywhere = model.unlinked, range(model.n)
+    own = (*apart.components, *varied(numbers, model.parameters))
+    partly = {name for name in own if apart.holders(name) != tuple(everywhere)}
+    states = {*apart.components, *apart.state}
+    known = (*own, *apart.state, *(name for name in numbers), TIME.name)
+    for name in sorted(s.name for s in value.free_symbols):
+        if name in partly:
+            raise ValueError(f"{what}: some nodes have no {name!r}; expected what all nodes have, or {name}_1 of one")
+        if name not in known:
+            raise ValueError(f"{what}: unknown name {short_repr(name)}; known: {_few(known)}{suggestion(name, known)}")
+    for e in value.atoms(Rate):
+        if e.args[0].name not in states:
+            raise ValueError(f"{what}: found {e}; expected the rate of a state: {', '.join(apart.components)}")
+    for e in value.atoms(AtNode):
+        if e.args[1] > model.n:
+            raise ValueError(f"{what}: found node {e.args[1]}; expected 1 to {model.n}")
+    if not value.free_symbols:
+        raise ValueError(f"{what}: found the constant {short_repr(value)}; expected an expression of states")
+
+
+def _few(names: tuple[str, ...]) -> str:
+    return ", ".join(names) if len(names) <= 30 else f"{', '.join(names[:15])}, … {', '.join(names[-5:])}"
