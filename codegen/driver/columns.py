@@ -25,6 +25,8 @@ class Control(IntEnum):
     """A number other than 0 stops the kernel while it runs."""
     NO_JUMPS = 7
     """A number other than 0 integrates a cell that repeats itself to its end."""
+    FURTHER = 8
+    """Behind those of every kernel: the directions of the second section and of those behind it."""
 
 
 class Span(IntEnum):

@@ -27,6 +27,10 @@ class Dimensions(NamedTuple):
     """1 if the right-hand side is periodic in time, so that a computation can repeat itself, else 0."""
     observed: int
     """Values that are observed."""
+    sections: int
+    """Sections of which points are taken."""
+    kept: int
+    """Most values that a point of a section on a function keeps."""
 
 
 class ModeDimensions(NamedTuple):

@@ -65,6 +65,7 @@ from .recording import CANCEL
 from .recording import CHANGE
 from .recording import CLOCK
 from .recording import DIRECTION
+from .recording import FURTHER
 from .recording import MAX_STEP
 from .recording import MEMORY
 from .recording import MODE
@@ -221,21 +222,23 @@ def drive(
     start (cells, dimension), numbers (cells, parameters), spans (cells, 4): start and end of the window, the period after
     which the right-hand side repeats (0: none), and the synchronisation error below which a cell that records nothing
     else may end early (0: never); control: see the column names above.  Filled: end (cells, dimension), sums (cells, 4,
-    or more if values are observed), counts (cells, 6), points (cells, room, dimension + 1), samples (cells, samples,
-    dimension).
+    or more if values are observed), counts (cells, 6), points (cells, room, dimension + 1, or
+    2 + kept of sections on functions), samples (cells, samples, dimension).
     """
     steering, members = address(control, 0), address(multiplicity, 0)
     size, rows = dims.dimension, dims.dense_rows * dims.dimension
     group = CLOCK + 2 * size + dims.parameters + len(REPEATING)
     groups = 3 if SWITCHING else 1
     scratch = 9 * dims.nodes if CONTACTS else 0
+    crossed = dims.sections * (1 + dims.kept)
     watched = len(rule) // ROW * dims.observed if OBSERVED else 0
-    block = aligned((2 * size + groups * (group + rows) + dims.workspace + scratch + watched) * WIDTH)
+    block = aligned((2 * size + groups * (group + rows) + dims.workspace + scratch + watched + crossed) * WIDTH)
     y_new, middle, out = address(block, 0), address(block, size * WIDTH), address(block, 2 * size * WIDTH)
     first_group = (2 * size + scratch) * WIDTH
     clock, y = address(block, first_group), address(block, first_group + CLOCK * WIDTH)
     dense = address(block, first_group + groups * group * WIDTH)
     seen = address(dense, (groups * rows + dims.workspace) * WIDTH)
+    found = address(seen, watched * WIDTH)
     away_clock, away_y, away_dense, lot_clock, lot_y = clock, y, dense, clock, y
     cell, away_cell, lot_cell = np.full(WIDTH, -1), np.full(WIDTH, -1), np.full(WIDTH, -1)
     for which in range(WIDTH):
@@ -290,7 +293,9 @@ def drive(
             observe(clock, y, h, counted, accept, y_new, dense, middle, members, dims)
         if SECTION and any_lane(counted):
             now = load(clock, BASE, WIDTH) + t
-            cut(counted, now, h, y, y_new, dense, cell, counts, points, steering[DIRECTION], dims, section)
+            for k in range(dims.sections):
+                way = steering[DIRECTION if k == 0 else FURTHER + k - 1]
+                cut(k, counted, now, h, y, y_new, dense, found, cell, counts, points, way, dims, section)
         if OBSERVED and any_lane(counted):
             now = load(clock, BASE, WIDTH) + t
             tally(lane_bits(counted), now, h, y, y_new, dense, seen, cell, sums, steering, rule, dims, values)

@@ -77,11 +77,12 @@ def signatures(driver: Driver) -> dict[str, Any]:
         times = (lane, lane, lane) if driver.series else (lane, lane)
         step = (*times, *[ADDRESS] * 4, types.float64, types.float64, *more)
         result = types.UniTuple(lane, 2) if driver.switching else lane
+        values = types.void(lane, lane, lane, *[ADDRESS] * 4, sizes)
         known = {
             "step": result(*step),
             "step_smooth": result(*step),
-            "section": lane(lane, lane, lane, *[ADDRESS] * 3, sizes),
-            "values": types.void(lane, lane, lane, *[ADDRESS] * 4, sizes),
+            "section": values if driver.sections else lane(lane, lane, lane, *[ADDRESS] * 3, sizes),
+            "values": values,
             "pushes": types.void(lane, *[ADDRESS] * 3, *more),
         }
         arrays = (*[_input] * 3, _vector, _matrix, _matrix, _counts, _cube, _cube)

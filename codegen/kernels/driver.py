@@ -27,7 +27,7 @@ class Driver:
     """What the text of a driver depends on; scenes that agree in it share its machine code.
 
     `width` is the number of cells in a register, or of modes in one; `series` is True for Taylor steps, which choose
-    their length; `observes` is True if values of the scene are observed.
+    their length; `observes` is True if values of the scene are observed, `sections` if it has sections on functions.
     """
 
     kind: KernelKind
@@ -38,9 +38,10 @@ class Driver:
     contacts: bool = False
     series: bool = False
     observes: bool = False
+    sections: bool = False
 
     def __str__(self) -> str:
-        traits = [name for name in ("looped", "switching", "contacts", "observes") if getattr(self, name)]
+        traits = [name for name in ("looped", "switching", "contacts", "observes", "sections") if getattr(self, name)]
         subject = "orbits and their modes" if self.kind is KernelKind.MODES else "sweeps"
         records = ", ".join(("final state", *self.records))
         lanes = f"{self.width} lane{'s' * (self.width != 1)}"
@@ -50,12 +51,17 @@ class Driver:
     def functions(self) -> tuple[str, ...]:
         """The functions of a scene, in the order in which the driver takes them; `step` stands for those not called."""
         wanted: tuple[tuple[str, bool], ...] = (
-            ("step_smooth", self.switching), ("section", Record.SECTION in self.records),
+            ("step_smooth", self.switching), ("section", self.cuts),
             ("values", self.observes), ("pushes", self.contacts),
         )  # fmt: skip
         if self.kind is KernelKind.MODES:
             wanted = (("carry", True), ("pushes", self.contacts), ("release", self.contacts))
         return ("step", *(name if called else "step" for name, called in wanted))
+
+    @property
+    def cuts(self) -> bool:
+        """True if section points are taken."""
+        return self.sections or Record.SECTION in self.records
 
     @property
     def entry(self) -> str:
@@ -70,6 +76,7 @@ class Driver:
             "WIDTH": 1 if modes else self.width,
             **({"LANES": self.width} if modes else {}),
             **{name.upper(): name in self.records for name in Record},
+            "SECTION": self.cuts,
             "OBSERVED": self.observes,
             "CONTACTS": self.contacts,
             "SWITCHING": self.switching,
@@ -82,7 +89,8 @@ class Driver:
         """The module."""
         last = "modes" if self.kind is KernelKind.MODES else "sweep"
         chosen = [name for name, called in (("contacts", self.contacts), ("observing", self.observes)) if called]
-        pieces = ("dense", "recording", "cells", "control", *chosen, last)
+        surfaces = "sections" if self.sections else "one_section"
+        pieces = ("dense", *([surfaces] if self.cuts else []), "recording", "cells", "control", *chosen, last)
         lines = [
             f'"""Driver of {"orbits and their modes" if last == "modes" else "sweeps"}, {self.width} lanes.',
             "",

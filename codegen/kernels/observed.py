@@ -61,13 +61,15 @@ def count_values(equations: Equations, observed: Iterable[sp.Expr]) -> int:
     return sum(equations.n if with_rows(equations, value) else 1 for value in observed)
 
 
-def values_function(equations: Equations, plain: Equations, observed: Sequence[sp.Expr]) -> Function:
-    """Return the function that writes the observed values at the fraction theta of a step, in the names of `plain`."""
+def values_function(
+    equations: Equations, plain: Equations, observed: Sequence[sp.Expr], name: str, about: str
+) -> Function:
+    """Return a function that writes values at the fraction theta of a step, in the names of `plain`."""
     writer = _Writer(equations, plain)
     return Function(
-        "values",
+        name,
         ("theta", "t", "h", "y", "y_new", "dense", "out", "dims"),
-        "The observed values at the fraction theta of the step.",
+        about,
         tuple(writer.statements(observed)),
         inline=False,
     )

@@ -107,6 +107,7 @@ def emit(
     multiplicity: Sequence[int] | None = None,
     *,
     observed: Sequence[sp.Expr] = (),
+    sections: Sequence[tuple[sp.Expr, ...]] = (),
     unroll: int = LARGEST_UNROLLED,
     fill: float = FILL_LIMIT,
 ) -> KernelSource:
@@ -128,6 +129,8 @@ def emit(
         How many oscillators each node stands for in the synchronisation error; by default one.
     observed
         Values that the kernel tallies over the window (`synchain.models.dynamics.observable`).
+    sections
+        Functions of which points are taken when they pass zero, each followed by the values that its points keep.
     unroll
         Nodes up to which a step is written out; the steps of a larger network run in loops.
     fill
@@ -151,6 +154,8 @@ def emit(
     unknown = [r for r in records if r not in list(Record)]
     if unknown:
         raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(Record)}")
+    if sections and "section" in records:
+        raise ValueError("the record 'section' and sections on functions: found both; expected one of them")
     if "section" in records and section is None:
         raise ValueError("the record 'section' needs a section function, for example v_1")
     width = default_width(equations) if width is None else width
@@ -168,7 +173,7 @@ def emit(
     weight = [edge.weight.name for edge in plain.edges]
     states = [s.name for node in plain.nodes for s in node.state]
     names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
-    traits = (looped, method.smooth is not None, plain.sticks, method.series, bool(observed))
+    traits = (looped, method.smooth is not None, plain.sticks, method.series, bool(observed), bool(sections))
     chosen = Driver(KernelKind.SWEEP, width, ordered, *traits)
     functions, scratch, count = (_series if method.series else _stages)(plain, method, names, elimination)
     events = [
@@ -176,22 +181,35 @@ def emit(
         *_section(equations, plain, section if "section" in ordered else None),
     ]
     if observed:
-        events.append(values_function(equations, plain, observed))
-    if "section" in ordered or observed:
+        about = "The observed values at the fraction theta of the step."
+        events.append(values_function(equations, plain, observed, "values", about))
+    if sections:
+        about = "The section functions at the fraction theta of the step, and what their points keep."
+        events.append(values_function(equations, plain, _padded(sections), "section", about))
+    if chosen.cuts or observed:
         functions.append(driver.text("dense"))
-    if any(e.has(Rate) for e in observed):
+    if any(e.has(Rate) for e in (*observed, *(e for parts in sections for e in parts))):
         functions.append(driver.text("slope"))
     text = "\n\n\n".join([*functions, *map(LANES.function, events)]) + "\n"
-    constants = {"WIDTH": width, "DENSE": bool(ordered or observed) or plain.sticks, "SERIES": method.series}
+    constants = {
+        "WIDTH": width,
+        "DENSE": bool(ordered or observed or sections) or plain.sticks,
+        "SERIES": method.series,
+    }
     if elimination is not None:
         solves = method.implicit or plain.inertial
         constants |= {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": method.dense_rows}
         constants |= {"ENTRIES": elimination.entries if solves else 0}
     watched = count_values(equations, observed)
-    head = describe(equations, plain, method, (*ordered, *([f"{watched} observed values"] * bool(watched))), count)
+    more = [f"{watched} observed values"] * bool(watched) + [f"{len(sections)} sections"] * bool(sections)
+    head = describe(equations, plain, method, (*ordered, *more), count)
     named = "\n".join(f"{name} = {value!r}" for name, value in constants.items())
     text = "\n\n\n".join([head, imports(text), named, text])
-    sizes = _dimensions(plain, method, scratch)._replace(observed=watched)
+    sizes = _dimensions(plain, method, scratch)._replace(
+        observed=watched,
+        sections=len(sections) or int("section" in ordered),
+        kept=max((len(parts) - 1 for parts in sections), default=0),
+    )
     rule = rule_of(method) if observed else ()
     return KernelSource(text, equations, method, chosen, sizes, weights or (1,) * equations.n, elimination, rule)
 
@@ -199,6 +217,13 @@ def emit(
 def default_width(equations: Equations) -> int:
     """Lanes that suit the processor; a small system does not keep its pipelines busy with one register and gets two."""
     return lanes.native_width(2 if equations.dimension <= 2 else 1)
+
+
+def _padded(sections: Sequence[tuple[sp.Expr, ...]]) -> list[sp.Expr]:
+    """The section functions, then what each keeps, filled up with zeros."""
+    kept = max(len(parts) - 1 for parts in sections)
+    rows = [[*parts[1:], *[sp.S.Zero] * (kept + 1 - len(parts))] for parts in sections]
+    return [*(parts[0] for parts in sections), *(e for row in rows for e in row)]
 
 
 def _series(
@@ -236,6 +261,8 @@ def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimension
         smooth_error_order=0 if method.smooth is None else method.smooth.error_order,
         repeats=int(angular_frequency(plain) is not None),
         observed=0,
+        sections=0,
+        kept=0,
     )
 
 

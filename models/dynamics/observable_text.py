@@ -6,15 +6,17 @@ import ast
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 import sympy as sp
 
 from ..inputs.checks import check_text, short_repr, suggestion
-from ..inputs.reader import Algebra, NoMeaning, parse
-from .observable import Observable, Window, nodes, rate
+from ..inputs.reader import Algebra, Expression, NoMeaning, parse
+from .observable import Observable, Window, nodes, rate, real
 
-__all__ = ["FUNCTIONS", "as_observable"]
+__all__ = ["FUNCTIONS", "as_observable", "as_value"]
+
+T = TypeVar("T")
 
 LENGTH, DEPTH, EXPONENT, MAGNITUDE = 4000, 60, 16, 1e100
 """Most characters, most nested operations, largest exponent that is a number, largest constant."""
@@ -62,21 +64,44 @@ def as_observable(what: str, value: object) -> Observable:
     return _read(what, check_text(what, value, LENGTH))
 
 
+def as_value(what: str, value: object) -> sp.Expr:
+    """Return an expression of states in the form that its text says, from an expression or from a text.
+
+    Parameters and errors are those of `as_observable`, without a window.
+    """
+    if isinstance(value, str):
+        text = check_text(what, value, LENGTH)
+    else:
+        try:
+            text = sp.sstr(real(value), order="lex")
+        except (TypeError, ValueError) as error:
+            raise type(error)(f"{what}: {str(error).removeprefix('observable: ')}") from None
+    expression = _parsed(what, text)
+    if expression is None:
+        raise ValueError(f"{what}: unreadable expression {short_repr(text)}; expected such as 'x_1 - x_2'")
+    return real(_evaluated(what, text, expression, _Values(what)))
+
+
 def _read(what: str, text: str) -> Observable:
+    expression = _parsed(what, text)
+    if expression is not None:
+        match expression.tree:
+            case ast.Call(func=ast.Name(id=name), args=[_], keywords=[]) if name in tuple(Window):
+                return _evaluated(what, text, expression, _Windows(_Values(what)))
+    windows = ", ".join(Window)
+    raise ValueError(f"{what}: found {short_repr(text)}; expected one of {windows} of an expression outermost")
+
+
+def _parsed(what: str, text: str) -> Expression | None:
     if len(text) > LENGTH:
         raise ValueError(f"{what}: found {len(text)} characters; expected at most {LENGTH}; define parts of it")
-    expression = parse(text)
-    tree = None if expression is None else expression.tree
-    windows = ", ".join(Window)
-    match tree:
-        case ast.Call(func=ast.Name(id=name), args=[_], keywords=[]) if name in tuple(Window):
-            pass
-        case _:
-            raise ValueError(f"{what}: found {short_repr(text)}; expected one of {windows} of an expression outermost")
-    assert expression is not None
-    algebra = _Values(what)
+    return parse(text)
+
+
+def _evaluated(what: str, text: str, expression: Expression, algebra: Algebra[T]) -> T:
+    """The value of a text; errors of one line."""
     try:
-        return expression.evaluate(_Windows(algebra))
+        return expression.evaluate(algebra)
     except _Refusal:
         raise
     except ValueError as error:

@@ -16,7 +16,7 @@ from ..mechanics.oscillator import Field
 from ..mechanics.physics import check_masses, check_power
 from .axis import Axis
 from .model import Model, NodeKind, as_coupling, as_groups, as_law, as_oscillator, as_topology
-from .observables import observables
+from .observables import observables, sections
 from .parameters import at_nodes, drive, parameters
 from .section import Section
 from .start import SEED_LIMIT, chosen_start, default_start
@@ -72,10 +72,12 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     values["record"] = _records(model, given["record"])
     values["section"] = _section(model, given["section"])
     values["observe"] = observables(model, numbers, given["observe"])
+    values["sections"] = sections(model, numbers, given["sections"])
+    _check_sections(values)
     values |= _times(model, numbers, given)
     for name in ("transient", "window"):
         values[name] = check_number(name, given[name], 0.0, TIME_LIMIT)
-    recorded = (*values["record"], *values["observe"])
+    recorded = (*values["record"], *values["observe"], *values["sections"])
     if recorded and values["window"] == 0.0:
         raise ValueError(f"window: found 0, in which {str(recorded[0])!r} has nothing to record; give a window > 0")
     values |= _numerics(given, values["record"])
@@ -153,6 +155,16 @@ def _section(model: Model, given: object) -> Section:
     section = Section.parse(default if given is None else given)
     model.check_state(section.variable, "section variable")
     return section
+
+
+def _check_sections(values: Mapping[str, Any]) -> None:
+    """Refuse two names for one variable, and two ways to say a section."""
+    if Record.SECTION in values["record"] and values["sections"]:
+        raise ValueError("record: found 'section' beside sections; expected one of them; make it one of the sections")
+    made = {f"{name}{more}" for name in values["sections"] for more in ("", "_time", "_count", "_kept")}
+    twice = sorted(made & {*values["observe"]})
+    if twice:
+        raise ValueError(f"observe: found the name {twice[0]!r}, which a section has; rename one of them")
 
 
 def _times(model: Model, numbers: Mapping[str, float], given: Mapping[str, object]) -> dict[str, object]:

@@ -47,7 +47,7 @@ def arguments(values: object, keywords: Iterable[str], folder: Path | None = Non
             raise ValueError("zipped is given twice, in [sweep] and above; expected it once; remove one")
         given["zipped"] = sweep.pop("zipped", given.get("zipped", False))
         given["axes"] = sweep
-    for name in ("parameters", "initial", "observe"):
+    for name in ("parameters", "initial", "observe", "sections"):
         if name in given:
             check_table(name, given[name])
     for name in ("oscillator", "friction", "coupling"):
@@ -127,8 +127,10 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
     written["initial"] = {name: list(states) for name, states in values["initial"].items()}
     written["record"] = [str(record) for record in values["record"]]
     written["observe"] = {name: str(observable) for name, observable in values["observe"].items()}
-    if not written["observe"]:
-        del written["observe"]
+    written["sections"] = {name: section.as_table() for name, section in values["sections"].items()}
+    for name in ("observe", "sections"):
+        if not written[name]:
+            del written[name]
     written["sweep"] = {axis.name: list(axis.values) for axis in written.pop("axes")}
     return written
 

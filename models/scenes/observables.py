@@ -1,20 +1,22 @@
-"""The observables of a scene, checked against its model."""
+"""The observables and the sections of a scene, checked against its model."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import sympy as sp
 
-from ..dynamics.observable import AtNode, Observable, Rate
-from ..dynamics.observable_text import as_observable
+from ..dynamics.observable import AtNode, Observable, Rate, node_symbols
+from ..dynamics.observable_text import as_observable, as_value
 from ..inputs.checks import check_table, check_text, short_repr, suggestion
 from ..inputs.frozen import Frozen
 from ..mechanics.components import TIME
 from .model import Model
 from .parameters import varied
+from .section import Section
 
-__all__ = ["TAKEN", "observables"]
+__all__ = ["TAKEN", "observables", "sections"]
 
 TAKEN = frozenset(
     {"cell", "component", "data", "end", "end_time", "ended_early", "kind", "link", "message", "name", "names", "node",
@@ -44,16 +46,63 @@ def observables(model: Model, numbers: Mapping[str, float], given: object) -> Fr
     if given is None:
         return Frozen()
     found: dict[str, Observable] = {}
-    for key, value in check_table("observe", given).items():
-        name = check_text("observe", key)
-        if not name.isidentifier() or name.startswith("_"):
-            raise ValueError(f"observe: found the name {short_repr(name)}; expected letters, digits and _")
-        taken = TAKEN | set(model.parameters) | set(numbers) | set(model.unlinked.state)
-        if name in taken:
-            raise ValueError(f"observe: found the name {name!r}, which results have for something else; rename it")
+    for name, value in _named("observe", model, numbers, given):
         found[name] = as_observable(f"observe {name}", value)
         _check_names(f"observe {name}", found[name].value, model, numbers)
     return Frozen(found)
+
+
+def sections(model: Model, numbers: Mapping[str, float], given: object) -> Frozen[Section]:
+    """Return the sections on functions of a scene by their names, with all that they keep spelled out.
+
+    Parameters and errors are those of `observables`; the values are sections or their tables.
+    """
+    if given is None:
+        return Frozen()
+    found: dict[str, Section] = {}
+    for name, value in _named("sections", model, numbers, given):
+        what = f"section {name}"
+        section = Section.of_table(what, value)
+        function = as_value(what, section.variable)
+        _check_names(what, function, model, numbers)
+        if _own(function, model, numbers):
+            raise ValueError(
+                f"{what}: found {function}, which each node has; expected one function, e.g. of x_1 or nodes.mean(x)"
+            )
+        kept: list[str] = []
+        for text in model.unlinked.state if section.keep is None else section.keep:
+            kept += _kept(what, as_value(what, text), model, numbers)
+        found[name] = replace(section, variable=sp.sstr(function, order="lex"), keep=tuple(kept))
+    return Frozen(found)
+
+
+def _kept(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, float]) -> list[str]:
+    """What a section keeps of one expression: it, or its value at each node."""
+    _check_names(what, value, model, numbers)
+    own = _own(value, model, numbers)
+    if not own:
+        return [sp.sstr(value, order="lex")]
+    if value.is_Symbol:
+        return [f"{value}_{i + 1}" for i in range(model.n)]
+    return [f"nodes[{i + 1}]({sp.sstr(value, order='lex')})" for i in range(model.n)]
+
+
+def _own(value: sp.Expr, model: Model, numbers: Mapping[str, float]) -> bool:
+    """True if an expression has a value for each node."""
+    names = {*model.unlinked.components, *varied(numbers, model.parameters)}
+    return any(s.name in names for s in node_symbols(value))
+
+
+def _named(keyword: str, model: Model, numbers: Mapping[str, float], given: object) -> Iterator[tuple[str, object]]:
+    """Yield names and values of a table, whose names results must not have for something else."""
+    taken = TAKEN | set(model.parameters) | set(numbers) | set(model.unlinked.state)
+    for key, value in check_table(keyword, given).items():
+        name = check_text(keyword, key)
+        if not name.isidentifier() or name.startswith("_"):
+            raise ValueError(f"{keyword}: found the name {short_repr(name)}; expected letters, digits and _")
+        if name in taken:
+            raise ValueError(f"{keyword}: found the name {name!r}, which results have for something else; rename it")
+        yield name, value
 
 
 def _check_names(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, float]) -> None:

@@ -69,6 +69,9 @@ class Scene:
         `end` or `variance` of an expression of the states, such as ``"mean(nodes.mean(v**2/2))"``.
     section : Section or str, optional
         When section points are taken, such as "v_1 falling".
+    sections : mapping of str to Section or table, optional
+        Sections on functions of the states, by the names of the results' variables:
+        ``Section("x_1 - x_2", "rising", keep=("v_1", "v_2"))``.
     transient, window : float
         Time before the records, and time of the records, in units of `time_unit`.
     time_unit : str, optional
@@ -115,6 +118,7 @@ class Scene:
     record: tuple[Record, ...]
     observe: Frozen[Observable]
     section: Section
+    sections: Frozen[Section]
     transient: float
     window: float
     time_unit: TimeUnit
@@ -145,6 +149,7 @@ class Scene:
         record: Iterable[str] | None = None,
         observe: Mapping[str, Observable | str] | None = None,
         section: Section | str | None = None,
+        sections: Mapping[str, Section | Mapping[str, object]] | None = None,
         transient: float = 300.0,
         window: float = 100.0,
         time_unit: str | None = None,

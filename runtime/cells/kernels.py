@@ -16,7 +16,7 @@ from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
 from .choice import chosen_integrator
-from .observed import Observed
+from .observed import Observed, Sections
 from .reduce import Reduction, as_reduction
 
 __all__ = ["kernel", "kernel_source", "warn_of_chords", "write_kernel"]
@@ -63,8 +63,8 @@ def write_kernel(reduction: Reduction, width: int | None = None) -> KernelSource
         section = sp.Symbol(reduction.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
     method = chosen_integrator(reduction)
     width = default_width(reduction.equations) if width is None else width
-    observed = Observed(scene).values
-    return _emitted(reduction.equations, method, reduction.records, section, width, reduction.multiplicity, observed)
+    recorded = (reduction.records, section, width, reduction.multiplicity)
+    return _emitted(reduction.equations, method, *recorded, Observed(scene).values, Sections(scene).values)
 
 
 @lru_cache(maxsize=32)
@@ -76,9 +76,10 @@ def _emitted(
     width: int,
     multiplicity: tuple[int, ...] | None,
     observed: tuple[sp.Expr, ...],
+    sections: tuple[tuple[sp.Expr, ...], ...],
 ) -> KernelSource:
     """The text of a kernel; runs that differ in numbers alone share it."""
-    return emit(equations, method, records, section, width, multiplicity, observed=observed)
+    return emit(equations, method, records, section, width, multiplicity, observed=observed, sections=sections)
 
 
 def warn_of_chords(source: KernelSource) -> None:
@@ -86,6 +87,7 @@ def warn_of_chords(source: KernelSource) -> None:
     there.
     """
     between = [record for record in ("trajectory", "section") if record in source.records]
+    between += ["sections"] if source.driver.sections else []
     between += ["observables"] if source.driver.observes else []
     if between and source.method.dense_order < 2:
         warnings.warn(

@@ -228,7 +228,7 @@ def _windows(scene: Scene, period: np.ndarray) -> np.ndarray:
 def control_array(
     rtol: float, atol: float, max_step: float, max_steps: float, direction: float = 0.0, jumps: bool = True
 ) -> np.ndarray:
-    """Return the array (len(Control),) that steers a kernel.
+    """Return the array (Control.FURTHER,) that steers a kernel.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def control_array(
     jumps : bool
         If False, a cell that repeats itself is integrated to its end all the same.
     """
-    control = np.zeros(len(Control))
+    control = np.zeros(Control.FURTHER)
     control[Control.RTOL], control[Control.ATOL] = rtol, atol
     control[Control.FIRST_STEP], control[Control.MAX_STEP] = FIRST_STEP, max_step
     control[Control.MAX_STEPS], control[Control.DIRECTION] = max_steps, direction
@@ -255,7 +255,9 @@ def control_of(planner: Planner, jumps: bool) -> np.ndarray:
     """Return the control array of a scene's sweep; `jumps` as for `control_array`."""
     scene = planner.scene
     rtol, atol = tolerances(scene, planner.extremes().numbers)
-    return control_array(rtol, atol, longest_step(scene), scene.max_steps, DIRECTIONS[scene.section.direction], jumps)
+    directions = [DIRECTIONS[section.direction] for section in scene.sections.values() or (scene.section,)]
+    control = control_array(rtol, atol, longest_step(scene), scene.max_steps, directions[0], jumps)
+    return np.concatenate([control, directions[1:]])
 
 
 def tolerances(scene: Scene, numbers: np.ndarray) -> tuple[float, float]:

@@ -24,7 +24,7 @@ from synchain.models.scenes.scene import Scene, a_scene
 
 from ..support.status import Status
 from .buffers import IN_MEMORY, Buffers, numbers_of_a_cell
-from .observed import Observed
+from .observed import Observed, Sections
 from .plan import Plan
 
 __all__ = ["NodeMerge", "Reduction", "as_reduction", "explain", "reduce_scene"]
@@ -134,6 +134,16 @@ class Reduction:
     def observed(self) -> Observed:
         """What the scene observes."""
         return Observed(self.scene)
+
+    @property
+    def point_size(self) -> int:
+        """Numbers of a section point beside its time."""
+        return Sections(self.scene).width(self.dimension)
+
+    def empty(self, cells: int, room: int, observed: int | None = None) -> Buffers:
+        """Return buffers of cells of the reduced network, of its result or of what a kernel tallies."""
+        observed = self.observed.numbers if observed is None else observed
+        return Buffers.empty(cells, self.dimension, room, self.samples, observed, self.point_size)
 
     def check_memory(self) -> None:
         """Raise ValueError if the results of all cells do not fit into memory."""
@@ -268,8 +278,9 @@ def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> 
 
 
 def _observed_parameters(scene: Scene) -> set[str]:
-    """The parameters that occur in observables."""
-    names = {s.name for observable in scene.observe.values() for s in observable.value.free_symbols}
+    """The parameters that occur in observables and in sections on functions."""
+    values = [*Observed(scene).values, *(e for parts in Sections(scene).values for e in parts)]
+    names = {s.name for value in values for s in value.free_symbols}
     of_nodes = {str(NodeName(name, i)) for name in scene.varied if name in names for i in range(scene.n)}
     return (names | of_nodes) & set(scene.parameters)
 
@@ -306,7 +317,7 @@ def _merge(
     if equations.mixed:
         kept.append("quotient: nodes of several kinds are stepped one by one")
         return equations, alone
-    if scene.observe:
+    if scene.observe or scene.sections:
         kept.append(f"quotient: the {n} oscillators are observed one by one")
         return equations, alone
     colours = _colours(scene)

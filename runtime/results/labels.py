@@ -11,7 +11,7 @@ import numpy as np
 from synchain.codegen.driver.columns import Count, Point, Span, Sum
 from synchain.models.scenes.scene import Scene
 
-from ..cells.observed import Observed
+from ..cells.observed import Observed, Sections
 from ..support.status import Status
 from .certificate import VERDICTS, Certificate
 
@@ -115,6 +115,7 @@ def variables(
         yield "section_count", (), buffers.point_counts.astype(np.int32)
         yield "section_time", ("point",), points[:, :, Point.TIME]
         yield "section", ("point", "state"), points[:, :, Point.STATE :]
+    yield from Sections(scene).variables(buffers.points, most)
     if "trajectory" in scene.record:
         parts = np.linspace(0.0, 1.0, scene.samples) if scene.samples > 1 else np.zeros(1)
         start, end = spans[:, Span.START, None], spans[:, Span.END, None]
@@ -123,8 +124,10 @@ def variables(
 
 
 def meaning(scene: Scene, name: str) -> str:
-    """Return what a variable of a result holds, in words; of an observable its expression."""
-    return str(scene.observe[name]) if name in scene.observe else MEANINGS[name]
+    """Return what a variable of a result holds, in words; those of an observable are its expression."""
+    if name in scene.observe:
+        return str(scene.observe[name])
+    return Sections(scene).meanings().get(name) or MEANINGS[name]
 
 
 def dimensions(scene: Scene) -> tuple[str, ...]:
@@ -148,6 +151,7 @@ def coordinates(scene: Scene) -> dict[str, Any]:
     coords: dict[str, Any] = {"state": list(scene.equations.state)}
     if any(rows for _, rows, _ in Observed(scene).columns()):
         coords["node"] = np.arange(1, scene.n + 1)
+    coords |= {f"{name}_kept": list(section.keep) for name, section in scene.sections.items() if section.keep}
     for axis in scene.axes:
         coords[axis.name] = ("cell" if scene.zipped else axis.name, np.array(axis.values))
     return coords

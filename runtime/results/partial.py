@@ -17,6 +17,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import IN_MEMORY, Buffers, numbers_of_a_cell
 from ..cells.layout import Layout
+from ..cells.observed import Sections
 from ..cells.plan import Planner
 from ..cells.reduce import NodeMerge, Reduction
 from ..support.files import understood, whole_file
@@ -42,6 +43,7 @@ def describe_sweep(
         "dimension": reduction.dimension,
         "samples": reduction.samples,
         "observed": reduction.observed.numbers,
+        "kept": reduction.point_size,
         "merged": [merge.states.tolist(), merge.places.tolist()] if merge.merges else None,
         "together": merge.together,
         "certificate": None if exponents is None else [part.tolist() for part in exponents],
@@ -110,14 +112,14 @@ def _so_far(reader: _Reader) -> Result:
     """The blocks that a log holds, as a result."""
     log, scene = reader.log, reader.scene
     dimension, samples = len(reader.merge.places), int(log.about["samples"])
-    observed = int(log.about["observed"])
-    numbers = scene.cells * numbers_of_a_cell(dimension, log.most, samples, observed)
+    observed, kept = int(log.about["observed"]), Sections(scene).width(dimension)
+    numbers = scene.cells * numbers_of_a_cell(dimension, log.most, samples, observed, kept)
     if numbers > IN_MEMORY:
         raise ValueError(
             f"found a sweep of {numbers * 8 / 1e9:.0f} GB; expected at most {IN_MEMORY * 8 / 1e9:.0f} GB in "
             "memory; finish it with resume (--resume), and open parts of the result with xarray"
         )
-    buffers = Buffers.empty(scene.cells, dimension, log.most, samples, observed)
+    buffers = Buffers.empty(scene.cells, dimension, log.most, samples, observed, kept)
     for block in np.flatnonzero(log.done).tolist():
         buffers.put(reader.layout.rows(block), reader.buffers(block))
     spans = reader.planner.spans(np.arange(scene.cells))

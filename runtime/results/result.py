@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from synchain.codegen.driver.columns import Count, Point
 from synchain.codegen.kernels.processor import processor, told_apart
 from synchain.models.inputs.checks import check_instance
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.buffers import Buffers
-from ..cells.observed import Observed
+from ..cells.observed import Observed, Sections
 from ..support.files import netcdf_data, understood, whole_file
 from ..support.netcdf import DIGEST, seal, unsealed
 from ..support.status import Status
@@ -146,6 +147,11 @@ class Result:
                     table[:, column] = data[name].values.reshape(cells)
         for name, _, place in Observed(self.scene).columns():
             buffers.sums[:, place] = data[name].values.reshape(cells, -1)
+        if self.scene.sections:
+            points = Sections(self.scene).points(cells, {str(name): data[name].values for name in data})
+            buffers.counts[:, Count.POINTS] = np.isfinite(points[:, :, Point.TIME]).sum(axis=1)
+            buffers.widen(points.shape[1])
+            buffers.points[:, : points.shape[1]] = points
         if "section" in data:
             points = np.concatenate([data.section_time.values[..., None], data.section.values], axis=-1)
             points = points.reshape(cells, -1, points.shape[-1])
