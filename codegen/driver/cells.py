@@ -19,6 +19,7 @@ from ..simd.lanes import one_lane
 from ..simd.lanes import select
 from ..simd.lanes import store
 from .names import CONTACTS
+from .names import HALTS
 from .names import OBSERVED
 from .names import SECTION
 from .names import SYNC_ERROR
@@ -37,6 +38,7 @@ from .recording import END
 from .recording import FAR
 from .recording import FINISHED
 from .recording import FIRST_STEP
+from .recording import HALTED
 from .recording import INTERRUPTED
 from .recording import LAG
 from .recording import LAST
@@ -65,6 +67,7 @@ from .recording import START
 from .recording import STATUS
 from .recording import STEP
 from .recording import STOP
+from .recording import STOPPED
 from .recording import STOPPED_AT
 from .recording import SUM_BEFORE
 from .recording import SYNC
@@ -247,6 +250,8 @@ def outcome(which, clock, y, control, dims):
         if not size < FAR:  # NaN too
             return DIVERGED
         largest = max(largest, size)
+    if HALTS and clock[HALTED * WIDTH + which] != 0.0:
+        return STOPPED
     if t >= clock[END * WIDTH + which]:
         return FINISHED
     if control[CANCEL] != 0.0:
@@ -265,11 +270,11 @@ def finish(which, status, clock, y, i, spans, end, sums, counts, dims):
     """Write what is known about the cell in a lane."""
     for c in range(dims.dimension):
         end[i, c] = y[c * WIDTH + which]
-    length = spans[i, 1] - spans[i, 0]
+    stopped, early = clock[BASE * WIDTH + which] + clock[TIME * WIDTH + which], clock[END * WIDTH + which] == -math.inf
+    length = (stopped if status == STOPPED else spans[i, 1]) - spans[i, 0]
     sums[i, MEAN] = clock[SYNC_SUM * WIDTH + which] / length if length > 0.0 else clock[SYNC * WIDTH + which]
     sums[i, PEAK] = clock[SYNC_PEAK * WIDTH + which] if length > 0.0 else clock[SYNC * WIDTH + which]
     sums[i, LAST] = clock[SYNC * WIDTH + which]
-    stopped, early = clock[BASE * WIDTH + which] + clock[TIME * WIDTH + which], clock[END * WIDTH + which] == -math.inf
     sums[i, STOPPED_AT] = spans[i, 1] if status == FINISHED and spans[i, 1] > 0.0 and not early else stopped
     counts[i, STATUS] = status
     counts[i, N_ACCEPTED] = int(clock[ACCEPTED * WIDTH + which])

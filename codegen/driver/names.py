@@ -19,6 +19,7 @@ SYNC_ERROR = False
 SECTION = False
 TRAJECTORY = False
 OBSERVED = False
+HALTS = False
 """Records of this driver; what is False costs nothing."""
 
 LANES = 1

@@ -46,7 +46,9 @@ from .control import arrive
 from .control import judge
 from .control import pause
 from .control import turned
+from .halting import halt
 from .names import CONTACTS
+from .names import HALTS
 from .names import LOOPED
 from .names import OBSERVED
 from .names import SECTION
@@ -230,7 +232,7 @@ def drive(
     group = CLOCK + 2 * size + dims.parameters + len(REPEATING)
     groups = 3 if SWITCHING else 1
     scratch = 9 * dims.nodes if CONTACTS else 0
-    crossed = dims.sections * (1 + dims.kept)
+    crossed = dims.sections * (1 + dims.kept) + (1 if HALTS else 0)
     watched = len(rule) // ROW * dims.observed if OBSERVED else 0
     block = aligned((2 * size + groups * (group + rows) + dims.workspace + scratch + watched + crossed) * WIDTH)
     y_new, middle, out = address(block, 0), address(block, size * WIDTH), address(block, 2 * size * WIDTH)
@@ -288,6 +290,8 @@ def drive(
         t, h, accept, rate = attempt(
             mode, clock, y, dense, y_new, middle, out, steering, dims, step, step_smooth, pushes, network
         )
+        if HALTS:
+            h = halt(accept, t, h, clock, y, y_new, dense, found, dims, section)
         counted = accept & (t >= load(clock, START, WIDTH))
         if SYNC_ERROR:
             observe(clock, y, h, counted, accept, y_new, dense, middle, members, dims)

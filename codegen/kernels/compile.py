@@ -81,7 +81,7 @@ def signatures(driver: Driver) -> dict[str, Any]:
         known = {
             "step": result(*step),
             "step_smooth": result(*step),
-            "section": values if driver.sections else lane(lane, lane, lane, *[ADDRESS] * 3, sizes),
+            "section": values if driver.functional else lane(lane, lane, lane, *[ADDRESS] * 3, sizes),
             "values": values,
             "pushes": types.void(lane, *[ADDRESS] * 3, *more),
         }

@@ -108,6 +108,7 @@ def emit(
     *,
     observed: Sequence[sp.Expr] = (),
     sections: Sequence[tuple[sp.Expr, ...]] = (),
+    stop: sp.Expr | None = None,
     unroll: int = LARGEST_UNROLLED,
     fill: float = FILL_LIMIT,
 ) -> KernelSource:
@@ -131,6 +132,8 @@ def emit(
         Values that the kernel tallies over the window (`synchain.models.dynamics.observable`).
     sections
         Functions of which points are taken when they pass zero, each followed by the values that its points keep.
+    stop
+        A function that ends a cell when it passes zero.
     unroll
         Nodes up to which a step is written out; the steps of a larger network run in loops.
     fill
@@ -154,8 +157,8 @@ def emit(
     unknown = [r for r in records if r not in list(Record)]
     if unknown:
         raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(Record)}")
-    if sections and "section" in records:
-        raise ValueError("the record 'section' and sections on functions: found both; expected one of them")
+    if "section" in records and (sections or stop is not None):
+        raise ValueError("the record 'section' beside functions of the state: found both; expected one of them")
     if "section" in records and section is None:
         raise ValueError("the record 'section' needs a section function, for example v_1")
     width = default_width(equations) if width is None else width
@@ -173,7 +176,15 @@ def emit(
     weight = [edge.weight.name for edge in plain.edges]
     states = [s.name for node in plain.nodes for s in node.state]
     names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
-    traits = (looped, method.smooth is not None, plain.sticks, method.series, bool(observed), bool(sections))
+    traits = (
+        looped,
+        method.smooth is not None,
+        plain.sticks,
+        method.series,
+        bool(observed),
+        bool(sections),
+        stop is not None,
+    )
     chosen = Driver(KernelKind.SWEEP, width, ordered, *traits)
     functions, scratch, count = (_series if method.series else _stages)(plain, method, names, elimination)
     events = [
@@ -183,17 +194,18 @@ def emit(
     if observed:
         about = "The observed values at the fraction theta of the step."
         events.append(values_function(equations, plain, observed, "values", about))
-    if sections:
-        about = "The section functions at the fraction theta of the step, and what their points keep."
-        events.append(values_function(equations, plain, _padded(sections), "section", about))
-    if chosen.cuts or observed:
+    functional = [*_padded(sections), *([] if stop is None else [stop])]
+    if functional:
+        about = "The section functions at the fraction theta of the step, what their points keep, and what ends a cell."
+        events.append(values_function(equations, plain, functional, "section", about))
+    if chosen.cuts or observed or functional:
         functions.append(driver.text("dense"))
-    if any(e.has(Rate) for e in (*observed, *(e for parts in sections for e in parts))):
+    if any(e.has(Rate) for e in (*observed, *functional)):
         functions.append(driver.text("slope"))
     text = "\n\n\n".join([*functions, *map(LANES.function, events)]) + "\n"
     constants = {
         "WIDTH": width,
-        "DENSE": bool(ordered or observed or sections) or plain.sticks,
+        "DENSE": bool(ordered or observed or functional) or plain.sticks,
         "SERIES": method.series,
     }
     if elimination is not None:
@@ -202,6 +214,7 @@ def emit(
         constants |= {"ENTRIES": elimination.entries if solves else 0}
     watched = count_values(equations, observed)
     more = [f"{watched} observed values"] * bool(watched) + [f"{len(sections)} sections"] * bool(sections)
+    more += ["a stop"] * (stop is not None)
     head = describe(equations, plain, method, (*ordered, *more), count)
     named = "\n".join(f"{name} = {value!r}" for name, value in constants.items())
     text = "\n\n\n".join([head, imports(text), named, text])
@@ -221,7 +234,7 @@ def default_width(equations: Equations) -> int:
 
 def _padded(sections: Sequence[tuple[sp.Expr, ...]]) -> list[sp.Expr]:
     """The section functions, then what each keeps, filled up with zeros."""
-    kept = max(len(parts) - 1 for parts in sections)
+    kept = max((len(parts) - 1 for parts in sections), default=0)
     rows = [[*parts[1:], *[sp.S.Zero] * (kept + 1 - len(parts))] for parts in sections]
     return [*(parts[0] for parts in sections), *(e for row in rows for e in row)]
 

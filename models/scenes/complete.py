@@ -16,7 +16,7 @@ from ..mechanics.oscillator import Field
 from ..mechanics.physics import check_masses, check_power
 from .axis import Axis
 from .model import Model, NodeKind, as_coupling, as_groups, as_law, as_oscillator, as_topology
-from .observables import observables, sections
+from .observables import observables, sections, stop
 from .parameters import at_nodes, drive, parameters
 from .section import Section
 from .start import SEED_LIMIT, chosen_start, default_start
@@ -73,6 +73,7 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     values["section"] = _section(model, given["section"])
     values["observe"] = observables(model, numbers, given["observe"])
     values["sections"] = sections(model, numbers, given["sections"])
+    values["stop"] = stop(model, numbers, given["stop"])
     _check_sections(values)
     values |= _times(model, numbers, given)
     for name in ("transient", "window"):
@@ -159,8 +160,9 @@ def _section(model: Model, given: object) -> Section:
 
 def _check_sections(values: Mapping[str, Any]) -> None:
     """Refuse two names for one variable, and two ways to say a section."""
-    if Record.SECTION in values["record"] and values["sections"]:
-        raise ValueError("record: found 'section' beside sections; expected one of them; make it one of the sections")
+    other = "sections" if values["sections"] else "stop" if values["stop"] else None
+    if Record.SECTION in values["record"] and other:
+        raise ValueError(f"record: found 'section' beside {other}; expected one of them; make it one of the sections")
     made = {f"{name}{more}" for name in values["sections"] for more in ("", "_time", "_count", "_kept")}
     twice = sorted(made & {*values["observe"]})
     if twice:

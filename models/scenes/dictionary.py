@@ -128,7 +128,7 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
     written["record"] = [str(record) for record in values["record"]]
     written["observe"] = {name: str(observable) for name, observable in values["observe"].items()}
     written["sections"] = {name: section.as_table() for name, section in values["sections"].items()}
-    for name in ("observe", "sections"):
+    for name in ("observe", "sections", "stop"):
         if not written[name]:
             del written[name]
     written["sweep"] = {axis.name: list(axis.values) for axis in written.pop("axes")}

@@ -16,7 +16,7 @@ from .model import Model
 from .parameters import varied
 from .section import Section
 
-__all__ = ["TAKEN", "observables", "sections"]
+__all__ = ["TAKEN", "observables", "sections", "stop"]
 
 TAKEN = frozenset(
     {"cell", "component", "data", "end", "end_time", "ended_early", "kind", "link", "message", "name", "names", "node",
@@ -74,6 +74,24 @@ def sections(model: Model, numbers: Mapping[str, float], given: object) -> Froze
             kept += _kept(what, as_value(what, text), model, numbers)
         found[name] = replace(section, variable=sp.sstr(function, order="lex"), keep=tuple(kept))
     return Frozen(found)
+
+
+def stop(model: Model, numbers: Mapping[str, float], given: object) -> str | None:
+    """Return the text of the function that ends a cell when it passes zero; None for none.
+
+    Raises ValueError or TypeError as `observables`, and for set-valued contacts, whose events end steps themselves.
+    """
+    if given is None:
+        return None
+    function = as_value("stop", given)
+    _check_names("stop", function, model, numbers)
+    if _own(function, model, numbers):
+        raise ValueError(
+            f"stop: found {function}, which each node has; expected one function, e.g. of nodes.maximum(x)"
+        )
+    if model.unlinked.sticks:
+        raise ValueError("stop: found set-valued contacts; expected smooth equations; take contact 'atan'")
+    return sp.sstr(function, order="lex")
 
 
 def _kept(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, float]) -> list[str]:

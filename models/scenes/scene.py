@@ -72,6 +72,8 @@ class Scene:
     sections : mapping of str to Section or table, optional
         Sections on functions of the states, by the names of the results' variables:
         ``Section("x_1 - x_2", "rising", keep=("v_1", "v_2"))``.
+    stop : str or Expr, optional
+        A function of the states, parameters and t that ends a cell when it passes zero, in the transient too.
     transient, window : float
         Time before the records, and time of the records, in units of `time_unit`.
     time_unit : str, optional
@@ -119,6 +121,7 @@ class Scene:
     observe: Frozen[Observable]
     section: Section
     sections: Frozen[Section]
+    stop: str | None
     transient: float
     window: float
     time_unit: TimeUnit
@@ -150,6 +153,7 @@ class Scene:
         observe: Mapping[str, Observable | str] | None = None,
         section: Section | str | None = None,
         sections: Mapping[str, Section | Mapping[str, object]] | None = None,
+        stop: object = None,
         transient: float = 300.0,
         window: float = 100.0,
         time_unit: str | None = None,

@@ -63,23 +63,21 @@ def write_kernel(reduction: Reduction, width: int | None = None) -> KernelSource
         section = sp.Symbol(reduction.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
     method = chosen_integrator(reduction)
     width = default_width(reduction.equations) if width is None else width
+    sections = Sections(scene)
     recorded = (reduction.records, section, width, reduction.multiplicity)
-    return _emitted(reduction.equations, method, *recorded, Observed(scene).values, Sections(scene).values)
+    return _emitted(reduction.equations, method, recorded, (Observed(scene).values, sections.values, sections.stop))
 
 
 @lru_cache(maxsize=32)
 def _emitted(
     equations: Equations,
     method: Integrator,
-    records: tuple[str, ...],
-    section: sp.Expr | None,
-    width: int,
-    multiplicity: tuple[int, ...] | None,
-    observed: tuple[sp.Expr, ...],
-    sections: tuple[tuple[sp.Expr, ...], ...],
+    recorded: tuple[tuple[str, ...], sp.Expr | None, int, tuple[int, ...] | None],
+    functions: tuple[tuple[sp.Expr, ...], tuple[tuple[sp.Expr, ...], ...], sp.Expr | None],
 ) -> KernelSource:
     """The text of a kernel; runs that differ in numbers alone share it."""
-    return emit(equations, method, records, section, width, multiplicity, observed=observed, sections=sections)
+    observed, sections, stop = functions
+    return emit(equations, method, *recorded, observed=observed, sections=sections, stop=stop)
 
 
 def warn_of_chords(source: KernelSource) -> None:

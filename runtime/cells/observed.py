@@ -87,6 +87,11 @@ class Sections:
             for name, section in self.scene.sections.items()
         )
 
+    @property
+    def stop(self) -> sp.Expr | None:
+        """The function that ends a cell."""
+        return None if self.scene.stop is None else as_value("stop", self.scene.stop)
+
     def width(self, dimension: int) -> int:
         """Return how many numbers a section point has beside its time; `dimension` if sections are on states."""
         if not self.values:

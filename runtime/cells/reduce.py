@@ -279,7 +279,9 @@ def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> 
 
 def _observed_parameters(scene: Scene) -> set[str]:
     """The parameters that occur in observables and in sections on functions."""
-    values = [*Observed(scene).values, *(e for parts in Sections(scene).values for e in parts)]
+    sections = Sections(scene)
+    values = [*Observed(scene).values, *(e for parts in sections.values for e in parts)]
+    values += [] if sections.stop is None else [sections.stop]
     names = {s.name for value in values for s in value.free_symbols}
     of_nodes = {str(NodeName(name, i)) for name in scene.varied if name in names for i in range(scene.n)}
     return (names | of_nodes) & set(scene.parameters)
@@ -317,7 +319,7 @@ def _merge(
     if equations.mixed:
         kept.append("quotient: nodes of several kinds are stepped one by one")
         return equations, alone
-    if scene.observe or scene.sections:
+    if scene.observe or scene.sections or scene.stop:
         kept.append(f"quotient: the {n} oscillators are observed one by one")
         return equations, alone
     colours = _colours(scene)
