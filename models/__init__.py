@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from .mechanics.parameter import Parameter
     from .presentation.equations import latex, text
     from .scenes.axis import Axis
+    from .scenes.draw import normal, uniform
     from .scenes.file import load_scene, scene_names
     from .scenes.scene import Scene
     from .scenes.section import Section
@@ -67,6 +68,7 @@ _HOMES = {
     "mean": "dynamics.observable",
     "minimum": "dynamics.observable",
     "nodes": "dynamics.observable",
+    "normal": "scenes.draw",
     "probability_option": "inputs.options",
     "rate": "dynamics.observable",
     "read_edges": "graphs.readers",
@@ -75,6 +77,7 @@ _HOMES = {
     "scene_names": "scenes.file",
     "text": "presentation.equations",
     "topology": "graphs.families",
+    "uniform": "scenes.draw",
     "union": "graphs.products",
     "variance": "dynamics.observable",
     "weighted": "graphs.products",
@@ -108,6 +111,7 @@ __all__ = [
     "mean",
     "minimum",
     "nodes",
+    "normal",
     "probability_option",
     "rate",
     "read_edges",
@@ -116,6 +120,7 @@ __all__ = [
     "scene_names",
     "text",
     "topology",
+    "uniform",
     "union",
     "variance",
     "weighted",

@@ -15,12 +15,13 @@ from ..mechanics.friction import ContactModel, FrictionLaw
 from ..mechanics.oscillator import Field
 from ..mechanics.physics import check_masses, check_power
 from .axis import Axis
+from .draw import drawn_axes, draws
 from .model import Model, NodeKind, as_coupling, as_groups, as_law, as_oscillator, as_topology
 from .observables import observables, sections, stop
 from .parameters import at_nodes, drive, parameters
 from .section import Section
 from .start import SEED_LIMIT, chosen_start, default_start
-from .sweep import check_sweep, read_axes
+from .sweep import check_draws, check_sweep, read_axes
 
 __all__ = ["TimeUnit", "complete", "integrators"]
 
@@ -67,7 +68,10 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     values |= _model(given)
     model: Model = values["model"]
     values["axes"] = axes = read_axes(given["axes"], given["zipped"])
-    values["parameters"] = numbers = parameters(model, given["parameters"], axes)
+    values["rng"] = check_integer("rng", given["rng"], 0, SEED_LIMIT)
+    values["draw"] = draws(given["draw"], given["realisations"])
+    drawn = drawn_axes(model, values["draw"], given["realisations"], values["rng"])
+    values["parameters"] = numbers = parameters(model, given["parameters"], (*axes, *drawn))
     values["initial"] = _start(model, given["initial"], values["seed"])
     values["record"] = _records(model, given["record"])
     values["section"] = _section(model, given["section"])
@@ -83,8 +87,9 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
         raise ValueError(f"window: found 0, in which {str(recorded[0])!r} has nothing to record; give a window > 0")
     values |= _numerics(given, values["record"])
     values["continuation"] = check_sweep(model, values)
-    _check_friction(model, numbers, axes, values["zipped"])
-    _check_physics(model, numbers, axes)
+    check_draws(model, values, drawn)
+    _check_friction(model, numbers, (*axes, *drawn), values["zipped"])
+    _check_physics(model, numbers, (*axes, *drawn))
     return values
 
 

@@ -11,6 +11,7 @@ from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import check_integer, check_keys, check_table, check_text, short_repr
 from ..inputs.plugins import part
 from ..mechanics.coupling import split
+from .draw import Draw
 from .parameters import collected
 
 __all__ = ["arguments", "as_dict"]
@@ -47,7 +48,7 @@ def arguments(values: object, keywords: Iterable[str], folder: Path | None = Non
             raise ValueError("zipped is given twice, in [sweep] and above; expected it once; remove one")
         given["zipped"] = sweep.pop("zipped", given.get("zipped", False))
         given["axes"] = sweep
-    for name in ("parameters", "initial", "observe", "sections"):
+    for name in ("parameters", "initial", "observe", "sections", "draw"):
         if name in given:
             check_table(name, given[name])
     for name in ("oscillator", "friction", "coupling"):
@@ -128,7 +129,13 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
     written["record"] = [str(record) for record in values["record"]]
     written["observe"] = {name: str(observable) for name, observable in values["observe"].items()}
     written["sections"] = {name: section.as_table() for name, section in values["sections"].items()}
-    for name in ("observe", "sections", "stop"):
+    written["draw"] = {
+        name: str(drawn) if isinstance(drawn, Draw) else [list(row) for row in drawn]
+        for name, drawn in values["draw"].items()
+    }
+    if not written["draw"]:
+        del written["rng"], written["realisations"]
+    for name in ("observe", "sections", "stop", "draw"):
         if not written[name]:
             del written[name]
     written["sweep"] = {axis.name: list(axis.values) for axis in written.pop("axes")}

@@ -23,6 +23,7 @@ from ..mechanics.oscillator import Oscillator
 from .axis import Axis
 from .complete import TimeUnit, complete
 from .dictionary import arguments, as_dict
+from .draw import Drawn, drawn_axes
 from .model import Group, Model, as_oscillator
 from .parameters import drive, varied, without
 from .section import Section
@@ -94,6 +95,13 @@ class Scene:
         "up" or "down" if cells start from the end of their neighbours, else "none".
     seed : int
         Seed of random initial states.
+    realisations : int
+        Realisations of what is drawn, a further dimension of the sweep; 0 for none.
+    draw : mapping, optional
+        What is drawn, by the names of parameters and initial states: `normal`, `uniform` (of each node by itself), or a
+        list with one entry for each realisation.
+    rng : int
+        Seed of what is drawn.
 
     Attributes
     ----------
@@ -134,6 +142,9 @@ class Scene:
     zipped: bool
     continuation: Continuation
     seed: int
+    realisations: int
+    draw: Frozen[Drawn]
+    rng: int
     model: Model = field(compare=False)
     given: Frozen[Any] = field(compare=False)
 
@@ -166,6 +177,9 @@ class Scene:
         zipped: bool = False,
         continuation: str = "none",
         seed: int = 0,
+        realisations: int = 0,
+        draw: Mapping[str, object] | None = None,
+        rng: int = 0,
     ) -> None:
         given = {name: value for name, value in locals().items() if name != "self"}
         values = complete(given)
@@ -228,9 +242,15 @@ class Scene:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of cells along each dimension of the sweep; zipped axes are one dimension, no axes none."""
+        """Number of cells along each dimension of the sweep, realisations last; zipped axes are one, no axes none."""
         lengths = tuple(len(axis) for axis in self.axes)
-        return lengths[:1] if self.zipped else lengths
+        more = (self.realisations,) if self.realisations else ()
+        return (*(lengths[:1] if self.zipped else lengths), *more)
+
+    @property
+    def drawn(self) -> tuple[Axis, ...]:
+        """What is drawn, with one value for each realisation; all of these run together along the last dimension."""
+        return drawn_axes(self.model, self.draw, self.realisations, self.rng)
 
     @property
     def cells(self) -> int:

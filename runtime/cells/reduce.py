@@ -252,7 +252,7 @@ def _column(name: str, equations: Equations, first: list[int]) -> str:
 
 def _fixed(scene: Scene) -> dict[str, float]:
     """The parameters with one value in every cell."""
-    swept = {axis.name: axis.values for axis in scene.axes}
+    swept = {axis.name: axis.values for axis in (*scene.axes, *scene.drawn)}
     values = {name: swept.get(name, (scene.parameters[name],)) for name in scene.equations.parameters}
     return {name: found[0] for name, found in values.items() if min(found) == max(found)}
 
@@ -347,7 +347,8 @@ def _colours(scene: Scene) -> list[Hashable]:
     """For each oscillator its start and its own parameters in all cells; equal if these are equal
     in every cell.
     """
-    swept = {axis.name: axis.values for axis in scene.axes}
+    drawn = {axis.name for axis in scene.drawn}
+    swept = {axis.name: axis.values for axis in (*scene.axes, *scene.drawn)}
     colours: list[Hashable] = []
     for i in range(scene.n):
         own: list[Hashable] = []
@@ -358,7 +359,8 @@ def _colours(scene: Scene) -> list[Hashable]:
             if min(found) == max(found):
                 own.append(found[0])
             else:
-                own.append(found if scene.zipped else name)  # on a grid two axes differ in some cell
+                together = scene.zipped or name in drawn
+                own.append(found if together else name)  # on a grid two axes differ in some cell
         colours.append(tuple(own))
     return colours
 

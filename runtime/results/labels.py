@@ -131,8 +131,9 @@ def meaning(scene: Scene, name: str) -> str:
 
 
 def dimensions(scene: Scene) -> tuple[str, ...]:
-    """Return the dimensions of a sweep: the names of its axes, or "cell" if they are zipped."""
-    return ("cell",) if scene.zipped else tuple(axis.name for axis in scene.axes)
+    """Return the dimensions of a sweep: the names of its axes, or "cell" if they are zipped; then "realisation"."""
+    axes = ("cell",) if scene.zipped else tuple(axis.name for axis in scene.axes)
+    return (*axes, "realisation") if scene.realisations else axes
 
 
 def _certified(scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: Certificate) -> dict[str, np.ndarray]:
@@ -154,6 +155,8 @@ def coordinates(scene: Scene) -> dict[str, Any]:
     coords |= {f"{name}_kept": list(section.keep) for name, section in scene.sections.items() if section.keep}
     for axis in scene.axes:
         coords[axis.name] = ("cell" if scene.zipped else axis.name, np.array(axis.values))
+    for axis in scene.drawn:
+        coords[axis.name] = ("realisation", np.array(axis.values))
     return coords
 
 

@@ -138,11 +138,10 @@ def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> d
     """
     reader = _Reader(log, scene)
     verdicts: dict[str, int] = {}
-    axes = {axis.name: len(axis) for axis in scene.axes}
-    lengths = {"cell": scene.cells} if scene.zipped else axes
+    lengths = dict(zip(dimensions(scene), scene.shape, strict=True))
     with whole_file(path) as temporary, open(temporary, "w+b") as file:
         sheet = Sheet(file, _template(reader), lengths)
-        for axis in scene.axes:
+        for axis in (*scene.axes, *scene.drawn):
             sheet.put(axis.name, np.arange(len(axis)), np.array(axis.values))
         for block in range(reader.layout.blocks):
             rows = reader.layout.rows(block)
@@ -167,7 +166,7 @@ def _template(reader: _Reader) -> xr.Dataset:
         for name, more, values in reader.variables(one, first)
     }
     coords = coordinates(scene)
-    for axis in scene.axes:
+    for axis in (*scene.axes, *scene.drawn):
         dim, values = coords[axis.name]
         coords[axis.name] = (dim, values[:1])
     return unsealed(xr.Dataset(data, coords, reader.log.about["attributes"]))
