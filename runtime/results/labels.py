@@ -45,7 +45,7 @@ MEANINGS = {
     "sync_error": "average synchronisation error",
     "sync_error_max": "largest synchronisation error seen in the window",
     "sync_error_end": "synchronisation error at the end of the window",
-    "status": "how the cell ended: " + "; ".join(f"{s.value} {s.name.lower()}" for s in Status),
+    "status": "how the cell ended",
     "steps": "accepted steps",
     "rejected": "rejected steps",
     "periods_skipped": "periods of the drive jumped over in a cell that repeats itself",
@@ -127,6 +127,9 @@ def meaning(scene: Scene, name: str) -> str:
     """Return what a variable of a result holds, in words; those of an observable are its expression."""
     if name in scene.observe:
         return str(scene.observe[name])
+    if name == "status":
+        codes = [status for status in Status if scene.stop is not None or status != Status.STOPPED]
+        return f"{MEANINGS[name]}: {'; '.join(f'{code.value} {code.name.lower()}' for code in codes)}"
     return Sections(scene).meanings().get(name) or MEANINGS[name]
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 import sympy as sp
 from sympy.physics.mechanics import dynamicsymbols
 
 from synchain.models import end, maximum, mean, minimum, nodes, rate, ring, variance
 from synchain.models.dynamics.observable_text import as_observable
+from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.observables import TAKEN
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.results.labels import MEANINGS
@@ -127,3 +131,21 @@ def test_scene_files_hold_observables() -> None:
 
 def test_no_observable_takes_the_name_of_a_variable() -> None:
     assert set(MEANINGS) <= TAKEN
+
+
+MANUAL = (Path(__file__).parents[3] / "docs" / "observing.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("words", re.findall(r"```toml\n(.*?)```", MANUAL, re.DOTALL))
+def test_the_manuals_files_are_scenes(tmp_path: Path, words: str) -> None:
+    (tmp_path / "mine.toml").write_text(words, "utf-8")
+    scene = load_scene(tmp_path / "mine.toml")
+    assert scene.n > 1
+    assert scene.observe or scene.sections or scene.draw
+
+
+@pytest.mark.parametrize("program", re.findall(r"```python\n(.*?)```", MANUAL, re.DOTALL))
+def test_the_manuals_programs_run(program: str) -> None:
+    names: dict[str, object] = {}
+    exec(program, names)
+    assert isinstance(names["scene"], Scene)
