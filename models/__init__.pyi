@@ -1,6 +1,14 @@
 # What `__init__.py` loads on first use; tests/test_front.py writes it with --update.
 from collections.abc import Iterable
 
+from .dynamics.observable import Observable as Observable
+from .dynamics.observable import end as end
+from .dynamics.observable import maximum as maximum
+from .dynamics.observable import mean as mean
+from .dynamics.observable import minimum as minimum
+from .dynamics.observable import nodes as nodes
+from .dynamics.observable import rate as rate
+from .dynamics.observable import variance as variance
 from .graphs.families import topology as topology
 from .graphs.products import cartesian as cartesian
 from .graphs.products import complement as complement
@@ -33,6 +41,8 @@ from .mechanics.parameter import Parameter as Parameter
 from .presentation.equations import latex as latex
 from .presentation.equations import text as text
 from .scenes.axis import Axis as Axis
+from .scenes.draw import normal as normal
+from .scenes.draw import uniform as uniform
 from .scenes.file import load_scene as load_scene
 from .scenes.file import scene_names as scene_names
 from .scenes.scene import Scene as Scene

@@ -19,6 +19,8 @@ from ..simd.lanes import one_lane
 from ..simd.lanes import select
 from ..simd.lanes import store
 from .names import CONTACTS
+from .names import HALTS
+from .names import OBSERVED
 from .names import SECTION
 from .names import SYNC_ERROR
 from .names import TRAJECTORY
@@ -36,6 +38,7 @@ from .recording import END
 from .recording import FAR
 from .recording import FINISHED
 from .recording import FIRST_STEP
+from .recording import HALTED
 from .recording import INTERRUPTED
 from .recording import LAG
 from .recording import LAST
@@ -64,6 +67,7 @@ from .recording import START
 from .recording import STATUS
 from .recording import STEP
 from .recording import STOP
+from .recording import STOPPED
 from .recording import STOPPED_AT
 from .recording import SUM_BEFORE
 from .recording import SYNC
@@ -77,6 +81,8 @@ from .recording import spread
 # What must repeat for the future to repeat, saved behind state and parameters: the state and these of the clock.
 REPEATING = (STEP, MODE, SYNC)
 LONGEST_CYCLE = 32.0
+# True if every step of the window counts: nothing in it can be left out.
+WHOLE = SECTION or TRAJECTORY or OBSERVED
 
 
 @njit(error_model="numpy")
@@ -154,7 +160,7 @@ def turn_over(which, cell, spans, control, clock, y, dims):
         if clock[CYCLE * WIDTH + which] > 0.0:
             jump(which, cell, spans, clock)
     begin(which, cell, spans, clock)
-    if SYNC_ERROR and not SECTION and not TRAJECTORY and clock[SYNC * WIDTH + which] < spans[cell, 3]:
+    if SYNC_ERROR and not WHOLE and clock[SYNC * WIDTH + which] < spans[cell, 3]:
         settle_down(which, cell, spans, clock)
 
 
@@ -213,7 +219,7 @@ def jump(which, cell, spans, clock):
     start, end = spans[cell, 0], spans[cell, 1]
     if now * period < start:
         leap(which, math.floor((start / period - now) / cycle + 1e-9) * cycle, clock)
-    elif not SECTION and not TRAJECTORY:
+    elif not WHOLE:
         left = clock[LEFT * WIDTH + which]
         if left < 0.0:
             put(clock, LEFT, which, cycle)
@@ -244,6 +250,8 @@ def outcome(which, clock, y, control, dims):
         if not size < FAR:  # NaN too
             return DIVERGED
         largest = max(largest, size)
+    if HALTS and clock[HALTED * WIDTH + which] != 0.0:
+        return STOPPED
     if t >= clock[END * WIDTH + which]:
         return FINISHED
     if control[CANCEL] != 0.0:
@@ -262,11 +270,11 @@ def finish(which, status, clock, y, i, spans, end, sums, counts, dims):
     """Write what is known about the cell in a lane."""
     for c in range(dims.dimension):
         end[i, c] = y[c * WIDTH + which]
-    length = spans[i, 1] - spans[i, 0]
+    stopped, early = clock[BASE * WIDTH + which] + clock[TIME * WIDTH + which], clock[END * WIDTH + which] == -math.inf
+    length = (stopped if status == STOPPED else spans[i, 1]) - spans[i, 0]
     sums[i, MEAN] = clock[SYNC_SUM * WIDTH + which] / length if length > 0.0 else clock[SYNC * WIDTH + which]
     sums[i, PEAK] = clock[SYNC_PEAK * WIDTH + which] if length > 0.0 else clock[SYNC * WIDTH + which]
     sums[i, LAST] = clock[SYNC * WIDTH + which]
-    stopped, early = clock[BASE * WIDTH + which] + clock[TIME * WIDTH + which], clock[END * WIDTH + which] == -math.inf
     sums[i, STOPPED_AT] = spans[i, 1] if status == FINISHED and spans[i, 1] > 0.0 and not early else stopped
     counts[i, STATUS] = status
     counts[i, N_ACCEPTED] = int(clock[ACCEPTED * WIDTH + which])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-__all__ = ["Control", "Count", "Point", "Span", "Sum"]
+__all__ = ["Control", "Count", "Point", "Span", "Sum", "Tally"]
 
 
 class Control(IntEnum):
@@ -25,6 +25,8 @@ class Control(IntEnum):
     """A number other than 0 stops the kernel while it runs."""
     NO_JUMPS = 7
     """A number other than 0 integrates a cell that repeats itself to its end."""
+    FURTHER = 8
+    """Behind those of every kernel: the directions of the second section and of those behind it."""
 
 
 class Span(IntEnum):
@@ -49,6 +51,21 @@ class Sum(IntEnum):
     PEAK = 1
     LAST = 2
     STOPPED_AT = 3
+
+
+class Tally(IntEnum):
+    """Columns of each observed value in `sums`; behind those of `Sum` stands the time that was
+    observed, then come the values one after the other.
+    """
+
+    FIRST = 0
+    """The value at the beginning of the window."""
+    SUM = 1
+    """Integral of the distance from the first value."""
+    SQUARES = 2
+    LARGEST = 3
+    LEAST = 4
+    LATEST = 5
 
 
 class Count(IntEnum):

@@ -19,11 +19,13 @@ from ..simd.lanes import store
 from ..simd.lanes import truncated
 from ..simd.special import power_of_two
 from .names import CONTACTS
+from .names import HALTS
 from .names import WIDTH
 from .recording import ACCEPTED
 from .recording import CHANGE
 from .recording import END
 from .recording import FAR
+from .recording import HALTED
 from .recording import LONGEST_RUSH
 from .recording import MAX_STEP
 from .recording import MAX_STEPS
@@ -121,7 +123,8 @@ def pause(clock, largest, control):
     spent = load(clock, ACCEPTED, WIDTH) + load(clock, REJECTED, WIDTH) >= control[MAX_STEPS]
     stopped = (t >= load(clock, END, WIDTH)) | (t >= load(clock, PERIOD, WIDTH))
     found = stopped | spent | (h <= 4e-16 * maximum(t, 1.0)) | (largest >= FAR)
-    return found | (load(clock, RUSH, WIDTH) >= LONGEST_RUSH) if CONTACTS else found
+    found = found | (load(clock, RUSH, WIDTH) >= LONGEST_RUSH) if CONTACTS else found
+    return found | (load(clock, HALTED, WIDTH) > 0.0) if HALTS else found
 
 
 @njit(error_model="numpy", forceinline=True)

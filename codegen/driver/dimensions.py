@@ -25,6 +25,12 @@ class Dimensions(NamedTuple):
     """That of the explicit step of a switching integrator; 0 if there is none."""
     repeats: int
     """1 if the right-hand side is periodic in time, so that a computation can repeat itself, else 0."""
+    observed: int
+    """Values that are observed."""
+    sections: int
+    """Sections of which points are taken."""
+    kept: int
+    """Most values that a point of a section on a function keeps."""
 
 
 class ModeDimensions(NamedTuple):

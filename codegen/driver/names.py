@@ -20,6 +20,8 @@ KINKS = False
 SYNC_ERROR = False
 SECTION = False
 TRAJECTORY = False
+OBSERVED = False
+HALTS = False
 """Records of this driver; what is False costs nothing."""
 
 LANES = 1

@@ -10,6 +10,7 @@ from numba import njit
 from ..simd.lanes import absolute, any_lane, broadcast, lane_bits, load, maximum, select, sqrt, store
 from .dense import inside
 from .names import SERIES, WIDTH
+from .one_section import keep, surface
 
 # --- kernel text below ---
 # Each lane has its state in `y`, followed by its parameters, and what the driver remembers about it in `clock`.
@@ -17,11 +18,12 @@ from .names import SERIES, WIDTH
 TIME, STEP, STOP, START, END, MEMORY, CHANGE, ACCEPTED, REJECTED = 0, 1, 2, 3, 4, 5, 6, 7, 8
 SYNC, SYNC_SUM, SYNC_PEAK, NEXT_SAMPLE, SAMPLE_GAP, BASE, PERIOD, PERIODS = 9, 10, 11, 12, 13, 14, 15, 16
 MODE, SMOOTH_STEPS, POWER, LAG, CYCLE, LEFT, SUM_BEFORE, SKIPPED, RUSH = 17, 18, 19, 20, 21, 22, 23, 24, 25
-CLOCK = 26
+HALTED = 26
+CLOCK = 27
 # How a cell ended.
-FINISHED, BUDGET, UNDERFLOW, DIVERGED, INTERRUPTED, CHATTERING = 1, 2, 3, 4, 5, 6
+FINISHED, BUDGET, UNDERFLOW, DIVERGED, INTERRUPTED, CHATTERING, STOPPED = 1, 2, 3, 4, 5, 6, 7
 # Columns of `control`, of `sums` and of `counts`.
-RTOL, ATOL, FIRST_STEP, MAX_STEP, MAX_STEPS, DIRECTION, CANCEL, NO_JUMPS = 0, 1, 2, 3, 4, 5, 6, 7
+RTOL, ATOL, FIRST_STEP, MAX_STEP, MAX_STEPS, DIRECTION, CANCEL, NO_JUMPS, FURTHER = 0, 1, 2, 3, 4, 5, 6, 7, 8
 MEAN, PEAK, LAST, STOPPED_AT = 0, 1, 2, 3
 STATUS, N_ACCEPTED, N_REJECTED, N_POINTS, N_SKIPPED, N_SMOOTH = 0, 1, 2, 3, 4, 5
 # So many events in a row without time passing are chattering.
@@ -76,21 +78,21 @@ def crosses(before, after, direction):
 
 
 @njit(error_model="numpy")
-def locate(hits, low, high, g_low, g_high, t, h, y, y_new, dense, dims, section):
-    """Zero of the section function between two fractions of the step, to rounding, in the lanes of `hits`.
+def locate(k, hits, low, high, g_low, g_high, t, h, y, y_new, dense, found, dims, section):
+    """Zero of section function k between two fractions of the step, to rounding, in the lanes of `hits`.
 
     Regula falsi with the Anderson-Bjorck weight (BIT 13, 253, 1973), bisection where that stalls.
     """
     a, b, fa, fb = select(hits, low, high), high, g_low, g_high
-    for k in range(60):
+    for tried in range(60):
         active = absolute(b - a) > 1e-15  # the others are done and must not move, whatever their neighbours need
         if not any_lane(active):
             break
         secant = b - fb * (b - a) / (fb - fa)
         good = (secant - a) * (b - secant) > 0.0
-        c = select(good, secant, 0.5 * (a + b)) if k % 4 != 3 else 0.5 * (a + b)
+        c = select(good, secant, 0.5 * (a + b)) if tried % 4 != 3 else 0.5 * (a + b)
         c = select(active, c, b)
-        fc = section(c, t, h, y, y_new, dense, dims)
+        fc = surface(k, c, t, h, y, y_new, dense, found, dims, section)
         done = (fc == 0.0) | (absolute(c - b) <= 1e-15)
         other = fc * fb < 0.0  # the zero lies between c and b
         weight = 1.0 - fc / fb
@@ -101,37 +103,39 @@ def locate(hits, low, high, g_low, g_high, t, h, y, y_new, dense, dims, section)
 
 
 @njit(error_model="numpy")
-def keep_points(theta, hits, t, h, y, y_new, dense, cell, counts, points, dims):
-    """Write the section points of the lanes in `hits`: time and state."""
+def keep_points(k, theta, hits, t, h, y, y_new, dense, found, cell, counts, points, dims, section):
+    """Write the points of section k of the lanes in `hits`: time, and what is kept there."""
+    size = points.shape[2] - 1
     when = np.empty(WIDTH)
-    where = np.empty(dims.dimension * WIDTH)
+    where = np.empty(size * WIDTH)
     store(when, 0, t + theta * h)
-    for c in range(dims.dimension):
-        store(where, c, inside(theta, c, y, y_new, dense, dims))
+    keep(k, theta, t, h, y, y_new, dense, found, where, dims, section)
     for which in range(WIDTH):
         if (hits >> which) & 1:
-            k = counts[cell[which], N_POINTS]
-            counts[cell[which], N_POINTS] = k + 1
-            if k < points.shape[1]:
-                points[cell[which], k, 0] = when[which]
-                for c in range(dims.dimension):
-                    points[cell[which], k, c + 1] = where[c * WIDTH + which]
+            place = counts[cell[which], N_POINTS]
+            counts[cell[which], N_POINTS] = place + 1
+            if place < points.shape[1]:
+                points[cell[which], place, 0] = when[which]
+                for c in range(size):
+                    points[cell[which], place, c + 1] = where[c * WIDTH + which]
 
 
 @njit(error_model="numpy")
-def cut(counted, t, h, y, y_new, dense, cell, counts, points, direction, dims, section):
-    """Find section points in either half of the step."""
+def cut(k, counted, t, h, y, y_new, dense, found, cell, counts, points, direction, dims, section):
+    """Find points of section k in either half of the step."""
     zero, half, one = broadcast(0.0, WIDTH), broadcast(0.5, WIDTH), broadcast(1.0, WIDTH)
-    g0 = section(zero, t, h, y, y_new, dense, dims)
-    g1 = section(half, t, h, y, y_new, dense, dims)
-    g2 = section(one, t, h, y, y_new, dense, dims)
+    g0 = surface(k, zero, t, h, y, y_new, dense, found, dims, section)
+    g1 = surface(k, half, t, h, y, y_new, dense, found, dims, section)
+    g2 = surface(k, one, t, h, y, y_new, dense, found, dims, section)
     early, late = crosses(g0, g1, direction) & counted, crosses(g1, g2, direction) & counted
     if any_lane(early):
-        theta = locate(early, zero, half, g0, g1, t, h, y, y_new, dense, dims, section)
-        keep_points(theta, lane_bits(early), t, h, y, y_new, dense, cell, counts, points, dims)
+        theta = locate(k, early, zero, half, g0, g1, t, h, y, y_new, dense, found, dims, section)
+        bits = lane_bits(early)
+        keep_points(k, theta, bits, t, h, y, y_new, dense, found, cell, counts, points, dims, section)
     if any_lane(late):
-        theta = locate(late, half, one, g1, g2, t, h, y, y_new, dense, dims, section)
-        keep_points(theta, lane_bits(late), t, h, y, y_new, dense, cell, counts, points, dims)
+        theta = locate(k, late, half, one, g1, g2, t, h, y, y_new, dense, found, dims, section)
+        bits = lane_bits(late)
+        keep_points(k, theta, bits, t, h, y, y_new, dense, found, cell, counts, points, dims, section)
 
 
 @njit(error_model="numpy")

@@ -46,15 +46,21 @@ from .control import arrive
 from .control import judge
 from .control import pause
 from .control import turned
+from .halting import halt
 from .names import CONTACTS
 from .names import KINKS
+from .names import HALTS
 from .names import LOOPED
+from .names import OBSERVED
 from .names import SECTION
 from .names import SERIES
 from .names import SWITCHING
 from .names import SYNC_ERROR
 from .names import TRAJECTORY
 from .names import WIDTH
+from .observing import LENGTH
+from .observing import ROW
+from .observing import tally
 from .recording import ALL
 from .recording import ATOL
 from .recording import BASE
@@ -62,6 +68,7 @@ from .recording import CANCEL
 from .recording import CHANGE
 from .recording import CLOCK
 from .recording import DIRECTION
+from .recording import FURTHER
 from .recording import MAX_STEP
 from .recording import MEMORY
 from .recording import MODE
@@ -210,29 +217,35 @@ def conclude(mode, t, h, accept, rate, clock, y, y_new, out, control, dims, push
 
 @njit(error_model="numpy", nogil=True, cache=True)
 def drive(
-    step, step_smooth, section, pushes, dims, multiplicity, network, first, last, start, numbers, spans, control, end, sums,
-    counts, points, samples,
+    step, step_smooth, section, values, pushes, dims, multiplicity, rule, network, first, last, start, numbers, spans,
+    control, end, sums, counts, points, samples,
 ):  # fmt: skip
     """Run the cells first … last-1.
 
-    step, step_smooth, section, pushes: functions of a scene; those that this driver does not call may be any.  dims: the
-    sizes of its arrays.  multiplicity (nodes): how many oscillators each node stands for.  network: of one that is
-    stepped through in loops, the arrays of its program (codegen/steps/program.py) and the weights of its links.
+    step, step_smooth, section, values, pushes: functions of a scene; those that this driver does not call may be any.
+    dims: the sizes of its arrays.  multiplicity (nodes): how many oscillators each node stands for.  rule: of the
+    quadrature of a step, four numbers for each point (codegen/kernels/observed.py).  network: of one that is stepped through in loops, the arrays of its
+    program (codegen/steps/program.py) and the weights of its links.
     start (cells, dimension), numbers (cells, parameters), spans (cells, 4): start and end of the window, the period after
     which the right-hand side repeats (0: none), and the synchronisation error below which a cell that records nothing
-    else may end early (0: never); control: see the column names above.  Filled: end (cells, dimension), sums (cells, 4),
-    counts (cells, 6), points (cells, room, dimension + 1), samples (cells, samples, dimension).
+    else may end early (0: never); control: see the column names above.  Filled: end (cells, dimension), sums (cells, 4,
+    or more if values are observed), counts (cells, 6), points (cells, room, dimension + 1, or
+    2 + kept of sections on functions), samples (cells, samples, dimension).
     """
     steering, members = address(control, 0), address(multiplicity, 0)
     size, rows = dims.dimension, dims.dense_rows * dims.dimension
     group = CLOCK + 2 * size + dims.parameters + len(REPEATING)
     groups = 3 if SWITCHING else 1
     scratch = 9 * dims.nodes if CONTACTS else 0
-    block = aligned((2 * size + groups * (group + rows) + dims.workspace + scratch) * WIDTH)
+    crossed = dims.sections * (1 + dims.kept) + (1 if HALTS else 0)
+    watched = len(rule) // ROW * dims.observed if OBSERVED else 0
+    block = aligned((2 * size + groups * (group + rows) + dims.workspace + scratch + watched + crossed) * WIDTH)
     y_new, middle, out = address(block, 0), address(block, size * WIDTH), address(block, 2 * size * WIDTH)
     first_group = (2 * size + scratch) * WIDTH
     clock, y = address(block, first_group), address(block, first_group + CLOCK * WIDTH)
     dense = address(block, first_group + groups * group * WIDTH)
+    seen = address(dense, (groups * rows + dims.workspace) * WIDTH)
+    found = address(seen, watched * WIDTH)
     away_clock, away_y, away_dense, lot_clock, lot_y = clock, y, dense, clock, y
     cell, away_cell, lot_cell = np.full(WIDTH, -1), np.full(WIDTH, -1), np.full(WIDTH, -1)
     for which in range(WIDTH):
@@ -243,6 +256,8 @@ def drive(
         away_dense = address(dense, rows * WIDTH)
         for which in range(WIDTH):
             fill(which, -1, start, numbers, spans, control, away_clock, away_y, samples, members, dims)
+    if OBSERVED:
+        sums[first:last, LENGTH:] = 0.0
     mode, queue, look, flips = STIFF, first, ALL, 0
     while True:
         if SWITCHING and look != 0:
@@ -280,12 +295,19 @@ def drive(
         t, h, accept, rate = attempt(
             mode, clock, y, dense, y_new, middle, out, steering, dims, step, step_smooth, pushes, network
         )
+        if HALTS:
+            h = halt(accept, t, h, clock, y, y_new, dense, found, dims, section)
         counted = accept & (t >= load(clock, START, WIDTH))
         if SYNC_ERROR:
             observe(clock, y, h, counted, accept, y_new, dense, middle, members, dims)
         if SECTION and any_lane(counted):
             now = load(clock, BASE, WIDTH) + t
-            cut(counted, now, h, y, y_new, dense, cell, counts, points, steering[DIRECTION], dims, section)
+            for k in range(dims.sections):
+                way = steering[DIRECTION if k == 0 else FURTHER + k - 1]
+                cut(k, counted, now, h, y, y_new, dense, found, cell, counts, points, way, dims, section)
+        if OBSERVED and any_lane(counted):
+            now = load(clock, BASE, WIDTH) + t
+            tally(lane_bits(counted), now, h, y, y_new, dense, seen, cell, sums, steering, rule, dims, values)
         if TRAJECTORY and any_lane(accept):
             sample(clock, y, arrive(clock, t, h), h, lane_bits(accept), y_new, dense, cell, spans, samples, dims)
         look, flips = conclude(mode, t, h, accept, rate, clock, y, y_new, out, steering, dims, pushes, network)

@@ -79,14 +79,16 @@ def signatures(driver: Driver) -> dict[str, Any]:
         times = (lane, lane, lane) if driver.series else (lane, lane)
         step = (*times, *[ADDRESS] * 4, types.float64, types.float64, *more)
         result = types.UniTuple(lane, 2) if driver.switching or driver.kinks else lane
+        values = types.void(lane, lane, lane, *[ADDRESS] * 4, sizes)
         known = {
             "step": result(*step),
             "step_smooth": result(*step),
-            "section": lane(lane, lane, lane, *[ADDRESS] * 3, sizes),
+            "section": values if driver.functional else lane(lane, lane, lane, *[ADDRESS] * 3, sizes),
+            "values": values,
             "pushes": types.void(lane, *[ADDRESS] * 3, *more),
         }
         arrays = (*[_input] * 3, _vector, _matrix, _matrix, _counts, _cube, _cube)
-        own = (sizes, _vector, types.Tuple(more))
+        own = (sizes, _vector, _vector, types.Tuple(more))
     functions = [types.FunctionType(known[name]) for name in driver.functions]
     entry = types.void(*functions, *own, types.int64, types.int64, *arrays)
     return {**{name: known[name] for name in dict.fromkeys(driver.functions)}, driver.entry: entry}
@@ -288,7 +290,7 @@ def _kernel(source: KernelSource) -> Kernel:
     else:
         loops = source.elimination
         network = () if loops is None else (loops.arrays, loops.weights)
-        own = (*functions, source.dimensions, np.array(source.marks, np.float64), network)
+        own = (*functions, source.dimensions, np.array(source.marks, np.float64), np.array(source.rule), network)
     return Kernel(source, compiled, driver, own)
 
 

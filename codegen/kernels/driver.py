@@ -27,7 +27,8 @@ class Driver:
     """What the text of a driver depends on; scenes that agree in it share its machine code.
 
     `width` is the number of cells in a register, or of modes in one; `series` is True for Taylor steps, which choose
-    their length, and `kinks` for those among them that end at kinks.
+    their length, and `kinks` for those among them that end at kinks; `observes` is True if values of the scene are
+    observed, `sections` if it has sections on functions, `halts` if a function of the state, the last of these, ends a cell.
     """
 
     kind: KernelKind
@@ -38,9 +39,13 @@ class Driver:
     contacts: bool = False
     series: bool = False
     kinks: bool = False
+    observes: bool = False
+    sections: bool = False
+    halts: bool = False
 
     def __str__(self) -> str:
-        traits = [name for name in ("looped", "switching", "contacts", "kinks") if getattr(self, name)]
+        names = ("looped", "switching", "contacts", "kinks", "observes", "sections", "halts")
+        traits = [name for name in names if getattr(self, name)]
         subject = "orbits and their modes" if self.kind is KernelKind.MODES else "sweeps"
         records = ", ".join(("final state", *self.records))
         lanes = f"{self.width} lane{'s' * (self.width != 1)}"
@@ -50,11 +55,22 @@ class Driver:
     def functions(self) -> tuple[str, ...]:
         """The functions of a scene, in the order in which the driver takes them; `step` stands for those not called."""
         wanted: tuple[tuple[str, bool], ...] = (
-            ("step_smooth", self.switching), ("section", Record.SECTION in self.records), ("pushes", self.contacts),
+            ("step_smooth", self.switching), ("section", self.cuts or self.halts),
+            ("values", self.observes), ("pushes", self.contacts),
         )  # fmt: skip
         if self.kind is KernelKind.MODES:
             wanted = (("carry", True), ("pushes", self.contacts), ("release", self.contacts))
         return ("step", *(name if called else "step" for name, called in wanted))
+
+    @property
+    def cuts(self) -> bool:
+        """True if section points are taken."""
+        return self.sections or Record.SECTION in self.records
+
+    @property
+    def functional(self) -> bool:
+        """True if functions of the state are looked at, for sections or for the end of a cell."""
+        return self.sections or self.halts
 
     @property
     def entry(self) -> str:
@@ -69,6 +85,9 @@ class Driver:
             "WIDTH": 1 if modes else self.width,
             **({"LANES": self.width} if modes else {}),
             **{name.upper(): name in self.records for name in Record},
+            "SECTION": self.cuts,
+            "OBSERVED": self.observes,
+            "HALTS": self.halts,
             "CONTACTS": self.contacts,
             "SWITCHING": self.switching,
             "LOOPED": self.looped,
@@ -80,7 +99,21 @@ class Driver:
     def text(self) -> str:
         """The module."""
         last = "modes" if self.kind is KernelKind.MODES else "sweep"
-        pieces = ("dense", "recording", "cells", "control", *(("contacts",) if self.contacts else ()), last)
+        chosen = [
+            name
+            for name, called in (("contacts", self.contacts), ("observing", self.observes), ("halting", self.halts))
+            if called
+        ]
+        surfaces = "sections" if self.functional else "one_section"
+        pieces = (
+            "dense",
+            *([surfaces] if self.cuts or self.halts else []),
+            "recording",
+            "cells",
+            "control",
+            *chosen,
+            last,
+        )
         lines = [
             f'"""Driver of {"orbits and their modes" if last == "modes" else "sweeps"}, {self.width} lanes.',
             "",

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.observable import Rate
 from synchain.models.dynamics.periodicity import angular_frequency
 from synchain.models.dynamics.record import Record
 
@@ -30,6 +31,7 @@ from ..steps.step import PAIR, SCALED, Step, function_name, node_function
 from ..steps.unrolled import Unrolled
 from ..taylor import write_looped, write_step
 from .driver import Driver, KernelKind, imports
+from .observed import count_values, rule_of, values_function
 
 __all__ = [
     "KernelSource",
@@ -56,7 +58,7 @@ class KernelSource:
 
     `marks` says of each node how many oscillators it stands for, or of each component of a mode which contact's velocity
     it is (-1: none).  `elimination` holds the integer arrays that a kernel of loops runs through; None if its steps are
-    written out.
+    written out.  `rule` has the points and weights by which observed values are integrated over a step.
     """
 
     text: str = field(repr=False)
@@ -66,6 +68,7 @@ class KernelSource:
     dimensions: Dimensions | ModeDimensions = field(repr=False)
     marks: tuple[int, ...] = field(repr=False)
     elimination: Program | None = field(default=None, repr=False, compare=False)
+    rule: tuple[float, ...] = field(default=(), repr=False)
 
     @property
     def integrator(self) -> str:
@@ -106,6 +109,9 @@ def emit(
     width: int | None = None,
     multiplicity: Sequence[int] | None = None,
     *,
+    observed: Sequence[sp.Expr] = (),
+    sections: Sequence[tuple[sp.Expr, ...]] = (),
+    stop: sp.Expr | None = None,
     unroll: int = LARGEST_UNROLLED,
     fill: float = FILL_LIMIT,
 ) -> KernelSource:
@@ -125,6 +131,12 @@ def emit(
         Cells that one register holds; by default what suits the processor.
     multiplicity
         How many oscillators each node stands for in the synchronisation error; by default one.
+    observed
+        Values that the kernel tallies over the window (`synchain.models.dynamics.observable`).
+    sections
+        Functions of which points are taken when they pass zero, each followed by the values that its points keep.
+    stop
+        A function that ends a cell when it passes zero.
     unroll
         Nodes up to which a step is written out; the steps of a larger network, or of more than MOST_OF_LINKS operations in
         its links, run in loops.
@@ -149,6 +161,8 @@ def emit(
     unknown = [r for r in records if r not in list(Record)]
     if unknown:
         raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(Record)}")
+    if "section" in records and (sections or stop is not None):
+        raise ValueError("the record 'section' beside functions of the state: found both; expected one of them")
     if "section" in records and section is None:
         raise ValueError("the record 'section' needs a section function, for example v_1")
     width = default_width(equations, method) if width is None else width
@@ -168,25 +182,55 @@ def emit(
     states = [s.name for node in plain.nodes for s in node.state]
     names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
     functions, scratch, count, kinks = (_series if method.series else _stages)(plain, method, names, elimination)
-    switching = method.smooth is not None
-    chosen = Driver(KernelKind.SWEEP, width, ordered, looped, switching, plain.sticks, method.series, kinks)
+    traits = (
+        looped,
+        method.smooth is not None,
+        plain.sticks,
+        method.series,
+        kinks,
+        bool(observed),
+        bool(sections),
+        stop is not None,
+    )
+    chosen = Driver(KernelKind.SWEEP, width, ordered, *traits)
     events = [
         *push_functions(plain, names, looped),
         *_section(equations, plain, section if "section" in ordered else None),
     ]
-    if "section" in ordered:
+    if observed:
+        about = "The observed values at the fraction theta of the step."
+        events.append(values_function(equations, plain, observed, "values", about))
+    functional = [*_padded(sections), *([] if stop is None else [stop])]
+    if functional:
+        about = "The section functions at the fraction theta of the step, what their points keep, and what ends a cell."
+        events.append(values_function(equations, plain, functional, "section", about))
+    if chosen.cuts or observed or functional:
         functions.append(driver.text("dense"))
+    if any(e.has(Rate) for e in (*observed, *functional)):
+        functions.append(driver.text("slope"))
     text = "\n\n\n".join([*functions, *map(LANES.function, events)]) + "\n"
-    constants = {"WIDTH": width, "DENSE": bool(ordered) or plain.sticks, "SERIES": method.series}
+    constants = {
+        "WIDTH": width,
+        "DENSE": bool(ordered or observed or functional) or plain.sticks,
+        "SERIES": method.series,
+    }
     if elimination is not None:
         solves = method.implicit or plain.inertial
         constants |= {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": method.dense_rows}
         constants |= {"ENTRIES": elimination.entries if solves else 0}
-    head = describe(equations, plain, method, ordered, count)
+    watched = count_values(equations, observed)
+    more = [f"{watched} observed values"] * bool(watched) + [f"{len(sections)} sections"] * bool(sections)
+    more += ["a stop"] * (stop is not None)
+    head = describe(equations, plain, method, (*ordered, *more), count)
     named = "\n".join(f"{name} = {value!r}" for name, value in constants.items())
     text = "\n\n\n".join([head, imports(text), named, text])
-    sizes = _dimensions(plain, method, scratch)
-    return KernelSource(text, equations, method, chosen, sizes, weights or (1,) * equations.n, elimination)
+    sizes = _dimensions(plain, method, scratch)._replace(
+        observed=watched,
+        sections=len(sections) or int("section" in ordered),
+        kept=max((len(parts) - 1 for parts in sections), default=0),
+    )
+    rule = rule_of(method) if observed else ()
+    return KernelSource(text, equations, method, chosen, sizes, weights or (1,) * equations.n, elimination, rule)
 
 
 def default_width(equations: Equations, method: Integrator) -> int:
@@ -203,6 +247,13 @@ def _of_links(equations: Equations) -> int:
     """The number of operations that the right-hand sides of all links take."""
     size = {edge: sum(int(sp.count_ops(e)) for e in edge.rhs) for edge in equations.edges}
     return sum(size[edge] for _, edge in equations.linked()) if equations.n <= LARGEST_UNROLLED else 0
+
+
+def _padded(sections: Sequence[tuple[sp.Expr, ...]]) -> list[sp.Expr]:
+    """The section functions, then what each keeps, filled up with zeros."""
+    kept = max((len(parts) - 1 for parts in sections), default=0)
+    rows = [[*parts[1:], *[sp.S.Zero] * (kept + 1 - len(parts))] for parts in sections]
+    return [*(parts[0] for parts in sections), *(e for row in rows for e in row)]
 
 
 def _series(
@@ -242,6 +293,9 @@ def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimension
         error_order=method.error_order,
         smooth_error_order=0 if method.smooth is None else method.smooth.error_order,
         repeats=int(angular_frequency(plain) is not None),
+        observed=0,
+        sections=0,
+        kept=0,
     )
 
 

@@ -110,7 +110,7 @@ class Algebra(Generic[V]):
         Parameters
         ----------
         function : str
-            The name that is called.
+            What is called: a name, or ``name.own``, or ``name[3]``.
         count : int
             Number of arguments without a name.
         options : sequence of str
@@ -170,7 +170,7 @@ class Expression:
                     return algebra.negative(self._value(operand, algebra, depth + 1))
                 case ast.BinOp():
                     return self._operation(node, algebra, depth + 1)
-                case ast.Call(func=ast.Name(id=function)):
+                case ast.Call(func=called) if (function := _called(called)) is not None:
                     return self._call(function, node, algebra, depth + 1)
             return self._logic(node, algebra, depth + 1)
         except NoMeaning as error:
@@ -228,6 +228,18 @@ class Expression:
         if isinstance(node, ast.Tuple):
             return ",".join(self._written(element) for element in node.elts)
         return (ast.get_source_segment(self.text, node) or "").replace(" ", "")
+
+
+def _called(node: ast.expr) -> str | None:
+    """The name of what is called: f, nodes.mean or nodes[3]; None for anything else."""
+    match node:
+        case ast.Name(id=name):
+            return name
+        case ast.Attribute(value=ast.Name(id=name), attr=own):
+            return f"{name}.{own}"
+        case ast.Subscript(value=ast.Name(id=name), slice=ast.Constant(value=int() as i)) if not isinstance(i, bool):
+            return f"{name}[{i}]"
+    return None
 
 
 def parse(text: str) -> Expression | None:

@@ -15,11 +15,13 @@ from ..mechanics.friction import ContactModel, FrictionLaw
 from ..mechanics.oscillator import FieldModel
 from ..mechanics.physics import check_masses, check_power
 from .axis import Axis
+from .draw import LIMIT, drawn_axes, draws
 from .model import Model, NodeKind, as_contact, as_coupling, as_groups, as_law, as_layers, as_oscillator
+from .observables import observables, sections, stop
 from .parameters import at_nodes, drive, parameters
 from .section import Section
 from .start import SEED_LIMIT, chosen_start, default_start
-from .sweep import check_sweep, read_axes
+from .sweep import check_draws, check_sweep, read_axes
 
 __all__ = ["LIMITS", "TimeUnit", "complete", "integrators"]
 
@@ -42,6 +44,8 @@ LIMITS: Mapping[str, tuple[Any, Any]] = {
     "max_steps": (1, 10**12),
     "samples": (0, 10**8),
     "seed": (0, SEED_LIMIT),
+    "realisations": (0, LIMIT),
+    "rng": (0, SEED_LIMIT),
 }
 """The range of each number that belongs to a keyword, both ends in it."""
 
@@ -75,19 +79,28 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     values |= _model(given)
     model: Model = values["model"]
     values["axes"] = axes = read_axes(given["axes"], given["zipped"])
-    values["parameters"] = numbers = parameters(model, given["parameters"], axes)
+    values["rng"] = check_integer("rng", given["rng"], *LIMITS["rng"])
+    values["draws"] = draws(given["draws"], given["realisations"])
+    drawn = drawn_axes(model, values["draws"], given["realisations"], values["rng"])
+    values["parameters"] = numbers = parameters(model, given["parameters"], (*axes, *drawn))
     values["initial"] = _start(model, given["initial"], values["seed"])
     values["record"] = _records(model, given["record"])
     values["section"] = _section(model, given["section"])
+    values["observe"] = observables(model, numbers, given["observe"])
+    values["sections"] = sections(model, numbers, given["sections"])
+    values["stop"] = stop(model, numbers, given["stop"])
+    _check_sections(values)
     values |= _times(model, numbers, given)
     for name in ("transient", "window"):
         values[name] = check_number(name, given[name], *LIMITS[name])
-    if values["record"] and values["window"] == 0.0:
-        raise ValueError(f"window: found 0, in which {values['record'][0]!r} has nothing to record; give a window > 0")
+    recorded = (*values["record"], *values["observe"], *values["sections"])
+    if recorded and values["window"] == 0.0:
+        raise ValueError(f"window: found 0, in which {str(recorded[0])!r} has nothing to record; give a window > 0")
     values |= _numerics(given, values["record"])
     values["continuation"] = check_sweep(model, values)
-    _check_friction(model, numbers, axes, values["zipped"])
-    _check_physics(model, numbers, axes)
+    check_draws(model, values, drawn)
+    _check_friction(model, numbers, (*axes, *drawn), values["zipped"])
+    _check_physics(model, numbers, (*axes, *drawn))
     return values
 
 
@@ -163,6 +176,17 @@ def _section(model: Model, given: object) -> Section:
     section = Section.parse(default if given is None else given)
     model.check_state(section.variable, "section variable")
     return section
+
+
+def _check_sections(values: Mapping[str, Any]) -> None:
+    """Refuse two names for one variable, and two ways to say a section."""
+    other = "sections" if values["sections"] else "stop" if values["stop"] else None
+    if Record.SECTION in values["record"] and other:
+        raise ValueError(f"record: found 'section' beside {other}; expected one of them; make it one of the sections")
+    made = {f"{name}{more}" for name in values["sections"] for more in ("", "_time", "_count", "_kept")}
+    twice = sorted(made & {*values["observe"]})
+    if twice:
+        raise ValueError(f"observe: found the name {twice[0]!r}, which a section has; rename one of them")
 
 
 def _times(model: Model, numbers: Mapping[str, float], given: Mapping[str, object]) -> dict[str, object]:

@@ -12,6 +12,7 @@ from ..inputs.checks import check_integer, check_keys, check_table, check_text, 
 from ..inputs.plugins import part
 from ..mechanics.coupling import Coupling, Potential, Rates, split
 from ..mechanics.table import as_name_or_table
+from .draw import Draw
 from .parameters import collected
 
 __all__ = ["arguments", "as_dict", "graph_of", "graph_table"]
@@ -48,7 +49,7 @@ def arguments(values: object, keywords: Iterable[str], folder: Path | None = Non
             raise ValueError("zipped is given twice, in [sweep] and above; expected it once; remove one")
         given["zipped"] = sweep.pop("zipped", given.get("zipped", False))
         given["axes"] = sweep
-    for name in ("parameters", "initial"):
+    for name in ("parameters", "initial", "observe", "sections", "draws"):
         if name in given:
             check_table(name, given[name])
     for name in ("oscillator", "friction", "coupling"):
@@ -146,6 +147,17 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
     written["parameters"] = collected(values["parameters"], varied)
     written["initial"] = {name: list(states) for name, states in values["initial"].items()}
     written["record"] = [str(record) for record in values["record"]]
+    written["observe"] = {name: str(observable) for name, observable in values["observe"].items()}
+    written["sections"] = {name: section.as_table() for name, section in values["sections"].items()}
+    written["draws"] = {
+        name: str(drawn) if isinstance(drawn, Draw) else [list(row) for row in drawn]
+        for name, drawn in values["draws"].items()
+    }
+    if not written["draws"]:
+        del written["rng"], written["realisations"]
+    for name in ("observe", "sections", "stop", "draws"):
+        if not written[name]:
+            del written[name]
     written["sweep"] = {axis.name: list(axis.values) for axis in written.pop("axes")}
     return written
 

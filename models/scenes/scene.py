@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..dynamics.equations import Equations
+from ..dynamics.observable import Observable
 from ..dynamics.periodicity import Drive, as_function, names_in, period_of
 from ..dynamics.record import Record
 from ..graphs.topology import Topology
@@ -25,6 +26,7 @@ from ..mechanics.oscillator import Oscillator
 from .axis import Axis
 from .complete import TimeUnit, complete
 from .dictionary import arguments, as_dict
+from .draw import Draws, drawn_axes
 from .file import save_scene
 from .model import Group, Model, as_oscillator, as_topology
 from .parameters import drive, varied, without
@@ -69,8 +71,16 @@ class Scene(Drawn, Written):
         Initial states: a number, one number for each node, or {low, high, seed} for random ones.
     record : iterable of str, optional
         What each cell records: "sync_error", "section", "trajectory".
+    observe : mapping of str to Observable or str, optional
+        What each cell observes over the window, by the names of the results' variables: `mean`, `maximum`, `minimum`,
+        `end` or `variance` of an expression of the states, such as ``"mean(nodes.mean(v**2/2))"``.
     section : Section or str, optional
         When section points are taken, such as "v_1 falling".
+    sections : mapping of str to Section or table, optional
+        Sections on functions of the states, by the names of the results' variables:
+        ``Section("x_1 - x_2", "rising", keep=("v_1", "v_2"))``.
+    stop : str or Expr, optional
+        A function of the states, parameters and t that ends a cell when it passes zero, in the transient too.
     transient, window : float
         Time before the records, and time of the records, in units of `time_unit`.
     time_unit : str, optional
@@ -91,6 +101,13 @@ class Scene(Drawn, Written):
         "up" or "down" if cells start from the end of their neighbours, else "none".
     seed : int
         Seed of random initial states.
+    realisations : int
+        Realisations of what is drawn, a further dimension of the sweep; 0 for none.
+    draws : mapping, optional
+        What is drawn, by the names of parameters and initial states: `normal`, `uniform` (of each node by itself), or a
+        list with one entry for each realisation.
+    rng : int
+        Seed of what is drawn.
 
     Attributes
     ----------
@@ -116,7 +133,10 @@ class Scene(Drawn, Written):
     parameters: Frozen[float]
     initial: Frozen[tuple[float, ...]]
     record: tuple[Record, ...]
+    observe: Frozen[Observable]
     section: Section
+    sections: Frozen[Section]
+    stop: str | None
     transient: float
     window: float
     time_unit: TimeUnit
@@ -129,6 +149,9 @@ class Scene(Drawn, Written):
     zipped: bool
     continuation: Continuation
     seed: int
+    realisations: int
+    draws: Frozen[Draws]
+    rng: int
     model: Model = field(compare=False)
     given: Frozen[Any] = field(compare=False)
 
@@ -146,7 +169,10 @@ class Scene(Drawn, Written):
         parameters: Mapping[str, object] | None = None,
         initial: Mapping[str, object] | None = None,
         record: Iterable[str] | None = None,
+        observe: Mapping[str, Observable | str] | None = None,
         section: Section | str | None = None,
+        sections: Mapping[str, Section | Mapping[str, object]] | None = None,
+        stop: object = None,
         transient: float = 300.0,
         window: float = 100.0,
         time_unit: str | None = None,
@@ -159,6 +185,9 @@ class Scene(Drawn, Written):
         zipped: bool = False,
         continuation: str = "none",
         seed: int = 0,
+        realisations: int = 0,
+        draws: Mapping[str, object] | None = None,
+        rng: int = 0,
     ) -> None:
         given = {name: value for name, value in locals().items() if name != "self"}
         values = complete(given)
@@ -239,9 +268,15 @@ class Scene(Drawn, Written):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of cells along each dimension of the sweep; zipped axes are one dimension, no axes none."""
+        """Number of cells along each dimension of the sweep, realisations last; zipped axes are one, no axes none."""
         lengths = tuple(len(axis) for axis in self.axes)
-        return lengths[:1] if self.zipped else lengths
+        more = (self.realisations,) if self.realisations else ()
+        return (*(lengths[:1] if self.zipped else lengths), *more)
+
+    @property
+    def drawn(self) -> tuple[Axis, ...]:
+        """What is drawn, with one value for each realisation; all of these run together along the last dimension."""
+        return drawn_axes(self.model, self.draws, self.realisations, self.rng)
 
     @property
     def cells(self) -> int:

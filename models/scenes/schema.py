@@ -89,6 +89,12 @@ def _rows() -> dict[str, Table]:
     words = {"type": "string", "pattern": "->| on "}
     coupling = {"anyOf": [*_part(COUPLING, "none")["anyOf"], words, *tables]}
     graph = {"anyOf": _graphs()}
+    section = {
+        "function": TEXT,
+        "direction": {"enum": list(map(str, Direction))},
+        "level": NUMBER,
+        "keep": {"anyOf": [TEXT, {"type": "array", "items": TEXT}]},
+    }
     return {
         "oscillator": oscillator,
         "friction": friction,
@@ -102,6 +108,10 @@ def _rows() -> dict[str, Table]:
             "additionalProperties": _either(numbers),
         },
         "initial": {"type": "object", "additionalProperties": _either(numbers, _table(uniform, "low", "high"))},
+        "observe": {"type": "object", "additionalProperties": TEXT},
+        "sections": {"type": "object", "additionalProperties": _table(section, "function")},
+        "stop": TEXT,
+        "draws": {"type": "object", "additionalProperties": {"anyOf": [TEXT, {"type": "array", "minItems": 1}]}},
         "section": {**TEXT, "pattern": rf"^\s*\S+\s+({'|'.join(Direction)})(\s|$)"},
         "integrator": {"enum": ["auto", *integrators()]},
         "axes": {

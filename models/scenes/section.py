@@ -1,10 +1,13 @@
-"""The surface on which section points are taken: one state variable crosses a level in a stated direction."""
+"""The surface on which section points are taken: a state, or a function of the states, crosses a level."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..inputs.checks import check_number, check_text
+import sympy as sp
+
+from ..dynamics.observable_text import LENGTH, as_value
+from ..inputs.checks import check_keys, check_number, check_table, check_text, short_repr
 from ..inputs.words import Word
 
 __all__ = ["Direction", "Section"]
@@ -20,19 +23,38 @@ class Direction(Word):
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """State variable `variable` (such as "v_1") passes `level`: falling (from above), rising or both.
+    """A state, or a function of the states, passes `level`: falling (from above), rising or both.
 
-    Raises ValueError or TypeError on an unknown direction or a level that is no finite number.
+    Parameters
+    ----------
+    variable : str or Expr
+        A state such as "v_1", or of the `sections` of a scene any function of states, parameters and t.
+    direction : Direction or str
+    level : float
+    keep : iterable of str or Expr, optional
+        What the points of a function keep beside their time: expressions; one of a state of all nodes is kept of each.
+        All states if left out.
+
+    Raises
+    ------
+    ValueError, TypeError
+        On an unknown direction, a level that is no finite number, or an expression that cannot be read.
     """
 
     variable: str
     direction: Direction = Direction.FALLING
     level: float = 0.0
+    keep: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
-        check_text("section variable", self.variable)
+        if not isinstance(self.variable, str):
+            object.__setattr__(self, "variable", _text("section", self.variable))
+        check_text("section variable", self.variable, LENGTH)
         object.__setattr__(self, "direction", Direction.parse("section direction", self.direction))
         object.__setattr__(self, "level", check_number("section level", self.level))
+        if self.keep is not None:
+            kept = (self.keep,) if isinstance(self.keep, str | sp.Expr) else self.keep
+            object.__setattr__(self, "keep", tuple(_text("section keep", e) for e in kept))
 
     @classmethod
     def parse(cls, words: object) -> Section:
@@ -48,5 +70,28 @@ class Section:
             check_number("section level", parts[2]) if len(parts) > 2 else 0.0,
         )
 
+    @classmethod
+    def of_table(cls, what: str, given: object) -> Section:
+        """Return the section of a table {function, direction, level, keep}; a Section passes unchanged."""
+        if isinstance(given, Section):
+            return given
+        table = check_table(what, given)
+        check_keys(what, table, ("function", "direction", "level", "keep"))
+        if "function" not in table:
+            raise ValueError(f"{what}: found {short_repr(dict(table))}; expected function = 'x_1 - x_2'")
+        direction, level = table.get("direction", Direction.FALLING), table.get("level", 0.0)
+        return cls(table["function"], direction, level, table.get("keep"))  # type: ignore[arg-type]
+
+    def as_table(self) -> dict[str, object]:
+        """Return the section as a table in JSON types."""
+        level = {"level": self.level} if self.level else {}
+        keep = {} if self.keep is None else {"keep": list(self.keep)}
+        return {"function": self.variable, "direction": str(self.direction), **level, **keep}
+
     def __str__(self) -> str:
         return f"{self.variable} {self.direction}" + (f" {self.level!r}" if self.level else "")
+
+
+def _text(what: str, value: object) -> str:
+    """An expression as the text that it is kept as."""
+    return sp.sstr(as_value(what, value), order="lex")

@@ -18,7 +18,7 @@ from .axis import LIMIT, Axis, known_length
 from .model import Model, in_range
 from .parameters import drive
 
-__all__ = ["Continuation", "check_sweep", "read_axes", "rest_in_sweep"]
+__all__ = ["Continuation", "check_draws", "check_sweep", "read_axes", "rest_in_sweep"]
 
 
 class Continuation(Word):
@@ -69,6 +69,21 @@ def check_sweep(model: Model, values: Mapping[str, Any]) -> Continuation:
     if "trajectory" in values["record"]:
         _samples(model, values["samples"], cells)
     return _continuation(model, axes, zipped, values["continuation"])
+
+
+def check_draws(model: Model, values: Mapping[str, Any], drawn: Sequence[Axis]) -> None:
+    """Refuse draws that are unknown, out of range or swept as well, too many cells, and continued realisations."""
+    swept = {axis.name for axis in values["axes"]}
+    for axis in drawn:
+        if axis.name in swept:
+            raise ValueError(f"draw {axis.name!r}: it is an axis as well; expected one of them")
+        _axis(model, values["parameters"], axis)
+    if drawn and values["continuation"] != Continuation.NONE:
+        raise ValueError(
+            f"continuation: found {str(values['continuation'])!r} with realisations; expected none of either"
+        )
+    lengths = [len(axis) for axis in values["axes"]]
+    _cells([*(lengths[:1] if values["zipped"] else lengths), values["realisations"] or 1], False)
 
 
 def _cells(lengths: Sequence[int], zipped: object) -> int:

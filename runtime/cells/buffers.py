@@ -16,9 +16,10 @@ IN_MEMORY = 10**9
 """Numbers of the largest result that is kept in memory, 8 GB."""
 
 
-def numbers_of_a_cell(dimension: int, room: int, samples: int) -> int:
-    """Return how many numbers the buffers hold for each cell."""
-    return dimension * (1 + samples) + (Point.STATE + dimension) * room + len(Sum) + len(Count)
+def numbers_of_a_cell(dimension: int, room: int, samples: int, observed: int = 0, kept: int | None = None) -> int:
+    """Return how many numbers the buffers hold for each cell; the arguments are those of `Buffers.empty`."""
+    kept = dimension if kept is None else kept
+    return dimension * (1 + samples) + (Point.STATE + kept) * room + len(Sum) + observed + len(Count)
 
 
 @dataclass(slots=True)
@@ -30,12 +31,13 @@ class Buffers:
     ----------
     end : ndarray, shape (cells, dimension)
         States at which the cells stopped.
-    sums : ndarray, shape (cells, len(Sum))
-        Synchronisation errors and the time at which each cell stopped.
+    sums : ndarray, shape (cells, len(Sum) + observed)
+        Synchronisation errors, the time at which each cell stopped, and what was observed.
     counts : ndarray of int64, shape (cells, len(Count))
         Status, steps and numbers of section points.
-    points : ndarray, shape (cells, room, 1 + dimension)
-        Time and state of the section points, NaN if a cell has fewer.
+    points : ndarray, shape (cells, room, 1 + kept)
+        Time and state of the section points, or time, number of the section and what it keeps; NaN
+        if a cell has fewer.
     samples : ndarray, shape (cells, samples, dimension)
         States at equally spaced times of the window.
     """
@@ -47,13 +49,28 @@ class Buffers:
     samples: np.ndarray
 
     @classmethod
-    def empty(cls, cells: int, dimension: int, room: int, samples: int) -> Buffers:
-        """Return buffers of cells that have not run: numbers NaN, counts zero."""
+    def empty(
+        cls, cells: int, dimension: int, room: int, samples: int, observed: int = 0, kept: int | None = None
+    ) -> Buffers:
+        """Return buffers of cells that have not run: numbers NaN, counts zero.
+
+        Parameters
+        ----------
+        cells, dimension : int
+            Numbers of cells and of states.
+        room, samples : int
+            Section points that there is room for, and points of a trajectory.
+        observed : int
+            Numbers of what is observed.
+        kept : int, optional
+            Numbers of a section point beside its time; those of the state if left out.
+        """
+        kept = dimension if kept is None else kept
         return cls(
             end=np.full((cells, dimension), np.nan),
-            sums=np.full((cells, len(Sum)), np.nan),
+            sums=np.full((cells, len(Sum) + observed), np.nan),
             counts=np.zeros((cells, len(Count)), np.int64),
-            points=np.full((cells, room, Point.STATE + dimension), np.nan),
+            points=np.full((cells, room, Point.STATE + kept), np.nan),
             samples=np.full((cells, samples, dimension), np.nan),
         )
 

@@ -16,6 +16,7 @@ from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
 from .choice import chosen_integrator
+from .observed import Observed, Sections
 from .reduce import Reduction, as_reduction
 
 __all__ = ["kernel", "kernel_source", "warn_of_chords", "write_kernel"]
@@ -62,20 +63,21 @@ def write_kernel(reduction: Reduction, width: int | None = None) -> KernelSource
         section = sp.Symbol(reduction.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
     method = chosen_integrator(reduction)
     width = default_width(reduction.equations, method) if width is None else width
-    return _emitted(reduction.equations, method, reduction.records, section, width, reduction.multiplicity)
+    sections = Sections(scene)
+    recorded = (reduction.records, section, width, reduction.multiplicity)
+    return _emitted(reduction.equations, method, recorded, (Observed(scene).values, sections.values, sections.stop))
 
 
 @lru_cache(maxsize=32)
 def _emitted(
     equations: Equations,
     method: Integrator,
-    records: tuple[str, ...],
-    section: sp.Expr | None,
-    width: int,
-    multiplicity: tuple[int, ...] | None,
+    recorded: tuple[tuple[str, ...], sp.Expr | None, int, tuple[int, ...] | None],
+    functions: tuple[tuple[sp.Expr, ...], tuple[tuple[sp.Expr, ...], ...], sp.Expr | None],
 ) -> KernelSource:
     """The text of a kernel; runs that differ in numbers alone share it."""
-    return emit(equations, method, records, section, width, multiplicity)
+    observed, sections, stop = functions
+    return emit(equations, method, *recorded, observed=observed, sections=sections, stop=stop)
 
 
 def warn_of_chords(source: KernelSource) -> None:
@@ -83,6 +85,8 @@ def warn_of_chords(source: KernelSource) -> None:
     there.
     """
     between = [record for record in ("trajectory", "section") if record in source.records]
+    between += ["sections"] if source.driver.sections else []
+    between += ["observables"] if source.driver.observes else []
     if between and source.method.dense_order < 2:
         warnings.warn(
             f"{source.integrator} draws straight lines between its steps, so errors of {' and '.join(between)} are not bounded "

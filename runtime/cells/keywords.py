@@ -35,7 +35,11 @@ def with_axes(function: Callable[..., object], scene: Scene, axes: Mapping[str, 
     swept: dict[str, object] = {axis.name: axis.values for axis in a_scene(scene).axes}
     start = {name: list(values) for name, values in scene.initial.items()}
     for name, value in axes.items():
-        if isinstance(value, Iterable) and not isinstance(value, str | bytes) and getattr(value, "ndim", 1) > 0:
+        if (
+            isinstance(value, Iterable)
+            and not isinstance(value, str | bytes | Mapping)
+            and getattr(value, "ndim", 1) > 0
+        ):
             swept[name] = value
         elif state := _state(scene, name):
             start[state.base][scene.equations.holders(state.base).index(state.index)] = check_number(name, value)

@@ -94,13 +94,16 @@ class Planner:
         self.scene = scene
         self.equations = scene.equations
         self.values = {axis.name: np.array(axis.values) for axis in scene.axes}
+        self.drawn = {axis.name: np.array(axis.values) for axis in scene.drawn}
 
     def columns(self, cells: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the value of each axis in each of these cells."""
-        if self.scene.zipped or not self.values:
-            return {name: values[cells] for name, values in self.values.items()}
+        """Return the value of each axis, and of what is drawn, in each of these cells."""
+        if not self.scene.shape:
+            return {}
         places = np.unravel_index(cells, self.scene.shape)
-        return {name: values[place] for (name, values), place in zip(self.values.items(), places, strict=True)}
+        along = places[:1] * len(self.values) if self.scene.zipped else places
+        columns = {name: values[place] for (name, values), place in zip(self.values.items(), along, strict=False)}
+        return columns | {name: values[places[-1]] for name, values in self.drawn.items()}
 
     def rows(self, cells: np.ndarray, near: np.ndarray | None = None) -> Plan:
         """Return the rows of these cells; `near` (cells,) is the last column of their spans
@@ -142,14 +145,20 @@ class Planner:
         """Return the rows of a few cells in which every axis takes its smallest, its largest and
         its value nearest to 0.
         """
-        ends = [(v.argmin(), v.argmax(), np.abs(v).argmin()) for v in self.values.values()]
-        if not ends:
+        ends = [_ends(values) for values in self.values.values()]
+        cells = [(place,) for place in np.unique(ends)] if self.scene.zipped else [*zip(*ends, strict=True)]
+        cells = cells or [()]
+        if self.drawn:
+            places = np.unique([_ends(values) for values in self.drawn.values()])
+            cells = [(*cell, place) for cell in cells for place in places]
+        if not self.scene.shape:
             return self.rows(np.arange(1))
-        if self.scene.zipped:
-            return self.rows(np.unique(ends))
-        return self.rows(
-            np.unique([np.ravel_multi_index(places, self.scene.shape) for places in zip(*ends, strict=True)])
-        )
+        return self.rows(np.unique([np.ravel_multi_index(cell, self.scene.shape) for cell in cells]))
+
+
+def _ends(values: np.ndarray) -> tuple[int, int, int]:
+    """Where values are smallest, largest and nearest to 0."""
+    return int(values.argmin()), int(values.argmax()), int(np.abs(values).argmin())
 
 
 def periods(equations: Equations, numbers: np.ndarray) -> np.ndarray:
@@ -196,7 +205,7 @@ def longest_step(scene: Scene) -> float:
     ends = []
     for names in (parameter_names(scene, name) for name in known):
         values = [scene.parameters[name] for name in names]
-        values += [end(axis.values) for axis in scene.axes if axis.name in names for end in (min, max)]
+        values += [end(axis.values) for axis in (*scene.axes, *scene.drawn) if axis.name in names for end in (min, max)]
         ends.append((min(values), max(values)))
     corners = np.array(list(itertools.product(*ends)), dtype=float)
     return half_swing(scene.equations, dict(zip(known, corners.T, strict=True)))
@@ -228,7 +237,7 @@ def _windows(scene: Scene, period: np.ndarray) -> np.ndarray:
 def control_array(
     rtol: float, atol: float, max_step: float, max_steps: float, direction: float = 0.0, jumps: bool = True
 ) -> np.ndarray:
-    """Return the array (len(Control),) that steers a kernel.
+    """Return the array (Control.FURTHER,) that steers a kernel.
 
     Parameters
     ----------
@@ -243,7 +252,7 @@ def control_array(
     jumps : bool
         If False, a cell that repeats itself is integrated to its end all the same.
     """
-    control = np.zeros(len(Control))
+    control = np.zeros(Control.FURTHER)
     control[Control.RTOL], control[Control.ATOL] = rtol, atol
     control[Control.FIRST_STEP], control[Control.MAX_STEP] = FIRST_STEP, max_step
     control[Control.MAX_STEPS], control[Control.DIRECTION] = max_steps, direction
@@ -255,7 +264,9 @@ def control_of(planner: Planner, jumps: bool) -> np.ndarray:
     """Return the control array of a scene's sweep; `jumps` as for `control_array`."""
     scene = planner.scene
     rtol, atol = tolerances(scene, planner.extremes().numbers)
-    return control_array(rtol, atol, longest_step(scene), scene.max_steps, DIRECTIONS[scene.section.direction], jumps)
+    directions = [DIRECTIONS[section.direction] for section in scene.sections.values() or (scene.section,)]
+    control = control_array(rtol, atol, longest_step(scene), scene.max_steps, directions[0], jumps)
+    return np.concatenate([control, directions[1:]])
 
 
 def tolerances(scene: Scene, numbers: np.ndarray) -> tuple[float, float]:

@@ -24,6 +24,7 @@ from synchain.models.scenes.scene import Scene, a_scene
 
 from ..support.status import Status
 from .buffers import IN_MEMORY, Buffers, numbers_of_a_cell
+from .observed import Observed, Sections
 from .plan import Plan
 
 __all__ = ["NodeMerge", "Reduction", "as_reduction", "explain", "reduce_scene"]
@@ -129,10 +130,25 @@ class Reduction:
         """Points of a trajectory; 0 if none is recorded."""
         return self.scene.samples if "trajectory" in self.scene.record else 0
 
+    @property
+    def observed(self) -> Observed:
+        """What the scene observes."""
+        return Observed(self.scene)
+
+    @property
+    def point_size(self) -> int:
+        """Numbers of a section point beside its time."""
+        return Sections(self.scene).width(self.dimension)
+
+    def empty(self, cells: int, room: int, observed: int | None = None) -> Buffers:
+        """Return buffers of cells of the reduced network, of its result or of what a kernel tallies."""
+        observed = self.observed.numbers if observed is None else observed
+        return Buffers.empty(cells, self.dimension, room, self.samples, observed, self.point_size)
+
     def check_memory(self) -> None:
         """Raise ValueError if the results of all cells do not fit into memory."""
         cells = self.scene.cells
-        numbers = cells * numbers_of_a_cell(len(self.merge.places), 0, self.samples)
+        numbers = cells * numbers_of_a_cell(len(self.merge.places), 0, self.samples, self.observed.numbers)
         if numbers > IN_MEMORY:
             raise ValueError(
                 f"sweep: found {cells} cells, {numbers * 8 / 1e9:.0f} GB in memory; expected at most "
@@ -236,14 +252,14 @@ def _column(name: str, equations: Equations, first: list[int]) -> str:
 
 def _fixed(scene: Scene) -> dict[str, float]:
     """The parameters with one value in every cell."""
-    swept = {axis.name: axis.values for axis in scene.axes}
+    swept = {axis.name: axis.values for axis in (*scene.axes, *scene.drawn)}
     values = {name: swept.get(name, (scene.parameters[name],)) for name in scene.equations.parameters}
     return {name: found[0] for name, found in values.items() if min(found) == max(found)}
 
 
 def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> Equations:
     """Fold parameters one after the other, and say what each of them took along."""
-    equations, fixed = scene.equations, _fixed(scene)
+    equations, fixed, observed = scene.equations, _fixed(scene), _observed_parameters(scene)
     for name, value in fixed.items():
         if name not in equations.parameters or (value != 0.0 and not fold_all):
             continue
@@ -252,9 +268,23 @@ def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> 
         except ValueError as problem:
             kept.append(str(problem))
             continue
+        seen = sorted(observed & (set(equations.parameters) - set(made.parameters)))
+        if seen:
+            kept.append(f"parameter: {name} = {value:g} in every cell, but {', '.join(seen)} is observed")
+            continue
         skipped.append(_consequence(equations, made, name, value))
         equations = made
     return equations
+
+
+def _observed_parameters(scene: Scene) -> set[str]:
+    """The parameters that occur in observables and in sections on functions."""
+    sections = Sections(scene)
+    values = [*Observed(scene).values, *(e for parts in sections.values for e in parts)]
+    values += [] if sections.stop is None else [sections.stop]
+    names = {s.name for value in values for s in value.free_symbols}
+    of_nodes = {str(NodeName(name, i)) for name in scene.varied if name in names for i in range(scene.n)}
+    return (names | of_nodes) & set(scene.parameters)
 
 
 def _present(scene: Scene, equations: Equations) -> list[str]:
@@ -289,6 +319,9 @@ def _merge(
     if equations.mixed:
         kept.append("quotient: nodes of several kinds are stepped one by one")
         return equations, alone
+    if scene.observe or scene.sections or scene.stop:
+        kept.append(f"quotient: the {n} oscillators are observed one by one")
+        return equations, alone
     colours = _colours(scene)
     different = len(set(colours))
     words = f"quotient: {n} oscillators with {different} different starts"
@@ -314,7 +347,8 @@ def _colours(scene: Scene) -> list[Hashable]:
     """For each oscillator its start and its own parameters in all cells; equal if these are equal
     in every cell.
     """
-    swept = {axis.name: axis.values for axis in scene.axes}
+    drawn = {axis.name for axis in scene.drawn}
+    swept = {axis.name: axis.values for axis in (*scene.axes, *scene.drawn)}
     colours: list[Hashable] = []
     for i in range(scene.n):
         own: list[Hashable] = []
@@ -325,7 +359,8 @@ def _colours(scene: Scene) -> list[Hashable]:
             if min(found) == max(found):
                 own.append(found[0])
             else:
-                own.append(found if scene.zipped else name)  # on a grid two axes differ in some cell
+                together = scene.zipped or name in drawn
+                own.append(found if together else name)  # on a grid two axes differ in some cell
         colours.append(tuple(own))
     return colours
 

@@ -4,6 +4,7 @@ from synchain.models import Axis as Axis
 from synchain.models import Field as Field
 from synchain.models import FrictionLaw as FrictionLaw
 from synchain.models import Lagrangian as Lagrangian
+from synchain.models import Observable as Observable
 from synchain.models import Oscillator as Oscillator
 from synchain.models import Parameter as Parameter
 from synchain.models import Potential as Potential
@@ -23,6 +24,7 @@ from synchain.models import complement as complement
 from synchain.models import complete as complete
 from synchain.models import complete_bipartite as complete_bipartite
 from synchain.models import complete_multipartite as complete_multipartite
+from synchain.models import end as end
 from synchain.models import ends as ends
 from synchain.models import erdos_renyi as erdos_renyi
 from synchain.models import feed_forward as feed_forward
@@ -44,12 +46,18 @@ from synchain.models import kronecker as kronecker
 from synchain.models import ladder as ladder
 from synchain.models import latex as latex
 from synchain.models import load_scene as load_scene
+from synchain.models import maximum as maximum
+from synchain.models import mean as mean
+from synchain.models import minimum as minimum
+from synchain.models import nodes as nodes
+from synchain.models import normal as normal
 from synchain.models import one_way_ring as one_way_ring
 from synchain.models import paley as paley
 from synchain.models import petersen as petersen
 from synchain.models import probability_option as probability_option
 from synchain.models import random_cubic as random_cubic
 from synchain.models import random_regular as random_regular
+from synchain.models import rate as rate
 from synchain.models import read_edges as read_edges
 from synchain.models import read_graphml as read_graphml
 from synchain.models import read_matrix as read_matrix
@@ -61,7 +69,9 @@ from synchain.models import text as text
 from synchain.models import topology as topology
 from synchain.models import torus as torus
 from synchain.models import tree as tree
+from synchain.models import uniform as uniform
 from synchain.models import union as union
+from synchain.models import variance as variance
 from synchain.models import weighted as weighted
 from synchain.models import wheel as wheel
 from synchain.runtime import Basin as Basin

@@ -67,8 +67,8 @@ def is_block_log(path: str | os.PathLike[str]) -> bool:
 class Description(TypedDict):
     """What a log says of its sweep, in JSON types, so that it can be read without the kernel.
 
-    The numbers of blocks, of cells in a block, of the states and the samples of a cell; what its
-    reduction merged, and the exponents of a certified run.
+    The numbers of blocks, of cells in a block, of the states, the samples and the observed values
+    of a cell, and of the numbers that a section point keeps; what its reduction merged, and the exponents of a certified run.
     """
 
     attributes: dict[str, Any]
@@ -76,6 +76,8 @@ class Description(TypedDict):
     size: int
     dimension: int
     samples: int
+    observed: int
+    kept: int
     merged: list[list[int]] | None
     together: bool
     certificate: list[list[float]] | None
@@ -205,7 +207,8 @@ class BlockLog:
         body = self._file.read(head[2])
         if zlib.crc32(body) != head[3]:
             raise OSError(f"{self.path}: block {block} was damaged while it was in use; run again with resume")
-        made = _unpacked(body, head[4], head[5], int(self.about["dimension"]), int(self.about["samples"]))
+        sizes = (int(self.about[name]) for name in ("dimension", "samples", "observed", "kept"))
+        made = _unpacked(body, head[4], head[5], *sizes)
         if made is None:
             raise ValueError(f"{self.path}: block {block} is not as long as its cells need; {AGAIN}")
         return made
@@ -259,7 +262,7 @@ def _understood(text: bytes, path: str | os.PathLike[str]) -> Description:
         about = json.loads(text)
     except (ValueError, RecursionError):
         about = None
-    names = ("blocks", "dimension", "samples")
+    names = ("blocks", "dimension", "samples", "observed", "kept")
     if isinstance(about, dict) and all(type(about.get(n)) is int and 0 <= about[n] <= MOST for n in names):
         return cast(Description, about)
     raise ValueError(f"{os.fspath(path)}: its first line does not say what its sweep is; {AGAIN}")
@@ -303,7 +306,9 @@ def _exists(buffers: Buffers) -> np.ndarray:
     return np.arange(buffers.points.shape[1]) < buffers.point_counts[:, None]
 
 
-def _unpacked(body: bytes, cells: int, most: int, dimension: int, samples: int) -> Buffers | None:
+def _unpacked(
+    body: bytes, cells: int, most: int, dimension: int, samples: int, observed: int, kept: int
+) -> Buffers | None:
     """The numbers of a block; None if there are not as many as its cells need, the most section
     points among them.
     """
@@ -312,15 +317,16 @@ def _unpacked(body: bytes, cells: int, most: int, dimension: int, samples: int) 
     counts = np.frombuffer(body, "<i8", cells * len(Count)).reshape(cells, len(Count)).astype(np.int64)
     lengths = [int(count) for count in counts[:, Count.POINTS]]
     points = sum(lengths)
-    sizes = (cells * dimension, cells * len(Sum), points * (Point.STATE + dimension), cells * samples * dimension)
+    sums_of_a_cell = len(Sum) + observed
+    sizes = (cells * dimension, cells * sums_of_a_cell, points * (Point.STATE + kept), cells * samples * dimension)
     if min(lengths, default=0) < 0 or max(lengths, default=0) != most or counts.nbytes + 8 * sum(sizes) != len(body):
         return None
     floats = np.frombuffer(body, "<f8", offset=counts.nbytes).astype(float)
     end, sums, sections, tracks = np.split(floats, np.cumsum(sizes)[:-1])
-    buffers = Buffers.empty(cells, dimension, most, samples)
+    buffers = Buffers.empty(cells, dimension, most, samples, 0, kept)
     buffers.counts = counts
-    buffers.points[_exists(buffers)] = sections.reshape(points, Point.STATE + dimension)
-    buffers.end, buffers.sums = end.reshape(cells, dimension), sums.reshape(cells, len(Sum))
+    buffers.points[_exists(buffers)] = sections.reshape(points, Point.STATE + kept)
+    buffers.end, buffers.sums = end.reshape(cells, dimension), sums.reshape(cells, sums_of_a_cell)
     buffers.samples = tracks.reshape(cells, samples, dimension)
     return buffers
 

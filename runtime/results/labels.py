@@ -13,6 +13,7 @@ import xarray as xr
 from synchain.codegen.driver.columns import Count, Point, Span, Sum
 from synchain.models.scenes.scene import Scene
 
+from ..cells.observed import Observed, Sections
 from ..support.status import Status
 from .certificate import VERDICTS, Certificate
 
@@ -35,6 +36,7 @@ __all__ = [
     "coordinates",
     "dimensions",
     "labelled",
+    "meaning",
     "provenance",
     "scene_of",
     "variables",
@@ -59,7 +61,7 @@ MEANINGS = {
     "sync_error": "average synchronisation error",
     "sync_error_max": "largest synchronisation error seen in the window",
     "sync_error_end": "synchronisation error at the end of the window",
-    "status": "how the cell ended: " + "; ".join(f"{s.value} {s.name.lower()}" for s in Status),
+    "status": "how the cell ended",
     "steps": "accepted steps",
     "rejected": "rejected steps",
     "periods_skipped": "periods of the drive jumped over in a cell that repeats itself",
@@ -159,6 +161,9 @@ def variables(
     if "sync_error" in scene.record:
         for name in ("sync_error", "sync_error_max", "sync_error_end"):
             yield name, (), buffers.sums[:, SUMS[name]]
+    for name, rows, columns in Observed(scene).columns():
+        values = buffers.sums[:, columns]
+        yield name, ("node",) if rows else (), values if rows else values[:, 0]
     if certificate is not None:
         for name, values in _certified(scene, spans, buffers, certificate).items():
             yield name, (), values
@@ -169,6 +174,7 @@ def variables(
         yield "section_count", (), buffers.point_counts.astype(np.int32)
         yield "section_time", ("point",), points[:, :, Point.TIME]
         yield "section", ("point", *STATE), states.table(points[:, :, Point.STATE :])
+    yield from Sections(scene).variables(buffers.points, most)
     if "trajectory" in scene.record:
         parts = np.linspace(0.0, 1.0, scene.samples) if scene.samples > 1 else np.zeros(1)
         start, end = spans[:, Span.START, None], spans[:, Span.END, None]
@@ -184,9 +190,20 @@ def _drive_phase(scene: Scene, spans: np.ndarray, time: np.ndarray) -> np.ndarra
     return np.asarray(np.mod(time / period, 1.0))
 
 
+def meaning(scene: Scene, name: str) -> str:
+    """Return what a variable of a result holds, in words; those of an observable are its expression."""
+    if name in scene.observe:
+        return str(scene.observe[name])
+    if name == "status":
+        codes = [status for status in Status if scene.stop is not None or status != Status.STOPPED]
+        return f"{MEANINGS[name]}: {'; '.join(f'{code.value} {code.name.lower()}' for code in codes)}"
+    return Sections(scene).meanings().get(name) or MEANINGS[name]
+
+
 def dimensions(scene: Scene) -> tuple[str, ...]:
-    """Return the dimensions of a sweep: the names of its axes, or "cell" if they are zipped."""
-    return ("cell",) if scene.zipped else tuple(axis.name for axis in scene.axes)
+    """Return the dimensions of a sweep: the names of its axes, or "cell" if they are zipped; then "realisation"."""
+    axes = ("cell",) if scene.zipped else tuple(axis.name for axis in scene.axes)
+    return (*axes, "realisation") if scene.realisations else axes
 
 
 def _certified(scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: Certificate) -> dict[str, np.ndarray]:
@@ -201,10 +218,13 @@ def _certified(scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: C
 
 
 def coordinates(scene: Scene) -> dict[str, Any]:
-    """Return the coordinates of a result: the axes, the components and the numbers of the nodes."""
+    """Return the coordinates of a result: the axes, the components, the numbers of the nodes, and what sections keep."""
     coords: dict[str, Any] = {"component": list(scene.equations.components), "node": np.arange(1, scene.n + 1)}
+    coords |= {f"{name}_kept": list(section.keep) for name, section in scene.sections.items() if section.keep}
     for axis in scene.axes:
         coords[axis.name] = ("cell" if scene.zipped else axis.name, np.array(axis.values))
+    for axis in scene.drawn:
+        coords[axis.name] = ("realisation", np.array(axis.values))
     return coords
 
 
@@ -223,11 +243,11 @@ def labelled(
     attributes : mapping
     """
     dims, coords = dimensions(scene), coordinates(scene)
-    for axis in scene.axes:
+    for axis in (*scene.axes, *scene.drawn):
         dim, values = coords[axis.name]
         coords[axis.name] = (dim, values[: shape[dims.index(dim)]])
     made = {
-        name: ((*dims, *more), values.reshape((*shape, *values.shape[1:])), {"long_name": MEANINGS[name]})
+        name: ((*dims, *more), values.reshape((*shape, *values.shape[1:])), {"long_name": meaning(scene, name)})
         for name, more, values in found
     }
     coords |= {name: made.pop(name) for name in TIMES if name in made}

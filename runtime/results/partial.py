@@ -17,13 +17,14 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import IN_MEMORY, Buffers, numbers_of_a_cell
 from ..cells.layout import Layout
+from ..cells.observed import Sections
 from ..cells.plan import Planner
 from ..cells.reduce import NodeMerge, Reduction
 from ..support.files import understood, whole_file
 from ..support.netcdf import Sheet, seal, unsealed
 from .block_log import BlockLog, Description
 from .certificate import VERDICTS, Certificate
-from .labels import Variable, labelled, scene_of, variables
+from .labels import Variable, dimensions, labelled, scene_of, variables
 from .result import Result, gather
 
 __all__ = ["certificate_of", "describe_sweep", "layout_of", "partial_path", "read_partial", "write_result"]
@@ -41,6 +42,8 @@ def describe_sweep(
         "size": layout.size,
         "dimension": reduction.dimension,
         "samples": reduction.samples,
+        "observed": reduction.observed.numbers,
+        "kept": reduction.point_size,
         "merged": [merge.states.tolist(), merge.places.tolist()] if merge.merges else None,
         "together": merge.together,
         "certificate": None if exponents is None else [part.tolist() for part in exponents],
@@ -109,13 +112,14 @@ def _so_far(reader: _Reader) -> Result:
     """The blocks that a log holds, as a result."""
     log, scene = reader.log, reader.scene
     dimension, samples = len(reader.merge.places), int(log.about["samples"])
-    numbers = scene.cells * numbers_of_a_cell(dimension, log.most, samples)
+    observed, kept = int(log.about["observed"]), Sections(scene).width(dimension)
+    numbers = scene.cells * numbers_of_a_cell(dimension, log.most, samples, observed, kept)
     if numbers > IN_MEMORY:
         raise ValueError(
             f"found a sweep of {numbers * 8 / 1e9:.0f} GB; expected at most {IN_MEMORY * 8 / 1e9:.0f} GB in "
             "memory; finish it with resume (--resume), and open parts of the result with xarray"
         )
-    buffers = Buffers.empty(scene.cells, dimension, log.most, samples)
+    buffers = Buffers.empty(scene.cells, dimension, log.most, samples, observed, kept)
     for block in np.flatnonzero(log.done).tolist():
         buffers.put(reader.layout.rows(block), reader.buffers(block))
     spans = reader.planner.spans(np.arange(scene.cells))
@@ -134,11 +138,10 @@ def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> d
     """
     reader = _Reader(log, scene)
     verdicts: dict[str, int] = {}
-    axes = {axis.name: len(axis) for axis in scene.axes}
-    lengths = {"cell": scene.cells} if scene.zipped else axes
+    lengths = dict(zip(dimensions(scene), scene.shape, strict=True))
     with whole_file(path) as temporary, open(temporary, "w+b") as file:
         sheet = Sheet(file, _template(reader), lengths)
-        for axis in scene.axes:
+        for axis in (*scene.axes, *scene.drawn):
             sheet.put(axis.name, np.arange(len(axis)), np.array(axis.values))
         for block in range(reader.layout.blocks):
             rows = reader.layout.rows(block)

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from synchain.codegen.driver.columns import Count, Point
 from synchain.codegen.kernels.processor import processor, told_apart
 from synchain.models.inputs.checks import check_instance
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.buffers import Buffers
+from ..cells.observed import Observed, Sections
 from ..support.files import understood
 from ..support.status import Status
 from .certificate import Certificate
@@ -183,6 +185,13 @@ class Result(Labelled):
             for name, column in columns.items():
                 if name in data:
                     table[:, column] = data[name].values.reshape(cells)
+        for name, _, place in Observed(self.scene).columns():
+            buffers.sums[:, place] = data[name].values.reshape(cells, -1)
+        if self.scene.sections:
+            points = Sections(self.scene).points(cells, {str(name): data[name].values for name in data})
+            buffers.counts[:, Count.POINTS] = np.isfinite(points[:, :, Point.TIME]).sum(axis=1)
+            buffers.widen(points.shape[1])
+            buffers.points[:, : points.shape[1]] = points
         if "section" in data:
             points = np.concatenate([data.section_time.values[..., None], states.flat(data.section.values)], axis=-1)
             points = points.reshape(cells, -1, points.shape[-1])

@@ -24,6 +24,7 @@ class Status(IntEnum):
     DIVERGED = 4
     INTERRUPTED = 5
     CHATTERING = 6
+    STOPPED = 7
 
     @property
     def message(self) -> str:
@@ -40,6 +41,7 @@ _MESSAGES = {
     Status.DIVERGED: "the state grew without bound, beyond 2^53, or became undefined",
     Status.CHATTERING: "a contact changed between stick and slip hundreds of times while no time passed; "
     "check the friction law",
+    Status.STOPPED: "met the stop condition of the scene before the end of the window",
     Status.INTERRUPTED: "stopped by the user before the end; run again with resume",
 }
 

@@ -76,6 +76,8 @@ def check_certifiable(scene: Scene) -> None:
         raise ValueError("a certificate needs coupled oscillators; found a scene without links")
     if scene.cells > MOST:
         raise ValueError(f"a certificate needs memory for every cell; found {scene.cells}, expected at most {MOST}")
+    if scene.realisations:
+        raise ValueError(f"a certificate is for a sweep; found {scene.realisations} realisations, expected axes alone")
     mode(scene.equations)
     unit_of_time(scene)
     frequency = scene.drive.frequency

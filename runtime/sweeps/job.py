@@ -199,7 +199,7 @@ class SweepJob:
         rows = reduction.rows(self.planner.rows(cells, near))
         if start is not None:
             rows = replace(rows, start=np.where(start[1][:, None], start[0], rows.start))
-        room = first_room(reduction.scene, len(cells) * (reduction.dimension + 1)) if self.room is None else self.room
+        room = first_room(reduction.scene, len(cells) * (reduction.point_size + 1)) if self.room is None else self.room
         buffers = self._drive(rows, room)
         short = np.flatnonzero(buffers.point_counts > room)
         if len(short):
@@ -209,8 +209,10 @@ class SweepJob:
 
     def _drive(self, rows: Plan, room: int) -> Buffers:
         """Run rows with room for so many section points of each."""
-        buffers = Buffers.empty(len(rows), self.reduction.dimension, room, self.reduction.samples)
+        observed = self.reduction.observed
+        buffers = self.reduction.empty(len(rows), room, observed.tallies)
         _drive(self.kernel, rows, self.control, buffers)
+        buffers.sums = observed.summary(buffers.sums)
         return buffers
 
 
@@ -279,7 +281,7 @@ def first_room(scene: Scene, row: int) -> int:
     """Return the section points to make room for at first: two a period, if one more needs `row`
     numbers.
     """
-    if "section" not in scene.record:
+    if "section" not in scene.record and not scene.sections:
         return 0
     periods = scene.window if scene.time_unit == "period" else scene.window / math.pi
-    return int(min(2.0 * periods, 1e6, LARGEST_ROOM // row)) + 8
+    return int(min(2.0 * max(len(scene.sections), 1) * periods, 1e6, LARGEST_ROOM // row)) + 8

@@ -9,6 +9,7 @@ import numpy as np
 from ..cells.buffers import Buffers
 from ..cells.choice import warn_of_stiffness
 from ..cells.layout import Layout
+from ..cells.observed import Sections
 from ..results.result import Result, gather
 from ..support.status import tally
 from .errors import SweepFailed, SweepInterrupted
@@ -33,10 +34,12 @@ class Memory:
     def of(cls, prepared: PreparedRun, earlier: Result | None) -> Memory:
         """Return arrays for all cells, with those of an earlier result that finished."""
         reduction = prepared.reduction
-        cells, samples = reduction.scene.cells, reduction.samples
+        cells = reduction.scene.cells
         if earlier is None:
-            return cls(prepared, prepared.layout(), Buffers.empty(cells, reduction.dimension, 0, samples))
-        whole = Buffers.empty(cells, len(reduction.scene.y0), 0, samples)
+            return cls(prepared, prepared.layout(), reduction.empty(cells, 0))
+        dimension = len(reduction.scene.y0)
+        kept = Sections(reduction.scene).width(dimension)
+        whole = Buffers.empty(cells, dimension, 0, reduction.samples, reduction.observed.numbers, kept)
         earlier.restore(reduction.scene, whole, reduction.equations)
         return cls(prepared, prepared.layout(), reduction.merge.contract(whole))
 

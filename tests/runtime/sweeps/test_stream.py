@@ -130,7 +130,7 @@ def block(cells: int, value: float) -> Buffers:
     return made
 
 
-ABOUT = {"blocks": 4, "dimension": 2, "samples": 1}
+ABOUT = {"blocks": 4, "dimension": 2, "samples": 1, "observed": 0, "kept": 2}
 
 
 @pytest.fixture

@@ -1,0 +1,203 @@
+"""The function that computes the observed values of a scene at a point inside a step, and the rule of its quadrature."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+import sympy as sp
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.observable import (
+    AtNode,
+    NodeMaximum,
+    NodeMean,
+    NodeMinimum,
+    NodeSum,
+    Rate,
+    Reduction,
+    node_symbols,
+)
+from synchain.models.mechanics.components import TIME
+
+from ..integrators import Integrator
+from ..program.expressions import Expression, Load, Name, Number, call, plus
+from ..program.lowering import lower
+from ..program.statements import Function, Loop, Statement, let, store
+
+__all__ = ["count_values", "rule_of", "values_function", "with_rows"]
+
+LARGEST = 1.7976931348623157e308
+BEGINS = {NodeSum: 0.0, NodeMean: 0.0, NodeMaximum: -LARGEST, NodeMinimum: LARGEST}
+"""What the loop of a reduction begins with."""
+
+
+def rule_of(method: Integrator) -> tuple[float, ...]:
+    """Return the rule of Gauss and Lobatto on a step from 0 to 1: each point with four numbers.
+
+    These are the point, its weight, and its weights in the last two Legendre coefficients of the interpolant.  A rule
+    of m points is exact for polynomials of degree 2 m - 3 (Abramowitz & Stegun, *Handbook of Mathematical Functions*,
+    1964, 25.4.32).  Steps of high order are long, and the rule has more points for them.
+    """
+    order = max(m.order for m in (method, method.smooth) if m is not None)
+    count = 11 if method.series else max(5, order - 1)
+    last, before = (np.polynomial.legendre.Legendre.basis(k) for k in (count - 1, count - 2))
+    inner = np.sort(last.deriv().roots().real)
+    points = np.concatenate([[-1.0], (inner - inner[::-1]) / 2.0, [1.0]])
+    weights = 1.0 / (count * (count - 1) * last(points) ** 2)
+    top, following = weights * last(points) * (count - 1), weights * before(points) * (2 * count - 3)
+    rows = zip((points + 1.0) / 2.0, weights, top, following, strict=True)
+    return tuple(float(number) for row in rows for number in row)
+
+
+def with_rows(equations: Equations, value: sp.Expr) -> bool:
+    """True if an expression has one value for each node, False if it has one for the network."""
+    own = {*equations.components, *equations.varied}
+    return any(s.name in own for s in node_symbols(value))
+
+
+def count_values(equations: Equations, observed: Iterable[sp.Expr]) -> int:
+    """Return how many numbers the values of some expressions are."""
+    return sum(equations.n if with_rows(equations, value) else 1 for value in observed)
+
+
+def values_function(
+    equations: Equations, plain: Equations, observed: Sequence[sp.Expr], name: str, about: str
+) -> Function:
+    """Return a function that writes values at the fraction theta of a step, in the names of `plain`."""
+    writer = _Writer(equations, plain)
+    return Function(
+        name,
+        ("theta", "t", "h", "y", "y_new", "dense", "out", "dims"),
+        about,
+        tuple(writer.statements(observed)),
+        inline=False,
+    )
+
+
+class _Writer:
+    """Writes the loops over nodes, those of inner reductions first."""
+
+    def __init__(self, equations: Equations, plain: Equations) -> None:
+        self.n = plain.n
+        self.own = self._places(equations.components, plain.components, equations.state, plain)
+        self.own |= self._parameters(equations.varied, plain.varied, equations)
+        self.whole: dict[str, tuple[str, Expression]] = {}
+        for slot, (name, shown) in enumerate(zip(equations.state, plain.state, strict=True)):
+            self.whole[name] = (shown, Number(slot))
+        self.numbers = {
+            name: (shown, Number(plain.dimension + slot))
+            for slot, (name, shown) in enumerate(zip(equations.parameters, plain.parameters, strict=True))
+        }
+        self.components, self.varied = equations.components, equations.varied
+        self.reduced: dict[sp.Expr, sp.Symbol] = {}
+
+    def _places(
+        self, names: Sequence[str], shown: Sequence[str], state: Sequence[str], plain: Equations
+    ) -> dict[str, tuple[str, Expression]]:
+        """Name and place of each component of node i, of those that all nodes have."""
+        whole = [(a, b) for a, b in zip(names, shown, strict=True) if len(plain.holders(b)) == plain.n]
+        return {a: (b, _row(state.index(f"{a}_1"))) for a, b in whole}
+
+    def _parameters(
+        self, names: Sequence[str], shown: Sequence[str], equations: Equations
+    ) -> dict[str, tuple[str, Expression]]:
+        """Name and place of each parameter of node i that has a value for each node."""
+        first = {name: equations.parameters.index(f"{name}_{equations.holders(name)[0] + 1}") for name in names}
+        return {a: (b, _row(equations.dimension + first[a])) for a, b in zip(names, shown, strict=True)}
+
+    def statements(self, observed: Sequence[sp.Expr]) -> list[Statement]:
+        """All statements of the function."""
+        values = [self._placed(e) for e in observed]
+        body: list[Statement] = []
+        if any(e.has(TIME) for e in values):
+            body.append(let("now", Name("t") + Name("theta") * "h"))
+        body += self._loads(values, {**self.whole, **self.numbers})
+        while left := self._innermost(values):
+            body += self._reductions(left)
+            values = [e.xreplace(self.reduced) for e in values]
+        slot = 0
+        for value in values:
+            if self._per_node(value):
+                inside, (computed,) = self._node_values([value])
+                inside.append(store("out", plus(Number(slot), Name("i")), computed))
+                body.append(Loop("i", Number(0), Number(self.n), tuple(inside)))
+                slot += self.n
+            else:
+                body.append(store("out", slot, lower(self._shown(value)) + 0.0 * Name("theta")))
+                slot += 1
+        return body
+
+    def _placed(self, e: sp.Expr) -> sp.Expr:
+        """The expression with the names of the network where it takes the value of one node."""
+        names = (*self.components, *self.varied)
+
+        def at_node(value: sp.Expr, number: sp.Integer) -> sp.Expr:
+            return value.xreplace({_real(name): _real(f"{name}_{number}") for name in names})
+
+        return e.replace(AtNode, at_node)
+
+    def _per_node(self, e: sp.Expr) -> bool:
+        return any(s.name in self.own for s in node_symbols(e))
+
+    def _innermost(self, values: Sequence[sp.Expr]) -> list[sp.Expr]:
+        """The reductions that hold no other, in a fixed order."""
+        found = {r for e in values for r in e.atoms(Reduction) if not any(a.has(Reduction) for a in r.args)}
+        return sorted(found, key=sp.default_sort_key)
+
+    def _reductions(self, found: Sequence[sp.Expr]) -> list[Statement]:
+        """The loop that computes reductions."""
+        begins: list[Statement] = []
+        inside, computed = self._node_values([r.args[0] for r in found])
+        for r, value in zip(found, computed, strict=True):
+            symbol = _real(f"_total{len(self.reduced)}")
+            begins.append(let(symbol.name, BEGINS[type(r)] + 0.0 * Name("theta")))
+            linear = type(r) in (NodeSum, NodeMean)
+            function = {NodeMaximum: "maximum", NodeMinimum: "minimum"}.get(type(r), "")
+            inside.append(let(symbol.name, Name(symbol.name) + value if linear else call(function, symbol.name, value)))
+            self.reduced[r] = symbol / self.n if type(r) is NodeMean else symbol
+        return [*begins, Loop("i", Number(0), Number(self.n), tuple(inside))]
+
+    def _node_values(self, values: Sequence[sp.Expr]) -> tuple[list[Statement], list[Expression]]:
+        """The statements that a loop over nodes needs for some values, and the values."""
+        loads = self._loads(values, self.own)
+        shown = [self._shown(e) for e in values]
+        parts, results = sp.cse(shown, symbols=(sp.Symbol(f"_part{k}", real=True) for k in range(10**6)))
+        return [*loads, *(let(s.name, lower(e)) for s, e in parts)], [lower(e) for e in results]
+
+    def _loads(self, values: Sequence[sp.Expr], places: Mapping[str, tuple[str, Expression]]) -> list[Statement]:
+        """The statements that load what has a place and is used: states, their rates, and parameters."""
+        rates = {r.args[0].name for e in values for r in e.atoms(Rate)}
+        plain = {s.name for e in values for s in e.xreplace({r: sp.S.Zero for r in e.atoms(Rate)}).free_symbols}
+        body: list[Statement] = []
+        for name, (shown, place) in places.items():
+            if name in rates:
+                body.append(
+                    let(f"_rate_{shown}", call("slope", "theta", place, "y", "y_new", "dense", "dims") / Name("h"))
+                )
+            if name not in plain:
+                continue
+            parameter = name in self.numbers or name in self.varied
+            body.append(let(shown, Load("y", place) if parameter else _inside(place)))
+        return body
+
+    def _shown(self, e: sp.Expr) -> sp.Expr:
+        """The expression in the names of the function."""
+        names = {name: shown for name, (shown, _) in (*self.whole.items(), *self.numbers.items(), *self.own.items())}
+        names[TIME.name] = "now"
+        rates = {r: _real(f"_rate_{names[r.args[0].name]}") for r in e.atoms(Rate)}
+        e = e.xreplace(self.reduced).xreplace(rates)
+        return e.xreplace({_real(name): _real(shown) for name, shown in names.items() if name != shown})
+
+
+def _inside(place: Expression) -> Expression:
+    return call("inside", "theta", place, "y", "y_new", "dense", "dims")
+
+
+def _row(first: int) -> Expression:
+    """The place of a variable of node i, that of the first node being known."""
+    return plus(Number(first), Name("i")) if first else Name("i")
+
+
+def _real(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)

@@ -1,0 +1,262 @@
+"""What a run observes: expressions of the states, reduced over the nodes and then over the window.
+
+Symbols inside ``nodes.mean(…)`` and its like, and those of a value for each node, are states and parameters of one
+node: ``x``.  The names of the network's states, ``x_1`` … ``x_n``, are known everywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, ClassVar
+
+import sympy as sp
+from sympy.core.function import AppliedUndef
+
+from ..inputs.checks import short_repr
+from ..inputs.words import Word
+
+__all__ = [
+    "AtNode",
+    "NodeMaximum",
+    "NodeMean",
+    "NodeMinimum",
+    "NodeSum",
+    "Nodes",
+    "Observable",
+    "Rate",
+    "Reduction",
+    "Window",
+    "end",
+    "maximum",
+    "mean",
+    "minimum",
+    "node_symbols",
+    "nodes",
+    "rate",
+    "real",
+    "variance",
+]
+
+
+class Window(Word):
+    """What is kept of a value over the window."""
+
+    MEAN = "mean"
+    MAXIMUM = "maximum"
+    MINIMUM = "minimum"
+    END = "end"
+    VARIANCE = "variance"
+
+
+class _Real(sp.Function):
+    """A function of real values."""
+
+    is_real = True
+    spelling: ClassVar[str]
+
+    def _sympystr(self, printer: Any) -> str:
+        return f"{self.spelling}({printer._print(self.args[0])})"
+
+
+class Rate(_Real):
+    """The derivative of a state by time."""
+
+    spelling = "rate"
+
+
+class Reduction(_Real):
+    """One value out of those of all nodes."""
+
+
+class NodeSum(Reduction):
+    """The sum over the nodes."""
+
+    spelling = "nodes.sum"
+
+
+class NodeMean(Reduction):
+    """The mean over the nodes."""
+
+    spelling = "nodes.mean"
+
+
+class NodeMaximum(Reduction):
+    """The largest value of all nodes."""
+
+    spelling = "nodes.maximum"
+
+
+class NodeMinimum(Reduction):
+    """The smallest value of all nodes."""
+
+    spelling = "nodes.minimum"
+
+
+class AtNode(Reduction):
+    """The value of one node, whose number counts from 1."""
+
+    def _sympystr(self, printer: Any) -> str:
+        return f"nodes[{self.args[1]}]({printer._print(self.args[0])})"
+
+
+class Nodes:
+    """Reductions over the nodes: ``nodes.mean(x)``, and ``nodes[3](x)`` for one node, counted from 1."""
+
+    def sum(self, value: object) -> sp.Expr:
+        """Return the sum of a value over all nodes; it may be complex."""
+        return _linear(NodeSum, value)
+
+    def mean(self, value: object) -> sp.Expr:
+        """Return the mean of a value over all nodes; it may be complex, as in ``abs(nodes.mean(exp(I*theta)))``."""
+        return _linear(NodeMean, value)
+
+    def maximum(self, value: object) -> sp.Expr:
+        """Return the largest value of all nodes."""
+        return NodeMaximum(real(value))
+
+    def minimum(self, value: object) -> sp.Expr:
+        """Return the smallest value of all nodes."""
+        return NodeMinimum(real(value))
+
+    def std(self, value: object) -> sp.Expr:
+        """Return the standard deviation of a value over the nodes, of n and not of n - 1 of them."""
+        own = real(value)
+        return sp.sqrt(NodeMean((own - NodeMean(own)) ** 2))
+
+    def __getitem__(self, number: int) -> Callable[[object], sp.Expr]:
+        """Return the function that takes the value of one node, counted from 1."""
+        if isinstance(number, bool) or not isinstance(number, int) or number < 1:
+            raise ValueError(f"nodes: found the number {short_repr(number)}; expected a whole number from 1")
+        return partial(_linear, AtNode, number=sp.Integer(number))
+
+
+nodes = Nodes()
+"""The nodes of the network, whose values expressions of observables reduce."""
+
+
+def _linear(kind: type[Reduction], value: object, **more: sp.Expr) -> sp.Expr:
+    """A reduction of the real and of the imaginary part."""
+    own = _made_real(value)
+    if not own.has(sp.I):
+        return kind(own, *more.values())
+    parts = own.as_real_imag()
+    return kind(parts[0], *more.values()) + sp.I * kind(parts[1], *more.values())
+
+
+def rate(state: object) -> sp.Expr:
+    """Return the derivative of a state by time: that of the dense output, which is one order less exact than the state.
+
+    Its mean is the difference of the states at the ends of the window, over the length of the window.
+    """
+    own = real(state)
+    if not own.is_Symbol:
+        raise ValueError(f"rate: found {short_repr(own)}; expected one state, such as rate(theta)")
+    return Rate(own)
+
+
+def _made_real(value: object) -> sp.Expr:
+    """An expression with real symbols and exact numbers; functions of time become states, their derivatives rates."""
+    if isinstance(value, bool) or not isinstance(value, int | float | sp.Expr):
+        kind = type(value).__name__
+        raise TypeError(f"observable: found {short_repr(value)} ({kind}); expected an expression of states")
+    e = sp.sympify(value)
+    e = e.replace(lambda p: isinstance(p, sp.Derivative) and isinstance(p.expr, AppliedUndef), _as_rate)
+    states = {p: sp.Symbol(p.func.__name__, real=True) for p in e.atoms(AppliedUndef)}
+    symbols = {s: sp.Symbol(s.name, real=True) for s in e.free_symbols}
+    numbers = {number: _exact(number) for number in e.atoms(sp.Float)}
+    return e.xreplace(states).xreplace({**symbols, **numbers})
+
+
+def _as_rate(derivative: sp.Derivative) -> sp.Expr:
+    if derivative.derivative_count != 1:
+        raise ValueError(f"observable: found {short_repr(derivative)}; expected first derivatives of states by time")
+    return Rate(sp.Symbol(derivative.expr.func.__name__, real=True))
+
+
+def _exact(number: sp.Float) -> sp.Rational:
+    if not number.is_finite:
+        raise ValueError(f"observable: found {number}; expected finite real numbers")
+    return sp.Rational(repr(float(number)))
+
+
+def real(value: object) -> sp.Expr:
+    """Return an expression with real symbols and exact numbers.
+
+    Raises
+    ------
+    TypeError
+        If the value is no expression.
+    ValueError
+        If it is complex, or has numbers that are not finite.
+    """
+    own = _made_real(value)
+    if own.has(sp.I):
+        own = sp.expand_complex(own)
+    if own.has(sp.I, sp.re, sp.im, sp.zoo, sp.nan, sp.oo):
+        raise ValueError(f"observable: found {short_repr(own)}; expected a real value; take abs(…) of a complex one")
+    return own
+
+
+def node_symbols(e: sp.Expr) -> Iterator[sp.Symbol]:
+    """Yield the symbols of an expression outside reductions: with a state of a node, it has one value for each node."""
+    if e.is_Symbol:
+        yield e
+    elif not isinstance(e, Reduction):
+        for part in e.args:
+            yield from node_symbols(part)
+
+
+@dataclass(frozen=True, slots=True)
+class Observable:
+    """A value of the network, or of each node, and what is kept of it over the window.
+
+    `mean`, `maximum`, `minimum`, `end` and `variance` make observables.
+
+    Parameters
+    ----------
+    window : Window
+    value : Expr
+        An expression of the states and their rates, the parameters and t.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the value is no real expression.
+    """
+
+    window: Window
+    value: sp.Expr
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "window", Window.parse("observable", self.window))
+        object.__setattr__(self, "value", real(self.value))
+
+    def __str__(self) -> str:
+        return f"{self.window}({sp.sstr(self.value, order='lex')})"
+
+
+def mean(value: object) -> Observable:
+    """Observe the mean of a value over the window, an integral as exact as the dense output of the steps."""
+    return Observable(Window.MEAN, value)
+
+
+def maximum(value: object) -> Observable:
+    """Observe the largest of the values at the points of the quadrature, which hold both ends of every step."""
+    return Observable(Window.MAXIMUM, value)
+
+
+def minimum(value: object) -> Observable:
+    """Observe the smallest of the values at the points of the quadrature, which hold both ends of every step."""
+    return Observable(Window.MINIMUM, value)
+
+
+def end(value: object) -> Observable:
+    """Observe a value at the end of the window."""
+    return Observable(Window.END, value)
+
+
+def variance(value: object) -> Observable:
+    """Observe the mean over the window of the square of a value's distance from its mean."""
+    return Observable(Window.VARIANCE, value)

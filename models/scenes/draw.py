@@ -1,0 +1,191 @@
+"""Realisations: parameters and initial states that are drawn from distributions, or listed, along an axis of their own."""
+
+from __future__ import annotations
+
+import ast
+import random
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from statistics import NormalDist
+from typing import NoReturn
+
+from ..inputs.arithmetic import constant
+from ..inputs.checks import check_integer, check_number, check_positive, check_table, check_text, short_repr
+from ..inputs.frozen import Frozen
+from ..inputs.node_name import NodeName
+from ..inputs.reader import Algebra, NoMeaning, parse
+from ..inputs.words import Word
+from .axis import LIMIT, Axis
+from .model import Model
+
+__all__ = ["Distribution", "Draw", "Draws", "drawn_axes", "draws", "normal", "uniform"]
+
+
+class Distribution(Word):
+    """What numbers are drawn from."""
+
+    NORMAL = "normal"
+    UNIFORM = "uniform"
+
+
+@dataclass(frozen=True, slots=True)
+class Draw:
+    """A distribution: normal with mean and standard deviation, or uniform between two ends.
+
+    Raises ValueError or TypeError on anything but finite numbers, a deviation that is not positive, and ends that do
+    not rise.
+    """
+
+    distribution: Distribution
+    first: float
+    second: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "distribution", Distribution.parse("draw", self.distribution))
+        object.__setattr__(self, "first", check_number(f"{self.distribution}: first", self.first))
+        object.__setattr__(self, "second", check_number(f"{self.distribution}: second", self.second))
+        if self.distribution is Distribution.NORMAL:
+            check_positive("normal: standard deviation", self.second)
+        elif not self.first < self.second:
+            raise ValueError(f"uniform: found the ends {self.first!r} and {self.second!r}; expected rising ends")
+
+    def value(self, chance: float) -> float:
+        """Return the value below which a share `chance` of the distribution lies."""
+        if self.distribution is Distribution.NORMAL:
+            return NormalDist(self.first, self.second).inv_cdf(chance)
+        return self.first + (self.second - self.first) * chance
+
+    def __str__(self) -> str:
+        return f"{self.distribution}({self.first!r}, {self.second!r})"
+
+
+def normal(mean: float, deviation: float) -> Draw:
+    """Return the normal distribution of a mean and a standard deviation."""
+    return Draw(Distribution.NORMAL, mean, deviation)
+
+
+def uniform(low: float, high: float) -> Draw:
+    """Return the uniform distribution between two numbers."""
+    return Draw(Distribution.UNIFORM, low, high)
+
+
+Draws = Draw | tuple[tuple[float, ...], ...]
+"""A distribution, or numbers by realisation: one, or one for each node."""
+
+
+def draws(given: object, realisations: object) -> Frozen[Draws]:
+    """Return what is drawn, by the names of parameters and initial states.
+
+    Parameters
+    ----------
+    given : object
+        A mapping of names to distributions, their texts ("normal(0, 1)"), or lists; None for none.
+    realisations : object
+        The number of realisations; 0 for none.
+
+    Raises
+    ------
+    ValueError, TypeError
+        For other values, lists of another length, and draws without realisations.
+    """
+    count = check_integer("realisations", realisations, 0, LIMIT)
+    table = {} if given is None else check_table("draws", given)
+    if bool(table) != bool(count):
+        found = f"{count} realisations and {len(table)} names to draw"
+        raise ValueError(f"draws: found {found}; expected both, e.g. realisations=50, draws={{'x': normal(0, 1)}}")
+    return Frozen({check_text("draw", name): _drawn(f"draw {name}", value, count) for name, value in table.items()})
+
+
+def _drawn(what: str, value: object, count: int) -> Draws:
+    if isinstance(value, Draw):
+        return value
+    if isinstance(value, str):
+        return _read(what, value)
+    listed = value.tolist() if hasattr(value, "tolist") else value
+    if not isinstance(listed, Sequence) or len(listed) != count:
+        raise ValueError(
+            f"{what}: found {short_repr(listed)}; expected normal(mean, deviation), uniform(low, high) or {count} entries"
+        )
+    rows = [row if isinstance(row, Sequence) and not isinstance(row, str) else (row,) for row in listed]
+    if len({len(row) for row in rows}) != 1:
+        raise ValueError(f"{what}: found rows of different lengths; expected one number, or one for each node, in each")
+    return tuple(tuple(check_number(what, number) for number in row) for row in rows)
+
+
+@dataclass(frozen=True, slots=True)
+class _Distributions(Algebra[Draw]):
+    """The call of a distribution with two constants."""
+
+    what: str
+    deepest = 2
+
+    def refuse(self, node: ast.expr, reason: str) -> NoReturn:
+        raise ValueError(
+            f"{self.what}: found {short_repr(ast.unparse(node))}; expected normal(mean, deviation) or uniform(low, high)"
+        )
+
+    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[None]:
+        if function not in tuple(Distribution) or count != 2 or options:
+            raise NoMeaning
+        return (None, None)
+
+    def call(self, function: str, arguments: Sequence[str], options: Mapping[str, str]) -> Draw:
+        first, second = map(constant, arguments)
+        return Draw(Distribution(function), first, second)
+
+
+def _read(what: str, text: str) -> Draw:
+    expression = parse(check_text(what, text))
+    if expression is None:
+        raise ValueError(f"{what}: found {short_repr(text)}; expected normal(mean, deviation) or uniform(low, high)")
+    try:
+        return expression.evaluate(_Distributions(what))
+    except ValueError as error:
+        words = str(error)
+        raise ValueError(words if words.startswith(what) else f"{what}: {words}") from None
+
+
+@lru_cache(maxsize=64)
+def drawn_axes(model: Model, drawn: Frozen[Draws], count: int, rng: int) -> tuple[Axis, ...]:
+    """Return the drawn values of each parameter and initial state, one for each realisation.
+
+    A distribution of a parameter or state of the nodes is drawn for each node by itself.  Each name has a stream of
+    its own, which depends on `rng` and the name alone: neither workers nor other draws change it.
+
+    Raises
+    ------
+    ValueError
+        For unknown names, and for lists that have neither one number nor one for each node.
+    """
+    axes: dict[str, Axis] = {}
+    for name, how in drawn.items():
+        for own, values in _columns(model, name, how, count, rng):
+            if own in axes:
+                raise ValueError(f"draw {name}: {own} is drawn twice; expected it once")
+            axes[own] = Axis(own, values)
+    return tuple(axes.values())
+
+
+def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Iterable[tuple[str, Sequence[float]]]:
+    """The names and the values of one draw."""
+    holders = model.unlinked.holders(name)
+    known = name in model.parameters or name in model.components or NodeName.parse(name) is not None
+    if not known:
+        raise ValueError(model.unknown(name, "draw", (*model.parameters, *model.components)))
+    alone = not holders or (model.n == 1 and name in model.parameters)
+    names = [name] if alone else [str(NodeName(name, i)) for i in holders]
+    if isinstance(how, Draw):
+        return [(own, _numbers(how, f"{rng} {own}", count)) for own in names]
+    width = len(how[0])
+    if width == 1 and len(names) > 1 and name in model.parameters:
+        names = [name]
+    if width not in (1, len(names)):
+        raise ValueError(f"draw {name}: found rows of {width} numbers; expected 1 or {len(names)}, one for each node")
+    return [(own, [row[min(k, width - 1)] for row in how]) for k, own in enumerate(names)]
+
+
+def _numbers(how: Draw, stream: str, count: int) -> list[float]:
+    """The numbers of one stream: a Mersenne twister that is seeded by the SHA-512 of its name."""
+    source = random.Random(stream)
+    return [how.value((source.getrandbits(52) + 0.5) / 2.0**52) for _ in range(count)]

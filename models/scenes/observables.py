@@ -1,0 +1,149 @@
+"""The observables and the sections of a scene, checked against its model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import sympy as sp
+
+from ..dynamics.observable import AtNode, Observable, Rate, node_symbols
+from ..dynamics.observable_text import as_observable, as_value
+from ..inputs.checks import check_table, check_text, short_repr, suggestion
+from ..inputs.frozen import Frozen
+from ..mechanics.components import TIME
+from .model import Model
+from .parameters import varied
+from .section import Section
+
+__all__ = ["TAKEN", "observables", "sections", "stop"]
+
+TAKEN = frozenset(
+    {"cell", "component", "data", "end", "end_time", "ended_early", "kind", "link", "message", "name", "names", "node",
+     "periods_skipped", "plot", "point", "realisation", "rejected", "sample", "save", "scene", "section",
+     "section_count", "section_time", "state", "status", "steps", "success", "sync_error", "sync_error_end",
+     "sync_error_max", "trajectory", "trajectory_time", "transversal_exponent", "transversal_stderr", "verdict"}
+)  # fmt: skip
+"""What results have under these names already."""
+
+
+def observables(model: Model, numbers: Mapping[str, float], given: object) -> Frozen[Observable]:
+    """Return the observables of a scene by their names.
+
+    Parameters
+    ----------
+    model : Model
+    numbers : mapping of str to float
+        The parameters of the scene; a_1 … a_n of one that has a value for each node.
+    given : object
+        A mapping of names to observables or their texts; None for none.
+
+    Raises
+    ------
+    ValueError, TypeError
+        For names that results have for other things, and for whatever `as_observable` and the model refuse.
+    """
+    if given is None:
+        return Frozen()
+    found: dict[str, Observable] = {}
+    for name, value in _named("observe", model, numbers, given):
+        found[name] = as_observable(f"observe {name}", value)
+        _check_names(f"observe {name}", found[name].value, model, numbers)
+    return Frozen(found)
+
+
+def sections(model: Model, numbers: Mapping[str, float], given: object) -> Frozen[Section]:
+    """Return the sections on functions of a scene by their names, with all that they keep spelled out.
+
+    Parameters and errors are those of `observables`; the values are sections or their tables.
+    """
+    if given is None:
+        return Frozen()
+    found: dict[str, Section] = {}
+    for name, value in _named("sections", model, numbers, given):
+        what = f"section {name}"
+        section = Section.of_table(what, value)
+        function = as_value(what, section.variable)
+        _check_names(what, function, model, numbers)
+        if _own(function, model, numbers):
+            raise ValueError(
+                f"{what}: found {function}, which each node has; expected one function, e.g. of x_1 or nodes.mean(x)"
+            )
+        kept: list[str] = []
+        for text in model.unlinked.state if section.keep is None else section.keep:
+            kept += _kept(what, as_value(what, text), model, numbers)
+        found[name] = replace(section, variable=sp.sstr(function, order="lex"), keep=tuple(kept))
+    return Frozen(found)
+
+
+def stop(model: Model, numbers: Mapping[str, float], given: object) -> str | None:
+    """Return the text of the function that ends a cell when it passes zero; None for none.
+
+    Raises ValueError or TypeError as `observables`, and for set-valued contacts, whose events end steps themselves.
+    """
+    if given is None:
+        return None
+    function = as_value("stop", given)
+    _check_names("stop", function, model, numbers)
+    if _own(function, model, numbers):
+        raise ValueError(
+            f"stop: found {function}, which each node has; expected one function, e.g. of nodes.maximum(x)"
+        )
+    if model.unlinked.sticks:
+        raise ValueError("stop: found set-valued contacts; expected smooth equations; take contact 'atan'")
+    return sp.sstr(function, order="lex")
+
+
+def _kept(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, float]) -> list[str]:
+    """What a section keeps of one expression: it, or its value at each node."""
+    _check_names(what, value, model, numbers)
+    own = _own(value, model, numbers)
+    if not own:
+        return [sp.sstr(value, order="lex")]
+    if value.is_Symbol:
+        return [f"{value}_{i + 1}" for i in range(model.n)]
+    return [f"nodes[{i + 1}]({sp.sstr(value, order='lex')})" for i in range(model.n)]
+
+
+def _own(value: sp.Expr, model: Model, numbers: Mapping[str, float]) -> bool:
+    """True if an expression has a value for each node."""
+    names = {*model.unlinked.components, *varied(numbers, model.parameters)}
+    return any(s.name in names for s in node_symbols(value))
+
+
+def _named(keyword: str, model: Model, numbers: Mapping[str, float], given: object) -> Iterator[tuple[str, object]]:
+    """Yield names and values of a table, whose names results must not have for something else."""
+    taken = TAKEN | set(model.parameters) | set(numbers) | set(model.unlinked.state)
+    for key, value in check_table(keyword, given).items():
+        name = check_text(keyword, key)
+        if not name.isidentifier() or name.startswith("_"):
+            raise ValueError(f"{keyword}: found the name {short_repr(name)}; expected letters, digits and _")
+        if name in taken:
+            raise ValueError(f"{keyword}: found the name {name!r}, which results have for something else; rename it")
+        yield name, value
+
+
+def _check_names(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, float]) -> None:
+    """Refuse symbols that are no state, parameter or t, and states that some nodes lack."""
+    apart, everywhere = model.unlinked, range(model.n)
+    own = (*apart.components, *varied(numbers, model.parameters))
+    partly = {name for name in own if apart.holders(name) != tuple(everywhere)}
+    states = {*apart.components, *apart.state}
+    known = (*own, *apart.state, *(name for name in numbers), TIME.name)
+    for name in sorted(s.name for s in value.free_symbols):
+        if name in partly:
+            raise ValueError(f"{what}: some nodes have no {name!r}; expected what all nodes have, or {name}_1 of one")
+        if name not in known:
+            raise ValueError(f"{what}: unknown name {short_repr(name)}; known: {_few(known)}{suggestion(name, known)}")
+    for e in value.atoms(Rate):
+        if e.args[0].name not in states:
+            raise ValueError(f"{what}: found {e}; expected the rate of a state: {', '.join(apart.components)}")
+    for e in value.atoms(AtNode):
+        if e.args[1] > model.n:
+            raise ValueError(f"{what}: found node {e.args[1]}; expected 1 to {model.n}")
+    if not value.free_symbols:
+        raise ValueError(f"{what}: found the constant {short_repr(value)}; expected an expression of states")
+
+
+def _few(names: tuple[str, ...]) -> str:
+    return ", ".join(names) if len(names) <= 30 else f"{', '.join(names[:15])}, … {', '.join(names[-5:])}"

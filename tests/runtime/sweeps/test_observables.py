@@ -1,0 +1,254 @@
+"""Observables of runs beside independent integrals, records and trajectories."""
+
+from __future__ import annotations
+
+import functools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.integrate import solve_ivp
+
+from synchain.models import complete, end, maximum, mean, minimum, nodes, rate, ring, variance
+from synchain.models.mechanics.components import TIME
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.cells.reduce import as_reduction
+from synchain.runtime.opening.open import open_result
+from synchain.runtime.results.result import Result
+from synchain.runtime.support.status import Status
+from synchain.runtime.sweeps.run import run
+from synchain.runtime.sweeps.stream import stream
+
+x, v, x_1, v_1, theta, t = sp.symbols("x v x_1 v_1 theta t")
+ERROR = sp.sqrt((x - x_1) ** 2 + (v - v_1) ** 2)
+
+
+def integrals(scene: Scene, values: list[sp.Expr]) -> np.ndarray:
+    """The means over the window of expressions of x_1 … and t, as further states of SciPy's DOP853."""
+    equations = scene.equations
+    symbols = [sp.Symbol(name, real=True) for name in (*equations.state, *equations.parameters)]
+    rates = sp.lambdify([TIME, *symbols], equations.rhs(), "numpy", cse=True)
+    own = sp.lambdify([TIME, *symbols], [e.xreplace({s: sp.Symbol(s.name, real=True) for s in e.free_symbols})
+                                         for e in values], "numpy", cse=True)  # fmt: skip
+    numbers = [scene.parameters[name] for name in equations.parameters]
+    size = len(equations.state)
+
+    def before(time, y):
+        return np.array(rates(time, *y, *numbers), float)
+
+    def inside(time, y):
+        return np.concatenate([before(time, y[:size]), np.array(own(time, *y[:size], *numbers), float)])
+
+    unit = scene.period if scene.time_unit == "period" else 1.0
+    begin, finish = scene.transient * unit, (scene.transient + scene.window) * unit
+    start = solve_ivp(before, (0.0, begin), scene.y0, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    whole = solve_ivp(
+        inside, (begin, finish), np.concatenate([start, np.zeros(len(values))]), "DOP853", rtol=1e-13, atol=1e-14
+    )
+    return whole.y[size:, -1] / (finish - begin)
+
+
+def names(component: str, n: int) -> list[sp.Symbol]:
+    return [sp.Symbol(f"{component}_{i + 1}") for i in range(n)]
+
+
+NUMBERS = {"transient": 1.0, "window": 9.0, "time_unit": "time"}
+
+
+def duffing(n: int, **more: object) -> Scene:
+    """A driven network of unequal nodes, with smooth values and one that comes close to a kink."""
+    return Scene(
+        oscillator="duffing", topology=ring(n), rtol=1e-13, atol=1e-14, record=(), **NUMBERS,
+        parameters={"sigma": 0.2, "beta": [0.3 + 0.01 * i for i in range(n)]},
+        initial={"x": [0.1 + 0.1 * i for i in range(n)]},
+        observe={
+            "energy": mean(nodes.mean(v**2 / 2 + x**2 / 2)),
+            "power": mean(nodes.sum(v * sp.cos(t) * sp.Symbol("beta"))),
+            "spread": mean(nodes.std(x)),
+            "own": mean(x * nodes.mean(v) + sp.exp(-(nodes[2](x) ** 2))),
+        }, **more,
+    )  # fmt: skip
+
+
+@functools.cache
+def of_duffing(n: int) -> np.ndarray:
+    """The same means, spelled out node by node."""
+    xs, vs = names("x", n), names("v", n)
+    average = sum(xs) / n
+    energy = sum(a**2 / 2 + b**2 / 2 for a, b in zip(xs, vs, strict=True)) / n
+    power = sum(b * sp.cos(t) * sp.Symbol(f"beta_{i + 1}") for i, b in enumerate(vs))
+    spread = sp.sqrt(sum((a - average) ** 2 for a in xs) / n)
+    own = [a * sum(vs) / n + sp.exp(-(xs[1] ** 2)) for a in xs]
+    return integrals(duffing(n), [energy, power, spread, *own])
+
+
+@pytest.mark.parametrize("integrator", ["rodas5p", "dop853", "taylor"])
+@pytest.mark.parametrize("n", [3, 12])
+def test_means_are_the_integrals_that_scipy_finds(integrator: str, n: int) -> None:
+    """Of a driven network, written out and in loops; the near kink of the spread needs panels that are halved."""
+    found = run(duffing(n, integrator=integrator), show_progress=False)
+    assert found.own.dims == ("node",)
+    assert found.node.values.tolist() == list(range(1, n + 1))
+    values = np.concatenate([[found.energy, found.power, found.spread], found.own])
+    np.testing.assert_allclose(values, of_duffing(n), rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "taylor"])
+def test_kinks_are_found(integrator: str) -> None:
+    """The mean of |cos t| over whole periods is 2/pi, and that of cos^2 t is 1/2; each step meets a kink."""
+    scene = Scene(
+        oscillator="harmonic", integrator=integrator, rtol=1e-12, record=(), transient=0.0, window=4 * math.pi,
+        time_unit="time", initial={"x": [1.0], "v": [0.0]},
+        observe={"size": mean(abs(x)), "square": "mean(x**2)", "swing": variance(x), "top": maximum(v)},
+    )  # fmt: skip
+    found = run(scene, show_progress=False)
+    assert float(found.data["size"][0]) == pytest.approx(2 / math.pi, abs=1e-8)
+    assert float(found.square[0]) == pytest.approx(0.5, abs=1e-10)
+    assert float(found.swing[0]) == pytest.approx(0.5, abs=1e-10)
+    assert 0.97 < float(found.top[0]) <= 1.0 + 1e-12
+
+
+ROTORS = Scene(
+    oscillator="rotor", coupling="torsion", topology=complete(10), rtol=1e-11, record=("sync_error", "trajectory"),
+    samples=3, parameters={"power": [0.1 * math.sin(3 * i) for i in range(10)]}, **NUMBERS, integrator="dop853",
+    initial={"x": [0.3 * i for i in range(10)]}, axes={"sigma": [0.05, 0.1, 0.3]},
+    observe={
+        "r": mean(abs(nodes.mean(sp.exp(sp.I * x)))),
+        "again": "mean(sqrt(nodes.mean(cos(x))**2 + nodes.mean(sin(x))**2))",
+        "frequency": mean(rate(x)),
+        "speed": mean(v),
+        "error": mean(nodes.sum(ERROR)),
+        "worst": maximum(nodes.sum(ERROR)),
+        "last": end(x),
+        "force": end(rate(v)),
+        "lowest": minimum(nodes.minimum(v)),
+    },
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def rotors() -> Result:
+    return run(ROTORS, show_progress=False)
+
+
+def test_order_parameter_and_frequencies_of_rotors(rotors: Result) -> None:
+    np.testing.assert_allclose(rotors.r, rotors.again, rtol=0, atol=1e-15)
+    xs = names("x", 10)
+    order = sp.sqrt(sum(map(sp.cos, xs)) ** 2 + sum(map(sp.sin, xs)) ** 2) / 10
+    one = ROTORS.replace(axes={}, sigma=0.3)
+    assert float(rotors.r[2]) == pytest.approx(float(integrals(one, [order])[0]), abs=1e-10)
+    moved = rotors.trajectory.values[:, -1, :10] - rotors.trajectory.values[:, 0, :10]
+    np.testing.assert_allclose(rotors.frequency, moved / 9.0, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(rotors.frequency, rotors.speed, rtol=0, atol=1e-10)
+
+
+def test_values_at_the_end(rotors: Result) -> None:
+    state = [sp.Symbol(name, real=True) for name in (*ROTORS.equations.state, *ROTORS.equations.parameters)]
+    field = sp.lambdify(state, ROTORS.equations.rhs()[10:], "numpy", cse=True)
+    numbers = [ROTORS.parameters[name] for name in ROTORS.equations.parameters[:-1]]
+    np.testing.assert_array_equal(rotors.last, rotors.end.values[:, :10])
+    for cell, sigma in enumerate((0.05, 0.1, 0.3)):
+        force = field(*rotors.end.values[cell], *numbers, sigma)
+        np.testing.assert_allclose(rotors.force[cell], force, rtol=0, atol=1e-6)  # the dense output has order 7
+
+
+def test_the_synchronisation_error_is_an_observable() -> None:
+    """At short steps Simpson's rule of the record is exact to rounding too, and both look at the same extremes."""
+    scene = Scene(
+        topology=ring(4), integrator="rodas5p", rtol=1e-13, record=("sync_error",), parameters={"kappa": 50}, **NUMBERS,
+        observe={"error": mean(nodes.sum(ERROR)), "worst": maximum(nodes.sum(ERROR)), "last": end(nodes.sum(ERROR))},
+    )  # fmt: skip
+    found = run(scene, show_progress=False, sigma=[0.1, 0.2])
+    np.testing.assert_allclose(found.error, found.sync_error, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found.worst, found.sync_error_max, rtol=1e-5)
+    np.testing.assert_allclose(found.data["last"], found.sync_error_end, rtol=1e-13)
+
+
+def test_observables_do_not_depend_on_lanes_workers_and_other_records(rotors: Result) -> None:
+    other = run(ROTORS.replace(record=(), samples=0), show_progress=False, width=2, workers=1)
+    for name in ROTORS.observe:
+        np.testing.assert_array_equal(other.data[name], rotors.data[name])
+
+
+def test_files_hold_observables(rotors: Result, tmp_path: Path) -> None:
+    rotors.save(tmp_path / "whole.nc")
+    opened = open_result(tmp_path / "whole.nc")
+    assert opened.scene == ROTORS
+    assert opened.frequency.attrs["long_name"] == "mean(rate(x))"
+    streamed = stream(ROTORS, tmp_path / "streamed.nc", show_progress=False)
+    assert streamed.success
+    assert (tmp_path / "streamed.nc").read_bytes() == (tmp_path / "whole.nc").read_bytes()
+
+
+def test_a_resumed_run_keeps_what_was_observed(rotors: Result) -> None:
+    """Cells of an earlier result are not run again: their numbers come from its variables."""
+    data = rotors.data.copy(deep=True)
+    data["status"][1] = Status.NOT_RUN
+    data["frequency"][1] = np.nan
+    data["r"][0] += 1.0
+    found = run(ROTORS, resume=Result(data, ROTORS), show_progress=False)
+    assert float(found.r[0]) == float(rotors.r[0]) + 1.0
+    np.testing.assert_array_equal(found.frequency, rotors.frequency)
+
+
+@pytest.mark.parametrize(
+    ("contact", "integrator"),
+    [("atan", "rodas5p"), ("atan", "switching"), ("set-valued", "rodas5p"), ("set-valued", "taylor")],
+)
+def test_the_mean_speed_is_the_distance_over_the_time(contact: str, integrator: str) -> None:
+    """Of oscillators that slip and stick, by every kind of step; cells jump over no cycle of the window."""
+    scene = Scene(
+        topology=ring(3), contact=contact, integrator=integrator, rtol=1e-10, record=(), transient=0.0, window=20.0,
+        parameters={"kappa": 1e3} if contact == "atan" else {}, initial={"x": [0.3, 0.3, 0.5], "v": [0.0, 0.0, 0.1]},
+        observe={"speed": mean(v), "square": mean((x - nodes[1](x)) ** 2)},
+    )  # fmt: skip
+    found = run(scene, show_progress=False, sigma=[0.1, 0.2])
+    span = 20.0 * scene.period
+    moved = found.end.values[:, :3] - np.array(scene.y0[:3])
+    np.testing.assert_allclose(found.speed, moved / span, rtol=0, atol=2e-9)
+    assert (found.square.values[:, 0] == 0.0).all()
+    assert (found.square.values[:, 2] > 0.0).all()
+
+
+def test_a_periodic_cell_leaves_out_no_cycle_of_the_window() -> None:
+    """The approach to the cycle counts: a cell that jumped would give the cycles after it too little weight."""
+    scene = Scene(
+        transient=0.0, window=300.0, initial={"x": [0.3], "v": [0.0]}, record=(), integrator="rodas5p",
+        parameters={"kappa": 100.0}, observe={"speed": mean(v), "square": mean(x**2), "top": maximum(v)},
+    )  # fmt: skip
+    found = run(scene, show_progress=False, omega=[0.5, 2.0])
+    plain = run(scene, show_progress=False, omega=[0.5, 2.0], reduce=False)
+    early = run(scene, show_progress=False, omega=[0.5, 2.0], transient=200.0, window=1.0)
+    assert (early.periods_skipped > 100).all()
+    assert (found.periods_skipped == 0).all()
+    assert (plain.periods_skipped == 0).all()
+    for name in scene.observe:
+        np.testing.assert_allclose(found.data[name], plain.data[name], rtol=1e-11, atol=1e-12)
+
+
+def test_observed_parameters_and_equal_oscillators_are_kept() -> None:
+    """What a reduction would leave out is there if it is observed."""
+    scene = Scene(
+        oscillator="duffing", topology=ring(4), record=(), **NUMBERS, parameters={"u": 0.0},
+        initial={"x": [0.5] * 4}, observe={"force": mean(sp.Symbol("u") + sp.Symbol("omega") * v), "speed": mean(v)},
+        axes={"omega": [0.5, 2.0]},
+    )  # fmt: skip
+    reduction = as_reduction(scene, True)
+    assert {"u", "omega"} < set(reduction.equations.parameters)
+    assert any("observed" in sentence for sentence in reduction.kept)
+    found = run(scene, show_progress=False)
+    np.testing.assert_allclose(found.force, found.speed * np.array([[0.5], [2.0]]), rtol=1e-9)
+    assert found.speed.shape == (2, 4)
+
+
+def test_a_cell_that_ends_early_says_what_it_saw() -> None:
+    """A cell that used up its steps before the window has seen nothing; one inside it has its part of the window."""
+    scene = Scene(
+        oscillator="harmonic", integrator="dop853", record=(), transient=5.0, window=5.0, time_unit="time",
+        observe={"speed": mean(v)},
+    )  # fmt: skip
+    early = run(scene, show_progress=False, max_steps=3)
+    assert int(early.status) == Status.STEP_BUDGET
+    assert np.isnan(early.speed.values).all()
