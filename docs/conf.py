@@ -1,4 +1,4 @@
-"""How Sphinx builds the site: ``sphinx-build -W docs out/site``.  Nothing is fetched from the network."""
+"""How Sphinx builds the site: ``sphinx-build -W docs out/site``.  Nothing comes from the network."""
 
 from __future__ import annotations
 
@@ -16,10 +16,12 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.napoleon",
+    "numpydoc",
     "sphinx_gallery.gen_gallery",
     "mathml",
     "checked_links",
+    "families",
+    "package_words",
 ]
 exclude_patterns = ["gallery/README.rst", "tutorial/README.rst", "sg_execution_times.rst"]
 
@@ -28,11 +30,13 @@ myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 4
 html_theme = "furo"
 html_title = f"synchain {version}"
+html_theme_options = {"top_of_page_buttons": []}
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_math_renderer = "mathml"
 html_copy_source = False
 html_show_sourcelink = False
+html_show_copyright = False
 pygments_style = "friendly"
 pygments_dark_style = "github-dark"
 
@@ -40,9 +44,7 @@ pygments_dark_style = "github-dark"
 autodoc_typehints = "none"  # the docstrings say types in words, with shapes and units
 autodoc_member_order = "bysource"
 autosummary_generate = False
-napoleon_google_docstring = False
-napoleon_use_rtype = False
-napoleon_use_ivar = True
+numpydoc_show_class_members = False  # `:members:` shows them
 
 # Tutorial and gallery: plain files that run when the site is built; what raises fails the build
 sphinx_gallery_conf = {
@@ -58,4 +60,5 @@ sphinx_gallery_conf = {
     "abort_on_example_error": True,
     "image_srcset": ["2x"],
     "parallel": 2,
+    "run_stale_examples": True,  # the package may have changed though the example has not
 }

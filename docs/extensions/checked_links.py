@@ -1,4 +1,7 @@
-"""After a build: every link, anchor, image, style and script of the pages exists, and none is fetched from the network."""
+"""After a build: what pages link to and load exists, anchors too.
+
+Nothing is loaded from the network.  Links to other sites are not followed.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ class _Page(HTMLParser):
 
 
 def broken(folder: Path) -> list[str]:
-    """A line for each link of the built pages in `folder` that leads nowhere, or is loaded from elsewhere."""
+    """A line for each link of the pages in `folder` that leads nowhere or loads from elsewhere."""
     read = cache(_Page)
     found = []
     for path in sorted(folder.rglob("*.html")):

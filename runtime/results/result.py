@@ -42,7 +42,9 @@ class Result:
     scene : Scene
         The scene, with its axes.
 
-    Notes ----- Every cell has a `status`; `synchain.runtime.Status` names the codes.  Times are
+    Notes
+    -----
+    Every cell has a `status`; `synchain.runtime.Status` names the codes.  Times are
     non-dimensional.
     """
 
