@@ -1,4 +1,4 @@
-"""How Sphinx builds the site: ``sphinx-build -W docs out/site``.  Nothing comes from the network."""
+"""How Sphinx builds the site: ``sphinx-build -W docs out/site``; the network is not needed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Directive `families`: every family of graphs as a function, with its options, its summary and its source."""
+"""Directive `families`: every family of graphs as a function, with its options and its source."""
 
 from __future__ import annotations
 
@@ -21,9 +21,8 @@ class Families(SphinxDirective):
         for name in dir(models):
             family = getattr(models, name) if not name.startswith("_") else None
             if isinstance(family, Family):
-                lines += [
-                    f".. py:function:: {name}{signature(family).replace(return_annotation=signature(family).empty)}"
-                ]
+                call = signature(family)
+                lines += [f".. py:function:: {name}{call.replace(return_annotation=call.empty)}"]
                 lines += ["   :module: synchain.models", ""]
                 lines += [f"   {line}" for line in _text(name, family)] + [""]
         return self.parse_text_to_nodes("\n".join(lines))

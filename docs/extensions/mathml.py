@@ -1,6 +1,6 @@
 """Formulas as MathML, which browsers draw themselves: no script, no image, no network.
 
-latex2mathml converts them.  (The converter of docutils sets the index of ``\\dot x_i`` below the x.)
+latex2mathml converts them; the converter of docutils sets the index of ``\\dot x_i`` below the x.
 A formula with a command that it does not know is a warning.
 """
 

@@ -1,4 +1,4 @@
-"""Directive `package-words`: the glossary of a package, as it stands in the docstring of its `__init__`."""
+"""Directive `package-words`: the glossary in the docstring of a package."""
 
 from __future__ import annotations
 

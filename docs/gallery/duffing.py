@@ -35,7 +35,7 @@ downwards = run(scene.replace(continuation="down"))
 from scipy.integrate import solve_ivp
 
 up, down = (abs(result.trajectory[:, :, 0]).max("sample").values for result in (upwards, downwards))
-for result, amplitudes in ((upwards, up), (downwards, down)):
+for result in (upwards, downwards):
     for k in (10, 40, 70):
         w, times = frequencies[k], result.trajectory_time.values[k]
 

@@ -5,7 +5,8 @@ The friction chain and its threshold
 Four oscillators on a moving belt, joined by springs, driven at :math:`\omega = 1.15`:
 
 .. math::
-   \ddot x_i = -x_i + u\cos\omega t + \varepsilon f(\vartheta_b - \dot x_i) + \sigma\sum_j G_{ij} x_j .
+   \ddot x_i = -x_i + u\cos\omega t + \varepsilon f(\vartheta_b - \dot x_i)
+   + \sigma\sum_j G_{ij} x_j .
 
 Marszal, Saha, Jankowski & Stefański, Eur. Phys. J. Special Topics (2016), measured that two of them
 synchronise up to :math:`\sigma = 0.233`.  The master stability function predicts this for every
@@ -32,9 +33,8 @@ result = run(four, sigma=np.linspace(0.0, 0.25, 26))
 # The published end of the window of two, and direct simulation on either side of the end of four.
 end = function.windows[0].high
 synchronous = result.sync_error.values < 1e-6
-print(
-    f"two: sigma < {end:.4f}, published 0.233; four: sigma < {window.high:.4f}, by γ = {window.high_mode.eigenvalue.number}"
-)
+print(f"two: σ < {end:.4f}, published 0.233")
+print(f"four: σ < {window.high:.4f}, where γ = {window.high_mode.eigenvalue.number} is lost")
 assert abs(end - 0.233) < 5e-4
 assert synchronous[(result.sigma > 0.03) & (result.sigma < window.high - 0.02)].all()
 assert not synchronous[result.sigma > window.high + 0.01].any()

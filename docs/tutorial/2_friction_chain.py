@@ -33,8 +33,8 @@ for eigenvalue in scene.spectrum:
 # %%
 # One orbit tells the stability
 # -----------------------------
-# The master stability function is the exponent :math:`\Lambda(\alpha)` with which a mode of strength
-# α grows or decays along the synchronous motion.  It knows nothing of the graph.
+# The master stability function is the exponent :math:`\Lambda(\alpha)` with which a mode of
+# strength α grows or decays along the synchronous motion.  It knows nothing of the graph.
 import matplotlib.pyplot as plt
 import numpy as np
 

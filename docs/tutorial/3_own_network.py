@@ -49,8 +49,8 @@ for name, graph in graphs.items():
 # %%
 # Try it
 # ------
-# The lower end of the window of the two triangles, by simulation of all six oscillators.  Beyond the
-# upper end this oscillator runs away from its attractor, which the exponent cannot know.
+# The lower end of the window of the two triangles, by simulation of all six oscillators.  Beyond
+# the upper end this oscillator runs away from its attractor, which the exponent cannot know.
 import matplotlib.pyplot as plt
 
 (window,) = function.windows
