@@ -1,6 +1,7 @@
 """From a Lagrangian and a graph to exact equations and exact spectra.
 
-Names are loaded on first use, so that importing this package costs next to nothing. Every file of
+Names are loaded on first use, so that importing this package costs next to nothing; `__init__.pyi`
+says to editors what they are. Every file of
 the folder `topologies` is offered as a function of the number of nodes and of its options:
 ``circulant(10, offsets=(1, 3))`` is ``topology("circulant", 10, offsets=(1, 3))``.  Families whose
 name in networkx is another have that one too: ``path(4) == chain(4)``, ``cycle(5) == ring(5)``.
@@ -25,28 +26,14 @@ cell          One point of the axes of a scene: one initial-value problem.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from .graphs.families import topology
-    from .graphs.products import cartesian, complement, kronecker, union, weighted
-    from .graphs.readers import from_edges, from_graph, from_sparse, read_edges, read_graphml
-    from .graphs.symbolic import from_symbols
-    from .graphs.topology import Topology, from_matrix, read_matrix
-    from .inputs.options import integer_option, integers_option, probability_option
-    from .inputs.plugins import allow_code
-    from .mechanics.ends import ends
-    from .mechanics.interaction import Potential, Rates
-    from .mechanics.parameter import Parameter
-    from .presentation.equations import latex, text
-    from .scenes.axis import Axis
-    from .scenes.file import load_scene, scene_names
-    from .scenes.scene import Scene
-    from .scenes.section import Section
-    from .spectra.spectrum import Spectrum
+from typing import Any
 
 _HOMES = {
     "Axis": "scenes.axis",
+    "Field": "mechanics.inline",
+    "FrictionLaw": "mechanics.friction",
+    "Lagrangian": "mechanics.inline",
+    "Oscillator": "mechanics.oscillator",
     "Parameter": "mechanics.parameter",
     "Potential": "mechanics.interaction",
     "Rates": "mechanics.interaction",
@@ -58,6 +45,8 @@ _HOMES = {
     "cartesian": "graphs.products",
     "complement": "graphs.products",
     "ends": "mechanics.ends",
+    "friction": "mechanics.oscillator",
+    "friction_law": "mechanics.inline",
     "from_edges": "graphs.readers",
     "from_graph": "graphs.readers",
     "from_matrix": "graphs.topology",
@@ -81,6 +70,10 @@ _HOMES = {
 
 __all__ = [
     "Axis",
+    "Field",
+    "FrictionLaw",
+    "Lagrangian",
+    "Oscillator",
     "Parameter",
     "Potential",
     "Rates",
@@ -92,6 +85,8 @@ __all__ = [
     "cartesian",
     "complement",
     "ends",
+    "friction",
+    "friction_law",
     "from_edges",
     "from_graph",
     "from_matrix",

@@ -10,7 +10,7 @@ from synchain.models.mechanics import link
 from synchain.models.mechanics.components import Edge, Node
 from synchain.models.mechanics.coupling import Coupling
 from synchain.models.mechanics.friction import FrictionLaw
-from synchain.models.mechanics.oscillator import Lagrangian, Oscillator
+from synchain.models.mechanics.oscillator import LagrangianModel, Oscillator
 from synchain.models.mechanics.parameter import Parameter
 from synchain.models.scenes.model import as_coupling, as_law, as_oscillator
 
@@ -34,7 +34,7 @@ def coupling_of(part: str | Coupling) -> Coupling:
 
 
 def is_lagrangian(name: str) -> bool:
-    return isinstance(as_oscillator(name).model, Lagrangian)
+    return isinstance(as_oscillator(name).model, LagrangianModel)
 
 
 def node(oscillator: str | Oscillator, friction: str | FrictionLaw | None = None, contact: str = "atan") -> Node:

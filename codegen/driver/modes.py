@@ -3,7 +3,7 @@
 A deviation grows or shrinks by any factor, so it is scaled by a power of two every few steps, which is
 exact; the powers are counted.  Step sizes follow the errors of the orbit and of the modes in the
 first and the last register: callers sort modes by the size of their strength, so that the fastest
-modes are watched.
+modes are watched.  Taylor steps follow the series of the orbit and of all modes.
 """
 
 # ruff: noqa: I001  (the long lists of names stay short)
@@ -21,6 +21,7 @@ from ..simd.lanes import broadcast
 from ..simd.lanes import lane_bits
 from ..simd.lanes import load
 from ..simd.lanes import maximum
+from ..simd.lanes import minimum
 from ..simd.lanes import scale_binary
 from ..simd.lanes import select
 from ..simd.lanes import split_binary
@@ -31,31 +32,40 @@ from .cells import fill
 from .cells import outcome
 from .cells import turn_over
 from .contacts import change_modes
+from .contacts import stop_at_event
 from .contacts import take_back
+from .control import accept_series
 from .control import advance
 from .control import aim
 from .control import arrive
 from .control import judge
 from .control import pause
+from .dense import inside
 from .names import CONTACTS
 from .names import LANES
+from .names import SERIES
 from .names import WIDTH
 from .recording import ACCEPTED
 from .recording import ATOL
 from .recording import BASE
 from .recording import CLOCK
+from .recording import MAX_STEP
 from .recording import N_ACCEPTED
 from .recording import N_REJECTED
 from .recording import PERIOD
 from .recording import REJECTED
 from .recording import RTOL
 from .recording import STATUS
+from .recording import STEP
+from .recording import STOP
 from .recording import STOPPED_AT
 from .recording import TIME
 
 # --- kernel text below ---
 # Steps between two scalings: a step's growth is bounded by its error, that of so many stays far from overflow.
 BETWEEN_SCALINGS = 8
+# Entry of the shared array: the length of the orbit's Taylor step.
+LENGTH = 1
 # Entry of `control`: how many times the tolerance of the orbit the modes are allowed.
 LOOSENESS = 8
 
@@ -135,6 +145,45 @@ def hand_back(modes, powers, registers, vectors, growth, parts):
                 vectors[c, k] = value / length if length != 0.0 else 0.0
 
 
+@njit(error_model="numpy", forceinline=True)
+def attempt(
+    t, clock, y, y_new, dense, middle, out, steering, shared, strengths, old, new, registers, tolerance, dims, step, carry,
+    pushes,
+):  # fmt: skip
+    """One step of the orbit and its modes; returns its length and whether it is accepted.
+
+    A Taylor step is as long as the series of the orbit and of all modes allow, or ends at the first event; it is rejected
+    if a coefficient overflows.
+    """
+    if SERIES:
+        limit = minimum(load(clock, STOP, WIDTH) - t, steering[MAX_STEP])
+        own = step(t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, steering[RTOL], steering[ATOL], shared)
+        h, good = own, own > 0.0
+        if any_lane(good):
+            if CONTACTS:
+                own = stop_at_event(good, t, own, clock, y, y_new, dense, middle, out, (), dims, pushes)
+                limit = minimum(limit, own)
+            store(shared, LENGTH, own)
+            h = broadcast(carry(shared, strengths, old, new, registers, tolerance), WIDTH)
+            if any_lane(h < own):
+                for c in range(dims.dimension):
+                    store(y_new, c, inside(h / own, c, y, y_new, dense, dims))
+        return h, accept_series(clock, h, limit)
+    h = aim(clock, steering)
+    error = step(t, h, y, y, y_new, dense, steering[RTOL], steering[ATOL], shared)
+    if any_lane(error <= 1.0):
+        worst = watched(shared, strengths, old, new, registers - 1, tolerance, carry)
+        if worst <= 1.0 and registers > 1:
+            worst = max(worst, watched(shared, strengths, old, new, 0, tolerance, carry))
+        error = maximum(error, broadcast(worst, WIDTH))
+    accept = judge(clock, h, error, 1.0 / (dims.error_order + 1.0))
+    if CONTACTS:
+        accept = take_back(accept, t, h, clock, y, y_new, dense, middle, out, (), dims, pushes)
+    if any_lane(accept):
+        carry(shared, strengths, old, new, 1, registers - 1)
+    return h, accept
+
+
 @njit(error_model="numpy", nogil=True, cache=True)
 def march(
     step, carry, pushes, release, dims, owners, first, last, start, numbers, spans, control, strengths, vectors, growth,
@@ -177,19 +226,13 @@ def march(
             powers[k] = 0.0
         status, taken = outcome(0, clock, y, control, dims), 0
         while status == 0:
-            t, h = load(clock, TIME, WIDTH), aim(clock, steering)
-            error = step(t, h, y, y, y_new, dense, steering[RTOL], steering[ATOL], shared)
-            if any_lane(error <= 1.0):
-                worst = watched(shared, strong, old, new, registers - 1, tolerance, carry)
-                if worst <= 1.0 and registers > 1:
-                    worst = max(worst, watched(shared, strong, old, new, 0, tolerance, carry))
-                error = maximum(error, broadcast(worst, WIDTH))
+            t = load(clock, TIME, WIDTH)
+            h, accept = attempt(
+                t, clock, y, y_new, dense, middle, out, steering, shared, strong, old, new, registers, tolerance, dims, step,
+                carry, pushes,
+            )  # fmt: skip
             t_new = arrive(clock, t, h)
-            accept = judge(clock, h, error, 1.0 / (dims.error_order + 1.0))
-            if CONTACTS:
-                accept = take_back(accept, t, h, clock, y, y_new, dense, middle, out, (), dims, pushes)
             if any_lane(accept):
-                carry(shared, strong, old, new, 1, registers - 1)
                 old, new = new, old
                 taken += 1
                 if taken % BETWEEN_SCALINGS == 0:

@@ -47,6 +47,7 @@ from .control import judge
 from .control import pause
 from .control import turned
 from .names import CONTACTS
+from .names import KINKS
 from .names import LOOPED
 from .names import SECTION
 from .names import SERIES
@@ -163,12 +164,16 @@ def attempt(mode, clock, y, dense, y_new, middle, out, control, dims, step, step
         limit = minimum(load(clock, STOP, WIDTH) - t, control[MAX_STEP])
         if LOOPED:
             graph, weights = network
-            h = step(
+            found = step(
                 t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL], graph, weights
             )
         else:
-            h = step(t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL])
-        accept = accept_series(clock, h, limit)
+            found = step(t, limit, load(clock, STEP, WIDTH), y, y, y_new, dense, control[RTOL], control[ATOL])
+        if KINKS:
+            h, reach = found
+        else:
+            h, reach = found, found
+        accept = accept_series(clock, reach, limit)
         if CONTACTS:
             h = stop_at_event(accept, t, h, clock, y, y_new, dense, middle, out, network, dims, pushes)
         return t, h, accept, rate

@@ -27,7 +27,7 @@ class Driver:
     """What the text of a driver depends on; scenes that agree in it share its machine code.
 
     `width` is the number of cells in a register, or of modes in one; `series` is True for Taylor steps, which choose
-    their length.
+    their length, and `kinks` for those among them that end at kinks.
     """
 
     kind: KernelKind
@@ -37,9 +37,10 @@ class Driver:
     switching: bool = False
     contacts: bool = False
     series: bool = False
+    kinks: bool = False
 
     def __str__(self) -> str:
-        traits = [name for name in ("looped", "switching", "contacts") if getattr(self, name)]
+        traits = [name for name in ("looped", "switching", "contacts", "kinks") if getattr(self, name)]
         subject = "orbits and their modes" if self.kind is KernelKind.MODES else "sweeps"
         records = ", ".join(("final state", *self.records))
         lanes = f"{self.width} lane{'s' * (self.width != 1)}"
@@ -72,6 +73,7 @@ class Driver:
             "SWITCHING": self.switching,
             "LOOPED": self.looped,
             "SERIES": self.series,
+            "KINKS": self.kinks,
         }
 
     @property
@@ -103,7 +105,7 @@ def common_drivers() -> list[Driver]:
     ways = ((False, False), (False, True), (True, True))  # contacts, series
     return [
         *(Driver(KernelKind.SWEEP, width, r, contacts=c, series=s) for c, s in ways for r in records),
-        *(Driver(KernelKind.MODES, width, contacts=contacts) for contacts in (False, True)),
+        *(Driver(KernelKind.MODES, width, contacts=c, series=s) for c, s in ways),
     ]
 
 

@@ -1,9 +1,9 @@
 """From a variational equation to the text of a kernel: one orbit, and any number of modes carried along it in lanes.
 
-The orbit is stepped by itself.  Each accepted step leaves what its stages know about the Jacobian in a short shared
-array, and from that every mode takes the same step of the same method: the result is that of the method applied to orbit
-and deviation together, whose Jacobian is lower triangular by blocks.  The orbit is scalar; a register holds one deviation
-for each of LANES modes.
+The orbit is stepped by itself.  Each step leaves what it knows about the Jacobian, in its stages or as a series, in a
+short shared array, and from that every mode takes the same step of the same method: the result is that of the method
+applied to orbit and deviation together, whose Jacobian is lower triangular by blocks.  The orbit is scalar; a register
+holds one deviation for each of LANES modes.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from ..steps.elimination import plan, write_factors, write_solve
 from ..steps.names import tidy
 from ..steps.step import SCALED, Step, node_function
 from ..steps.unrolled import Unrolled, stage_state
+from ..taylor import write_tangent
 from .driver import Driver, KernelKind, imports
-from .sweep import LARGEST_UNROLLED, KernelSource, describe, node_functions
+from .sweep import AUTO, LARGEST_UNROLLED, KernelSource, describe, node_functions
 
 __all__ = ["emit_modes"]
 
-METHOD = "rodas5p"
 HEAD = 3
 """First entries of the shared array: rate = 1/h, shift = 1/(gamma h), reach = gamma h."""
 
@@ -54,13 +54,15 @@ def carry(shared, strengths, old, new, first, last):
 Place = tuple[int, int]
 
 
-def emit_modes(variation: Variation, width: int | None = None) -> KernelSource:
+def emit_modes(variation: Variation, method: str | Integrator = AUTO, width: int | None = None) -> KernelSource:
     """Write the kernel that carries deviations along an orbit.
 
     Parameters
     ----------
     variation
         The orbit, and the equations of a mode along it.
+    method
+        A Rosenbrock or a Taylor method, or its name.
     width
         Modes that step together; by default those of one register.
 
@@ -72,7 +74,7 @@ def emit_modes(variation: Variation, width: int | None = None) -> KernelSource:
     Raises
     ------
     ValueError
-        If the orbit has more than eight oscillators.
+        If the orbit has more than eight oscillators, or for a method of another kind.
     UnprintableError
         If the equations cannot be printed.
     """
@@ -81,29 +83,59 @@ def emit_modes(variation: Variation, width: int | None = None) -> KernelSource:
         raise ValueError(
             f"tangent dynamics of {equations.n} oscillators; expected at most {LARGEST_UNROLLED} (steps are written out)"
         )
-    method = integrator(METHOD)
+    method = integrator(method) if isinstance(method, str) else method
+    if not (method.series or method.implicit) or method.smooth is not None:
+        raise ValueError(f"tangent dynamics: found integrator {method.name}; expected a Rosenbrock or a Taylor method")
     width = lanes.native_width() if width is None else width
     plain = tidy(equations)
     names = Names([*plain.state, *plain.parameters, *(s.name for s in plain.node.state)])
-    blocks = analyse(plain.node, names, plain.varied)
     variation = _renamed(variation, plain)
+    functions, shared, count = (_series if method.series else _stages)(variation, method, names)
+    text = "\n\n\n".join([*functions, *map(LANES.function, event_functions(variation, names))]) + "\n"
+    deviations = f"{variation.size} deviations, {width} modes a register"
+    head = describe(equations, plain, method, (), count, deviations)
+    constants = f"WIDTH = 1\nLANES = {width}\nDENSE = {plain.sticks or method.series}"
+    events = variation.events
+    owners = (-1,) * variation.size if events is None else tuple(events.owners)
+    return KernelSource(
+        "\n\n\n".join([head, imports(text), constants, text]),
+        equations,
+        method,
+        Driver(KernelKind.MODES, width, contacts=plain.sticks, series=method.series),
+        _dimensions(variation, method, shared),
+        owners,
+    )
+
+
+def _series(variation: Variation, method: Integrator, names: Names) -> tuple[list[str], int, int]:
+    """The functions of Taylor steps, the length of the shared array, and the operations of the orbit's step."""
+    made = write_tangent(variation, method.order)
+    return [made.orbit.text, *made.modes], made.shared, made.orbit.operations
+
+
+def _stages(variation: Variation, method: Integrator, names: Names) -> tuple[list[str], int, int]:
+    """The functions of steps in stages, the length of the shared array, and the operations of the orbit's step."""
+    plain = variation.orbit
+    blocks = analyse(plain.node, names, plain.varied)
     parts = Parts.of(variation, method.stages)
     writer = Unrolled(plain, [blocks], method)
     functions = _functions(parts, plain.state, names)
     writer.write(after=lambda i: _note(writer, parts, functions, method, i))
-    carry = _mode_step(variation, parts, method)
-    bodies = [*node_functions([writer], blocks), *functions.values()]
-    text = _module(writer, variation, width, bodies, carry, names)
-    events = variation.events
-    owners = (-1,) * variation.size if events is None else tuple(events.owners)
-    return KernelSource(
-        text,
-        equations,
-        method,
-        Driver(KernelKind.MODES, width, contacts=plain.sticks),
-        _dimensions(variation, plain, method, parts.size),
-        owners,
+    orbit = Function(
+        "step",
+        ("t", "h", "y", "p", "y_new", "dense", "rtol", "atol", "shared"),
+        "One step of the orbit from (t, y): writes y_new and what the modes need, returns the error.",
+        tuple(writer.statements),
+        inline=False,
     )
+    modes = Function(
+        "mode_step",
+        ("shared", "strengths", "old", "new", "which"),
+        "The same step of the modes in one register: writes them, returns their error and their size.",
+        tuple(_mode_step(variation, parts, method)),
+    )
+    made = map(LANES.function, [*node_functions([writer], blocks), *functions.values()])
+    return [*made, SCALED, LANES.function(orbit), LANES.function(modes), CARRY], parts.size, operations(orbit.body)
 
 
 def _renamed(variation: Variation, plain: Equations) -> Variation:
@@ -289,43 +321,14 @@ def _largest(values: Sequence[Expression]) -> Expression:
     return first
 
 
-def _module(
-    writer: Step,
-    variation: Variation,
-    width: int,
-    functions: list[Function],
-    carry: list[Statement],
-    names: Names,
-) -> str:
-    plain = writer.equations
-    orbit = Function(
-        "step",
-        ("t", "h", "y", "p", "y_new", "dense", "rtol", "atol", "shared"),
-        "One step of the orbit from (t, y): writes y_new and what the modes need, returns the error.",
-        tuple(writer.statements),
-        inline=False,
-    )
-    modes = Function(
-        "mode_step",
-        ("shared", "strengths", "old", "new", "which"),
-        "The same step of the modes in one register: writes them, returns their error and their size.",
-        tuple(carry),
-    )
-    deviations = f"{variation.size} deviations, {width} modes a register"
-    made = [*map(LANES.function, functions), SCALED, LANES.function(orbit), LANES.function(modes), CARRY]
-    text = "\n\n\n".join([*made, *map(LANES.function, event_functions(variation, names))]) + "\n"
-    head = describe(variation.orbit, plain, writer.method, (), operations(orbit.body), deviations)
-    constants = f"WIDTH = 1\nLANES = {width}\nDENSE = {plain.sticks}"
-    return "\n\n\n".join([head, imports(text), constants, text])
-
-
-def _dimensions(variation: Variation, plain: Equations, method: Integrator, shared: int) -> ModeDimensions:
+def _dimensions(variation: Variation, method: Integrator, shared: int) -> ModeDimensions:
+    plain = variation.orbit
     return ModeDimensions(
         nodes=plain.n,
         components=len(plain.node.continuous),
         dimension=plain.dimension,
         parameters=len(plain.parameters),
-        dense_rows=len(method.dense),
+        dense_rows=method.dense_rows,
         error_order=method.error_order,
         repeats=0,
         strengths=len(variation.parameters),

@@ -166,8 +166,9 @@ def emit(
     weight = [edge.weight.name for edge in plain.edges]
     states = [s.name for node in plain.nodes for s in node.state]
     names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
-    chosen = Driver(KernelKind.SWEEP, width, ordered, looped, method.smooth is not None, plain.sticks, method.series)
-    functions, scratch, count = (_series if method.series else _stages)(plain, method, names, elimination)
+    functions, scratch, count, kinks = (_series if method.series else _stages)(plain, method, names, elimination)
+    switching = method.smooth is not None
+    chosen = Driver(KernelKind.SWEEP, width, ordered, looped, switching, plain.sticks, method.series, kinks)
     events = [
         *push_functions(plain, names, looped),
         *_section(equations, plain, section if "section" in ordered else None),
@@ -205,16 +206,18 @@ def _of_links(equations: Equations) -> int:
 
 def _series(
     plain: Equations, method: Integrator, names: Names, elimination: Program | None
-) -> tuple[list[str], int, int]:
-    """The function of a Taylor step, the groups of scratch memory that it needs, and its operations."""
+) -> tuple[list[str], int, int, bool]:
+    """The function of a Taylor step, the groups of scratch memory that it needs, its operations, and whether it has kinks."""
     step = (write_step if elimination is None else write_looped)(plain, method.order)
-    return [step.text], step.workspace, step.operations
+    return [step.text], step.workspace, step.operations, step.kinks
 
 
 def _stages(
     plain: Equations, method: Integrator, names: Names, elimination: Program | None
-) -> tuple[list[str], int, int]:
-    """The functions of a step in stages, the groups of scratch memory that they need, and the operations of the steps."""
+) -> tuple[list[str], int, int, bool]:
+    """The functions of a step in stages, the groups of scratch memory that they need, and the operations of the steps; it
+    steps over kinks.
+    """
     blocks = [analyse(node, names, plain.varied) for node in plain.nodes]
     steps = _steps(plain, blocks, method, elimination)
     looped = elimination is not None
@@ -222,7 +225,7 @@ def _stages(
     stepping = [_step(name, writer, looped) for name, writer in steps.items()]
     made = [*map(LANES.function, functions), SCALED, *([PAIR, driver.text("sparse")] if looped else [])]
     scratch = workspace(steps["step"], elimination) if elimination is not None else 0
-    return [*made, *map(LANES.function, stepping)], scratch, sum(operations(f.body) for f in stepping)
+    return [*made, *map(LANES.function, stepping)], scratch, sum(operations(f.body) for f in stepping), False
 
 
 def _dimensions(plain: Equations, method: Integrator, scratch: int) -> Dimensions:

@@ -21,8 +21,10 @@ from ..program.lowering import lower
 from ..program.passes import Names
 from ..program.printers import LANES
 from .series import (
+    Choice,
     Constant,
     Integral,
+    Kink,
     Linear,
     Power,
     Product,
@@ -36,7 +38,7 @@ from .series import (
 from .terms import ONE, ZERO, Expr, Name, Number, add, times
 from .terms import Product as Factors
 
-__all__ = ["STARTS", "Graph", "Template", "is_linear", "kink"]
+__all__ = ["STARTS", "Graph", "Template", "is_linear", "jump"]
 
 STARTS: dict[type[sp.Expr], str] = {
     sp.exp: "exp", sp.log: "log", sp.sin: "sin", sp.cos: "cos", sp.tan: "tan", sp.sinh: "sinh", sp.cosh: "cosh",
@@ -50,14 +52,25 @@ The others follow from the derivative that SymPy knows.
 ODD = (sp.sin, sp.tan, sp.sinh, sp.tanh, sp.atan, sp.asin, sp.erf)
 EVEN = (sp.cos, sp.cosh)
 
-KINKED = (sp.Abs, sp.sign, sp.Max, sp.Min, Piecewise, sp.floor, sp.ceiling, sp.Heaviside)
+KINKED = (sp.Abs, sp.Max, sp.Min)
+"""Functions with a kink where an argument, or the difference of two, is zero."""
+
+JUMPING = (sp.sign, sp.floor, sp.ceiling, sp.Heaviside)
 
 
-def kink(equations: Equations) -> sp.Expr | None:
-    """Return a part of some equations that is not analytic in the states or in time, None if there is none."""
+def jump(equations: Equations) -> sp.Expr | None:
+    """Return a part of some equations that is not continuous in the states or in time, None if there is none."""
     templates = [(node.rhs, {TIME, *node.state}) for node in equations.nodes]
     templates += [(edge.rhs, {TIME, *edge.here, *edge.there}) for edge in equations.edges]
-    return next((part for rhs, moving in templates for part in _kinks(rhs, moving)), None)
+    return next((part for rhs, moving in templates for part in _jumps(rhs, moving)), None)
+
+
+def is_analytic(equations: Equations) -> bool:
+    """True if no rate has a jump or a kink in the states or in time."""
+    parts = (*JUMPING, *KINKED, Piecewise)
+    nodes = [(node.rhs, {TIME, *node.state}) for node in equations.nodes]
+    edges = [(edge.rhs, {TIME, *edge.here, *edge.there}) for edge in equations.edges]
+    return not any(part.free_symbols & moving for rhs, moving in nodes + edges for e in rhs for part in e.atoms(*parts))
 
 
 def is_linear(equations: Equations) -> bool:
@@ -68,9 +81,27 @@ def is_linear(equations: Equations) -> bool:
     return not any(e.free_symbols & moving for block, moving in blocks for row in block for e in row)
 
 
-def _kinks(expressions: Sequence[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
-    parts = {part for e in expressions for part in e.atoms(*KINKED) if part.free_symbols & moving}
-    return sorted(parts, key=sp.default_sort_key)
+def _jumps(expressions: Sequence[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
+    parts = {part for e in expressions for part in e.atoms(*JUMPING, Piecewise) if part.free_symbols & moving}
+    found = [part for part in parts if not (isinstance(part, Piecewise) and _joins(part, moving))]
+    return sorted(found, key=sp.default_sort_key)
+
+
+def _joins(choice: Piecewise, moving: Set[sp.Symbol]) -> bool:
+    """True if the pieces of a choice agree where it goes from one to the next, as far as can be seen."""
+    pieces = list(choice.args)
+    for k, (piece, condition) in enumerate(pieces[:-1]):
+        if not isinstance(condition, sp.StrictGreaterThan | sp.GreaterThan | sp.StrictLessThan | sp.LessThan):
+            return False
+        gap, rest = condition.lhs - condition.rhs, Piecewise(*pieces[k + 1 :])
+        at = next((s for s in sorted(gap.free_symbols & moving, key=str) if _steady(gap.diff(s), s)), None)
+        if at is None or sp.simplify((piece - rest).subs(at, sp.solve(gap, at)[0])) != 0:
+            return False
+    return bool(pieces[-1][1] == sp.true)
+
+
+def _steady(slope: sp.Expr, symbol: sp.Symbol) -> bool:
+    return bool(slope != 0 and not slope.has(symbol))
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,11 +113,11 @@ class Template:
 
     @classmethod
     def of(cls, expressions: Sequence[sp.Expr], moving: Iterable[sp.Symbol], supply: Iterator[sp.Symbol]) -> Template:
-        """Share the repeated parts under names of the supply; ValueError for functions of `moving` symbols that are not analytic."""
+        """Share the repeated parts under names of the supply; ValueError for functions of `moving` symbols that jump."""
         symbols = frozenset(moving)
-        for part in _kinks(expressions, symbols):
+        for part in _jumps(expressions, symbols):
             raise ValueError(
-                f"taylor: a function that is not analytic; found {part}; expected analytic functions; "
+                f"taylor: a function that jumps; found {part}; expected continuous functions, analytic between kinks; "
                 f"use integrator dop853 or rodas5p"
             )
         shared, reduced = sp.cse(expressions, symbols=supply, order="canonical")
@@ -139,13 +170,7 @@ class Graph:
 
     def settle(self, roots: Sequence[Series]) -> None:
         """Leave out what no root needs, name the rest, and find sums that are used once."""
-        needed, open_ends = set[Series](), list(roots)
-        while open_ends:
-            s = open_ends.pop()
-            if s not in needed:
-                needed.add(s)
-                open_ends += [*s.linear, *s.convolved, *s.started]
-        self.series = [s for s in self.series if s in needed]
+        self.series = self.behind(roots)
         uses = Counter([*roots, *(used for s in self.series for used in s.linear)])
         starts = uses + Counter(used for s in self.series for used in s.started)
         convolved = {used for s in self.series for used in s.convolved}
@@ -216,6 +241,31 @@ class Graph:
             raise TypeError(f"found {found}; expected a slope")
         return found
 
+    def choice(self, gap: Series, above: Series, below: Series) -> Series:
+        """`above` where a series is positive, `below` where it is negative; they agree where it is zero."""
+        factor, inner = split(gap)
+        if _negative(factor) and isinstance(factor, Number):
+            above, below = below, above
+        return self.put(Choice, self.put(Kink, inner if isinstance(factor, Number) else gap), above, below)
+
+    def larger(self, left: Series, right: Series) -> Series:
+        """The larger one of two series."""
+        return self.choice(self.sum([(ONE, left), (Number(-1.0), right)]), left, right)
+
+    def smaller(self, left: Series, right: Series) -> Series:
+        """The smaller one of two series."""
+        return self.choice(self.sum([(ONE, left), (Number(-1.0), right)]), right, left)
+
+    @property
+    def kinks(self) -> list[Kink]:
+        """The kinks of all series."""
+        return [s for s in self.series if isinstance(s, Kink)]
+
+    def behind(self, roots: Iterable[Series]) -> list[Series]:
+        """The series that some need for a coefficient, and they themselves, in the order of `series`."""
+        needed = _needed(roots)
+        return [s for s in self.series if s in needed]
+
     # -- expressions ------------------------------------------------------------------------------------------
 
     def moves(self, e: sp.Expr) -> bool:
@@ -241,6 +291,8 @@ class Graph:
             return self.term(e)
         if e.is_Pow:
             return self.power(e.base, e.exp)
+        if isinstance(e, (*KINKED, Piecewise)):
+            return self.kinked(e)
         return self.function(e)
 
     def constant(self, e: sp.Expr) -> Expr:
@@ -306,6 +358,18 @@ class Graph:
             else self.product(self.of(base ** (exponent - 1)), self.of(base))
         )
 
+    def kinked(self, e: sp.Expr) -> Series:
+        """An absolute value, the largest or smallest of some, or a choice."""
+        if isinstance(e, Piecewise):
+            (piece, condition), *rest = e.args
+            pieces = self.of(piece), self.of(Piecewise(*rest))
+            rises = isinstance(condition, sp.StrictGreaterThan | sp.GreaterThan)
+            return self.choice(self.of(condition.lhs - condition.rhs), *(pieces if rises else reversed(pieces)))
+        parts = [self.of(a) for a in _sorted(e.args)]
+        if isinstance(e, sp.Abs):
+            return self.choice(parts[0], parts[0], self.sum([(Number(-1.0), parts[0])]))
+        return reduce(self.larger if isinstance(e, sp.Max) else self.smaller, parts)
+
     def function(self, e: sp.Expr) -> Series:
         """A function of one argument, even and odd ones of the argument without its sign."""
         if type(e) not in STARTS:
@@ -349,6 +413,17 @@ class Graph:
         return found
 
 
+def _needed(roots: Iterable[Series]) -> set[Series]:
+    """All series that some need, and they themselves."""
+    needed, open_ends = set[Series](), list(roots)
+    while open_ends:
+        s = open_ends.pop()
+        if s not in needed:
+            needed.add(s)
+            open_ends += [*s.linear, *s.convolved, *s.started]
+    return needed
+
+
 def split(series: Series) -> tuple[Expr, Series]:
     """The constant factor of a series and the rest."""
     if isinstance(series, Linear) and len(series.terms) == 1 and series.constant == ZERO:
@@ -370,7 +445,7 @@ def _negative(e: Expr) -> bool:
 
 def _words() -> tuple[str, ...]:
     """What names of series begin with."""
-    kinds = (Linear, Power, Product, Ratio, Slope, Square, SquareRoot)
+    kinds = (Choice, Kink, Linear, Power, Product, Ratio, Slope, Square, SquareRoot)
     return (*(kind.__name__.lower() for kind in kinds), *STARTS.values())
 
 

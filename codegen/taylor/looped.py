@@ -21,7 +21,7 @@ from ..steps.names import NAMES
 from ..steps.places import Joint, Kind, Span, places
 from .graph import Graph, Template
 from .series import Constant, Series, State, Time
-from .step import TaylorStep, called, finished
+from .step import TaylorStep, called, ended, finished, lane, returned
 from .terms import ZERO, Assign, Expr, Name, Number, add, show, statement
 
 __all__ = ["write_looped"]
@@ -35,7 +35,7 @@ Hoisted = tuple[list[sp.Expr], dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]
 class Section:
     """What is done alike for all nodes of a kind, for all links of a joint, or once.
 
-    head, index, count: the loop, its variable and the number of its turns in the whole numbering; `before` loads what the
+    head, index, count: the loop, its variable and the number of its turns in the whole numbering; `setting` loads what the
     turn needs at any order, `places` are the states that it reads, and where they stand.
     """
 
@@ -43,7 +43,7 @@ class Section:
     head: str
     index: str
     count: int
-    before: list[str] = field(default_factory=list)
+    setting: list[str] = field(default_factory=list)
     places: dict[Series, str] = field(default_factory=dict)
     rates: list[tuple[str, Series]] = field(default_factory=list)
     adds: bool = False
@@ -74,6 +74,10 @@ class Section:
     def start(self, series: Series) -> Expr:
         """Coefficient 0 of a series."""
         return series.value if isinstance(series, Constant) else self.values[series]
+
+    def before(self, series: Series) -> Expr:
+        """Coefficient k - 1 of a series."""
+        return Name(self.load(series, "(k - 1)"))
 
     def sum(self, left: Series, right: Series, first: int, last: int) -> Expr:
         """Sum of left_j * right_(k-j) for j = first … k + last."""
@@ -109,10 +113,19 @@ class Section:
 
     def load(self, series: Series, order: str) -> str:
         """A coefficient of a series from memory."""
+        return f"load(dense, {self.where(series, order)}, WIDTH)"
+
+    def where(self, series: Series, order: str) -> str:
+        """Where a coefficient of a series stands."""
         if series in self.places:
-            return f"load(dense, at_states + {order}*DIMENSION + {self.places[series]}, WIDTH)"
-        owner = self.waves.get(series, self)
-        return f"load(dense, {owner.slot(series.name, order)}, WIDTH)"
+            return f"at_states + {order}*DIMENSION + {self.places[series]}"
+        return self.waves.get(series, self).slot(series.name, order)
+
+    def stride(self, series: Series) -> str:
+        """How far one coefficient of a series stands behind the last."""
+        if series in self.places:
+            return "DIMENSION"
+        return {"": "1", "i": "NODES", "e": "LINKS"}[self.waves.get(series, self).index]
 
     @property
     def remembered(self) -> set[Series]:
@@ -123,7 +136,7 @@ class Section:
 
     def text(self, order: str) -> list[str]:
         """The statements for coefficients `order`: 0, or k for any later one."""
-        self.lines, first = list(self.before), order == "0"
+        self.lines, first = list(self.setting), order == "0"
         outer = [*self.places, *self.waves]
         if not first:
             self.lines += [f"{name} = load(dense, {self.slot(name, '0')}, WIDTH)" for name in self.kept]
@@ -147,19 +160,25 @@ class Section:
             elif value != ZERO:
                 self.lines += statement(Assign("rate", add(Name(f"load(dense, at_rates + {place}, WIDTH)"), value)))
                 self.lines.append(f"store(dense, at_rates + {place}, rate)")
-        return [self.head, *(f"    {line}" for line in self.lines)] if self.index else self.lines
+        return self.turns(self.lines)
+
+    def passages(self, degree: int) -> list[str]:
+        """The statements that end the step at the kinks of this section."""
+        found = [
+            f"passed = passage({self.load(kink, str(degree))}, load(dense, {self.slot(kink.size, '0')}, WIDTH), dense, "
+            f"{self.where(kink.base, '0')}, {self.stride(kink.base)}, {degree}, passed)"
+            for kink in self.graph.kinks
+        ]
+        return self.turns([*self.setting, *found]) if found else []
+
+    def turns(self, lines: list[str]) -> list[str]:
+        """Statements that are run through in the section's loop."""
+        return [self.head, *(f"    {line}" for line in lines)] if self.index else lines
 
 
 def head_of(span: Span) -> str:
     """The head of the loop over a part of a numbering."""
     return LANES.loop(span.index, span.start, span.stop) + ":"
-
-
-def lane(value: Expr) -> str:
-    """The text of a value that is stored: numbers become lanes."""
-    if isinstance(value, Number):
-        return f"broadcast({show(value)}, WIDTH)"
-    return show(value)
 
 
 class LoopWriter:
@@ -187,6 +206,8 @@ class LoopWriter:
             self.waves.waves[self.time] = self.waves
         self.sections = [self.node(kind, *found) for kind, found in zip(kinds, nodes, strict=True)]
         self.sections += [self.link(joint, *found) for joint, found in zip(joints, links, strict=True)]
+        self.kinks = any(section.graph.kinks for section in (self.waves, *self.sections))
+        self.orders = order + 1 if self.kinks else order
 
     # -- sections ---------------------------------------------------------------------------------------------
 
@@ -206,7 +227,7 @@ class LoopWriter:
         states = [s for s, moving in zip(kind.node.state, moves, strict=True) if moving]
         fixed = [s for s in kind.node.state if s not in states]
         section = Section(Graph(self.names), head_of(kind.span), "i", self.equations.n)
-        section.before += self.own(kind.node.rhs, fixed, kind.node, "i", "")
+        section.setting += self.own(kind.node.rhs, fixed, kind.node, "i", "")
         moving = {s: State(name=self.swap[s].name) for s in states}
         component = {s: c for c, s in enumerate(kind.node.state)}
         section.places = {state: self.place(component[s]) for s, state in moving.items()}
@@ -234,7 +255,7 @@ class LoopWriter:
         edge = joint.edge
         section = Section(Graph(self.names), head_of(joint.span), "e", len(self.equations.links), adds=True)
         weight = self.called[edge.weight.name]
-        section.before += ["i, j_there = target[e], source[e]", f"{weight} = weights[e]"]
+        section.setting += ["i, j_there = target[e], source[e]", f"{weight} = weights[e]"]
         moving: dict[sp.Symbol, Series] = {}
         swap: dict[sp.Symbol, sp.Expr] = dict(constants)
         used = {s for e in edge.rhs for s in e.free_symbols}
@@ -251,10 +272,10 @@ class LoopWriter:
                     section.places[moving[s]] = self.place(c, index)
                 else:
                     swap[s] = sp.Symbol(name, real=True)
-                    section.before.append(f"{name} = load(y, {self.place(c, index)}, WIDTH)")
-        section.before += self.own(edge.rhs, [], joint.target, "i", "_here")
+                    section.setting.append(f"{name} = load(y, {self.place(c, index)}, WIDTH)")
+        section.setting += self.own(edge.rhs, [], joint.target, "i", "_here")
         for name, load in self.places.of_source(edge, used, "j_there"):
-            section.before.append(f"{name} = {LANES.text(load)}")
+            section.setting.append(f"{name} = {LANES.text(load)}")
         swap |= {s: sp.Symbol(f"{own.name}_there", real=True) for s, own in edge.theirs}
         seen: dict[sp.Symbol, Series] = {symbol: State(name=series.name) for symbol, series in waves.items()}
         section.waves = dict.fromkeys(seen.values(), self.waves)
@@ -317,7 +338,7 @@ class LoopWriter:
         template = Template.of(rates, moving, self.names.fresh("shared_"))
         found = graph.read(template, moving, {**self.swap, **swap})
         graph.settle(found)
-        section.before += [f"{name} = {text}" for name, text in graph.constants.items()]
+        section.setting += [f"{name} = {text}" for name, text in graph.constants.items()]
         return found
 
     # -- text -------------------------------------------------------------------------------------------------
@@ -339,12 +360,13 @@ class LoopWriter:
             lines += ["store(dense, at_t, t)", "store(dense, at_t + 1, scale)", f"for k in range(2, {self.order + 1}):"]
             lines += ["    store(dense, at_t + k, 0.0*scale)"]
         lines += [line for part in orders for line in part]
-        lines += ["# all further orders", f"for k in range(1, {self.order}):"]
+        lines += ["# all further orders", f"for k in range(1, {self.orders}):"]
         lines += [
             f"    {line}" for line in ("number = 1.0*k", "inverse = 1.0/k", *self.next_states("inverse*scale", "k"))
         ]
         lines += [f"    {line}" for part in later for line in part]
-        lines += self.next_states(f"{1.0 / self.order!r}*scale", str(self.order))
+        if not self.kinks:
+            lines += self.next_states(f"{1.0 / self.order!r}*scale", str(self.order))
         lines += self.closing()
         return lines, size
 
@@ -358,7 +380,7 @@ class LoopWriter:
             kept = {
                 s.name for s in section.remembered | ({s for _, s in section.rates} if not section.index else set())
             }
-            sizes |= {name: p * section.count for name in sorted(kept - {"t", ""})}
+            sizes |= {name: self.orders * section.count for name in sorted(kept - {"t", ""})}
             sizes |= {name: section.count for name in section.kept}
         lines, size = [], 0
         for name, groups in sizes.items():
@@ -398,6 +420,10 @@ class LoopWriter:
         reaches = [f"{-1.0 / k!r}*log(size_{k})" for k in (p, p - 1, p - 2)]
         lines.append(f"reach = minimum({reaches[0]}, minimum({reaches[1]}, {reaches[2]}))")
         lines += finished(p)
+        if self.kinks:
+            sections = (self.waves, *self.sections)
+            found = [line for section in sections for line in section.passages(p)]
+            lines += ["# first passage of a kink", "passed = ratio", *found, *ended()]
         lines += ["# new state", "total = 0.0*scale"]
         lines += self.states(
             f"new = {at.format(k=p)}",
@@ -409,10 +435,11 @@ class LoopWriter:
         lines += ["if DENSE:", "    raised = ratio", f"    for k in range(1, {p + 1}):"]
         inner = self.states(f"store(dense, (k - 1)*DIMENSION + {{0}}, raised*{at.format(k='k')})")
         lines += [f"        {line}" for line in (*inner, "raised = raised*ratio")]
-        return [*lines, "return length + 0.0*total  # NaN where any coefficient is infinite or NaN"]
+        return [*lines, returned(self.kinks)]
 
 
 def write_looped(equations: Equations, order: int) -> TaylorStep:
     """Return the looped Taylor step of some order; see `write_step`."""
-    lines, size = LoopWriter(equations, order).write()
-    return TaylorStep.of(lines, order, size, ", graph, weights")
+    writer = LoopWriter(equations, order)
+    lines, size = writer.write()
+    return TaylorStep.of(lines, order, size, ", graph, weights", writer.kinks)

@@ -15,10 +15,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from .terms import ONE, ZERO, Call, Expr, Name, Number, add, over, times
+from .terms import ONE, ZERO, Call, Expr, Name, Number, add, over, show, times
 
-__all__ = ["Constant", "Integral", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio", "Series",
-           "Slope", "Square", "SquareRoot", "State", "Time"]  # fmt: skip
+__all__ = ["Choice", "Constant", "Integral", "Kink", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
+           "Series", "Slope", "Square", "SquareRoot", "State", "Time"]  # fmt: skip
 
 
 class Order(Protocol):
@@ -37,6 +37,9 @@ class Order(Protocol):
 
     def start(self, series: Series) -> Expr:
         """Coefficient 0 of a series."""
+
+    def before(self, series: Series) -> Expr:
+        """Coefficient k - 1 of a series."""
 
     def sum(self, left: Series, right: Series, first: int, last: int) -> Expr:
         """Sum of left_j * right_(k-j) for j = first … k + last."""
@@ -313,3 +316,64 @@ class Power(Series):
     def coefficient(self, at: Order) -> Expr:
         grown = times(at.inverse, Name(self.beyond), at.sum(self.slope, self, 1, 0))
         return times(add(grown, times(Number(-1.0), at.sum(self.base, self, 1, 0))), Name(self.inverse))
+
+
+@dataclass(eq=False, slots=True)
+class Kink(Series):
+    """The side of zero on which a series lies just after the start, 1 or -1; 0 while nothing but zeros is known of it.
+
+    It is no series itself: its coefficient k is what the coefficients 0 … k of `base` say, the first of them that is not
+    zero.  Coefficient 0 counts as zero up to rounding, a small part of the terms that it is the sum of.
+    """
+
+    base: Series
+    size: str = ""
+
+    @property
+    def convolved(self) -> tuple[Series, ...]:
+        return self.base, self
+
+    def begin(self, at: Start) -> Expr:
+        parts = [at.start(self.base)]
+        if isinstance(self.base, Linear):
+            parts = [times(factor, at.start(series)) for factor, series in self.base.terms]
+            parts += [] if self.base.constant == ZERO else [self.base.constant]
+        self.size = at.keep(f"size_{self.name}", add(*map(_absolute, parts)))
+        return Call("side_of", (at.start(self.base), Name(f"ROUNDING*{self.size}")))
+
+    def coefficient(self, at: Order) -> Expr:
+        side, value = at.before(self), at.of(self.base)
+        if value == ZERO:
+            return side
+        return Call("select", (Name(f"absolute({show(side)}) > 0.5"), side, Call("side_of", (value, ZERO))))
+
+
+@dataclass(eq=False, slots=True)
+class Choice(Series):
+    """One of two series that agree where `kink` has its zero: `above` where the side is 1, `below` elsewhere."""
+
+    kink: Kink
+    above: Series
+    below: Series
+
+    @property
+    def linear(self) -> tuple[Series, ...]:
+        return self.kink, self.above, self.below
+
+    def begin(self, at: Start) -> Expr:
+        return _chosen(at.start(self.kink), at.start(self.above), at.start(self.below))
+
+    def coefficient(self, at: Order) -> Expr:
+        return _chosen(at.of(self.kink), at.of(self.above), at.of(self.below))
+
+
+def _absolute(e: Expr) -> Expr:
+    return Number(abs(e.value)) if isinstance(e, Number) else Call("absolute", (e,))
+
+
+def _chosen(side: Expr, above: Expr, below: Expr) -> Expr:
+    if above == below:
+        return above
+    if above == times(Number(-1.0), below):
+        return times(side, above)
+    return Call("select", (Name(f"{show(side)} > 0.0"), above, below))

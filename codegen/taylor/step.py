@@ -17,17 +17,32 @@ from synchain.models.mechanics.components import TIME
 
 from ..program.passes import Names
 from .graph import STARTS, Graph, Template
+from .passage import PASSAGE
 from .series import Constant, Series, State, Time
 from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
 
-__all__ = ["TaylorStep", "called", "finished", "write_step"]
+__all__ = [
+    "StepWriter",
+    "TaylorStep",
+    "Written",
+    "called",
+    "check_order",
+    "ended",
+    "extreme",
+    "finished",
+    "lane",
+    "largest",
+    "polynomial",
+    "returned",
+    "write_step",
+]
 
 FARTHEST = 16.0
 """How many times longer than `scale` a step may be."""
 
 WORDS = frozenset(
     {"scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
-     "slope_scale", *STARTS.values()}
+     "slope_scale", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", *STARTS.values()}
 )  # fmt: skip
 PREFIXES = ("i_", "e_", "half_", "w_", "n_", "size_", "odd_")
 """Names of the step; a user's symbol of that name is called otherwise within the step."""
@@ -39,13 +54,14 @@ COUNTED = re.compile(r"[rs]\d+$")
 class TaylorStep:
     """The text of the function `step` and what a kernel must know of it.
 
-    order: that of the series, and the number of rows of the dense output; workspace: the groups of memory that a looped
-    step needs behind the dense output.
+    order: that of the series, and the number of rows of the dense output; workspace: the groups of memory that it needs
+    behind the dense output; kinks: True if it ends at kinks, and so returns how far its series reach too.
     """
 
     text: str
     order: int
     workspace: int = 0
+    kinks: bool = False
 
     @property
     def operations(self) -> int:
@@ -54,14 +70,18 @@ class TaylorStep:
         return sum(body.count(sign) for sign in (" + ", " - ", "*", "/"))
 
     @classmethod
-    def of(cls, lines: Sequence[str], order: int, workspace: int = 0, more: str = "") -> TaylorStep:
+    def of(
+        cls, lines: Sequence[str], order: int, workspace: int = 0, more: str = "", kinks: bool = False
+    ) -> TaylorStep:
         """The step of some statements."""
+        returned = "its length and that of its series" if kinks else "the length of the step"
         head = [
+            *([PASSAGE, "", ""] if kinks else []),
             "@njit(error_model='numpy', cache=True)",
             f"def step(t, h, scale, y, p, y_new, dense, rtol, atol{more}):",
-            '    """One step from (t, y): writes y_new and the dense output, returns the length of the step."""',
+            f'    """One step from (t, y): writes y_new and the dense output, returns {returned}."""',
         ]
-        return cls("\n".join([*head, *(f"    {line}" for line in lines)]), order, workspace)
+        return cls("\n".join([*head, *(f"    {line}" for line in lines)]), order, workspace, kinks)
 
 
 @dataclass(slots=True)
@@ -98,6 +118,10 @@ class Written:
     def start(self, series: Series) -> Expr:
         """Coefficient 0 of a series."""
         return self.at(series, 0)
+
+    def before(self, series: Series) -> Expr:
+        """Coefficient k - 1 of a series."""
+        return self.at(series, self.k - 1)
 
     def sum(self, left: Series, right: Series, first: int, last: int) -> Expr:
         """Sum of left_j * right_(k-j) for j = first … k + last.
@@ -154,8 +178,9 @@ class StepWriter:
         }
         self.states = dict(sorted(self.states.items()))
         self.graph = Graph(self.supply)
+        self.noted: list[Series] = []
         self.rates = self.read()
-        self.graph.settle(self.rates)
+        self.graph.settle([*self.rates, *self.noted])
         self.at = Written({}, {}, [])
 
     def read(self) -> list[Series]:
@@ -203,6 +228,7 @@ class StepWriter:
         for k in range(1, self.order + 1):
             self.coefficients(k)
         self.length()
+        self.passages()
         self.closing()
         return self.lines
 
@@ -222,17 +248,16 @@ class StepWriter:
         self.flush()
 
     def coefficients(self, k: int) -> None:
-        """Coefficients k of the states, and of all series but in the last order."""
+        """Coefficients k of the states, and of all series; in the last order of those alone that kinks need."""
         at = self.at
         self.put(f"# order {k}", f"r{k} = scale" if k == 1 else f"r{k} = {1.0 / k!r}*scale")
         slopes = [at.at(rate, k - 1) for rate in self.rates]
         at.k = k
         for state, slope in zip(self.states.values(), slopes, strict=True):
             at.put(state, times(Name(f"r{k}"), slope))
-        if k < self.order:
-            at.values[self.time, k] = Name("scale") if k == 1 else ZERO
-            for s in self.graph.series:
-                at.put(s, s.coefficient(at), s in self.graph.inline)
+        at.values[self.time, k] = Name("scale") if k == 1 else ZERO
+        for s in self.graph.series if k < self.order else self.graph.behind(self.graph.kinks):
+            at.put(s, s.coefficient(at), s in self.graph.inline)
         self.flush()
 
     def state_at(self, slot: int, k: int) -> Expr:
@@ -250,40 +275,41 @@ class StepWriter:
             last = {k: e for k in sizes if (e := self.state_at(slot, k)) != ZERO}
             if not last:
                 continue
-            size = _largest(Call("absolute", (e,)) for k in range(3) if (e := self.state_at(slot, k)) != ZERO)
+            size = largest(Call("absolute", (e,)) for k in range(3) if (e := self.state_at(slot, k)) != ZERO)
             self.put(f"w_{state.name} = 1.0/(atol + rtol*{show(size)})")
             for k, e in last.items():
                 sizes[k].append(times(Call("absolute", (e,)), Name(f"w_{state.name}")))
         reaches: list[Expr] = []
         for k, found in sizes.items():
             if found:
-                self.put(*statement(Assign(f"size_{k}", _largest(found))))
+                self.put(*statement(Assign(f"size_{k}", largest(found))))
                 reaches.append(times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))))
         if not reaches:
             reaches = [Name("-log(0.0*scale)")]
-        self.put(*statement(Assign("reach", _extreme("minimum", reaches))), *finished(p))
+        self.put(*statement(Assign("reach", extreme("minimum", reaches))), *finished(p))
 
-    def horner(self, name: str, coefficients: Sequence[Expr]) -> Expr:
-        """A polynomial in ratio**2: two of half the degree are ready sooner than one."""
-        known = list(coefficients)
-        while known and known[-1] == ZERO:
-            known.pop()
-        if not known:
-            return ZERO
-        self.put(f"{name} = {show(known.pop())}")
-        for e in reversed(known):
-            self.put(f"{name} = {show(add(times(Name(name), Name('square')), e))}")
-        return Name(name)
+    def passages(self) -> None:
+        """End the step where a series passes a kink."""
+        kinks = self.graph.kinks
+        if not kinks:
+            return
+        first = self.order * self.equations.dimension
+        self.put("# first passage of a kink", "passed = ratio")
+        for kink in kinks:
+            for k in range(self.order + 1):
+                self.put(f"store(dense, {first + k}, {lane(self.at.at(kink.base, k))})")
+            side = show(self.at.at(kink, self.order))
+            self.put(f"passed = passage({side}, {kink.size}, dense, {first}, 1, {self.order}, passed)")
+        self.put(*ended())
 
     def closing(self) -> None:
         """The new state, the dense output, and the length of the step."""
         p, eq = self.order, self.equations
         self.put("# new state", "square = ratio*ratio")
         for slot, name in enumerate(self.names):
-            start, *known = [self.state_at(slot, k) for k in range(p + 1)]
-            odd, even = self.horner(f"odd_{name}", known[::2]), self.horner(f"n_{name}", known[1::2])
-            slope = add(times(even, Name("ratio")), odd)
-            self.put(f"n_{name} = {show(add(times(slope, Name('ratio')), start))}", f"store(y_new, {slot}, n_{name})")
+            self.put(
+                *polynomial(name, [self.state_at(slot, k) for k in range(p + 1)]), f"store(y_new, {slot}, n_{name})"
+            )
         self.put(f"total = {' + '.join(f'n_{name}' for name in self.names)}", "if DENSE:")
         for k in range(1, p + 1):
             self.put(f"    raised = {'ratio' if k == 1 else 'raised*ratio'}")
@@ -291,7 +317,28 @@ class StepWriter:
                 e = self.state_at(slot, k)
                 value = "0.0*raised" if e == ZERO else show(times(e, Name("raised")))
                 self.put(f"    store(dense, {(k - 1) * eq.dimension + slot}, {value})")
-        self.put("return length + 0.0*total  # NaN where any coefficient is infinite or NaN")
+        self.put(returned(bool(self.graph.kinks)))
+
+
+def polynomial(name: str, coefficients: Sequence[Expr]) -> list[str]:
+    """The lines for n_<name>, a polynomial in `ratio`: two in ratio**2 of half the degree are ready sooner than one."""
+    start, *known = coefficients
+    lines: list[str] = []
+    odd, even = _horner(lines, f"odd_{name}", known[::2]), _horner(lines, f"n_{name}", known[1::2])
+    slope = add(times(even, Name("ratio")), odd)
+    return [*lines, f"n_{name} = {show(add(times(slope, Name('ratio')), start))}"]
+
+
+def _horner(lines: list[str], name: str, coefficients: Sequence[Expr]) -> Expr:
+    """A polynomial in ratio**2, its lines appended."""
+    known = list(coefficients)
+    while known and known[-1] == ZERO:
+        known.pop()
+    if not known:
+        return ZERO
+    lines.append(f"{name} = {show(known.pop())}")
+    lines += [f"{name} = {show(add(times(Name(name), Name('square')), e))}" for e in reversed(known)]
+    return Name(name)
 
 
 def moving_states(equations: Equations, i: int) -> tuple[bool, ...]:
@@ -316,13 +363,20 @@ def write_step(equations: Equations, order: int) -> TaylorStep:
     Raises
     ------
     ValueError
-        For an order that is too small, functions that are not analytic, and links with inertia.
+        For an order that is too small, functions that jump, and links with inertia.
     """
+    check_order(equations, order)
+    writer = StepWriter(equations, order)
+    lines, kinks = writer.write(), bool(writer.graph.kinks)
+    return TaylorStep.of(lines, order, order + 1 if kinks else 0, kinks=kinks)
+
+
+def check_order(equations: Equations, order: int) -> None:
+    """Raise ValueError for an order that is too small, and for links with inertia."""
     if order < 6:
         raise ValueError(f"taylor: found order {order}; expected at least 6")
     if equations.inertial:
         raise ValueError("taylor: found links with inertia; expected an identity mass matrix; use dop853 or rodas5p")
-    return TaylorStep.of(StepWriter(equations, order).write(), order)
 
 
 def finished(order: int) -> list[str]:
@@ -336,16 +390,35 @@ def finished(order: int) -> list[str]:
     ]
 
 
-def _largest(values: Iterable[Expr]) -> Expr:
-    return _extreme("maximum", list(values))
+def ended() -> list[str]:
+    """The end of a step at the place `passed`, where a series has passed a kink."""
+    return ["until = select(passed < ratio, passed*scale, length)", "ratio = passed"]
 
 
-def _extreme(function: str, values: Sequence[Expr]) -> Expr:
+def returned(kinks: bool) -> str:
+    """What a step returns."""
+    length = "length + 0.0*total"
+    return f"return {'until, ' if kinks else ''}{length}  # NaN where any coefficient is infinite or NaN"
+
+
+def lane(value: Expr) -> str:
+    """The text of a value that is stored: numbers become lanes."""
+    if isinstance(value, Number):
+        return f"broadcast({show(value)}, WIDTH)"
+    return show(value)
+
+
+def largest(values: Iterable[Expr]) -> Expr:
+    """The largest of some values."""
+    return extreme("maximum", list(values))
+
+
+def extreme(function: str, values: Sequence[Expr]) -> Expr:
     """Nested calls of a function of two values."""
     if len(values) == 1:
         return values[0]
     half = len(values) // 2
-    return Call(function, (_extreme(function, values[:half]), _extreme(function, values[half:])))
+    return Call(function, (extreme(function, values[:half]), extreme(function, values[half:])))
 
 
 def called(name: str, taken: set[str]) -> str:

@@ -25,7 +25,7 @@ from ..mechanics.friction import KAPPA, SLIP, ContactModel, FrictionLaw, set_val
 from ..mechanics.lagrangian import Mechanics
 from ..mechanics.link import edge
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
-from ..mechanics.oscillator import Field, Oscillator
+from ..mechanics.oscillator import FieldModel, Oscillator
 from ..mechanics.parameter import Parameter
 from .equations import Equations, Layer
 
@@ -75,7 +75,7 @@ def node(oscillator: Oscillator, friction: FrictionLaw | None = None, contact: s
     Raises ValueError as `parameters` does.
     """
     symbols = tuple(sp.Symbol(name, real=True) for name in parameters(oscillator, friction, contact))
-    if isinstance(oscillator.model, Field):
+    if isinstance(oscillator.model, FieldModel):
         return Node(
             tuple(sp.Symbol(name, real=True) for name in oscillator.model.state), oscillator.model.rates, symbols
         )

@@ -21,6 +21,9 @@ V = TypeVar("V")
 _ARITHMETIC = re.compile(r"[0-9A-Za-z_.+\-*/() \t]*")
 
 
+_SIGNS: Mapping[type[ast.cmpop], str] = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
+
+
 class NoMeaning(Exception):
     """An operation, name or call that the expressions of an algebra may not contain."""
 
@@ -124,6 +127,22 @@ class Algebra(Generic[V]):
         """The value of a call; `options` are the arguments with a name, as they are written."""
         raise NoMeaning
 
+    def compare(self, sign: str, a: V, b: V) -> V:
+        """A condition a < b, a <= b, a > b or a >= b, by its sign."""
+        raise NoMeaning
+
+    def junction(self, word: str, conditions: Sequence[V]) -> V:
+        """All conditions ("and") or any of them ("or")."""
+        raise NoMeaning
+
+    def contrary(self, condition: V) -> V:
+        """The condition "not ..."."""
+        raise NoMeaning
+
+    def choice(self, condition: V, value: V, otherwise: V) -> V:
+        """The value "value if condition else otherwise"."""
+        raise NoMeaning
+
 
 @dataclass(frozen=True, slots=True)
 class Expression:
@@ -153,9 +172,9 @@ class Expression:
                     return self._operation(node, algebra, depth + 1)
                 case ast.Call(func=ast.Name(id=function)):
                     return self._call(function, node, algebra, depth + 1)
+            return self._logic(node, algebra, depth + 1)
         except NoMeaning as error:
             algebra.refuse(node, error.reason)
-        algebra.refuse(node, "")
 
     def _operation(self, node: ast.BinOp, algebra: Algebra[V], depth: int) -> V:
         if not isinstance(node.op, (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow)):
@@ -175,6 +194,22 @@ class Expression:
             case ast.Div():
                 return algebra.divide(a, b)
         return algebra.power(a, b)
+
+    def _logic(self, node: ast.expr, algebra: Algebra[V], depth: int) -> V:
+        match node:
+            case ast.IfExp():
+                parts = (node.test, node.body, node.orelse)
+                condition, value, otherwise = (self._value(part, algebra, depth) for part in parts)
+                return algebra.choice(condition, value, otherwise)
+            case ast.Compare(ops=[op], comparators=[right]) if type(op) in _SIGNS:
+                a, b = self._value(node.left, algebra, depth), self._value(right, algebra, depth)
+                return algebra.compare(_SIGNS[type(op)], a, b)
+            case ast.BoolOp():
+                word = "and" if isinstance(node.op, ast.And) else "or"
+                return algebra.junction(word, [self._value(part, algebra, depth) for part in node.values])
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                return algebra.contrary(self._value(operand, algebra, depth))
+        raise NoMeaning
 
     def _call(self, function: str, node: ast.Call, algebra: Algebra[V], depth: int) -> V:
         names = [keyword.arg for keyword in node.keywords if keyword.arg is not None]

@@ -6,14 +6,18 @@ that vanish there, or is used away from them; in both cases the one-sided deriva
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import sympy as sp
 
-__all__ = ["cancelled", "derivative", "operations"]
+__all__ = ["cancelled", "derivative", "expanded_terms", "operations"]
 
 LARGEST_CANCELLED = 200
 """Operations of an expression up to which it is cancelled: longer ones are products of minors, which grow by it."""
+
+MOST_TERMS = 5000
+"""Terms of the expanded expression up to which it is cancelled: that multiplies out all powers of sums."""
 
 
 def operations(expressions: Sequence[sp.Expr]) -> int:
@@ -24,10 +28,22 @@ def operations(expressions: Sequence[sp.Expr]) -> int:
 
 def cancelled(expressions: Sequence[sp.Expr]) -> tuple[sp.Expr, ...]:
     """The expressions over their common denominators without common factors, if that saves operations; else unchanged."""
-    if any(sp.count_ops(e) > LARGEST_CANCELLED for e in expressions):
+    if any(sp.count_ops(e) > LARGEST_CANCELLED or expanded_terms(e) > MOST_TERMS for e in expressions):
         return tuple(expressions)
     found = tuple(map(sp.cancel, expressions))
     return found if operations(found) < operations(expressions) else tuple(expressions)
+
+
+def expanded_terms(e: sp.Expr) -> int:
+    """Return at most how many terms an expression has when its products and powers of sums are multiplied out."""
+    if isinstance(e, sp.Add):
+        return sum(map(expanded_terms, e.args))
+    if isinstance(e, sp.Mul):
+        return math.prod(map(expanded_terms, e.args))
+    if isinstance(e, sp.Pow) and e.exp.is_Integer:
+        terms, times = expanded_terms(e.base), abs(int(e.exp))
+        return math.comb(terms + times - 1, times)
+    return 1
 
 
 def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:

@@ -53,6 +53,8 @@ class _PartFile(PluginFile):
             if not isinstance(parameter, Parameter):
                 like = f'Parameter({parameter!r}, "1", "what it means")'
                 raise self.wrong("PARAMETERS", f"PARAMETERS[{name!r}] is {parameter!r}; expected {like}")
+            if not parameter.meaning.strip():
+                raise self.wrong("PARAMETERS", f"{name!r} has no meaning; expected a phrase that says what it is")
 
     def expression(self, name: str, given: Mapping[str, object]) -> sp.Expr:
         """What a function returns for symbols, one expression."""

@@ -8,7 +8,7 @@ import sympy as sp
 
 from ..inputs.checks import check_instance, suggestion
 from .components import TIME, Node
-from .oscillator import Field, Oscillator
+from .oscillator import FieldModel, Oscillator
 
 __all__ = ["WEIGHT", "End", "Pair", "Terms", "ends"]
 
@@ -75,7 +75,7 @@ def ends(node: Oscillator, source: Oscillator | None = None) -> tuple[End, End, 
         model = check_instance("ends", own, Oscillator, "an Oscillator").model
         states = (
             model.state
-            if isinstance(model, Field)
+            if isinstance(model, FieldModel)
             else (*(c.name for c in model.coordinates), *(c.velocity for c in model.coordinates))
         )
         made.append(End(letter, tuple(states), tuple(own.parameters)))

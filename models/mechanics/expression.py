@@ -1,64 +1,262 @@
-"""Expressions of users: SymPy or text becomes an exact expression of real symbols that can be written as text again."""
+"""Expressions of models as text, and back: the one form in which a scene file or a result carries a model.
+
+`written` knows every piece of an expression that a model may have and refuses all others; `read` runs nothing and
+makes of the text the same expression again.  So what is read from what was written is the form of an expression that
+a model keeps, wherever it comes from.
+"""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, NoReturn
 
 import sympy as sp
+from sympy.logic.boolalg import Boolean
 
-from ..inputs.checks import check_text, short_repr, typed_repr
+from ..inputs.checks import short_repr, suggestion
 from ..inputs.reader import Algebra, NoMeaning, parse
+from .components import TIME
+from .oscillator import FRICTION
 
-__all__ = ["exact", "read"]
+__all__ = ["FRICTION_NAME", "FUNCTIONS", "LENGTH", "exact", "read", "written"]
 
-LENGTH, DEPTH, BITS, LARGEST = 4000, 60, 4000, 10**6
-"""Most characters and nested operations of a text, bits of a number, and largest constant that a function takes."""
+LENGTH, DEPTH, EXPONENT, MAGNITUDE = 20_000, 100, 16, 1e100
+"""Most characters, most nested operations, largest exponent of a power that is a number, largest constant."""
 
-_ONE: Mapping[str, Any] = {
-    name: getattr(sp, name)
-    for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "exp",
-                 "log", "sqrt", "erf", "Abs", "sign", "floor", "ceiling")
+DIGITS = 10**1000
+"""Largest whole number, above and below a line."""
+
+FUNCTIONS: Mapping[str, Any] = {
+    "abs": sp.Abs, "acos": sp.acos, "acosh": sp.acosh, "asin": sp.asin, "asinh": sp.asinh, "atan": sp.atan,
+    "atan2": sp.atan2, "atanh": sp.atanh, "ceiling": sp.ceiling, "cos": sp.cos, "cosh": sp.cosh, "exp": sp.exp,
+    "floor": sp.floor, "log": sp.log, "max": sp.Max, "min": sp.Min, "sign": sp.sign, "sin": sp.sin, "sinh": sp.sinh,
+    "sqrt": sp.sqrt, "tan": sp.tan, "tanh": sp.tanh,
 }  # fmt: skip
+"""The functions that a model may call, by their names in text; generated code knows the same ones."""
 
-_TWO: Mapping[str, Any] = {"atan2": sp.atan2, "Mod": sp.Mod, "Min": sp.Min, "Max": sp.Max}
+FRICTION_NAME = "friction"
+"""The friction coefficient of a velocity, in text."""
 
-CONSTANTS: Mapping[str, Any] = {"pi": sp.pi, "E": sp.E}
+RESERVED = frozenset({"pi", TIME.name, FRICTION_NAME})
+"""Names that text has for other things than states and parameters."""
 
-_KNOWN = ("numbers, names, pi, + - * / **, parentheses and", *_ONE, *_TWO)
+_NAMES = {function: name for name, function in FUNCTIONS.items()}
+_SIGNS: Mapping[type, str] = {
+    sp.StrictLessThan: "<",
+    sp.LessThan: "<=",
+    sp.StrictGreaterThan: ">",
+    sp.GreaterThan: ">=",
+}
+_RELATIONS = {sign: relation for relation, sign in _SIGNS.items()}
+_COUNTS = {"atan2": 2, "max": None, "min": None}
+"""Numbers of arguments other than one; None is any number from two."""
 
 
-def exact(what: str, value: object) -> sp.Expr:
-    """Return an expression with rationals for decimals and real symbols, in the form that its text has.
+def exact(what: str, value: object, names: Mapping[str, sp.Symbol]) -> sp.Expr:
+    """Return an expression in the form that a model keeps: real symbols, rational numbers, known functions.
 
     Parameters
     ----------
     what : str
         The subject of errors.
-    value : Expr or number
-        The expression; 0.1 in it means 1/10.
+    value : Expr, number or str
+        An expression, decimals in it are what they say (0.1 is 1/10); a text is parsed by `read`.
+    names : mapping of str to Symbol
+        What each name stands for.
 
     Raises
     ------
     TypeError
-        If it is no expression.
+        If the value is none of these.
     ValueError
-        If it is not finite, or has a function that no text has.
+        For unknown functions and symbols, and for numbers that are not finite and real.
     """
-    if isinstance(value, bool) or not isinstance(value, sp.Expr | int | float):
-        raise TypeError(f"{what}: found {typed_repr(value)}; expected an expression of symbols")
-    e = sp.sympify(value)
-    if e.has(sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I):
-        raise ValueError(f"{what}: found {short_repr(e)}; expected a real, finite expression")
-    taken = sorted(s.name for s in e.free_symbols if s.name in CONSTANTS or s.name in _ONE or s.name in _TWO)
-    if taken:
-        raise ValueError(f"{what}: the symbol {taken[0]!r} has the name of a constant or a function; rename it")
-    decimals = {number: sp.Rational(repr(float(number))) for number in e.atoms(sp.Float)}
-    return read(what, str(e.xreplace(decimals)))
+    if isinstance(value, str):
+        return read(what, value, names)
+    if isinstance(value, bool) or not isinstance(value, int | float | Fraction | sp.Expr):
+        kind = type(value).__name__
+        raise TypeError(f"{what}: found {short_repr(value)} ({kind}); expected an expression")
+    given = sp.sympify(value)
+    strange = sorted({s.name for s in given.free_symbols} - {*names})
+    if strange:
+        raise ValueError(f"{what}: {_undeclared(strange[0], names)}")
+    numbers = {number: _rational(what, number) for number in given.atoms(sp.Float)}
+    symbols = {s: names[s.name] for s in given.free_symbols}
+    try:
+        text = written(given.xreplace({**numbers, **symbols}))
+    except ValueError as error:
+        raise ValueError(f"{what}: {error}") from None
+    return read(what, text, names)
 
 
-def read(what: str, text: object) -> sp.Expr:
+def _undeclared(name: str, names: Mapping[str, sp.Symbol]) -> str:
+    return f"undeclared symbol {name!r}; declared: {', '.join(names)}{suggestion(name, names)}"
+
+
+def _rational(what: str, number: sp.Float) -> sp.Rational:
+    """The number that a decimal says: the shortest decimal of a double, all digits of a longer one."""
+    if not number.is_finite:
+        raise ValueError(f"{what}: found {number}; expected finite real numbers")
+    return sp.Rational(repr(float(number)) if number._prec <= 53 else str(number))
+
+
+# -- from expressions to text ------------------------------------------------------------------------------------
+
+_CHOICE, _OR, _AND, _NOT, _COMPARE, _SUM, _PRODUCT, _POWER, _ATOM = range(9)
+"""How tightly the pieces of a text hold together."""
+
+_LONGEST = 8
+"""Most terms or factors in a row; longer rows are halved by parentheses, so that text nests little."""
+
+
+def written(e: sp.Basic) -> str:
+    """Return an expression as text that `read` turns into it again.
+
+    Parameters
+    ----------
+    e : Expr
+        An expression of real symbols and exact numbers.
+
+    Raises
+    ------
+    ValueError
+        For a piece that no model may have.
+    """
+    return _inside(e, _CHOICE)
+
+
+def _inside(e: sp.Basic, level: int) -> str:
+    """The text of an expression where nothing looser than `level` may stand without parentheses."""
+    text, own = _text(e)
+    return text if own >= level else f"({text})"
+
+
+def _text(e: sp.Basic) -> tuple[str, int]:
+    """The text of an expression, and how tightly it holds together."""
+    if isinstance(e, sp.Symbol):
+        return e.name, _ATOM
+    if isinstance(e, sp.Number) or e in (sp.pi, sp.E):
+        return _number(e)
+    if isinstance(e, sp.Add):
+        return _row([_signed(term) for term in e.as_ordered_terms()]), _SUM
+    if isinstance(e, sp.Mul):
+        return _product(e)
+    if isinstance(e, sp.Pow):
+        return _power(e)
+    if isinstance(e, sp.Piecewise):
+        return _choice(e), _CHOICE
+    if type(e) in _SIGNS:
+        return f"{_inside(e.args[0], _SUM)} {_SIGNS[type(e)]} {_inside(e.args[1], _SUM)}", _COMPARE
+    if isinstance(e, sp.Not):
+        return f"not {_inside(e.args[0], _NOT)}", _NOT
+    if isinstance(e, sp.And | sp.Or):
+        word, level = ("and", _AND) if isinstance(e, sp.And) else ("or", _OR)
+        parts = (_inside(part, level + 1) for part in sorted(e.args, key=sp.default_sort_key))
+        return f" {word} ".join(parts), level
+    return _call(e)
+
+
+def _number(e: sp.Expr) -> tuple[str, int]:
+    if e == sp.pi:
+        return "pi", _ATOM
+    if e == sp.E:
+        return "exp(1)", _ATOM
+    if not isinstance(e, sp.Rational):
+        raise ValueError(f"found {e}; expected rational numbers, decimals and pi")
+    if e < 0:
+        return f"-{_inside(-e, _PRODUCT)}", _SUM
+    return (str(e.p), _ATOM) if e.q == 1 else (f"{e.p}/{e.q}", _PRODUCT)
+
+
+def _signed(term: sp.Expr) -> tuple[str, str]:
+    """The sign of a term, and what follows it."""
+    if _is_negative(term):
+        return "-", _inside(_negated(term), _PRODUCT)
+    return "+", _inside(term, _PRODUCT)
+
+
+def _is_negative(e: sp.Expr) -> bool:
+    return bool(e.as_coeff_Mul()[0].is_negative)
+
+
+def _negated(e: sp.Expr) -> sp.Expr:
+    """The negative of a product with a negative number in front, its other factors as they are."""
+    number, rest = e.as_coeff_Mul()
+    return -number if rest == 1 else sp.Mul(-number, *sp.Mul.make_args(rest))
+
+
+def _row(terms: Sequence[tuple[str, str]]) -> str:
+    """The text of a sum of signed terms."""
+    if len(terms) > _LONGEST:
+        half = len(terms) // 2
+        return f"({_row(terms[:half])}) + ({_row(terms[half:])})"
+    (sign, first), *others = terms
+    return ("-" if sign == "-" else "") + first + "".join(f" {sign} {text}" for sign, text in others)
+
+
+def _product(e: sp.Mul) -> tuple[str, int]:
+    """Factors and divisions from left to right; a number stays behind a sum, which would take it in."""
+    number, rest = e.as_coeff_Mul()
+    if not isinstance(number, sp.Rational):
+        raise ValueError(f"found {number}; expected rational numbers, decimals and pi")
+    if number < 0:
+        text = _inside(_negated(e), _PRODUCT)
+        return (f"-({text})" if text.startswith("(") else f"-{text}"), _SUM
+    factors = rest.as_ordered_factors()
+    below = [factor for factor in factors if isinstance(factor, sp.Pow) and factor.exp.is_Rational and factor.exp < 0]
+    above = [_inside(factor, _POWER) for factor in factors if factor not in below]
+    divisors = [_inside(1 / factor, _POWER) for factor in below]
+    last = any(isinstance(factor, sp.Add) for factor in factors)
+    if number.p != 1 and not last:
+        above.insert(0, str(number.p))
+    text = "/".join([_factors(above) if above else "1", *divisors])
+    if number.p != 1 and last:
+        text += f"*{number.p}"
+    return (text if number.q == 1 else f"{text}/{number.q}"), _PRODUCT
+
+
+def _factors(factors: Sequence[str]) -> str:
+    if len(factors) > _LONGEST:
+        half = len(factors) // 2
+        return f"({_factors(factors[:half])})*({_factors(factors[half:])})"
+    return "*".join(factors)
+
+
+def _power(e: sp.Pow) -> tuple[str, int]:
+    base, exponent = e.base, e.exp
+    if exponent.is_Rational and exponent < 0:
+        return f"1/{_inside(1 / e, _POWER)}", _PRODUCT
+    if exponent == sp.Rational(1, 2):
+        return f"sqrt({written(base)})", _ATOM
+    return f"{_inside(base, _ATOM)}**{_inside(exponent, _ATOM)}", _POWER
+
+
+def _choice(e: sp.Piecewise) -> str:
+    *others, (last, condition) = e.args
+    if condition is not sp.true:
+        raise ValueError(f"{e} has no value where no condition holds; end it with (value, True)")
+    parts = [f"{_inside(value, _OR)} if {_inside(condition, _OR)} else " for value, condition in others]
+    return "".join(parts) + _inside(last, _OR)
+
+
+def _call(e: sp.Basic) -> tuple[str, int]:
+    name = FRICTION_NAME if e.func == FRICTION else _NAMES.get(e.func)
+    if name is None:
+        kind = "the function" if isinstance(e, sp.Function) else "the piece"
+        raise ValueError(
+            f"found {kind} {short_repr(e)}; known: {', '.join(FUNCTIONS)}, friction, powers, Piecewise with <, <=, >, >="
+        )
+    arguments = sorted(e.args, key=sp.default_sort_key) if e.func in (sp.Max, sp.Min) else e.args
+    return f"{name}({', '.join(map(written, arguments))})", _ATOM
+
+
+# -- from text to expressions ------------------------------------------------------------------------------------
+
+
+def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     """Return the expression of a text; nothing in it is run.
 
     Parameters
@@ -66,89 +264,151 @@ def read(what: str, text: object) -> sp.Expr:
     what : str
         The subject of errors.
     text : str
-        Numbers, names, arithmetic and the usual functions; decimals are exact.
+        Numbers, names, ``+ - * / **``, parentheses, functions of `FUNCTIONS`, ``friction(velocity)``, and
+        ``a if x > 0 else b`` with ``< <= > >= and or not``.
+    names : mapping of str to Symbol
+        What each name stands for.
 
     Raises
     ------
-    TypeError
-        If it is no text.
     ValueError
-        If it is too long or too deep, has anything else in it, or is not finite.
+        For unknown names and functions, more than LENGTH characters or DEPTH nested operations, exponents beyond
+        EXPONENT, and constants that are not real or beyond MAGNITUDE.
     """
-    words = check_text(what, text, LENGTH)
-    expression = parse(words)
+    if len(text) > LENGTH:
+        raise ValueError(f"{what}: found {len(text)} characters; expected at most {LENGTH}")
+    expression = parse(text)
     if expression is None:
-        raise ValueError(f"{what}: cannot read {short_repr(words)}; expected an expression, e.g. 'K*W*sin(x_j - x_i)'")
-    found = expression.evaluate(_Expressions(what))
-    if found.has(sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I):
-        raise ValueError(f"{what}: found {short_repr(words)}, which is {found}; expected a real, finite expression")
+        raise ValueError(f"{what}: unreadable expression {short_repr(text)}; expected such as '-k*x + u*cos(omega*t)'")
+    algebra = _Expressions(what, names)
+    try:
+        found = algebra.value(expression.evaluate(algebra))
+    except _Refusal:
+        raise
+    except NoMeaning as error:
+        raise ValueError(f"{what}: {error.reason}; expected a value") from None
+    except Exception as error:  # of SymPy, which compares in vain
+        reason = " ".join(str(error).split())[:200]
+        raise ValueError(f"{what}: {short_repr(text)} has no value: {reason or type(error).__name__}") from None
+    if found.has(sp.I):
+        raise ValueError(f"{what}: found the complex {short_repr(found)}; expected a real value")
+    steep = [e for e in found.atoms(sp.Pow) if e.exp.is_number and not abs(e.exp) <= EXPONENT]
+    if steep:
+        raise ValueError(f"{what}: found the power {short_repr(steep[0])}; expected exponents up to {EXPONENT}")
     return found
 
 
-class _Expressions(Algebra[sp.Expr]):
-    """Expressions of real symbols."""
+class _Refusal(ValueError):
+    """An error in the words of this module."""
 
+
+@dataclass(frozen=True, slots=True)
+class _Expressions(Algebra[sp.Basic]):
+    """Expressions of some symbols as SymPy makes them; operands are checked, so that no constant grows."""
+
+    what: str
+    names: Mapping[str, sp.Symbol]
     deepest = DEPTH
 
-    def __init__(self, what: str) -> None:
-        self.what = what
-
     def refuse(self, node: ast.expr, reason: str) -> NoReturn:
-        raise ValueError(
-            f"{self.what}: found {short_repr(ast.unparse(node))}{reason and f', {reason}'}; expected {' '.join(_KNOWN)}"
-        )
+        piece = short_repr(ast.unparse(node))
+        raise _Refusal(f"{self.what}: {reason or f'found {piece}; expected numbers, {self._known()}'}")
 
     def refuse_depth(self) -> NoReturn:
-        raise ValueError(f"{self.what}: found more than {DEPTH} nested operations; write it shorter")
+        raise _Refusal(f"{self.what}: more than {DEPTH} nested operations; expected fewer; add parentheses")
 
-    def number(self, value: int | float) -> sp.Expr:
-        return self._bounded(sp.Rational(repr(value)) if abs(value) < float("inf") else sp.oo)
+    def _known(self) -> str:
+        return f"pi, + - * / **, {' '.join(FUNCTIONS)} friction, a if x > 0 else b, and {', '.join(self.names)}"
 
-    def name(self, name: str) -> sp.Expr:
-        if name in _ONE or name in _TWO:
-            raise NoMeaning("a function without arguments")
-        return CONSTANTS.get(name) or sp.Symbol(name, real=True)
+    def number(self, value: int | float) -> sp.Basic:
+        if not abs(value) <= (DIGITS if isinstance(value, int) else MAGNITUDE):
+            raise _Refusal(f"{self.what}: found {short_repr(value)}; expected numbers up to {MAGNITUDE:g}")
+        return sp.Integer(value) if isinstance(value, int) else sp.Rational(repr(value))
 
-    def positive(self, value: sp.Expr) -> sp.Expr:
+    def name(self, name: str) -> sp.Basic:
+        if name in self.names:
+            return self.names[name]
+        if name == "pi":
+            return sp.pi
+        raise _Refusal(f"{self.what}: {_undeclared(name, self.names)}")
+
+    def positive(self, value: sp.Basic) -> sp.Basic:
         return value
 
-    def negative(self, value: sp.Expr) -> sp.Expr:
-        return -value
+    def negative(self, value: sp.Basic) -> sp.Basic:
+        return -self.value(value)
 
-    def add(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
-        return self._bounded(a + b)
+    def add(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        return self.value(a) + self.value(b)
 
-    def multiply(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
-        return self._bounded(a * b)
+    def subtract(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        return self.value(a) - self.value(b)
 
-    def divide(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
-        return self._bounded(a / b)
+    def multiply(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        return self.value(a) * self.value(b)
 
-    def power(self, base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
-        if exponent.is_number and (not exponent.is_Rational or abs(exponent) > 1000):
-            raise NoMeaning("an exponent that is too large")
-        if base.is_Rational and exponent.is_Rational and _bits(base) * abs(exponent) > BITS:
-            raise NoMeaning("a number that is too large")
-        return base**exponent
+    def divide(self, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        if b == 0:
+            raise _Refusal(f"{self.what}: found a division by zero; expected finite real numbers")
+        return self.value(a) / self.value(b)
 
-    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[Any] | None]:
-        wanted = 1 if function in _ONE else 2 if function in _TWO else 0
-        many = function in ("Min", "Max") and 2 <= count <= 8
-        if not wanted or options or (count != wanted and not many):
-            raise NoMeaning
+    def power(self, base: sp.Basic, exponent: sp.Basic) -> sp.Basic:
+        lower, upper = self.value(base), self.value(exponent)
+        if upper.is_number and not abs(upper) <= EXPONENT:
+            raise _Refusal(f"{self.what}: found the exponent {short_repr(upper)}; expected at most {EXPONENT}")
+        return lower**upper
+
+    def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Basic]]:
+        known = {*FUNCTIONS, FRICTION_NAME}
+        if function not in known:
+            close = suggestion(function, known)
+            raise NoMeaning(f"unknown function {short_repr(function)}; known: {', '.join(sorted(known))}{close}")
+        wanted = _COUNTS.get(function, 1)
+        if options or (count < 2 if wanted is None else count != wanted):
+            raise NoMeaning(f"{function} has {count} arguments; expected {wanted or 'at least 2'}")
         return (self,) * count
 
-    def call(self, function: str, arguments: Sequence[sp.Expr], options: Mapping[str, str]) -> sp.Expr:
-        if any(a.is_number and abs(sp.N(a)) > LARGEST for a in arguments):
-            raise NoMeaning("a function of a large constant")
-        return (_ONE.get(function) or _TWO[function])(*arguments)
+    def call(self, function: str, arguments: Sequence[sp.Basic], options: Mapping[str, str]) -> sp.Basic:
+        return (FRICTION if function == FRICTION_NAME else FUNCTIONS[function])(*map(self.value, arguments))
 
-    def _bounded(self, e: sp.Expr) -> sp.Expr:
-        if e.is_Rational and _bits(e) > BITS:
-            raise NoMeaning("a number that is too large")
+    def compare(self, sign: str, a: sp.Basic, b: sp.Basic) -> sp.Basic:
+        return _RELATIONS[sign](self.value(a), self.value(b))
+
+    def junction(self, word: str, conditions: Sequence[sp.Basic]) -> sp.Basic:
+        return (sp.And if word == "and" else sp.Or)(*map(self.condition, conditions))
+
+    def contrary(self, condition: sp.Basic) -> sp.Basic:
+        return sp.Not(self.condition(condition))
+
+    def choice(self, condition: sp.Basic, value: sp.Basic, otherwise: sp.Basic) -> sp.Basic:
+        last = otherwise.args if isinstance(otherwise, sp.Piecewise) else ((self.value(otherwise), sp.true),)
+        return sp.Piecewise((self.value(value), self.condition(condition)), *last)
+
+    def value(self, e: sp.Basic) -> sp.Expr:
+        """The expression, if it is no condition and its constants are finite, real and not too large."""
+        if not isinstance(e, sp.Expr):
+            raise NoMeaning(f"found the condition {short_repr(e)}, which is no value")
+        for number in _constants(e):
+            if number.is_Rational:
+                large = max(abs(number.p), number.q) > DIGITS
+            else:
+                size = sp.N(number)
+                large = not (size.is_real and size.is_finite and abs(size) <= MAGNITUDE)
+            if large:
+                shown = short_repr(number)
+                raise _Refusal(f"{self.what}: found {shown}; expected finite real numbers up to {MAGNITUDE:g}")
+        return e
+
+    def condition(self, e: sp.Basic) -> Boolean:
+        """The condition, if it is one."""
+        if not isinstance(e, Boolean) or isinstance(e, sp.Expr):
+            raise NoMeaning(f"found {short_repr(e)}, which is no condition")
         return e
 
 
-def _bits(number: sp.Rational) -> int:
-    """The length of a rational number."""
-    return int(max(abs(number.p).bit_length(), number.q.bit_length()))
+def _constants(e: sp.Expr) -> Iterator[sp.Expr]:
+    """The constants at the top of an expression: itself, or its terms, factors, base and exponent that are constant."""
+    if e.is_number:
+        yield e
+    elif isinstance(e, sp.Mul | sp.Add | sp.Pow):
+        yield from (part for part in e.args if part.is_number)

@@ -6,7 +6,7 @@ Expressions are made of the symbols of `ends`: x_i is the state or parameter x o
 from __future__ import annotations
 
 import keyword
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
 
 import sympy as sp
@@ -25,13 +25,16 @@ from ..inputs.checks import (
 from ..inputs.frozen import Frozen
 from .components import TIME, Node
 from .ends import WEIGHT, Pair, Terms
-from .expression import exact, read
+from .expression import FRICTION_NAME, FUNCTIONS, LENGTH, exact, read, written
 from .parameter import Parameter
 
 __all__ = ["Potential", "Rates"]
 
 _WEIGHT = "W"
 """What the weight of a link is called in a text."""
+
+_TAKEN = frozenset({"pi", FRICTION_NAME, *FUNCTIONS})
+"""Names that mean something else in a text."""
 
 
 @dataclass(frozen=True, slots=True, init=False)
@@ -225,7 +228,7 @@ class _Content:
         table = _parameters(what, parameters)
         symbols = {sp.Symbol(name, real=True) for name in table}
         own = frozenset({TIME, WEIGHT, *symbols})
-        found = tuple(exact(what, e) for e in given)
+        found = tuple(_exact(what, e) for e in given)
         used = {s for e in found for s in e.free_symbols}
         for s in sorted(used - own, key=lambda s: s.name):
             if not s.name.endswith(("_i", "_j")) or len(s.name) < 3:
@@ -246,6 +249,15 @@ class _Content:
         if strange is not None:
             raise ValueError(f"{what}: found {strange}; expected known functions of symbols; write it out")
         return cls(found, table, own)
+
+
+def _exact(what: str, value: object) -> sp.Expr:
+    """The expression with real symbols and rational numbers."""
+    symbols = value.free_symbols if isinstance(value, sp.Expr) else ()
+    taken = sorted(s.name for s in symbols if s.name in _TAKEN)
+    if taken:
+        raise ValueError(f"{what}: the symbol {taken[0]!r} has the name of a constant or a function; rename it")
+    return exact(what, value, {s.name: sp.Symbol(s.name, real=True) for s in symbols})
 
 
 def _target(key: object) -> str:
@@ -311,7 +323,7 @@ def _placed(coupling: Rates | Potential, e: sp.Expr, pair: Pair) -> sp.Expr:
 
 def _written(e: sp.Expr) -> str:
     """An expression as the text that `read` reads."""
-    return str(e.xreplace({WEIGHT: sp.Symbol(_WEIGHT)}))
+    return written(e.xreplace({WEIGHT: sp.Symbol(_WEIGHT, real=True)}))
 
 
 def _numbers(parameters: Mapping[str, Parameter]) -> dict[str, object]:
@@ -353,5 +365,21 @@ def from_table(what: str, given: Mapping[object, object]) -> Rates | Potential:
     )
 
 
+class _AnyName(Mapping[str, sp.Symbol]):
+    """A symbol for every name but those of a constant and of friction: the nodes of a link are not known yet."""
+
+    def __contains__(self, name: object) -> bool:
+        return name not in _TAKEN
+
+    def __getitem__(self, name: str) -> sp.Symbol:
+        return WEIGHT if name == _WEIGHT else sp.Symbol(name, real=True)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(())
+
+    def __len__(self) -> int:
+        return 0
+
+
 def _read(what: str, text: object) -> sp.Expr:
-    return read(what, text).xreplace({sp.Symbol(_WEIGHT, real=True): WEIGHT})
+    return read(what, check_text(what, text, LENGTH), _AnyName())

@@ -13,6 +13,7 @@ from .components import TIME
 __all__ = [
     "Mechanics",
     "balance",
+    "check_masses_exist",
     "energy_rate",
     "equations_of_motion",
     "mass_matrix",
@@ -130,42 +131,55 @@ LARGEST_BY_MINORS = 3
 """Rows up to which minors are shorter than the fractions within fractions that elimination leaves."""
 
 
+def check_masses_exist(masses: sp.Matrix, velocities: Sequence[sp.Symbol]) -> None:
+    """Raise ValueError if a symmetric mass matrix is singular: some velocity, which names it, has no kinetic energy."""
+    rest = _joined(masses)
+    idle = [str(velocities[i]) for i in range(masses.rows) if i not in rest and masses[i, i] == 0]
+    if idle:
+        raise ValueError(f"no kinetic energy in the velocity {idle[0]}; expected T to grow with every velocity")
+    if rest and _is_singular(masses.extract(rest, rest)):
+        names = ", ".join(str(velocities[i]) for i in rest)
+        raise ValueError(f"the mass matrix of {names} is singular; expected an invertible one")
+
+
 def solve_masses(masses: sp.Matrix, forces: Sequence[sp.Expr], velocities: Sequence[sp.Symbol]) -> tuple[sp.Expr, ...]:
     """Return a with masses * a = forces, for a symmetric mass matrix; `velocities` name its rows in errors.
 
     Raises ValueError if the matrix is singular: some velocity then has no kinetic energy.
     """
-    size = len(forces)
-    alone = [i for i in range(size) if all(masses[i, j] == 0 for j in range(size) if j != i)]
-    idle = [str(velocities[i]) for i in alone if masses[i, i] == 0]
-    if idle:
-        raise ValueError(f"no kinetic energy in the velocity {idle[0]}; expected T to grow with every velocity")
-    found = {i: forces[i] / masses[i, i] for i in alone}
-    rest = [i for i in range(size) if i not in found]
+    check_masses_exist(masses, velocities)
+    rest = _joined(masses)
+    found = {i: forces[i] / masses[i, i] for i in range(masses.rows) if i not in rest}
     if rest:
         block = masses.extract(rest, rest)
-        names = ", ".join(str(velocities[i]) for i in rest)
-        found |= dict(zip(rest, _block(block, [forces[i] for i in rest], names), strict=True))
-    return tuple(found[i] for i in range(size))
+        found |= dict(zip(rest, _block(block, [forces[i] for i in rest]), strict=True))
+    return tuple(found[i] for i in range(len(forces)))
 
 
-def _vanishes(e: sp.Expr) -> bool:
-    """True if an expression is zero everywhere; a value that differs from zero at one place proves the contrary."""
-    symbols = sorted(e.free_symbols, key=str)
+def _joined(masses: sp.Matrix) -> list[int]:
+    """The rows with entries beside the diagonal."""
+    size = masses.rows
+    return [i for i in range(size) if any(masses[i, j] != 0 for j in range(size) if j != i)]
+
+
+def _determinant(masses: sp.Matrix) -> sp.Expr:
+    return masses.det(method="berkowitz")
+
+
+def _is_singular(masses: sp.Matrix) -> bool:
+    """True if the determinant is zero everywhere; a value that differs from zero at one place proves the contrary."""
+    symbols = sorted(masses.free_symbols, key=str)
     for k in range(3):
         place = {s: sp.Rational(7 * i + 3 * k + 5, 11 + 2 * i) for i, s in enumerate(symbols)}
-        value = e.subs(place).evalf(30)
+        value = _determinant(masses.subs(place).evalf(30))
         if value.is_number and value.is_finite and abs(value) > sp.Float("1e-15"):
             return False
-    return bool(e.equals(0))
+    return bool(_determinant(masses).equals(0))
 
 
-def _block(masses: sp.Matrix, forces: Sequence[sp.Expr], names: str) -> list[sp.Expr]:
+def _block(masses: sp.Matrix, forces: Sequence[sp.Expr]) -> list[sp.Expr]:
     """Cramer's rule for a small block, elimination for a large one."""
-    determinant = masses.det(method="berkowitz")
-    if _vanishes(determinant):
-        raise ValueError(f"the mass matrix of {names} is singular; expected an invertible one")
     if masses.rows > LARGEST_BY_MINORS:
         return list(masses.LUsolve(sp.Matrix(forces)))
-    minors = masses.adjugate()
+    minors, determinant = masses.adjugate(), _determinant(masses)
     return [sp.Add(*(minors[i, j] * force for j, force in enumerate(forces))) / determinant for i in range(masses.rows)]

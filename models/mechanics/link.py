@@ -21,7 +21,7 @@ from .ends import Pair, Terms
 from .friction import SLIP
 from .lagrangian import balance, mass_matrix, solve_masses
 from .nondimensional import nondimensional
-from .oscillator import Field, Oscillator
+from .oscillator import FieldModel, Oscillator
 
 __all__ = ["edge", "strength"]
 
@@ -161,7 +161,7 @@ def _in_differences(e: sp.Expr, pairs: list[tuple[sp.Symbol, sp.Symbol]], here: 
 
 def _masses(oscillator: Oscillator | None, single: Node, here: Symbols) -> sp.Matrix:
     """The mass matrix of the target by itself, in the symbols of a link's target."""
-    if oscillator is None or isinstance(oscillator.model, Field):
+    if oscillator is None or isinstance(oscillator.model, FieldModel):
         return sp.eye(len(here) // 2)
     system = nondimensional(oscillator)
     masses = mass_matrix(system.kinetic, system.velocities)

@@ -19,9 +19,12 @@ from .components import SLIDING, TIME
 from .coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling, split
 from .definition import COUPLING, FRICTION_LAW, OSCILLATOR, coordinates_of, lagrangian_symbols
 from .friction import FrictionLaw
-from .oscillator import Coordinate, Field, Lagrangian, Oscillator, Scaling
+from .oscillator import Coordinate, FieldModel, LagrangianModel, Oscillator, Scaling
 
 __all__ = ["load_friction_law", "load_oscillator", "read_coupling"]
+
+USUAL_LAW = "exponential"
+"""The friction law of an oscillator whose file says that it takes one."""
 
 
 def load_oscillator(name: str) -> Oscillator:
@@ -83,30 +86,34 @@ def _oscillator(name: str, module: ModuleType) -> Oscillator:
         Frozen(module.PARAMETERS),
         _field(module) if hasattr(module, "field") else _lagrangian(module),
         None if initial is None else Frozen(initial),
-        _text(module, "SUMMARY"),
-        _text(module, "SOURCE"),
+        load_friction_law(USUAL_LAW) if module.FRICTION else None,
+        summary=_text(module, "SUMMARY"),
+        source=_text(module, "SOURCE"),
     )
 
 
-def _field(module: ModuleType) -> Field:
+def _field(module: ModuleType) -> FieldModel:
     """The vector field that a module defines."""
     rates = call(module.field, {**_symbols((*module.PARAMETERS, *module.STATE)), TIME.name: TIME})
-    return Field(tuple(module.STATE), tuple(map(sp.sympify, rates)))
+    return FieldModel(tuple(module.STATE), tuple(map(sp.sympify, rates)))
 
 
-def _lagrangian(module: ModuleType) -> Lagrangian:
+def _lagrangian(module: ModuleType) -> LagrangianModel:
     """The Lagrangian that a module defines."""
     table = coordinates_of(module)
-    coordinates = tuple(Coordinate(name, velocity, unit) for name, (velocity, unit) in table.items())
+    scaling = _scaling(module)
+    coordinates = tuple(
+        Coordinate(name, velocity, "1" if scaling is None else unit) for name, (velocity, unit) in table.items()
+    )
     given = lagrangian_symbols(module)
     force = call(module.force, given) if hasattr(module, "force") else (sp.S.Zero,) * len(coordinates)
-    return Lagrangian(
+    return LagrangianModel(
         coordinates,
         sp.sympify(call(module.kinetic, given)),
         sp.sympify(call(module.potential, given)),
         tuple(map(sp.sympify, force if isinstance(force, tuple | list) else (force,))),
         sp.sympify(call(module.dissipation, given)) if hasattr(module, "dissipation") else sp.S.Zero,
-        _scaling(module),
+        scaling,
     )
 
 

@@ -14,7 +14,7 @@ from .calculus import derivative
 from .components import SLIDING, TIME
 from .friction import ContactModel, FrictionLaw, regularise
 from .lagrangian import Mechanics
-from .oscillator import FRICTION, Lagrangian, Oscillator
+from .oscillator import FRICTION, LagrangianModel, Oscillator
 from .parameter import Parameter, dimension
 
 __all__ = [
@@ -55,7 +55,7 @@ def scale(oscillator: Oscillator, unit: str) -> sp.Expr:
     ValueError
         If the oscillator's scales do not turn each quantity of its units into 1.
     """
-    scaling = oscillator.model.scaling if isinstance(oscillator.model, Lagrangian) else None
+    scaling = oscillator.model.scaling if isinstance(oscillator.model, LagrangianModel) else None
     if scaling is None:
         return sp.S.One
     values = {MASS: scaling.scales["kg"], LENGTH: scaling.scales["m"], DURATION: scaling.scales["s"]}
@@ -75,7 +75,7 @@ def physical(oscillator: Oscillator) -> Mechanics:
         If the oscillator is a vector field, and if it has not one force for each coordinate.
     """
     model = oscillator.model
-    if not isinstance(model, Lagrangian):
+    if not isinstance(model, LagrangianModel):
         raise ValueError(f"oscillator {oscillator.name!r} is a vector field; expected one with a Lagrangian")
     speeds = [_real(c.velocity) for c in model.coordinates]
     lost = [derivative(model.dissipation, speed) for speed in speeds] if model.dissipation != 0 else []
@@ -97,7 +97,7 @@ def nondimensional(oscillator: Oscillator) -> Mechanics:
         As `physical` does, and if units do not cancel.
     """
     system, model = physical(oscillator), oscillator.model
-    if not isinstance(model, Lagrangian) or model.scaling is None:
+    if not isinstance(model, LagrangianModel) or model.scaling is None:
         return system
     scale(oscillator, "1")  # the scales must turn every quantity of UNITS into 1
     amounts = {sp.Symbol(name, positive=True): magnitude(unit) for name, unit in model.scaling.units.items()}
@@ -131,7 +131,7 @@ def friction_coefficient(law: FrictionLaw, contact: str) -> Callable[[sp.Expr], 
     """Return f(w), the friction coefficient as a function of the non-dimensional sliding velocity.
 
     The parameters of a law have units too, so they scale with the rest: a rate of decay a = 2.5 of unit s/m decays
-    with 2.5 |w| only when w is measured in L/T.
+    with 2.5 |w| only when w is measured in L/T.  If none has a unit, w is a number as they are.
 
     Parameters
     ----------
@@ -147,7 +147,8 @@ def friction_coefficient(law: FrictionLaw, contact: str) -> Callable[[sp.Expr], 
     """
     treatment = ContactModel.parse("contact", contact)
     w = sp.Dummy("w", real=True)
-    amounts = {SLIDING: w * magnitude("m/s"), **_amounts(law.parameters)}
+    pure = all(parameter.unit == "1" for parameter in law.parameters.values())
+    amounts = {SLIDING: w if pure else w * magnitude("m/s"), **_amounts(law.parameters)}
     value = _cancel(law.force.xreplace(amounts), f"friction law {law}")
     if treatment == ContactModel.ATAN:
         value = regularise(value, sp.Symbol("kappa", real=True))

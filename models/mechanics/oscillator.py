@@ -9,21 +9,46 @@ from typing import Any
 import sympy as sp
 
 from ..inputs.frozen import Frozen
+from .friction import ContactModel, FrictionLaw
 from .parameter import Parameter
 
-__all__ = ["FRICTION", "Coordinate", "Field", "Lagrangian", "Oscillator", "Scaling"]
+__all__ = ["FRICTION", "Coordinate", "FieldModel", "LagrangianModel", "Oscillator", "Scaling", "friction"]
 
 FRICTION = sp.Function("f", real=True)
 """The friction coefficient as an unknown function of the sliding velocity; a law takes its place at the end."""
 
 
+def friction(velocity: sp.Expr) -> sp.Expr:
+    """Return the friction coefficient at a sliding velocity, for the forces of a Lagrangian.
+
+    Parameters
+    ----------
+    velocity : Expr
+        The velocity of the ground relative to the body, so that a positive coefficient drags the body along.
+
+    Returns
+    -------
+    Expr
+        An unknown function of the velocity; the friction law of the node takes its place.
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> from synchain.models import friction
+    >>> N, belt, v = sp.symbols("N belt v")
+    >>> N * friction(belt - v)
+    N*f(belt - v)
+    """
+    return FRICTION(velocity)
+
+
 @dataclass(frozen=True, slots=True)
 class Coordinate:
-    """A generalised coordinate, the name of its velocity, and its unit."""
+    """A generalised coordinate, the name of its velocity, and its unit, "1" if the Lagrangian is non-dimensional."""
 
     name: str
     velocity: str
-    unit: str = "m"
+    unit: str = "1"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +71,7 @@ class Scaling:
 
 
 @dataclass(frozen=True, slots=True)
-class Lagrangian:
+class LagrangianModel:
     """A mechanical system: energies and forces as expressions, `FRICTION` for a friction law.
 
     Coordinates, velocities and parameters are real symbols.  With a `scaling` all quantities are physical and the
@@ -80,7 +105,7 @@ class Lagrangian:
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class FieldModel:
     """A first-order vector field: the names of the states and an expression for the rate of each."""
 
     state: tuple[str, ...]
@@ -102,18 +127,29 @@ class Oscillator:
         What messages and scene files call it.
     parameters : mapping of str to Parameter
         Parameters of the non-dimensional equations.
-    model : Lagrangian or Field
+    model : LagrangianModel or FieldModel
         What moves it.
     initial : mapping of str to float, optional
         The state around which oscillators start, 0 for the states left out.
+    friction : FrictionLaw, optional
+        The law of its friction unless another is given.
+    contact : ContactModel
+        How the jump of a law at rest is treated unless said otherwise.
     summary, source : str
         What it is, and where it was published.
+
+    Attributes
+    ----------
+    states : tuple of str
+        Names of the states.  Each is an attribute too, its symbol: ``node.x``.
     """
 
     name: str
     parameters: Frozen[Parameter]
-    model: Lagrangian | Field
+    model: LagrangianModel | FieldModel
     initial: Mapping[str, Any] | None = None
+    friction: FrictionLaw | None = None
+    contact: ContactModel = ContactModel.ATAN
     summary: str = field(default="", compare=False)
     source: str = field(default="", compare=False)
 
@@ -125,7 +161,22 @@ class Oscillator:
         """True if the forces hold a friction coefficient, for which a law must be named."""
         return any(e.has(FRICTION) for e in self.model.expressions)
 
+    def __getattr__(self, name: str) -> sp.Symbol:
+        if name not in Oscillator.__dict__ and name in self.states:
+            return sp.Symbol(name, real=True)
+        raise AttributeError(f"oscillator has no attribute {name!r}")
+
+    def __dir__(self) -> list[str]:
+        return [*object.__dir__(self), *self.states]
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states: coordinates and their velocities, or those of a vector field."""
+        if isinstance(self.model, FieldModel):
+            return self.model.state
+        return (*self.coordinates, *(c.velocity for c in self.model.coordinates))
+
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the coordinates, none of a vector field."""
-        return tuple(c.name for c in self.model.coordinates) if isinstance(self.model, Lagrangian) else ()
+        return tuple(c.name for c in self.model.coordinates) if isinstance(self.model, LagrangianModel) else ()

@@ -17,9 +17,9 @@ class Parameter:
     default : float
         The non-dimensional value that it has unless another is given.
     unit : str
-        The SI unit of the physical quantity behind the number, such as "N/m".
+        The SI unit of the physical quantity behind the number, such as "N/m"; "1" if it is a number by itself.
     meaning : str
-        A phrase that says what it is.
+        A phrase that says what it is; plug-in files must have one.
     minimum, maximum : float, optional
         The range, both ends included.
     positive : bool
@@ -35,8 +35,8 @@ class Parameter:
     """
 
     default: float
-    unit: str
-    meaning: str
+    unit: str = "1"
+    meaning: str = ""
     minimum: float | None = None
     maximum: float | None = None
     positive: bool = False
@@ -44,11 +44,9 @@ class Parameter:
 
     def __post_init__(self) -> None:
         dimension(self.unit)
-        if not self.meaning.strip():
-            raise ValueError("a parameter has no meaning; expected a phrase that says what it is")
         if self.minimum is not None and self.maximum is not None and self.minimum > self.maximum:
             raise ValueError(f"parameter range is empty: minimum {self.minimum} above maximum {self.maximum}")
-        self.check(f"default of {self.meaning!r}", self.default)
+        self.check(f"default of {self.meaning!r}" if self.meaning else "default", self.default)
 
     def check(self, name: str, value: float) -> float:
         """Return `value` as a float, or raise ValueError (TypeError: no number) that names it and the range."""

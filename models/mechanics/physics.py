@@ -10,7 +10,7 @@ import sympy as sp
 from .friction import ContactModel, FrictionLaw
 from .lagrangian import mass_matrix
 from .nondimensional import friction_coefficient, nondimensional
-from .oscillator import Field, Oscillator
+from .oscillator import FieldModel, Oscillator
 
 __all__ = ["check_masses", "check_power"]
 
@@ -95,7 +95,7 @@ def _check_masses(oscillator: Oscillator, values: tuple[tuple[str, float], ...])
 @lru_cache(maxsize=64)
 def _masses(oscillator: Oscillator) -> tuple[sp.Matrix, tuple[sp.Symbol, ...]] | None:
     """The mass matrix in the parameters, None for a vector field."""
-    if isinstance(oscillator.model, Field):
+    if isinstance(oscillator.model, FieldModel):
         return None
     system = nondimensional(oscillator)
     return mass_matrix(system.kinetic, system.velocities), system.velocities

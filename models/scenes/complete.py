@@ -12,10 +12,10 @@ from ..inputs.checks import check_choice, check_integer, check_number, check_tex
 from ..inputs.frozen import Frozen
 from ..inputs.words import Word
 from ..mechanics.friction import ContactModel, FrictionLaw
-from ..mechanics.oscillator import Field
+from ..mechanics.oscillator import FieldModel
 from ..mechanics.physics import check_masses, check_power
 from .axis import Axis
-from .model import Model, NodeKind, as_coupling, as_groups, as_law, as_layers, as_oscillator
+from .model import Model, NodeKind, as_contact, as_coupling, as_groups, as_law, as_layers, as_oscillator
 from .parameters import at_nodes, drive, parameters
 from .section import Section
 from .start import SEED_LIMIT, chosen_start, default_start
@@ -85,13 +85,13 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
 def _model(given: Mapping[str, Any]) -> dict[str, Any]:
     """The parts of the model, and the model."""
     oscillator = as_oscillator(given["oscillator"])
-    contact = ContactModel.parse("contact", given["contact"])
     if given["links"] is not None and given["coupling"] not in (None, "spring"):
         raise ValueError("links: found a coupling beside it; expected each layer with its own coupling; leave one out")
     coupling = as_coupling(given["coupling"]) if given["links"] is None else None
     layers = as_layers(given["links"], coupling, given["topology"])
     friction = as_law(given["friction"], oscillator)
     groups = as_groups(given["nodes"], layers[0][1].n)
+    contact = as_contact(given["contact"], (oscillator, *(group.oscillator for group in groups)))
     model = Model.of(NodeKind(oscillator, friction), groups, contact, layers)
     single = len(layers) == 1
     return {
@@ -149,7 +149,7 @@ def _records(model: Model, given: object) -> tuple[Record, ...]:
 def _section(model: Model, given: object) -> Section:
     """The section: unless it is given, a velocity of the first node falls through 0, or the state of a vector field."""
     own = tuple(s.name for s in model.unlinked.node_at(0).state)
-    crossed = own[0] if isinstance(model.kinds[model.kind_of[0]].oscillator.model, Field) else own[-1]
+    crossed = own[0] if isinstance(model.kinds[model.kind_of[0]].oscillator.model, FieldModel) else own[-1]
     default = f"{'v' if 'v' in own else crossed}_1 falling"
     section = Section.parse(default if given is None else given)
     model.check_state(section.variable, "section variable")

@@ -11,6 +11,7 @@ from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import check_integer, check_keys, check_table, check_text, short_repr
 from ..inputs.plugins import part
 from ..mechanics.coupling import Coupling, Potential, Rates, split
+from ..mechanics.table import as_name_or_table
 from .parameters import collected
 
 __all__ = ["arguments", "as_dict"]
@@ -61,7 +62,9 @@ def arguments(values: object, keywords: Iterable[str], folder: Path | None = Non
 
 
 def _placed(name: object, folder: Path | None) -> object:
-    """The name of a part; a path to a file of code starts in the folder of the scene file."""
+    """The name of a part; a path to a file of code starts in the folder of the scene file, in a table too."""
+    if isinstance(name, Mapping) and "friction" in name:
+        return {**name, "friction": _placed(name["friction"], folder)}
     if not isinstance(name, str) or folder is None or not split(name)[0].endswith(".py"):
         return name
     return str(folder / name)
@@ -129,9 +132,10 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
         The parameters that have a value for each node.
     """
     written = dict(values)
-    for name in ("oscillator", "contact", "time_unit", "continuation", "section"):
+    for name in ("contact", "time_unit", "continuation", "section"):
         written[name] = str(values[name])
-    written["friction"] = "none" if values["friction"] is None else str(values["friction"])
+    for name in ("oscillator", "friction"):
+        written[name] = "none" if values[name] is None else as_name_or_table(values[name])
     written["coupling"], written["topology"] = _coupling(values["coupling"]), _graph(values["topology"])
     layers = written.pop("links")
     if layers is not None:

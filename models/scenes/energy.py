@@ -22,7 +22,7 @@ from ..mechanics.coupling import Coupling, LagrangianCoupling, Potential
 from ..mechanics.ends import Pair, Terms
 from ..mechanics.friction import ContactModel
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
-from ..mechanics.oscillator import Field
+from ..mechanics.oscillator import FieldModel
 from .model import NodeKind
 from .scene import a_scene
 
@@ -90,7 +90,7 @@ def energy(scene: Scene) -> Energy:
     """
     kinds = a_scene(scene).model.kinds
     for kind in kinds:
-        if isinstance(kind.oscillator.model, Field):
+        if isinstance(kind.oscillator.model, FieldModel):
             name = kind.oscillator.name
             raise ValueError(f"energy: oscillator {name!r} is a vector field; expected one with a Lagrangian")
     equations = scene.equations

@@ -22,11 +22,13 @@ from ..mechanics.friction import ContactModel, FrictionLaw
 from ..mechanics.loader import load_friction_law, load_oscillator, read_coupling
 from ..mechanics.oscillator import Oscillator
 from ..mechanics.parameter import Parameter
+from ..mechanics.table import as_name_or_table, law_of_table, oscillator_of_table
 
 __all__ = [
     "Group",
     "Model",
     "NodeKind",
+    "as_contact",
     "as_coupling",
     "as_groups",
     "as_law",
@@ -58,7 +60,8 @@ class Group:
 
     def as_dict(self) -> dict[str, object]:
         """Return the group in the names of a scene file."""
-        return {"oscillator": str(self.oscillator), "friction": str(self.friction or "none"), "at": list(self.at)}
+        law = "none" if self.friction is None else as_name_or_table(self.friction)
+        return {"oscillator": as_name_or_table(self.oscillator), "friction": law, "at": list(self.at)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -287,7 +290,9 @@ def in_range(name: str, value: object, parameter: Parameter) -> float:
 
 
 def as_oscillator(value: object, what: str = "oscillator") -> Oscillator:
-    """Return an oscillator as it is, or load the one of a name; any other value raises ValueError or TypeError."""
+    """Return an oscillator as it is, or make the one of a table or a name; ValueError or TypeError for other values."""
+    if isinstance(value, Mapping):
+        return oscillator_of_table(value)
     return value if isinstance(value, Oscillator) else load_oscillator(part(what, value))
 
 
@@ -297,16 +302,31 @@ def as_law(value: object, oscillator: Oscillator) -> FrictionLaw | None:
     Parameters
     ----------
     value : object
-        A law, a name, "default" (the one that an oscillator starts with), "none" or None.
+        A law, its table, a name, "default" (the one that an oscillator brings), "none" or None.
     oscillator : Oscillator
         The oscillator that "default" is meant for.
     """
     if value == "default":
-        return load_friction_law("exponential") if oscillator.takes_friction else None
+        return oscillator.friction
     if value is None or isinstance(value, FrictionLaw):
         return value
+    if isinstance(value, Mapping):
+        return law_of_table(value)
     name = part("friction", value)
     return None if name == "none" else load_friction_law(name)
+
+
+def as_contact(value: object, oscillators: Iterable[Oscillator]) -> ContactModel:
+    """Return the contact of a word; None stands for that of the oscillators which take friction.
+
+    Raises ValueError if these differ.
+    """
+    if value is not None:
+        return ContactModel.parse("contact", value)
+    found = dict.fromkeys(oscillator.contact for oscillator in oscillators if oscillator.takes_friction)
+    if len(found) > 1:
+        raise ValueError(f"contact: the nodes have {' and '.join(map(repr, found))}; expected one; give contact")
+    return next(iter(found), ContactModel.ATAN)
 
 
 def as_coupling(value: object) -> Coupling | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import lru_cache
@@ -23,6 +24,7 @@ from ..mechanics.oscillator import Oscillator
 from .axis import Axis
 from .complete import TimeUnit, complete
 from .dictionary import arguments, as_dict
+from .file import save_scene
 from .model import Group, Model, as_oscillator, as_topology
 from .parameters import drive, varied, without
 from .section import Section
@@ -44,20 +46,20 @@ class Scene:
 
     Parameters
     ----------
-    title : str
-        What the scene is called.
     oscillator : Oscillator or str
-        The nodes, by value or by name.
-    friction : FrictionLaw or str, optional
-        Their friction law; "default" is "exponential" if the oscillator takes a law, else None.
-    contact : str
-        How the jump of a law at rest is treated: "atan", "sign" or "set-valued".
+        The nodes, by value (`Lagrangian`, `Field`) or by name.
     coupling : Coupling or str, optional
         What joins the nodes: a name ("spring", "spring on x"), components ("x->x, 1/2 y->z"), `Rates` or a `Potential`.
-    nodes : iterable of Group or tables, optional
-        Nodes of other kinds.
     topology : Topology, optional
         The graph; one node alone if left out.  Of several layers of links it is the union of their graphs.
+    title : str
+        What the scene is called.
+    friction : FrictionLaw or str, optional
+        Their friction law; "default" is the one that the oscillator brings, None for none.
+    contact : str, optional
+        How the jump of a law at rest is treated: "atan", "sign" or "set-valued"; that of the oscillator if left out.
+    nodes : iterable of Group or tables, optional
+        Nodes of other kinds.
     links : iterable of (Coupling or str, Topology), optional
         Several layers of links, each with its own graph, in place of `coupling` and `topology`.
     parameters : mapping, optional
@@ -131,14 +133,14 @@ class Scene:
 
     def __init__(
         self,
+        oscillator: Oscillator | str = "friction",
+        coupling: Coupling | str | None = "spring",
+        topology: Topology | None = None,
         *,
         title: str = "",
-        oscillator: Oscillator | str = "friction",
         friction: FrictionLaw | str | None = "default",
-        contact: str = "atan",
-        coupling: Coupling | str | None = "spring",
+        contact: str | None = None,
         nodes: Iterable[Group | Mapping[str, object]] | None = None,
-        topology: Topology | None = None,
         links: Iterable[tuple[Coupling | str, Topology]] | None = None,
         parameters: Mapping[str, object] | None = None,
         initial: Mapping[str, object] | None = None,
@@ -307,6 +309,21 @@ class Scene:
         """Return the whole scene in JSON types; `Scene.from_dict` makes an equal scene of it."""
         return as_dict(self._values(), self.varied)
 
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the whole scene to a TOML file; `load_scene` makes an equal scene of it.
+
+        Parameters
+        ----------
+        path : str or path
+            The file, whose name ends in .toml.  A file of this name is replaced.
+
+        Raises
+        ------
+        ValueError
+            For another ending, more than a megabyte, and parts that no file can say.
+        """
+        save_scene(self, path)
+
     @classmethod
     def from_dict(cls, values: Mapping[str, object], folder: Path | None = None) -> Scene:
         """Return the scene of a scene file's names and values.
@@ -355,7 +372,7 @@ def _spectrum(graph: Topology) -> Spectrum:
 KEYWORDS = tuple(own.name for own in fields(Scene) if own.compare)
 """The keywords of a scene, which are the keys of a scene file."""
 
-_FOLLOWING = {"friction": "default", "record": None, "section": None, "time_unit": None, "atol": None}
+_FOLLOWING = {"friction": "default", "contact": None, "record": None, "section": None, "time_unit": None, "atol": None}
 """Keywords whose default depends on other keywords, with the value that stands for it."""
 
 

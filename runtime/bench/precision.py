@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from tqdm import tqdm
 
-from synchain.codegen.taylor import kink
+from synchain.codegen.taylor import jump
 
 from . import peers
 from .kit.cases import CASES as STORED
@@ -84,10 +84,10 @@ class Method:
         """False where the method is not to the point.
 
         Stability holds explicit methods back on stiff cases; implicit ones and the paper's serve
-        the smoothed law; power series need analytic functions between events.
+        the smoothed law; power series need functions without jumps between events.
         """
         if self.integrator in EXPLICIT:
-            return not case.stiff and (self.integrator != "taylor" or kink(case.scene.equations) is None)
+            return not case.stiff and (self.integrator != "taylor" or jump(case.scene.equations) is None)
         return case.smoothed
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from itertools import islice
 
@@ -14,8 +14,9 @@ import sympy as sp
 from synchain.codegen.driver.columns import Count, Sum
 from synchain.codegen.integrators import Integrator, integrator
 from synchain.codegen.kernels.sweep import AUTO, KernelSource
-from synchain.codegen.taylor import is_linear, kink, order_for
+from synchain.codegen.taylor import is_analytic, is_linear, jump, order_for
 from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.scene import Scene
 
@@ -23,7 +24,16 @@ from .buffers import Buffers
 from .plan import Plan, Planner
 from .reduce import Reduction
 
-__all__ = ["STIFF", "chosen_integrator", "stiffness", "warn_of_stiffness"]
+__all__ = [
+    "STIFF",
+    "chosen_for_modes",
+    "chosen_for_rows",
+    "chosen_integrator",
+    "mode_stiffness",
+    "stiffness",
+    "warn_of_stiff_modes",
+    "warn_of_stiffness",
+]
 
 STIFF = 30.0
 """Stiffness from which Rosenbrock steps are faster than Taylor steps at equal error."""
@@ -31,12 +41,18 @@ STIFF = 30.0
 NODES, LINKS = 50, 5000
 """Nodes of a large network that are looked at, and links."""
 
+LAYER = 0.1
+"""Part of its stiffness with which the layer of a smoothed jump counts: motion is not always inside."""
+
+TURNING = (sp.atan, sp.tanh, sp.erf, sp.Abs)
+"""Functions that are steep, or turn sharply, where their argument is zero: the layer of a smoothed jump."""
+
 
 def chosen_integrator(reduction: Reduction) -> Integrator:
     """Return the integrator of a scene, the fastest at equal error where the scene says "auto".
 
-    Power series where all functions are analytic and the start is not stiff, in the extreme cells of
-    the sweep; between the events of set-valued friction too.  Otherwise Rosenbrock steps, or a
+    Power series where all functions are continuous, and analytic between kinks, and the equations are
+    not stiff, in the extreme cells of the sweep; between the events of set-valued friction too.  Otherwise Rosenbrock steps, or a
     switching pair of methods for two oscillators at a tight tolerance.
 
     Parameters
@@ -44,17 +60,63 @@ def chosen_integrator(reduction: Reduction) -> Integrator:
     reduction : Reduction
         What is left of the scene to integrate.
     """
-    scene, equations = reduction.scene, reduction.equations
+    return _chosen(reduction.scene, reduction.equations, lambda: stiffness(reduction.scene))
+
+
+def chosen_for_rows(scene: Scene, equations: Equations, rows: Plan) -> Integrator:
+    """Return the integrator of equations whose cells come as rows; otherwise as `chosen_integrator`.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its integrator and its tolerances.
+    equations : Equations
+        What is integrated.
+    rows : Plan
+        The extreme cells.
+    """
+    return _chosen(scene, equations, lambda: _stiffness(equations, rows))
+
+
+def _chosen(scene: Scene, equations: Equations, stiffness_of: Callable[[], float]) -> Integrator:
     if scene.integrator == "taylor":
         return _taylor(scene, equations)
     if scene.integrator != "auto":
         return integrator(scene.integrator)
-    if not equations.inertial and kink(equations) is None and (equations.sticks or stiffness(scene) < STIFF):
+    if not equations.inertial and jump(equations) is None and (equations.sticks or stiffness_of() < STIFF):
         return _taylor(scene, equations)
     if equations.sticks:
         return integrator("dop853")
     pair = equations.n == 2 and not (equations.mixed or equations.inertial) and scene.rtol <= 1e-9
     return integrator("switching" if pair else AUTO)
+
+
+def chosen_for_modes(
+    scene: Scene, variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray
+) -> Integrator:
+    """Return the integrator of orbits with deviations along them, Taylor or Rosenbrock steps: modes have no others.
+
+    Power series where all functions are analytic, and neither the orbit nor the strongest mode is stiff at the start.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its integrator, and the tolerances that the order follows.
+    variation : Variation
+        Orbit with its variational equation.
+    state : ndarray, shape (cells, dimension)
+        Initial states.
+    numbers : ndarray, shape (cells, parameters)
+        Values of the parameters of the orbit.
+    strengths : ndarray, shape (number of strengths, modes)
+        Strengths of the modes.
+    """
+    if scene.integrator == "taylor":
+        return _taylor(scene, variation.orbit)
+    smooth = scene.integrator == "auto" and is_analytic(variation.orbit)
+    if smooth and mode_stiffness(variation, state, numbers, strengths) < STIFF:
+        return _taylor(scene, variation.orbit)
+    return integrator(AUTO)
 
 
 def _taylor(scene: Scene, equations: Equations) -> Integrator:
@@ -66,11 +128,67 @@ def stiffness(scene: Scene) -> float:
 
     The rate is the real part of an eigenvalue of a node's own block of the Jacobian, with twice what
     its links add, which bounds that of a network of springs; it is compared with the imaginary
-    parts and one.
+    parts and one.  The layers of smoothed jumps are looked at too, although the start lies outside.
     """
-    rows = Planner(scene).extremes()
-    found = (_rates(scene.equations, *row) for row in zip(rows.start, rows.numbers, strict=True))
-    return max((fastest / max(1.0, turning) for fastest, turning in found), default=0.0)
+    return _stiffness(scene.equations, Planner(scene).extremes())
+
+
+def _stiffness(equations: Equations, rows: Plan) -> float:
+    cells = list(zip(rows.start, rows.numbers, strict=True))
+    found = [_rates(equations, *cell) for cell in cells]
+    bends = [_eigenvalue_parts(_bends(equations, _named(equations, *cell))) for cell in cells]
+    return _stiffest(found + [(LAYER * fastest, LAYER * turning) for fastest, turning in bends])
+
+
+def mode_stiffness(variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray) -> float:
+    """Return how much faster deviations decay or grow at some states than they turn: the largest of the first orbits.
+
+    Of the strengths none and the largest are looked at; parameters as for `chosen_for_modes`.
+    """
+    return _stiffest(_mode_rates(variation, state, numbers, strengths))
+
+
+def warn_of_stiff_modes(
+    variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray, step: float
+) -> None:
+    """Warn if Taylor steps with deviations were short, `step` in the mean, because they are stiff where they ended.
+
+    The other parameters are those of `chosen_for_modes`.
+    """
+    if step * STIFF >= 1.0:
+        return
+    for fastest, turning in _mode_rates(variation, state, numbers, strengths):
+        if fastest * step > 1.0 and fastest > STIFF * max(1.0, turning):
+            warnings.warn(
+                f"stiff modes: found a rate of {fastest:.3g} beside slow motion, and Taylor steps of {step:.2g}; "
+                "expected longer ones; integrator = 'rodas5p' takes them",
+                RuntimeWarning,
+                stacklevel=4,
+            )
+            return
+
+
+def _mode_rates(
+    variation: Variation, state: np.ndarray, numbers: np.ndarray, strengths: np.ndarray
+) -> Iterator[tuple[float, float]]:
+    """The fastest growth and turning of deviations without a strength and with the largest, of the first orbits."""
+    strengths = strengths[: len(variation.parameters)]
+    largest = (
+        strengths[:, np.argmax(np.hypot.reduce(strengths, axis=0))] if strengths.size else np.zeros(len(strengths))
+    )
+    table = [[sp.S.Zero] * variation.size for _ in range(variation.size)]
+    for (row, column), e in variation.matrix:
+        table[row][column] = e
+    entries, orbit = tuple(map(tuple, table)), variation.orbit
+    names = (*orbit.state, *orbit.parameters, *(s.name for s in variation.parameters))
+    for cell in zip(state[:NODES], numbers[:NODES], strict=True):
+        for strong in (0.0 * largest, largest):
+            values = dict(zip(names, np.concatenate([*cell, strong]), strict=True))
+            yield _eigenvalue_parts([_value(entries, {}, values)])
+
+
+def _stiffest(rates: Iterable[tuple[float, float]]) -> float:
+    return max((fastest / max(1.0, turning) for fastest, turning in rates), default=0.0)
 
 
 def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[[np.ndarray], Plan]) -> None:
@@ -106,8 +224,17 @@ def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[
 
 def _rates(equations: Equations, state: np.ndarray, numbers: np.ndarray) -> tuple[float, float]:
     """The fastest decay or growth at a state, and the fastest turning; 0 where there are no numbers."""
-    values = dict(zip(equations.state, state, strict=True)) | dict(zip(equations.parameters, numbers, strict=True))
-    blocks = [block for block in _blocks(equations, values) if np.all(np.isfinite(block))]
+    return _eigenvalue_parts(_blocks(equations, _named(equations, state, numbers)))
+
+
+def _named(equations: Equations, state: np.ndarray, numbers: np.ndarray) -> dict[str, float]:
+    """States and parameters by name."""
+    return dict(zip(equations.state, state, strict=True)) | dict(zip(equations.parameters, numbers, strict=True))
+
+
+def _eigenvalue_parts(blocks: Iterable[np.ndarray]) -> tuple[float, float]:
+    """The largest real and the largest imaginary part of the eigenvalues of some blocks; 0 where there are no numbers."""
+    blocks = [block for block in blocks if np.all(np.isfinite(block))]
     rates = np.concatenate([np.linalg.eigvals(block) for block in blocks]) if blocks else np.zeros(0)
     return float(np.abs(rates.real).max(initial=0.0)), float(np.abs(rates.imag).max(initial=0.0))
 
@@ -121,6 +248,41 @@ def _blocks(equations: Equations, values: Mapping[str, float]) -> list[np.ndarra
             found = _value(edge.jacobian_here(), equations.at_link(link, edge), values)
             blocks[link[0]] = blocks[link[0]] + 2.0 * found
     return blocks
+
+
+def _bends(equations: Equations, values: Mapping[str, float]) -> Iterator[np.ndarray]:
+    """The blocks of the nodes and of the links in the layers of their turning functions, one state moved there."""
+    for i in range(min(equations.n, NODES)):
+        node = equations.node_at(i)
+        yield from _turned(node.rhs, node.state, node.jacobian(), equations.at_node(i), values)
+    for link, edge in islice(equations.linked(), LINKS):
+        for block in _turned(edge.rhs, edge.here, edge.jacobian_here(), equations.at_link(link, edge), values):
+            yield 2.0 * block
+
+
+def _turned(
+    rates: tuple[sp.Expr, ...],
+    states: tuple[sp.Symbol, ...],
+    jacobian: tuple[tuple[sp.Expr, ...], ...],
+    at: Mapping[sp.Symbol, sp.Expr],
+    values: Mapping[str, float],
+) -> Iterator[np.ndarray]:
+    """A block where the argument of a turning function is zero, and close by on either side."""
+    for state, place in _turns(rates, states):
+        ((there,),) = _value(((place,),), at, values)
+        for shift in (-1e-9, 0.0, 1e-9):
+            yield _value(jacobian, at, {**values, at[state].name: there + shift * (1.0 + abs(there))})
+
+
+@lru_cache(maxsize=64)
+def _turns(rates: tuple[sp.Expr, ...], states: tuple[sp.Symbol, ...]) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
+    """For each turning function a state, and the value of it at which the argument is zero."""
+    gaps = {part.args[0] for e in rates for part in e.atoms(*TURNING)}
+    found = []
+    for gap in sorted(gaps, key=sp.default_sort_key):
+        slopes = ((s, gap.diff(s)) for s in states)
+        found += [(s, s - gap / slope) for s, slope in slopes if slope != 0 and not slope.has(s)][:1]
+    return tuple(found)
 
 
 def _value(

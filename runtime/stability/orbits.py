@@ -9,11 +9,13 @@ from functools import lru_cache
 import numpy as np
 import sympy as sp
 
+from synchain.codegen.integrators import Integrator
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.mode_inertia import inertia_of_modes
 from synchain.models.dynamics.variational import Variation, mode
 from synchain.models.scenes.scene import Scene
 
+from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
 from .interpolation import Interpolation, exact_interpolation, strength_interpolation
 from .variational_integrator import VariationalIntegrator
@@ -49,6 +51,8 @@ class Orbits:
         Number of threads.
     unit : float
         Period of the drive, or 2 pi if there is none, in units of non-dimensional time.
+    method : Integrator
+        Method of all steps, the one that suits all strengths.
     block : float
         Number of units of one call of `advance`.
     interpolation : Interpolation, optional
@@ -67,6 +71,7 @@ class Orbits:
     state: np.ndarray
     workers: int | None
     unit: float
+    method: Integrator
     block: float = 1.0
     interpolation: Interpolation | None = None
     integrator: VariationalIntegrator | None = None
@@ -97,8 +102,10 @@ class Orbits:
         variation = _variation(scene.equations, bool(np.iscomplexobj(strengths)))
         unit = unit_of_time(scene)
         row = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])
-        state = with_modes(variation.orbit, state, np.repeat(row, len(state), axis=0))
-        return cls(scene, variation, _of_modes(scene, strengths), state, workers, unit)
+        numbers = np.repeat(row, len(state), axis=0)
+        state, strengths = with_modes(variation.orbit, state, numbers), _of_modes(scene, strengths)
+        method = chosen_for_modes(scene, variation, state, numbers, _rows(strengths))
+        return cls(scene, variation, strengths, state, workers, unit, method)
 
     @property
     def components(self) -> int:
@@ -107,7 +114,9 @@ class Orbits:
 
     def part(self, rows: list[int]) -> Orbits:
         """Return the orbits of some starts."""
-        return Orbits(self.scene, self.variation, self.strengths, self.state[rows], self.workers, self.unit)
+        return Orbits(
+            self.scene, self.variation, self.strengths, self.state[rows], self.workers, self.unit, self.method
+        )
 
     def integrator_of(self, strengths: np.ndarray, looseness: float = 1.0) -> VariationalIntegrator:
         """Return an integrator along the orbits from their current states.
@@ -120,11 +129,11 @@ class Orbits:
             Ratio of the tolerance of the deviations to that of the orbit.
         """
         repeated = np.repeat(strengths, self.components)
-        rows = np.stack([repeated.real, repeated.imag]) if np.iscomplexobj(self.strengths) else repeated[None]
+        rows = _rows(repeated.astype(self.strengths.dtype))
         names = self.variation.orbit.parameters
         numbers = np.tile([self.scene.parameters[name] for name in names], (len(self.state), 1))
         return VariationalIntegrator.make(
-            self.scene, self.variation, self.state, numbers, rows, self.workers, looseness
+            self.scene, self.variation, self.state, numbers, rows, self.workers, looseness, self.method
         )
 
     def settle(self, periods: float) -> None:
@@ -198,6 +207,11 @@ class Orbits:
         with np.errstate(divide="ignore", invalid="ignore"):
             self.deviations = np.where(length[..., None] > 0.0, moved / length[..., None], 0.0)
             return np.asarray(np.log(length))
+
+
+def _rows(strengths: np.ndarray) -> np.ndarray:
+    """The real numbers (1 or 2, modes) of real or complex strengths."""
+    return np.stack([strengths.real, strengths.imag]) if np.iscomplexobj(strengths) else strengths[None]
 
 
 def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:

@@ -14,11 +14,13 @@ from functools import lru_cache
 import numpy as np
 
 from synchain.codegen.driver.columns import Control
+from synchain.codegen.integrators import Integrator
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.modes import emit_modes
 from synchain.models.dynamics.variational import Variation
 from synchain.models.scenes.scene import Scene
 
+from ..cells.choice import chosen_for_modes, warn_of_stiff_modes
 from ..cells.initial_modes import local_clock
 from ..cells.plan import control_array, half_swing, periods, tolerances
 from ..support.status import Status
@@ -33,8 +35,10 @@ class VariationalIntegrator:
 
     Parameters
     ----------
+    variation : Variation
+        Orbit with its variational equation.
     kernel : Kernel
-        Compiled variational equation.
+        The same, compiled.
     state : ndarray, shape (cells, dimension)
         States of the orbits.
     numbers : ndarray, shape (cells, parameters)
@@ -55,6 +59,7 @@ class VariationalIntegrator:
         Steps taken so far.
     """
 
+    variation: Variation
     kernel: Kernel
     state: np.ndarray
     numbers: np.ndarray
@@ -76,6 +81,7 @@ class VariationalIntegrator:
         strengths: np.ndarray,
         workers: int | None = None,
         looseness: float = 1.0,
+        method: Integrator | None = None,
     ) -> VariationalIntegrator:
         """Prepare the kernel and the arrays; tolerances and the step budget are those of the scene.
 
@@ -95,8 +101,11 @@ class VariationalIntegrator:
             Number of threads; all cores by default.
         looseness : float
             Ratio of the tolerance of the deviations to that of the orbit.
+        method : Integrator, optional
+            Method of the steps; by default the one that suits these strengths.
         """
-        kernel = _kernel(variation)
+        method = chosen_for_modes(scene, variation, state, numbers, strengths) if method is None else method
+        kernel = _kernel(variation, method)
         width, count = kernel.origin.width, strengths.shape[1]
         order = np.argsort(np.hypot.reduce(strengths, axis=0) if len(strengths) else np.zeros(count), kind="stable")
         padded = -(-count // width) * width
@@ -111,6 +120,7 @@ class VariationalIntegrator:
         kept = np.ascontiguousarray(strengths[:, columns], dtype=float)
         kept = kept if len(kept) else np.zeros((1, padded))
         return cls(
+            variation=variation,
             kernel=kernel,
             state=np.ascontiguousarray(state, dtype=float).copy(),
             numbers=np.ascontiguousarray(numbers, dtype=float),
@@ -190,8 +200,15 @@ class VariationalIntegrator:
         if len(bad):
             status = Status(int(counts[bad[0], 0]))
             raise FloatingPointError(f"the orbit with its deviations cannot be integrated: {status.message}")
+        taken = int(counts[:, 1:3].sum())
+        if self.kernel.origin.method.series and taken:
+            step = float(np.broadcast_to(length, cells).sum()) / taken
+            self.control[Control.FIRST_STEP] = (
+                step  # a Taylor step of any scale finds its length, only the first few gain
+            )
+            warn_of_stiff_modes(self.variation, end, self.numbers, self.strengths, step)
         self.state = end
-        self.steps += int(counts[:, 1:3].sum())
+        self.steps += taken
         return growth[:, self.order]
 
     def _share(self, cuts: np.ndarray, rest: tuple[np.ndarray, ...]) -> None:
@@ -207,6 +224,6 @@ class VariationalIntegrator:
 
 
 @lru_cache(maxsize=64)
-def _kernel(variation: Variation) -> Kernel:
+def _kernel(variation: Variation, method: Integrator) -> Kernel:
     """Compiled kernel of a variational equation."""
-    return load(emit_modes(variation))
+    return load(emit_modes(variation, method))

@@ -25,6 +25,7 @@ from synchain.models.mechanics.components import Edge
 from synchain.models.mechanics.link import strength
 from synchain.models.scenes.scene import Scene, a_scene
 
+from ..cells.choice import chosen_for_rows
 from ..cells.plan import Plan, Planner, control_of
 from ..support.arrays import numbers
 from ..sweeps.job import RowsSpec
@@ -116,7 +117,9 @@ def universal_probe(
     )
     equations, planner = ring_of_three(ring.equations), Planner(ring)
     rows = _rows(planner, equations.parameters, real.reshape(-1), imaginary.reshape(-1), criterion)
-    problem = RowsSpec(equations, ring.integrator, control_of(planner, jumps=True))
+    strongest = criterion.starts * np.atleast_1d(np.hypot(real, imaginary).argmax())
+    method = chosen_for_rows(ring, equations, rows.take(strongest))
+    problem = RowsSpec(equations, method, control_of(planner, jumps=True))
     with Trials(ring, problem, problem.source(), execution) as trials:
         error, status = trials.run(len(rows), rows.take)
     shape = (*real.shape, criterion.starts)

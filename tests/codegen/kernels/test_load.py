@@ -391,13 +391,14 @@ def test_a_cache_that_cannot_be_filled_is_an_error(tmp_path, monkeypatch, capsys
 
 def test_the_common_drivers_are_those_of_common_scenes():
     common = driver.common_drivers()
-    assert len({made.text for made in common}) == len(common) == 17
+    assert len({made.text for made in common}) == len(common) == 18
     width, speed = lanes.native_width(), real("v_1")[0]
     for records in ((), ("sync_error",), ("section",), ("trajectory",), ("sync_error", "section")):
         for method in ("rodas5p", "taylor"):
             equations = friction_chain(3) if method == "rodas5p" else harmonic_chain(3)
             assert emit(equations, method, records, speed, width).driver in common
     assert emit_modes(network_variation(friction_chain(2))).driver in common
+    assert emit_modes(network_variation(harmonic_chain(2)), "taylor").driver in common
 
 
 @pytest.mark.long
@@ -405,8 +406,8 @@ def test_the_common_drivers_compile(folder, capsys):
     for word in ("compiled", "was there"):
         loading.forget()
         assert main(["cache", "warm"]) == 0
-        assert [line.startswith(word) for line in capsys.readouterr().out.splitlines()] == [True] * 17
-    assert cache.describe()["drivers"] == 17
+        assert [line.startswith(word) for line in capsys.readouterr().out.splitlines()] == [True] * 18
+    assert cache.describe()["drivers"] == 18
 
 
 # -- damage --------------------------------------------------------------------------------------------------

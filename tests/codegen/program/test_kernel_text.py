@@ -11,12 +11,15 @@ import pytest
 import sympy as sp
 from samples import CASES, TABLE, friction_chain, real
 
+from synchain.codegen.integrators import integrator
 from synchain.codegen.kernels.driver import Driver, KernelKind
+from synchain.codegen.kernels.modes import emit_modes
 from synchain.codegen.kernels.sweep import emit
 from synchain.codegen.program.lowering import UnprintableError
 from synchain.models import chain
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.record import Record
+from synchain.models.dynamics.variational import mode
 from synchain.models.mechanics.components import Node
 from synchain.models.scenes.scene import Scene
 
@@ -26,6 +29,8 @@ V_1 = sp.Symbol("v_1", real=True)
 def test_golden_kernels(golden):
     golden("chain_2_rodas5p.txt", emit(friction_chain(2), "rodas5p", ("sync_error", "section"), V_1, width=8).text)
     golden("chain_1_dop853.txt", emit(friction_chain(1), "dop853", (), width=4).text)
+    variation = mode(Scene(oscillator="duffing", topology=chain(2)).equations)
+    golden("modes_taylor_6.txt", emit_modes(variation, integrator("taylor", 6), width=8).text)
 
 
 DRIVERS = {
@@ -35,6 +40,7 @@ DRIVERS = {
     "looped": Driver(KernelKind.SWEEP, 8, looped=True),
     "switching": Driver(KernelKind.SWEEP, 8, switching=True),
     "modes": Driver(KernelKind.MODES, 8, contacts=True),
+    "modes_series": Driver(KernelKind.MODES, 8, contacts=True, series=True),
 }
 
 

@@ -93,7 +93,7 @@ def compiled(equations: Equations, order: int, width: int = 1, dense: bool = Fal
         )
     step, load, store, select, broadcast = (space[n] for n in ("step", "load", "store", "select", "broadcast"))
     size, lane_bits, power_of_two = equations.dimension, simd.lane_bits, simd.power_of_two
-    groups = order * size + written.workspace
+    groups, kinks = order * size + written.workspace, written.kinks
 
     @numba_njit(error_model="numpy")
     def march(t, y, ends, rtol, atol, first):
@@ -101,8 +101,12 @@ def compiled(equations: Equations, order: int, width: int = 1, dense: bool = Fal
         steps = 0
         while True:
             now, end = load(t, 0, width), load(ends, 0, width)
-            h = step(now, end - now, load(scales, 0, width), y, y, y_new, work, rtol, atol)
-            running = h > 0.0
+            found = step(now, end - now, load(scales, 0, width), y, y, y_new, work, rtol, atol)
+            if kinks:
+                h, reach = found
+            else:
+                h, reach = found, found
+            running = reach > 0.0
             if lane_bits(running) == 0:
                 return steps
             steps += 1
@@ -110,13 +114,16 @@ def compiled(equations: Equations, order: int, width: int = 1, dense: bool = Fal
                 store(y, c, select(running, load(y_new, c, width), load(y, c, width)))
             landed = h >= end - now
             store(t, 0, select(landed, end, now + h))
-            store(scales, 0, select(landed, load(scales, 0, width), power_of_two(h)))
+            store(scales, 0, select(reach >= end - now, load(scales, 0, width), power_of_two(reach)))
 
     @numba_njit(error_model="numpy")
     def once(t, h, scale, y, y_new, work, rtol, atol):
         length = np.zeros(width)
         found = step(broadcast(t, width), broadcast(h, width), broadcast(scale, width), y, y, y_new, work, rtol, atol)
-        store(length, 0, found)
+        if kinks:
+            store(length, 0, select(found[1] > 0.0, found[0], found[1]))
+        else:
+            store(length, 0, found)
         return length
 
     return Lanes(march, once, equations, width, order, groups)

@@ -138,13 +138,6 @@ def test_random_equations_are_solved_term_by_term(first, second):
                 assert abs(found[k][c] - mpmath.mpf(value) / factorial) <= mpmath.mpf(10) ** -40 * (1 + abs(value))
 
 
-@pytest.mark.parametrize("kink", [sp.Abs(V), sp.sign(V), sp.Max(V, 0), sp.Min(X, V), sp.floor(X), sp.Heaviside(X),
-                                  sp.Piecewise((V, V > 0), (X, True))])  # fmt: skip
-def test_functions_with_kinks_are_refused(kink):
-    with pytest.raises(ValueError, match=r"taylor: .* found .*; expected analytic functions; use integrator dop853"):
-        step_of(alone([X, V], [V, -X - kink]), 8)
-
-
 def test_a_kink_of_parameters_is_no_kink():
     assert "absolute(a)" in step_of(alone([X], [-X * sp.Abs(A)], [A]), 8).text
 

@@ -464,6 +464,11 @@ def test_what_would_be_ignored_is_refused(kind: str, text: str, words: str, tmp_
             WELL.replace("{}", '{"k": 2.0}'),
             "line 6: PARAMETERS['k'] is 2.0; expected Parameter(2.0, \"1\",",
         ),
+        (
+            "oscillator",
+            WELL.replace("{}", '{"k": Parameter(2.0)}'),
+            "line 6: 'k' has no meaning; expected a phrase that says what it is",
+        ),
         ("oscillator", WELL.partition("def potential")[0], "part.py: found no potential; expected an oscillator file"),
         ("oscillator", FIELD.replace("STATE = ('x', 'y')\n", ""), "part.py: found no STATE"),
         ("oscillator", FIELD.replace("('x', 'y')", "'xy'"), "line 7: STATE is 'xy'; expected a tuple of names"),

@@ -25,7 +25,7 @@ from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.components import Node
 from synchain.models.mechanics.coupling import MatrixCoupling
 from synchain.models.mechanics.definition import OSCILLATOR
-from synchain.models.mechanics.oscillator import Field
+from synchain.models.mechanics.oscillator import FieldModel
 from synchain.models.presentation.equations import text
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
@@ -202,7 +202,7 @@ def test_the_parameter() -> None:
 def test_a_field_of_positions_and_velocities_takes_a_spring() -> None:
     """Mass 1: no kinetic energy is asked for."""
     x, v = sp.symbols("x v", real=True)
-    rossler = replace(oscillator_of("rossler"), model=Field(("x", "v"), (v, -x)))
+    rossler = replace(oscillator_of("rossler"), model=FieldModel(("x", "v"), (v, -x)))
     assert edge("spring", Node((x, v), (v, -x), ()), rossler).rhs[1] == SIGMA * WEIGHT * GAP["x"]
 
 

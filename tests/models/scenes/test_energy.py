@@ -16,7 +16,7 @@ from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.definition import COUPLING, OSCILLATOR
 from synchain.models.mechanics.lagrangian import total_derivative
-from synchain.models.mechanics.oscillator import Coordinate, Lagrangian, Oscillator
+from synchain.models.mechanics.oscillator import Coordinate, LagrangianModel, Oscillator
 from synchain.models.scenes.energy import energy
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
@@ -176,7 +176,9 @@ def test_a_ring_of_fput_springs_keeps_what_its_report_keeps() -> None:
 def test_bodies_of_different_masses_have_an_energy_and_rates_have_none() -> None:
     """The masses cancel in the forces, not in the energy: its exact derivative along the motion vanishes."""
     m, u, v, g = sp.symbols("m u v g", real=True)
-    model = Lagrangian((Coordinate("x", "u"), Coordinate("y", "v")), m * (u**2 + v**2) / 2, sp.S.Zero, (sp.S.Zero,) * 2)
+    model = LagrangianModel(
+        (Coordinate("x", "u"), Coordinate("y", "v")), m * (u**2 + v**2) / 2, sp.S.Zero, (sp.S.Zero,) * 2
+    )
     body = Oscillator("body", Frozen({"m": Parameter(1.0, "1", "mass", positive=True)}), model)
     i, j, w = ends(body)
     gravity = Potential(-g * w * i.m * j.m / sp.sqrt((i.x - j.x) ** 2 + (i.y - j.y) ** 2), {g: 1})

@@ -13,12 +13,12 @@ from synchain.models.inputs.frozen import Frozen
 from synchain.models.inputs.node_name import NodeName
 from synchain.models.mechanics.coupling import WEIGHT, LagrangianCoupling, MatrixCoupling
 from synchain.models.mechanics.friction import ContactModel, FrictionLaw
-from synchain.models.mechanics.oscillator import FRICTION, Coordinate, Field, Lagrangian, Oscillator
+from synchain.models.mechanics.oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel, Oscillator
 from synchain.models.scenes.model import Model, NodeKind, as_law, as_oscillator
 from synchain.models.scenes.scene import Scene
 
 x, v, w, mu, k, sigma, q_i, q_j = sp.symbols("x v w mu k sigma q_i q_j", real=True)
-DUMB = Lagrangian((Coordinate("x", "v"),), v**2 / 2, k * x**2 / 2, (FRICTION(1 - v),))
+DUMB = LagrangianModel((Coordinate("x", "v"),), v**2 / 2, k * x**2 / 2, (FRICTION(1 - v),))
 SLIDER = Oscillator("slider", Frozen({"k": Parameter(2.0, "1", "stiffness")}), DUMB)
 LAW = FrictionLaw("dry", Frozen({"mu": Parameter(0.3, "1", "coefficient", minimum=0)}), mu * sp.sign(w))
 ROPE = LagrangianCoupling(
@@ -38,7 +38,7 @@ def test_parts_made_by_hand_make_a_scene() -> None:
 
 def test_a_field_made_by_hand_takes_components() -> None:
     rotation = Oscillator(
-        "rotation", Frozen(), Field(("a", "b"), (-sp.Symbol("b", real=True), sp.Symbol("a", real=True)))
+        "rotation", Frozen(), FieldModel(("a", "b"), (-sp.Symbol("b", real=True), sp.Symbol("a", real=True)))
     )
     scene = Scene(oscillator=rotation, coupling="2/4 b->a", topology=chain(3))
     assert scene.coupling == MatrixCoupling.parse("1/2 b->a")
@@ -52,7 +52,9 @@ def test_equal_contents_are_one_part_and_others_are_not() -> None:
     assert hash(again) == hash(SLIDER)
     assert replace(SLIDER, model=replace(DUMB, potential=k * x**4)) != SLIDER
     assert as_oscillator("duffing") == as_oscillator("duffing")
-    assert as_law("default", SLIDER) == as_law("exponential", SLIDER)
+    assert as_law("default", as_oscillator("friction")) == as_law("exponential", SLIDER)
+    assert as_law("default", replace(SLIDER, friction=LAW)) == LAW
+    assert as_law("default", SLIDER) is None
 
 
 def test_an_oscillator_and_its_law_go_together() -> None:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import warnings
 
+import numpy as np
 import pytest
 
 from synchain.models import Scene, chain
 from synchain.runtime import run
-from synchain.runtime.cells.choice import STIFF, stiffness
+from synchain.runtime.cells.choice import STIFF, chosen_for_rows, stiffness
 from synchain.runtime.cells.kernels import kernel_source
+from synchain.runtime.cells.plan import Plan
+from synchain.runtime.stability.orbits import Orbits
+from synchain.runtime.synchronisation.probe import ring_of_three
 
 
 def method(scene: Scene) -> tuple[str, int]:
@@ -25,7 +29,12 @@ def method(scene: Scene) -> tuple[str, int]:
         (Scene(oscillator="van_der_pol", topology=chain(2), parameters={"mu": 1.0}), "taylor"),
         (Scene(oscillator="van_der_pol", topology=chain(2), parameters={"mu": 200.0}), "rodas5p"),
         (Scene(topology=chain(2), contact="set-valued"), "taylor"),
-        (Scene(topology=chain(3)), "rodas5p"),  # the smoothed law has a kink
+        (Scene(topology=chain(2), parameters={"kappa": 10.0}), "taylor"),  # the smoothed law has a kink
+        (Scene(topology=chain(20), parameters={"kappa": 10.0}), "taylor"),
+        (Scene(topology=chain(3)), "rodas5p"),  # its layer is steep, although the start lies outside
+        (Scene(topology=chain(3), friction="coulomb"), "rodas5p"),
+        (Scene(topology=chain(3), contact="sign"), "rodas5p"),  # it jumps
+        (Scene(oscillator="chua", coupling="x->x", topology=chain(2)), "taylor"),
         (Scene(topology=chain(2), rtol=1e-10, parameters={"sigma": 0.1}), "switching"),
     ],
 )
@@ -52,11 +61,16 @@ def test_linear_equations_take_the_highest_order():
     assert method(scene.replace(rtol=1e-2))[1] < 24
 
 
-def test_what_is_not_analytic_is_refused():
-    with pytest.raises(
-        ValueError, match=r"taylor: a function that is not analytic; found Abs\(.*use integrator dop853"
-    ):
-        kernel_source(Scene(topology=chain(2), integrator="taylor"))
+def test_what_jumps_is_refused():
+    with pytest.raises(ValueError, match=r"taylor: a function that jumps; found sign\(.*use integrator dop853"):
+        kernel_source(Scene(topology=chain(2), contact="sign", integrator="taylor"))
+
+
+def test_the_layer_of_a_smoothed_jump_is_seen_from_a_start_outside():
+    scene = Scene(topology=chain(2), friction="coulomb", parameters={"kappa": 1e5})
+    assert stiffness(scene) > STIFF > stiffness(scene.replace(parameters={"kappa": 10.0}))
+    link = Scene(oscillator="duffing", coupling="friction_damper", topology=chain(2), initial={"v": (0.0, 1.0)})
+    assert stiffness(link.replace(parameters={"sigma": 1e4})) > STIFF > stiffness(link)
 
 
 def test_stiffness_is_that_of_the_extreme_cells():
@@ -65,6 +79,49 @@ def test_stiffness_is_that_of_the_extreme_cells():
     swept = scene.replace(axes={"mu": [1.0, 200.0]})
     assert stiffness(swept) > STIFF
     assert kernel_source(swept).integrator == "rodas5p"
+
+
+def of_modes(scene: Scene, alpha: list[float] | list[complex]) -> str:
+    state = np.array([[values[0] for values in scene.initial.values()]])
+    return Orbits.make(scene, np.array(alpha), state, 1).method.name
+
+
+@pytest.mark.parametrize(
+    ("scene", "alpha", "expected"),
+    [
+        (Scene(oscillator="pendulum", coupling="damper", topology=chain(2)), [0.0, 5.0], "taylor"),
+        (Scene(oscillator="pendulum", coupling="damper", topology=chain(2)), [0.0, -200.0, 5.0], "rodas5p"),
+        (Scene(oscillator="pendulum", coupling="damper", topology=chain(2)), [0.0, 200.0 + 1j], "rodas5p"),
+        (Scene(oscillator="van_der_pol", topology=chain(2), parameters={"mu": 200.0}), [0.0], "rodas5p"),
+        (Scene(topology=chain(2), contact="set-valued"), [0.0, 1.0], "taylor"),
+        (Scene(topology=chain(2)), [0.0, 1.0], "rodas5p"),  # the smoothed law has a kink
+        (
+            Scene(oscillator="pendulum", topology=chain(2), integrator="dop853"),
+            [0.0],
+            "rodas5p",
+        ),  # modes have no dop853
+    ],
+)
+def test_auto_for_modes_looks_at_the_strongest(scene, alpha, expected):
+    assert of_modes(scene, alpha) == expected
+
+
+def test_a_named_integrator_is_taken_for_modes_too():
+    scene = Scene(oscillator="pendulum", coupling="damper", topology=chain(2), integrator="taylor")
+    assert of_modes(scene, [200.0]) == "taylor"
+    assert of_modes(scene.replace(integrator="rodas5p"), [0.0]) == "rodas5p"
+
+
+def test_the_probe_looks_at_its_strongest_ring():
+    scene = Scene(oscillator="pendulum", coupling="damper", topology=chain(2), record=())
+    equations = ring_of_three(scene.equations)
+
+    def method(alpha: float) -> str:
+        values = {**scene.parameters, "mode_alpha": alpha, "mode_beta": 0.0}
+        numbers = np.array([[values[name] for name in equations.parameters]])
+        return chosen_for_rows(scene, equations, Plan(np.full((1, 6), 0.1), numbers, np.zeros((1, 4)))).name
+
+    assert (method(1.0), method(-100.0)) == ("taylor", "rodas5p")
 
 
 def test_stiffness_that_appears_is_said():
@@ -82,3 +139,15 @@ def test_stiffness_that_appears_is_said():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         run(scene, mu=[1.0, 2.0], show_progress=False)
+
+
+def test_modes_that_become_stiff_are_said():
+    """Van der Pol from the middle of a jump, where it is not stiff yet, onto the slow branch."""
+    scene = Scene(oscillator="van_der_pol", topology=chain(2), parameters={"mu": 200.0}, integrator="taylor")
+    orbits = Orbits.make(scene, np.array([0.0]), np.array([[0.0, 1.0]]), 1)
+    with pytest.warns(RuntimeWarning, match=r"stiff modes: found a rate of .*integrator = 'rodas5p'"):
+        orbits.integrator_of(orbits.strengths).advance(2.0)
+    easy = Orbits.make(scene.replace(parameters={"mu": 1.0}), np.array([0.0]), np.array([[0.0, 1.0]]), 1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        easy.integrator_of(easy.strengths).advance(20.0)

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from synchain.models import Potential, Rates, Scene, Topology, complete, ends, ring, star
 from synchain.models.inputs.frozen import Frozen
-from synchain.models.mechanics.oscillator import Coordinate, Field, Lagrangian, Oscillator
+from synchain.models.mechanics.oscillator import Coordinate, FieldModel, LagrangianModel, Oscillator
 from synchain.models.mechanics.parameter import Parameter
 from synchain.runtime import run
 
@@ -26,12 +26,12 @@ def number(default: float) -> Parameter:
     return Parameter(default, "1", "a number")
 
 
-PHASE = Oscillator("phase", Frozen({"p": number(0.3)}), Field(("theta",), (P,)))
+PHASE = Oscillator("phase", Frozen({"p": number(0.3)}), FieldModel(("theta",), (P,)))
 
 NEURON = Oscillator(
     "hindmarsh_rose",
     Frozen({}),
-    Field(
+    FieldModel(
         ("x", "y", "z"),
         (
             Y - X**3 + 3 * X**2 - Z + sp.Rational(16, 5),
@@ -44,7 +44,7 @@ NEURON = Oscillator(
 BODY = Oscillator(
     "body",
     Frozen({"m": Parameter(1.0, "1", "mass", positive=True)}),
-    Lagrangian((Coordinate("x", "u"), Coordinate("y", "v")), M * (U**2 + V**2) / 2, sp.S.Zero, (sp.S.Zero,) * 2),
+    LagrangianModel((Coordinate("x", "u"), Coordinate("y", "v")), M * (U**2 + V**2) / 2, sp.S.Zero, (sp.S.Zero,) * 2),
 )
 
 
@@ -143,7 +143,7 @@ def test_links_against_dop853(make: Callable[[int], tuple[Scene, Rhs]], n: int, 
 def test_time_in_links_costs_a_rosenbrock_method_no_steps(n: int) -> None:
     """With the exact derivative by time its steps are those of the same motion with time as a state."""
     scene, _ = case(kuramoto, n)
-    clock = Oscillator("clocked", PHASE.parameters, Field(("theta", "s"), (P, sp.S.One)))
+    clock = Oscillator("clocked", PHASE.parameters, FieldModel(("theta", "s"), (P, sp.S.One)))
     i, j, w = ends(clock)
     pumped = (1 + 0.5 * sp.cos(OMEGA * i.s)) * K * w * sp.sin(j.theta - i.theta - LAG)
     given = {"oscillator": clock, "coupling": Rates({i.theta: pumped}, {K: 1.3, LAG: 0.2, OMEGA: 2})}

@@ -1,0 +1,274 @@
+"""The text of a Taylor step of an orbit and of the deviations along it.
+
+The tangent of a Taylor step is the Taylor step of orbit and deviation together. Of d' = A d the coefficients are
+d_(k+1) = scale/(k+1) sum_j A_j d_(k-j), and the series of A belongs to the orbit: a step of the orbit leaves it in a short
+shared array, from which every mode takes its own step. The orbit is scalar; a register holds one deviation for each of
+LANES modes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.variational import Variation
+from synchain.models.mechanics.components import TIME
+
+from ..program.passes import Names
+from .graph import Graph, Template, is_analytic
+from .series import Series, State
+from .step import StepWriter, TaylorStep, Written, check_order, extreme, largest, polynomial
+from .terms import ONE, ZERO, Call, Expr, Name, Number, add, show, statement, times
+
+__all__ = ["TangentStep", "write_tangent"]
+
+HEAD = 2
+"""First entries of the shared array: `scale` of the orbit's step, and its length, which the driver writes."""
+
+COMMON = '''
+@njit(error_model="numpy")
+def common_length(lengths, longest, new, place):
+    """The shortest of the lengths that the lanes can go, `longest` if none is much shorter; `new` has room at `place`."""
+    if any_lane(lengths < 0.96875*longest):
+        store(new, place, lengths)
+        for lane in range(LANES):
+            longest = min(longest, new[place*LANES + lane])
+    return longest
+'''.strip()
+
+CARRY = '''
+@njit(error_model="numpy", cache=True)
+def carry(shared, strengths, old, new, registers, tolerance):
+    """Step all modes, the last register first; returns the length of the step, with which all of them agree."""
+    done, longest = 0, shared[1]
+    while done < registers and longest > 0.0:
+        length = mode_step(shared, strengths, old, new, registers - 1 - done, longest, tolerance)
+        done = done + 1 if length == longest or done == 0 else 0  # a shorter step begins anew with all that are done
+        longest = length
+    return longest
+'''.strip()
+
+
+HEADING = (
+    "@njit(error_model='numpy')",
+    "def mode_step(shared, strengths, old, new, which, longest, tolerance):",
+    '    """Step the modes in one register by at most `longest`; returns the length, which may be shorter."""',
+)
+
+
+@dataclass(frozen=True, slots=True)
+class TangentStep:
+    """The text of `step` for the orbit and those of the functions that step its modes.
+
+    shared: the length of the array in which the orbit leaves the series of A.
+    """
+
+    orbit: TaylorStep
+    modes: tuple[str, ...]
+    shared: int
+
+
+class OrbitWriter(StepWriter):
+    """Writes the step of an orbit, which leaves the series of some coefficients.
+
+    Attributes
+    ----------
+    wanted : list of Expr
+        The coefficients, in the symbols of the network.
+    called_so : dict
+        What each of them is called in the step of a mode; those that are one series have one name.
+    left : dict
+        Their coefficients by name and order: a number, or the name of what is left.
+    places : dict
+        Where in the shared array a name is found.
+    """
+
+    def __init__(self, equations: Equations, order: int, wanted: Sequence[sp.Expr]) -> None:
+        self.wanted = list(wanted)
+        self.called_so: dict[sp.Expr, str] = {}
+        self.left: dict[tuple[str, int], Expr] = {}
+        self.places: dict[str, int] = {}
+        super().__init__(equations, order)
+
+    def read(self) -> list[Series]:
+        """The rates of the states; what is wanted beside them is noted."""
+        rates = super().read()
+        moving, swap = self.parted({TIME: self.time}, {s: s for s in map(_real, self.equations.state)})
+        found = self.graph.read(Template.of(self.wanted, moving, self.supply.fresh("shared_")), moving, swap)
+        self.noted = list(dict.fromkeys(found))
+        self.called_so = {e: f"a{self.noted.index(series)}" for e, series in zip(self.wanted, found, strict=True)}
+        return rates
+
+    def opening(self) -> None:
+        """The first coefficients of all series."""
+        super().opening()
+        self.put("store(shared, 0, scale)")
+        self.leave()
+
+    def coefficients(self, k: int) -> None:
+        """Coefficients k of the states, and of all series but in the last order."""
+        super().coefficients(k)
+        if k < self.order:
+            self.leave()
+
+    def leave(self) -> None:
+        """Leave coefficients k of what is wanted."""
+        for which, series in enumerate(self.noted):
+            name, value = f"a{which}_{self.at.k}", self.at.of(series)
+            if not isinstance(value, Number):
+                self.places[name] = HEAD + len(self.places)
+                self.put(f"store(shared, {self.places[name]}, {show(value)})")
+                value = Name(name)
+            self.left[f"a{which}", self.at.k] = value
+
+
+class ModeWriter:
+    """Writes the step of the modes in one register, from what an orbit leaves."""
+
+    def __init__(self, variation: Variation, orbit: OrbitWriter) -> None:
+        self.variation, self.orbit, self.order = variation, orbit, orbit.order
+        self.at = Written({}, {}, [])
+        self.deviations = [State(name=f"d{c}") for c in range(variation.size)]
+        self.outer = {name: State(name=name) for name in orbit.called_so.values()}
+        self.at.values |= {(self.outer[name], k): value for (name, k), value in orbit.left.items()}
+        self.graph = Graph(Names([s.name for s in variation.parameters]))
+        self.lines: list[str] = []
+        self.rates = [self.rate(row) for row in range(variation.size)]
+        self.graph.settle(self.rates)
+
+    def rate(self, row: int) -> Series:
+        """The rate of a deviation: each entry is what does not move times it, and convolutions for what does."""
+        terms: list[tuple[Expr, Series]] = []
+        for (r, c), e in self.variation.matrix:
+            if r != row:
+                continue
+            fixed: Expr = ZERO
+            for coefficient, strength in _parted(self.variation, e):
+                series = self.outer[self.orbit.called_so[coefficient]]
+                if self.moves(series):
+                    terms.append((strength, self.graph.product(series, self.deviations[c])))
+                else:
+                    fixed = add(fixed, times(strength, self.at.start(series)))
+            if not isinstance(fixed, Number | Name):  # what each order multiplies by is made once
+                self.lines.append(f"g{r}_{c} = {show(fixed)}")
+                fixed = Name(f"g{r}_{c}")
+            if fixed != ZERO:
+                terms.append((fixed, self.deviations[c]))
+        return self.graph.sum(terms)
+
+    def moves(self, series: Series) -> bool:
+        """True if any later coefficient of a series is not zero."""
+        return any(self.at.at(series, k) != ZERO for k in range(1, self.order))
+
+    def write(self) -> str:
+        """The function `mode_step`."""
+        size, strengths, head = self.variation.size, self.variation.parameters, [f"scale = {_shared(0)}"]
+        head += [f"{s.name} = load(strengths, {_place(len(strengths), k)}, LANES)" for k, s in enumerate(strengths)]
+        head += [f"d{c}_0 = load(old, {_place(size, c)}, LANES)" for c in range(size)]
+        head += [f"{name} = {_shared(place)}" for name, place in self.orbit.places.items()]
+        self.lines = [*head, *self.lines, "# order 0"]
+        self.at.values |= {(d, 0): Name(f"{d.name}_0") for d in self.deviations}
+        for s in self.graph.series:
+            self.at.put(s, s.begin(self.at), s in self.graph.inline_start)
+        self.flush()
+        for k in range(1, self.order + 1):
+            self.coefficients(k)
+        self.length()
+        self.lines += ["# new deviation", "square = ratio*ratio"]
+        for c, s in enumerate(self.deviations):
+            self.lines += polynomial(s.name, [self.at.at(s, k) for k in range(self.order + 1)])
+            self.lines.append(f"store(new, {_place(size, c)}, n_{s.name})")
+        self.lines.append(f"total = {' + '.join(f'absolute(n_{s.name})' for s in self.deviations)}")
+        self.lines.append("return math.nan if any_lane(~(total < math.inf)) else length")
+        return "\n".join([*HEADING, *(f"    {line}" for line in self.lines)])
+
+    def flush(self) -> None:
+        """Turn statements into text."""
+        self.lines += [line for assign in self.at.lines for line in statement(assign)]
+        self.at.lines.clear()
+
+    def coefficients(self, k: int) -> None:
+        """Coefficients k of the deviations, and of all series but in the last order."""
+        at = self.at
+        self.lines += [f"# order {k}", f"r{k} = {show(times(Number(1.0 / k), Name('scale')))}"]
+        slopes = [at.at(rate, k - 1) for rate in self.rates]
+        at.k = k
+        for d, slope in zip(self.deviations, slopes, strict=True):
+            at.put(d, times(Name(f"r{k}"), slope))
+        if k < self.order:
+            for s in self.graph.series:
+                at.put(s, s.coefficient(at), s in self.graph.inline)
+        self.flush()
+
+    def length(self) -> None:
+        """The length of the step: the last three coefficients are small beside the deviation at its beginning."""
+        self.lines += ["# step length", f"size = {show(largest(_sizes(self.at.at(s, 0) for s in self.deviations)))}"]
+        self.lines.append("weight = 1.0/(tolerance*size + 2.2250738585072014e-308)")
+        reaches: list[Expr] = []
+        for k in (self.order, self.order - 1, self.order - 2):
+            last = [e for s in self.deviations if (e := self.at.at(s, k)) != ZERO]
+            if last:
+                self.lines.append(f"size_{k} = {show(times(largest(_sizes(last)), Name('weight')))}")
+                reaches.append(times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))))
+        if reaches:
+            self.lines.append(f"lengths = truncated(scale*exp({show(extreme('minimum', reaches))}))")
+            self.lines.append(f"length = common_length(lengths, longest, new, {_place(self.variation.size, 0)})")
+        else:
+            self.lines.append("length = longest")
+        self.lines.append("ratio = length/scale")
+
+
+def write_tangent(variation: Variation, order: int) -> TangentStep:
+    """Return the Taylor step of some order of an orbit and of deviations along it.
+
+    Parameters
+    ----------
+    variation : Variation
+        The orbit, in names that a kernel can use (`tidy`), and the matrix A of the deviations.
+    order : int
+        The order of the series, at least 6.
+
+    Raises
+    ------
+    ValueError
+        As `write_step`, and for equations with kinks.
+    """
+    if not is_analytic(variation.orbit):
+        raise ValueError(
+            "taylor: found a kink beside deviations along an orbit; expected analytic functions; use rodas5p"
+        )
+    wanted = dict.fromkeys(c for _, e in variation.matrix for c, _ in _parted(variation, e))
+    check_order(variation.orbit, order)
+    orbit = OrbitWriter(variation.orbit, order, list(wanted))
+    step = TaylorStep.of(orbit.write(), order, more=", shared")
+    return TangentStep(step, (COMMON, ModeWriter(variation, orbit).write(), CARRY), HEAD + len(orbit.places))
+
+
+def _parted(variation: Variation, e: sp.Expr) -> Iterator[tuple[sp.Expr, Expr]]:
+    """An entry of A as coefficients times strengths of a mode."""
+    rest = e.xreplace(dict.fromkeys(variation.parameters, sp.S.Zero))
+    strengths: list[tuple[sp.Expr, Expr]] = [(e.diff(s), Name(s.name)) for s in variation.parameters]
+    for coefficient, strength in ((rest, ONE), *strengths):
+        if coefficient != 0:
+            yield coefficient, strength
+
+
+def _sizes(values: Iterable[Expr]) -> list[Expr]:
+    return [Call("absolute", (e,)) for e in values]
+
+
+def _place(size: int, k: int) -> str:
+    """Number k of the registers of one group of modes, which fill `size` registers of an array."""
+    group = "which" if size == 1 else f"{size}*which"
+    return f"{group} + {k}" if k else group
+
+
+def _shared(place: int) -> str:
+    return f"shared[{place}]"
+
+
+def _real(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)

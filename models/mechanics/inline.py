@@ -1,0 +1,493 @@
+"""Oscillators and friction laws of a notebook: a Lagrangian or a vector field in SymPy, without a file.
+
+What is made is the value that a plug-in file makes.  States are functions of time or plain symbols, the time is any
+symbol called t, decimals are what they say.  Names count: symbols of one name are one quantity, real whatever was
+assumed; a parameter that was assumed positive or nonnegative has that range.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, fields, replace
+from fractions import Fraction
+from keyword import iskeyword
+from typing import Any, TypeAlias
+
+import sympy as sp
+from sympy.core.function import AppliedUndef
+
+from ..inputs.checks import (
+    check_flag,
+    check_instance,
+    check_keys,
+    check_number,
+    check_table,
+    check_text,
+    short_repr,
+    suggestion,
+    typed_repr,
+)
+from ..inputs.frozen import Frozen
+from .components import SLIDING, TIME
+from .expression import FUNCTIONS, RESERVED, exact
+from .friction import ContactModel, FrictionLaw
+from .lagrangian import check_masses_exist, mass_matrix
+from .loader import load_friction_law
+from .oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel, Oscillator
+from .parameter import Parameter
+
+__all__ = ["Field", "Lagrangian", "friction_law"]
+
+Expression: TypeAlias = "sp.Expr | float | str"
+"""An expression of SymPy, a number, or text that is parsed and not run."""
+
+Given: TypeAlias = "Mapping[Any, Any]"
+"""A mapping whose keys are symbols, functions of time, or names."""
+
+
+def Lagrangian(
+    T: Expression,
+    V: Expression = 0,
+    Q: Mapping[Any, Expression] | None = None,
+    R: Expression = 0,
+    *,
+    coordinates: Given | Iterable[Any] | None = None,
+    friction: FrictionLaw | Expression | Given | None = None,
+    contact: str | None = None,
+    parameters: Given | None = None,
+    initial: Given | None = None,
+    name: str = "oscillator",
+) -> Oscillator:
+    """Return the oscillator of a Lagrangian L = T - V with generalised forces.
+
+    Parameters
+    ----------
+    T, V : Expr, number or str
+        Kinetic and potential energy.  A text is parsed, not run: ``"k*x**2/2"``.
+    Q : mapping, optional
+        The generalised force on each coordinate, 0 for those left out.  ``friction(velocity)`` in it is the friction
+        coefficient at a sliding velocity.
+    R : Expr, number or str
+        Rayleigh's function, half the power lost; its negative derivatives by the velocities are added to the forces.
+    coordinates : iterable or mapping, optional
+        The coordinates in their order, or each with the name of its velocity: ``{x: v}``.  Left out, they are the
+        functions of time in the expressions, sorted by name.  Velocities are derivatives of such functions; as states
+        and in text they are called v if there is one coordinate, v_x and v_y if there are several, unless said
+        otherwise.  Coordinates that are plain symbols must be given.
+    friction : str, FrictionLaw or Expr, optional
+        The friction law: its name, its value, or the friction coefficient as an expression of the sliding velocity
+        ``w`` and of parameters that occur nowhere else.  A scene may name another.
+    contact : str, optional
+        How the jump of the law at rest is treated: "atan" (the default), "sign" or "set-valued".
+    parameters : mapping, optional
+        The default of each parameter: a number, or a `Parameter` with its range.
+    initial : mapping, optional
+        The state around which oscillators start, 0 for the states left out.
+    name : str
+        What messages call it.
+
+    Returns
+    -------
+    Oscillator
+        The same value that a plug-in file makes; its states are its attributes, ``node.x``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        For undeclared symbols, unused parameters, functions that generated code does not know, numbers that are not
+        finite and real, unknown coordinates, two meanings of one name, and a velocity without kinetic energy.
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> from sympy.physics.mechanics import dynamicsymbols
+    >>> from synchain.models import Lagrangian
+    >>> x, t = dynamicsymbols("x"), dynamicsymbols._t
+    >>> v, mu, u, omega = x.diff(t), *sp.symbols("mu u omega")
+    >>> node = Lagrangian(v**2/2, x**2/2, {x: mu*(1 - x**2)*v + u*sp.cos(omega*t)},
+    ...                   parameters={mu: 0.2, u: 0.5, omega: 0.9})
+    >>> node.states
+    ('x', 'v')
+    """
+    what = f"oscillator {_called(name)!r}"
+    forces = dict(check_table(f"{what}: Q", {} if Q is None else Q))
+    moving = _functions(what, [T, V, R, *forces, *forces.values()])
+    table = _coordinates(what, coordinates, moving)
+    defaults = _parameters(what, parameters)
+    names = _Names.of(what, table, moving, defaults)
+    on = {names.state("Q", key, table): value for key, value in forces.items()}
+    acting = tuple(names.expression(f"force on {c}", on.get(c, 0)) for c in table)
+    energies = [names.expression(about, e) for about, e in (("T", T), ("V", V), ("R", R))]
+    for about, energy in zip("TVR", energies, strict=True):
+        if energy.has(FRICTION):
+            raise ValueError(f"{what}: found friction(…) in {about}; expected it in the forces Q alone")
+    kinetic, potential, dissipation = energies
+    speeds = [sp.Symbol(speed, real=True) for speed in table.values()]
+    _try(what, lambda: check_masses_exist(mass_matrix(kinetic - potential, speeds), speeds))
+    law = _law(what, friction, defaults)
+    rubs = any(force.has(FRICTION) for force in acting)
+    for keyword, value in (("friction", law), ("contact", contact)):
+        if value is not None and not rubs:
+            raise ValueError(f"{what}: found {keyword} {str(value)!r}, but no force has friction(…); leave it out")
+    own = _own_parameters(
+        what, (*energies, *acting), law if isinstance(friction, sp.Expr | int | float) else None, defaults
+    )
+    model = LagrangianModel(
+        tuple(Coordinate(c, speed, "1") for c, speed in table.items()), kinetic, potential, acting, dissipation
+    )
+    treatment = ContactModel.ATAN if contact is None else ContactModel.parse("contact", contact)
+    return Oscillator(name, own, model, names.initial(initial), law, treatment)
+
+
+def Field(
+    rates: Mapping[Any, Expression],
+    *,
+    parameters: Given | None = None,
+    initial: Given | None = None,
+    name: str = "field",
+) -> Oscillator:
+    """Return the oscillator of a first-order vector field of any dimension.
+
+    Parameters
+    ----------
+    rates : mapping
+        The rate of each state, in the order of the states: plain symbols, functions of time, or names.  Rates are
+        expressions of SymPy, numbers, or text that is parsed, not run.
+    parameters : mapping, optional
+        The default of each parameter: a number, or a `Parameter` with its range.
+    initial : mapping, optional
+        The state around which oscillators start, 0 for the states left out.
+    name : str
+        What messages call it.
+
+    Returns
+    -------
+    Oscillator
+        The same value that a plug-in file makes; its states are its attributes, ``node.x``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `Lagrangian` does.
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> from synchain.models import Field
+    >>> x, y, c = sp.symbols("x y c")
+    >>> node = Field({x: c*(y + x - x**3/3), y: -(x - 0.7 + 0.8*y)/c}, parameters={c: 3})
+    >>> node.y
+    y
+    """
+    what = f"oscillator {_called(name)!r}"
+    given = dict(check_table(f"{what}: rates", rates))
+    if not given:
+        raise ValueError(f"{what}: found no rates; expected one for each state")
+    moving = _functions(what, [*given, *given.values()])
+    table = _distinct(what, "state", {_name(what, "state", key): "" for key in given}, len(given))
+    defaults = _parameters(what, parameters)
+    names = _Names.of(what, table, moving, defaults)
+    found = tuple(names.expression(f"rate of {s}", e) for s, e in zip(table, given.values(), strict=True))
+    if any(rate.has(FRICTION) for rate in found):
+        raise ValueError(f"{what}: found friction(…) in a rate; expected it in the forces of a Lagrangian")
+    own = _own_parameters(what, found, None, defaults)
+    return Oscillator(name, own, FieldModel(tuple(table), found), names.initial(initial))
+
+
+def friction_law(
+    force: Expression,
+    parameters: Given | None = None,
+    *,
+    static: Expression | None = None,
+    order: Iterable[tuple[str, str]] = (),
+    self_exciting: bool = False,
+    name: str = "law",
+) -> FrictionLaw:
+    """Return a friction law from its coefficient as an expression of the sliding velocity ``w``.
+
+    Parameters
+    ----------
+    force : Expr, number or str
+        Friction force over normal load, of the velocity w of the ground relative to the body; w f(w) >= 0.  A jump
+        is written with sign(w).
+    parameters : mapping, optional
+        The default of each parameter.  If none has a unit, w is the non-dimensional velocity.
+    static : Expr, number or str, optional
+        The static friction coefficient if it exceeds f(0+); set-valued contact alone knows it.
+    order : iterable of (str, str)
+        Pairs of parameters of which the first must not exceed the second under set-valued contact.
+    self_exciting : bool
+        True if the law is meant to feed energy.
+    name : str
+        What messages call it.
+
+    Returns
+    -------
+    FrictionLaw
+        The same value that a plug-in file makes.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As `Lagrangian` does.
+
+    Examples
+    --------
+    >>> from synchain.models import friction_law
+    >>> friction_law("mu*sign(w)/(1 + abs(w))", {"mu": 0.3}).jumps
+    True
+    """
+    what = f"friction law {_called(name)!r}"
+    defaults = _parameters(what, parameters)
+    names = _Names.of_law(what, defaults)
+    coefficient = names.expression("force", force)
+    holding = None if static is None else names.expression("static", static)
+    used = (coefficient,) if holding is None else (coefficient, holding)
+    if any(e.has(FRICTION) for e in used) or (holding is not None and holding.has(SLIDING)):
+        raise ValueError(f"{what}: found friction(…), or w in static; expected a force of w and a static coefficient")
+    pairs = tuple((str(low), str(high)) for low, high in order)
+    for name_of in (entry for pair in pairs for entry in pair):
+        if name_of not in defaults:
+            raise ValueError(f"{what}: order names {name_of!r}; expected parameters: {', '.join(defaults) or 'none'}")
+    own = _own_parameters(what, used, None, defaults)
+    return FrictionLaw(name, own, coefficient, holding, pairs, check_flag("self_exciting", self_exciting))
+
+
+def _called(name: object) -> str:
+    """The name of a model: a short text, and no path of a file of code."""
+    words = check_text("name", name)
+    if words.endswith(".py"):
+        raise ValueError(f"name: found {words!r}, which names a file of code; expected another name")
+    return words
+
+
+# -- names -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Names:
+    """What the names in the expressions of one model stand for.
+
+    `moving` has the functions of time and their derivatives with the symbols that take their places; a plain symbol
+    of the same name is refused, since SymPy's derivatives would not have seen it.
+    """
+
+    what: str
+    symbols: Mapping[str, sp.Symbol]
+    states: tuple[str, ...]
+    moving: Mapping[sp.Expr, sp.Symbol]
+
+    @classmethod
+    def of(
+        cls,
+        what: str,
+        table: Mapping[str, str],
+        functions: Iterable[AppliedUndef],
+        parameters: Mapping[str, Parameter],
+    ) -> _Names:
+        """The names of a model: coordinates with the names of their velocities ("" for none), and parameters."""
+        states = (*table, *filter(None, table.values()))
+        for state in states:
+            if state in Oscillator.__dict__:
+                raise ValueError(f"{what}: the state {state!r} has the name of an attribute of nodes; rename it")
+        clash = next((s for i, s in enumerate(states) if s in states[:i] or s in parameters), None)
+        if clash is not None:
+            raise ValueError(
+                f"{what}: the name {clash!r} stands for two things; rename one, e.g. by coordinates={{x: v}}"
+            )
+        moving: dict[sp.Expr, sp.Symbol] = {}
+        for function in functions:
+            state = function.func.__name__
+            if state not in table:
+                raise ValueError(f"{what}: undeclared function {function}; declared: {', '.join(table)}")
+            moving[function] = sp.Symbol(state, real=True)
+            if table[state]:
+                moving[function.diff(function.args[0])] = sp.Symbol(table[state], real=True)
+        symbols = {name: sp.Symbol(name, real=True) for name in (*states, *parameters)}
+        return cls(what, {**symbols, TIME.name: TIME}, states, moving)
+
+    @classmethod
+    def of_law(cls, what: str, parameters: Mapping[str, Parameter]) -> _Names:
+        """The names of a friction law: the sliding velocity and parameters."""
+        if SLIDING.name in parameters:
+            raise ValueError(f"{what}: the name 'w' stands for the sliding velocity; rename that parameter")
+        symbols = {name: sp.Symbol(name, real=True) for name in parameters}
+        return cls(what, {SLIDING.name: SLIDING, **symbols}, (), {})
+
+    def expression(self, about: str, value: object) -> sp.Expr:
+        """The expression that a user gave, in the form that a model keeps."""
+        about = f"{self.what}: {about}"
+        if not isinstance(value, sp.Expr):
+            return exact(about, value, self.symbols)
+        hidden = {symbol.name for symbol in self.moving.values()}
+        for symbol in sorted(value.free_symbols, key=str):
+            if symbol.name in hidden:
+                raise ValueError(
+                    f"{about}: found the symbol {symbol} beside functions of time; expected one of the two"
+                )
+        unknown = [e for e in value.atoms(AppliedUndef, sp.Derivative) if e.func != FRICTION and e not in self.moving]
+        if unknown:
+            found = min(map(str, unknown))
+            raise ValueError(f"{about}: found {found}; expected {', '.join(map(str, self.moving)) or 'plain symbols'}")
+        return exact(about, value.xreplace(self.moving), self.symbols)
+
+    def state(self, about: str, key: object, known: Collection[str]) -> str:
+        """The name of a state out of some that is a key of a mapping."""
+        symbol = self.moving.get(key)
+        name = symbol.name if symbol is not None else _name(self.what, about, key)
+        if name not in known:
+            expected = f"{', '.join(known)}{suggestion(name, known)}"
+            raise ValueError(f"{self.what}: {about} has the key {short_repr(key)}; expected {expected}")
+        return name
+
+    def initial(self, given: Given | None) -> Frozen[float] | None:
+        """The state around which oscillators start."""
+        if given is None:
+            return None
+        table = check_table(f"{self.what}: initial", given)
+        return Frozen(
+            {self.state("initial", key, self.states): _value(f"initial {key}", value) for key, value in table.items()}
+        )
+
+
+def _functions(what: str, values: Iterable[object]) -> list[AppliedUndef]:
+    """The functions of time in some expressions, sorted by name."""
+    found = {f for value in values if isinstance(value, sp.Expr) for f in value.atoms(AppliedUndef)}
+    moving = sorted((f for f in found if f.func != FRICTION), key=str)
+    for function in moving:
+        if len(function.args) != 1 or getattr(function.args[0], "name", "") != TIME.name:
+            raise ValueError(f"{what}: found the function {function}; expected functions of t alone, e.g. x(t)")
+    return moving
+
+
+def _coordinates(what: str, given: object, moving: Iterable[AppliedUndef]) -> Mapping[str, str]:
+    """Each coordinate with the name of its velocity."""
+    if given is None:
+        given = list(dict.fromkeys(function.func.__name__ for function in moving))
+        if not given:
+            raise ValueError(f"{what}: found no function of time; expected coordinates = {{x: v}} for plain symbols")
+    if isinstance(given, Mapping):
+        table = {_name(what, "coordinate", key): _name(what, "velocity", value) for key, value in given.items()}
+        return _distinct(what, "coordinate", table, len(given))
+    if isinstance(given, str | bytes) or not isinstance(given, Iterable):
+        raise TypeError(
+            f"{what}: coordinates: found {typed_repr(given)}; expected a list, or a mapping such as {{x: v}}"
+        )
+    names = [_name(what, "coordinate", key) for key in given]
+    if not names:
+        raise ValueError(f"{what}: found no coordinates; expected at least one")
+    speeds = ["v"] if len(names) == 1 else [f"v_{name}" for name in names]
+    return _distinct(what, "coordinate", dict(zip(names, speeds, strict=True)), len(names))
+
+
+def _distinct(what: str, role: str, table: dict[str, str], count: int) -> dict[str, str]:
+    if len(table) < count:
+        raise ValueError(f"{what}: two keys are the same {role}; expected each once")
+    return table
+
+
+def _name(what: str, role: str, key: object) -> str:
+    """The name of a symbol, a function of time or a text, as a name that all texts can have."""
+    name = key.func.__name__ if isinstance(key, AppliedUndef) else getattr(key, "name", key)
+    if not isinstance(name, str):
+        raise TypeError(
+            f"{what}: found {typed_repr(key)} for a {role}; expected a symbol, a function of time or a name"
+        )
+    plain = name.isidentifier() and not iskeyword(name) and not name.startswith("_") and len(name) <= 60
+    if not plain or unicodedata.normalize("NFKC", name) != name:
+        raise ValueError(
+            f"{what}: {short_repr(name)} is no name of a {role}; expected letters and digits, such as 'mu_1'"
+        )
+    if name in RESERVED or name in FUNCTIONS:
+        raise ValueError(f"{what}: the name {name!r} of a {role} has another meaning in expressions; rename it")
+    return name
+
+
+# -- parameters --------------------------------------------------------------------------------------------------
+
+
+def _parameters(what: str, given: Given | None) -> dict[str, Parameter]:
+    """Name -> Parameter, with the range that a symbol was assumed to have."""
+    table: dict[str, Parameter] = {}
+    for key, value in check_table(f"{what}: parameters", {} if given is None else given).items():
+        name = _name(what, "parameter", key)
+        if name in table:
+            raise ValueError(f"{what}: two parameters are called {name!r}; expected each name once")
+        table[name] = _try(f"{what}: {name}", lambda key=key, value=value: _assumed(key, _parameter(value)))
+    return table
+
+
+def _parameter(value: object) -> Parameter:
+    if isinstance(value, Parameter):
+        return value
+    if not isinstance(value, Mapping):
+        return Parameter(_value("default", value))
+    check_keys("parameter", value, [own.name for own in fields(Parameter)])
+    if "default" not in value:
+        raise ValueError(f"found {short_repr(dict(value))}; expected a table with a default")
+    checks: dict[str, Callable[[str, object], Any]] = {own.name: check_number for own in fields(Parameter)}
+    checks |= {"unit": check_text, "meaning": check_text, "scale": check_text, "positive": check_flag}
+    return Parameter(**{str(key): checks[str(key)](str(key), entry) for key, entry in value.items()})
+
+
+def _value(what: str, value: object) -> float:
+    """A finite number; constants of SymPy and fractions are numbers too."""
+    if isinstance(value, sp.Expr) and value.is_number and value.is_real:
+        return check_number(what, float(value))
+    return check_number(what, float(value) if isinstance(value, Fraction) else value)
+
+
+_REAL = sp.Symbol("x", real=True).assumptions0
+_POSITIVE = sp.Symbol("x", positive=True).assumptions0
+_NONNEGATIVE = sp.Symbol("x", nonnegative=True).assumptions0
+
+
+def _assumed(key: object, parameter: Parameter) -> Parameter:
+    """A parameter with the range of the assumptions of its symbol; ValueError if no range says the same."""
+    facts = key.assumptions0 if isinstance(key, sp.Symbol) else _REAL
+    if facts.items() <= _REAL.items():
+        return parameter
+    if facts.items() <= _NONNEGATIVE.items():
+        return replace(parameter, minimum=max(0.0, parameter.minimum or 0.0))
+    if facts.items() <= _POSITIVE.items():
+        return replace(parameter, positive=True)
+    told = ", ".join(sorted(name for name, holds in facts.items() if holds and name not in _POSITIVE))
+    raise ValueError(f"its symbol is assumed to be {told or 'nonzero'}; expected real, nonnegative or positive")
+
+
+def _own_parameters(
+    what: str, expressions: Iterable[sp.Expr], law: FrictionLaw | None, defaults: Mapping[str, Parameter]
+) -> Frozen[Parameter]:
+    """The parameters without those of a law that was written among them; ValueError if one is unused or in both."""
+    used = {s.name for e in expressions for s in e.free_symbols}
+    of_law = frozenset(() if law is None else law.parameters)
+    for name in defaults:
+        if name in of_law and name in used:
+            raise ValueError(f"{what}: {name!r} is in the friction law and outside of it; expected it in one of them")
+        if name not in of_law and name not in used:
+            raise ValueError(f"{what}: no expression has the parameter {name!r}; use it or leave it out")
+    return Frozen({name: parameter for name, parameter in defaults.items() if name not in of_law})
+
+
+def _law(what: str, given: object, defaults: Mapping[str, Parameter]) -> FrictionLaw | None:
+    """The friction law of a name, a value, or an expression of the sliding velocity and some of the parameters."""
+    if given is None or isinstance(given, FrictionLaw):
+        return given
+    if isinstance(given, str):
+        return load_friction_law(given)
+    expected = "a name, a friction law, or an expression of the sliding velocity w"
+    value = check_instance(f"{what}: friction", given, (sp.Expr, int, float), expected)
+    about = f"{what}: friction"
+    coefficient = _Names.of_law(about, defaults).expression("law", value)
+    used = {s.name for s in coefficient.free_symbols}
+    own = {name: parameter for name, parameter in defaults.items() if name in used}
+    return friction_law(coefficient, own)
+
+
+def _try(what: str, action: Any) -> Any:
+    """What an action returns; its errors begin with `what`."""
+    try:
+        return action()
+    except (ValueError, TypeError) as error:
+        raise type(error)(f"{what}: {' '.join(str(error).split())}") from None

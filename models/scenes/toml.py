@@ -1,0 +1,60 @@
+"""Tables of names and values as TOML text, the form of scene files."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+
+from ..inputs.checks import typed_repr
+
+__all__ = ["toml"]
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def toml(table: Mapping[str, object]) -> str:
+    """Return a table as TOML text that `tomllib` reads as the same table.
+
+    Parameters
+    ----------
+    table : mapping
+        Names and values: text, booleans, finite numbers, lists, and tables of these.
+
+    Raises
+    ------
+    TypeError
+        For a value of another type.
+    """
+    return "\n".join(_lines(table, ())).strip() + "\n"
+
+
+def _lines(table: Mapping[str, object], path: tuple[str, ...]) -> Iterator[str]:
+    """The lines of a table: its values, then the tables in it, each below its title."""
+    tables = {key: value for key, value in table.items() if isinstance(value, Mapping)}
+    if path and (len(tables) < len(table) or not table):
+        yield f"\n[{'.'.join(map(_key, path))}]"
+    for key, value in table.items():
+        if key not in tables:
+            yield f"{_key(key)} = {_value(value)}"
+    for key, value in tables.items():
+        yield from _lines(value, (*path, key))
+
+
+def _key(key: str) -> str:
+    return key if _BARE.fullmatch(key) else json.dumps(key, ensure_ascii=False)
+
+
+def _value(value: object) -> str:
+    """A value on one line."""
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{_key(key)} = {_value(entry)}' for key, entry in value.items())}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, str):
+        return json.dumps(str(value), ensure_ascii=False)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | float):
+        return repr(value)
+    raise TypeError(f"scene: found {typed_repr(value)}; expected text, numbers, lists and tables")

@@ -1,0 +1,285 @@
+"""Taylor steps that end at kinks: exact switching times, starts on a kink, joint kinks, kinks that are touched, zero series."""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+from march import Lanes, alone, compiled, step_of
+from samples import path, spring
+
+from synchain.codegen.steps.names import tidy
+from synchain.codegen.taylor import jump, write_looped
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import TIME as T
+from synchain.models.mechanics.components import Edge, Node
+
+X, V, A, B = sp.symbols("x v a b", real=True)
+NONE: list[float] = []
+BOTH = pytest.mark.parametrize("looped", [False, True], ids=["lines", "loops"])
+
+
+def bilinear(t: float, stiff: float, x: float = 0.0, v: float = 1.0) -> list[float]:
+    """x'' = -x for x < 0 and -stiff**2 x for x > 0, from x = 0 with v > 0: half waves of two lengths, to 30 digits."""
+    with mpmath.workdps(30):
+        above, below = mpmath.pi / stiff, mpmath.pi
+        t = mpmath.mpf(t) % (above + below)
+        if t < above:
+            return [float(v * mpmath.sin(stiff * t) / stiff), float(v * mpmath.cos(stiff * t))]
+        return [float(-v * mpmath.sin(t - above)), float(-v * mpmath.cos(t - above))]
+
+
+@functools.cache
+def springs(form: str = "max", order: int = 20, looped: bool = False, width: int = 1) -> Lanes:
+    more = {
+        "max": (A**2 - 1) * sp.Max(X, 0),
+        "min": (1 - A**2) * sp.Min(-X, 0),
+        "abs": (A**2 - 1) * (X + sp.Abs(X)) / 2,
+        "negative": (A**2 - 1) * (X + sp.Abs(-3 * X) / 3) / 2,
+        "pieces": sp.Piecewise((0, X < 0), ((A**2 - 1) * X, True)),
+        "turned": sp.Piecewise(((A**2 - 1) * X, X >= 0), (0, True)),
+    }[form]
+    return compiled(alone([X, V], [V, -X - more], [A]), order, width, looped=looped)
+
+
+# -- accuracy ----------------------------------------------------------------------------------------------------
+
+
+@BOTH
+@pytest.mark.parametrize("form", ["max", "min", "abs", "negative", "pieces", "turned"])
+def test_a_bilinear_spring_switches_where_it_should(form, looped):
+    """Two hundred passages; every form of the same force."""
+    end = 100.3 * (math.pi + math.pi / 3.0)
+    state, steps = springs(form, looped=looped).run([0.0, 1.0], [3.0], end, 1e-14)
+    assert np.abs(state[0] - bilinear(end, 3.0)).max() < 3e-12  # rounding: a smooth swing of this length comes to 1e-12
+    assert steps < 1200
+
+
+@pytest.mark.parametrize(("rtol", "order"), [(1e-5, 12), (1e-8, 16), (1e-12, 20)])
+def test_the_error_is_what_the_tolerance_asks(rtol, order):
+    state, _ = springs(order=order).run([0.0, 1.0], [3.0], 40.0, rtol)
+    assert np.abs(state[0] - bilinear(40.0, 3.0)).max() < 30 * rtol
+
+
+def test_a_step_has_its_order_across_a_kink():
+    """The error of a fixed time falls with the tolerance although each half wave holds a jump of the third derivative."""
+    errors = [
+        np.abs(springs(order=8).run([0.0, 1.0], [3.0], 20.0, r)[0][0] - bilinear(20.0, 3.0)).max()
+        for r in (1e-4, 1e-7, 1e-10)
+    ]
+    assert errors[0] > 20 * errors[1] > 400 * errors[2]
+    assert errors[2] < 1e-9
+
+
+def test_exact_times_of_a_piecewise_exponential():
+    """x' = 1 - |x| from -1/2: x = -1 + exp(t)/2 up to t = ln 2, then 1 - exp(-(t - ln 2))."""
+    step = compiled(alone([X], [1 - sp.Abs(X)]), 20)
+    with mpmath.workdps(30):
+        for t in (0.5, 0.7, 3.0):
+            low, switch = mpmath.exp(mpmath.mpf(t)) / 2 - 1, mpmath.log(2)
+            exact = low if t < switch else 1 - mpmath.exp(-(mpmath.mpf(t) - switch))
+            assert abs(step.run([-0.5], NONE, t, 1e-15)[0][0, 0] - exact) < 5e-16 * 4
+
+
+def test_kinks_of_time_are_found():
+    """x' = |sin t|: 2 for each half turn."""
+    for looped in (False, True):
+        step = compiled(alone([X], [sp.Abs(sp.sin(T))]), 20, looped=looped)
+        state, _ = step.run([0.0], NONE, 100 * math.pi, 1e-14)
+        assert state[0, 0] == pytest.approx(200.0, rel=1e-14)
+
+
+def test_a_kink_that_bends_itself():
+    """x' = |x**2 - 1| from 0: tanh t up to nothing; from -3 it comes down to -1 and rests there; from 2 it blows up."""
+    step = compiled(alone([X], [sp.Abs(X**2 - 1)]), 20)
+    assert step.run([0.0], NONE, 3.0, 1e-14)[0][0, 0] == pytest.approx(math.tanh(3.0), rel=1e-13)
+    slow = step.run([-3.0], NONE, 5.0, 1e-14)[0][0, 0]
+    assert slow == pytest.approx(float(-mpmath.coth(mpmath.atanh(mpmath.mpf(1) / 3) + 5)), rel=1e-13)
+    crossing = compiled(alone([X, V], [sp.S.One, sp.Abs(X**2 - 1)]), 16).run([-2.0, 0.0], NONE, 4.0, 1e-12)[0]
+    assert crossing[0].tolist() == pytest.approx([2.0, 4.0 / 3.0 + 4.0 / 3.0 + 4.0 / 3.0], rel=1e-13)
+
+
+# -- where a step begins and what it touches ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("start", [0.0, 1e-17, -1e-17, 1e-12, -1e-12, 1e-9])
+@pytest.mark.parametrize("speed", [1.0, -1.0])
+def test_a_start_on_or_by_the_kink_costs_a_step_at_most(start, speed):
+    state, steps = springs().run([start, speed], [3.0], 2.5, 1e-12)
+    _, usual = springs().run([0.0, speed], [3.0], 2.5, 1e-12)
+    reference = bilinear(2.5, 3.0) if speed > 0 else [-v for v in (math.sin(2.5), math.cos(2.5))]
+    assert np.abs(state[0] - reference).max() < 1e-11 + 4 * abs(start)
+    assert steps <= usual + 1
+
+
+@pytest.mark.parametrize("power", [2, 3, 4])
+def test_a_start_at_rest_on_the_kink_goes_where_the_series_goes(power):
+    """x leaves zero like t**power: what is on its side is chosen by the first coefficient that is not zero."""
+    for sign in (1.0, -1.0):
+        step = compiled(alone([X, V], [A * T ** (power - 1), sp.Abs(X)], [A]), 16)
+        state, _ = step.run([0.0, 0.0], [sign], 2.0, 1e-13)
+        assert state[0].tolist() == pytest.approx([sign * 2.0**power / power, 2.0 ** (power + 1) / power / (power + 1)])
+
+
+@pytest.mark.parametrize("depth", [-1e-3, -1e-7, -1e-9, -1e-13, 0.0, 1e-13, 1e-9, 1e-7, 1e-3])
+def test_a_kink_that_is_touched(depth):
+    """v' = |(t - 1)**2 + depth|: two passages so close to each other that looks between would miss them, or none."""
+    step = compiled(alone([X, V], [2 * (T - 1), sp.Abs(X + A)], [A]), 16)
+    state, steps = step.run([1.0, 0.0], [depth], 2.0, 1e-13)
+    with mpmath.workdps(40):
+        d, edge = mpmath.mpf(depth), mpmath.sqrt(max(0, -mpmath.mpf(depth)))
+        exact = mpmath.mpf(2) / 3 + 2 * d + 2 * (-2 * (edge**3 / 3 + d * edge))
+        assert abs(state[0, 1] - exact) < 2e-14
+    assert steps < 25
+
+
+def test_joint_kinks_end_one_step():
+    """Two kinks that are passed at the same instant by equal and by opposite series."""
+    y, w = sp.symbols("y w", real=True)
+    rates = [V, -X - 8 * sp.Max(X, 0), w, -y - 8 * sp.Max(y, 0)]
+    pair = compiled(alone([X, V, y, w], rates), 20)
+    _, steps = springs().run([0.0, 1.0], [3.0], 30.0, 1e-12)
+    both, count = pair.run([0.0, 1.0, 0.0, 1.0], NONE, 30.0, 1e-12)
+    assert count == steps
+    assert both[0, :2].tolist() == both[0, 2:].tolist()
+    mirrored = compiled(alone([X, V, y, w], [V, -X - 8 * sp.Max(X, 0), w, -y - 8 * sp.Min(y, 0)]), 20)
+    both, count = mirrored.run([0.0, 1.0, 0.0, -1.0], NONE, 30.0, 1e-12)
+    assert count <= steps + 1
+    assert both[0, :2].tolist() == (-both[0, 2:]).tolist()
+
+
+def test_a_series_that_is_zero_for_ever_costs_nothing():
+    """|x - y| of two equal motions, with equal bits and with rounding between them."""
+    y, w = sp.symbols("y w", real=True)
+    force = sp.Abs(X - y)
+    for second, start in ((-y + force, 1.0), (-y + force, 1.0 + 2.0**-52), (-(y * A) / A + force, 1.0)):
+        pair = compiled(alone([X, V, y, w], [V, -X + force, w, second], [A]), 16)
+        plain = compiled(alone([X, V, y, w], [V, -X, w, -y], [A]), 16)
+        state, steps = pair.run([1.0, 0.0, start, 0.0], [0.3], 60.0, 1e-10)
+        usual = plain.run([1.0, 0.0, start, 0.0], [0.3], 60.0, 1e-10)[1]
+        assert steps <= usual + 2
+        assert np.abs(state[0, [0, 2]] - math.cos(60.0)).max() < 1e-8
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e-8, 1e8, 1e200])
+def test_the_size_of_states_does_not_matter(size):
+    state, steps = springs().run([0.0, size], [3.0], 40.0, 1e-12, 1e-13 * size)
+    assert np.abs(state[0] / size - bilinear(40.0, 3.0)).max() < 1e-10
+    assert steps <= springs().run([0.0, 1.0], [3.0], 40.0, 1e-12, 1e-13)[1] + 2
+
+
+@pytest.mark.parametrize("offset", [1.0, 1e4, 1e8])
+def test_a_kink_far_from_zero_passes_on(offset):
+    """Rounding of x - a is not that of x: no kink is passed to and fro."""
+    step = compiled(alone([X, V], [sp.S.One, sp.Abs(X - A)], [A]), 16)
+    state, steps = step.run([offset - 1.0, 0.0], [offset], 2.0, 1e-12)
+    assert state[0, 1] == pytest.approx(1.0, abs=1e-12 + 1e-15 * offset)
+    assert steps < 20
+
+
+# -- lanes, networks, dense output -----------------------------------------------------------------------------------
+
+
+def test_lanes_pass_kinks_at_times_of_their_own():
+    start = [[0.1 * lane, 1.0 - 0.2 * lane] for lane in range(8)]
+    many, _ = springs(width=8).run(start, [3.0], 17.0, 1e-11)
+    assert [springs().run(row, [3.0], 17.0, 1e-11)[0][0].tolist() for row in start] == many.tolist()
+
+
+@BOTH
+def test_equal_oscillators_keep_equal_bits(looped):
+    """A ring of four whose links are one-sided springs, in a start of two alternating states."""
+    here, there, w = sp.symbols("xh vh", real=True), sp.symbols("xt vt", real=True), sp.Symbol("w", real=True)
+    gap = there[0] - here[0]
+    edge = Edge(here, there, w, (sp.S.Zero, w * (sp.Max(gap - B, 0) - sp.Max(-gap - B, 0))), (B,))
+    node = Node((X, V), (V, -X - A * sp.Abs(V) * V - 5 * sp.Max(X - sp.Rational(1, 5), 0)), (A,))
+    ring = Equations.of_equal_nodes(node, edge, 4, tuple((i, (i + k) % 4, 1) for i in range(4) for k in (1, 3)))
+    step = compiled(ring, 16, looped=looped)
+    state, _ = step.run([1.0, -0.5, 1.0, -0.5, 0.0, 0.2, 0.0, 0.2], [0.3, 0.1], 40.0, 1e-11)
+    assert state[0, [0, 1, 4, 5]].tolist() == state[0, [2, 3, 6, 7]].tolist()
+    other = compiled(ring, 16, looped=not looped).run(
+        [1.0, -0.5, 1.0, -0.5, 0.0, 0.2, 0.0, 0.2], [0.3, 0.1], 40.0, 1e-11
+    )
+    assert np.abs(other[0] - state).max() < 1e-9
+
+
+def test_dense_output_ends_at_the_kink():
+    step = compiled(alone([X, V], [V, -X - 8 * sp.Max(X, 0)]), 20, dense=True)
+    length, new, dense = step.step([-0.05, 1.0], NONE, rtol=1e-13, atol=1e-14)
+    passage = math.atan(0.05)
+    assert length[0] == pytest.approx(passage, abs=1e-9)
+    assert 0.0 < new[0, 0] < 1e-9
+    for theta in (0.5, 1.0):
+        value = -0.05 + sum(theta ** (k + 1) * row[0, 0] for k, row in enumerate(dense))
+        assert value == pytest.approx(math.sin(theta * length[0]) - 0.05 * math.cos(theta * length[0]), abs=1e-15)
+
+
+def test_states_that_are_no_numbers_give_no_length():
+    for start in ([math.nan, 0.0], [1.0, math.inf]):
+        assert math.isnan(springs().step(start, [3.0])[0][0])
+
+
+# -- what is refused --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "jumping",
+    [sp.sign(V), sp.floor(X), sp.ceiling(V), sp.Heaviside(X), sp.Piecewise((V, V > 0), (X, True)),
+     sp.Piecewise((X, V > 0), (V, True)), sp.Piecewise((0, sp.And(X > 0, V > 0)), (X, True)),
+     sp.Piecewise((sp.sin(X), X > 0), (sp.Abs(sp.sign(V)), True))],
+)  # fmt: skip
+def test_functions_that_jump_are_refused(jumping):
+    equations = alone([X, V], [V, -X - jumping])
+    assert jump(equations) is not None
+    for write in (step_of, lambda e, order: write_looped(tidy(e), order)):
+        with pytest.raises(ValueError, match=r"taylor: a function that jumps; found .*; expected continuous functions"):
+            write(equations, 8)
+
+
+@pytest.mark.parametrize(
+    "joined",
+    [sp.Abs(V), sp.Max(X, V, 0), sp.Piecewise((V, V > 0), (2 * V, True)), sp.Piecewise((-1, X < -1), (1, X > 1), (X, True)),
+     sp.Piecewise((X**2, X * A > 0), (sp.sin(X), True)), sp.Abs(sp.Abs(X) - 1)],
+)  # fmt: skip
+def test_continuous_functions_are_taken(joined):
+    assert jump(alone([X, V], [V, -X - joined], [A])) is None
+
+
+def test_nested_kinks_follow_the_solution():
+    """x' = 1, v' = ||x| - 1| from -2 to 2: four triangles of area 1/2; a clipped ramp."""
+    nested = compiled(alone([X, V], [sp.S.One, sp.Abs(sp.Abs(X) - 1)]), 12).run([-2.0, 0.0], NONE, 4.0, 1e-12)[0]
+    assert nested[0, 1] == pytest.approx(2.0, rel=1e-14)
+    clip = sp.Piecewise((-1, X < -1), (1, X > 1), (X, True))
+    ramp = compiled(alone([X, V], [sp.S.One, clip]), 12).run([-2.0, 0.0], NONE, 4.5, 1e-12)[0]
+    assert ramp[0, 1] == pytest.approx(0.5, rel=1e-13)
+
+
+def test_the_pair_of_springs_is_that_of_runge_and_kutta():
+    from scipy.integrate import solve_ivp
+
+    node = Node((X, V), (V, -X - sp.Abs(V) * V / 5 - A * sp.Max(X - sp.Rational(1, 3), 0) + sp.cos(2 * T)), (A,))
+    pair = compiled(Equations.of_equal_nodes(node, spring(), 2, path(2)), 20)
+    names = pair.equations.parameters
+    values = [{"a": 5.0}.get(name, 0.4) for name in names]
+    state, _ = pair.run([0.5, -0.3, 0.0, 0.2], values, 6.0, 1e-13)
+    links = [(i, j, float(w)) for i, j, w in pair.equations.links]
+    edge = sp.lambdify([*pair.equations.edges[0].here, *pair.equations.edges[0].there, pair.equations.edges[0].weight,
+                        *pair.equations.edges[0].parameters], pair.equations.edges[0].rhs)  # fmt: skip
+
+    def rhs(t: float, y: np.ndarray) -> np.ndarray:
+        x, v = y[:2], y[2:]
+        a = -x - np.abs(v) * v / 5 - 5.0 * np.maximum(x - 1 / 3, 0) + np.cos(2 * t)
+        rate = [v.copy(), a]
+        for i, j, w in links:
+            for c, value in enumerate(
+                edge(x[i], v[i], x[j], v[j], w, *[0.4] * len(pair.equations.edges[0].parameters))
+            ):
+                rate[c][i] += value
+        return np.concatenate(rate)
+
+    found = solve_ivp(rhs, (0.0, 6.0), [0.5, -0.3, 0.0, 0.2], "DOP853", rtol=1e-13, atol=1e-15, max_step=0.02)
+    assert np.abs(state[0] - found.y[:, -1]).max() < 1e-11

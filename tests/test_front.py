@@ -1,0 +1,173 @@
+"""The front door: what `import synchain` offers, what it costs, and what its stubs tell to editors."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import inspect
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import synchain
+from synchain import models, runtime
+from synchain.models.graphs import families
+from synchain.models.inputs.plugins import load
+
+ROOT = Path(__file__).resolve().parents[1]
+CONTRACT = [
+    *(
+        "Scene",
+        "Lagrangian",
+        "Field",
+        "Potential",
+        "Rates",
+        "ends",
+        "Parameter",
+        "friction",
+        "friction_law",
+        "load_scene",
+    ),
+    *("run", "stream", "msf", "thresholds", "open_result", "kernel"),
+]
+TYPES = {"tuple[int, ...]": "Iterable[int]", "str": "float | str"}
+"""What options accept beside what they are stored as; every option that is kept as text is a probability."""
+
+
+def shipped() -> list[str]:
+    folder = Path(models.__file__).parent / "topologies"
+    return sorted(path.stem for path in folder.glob("*.py") if path.stem != "__init__")
+
+
+def written(default: object) -> str:
+    return f'"{default}"' if isinstance(default, str) else repr(default)
+
+
+def accepted(annotation: str) -> str:
+    return " | ".join(TYPES.get(part, part) for part in annotation.split(" | "))
+
+
+def function_stub(name: str, module: ModuleType) -> str:
+    """The stub of a family, from its plug-in file."""
+    given = inspect.signature(module.edges).parameters.values()
+    options = [
+        f"{p.name}: {accepted(p.annotation)} = {written(p.default)}"
+        for p in given
+        if p.kind is inspect.Parameter.KEYWORD_ONLY
+    ]
+    arguments = ", ".join(["n: int", *(["*"] if options else []), *options])
+    return f'def {name}({arguments}) -> Topology:\n    """{module.SUMMARY.replace(chr(34), chr(39))}."""\n'
+
+
+def models_stub() -> str:
+    homes = sorted((home, name) for name, home in models._HOMES.items())
+    lines = [f"from .{home} import {name} as {name}" for home, name in homes]
+    stubs = [function_stub(name, load(families.TOPOLOGY, name)) for name in shipped()]
+    head = "# What `__init__.py` loads on first use; tests/test_front.py writes it with --update.\n"
+    return f"{head}from collections.abc import Iterable\n\n" + "\n".join(lines) + "\n\n" + "\n".join(stubs)
+
+
+def front_stub() -> str:
+    lines = [f"from synchain.models import {name} as {name}" for name in sorted({*models.__all__, *shipped()})]
+    lines += [f"from synchain.runtime import {name} as {name}" for name in sorted(runtime.__all__)]
+    head = "# What `__init__.py` loads on first use; tests/test_front.py writes it with --update.\n"
+    return (
+        head
+        + "\n".join(["from synchain import models as models, runtime as runtime", *lines])
+        + "\n\n__version__: str\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("place", "make"), [("models/__init__.pyi", models_stub), ("runtime/front/__init__.pyi", front_stub)]
+)
+def test_the_stubs_say_what_the_packages_offer(place: str, make: object, request: pytest.FixtureRequest) -> None:
+    text = make()  # type: ignore[operator]
+    if request.config.getoption("--update"):
+        (ROOT / place).write_text(text, encoding="utf-8")
+    assert (ROOT / place).read_text("utf-8") == text, f"{place} is old; run: pytest tests/test_front.py --update"
+
+
+def test_the_front_offers_every_name_of_both_packages_once() -> None:
+    assert not {*dir(models)} & {*runtime.__all__} - {"__doc__"}
+    for name in (*models.__all__, *runtime.__all__, *shipped()):
+        home = runtime if name in runtime.__all__ else models
+        assert getattr(synchain, name) is getattr(home, name) or getattr(synchain, name) == getattr(home, name)
+    offered = set(dir(synchain))
+    assert {*CONTRACT, *shipped(), "__version__", "models", "runtime"} <= offered
+    assert synchain.__version__ == importlib.import_module("importlib.metadata").version("synchain")
+    with pytest.raises(AttributeError, match="module 'synchain' has no attribute 'chian'"):
+        _ = synchain.chian
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_a_family_tells_its_options(name: str) -> None:
+    own = inspect.signature(getattr(synchain, name))
+    assert list(own.parameters) == ["n", *getattr(synchain, name).options]
+    assert {p.name: p.default for p in own.parameters.values() if p.name != "n"} == getattr(synchain, name).options
+
+
+def test_the_class_of_families_has_the_signature_of_its_constructor() -> None:
+    assert "edges" in inspect.signature(families.Family).parameters
+
+
+def test_import_synchain_is_light() -> None:
+    code = "import synchain, sys; print(*{name.split('.')[0] for name in sys.modules})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    heavy = {"sympy", "numba", "numpy", "matplotlib", "xarray", "scipy", "flint", "llvmlite"}
+    assert set(done.stdout.split()) & heavy == set()
+
+
+def test_a_star_import_brings_the_contract() -> None:
+    code = f"from synchain import *; print(*[n for n in {CONTRACT!r} if n not in globals()]); print(chain(3).n)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.split() == ["3"]
+
+
+@pytest.mark.parametrize("name", ["mechanics.inline", "mechanics.oscillator"])
+def test_examples_of_docstrings_run(name: str) -> None:
+    found = doctest.testmod(importlib.import_module(f"synchain.models.{name}"))
+    assert found.attempted > 3
+    assert found.failed == 0
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/inline.md"])
+def test_the_models_of_the_docs_can_be_made(page: str) -> None:
+    """All but what runs them, which other tests do."""
+    blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / page).read_text("utf-8"), re.MULTILINE | re.DOTALL)
+    inline = [block for block in blocks if "sc." in block]
+    known: dict[str, object] = {}
+    for block in inline:
+        lines = [line for line in block.splitlines() if "sc.run(" not in line and not line.startswith("result")]
+        exec("\n".join(lines), known)
+    assert isinstance(known["scene"], synchain.Scene)
+    assert len(inline) == (1 if page == "README.md" else 3)
+
+
+@pytest.mark.long
+def test_wheel_and_source_archive_hold_the_front(tmp_path: Path) -> None:
+    pip = [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", str(tmp_path)]
+    source = tmp_path / "source"
+    tracked = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True)
+    for name in tracked.stdout.splitlines():
+        target = source / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes((ROOT / name).read_bytes())
+    subprocess.run([*pip, str(source)], check=True, timeout=300)
+    (wheel,) = tmp_path.glob("*.whl")
+    names = set(zipfile.ZipFile(wheel).namelist())
+    front = {"synchain/__init__.py", "synchain/__init__.pyi", "synchain/py.typed", "synchain/models/__init__.pyi"}
+    assert front <= names
+    assert not [name for name in names if "front" in name]
+    code = "import synchain; print(synchain.__file__); print(synchain.star(6).spectrum)"
+    place = tmp_path / "site"
+    zipfile.ZipFile(wheel).extractall(place)
+    run = [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(place)!r}); {code}"]
+    done = subprocess.run(run, capture_output=True, text=True, check=True, timeout=60, cwd=tmp_path)
+    assert str(place) in done.stdout
+    assert "{0: 1, -1: 4, -6: 1}" in done.stdout
