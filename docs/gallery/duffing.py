@@ -12,11 +12,10 @@ Brennan, *The Duffing Equation* (Wiley, 2011), chapter 5).
 # -------------
 import numpy as np
 
-from synchain.models import Scene
-from synchain.runtime import run
+import synchain as sc
 
 frequencies = np.linspace(0.5, 2.5, 81)
-scene = Scene(
+scene = sc.Scene(
     oscillator="duffing",
     parameters={"delta": 0.1, "beta": 1, "u": 0.3},
     axes={"omega": frequencies},
@@ -25,8 +24,8 @@ scene = Scene(
     window=1,
     samples=201,
 )
-upwards = run(scene.replace(continuation="up"))
-downwards = run(scene.replace(continuation="down"))
+upwards = sc.run(scene.replace(continuation="up"))
+downwards = sc.run(scene.replace(continuation="down"))
 
 # %%
 # Check

@@ -16,15 +16,14 @@ Phys. Rep. 213, 271 (1992)).
 # -------------
 import numpy as np
 
-from synchain.models import Scene, ring
-from synchain.runtime import run
+import synchain as sc
 
 n = 16
-wave = 0.5 * np.sin(2 * np.pi * np.arange(n) / n)
-scene = Scene(
+wave = 1.0 * np.sin(2 * np.pi * np.arange(n) / n)
+scene = sc.Scene(
     oscillator="mass",
     coupling="fput",
-    topology=ring(n),
+    topology=sc.ring(n),
     parameters={"sigma": 1, "fput_alpha": 0.25},
     initial={"x": wave.tolist(), "v": 0},
     record=("trajectory",),
@@ -35,7 +34,7 @@ scene = Scene(
     integrator="dop853",
     rtol=1e-10,
 )
-result = run(scene)
+result = sc.run(scene)
 
 # %%
 # Check

@@ -18,14 +18,13 @@ graph from one orbit.
 # -------------
 import numpy as np
 
-from synchain.models import Scene, chain
-from synchain.runtime import msf, run
+import synchain as sc
 
-two = Scene(topology=chain(2), parameters={"omega": 1.15})
-four = two.replace(topology=chain(4), record=("sync_error",))
-function = msf(two, np.linspace(0.0, 1.0, 101))
-window = msf(four, np.linspace(0.0, 1.0, 101)).windows[0]
-result = run(four, sigma=np.linspace(0.0, 0.25, 26))
+two = sc.Scene(topology=sc.chain(2), parameters={"omega": 1.15})
+four = two.replace(topology=sc.chain(4), record=("sync_error",))
+function = sc.msf(two, np.linspace(0.0, 1.0, 101))
+window = sc.msf(four, np.linspace(0.0, 1.0, 101)).windows[0]
+result = sc.run(four, sigma=np.linspace(0.0, 0.25, 26))
 
 # %%
 # Check

@@ -14,14 +14,13 @@ b = 2) coupled in x it begins at 7.3 and has no end.
 # -------------
 import numpy as np
 
-from synchain.models import Scene, chain
-from synchain.runtime import msf
+import synchain as sc
 
-rossler = Scene(oscillator="rossler", coupling="x->x", topology=chain(2))
-lorenz = Scene(oscillator="lorenz", coupling="x->x", topology=chain(2), parameters={"b": 2})
+rossler = sc.Scene(oscillator="rossler", coupling="x->x", topology=sc.chain(2))
+lorenz = sc.Scene(oscillator="lorenz", coupling="x->x", topology=sc.chain(2), parameters={"b": 2})
 functions = {
-    "Rössler x→x": msf(rossler, np.linspace(0, 6, 121), starts=2, periods=400, precision=5e-3),
-    "Lorenz x→x": msf(lorenz, np.linspace(0, 20, 121), starts=2, periods=200, precision=5e-3),
+    "Rössler x→x": sc.msf(rossler, np.linspace(0, 6, 121), starts=2, periods=400, precision=5e-3),
+    "Lorenz x→x": sc.msf(lorenz, np.linspace(0, 20, 121), starts=2, periods=200, precision=5e-3),
 }
 
 # %%

@@ -17,10 +17,10 @@ The question is that of Marszal, Saha, Jankowski & Stefański, *Eur. Phys. J. Sp
 # ---------
 # A scene says everything that a run needs.  What is not said has a default: the friction
 # oscillator, springs, the published parameters.
-from synchain.models import Scene, chain, text
+import synchain as sc
 
-scene = Scene(topology=chain(4), parameters={"omega": 1.15}, record=("sync_error",))
-print(text(scene.equations))
+scene = sc.Scene(topology=sc.chain(4), parameters={"omega": 1.15}, record=("sync_error",))
+print(sc.text(scene.equations))
 
 # %%
 # The spectrum
@@ -38,9 +38,7 @@ for eigenvalue in scene.spectrum:
 import matplotlib.pyplot as plt
 import numpy as np
 
-from synchain.runtime import msf
-
-function = msf(scene, np.linspace(0.0, 1.0, 101))
+function = sc.msf(scene, np.linspace(0.0, 1.0, 101))
 print("decay for α in", function.intervals, "of", function.attractors[0])
 
 _, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")
@@ -62,9 +60,8 @@ print(
 # ---------------------
 # A sweep integrates the whole network for every σ and records the mean difference between the
 # oscillators.  The first call compiles a kernel for these equations; later ones find it in a cache.
-from synchain.runtime import run
 
-result = run(scene, sigma=np.linspace(0.0, 0.25, 51))
+result = sc.run(scene, sigma=np.linspace(0.0, 0.25, 51))
 print(result.message)
 
 _, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")
@@ -76,7 +73,7 @@ plt.show()
 # Another drive
 # -------------
 # At ω = 1.40 one oscillator is chaotic, and modes need some coupling before they decay.
-chaotic = msf(scene, np.linspace(0.0, 1.0, 101), omega=1.40)
+chaotic = sc.msf(scene, np.linspace(0.0, 1.0, 101), omega=1.40)
 for low, high in chaotic.intervals:
     print(f"decay for α from {low:.3f} to {high:.3f}")
 for window in chaotic.windows:
@@ -89,9 +86,7 @@ for window in chaotic.windows:
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from synchain.runtime import open_result
-
 with TemporaryDirectory() as folder:
     path = Path(folder, "four.nc")
     result.save(path)
-    print(open_result(path).data)
+    print(sc.open_result(path).data)

@@ -12,16 +12,16 @@ fit into it (Pecora & Carroll, *Phys. Rev. Lett.* 80, 2109 (1998)).
 # -------
 # A graph is a family with a number of nodes, a list of edges, a matrix, a file, or a graph of
 # networkx.  Weights are exact, and so is the spectrum.
-from synchain.models import cartesian, chain, from_edges, ring, star
+import synchain as sc
 
-friends = from_edges([(0, 1), (1, 2), (2, 0), (2, 3), (3, 4), (4, 5), (5, 3)])
+friends = sc.from_edges([(0, 1), (1, 2), (2, 0), (2, 3), (3, 4), (4, 5), (5, 3)])
 print(friends.spectrum)
 
 # %%
 # Two triangles joined by a bridge have the eigenvalues of a graph with that much symmetry; other
 # graphs have algebraic numbers, which are exact too and evaluate to any number of digits.
-print(star(6).spectrum)
-print(cartesian(ring(5), chain(3)).spectrum.largest)
+print(sc.star(6).spectrum)
+print(sc.cartesian(sc.ring(5), sc.chain(3)).spectrum.largest)
 
 # %%
 # The oscillator
@@ -29,19 +29,16 @@ print(cartesian(ring(5), chain(3)).spectrum.largest)
 # Rössler's oscillator, coupled in x, has a bounded range.
 import numpy as np
 
-from synchain.models import Scene
-from synchain.runtime import msf, run
-
-scene = Scene(oscillator="rossler", coupling="x->x", topology=friends, record=("sync_error",))
-function = msf(scene, np.linspace(0.0, 6.0, 121), starts=2, periods=400, precision=5e-3)
+scene = sc.Scene(oscillator="rossler", coupling="x->x", topology=friends, record=("sync_error",))
+function = sc.msf(scene, np.linspace(0.0, 6.0, 121), starts=2, periods=400, precision=5e-3)
 ((low, high),) = function.intervals
 print(f"modes decay for α from {low:.2f} to {high:.2f}: a factor of {high / low:.0f}")
 
 # %%
 # A graph can synchronise if the ratio of its largest to its smallest non-zero eigenvalue is less.
-graphs = {"two triangles": friends, "chain(12)": chain(12), "star(12)": star(12), "ring(12)": ring(12)}
+graphs = {"two triangles": friends, "chain(12)": sc.chain(12), "star(12)": sc.star(12), "ring(12)": sc.ring(12)}
 for name, graph in graphs.items():
-    found = msf(scene.replace(topology=graph), function.alpha, starts=2, periods=400, precision=5e-3).windows
+    found = sc.msf(scene.replace(topology=graph), function.alpha, starts=2, periods=400, precision=5e-3).windows
     words = f"σ from {found[0].low:.3f} to {found[0].high:.3f}" if found else "never"
     ratio = graph.spectrum[-1].value / graph.spectrum[1].value
     print(f"{name:15} ratio {ratio:5.1f}: {words}")
@@ -56,7 +53,7 @@ import matplotlib.pyplot as plt
 (window,) = function.windows
 start = {"x": [1.0, 1.1, 0.9, 1.2, 0.8, 1.05]}
 sweep = scene.replace(initial=start, transient=1000, window=200, time_unit="time")
-result = run(sweep, sigma=np.linspace(0.2, 1.0, 33))
+result = sc.run(sweep, sigma=np.linspace(0.2, 1.0, 33))
 
 _, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")
 axes.semilogy(result.sigma, result.sync_error + 1e-16, ".-")
@@ -70,4 +67,4 @@ plt.show()
 # No two oscillators of a laboratory are equal.  A parameter may have one value for each node; the
 # error then does not vanish, it becomes small.
 unequal = sweep.replace(parameters={"a": [0.2, 0.201, 0.199, 0.2005, 0.1995, 0.2]})
-print(f"error at σ = 0.7: {float(run(unequal, sigma=0.7).sync_error):.3f}")
+print(f"error at σ = 0.7: {float(sc.run(unequal, sigma=0.7).sync_error):.3f}")
