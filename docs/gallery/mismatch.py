@@ -14,7 +14,7 @@ import numpy as np
 
 import synchain as sc
 
-n, sets, sizes = 5, 8, np.geomspace(1e-5, 1e-3, 5)
+n, sets, sizes = 5, 8, np.geomspace(1e-4, 1e-3, 5)
 deviations = np.random.default_rng(7).standard_normal((sets, n))
 mu = 1 + (sizes[:, None, None] * deviations).reshape(-1, n)
 scene = sc.Scene(
@@ -26,7 +26,7 @@ scene = sc.Scene(
     zipped=True,
     initial={"x": [2, 1.9, 1.8, 2.1, 2.2], "v": 0},
     record=("sync_error", "trajectory"),
-    transient=200,
+    transient=500,
     window=20,
     time_unit="time",
     samples=201,
@@ -48,7 +48,7 @@ def rates(t, y):
 
 
 begin = [2, 1.9, 1.8, 2.1, 2.2, *[0] * n]
-end = solve_ivp(rates, (0, 220), begin, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+end = solve_ivp(rates, (0, 520), begin, "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
 errors = result.sync_error.values.reshape(len(sizes), sets)
 slopes = np.log(errors[-1] / errors[0]) / np.log(sizes[-1] / sizes[0])
 print(f"difference from SciPy {abs(result.end.values[-1] - end).max():.0e}")

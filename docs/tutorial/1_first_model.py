@@ -9,8 +9,8 @@ In five minutes: say what an oscillator is, join some of them, run, look.
 # One oscillator
 # --------------
 # An oscillator is a Lagrangian: kinetic energy T, potential energy V, and the forces Q that have no
-# energy.  This one is van der Pol's with a cubic spring and a drive.  Numbers are parameters, with a
-# default each.
+# energy.  This one is van der Pol's with a cubic spring and a drive.  Numbers are parameters,
+# with a default each.
 import sympy as sp
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -76,7 +76,7 @@ plt.show()
 # What ran
 # --------
 # The kernel is Python that can be read.
-print("\n".join(sc.kernel(scene).source.splitlines()[:16]))
+print("\n".join(sc.kernel(scene.replace(parameters={"sigma": 0.05})).source.splitlines()[:9]))
 
 # %%
 # The next lesson asks where such a network synchronises, and answers before it simulates.
