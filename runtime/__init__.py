@@ -27,9 +27,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .bifurcation.branches import Branch, follow
     from .bifurcation.periodic import PeriodicOrbit, periodic_orbit
-    from .bifurcation.skeleton import skeleton
+    from .bifurcation.skeleton import Skeleton, skeleton
     from .cells.kernels import kernel
-    from .results.open import open_result
+    from .opening.open import open_result
     from .results.result import Result
     from .stability.clusters import ClusterExponents, cluster_exponents
     from .stability.exponents import Exponents, exponents
@@ -56,6 +56,7 @@ __all__ = [
     "Probe",
     "Progress",
     "Result",
+    "Skeleton",
     "Status",
     "Streamed",
     "SweepFailed",
@@ -90,6 +91,7 @@ _HOME = {
     "Probe": "synchronisation.probe",
     "Progress": "sweeps.progress",
     "Result": "results.result",
+    "Skeleton": "bifurcation.skeleton",
     "Status": "support.status",
     "Streamed": "sweeps.stream",
     "SweepFailed": "sweeps.errors",
@@ -102,7 +104,7 @@ _HOME = {
     "kernel": "cells.kernels",
     "lyapunov_spectrum": "stability.lyapunov",
     "msf": "stability.msf",
-    "open_result": "results.open",
+    "open_result": "opening.open",
     "periodic_orbit": "bifurcation.periodic",
     "plane": "stability.msf",
     "run": "sweeps.run",

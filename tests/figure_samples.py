@@ -13,6 +13,7 @@ import xarray as xr
 
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.figures import exponent, figure_runs, load, make, plane, style, synchronisability_map
+from synchain.runtime.results.labels import States
 from synchain.runtime.results.result import Result
 from synchain.runtime.stability.attractor import Attractor, Motion
 from synchain.runtime.stability.exponents import Exponents
@@ -33,7 +34,8 @@ def pretend(scene: Scene, failed: tuple[int, ...] = (), **options: Any) -> Resul
     status[list(failed)] = Status.DIVERGED
     dims = ("cell",) if scene.zipped else tuple(axis.name for axis in scene.axes)
     data: dict[str, Any] = {"status": (dims, status.reshape(shape))}
-    data["end"] = ((*dims, "state"), (cells[:, None] + np.arange(dimension)).reshape(*shape, dimension))
+    states, table = ("component", "node"), States.of(scene).table
+    data["end"] = ((*dims, *states), table((cells[:, None] + np.arange(dimension)).reshape(*shape, dimension)))
     for name in ("sync_error", "sync_error_max", "sync_error_end"):
         data[name] = (dims, np.where(cells % 3 == 1, 0.0, 0.1 * cells + 0.1).reshape(shape))
     if "section" in scene.record:
@@ -42,12 +44,12 @@ def pretend(scene: Scene, failed: tuple[int, ...] = (), **options: Any) -> Resul
         data["section_count"] = (dims, counts.reshape(shape))
         data["section_time"] = ((*dims, "point"), np.where(inside, cells[:, None], np.nan).reshape(*shape, 2))
         points = np.where(inside[..., None], 0.1 * cells[:, None, None] + np.arange(dimension), np.nan)
-        data["section"] = ((*dims, "point", "state"), points.reshape(*shape, 2, dimension))
+        data["section"] = ((*dims, "point", *states), table(points.reshape(*shape, 2, dimension)))
     if "trajectory" in scene.record:
         waves = np.sin(np.linspace(0, 6, 20)[:, None] + np.arange(dimension))
-        data["trajectory_time"] = (("sample",), np.linspace(0, 6, 20))
-        data["trajectory"] = ((*dims, "sample", "state"), np.broadcast_to(waves, (*shape, *waves.shape)))
-    coordinates: dict[str, Any] = {"state": list(scene.equations.state)}
+        data["time"] = (("sample",), np.linspace(0, 6, 20))
+        data["trajectory"] = ((*dims, "sample", *states), table(np.broadcast_to(waves, (*shape, *waves.shape))))
+    coordinates: dict[str, Any] = {"component": list(scene.equations.components), "node": np.arange(1, scene.n + 1)}
     for axis in scene.axes:
         coordinates[axis.name] = ("cell" if scene.zipped else axis.name, np.array(axis.values))
     return Result(xr.Dataset(data, coordinates), scene)

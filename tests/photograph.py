@@ -43,7 +43,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.bifurcation.branches import follow
 from synchain.runtime.bifurcation.periodic import periodic_orbit
 from synchain.runtime.bifurcation.skeleton import skeleton
-from synchain.runtime.results.open import open_result
+from synchain.runtime.opening.open import open_result
 from synchain.runtime.stability.clusters import cluster_exponents
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.stability.lyapunov import lyapunov_spectrum
@@ -227,7 +227,10 @@ def simulated(given: Scene, **options: Any) -> Quantities:
     seen: Quantities = {"message": found.message, "left out": found.data.attrs["skipped"], "parts": _parts(found.scene)}
     counts = ("steps", "rejected", "periods_skipped")
     for name, values in found.data.data_vars.items():
-        seen[str(name)] = Counts(values.values) if name in counts else values.values
+        rows = found.states(str(name)) if "component" in values.dims else values.values
+        seen[str(name)] = Counts(rows) if name in counts else rows
+    times = {"time": "trajectory_time", "section_time": "section_time", "end_time": "end_time"}
+    seen |= {old: found.data[name].values for name, old in times.items() if name in found.data.coords}
     return seen | written(found.scene, options.get("reduce", True))
 
 
@@ -267,7 +270,9 @@ def exact(graph: Any) -> str:
     """The exact spectrum of a graph, with Jordan blocks and whether it is proved."""
     found = graph.spectrum
     rows = [f"{e.text}: {e.multiplicity} {e.blocks}" for e in found.eigenvalues]
-    return "\n".join([repr(graph), repr(found), *rows, f"verified {found.verified}, chance {found.error_probability}"])
+    return "\n".join(
+        [repr(graph), found.text(1000), *rows, f"verified {found.verified}, chance {found.error_probability}"]
+    )
 
 
 def printed(*words: str) -> str:

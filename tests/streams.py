@@ -14,7 +14,7 @@ from synchain.models.scenes.axis import Axis
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.kernels import kernel
 from synchain.runtime.cells.reduce import reduce_scene
-from synchain.runtime.results.open import open_result
+from synchain.runtime.opening.open import open_result
 from synchain.runtime.sweeps.progress import Progress
 from synchain.runtime.sweeps.stream import stream
 

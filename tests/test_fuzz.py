@@ -82,7 +82,7 @@ def check(name: str, examples: int) -> None:
         assert int(found.status) == Status.FINISHED, found.message
         expected = reference(drawn, method)
         size = max(1.0, float(np.abs(expected).max()))
-        error = float(np.abs(found.end.values - expected).max())
+        error = float(np.abs(found.states("end") - expected).max())
         note(f"error {error:.3g}, size {size:.3g}")
         assert error <= 100.0 * rtol * size + 1e-9 * size
 

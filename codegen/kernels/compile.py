@@ -381,6 +381,7 @@ def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) 
             function._cache._cache_file = code
             function.compile(wanted[name])
             function.disable_compile()  # arrays of another type are a mistake of ours, not a reason to compile anew
+            _remember(function)
     finally:
         numba.config.CACHE_DIR = elsewhere
         del sys.modules[path.stem]
@@ -388,6 +389,14 @@ def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) 
             delattr(module, name)
     hits = all(sum(function.stats.cache_hits.values()) for function in functions.values())
     return Compiled(functions, str(path), hits)
+
+
+def _remember(function: Any) -> None:
+    """Keep the address of a function's machine code, which Numba else searches at each call of a driver."""
+    (found,) = function.overloads.values()
+    library = found.library
+    library.get_pointer_to_function = functools.cache(library.get_pointer_to_function)
+    function.get_compile_result = lambda signature: found
 
 
 @functools.cache

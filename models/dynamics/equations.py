@@ -14,6 +14,7 @@ from functools import cached_property
 import sympy as sp
 
 from ..graphs.links import Link
+from ..inputs.shown import Written
 from ..mechanics.components import Edge, Node
 from ..mechanics.friction import Contact
 
@@ -51,8 +52,8 @@ class Layer:
         return replace(self, edge_of=tuple((ends, change(edge)) for ends, edge in self.edge_of))
 
 
-@dataclass(frozen=True, slots=True)
-class Equations(_Cached):
+@dataclass(frozen=True, slots=True, repr=False)
+class Equations(_Cached, Written):
     """The equations of motion of a network, M d(state)/dt = rhs.
 
     M is the identity unless links have inertia.  The state is ordered by components, x_1 … x_n,
@@ -83,6 +84,11 @@ class Equations(_Cached):
 
     def __post_init__(self) -> None:
         check(self)
+
+    def __repr__(self) -> str:
+        kinds = f", {len(self.nodes)} kinds of nodes" if self.mixed else ""
+        names = f"states {', '.join(self.components)}, {len(self.parameters)} parameters"
+        return f"Equations({self.n} node{'s' * (self.n > 1)}, {len(self.links)} links, {names}{kinds})"
 
     @classmethod
     def of_equal_nodes(

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from ..inputs.checks import check_instance, check_integer, check_printable, short_repr, typed_repr
 from ..inputs.options import Options
 from ..inputs.rationals import file_text, parse_rows, rational_rows, total
+from ..inputs.shown import Drawn
 from .partitions import join
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ class Rule(Protocol):
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
-class Topology:
+class Topology(Drawn):
     """`n` nodes and their sorted links (target, source, weight); an undirected edge is two links.
 
     Parameters

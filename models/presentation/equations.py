@@ -17,7 +17,7 @@ from ..mechanics.components import SLIDING, TIME, Edge, Node
 from ..mechanics.nondimensional import FRICTION
 from .writer import Latex, Style, Text, Writer
 
-__all__ = ["as_dict", "latex", "text"]
+__all__ = ["as_dict", "latex", "lines", "text"]
 
 LARGEST = 6
 """Networks of more nodes are written once, for node i, instead of node by node."""
@@ -42,8 +42,8 @@ def latex(equations: Equations) -> str:
     str
         An align* environment; more than LARGEST nodes give one equation for node i.
     """
-    lines = " \\\\\n".join(f"  & {line}" for line in _lines(equations, Latex()))
-    return f"\\begin{{align*}}\n{lines}\n\\end{{align*}}"
+    body = " \\\\\n".join(f"  & {line}" for line in lines(equations, Latex()))
+    return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"
 
 
 def text(equations: Equations) -> str:
@@ -59,7 +59,7 @@ def text(equations: Equations) -> str:
     str
         One equation a line; more than LARGEST nodes give one for node i.
     """
-    return "\n".join(_lines(equations, Text()))
+    return "\n".join(lines(equations, Text()))
 
 
 def as_dict(equations: Equations) -> dict[str, object]:
@@ -114,8 +114,8 @@ def _with_law(e: sp.Expr, law: sp.Expr, state: tuple[sp.Symbol, ...]) -> sp.Expr
     return e
 
 
-def _lines(equations: Equations, style: Style) -> Iterator[str]:
-    """Equation by equation, then the laws, then what the indices of a large network mean."""
+def lines(equations: Equations, style: Style) -> Iterator[str]:
+    """Yield equation by equation, then the laws, then what the indices of a large network mean."""
     sticks, equations = equations.sticks, _in_slip(equations)
     named = tuple(_name_law(node) for node in equations.nodes)
     generic = equations.n > LARGEST and not equations.mixed

@@ -21,7 +21,7 @@ from .section import Section
 from .start import SEED_LIMIT, chosen_start, default_start
 from .sweep import check_sweep, read_axes
 
-__all__ = ["TimeUnit", "complete", "integrators"]
+__all__ = ["LIMITS", "TimeUnit", "complete", "integrators"]
 
 
 class TimeUnit(Word):
@@ -34,7 +34,16 @@ class TimeUnit(Word):
 METHODS = Path(__file__).parents[2] / "codegen" / "integrators"
 """The folder of the integrators, one file each; it is listed here, and read by the code generator alone."""
 
-TIME_LIMIT, STEP_LIMIT, SAMPLE_LIMIT = 1e9, 10**12, 10**8
+LIMITS: Mapping[str, tuple[Any, Any]] = {
+    "transient": (0.0, 1e9),
+    "window": (0.0, 1e9),
+    "rtol": (1e-15, 0.1),
+    "atol": (0.0, 0.1),
+    "max_steps": (1, 10**12),
+    "samples": (0, 10**8),
+    "seed": (0, SEED_LIMIT),
+}
+"""The range of each number that belongs to a keyword, both ends in it."""
 
 
 def integrators() -> tuple[str, ...]:
@@ -62,7 +71,7 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     """
     values = dict(given)
     values["title"] = check_text("title", given["title"])
-    values["seed"] = check_integer("seed", given["seed"], 0, SEED_LIMIT)
+    values["seed"] = check_integer("seed", given["seed"], *LIMITS["seed"])
     values |= _model(given)
     model: Model = values["model"]
     values["axes"] = axes = read_axes(given["axes"], given["zipped"])
@@ -72,7 +81,7 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     values["section"] = _section(model, given["section"])
     values |= _times(model, numbers, given)
     for name in ("transient", "window"):
-        values[name] = check_number(name, given[name], 0.0, TIME_LIMIT)
+        values[name] = check_number(name, given[name], *LIMITS[name])
     if values["record"] and values["window"] == 0.0:
         raise ValueError(f"window: found 0, in which {values['record'][0]!r} has nothing to record; give a window > 0")
     values |= _numerics(given, values["record"])
@@ -172,15 +181,15 @@ def _times(model: Model, numbers: Mapping[str, float], given: Mapping[str, objec
 
 def _numerics(given: Mapping[str, object], records: Sequence[Record]) -> dict[str, object]:
     """The integrator, its tolerances and limits."""
-    rtol = check_number("rtol", given["rtol"], 1e-15, 0.1)
-    atol = rtol / 10 if given["atol"] is None else check_number("atol", given["atol"], 0.0, 0.1)
+    rtol = check_number("rtol", given["rtol"], *LIMITS["rtol"])
+    atol = rtol / 10 if given["atol"] is None else check_number("atol", given["atol"], *LIMITS["atol"])
     integrator = check_choice("integrator", given["integrator"], ("auto", *integrators()))
     if atol < 1e-300:
         raise ValueError(
             f"atol: found {atol!r}; expected a number above 0, since states pass through 0; take e.g. 1e-10"
         )
-    max_steps = check_integer("max_steps", given["max_steps"], 1, STEP_LIMIT)
-    samples = check_integer("samples", given["samples"], 0, SAMPLE_LIMIT)
+    max_steps = check_integer("max_steps", given["max_steps"], *LIMITS["max_steps"])
+    samples = check_integer("samples", given["samples"], *LIMITS["samples"])
     if Record.TRAJECTORY in records and samples < 2:
         raise ValueError(
             f"samples: found {samples} for the trajectory; expected at least 2, "

@@ -14,7 +14,7 @@ from ..mechanics.coupling import Coupling, Potential, Rates, split
 from ..mechanics.table import as_name_or_table
 from .parameters import collected
 
-__all__ = ["arguments", "as_dict"]
+__all__ = ["arguments", "as_dict", "graph_of", "graph_table"]
 
 NODES = 100_000
 """Largest number of oscillators that a scene file may ask for."""
@@ -41,7 +41,7 @@ def arguments(values: object, keywords: Iterable[str], folder: Path | None = Non
     check_keys("scene", found, ["sweep" if name == "axes" else name for name in keywords])
     given: dict[str, Any] = {str(key): value for key, value in found.items()}
     if "topology" in given:
-        given["topology"] = _topology(check_table("topology", given["topology"]), folder)
+        given["topology"] = graph_of(check_table("topology", given["topology"]), folder)
     if "sweep" in given:
         sweep = dict(check_table("sweep", given.pop("sweep")))
         if "zipped" in sweep and "zipped" in given:
@@ -77,7 +77,7 @@ def _layer(what: str, given: object, folder: Path | None) -> tuple[object, Topol
     for key in ("coupling", "topology"):
         if key not in table:
             raise ValueError(f"{what}: {key!r} is missing; expected a coupling and its graph")
-    return _placed(table["coupling"], folder), _topology(check_table(f"{what}: topology", table["topology"]), folder)
+    return _placed(table["coupling"], folder), graph_of(check_table(f"{what}: topology", table["topology"]), folder)
 
 
 def _placed_group(group: object, folder: Path | None) -> object:
@@ -87,7 +87,8 @@ def _placed_group(group: object, folder: Path | None) -> object:
     return {key: _placed(value, folder) if key in ("oscillator", "friction") else value for key, value in group.items()}
 
 
-def _topology(given: Mapping[object, Any], folder: Path | None) -> Topology:
+def graph_of(given: Mapping[object, Any], folder: Path | None = None) -> Topology:
+    """Return the graph of a table in a scene file; relative paths in it start at `folder`."""
     name = _placed(given.get("name"), folder)
     known = isinstance(name, str) and "matrix" not in given and (name in names() or name.endswith(".py"))
     options = family(str(name)).options if known else {}
@@ -136,11 +137,11 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
         written[name] = str(values[name])
     for name in ("oscillator", "friction"):
         written[name] = "none" if values[name] is None else as_name_or_table(values[name])
-    written["coupling"], written["topology"] = _coupling(values["coupling"]), _graph(values["topology"])
+    written["coupling"], written["topology"] = _coupling(values["coupling"]), graph_table(values["topology"])
     layers = written.pop("links")
     if layers is not None:
         del written["coupling"], written["topology"]
-        written["links"] = [{"coupling": _coupling(own), "topology": _graph(graph)} for own, graph in layers]
+        written["links"] = [{"coupling": _coupling(own), "topology": graph_table(graph)} for own, graph in layers]
     written["nodes"] = [group.as_dict() for group in values["nodes"]]
     written["parameters"] = collected(values["parameters"], varied)
     written["initial"] = {name: list(states) for name, states in values["initial"].items()}
@@ -156,7 +157,8 @@ def _coupling(coupling: Coupling | None) -> object:
     return "none" if coupling is None else str(coupling)
 
 
-def _graph(graph: Topology) -> dict[str, object]:
+def graph_table(graph: Topology) -> dict[str, object]:
+    """Return a graph in JSON types: its family and options, or its matrix; `graph_of` reads it."""
     try:
         same = topology(graph.name, graph.n, **dict(graph.options)) == graph
     except (ValueError, TypeError):

@@ -17,6 +17,7 @@ from ..graphs.topology import Topology
 from ..inputs.checks import check_instance, check_table, check_text, suggestion
 from ..inputs.frozen import Frozen
 from ..inputs.node_name import NodeName
+from ..inputs.shown import Drawn, Written
 from ..mechanics.coupling import Coupling
 from ..mechanics.friction import SLIP, ContactModel, FrictionLaw
 from ..mechanics.link import strength
@@ -38,7 +39,7 @@ __all__ = ["KEYWORDS", "Axis", "Scene", "Section", "a_scene"]
 
 
 @dataclass(frozen=True, slots=True, init=False, repr=False)
-class Scene:
+class Scene(Drawn, Written):
     """A network of oscillators, its numbers, its start, what to record and what to sweep.
 
     Every keyword has a default; the same names are the keys of a scene file (see docs/scenes.md).  States,

@@ -13,16 +13,17 @@ from ..algebra.balls import precision
 from ..algebra.lazy import LazyEigenvalues
 from ..algebra.roots import Root, coefficient_text
 from ..inputs.checks import check_instance
+from ..inputs.shown import Written
 from .eigenvalue import Eigenvalue, decimal
 
 __all__ = ["Spectrum", "table"]
 
-SHOWN = 1000
+SHOWN = 24
 """The text of a spectrum leaves out the middle of more eigenvalues than this."""
 
 
 @dataclass(frozen=True, slots=True)
-class Spectrum:
+class Spectrum(Written):
     """The distinct eigenvalues downwards by real part (of G from 0), conjugates side by side.
 
     Parameters

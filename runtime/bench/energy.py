@@ -116,8 +116,8 @@ def drift(case: Case, integrator: str, rtol: float, periods: int) -> tuple[float
     result = run(scene, workers=1, show_progress=False, reduce=False)
     if not result.success:
         raise RuntimeError(f"{case.name}, {integrator}: {result.message}")
-    between = result.trajectory.values[: -1 if integrator not in CHORDS else 1]
-    states = np.vstack([between, result.end.values])
+    between = result.states("trajectory")[: -1 if integrator not in CHORDS else 1]
+    states = np.vstack([between, result.states("end")])
     found = energy_function(scene)(states)
     relative = np.abs(found - found[0]) / abs(found[0])
     steps = float(result.steps.values + result.rejected.values) / periods

@@ -60,7 +60,7 @@ def row(case: Case) -> Row:
     """Run one case and compare it with its reference."""
     found = run(case.scene, reduce=case.skip, show_progress=False)
     status = Status(int(found.status))
-    end = found.end.values
+    end = found.states("end")
     expected = (
         end_state(case.scene, case.reference) if status == Status.FINISHED else np.full(2 * case.scene.n, math.nan)
     )

@@ -15,10 +15,12 @@ from dataclasses import dataclass
 from numbers import Real
 
 import numpy as np
+import xarray as xr
 
 from synchain.models.inputs.checks import check_instance, short_repr
 from synchain.models.scenes.scene import Scene
 
+from ..results.labelled import Labelled, dataset, ends_of
 from .bifurcations import Bifurcation, bifurcations_at_end, bifurcations_between
 from .continuation import Arc
 from .periodic import PeriodicOrbit, periodic_orbit
@@ -46,8 +48,8 @@ KINK = 1e-2
 """Distance from the expected state that is always allowed: changes of phases are kinks."""
 
 
-@dataclass(frozen=True, slots=True)
-class Branch:
+@dataclass(frozen=True, slots=True, repr=False)
+class Branch(Labelled):
     """Periodic orbits along a parameter.
 
     The branch ends if no further orbit can be found, usually at a fold or a graze.
@@ -71,6 +73,33 @@ class Branch:
     orbits: tuple[PeriodicOrbit, ...]
     bifurcations: tuple[Bifurcation, ...]
     phases: tuple[Phases, ...] = ()
+
+    @property
+    def data(self) -> xr.Dataset:
+        """States and multipliers along the parameter, and the bifurcations."""
+        turns = self.bifurcations
+        return dataset(
+            {
+                "state": ((self.name, "component"), [o.state for o in self.orbits], "state at the start of a period"),
+                "multipliers": ((self.name, "number"), [o.multipliers for o in self.orbits], "Floquet multipliers"),
+                "stable": ((self.name,), [o.stable for o in self.orbits], "whether all multipliers lie in the circle"),
+                "bifurcation": (("turn",), np.array([t.value for t in turns], dtype=float), f"values of {self.name}"),
+                "bifurcation_kind": (("turn",), np.array([str(t.kind) for t in turns], dtype=str), "their kinds"),
+            },
+            {self.name: self.values, "component": list(self.orbits[0].components)},
+            self.orbits[0].scene,
+        )
+
+    @property
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Orbits, their stability and the bifurcations."""
+        stable = sum(orbit.stable for orbit in self.orbits)
+        turns = "; ".join(f"{turn.kind} at {turn.value:.8g}" for turn in self.bifurcations)
+        return (
+            ("orbits", f"{len(self.orbits)} of {self.orbits[0].periods} drive periods, {stable} stable"),
+            (self.name, ends_of(self.values)),
+            ("bifurcations", turns or "none"),
+        )
 
 
 def follow(scene: Scene, name: str, values: Sequence[float] | np.ndarray, first: PeriodicOrbit) -> Branch:

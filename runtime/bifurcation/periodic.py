@@ -17,12 +17,14 @@ from dataclasses import dataclass, field
 from numbers import Integral, Real
 
 import numpy as np
+import xarray as xr
 from scipy.optimize import brentq
 
 from synchain.models.inputs.checks import short_repr
 from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene
 
+from ..results.labelled import Labelled, dataset
 from ..stability.attractor import cycle_propagators
 from ..stability.exponents import coupled_cell, single_cell
 from ..stability.orbits import Orbits, unit_of_time
@@ -44,8 +46,8 @@ LONGEST = 10_000
 """Most drive periods of an orbit; unstable ones far shorter already lose all their digits."""
 
 
-@dataclass(frozen=True, slots=True)
-class PeriodicOrbit:
+@dataclass(frozen=True, slots=True, repr=False)
+class PeriodicOrbit(Labelled):
     """A motion that repeats itself after some periods of the drive.
 
     Parameters
@@ -70,6 +72,36 @@ class PeriodicOrbit:
     multipliers: np.ndarray
     residual: float
     steps: int
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the components of `state`."""
+        return tuple(name for name in self.scene.components if name != SLIP.name)
+
+    @property
+    def data(self) -> xr.Dataset:
+        """State and Floquet multipliers."""
+        return dataset(
+            {
+                "state": (("component",), self.state, "state at the beginning of a drive period"),
+                "multipliers": (("number",), self.multipliers, "Floquet multipliers, the largest first"),
+            },
+            {"component": list(self.components), "number": np.arange(1, len(self.multipliers) + 1)},
+            self.scene,
+        )
+
+    @property
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Periods, state, multipliers and residual."""
+        state = ", ".join(f"{name} = {x:.10g}" for name, x in zip(self.components, self.state, strict=True))
+        sizes = ", ".join(f"{value:.6g}" for value in self.multipliers)
+        return (
+            ("scene", repr(self.scene)),
+            ("drive periods", str(self.periods)),
+            ("state", state),
+            ("multipliers", f"{sizes}: {'stable' if self.stable else 'unstable'}"),
+            ("residual", f"{self.residual:.1e} after {self.steps} steps"),
+        )
 
     @property
     def stable(self) -> bool:

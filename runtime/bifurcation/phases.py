@@ -93,7 +93,7 @@ def phases_of(scene: Scene, state: np.ndarray, periods: int) -> Phases | None:
         time_unit="period",
         initial={"x": [float(state[0])], "v": [float(state[1])]},
     )
-    once = np.asarray(run(single, show_progress=False, workers=1).trajectory.values, dtype=float)[:-1]
+    once = np.asarray(run(single, show_progress=False, workers=1).trajectory.sel(node=1).values, dtype=float)[:-1]
     path = np.concatenate([once, once])  # two cycles, so that each phase is seen whole
     t, slip = np.arange(len(path)) * ((scene.period or 0.0) / SAMPLES), np.round(path[:, 2]).astype(int)
     held, slides = _margins(scene, contact)

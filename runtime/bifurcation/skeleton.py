@@ -9,22 +9,25 @@ Source: Auerbach, Cvitanovic, Eckmann, Gunaratne & Procaccia, Phys. Rev. Lett. 5
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from numbers import Integral
 
 import numpy as np
+import xarray as xr
 from tqdm import tqdm
 
 from synchain.models.inputs.checks import short_repr
 from synchain.models.scenes.scene import Scene, a_scene
 
+from ..results.labelled import Labelled, dataset
 from ..stability.exponents import coupled_cell, initial_states
 from ..stability.orbits import Orbits
 from .bifurcations import BifurcationKind
 from .branches import Branch, checked_values, follow
 from .periodic import SAME, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit
 
-__all__ = ["near_returns", "skeleton"]
+__all__ = ["Skeleton", "near_returns", "skeleton"]
 
 STARTS, LENGTH, DROPPED = 16, 200, 20
 """Motions that are searched for returns, their length and their transient in drive periods."""
@@ -36,6 +39,66 @@ CLOSE, APART, TRIES = 0.05, 0.02, 12
 """Largest distance of a return, least distance between starts, most starts for one period."""
 
 
+@dataclass(frozen=True, slots=True, repr=False)
+class Skeleton(Labelled):
+    """Branches of periodic orbits; reads like a tuple of them.
+
+    Parameters
+    ----------
+    branches : tuple of Branch
+        Each rises in the parameter; sorted by the number of periods and the first value.
+    """
+
+    branches: tuple[Branch, ...]
+
+    def __len__(self) -> int:
+        return len(self.branches)
+
+    def __iter__(self) -> Iterator[Branch]:
+        return iter(self.branches)
+
+    def __getitem__(self, place: int) -> Branch:
+        return self.branches[place]
+
+    @property
+    def data(self) -> xr.Dataset:
+        """All orbits of all branches as one row, with branch, periods and parameter as coordinates."""
+        rows = [
+            (number, value, orbit)
+            for number, branch in enumerate(self.branches)
+            for value, orbit in zip(branch.values, branch.orbits, strict=True)
+        ]
+        if not rows:
+            return dataset({}, {})
+        numbers, values, orbits = zip(*rows, strict=True)
+        return dataset(
+            {
+                "state": (("orbit", "component"), [o.state for o in orbits], "state at the start of a period"),
+                "multipliers": (("orbit", "number"), [o.multipliers for o in orbits], "Floquet multipliers"),
+                "stable": (("orbit",), [o.stable for o in orbits], "whether all multipliers lie in the circle"),
+            },
+            {
+                self.branches[0].name: ("orbit", np.array(values)),
+                "branch": ("orbit", np.array(numbers)),
+                "periods": ("orbit", np.array([o.periods for o in orbits])),
+                "component": list(orbits[0].components),
+            },
+            orbits[0].scene,
+        )
+
+    @property
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """One row for each branch."""
+        rows = tuple(
+            (
+                f"branch {k}",
+                ", ".join(f"{name} {words}" if name != "orbits" else words for name, words in branch.summary),
+            )
+            for k, branch in enumerate(self.branches, 1)
+        )
+        return rows or (("branches", "none"),)
+
+
 def skeleton(
     scene: Scene,
     name: str,
@@ -44,7 +107,7 @@ def skeleton(
     looks: int = 8,
     *,
     show_progress: bool | None = False,
-) -> tuple[Branch, ...]:
+) -> Skeleton:
     """Find the skeleton of a bifurcation diagram.
 
     Orbits are found from near returns at some of the values and followed up and down from there. An
@@ -68,8 +131,8 @@ def skeleton(
 
     Returns
     -------
-    tuple of Branch
-        Each rises in the parameter; sorted by the number of periods and the first value.
+    Skeleton
+        The branches.
 
     Raises
     ------
@@ -100,7 +163,7 @@ def skeleton(
     for k in tqdm(places, unit="value", disable=hidden):
         for orbit in near_returns(scene, periods, **{name: grid[k]}):
             take(k, orbit)
-    return tuple(sorted(branches, key=lambda branch: (branch.orbits[0].periods, branch.values[0])))
+    return Skeleton(tuple(sorted(branches, key=lambda branch: (branch.orbits[0].periods, branch.values[0]))))
 
 
 def near_returns(scene: Scene, periods: Sequence[int], **parameters: float) -> list[PeriodicOrbit]:

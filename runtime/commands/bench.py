@@ -14,7 +14,9 @@ EXAMPLES = ("synchain bench precision --quick", "synchain bench precision --out 
 
 def configure(parser: ArgumentParser) -> None:
     """Add names, folder and effort."""
-    parser.add_argument("names", metavar="NAME", nargs="*", help="benchmarks to run, e.g. precision (default: all)")
+    parser.add_argument(
+        "names", metavar="BENCHMARK", nargs="*", help="benchmarks to run, e.g. precision (default: all)"
+    )
     effort = parser.add_mutually_exclusive_group()
     effort.add_argument("--quick", action="store_true", help="fewer repetitions and shorter runs")
     effort.add_argument(

@@ -17,7 +17,7 @@ def configure(parser: ArgumentParser) -> None:
     """Add names, folder and effort."""
     parser.add_argument(
         "names",
-        metavar="NAME",
+        metavar="FIGURE",
         nargs="*",
         help="what to make, e.g. figure_4b, in short 4b, msf or thresholds (default: all)",
     )

@@ -172,9 +172,9 @@ def _check(skip: Reduction, arguments: Namespace) -> None:
 
 def _nothing_to_do(target: Path) -> int:
     """Say that the result is there already; the exit code of the run that made it."""
-    from ..results.open import open_result
+    from ..results.result import read_result
 
-    kept = open_result(target)
+    kept = read_result(target)
     print(f"{target} holds the result of this scene already; nothing was run (--overwrite runs it again)")
     print(f"  made with {kept.data.attrs['versions']}\n  {kept.message}")
     if not target.with_suffix(".png").exists():

@@ -27,7 +27,7 @@ def add_network(parser: ArgumentParser) -> None:
     parser.add_argument("--n", metavar="N", type=whole, help="number of oscillators (default: the scene's)")
     parser.add_argument(
         "--topology",
-        metavar="NAME",
+        metavar="TOPOLOGY",
         help="family of graphs (see: synchain topologies; default: the scene's, else chain)",
     )
     parser.add_argument(

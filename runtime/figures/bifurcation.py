@@ -78,7 +78,7 @@ def points(data: Diagram) -> tuple[np.ndarray, np.ndarray]:
     """
     result = data.result
     values = result.data[data.axis].values
-    x = result.section.sel(state="x_1").values
+    x = result.section.sel(component="x", node=1).values
     good = np.isfinite(x) & (result.status.values == Status.FINISHED)[:, None]
     cell = np.broadcast_to(np.arange(len(values))[:, None], x.shape)[good]
     return np.stack([values[cell], x[good]], axis=1), cell
@@ -87,13 +87,13 @@ def points(data: Diagram) -> tuple[np.ndarray, np.ndarray]:
 def table(data: Diagram) -> Table:
     """Return one row for each section point; a cell without any has one row with its status."""
     result = data.result
-    states = [str(name) for name in result.data.state.values]
+    states, section = result.scene.equations.state, result.states("section")
     rows: list[tuple[object, ...]] = []
     names = status_names(result.status)
     for k, value in enumerate(result.data[data.axis].values):
         count = int(result.section_count.values[k]) if names[k] == "finished" else 0
         for j in range(count):
-            rows.append((value, result.section_time.values[k, j], *result.section.values[k, j], names[k]))
+            rows.append((value, result.section_time.values[k, j], *section[k, j], names[k]))
         if count == 0:
             rows.append((value, None, *[None] * len(states), names[k]))
     return Table((data.axis, "time", *states, "status"), tuple(rows))

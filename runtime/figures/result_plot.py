@@ -28,7 +28,7 @@ MARKED = 60
 """Most cells that are each marked by a dot."""
 
 
-def draw_result(result: Result, axes: Axes | None = None, kind: str | None = None) -> Axes:
+def draw_result(result: Result, ax: Axes | None = None, kind: str | None = None) -> Axes:
     """Draw a result.
 
     Axes in excess of those of the plot are kept at their first value, the leading ones first. A
@@ -39,7 +39,7 @@ def draw_result(result: Result, axes: Axes | None = None, kind: str | None = Non
     ----------
     result : Result
         Result to draw.
-    axes : Axes, optional
+    ax : Axes, optional
         Axes to draw into; by default those of a new figure.
     kind : {"error", "section", "map", "phase", "end"}, optional
         Synchronisation error over one axis, section points over one axis or each over the one
@@ -62,8 +62,7 @@ def draw_result(result: Result, axes: Axes | None = None, kind: str | None = Non
     if chosen not in possible:
         raise ValueError(f"this result has no numbers for the plot {chosen!r}; it has them for: {', '.join(possible)}")
     with context():
-        if axes is None:
-            axes = new_figure(SIZE).add_subplot()
+        axes = new_figure(SIZE).add_subplot() if ax is None else ax
         cut, words = _cut(result, 2 if chosen == "map" else 1)
         drawn = {"error": _error, "section": _section, "map": _map, "phase": _phase, "end": _end}[chosen](
             axes, cut, result
@@ -125,10 +124,9 @@ def _error(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
 
 def _section(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
     """First state other than the section's, over the axis if there is one, else its return map."""
-    state = next(
-        (s for s in map(str, data.state.values) if s != result.scene.section.variable), str(data.state.values[0])
-    )
-    y = data.section.sel(state=state).values
+    states = result.scene.equations.state
+    state = next((name for name in states if name != result.scene.section.variable), states[0])
+    y = _state(data.section, state).values
     dots: dict[str, Any] = {
         "linestyle": "none",
         "marker": ".",
@@ -159,7 +157,7 @@ def _map(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
     elif "section_count" in data:
         values, label = data.section_count.where(data.status == Status.FINISHED), "section points"
     else:
-        values, label = data.end.isel(state=0), f"{symbol(str(data.state.values[0]))} at the end"
+        values, label = data.end.isel(component=0, node=0), f"{symbol(result.scene.equations.state[0])} at the end"
     down, along = (str(name) for name in values.dims)
     values = values.sortby([down, along])
     painted = axes.pcolormesh(values[along], values[down], values, shading="nearest", cmap="cividis", rasterized=True)
@@ -171,27 +169,34 @@ def _map(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
 def _phase(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
     """Velocity over position in the first cell; for many oscillators colours over time."""
     data = data.isel({name: 0 for name in data.status.dims})
-    own = [_own(data, i) for i in range(result.scene.n)]
+    own = [_own(result, i) for i in range(result.scene.n)]
     if len(own) > len(CYCLE):
-        values = data.trajectory.sel(state=[str(names[0]) for names in own])
-        time = data.trajectory_time.values
+        values = np.array([_state(data.trajectory, str(names[0])).values for names in own])
+        time = data.time.values
         painted = axes.pcolormesh(
-            time, np.arange(1, len(own) + 1), values.T, shading="nearest", cmap="cividis", rasterized=True
+            time, np.arange(1, len(own) + 1), values, shading="nearest", cmap="cividis", rasterized=True
         )
         axes.set(xlabel="time", ylabel="oscillator")
         axes.figure.colorbar(painted, ax=axes, label=_common(names[0] for names in own))
         return axes
     for i, names in enumerate(own):
-        x, y = (data.trajectory.sel(state=str(name)) for name in names)
+        x, y = (_state(data.trajectory, str(name)) for name in names)
         axes.plot(x, y, color=CYCLE[i % len(CYCLE)], linewidth=0.7, label="oscillator " * (i == 0) + str(i + 1))
     axes.set(xlabel=_common(names[0] for names in own), ylabel=_common(names[1] for names in own))
     return _legend(axes, result)
 
 
-def _own(data: xr.Dataset, i: int) -> tuple[NodeName, NodeName]:
+def _state(values: xr.DataArray, name: str) -> xr.DataArray:
+    """One state of a variable, by its name such as "x_1"."""
+    parts = NodeName.parse(name)
+    assert parts is not None
+    return values.sel(component=parts.base, node=parts.index + 1)
+
+
+def _own(result: Result, i: int) -> tuple[NodeName, NodeName]:
     """First two states of oscillator `i` (from 0); the first one twice if there is no other."""
-    states = (NodeName.parse(str(name)) for name in data.state.values)
-    names = [state for state in states if state and state.index == i]
+    equations = result.scene.equations
+    names = [NodeName(name, i) for name in equations.components if i in equations.holders(name)]
     return names[0], names[min(1, len(names) - 1)]
 
 
@@ -202,13 +207,13 @@ def _common(states: Iterable[NodeName]) -> str:
 
 def _end(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
     """Final states of every oscillator, over the axis if there is one."""
-    own = [_own(data, i) for i in range(result.scene.n)]
+    own = [_own(result, i) for i in range(result.scene.n)]
     first, second = (_common(names[k] for names in own) for k in (0, 1))
     along = _along(data, result) if data.status.ndim else None
     for i, names in enumerate(own, start=1):
-        end = data.end.sel(state=str(names[0]))
+        end = _state(data.end, str(names[0]))
         x = end if along is None else along[0]
-        y = data.end.sel(state=str(names[1])) if along is None else end
+        y = _state(data.end, str(names[1])) if along is None else end
         color = CYCLE[(i - 1) % len(CYCLE)]
         axes.plot(x, y, linestyle="none", marker=".", color=color, label="oscillator " * (i == 1) + str(i))
     labels = (

@@ -145,7 +145,7 @@ def _crossings(scene: Scene, name: str, orbits: list[PeriodicOrbit]) -> list[np.
         rtol=1e-11,
     )
     found = run(twice, show_progress=False)
-    each = found.section.sel(state="x_1").values
+    each = found.section.sel(component="x", node=1).values
     return [x[: (int(count) + 1) // 2] for x, count in zip(each, found.section_count.values, strict=True)]
 
 

@@ -75,6 +75,7 @@ from synchain.runtime import Plane as Plane
 from synchain.runtime import Probe as Probe
 from synchain.runtime import Progress as Progress
 from synchain.runtime import Result as Result
+from synchain.runtime import Skeleton as Skeleton
 from synchain.runtime import Status as Status
 from synchain.runtime import Streamed as Streamed
 from synchain.runtime import SweepFailed as SweepFailed

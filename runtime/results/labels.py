@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from synchain.codegen.driver.columns import Count, Point, Span, Sum
 from synchain.models.scenes.scene import Scene
@@ -21,13 +23,18 @@ if TYPE_CHECKING:
 
 __all__ = [
     "COUNTS",
+    "DRIVE_PHASE",
+    "END_TIME",
     "MEANINGS",
+    "STATE",
     "SUMS",
+    "States",
     "Variable",
     "alike",
     "changed",
     "coordinates",
     "dimensions",
+    "labelled",
     "provenance",
     "scene_of",
     "variables",
@@ -35,6 +42,15 @@ __all__ = [
 
 Variable = tuple[str, tuple[str, ...], np.ndarray]
 """Name, dimensions besides those of the sweep, values with one row for each cell."""
+
+STATE = ("component", "node")
+"""The dimensions of a state."""
+
+END_TIME, DRIVE_PHASE = "end_time", "drive_phase"
+"""Coordinates of each cell: when it stopped, and how far into a period of the drive that was."""
+
+TIMES = ("time", "section_time", END_TIME, DRIVE_PHASE)
+"""Variables that are coordinates of others."""
 
 TOLD = ("scene", "title", "equations", "kernel", "versions")
 """Attributes of a result that are text."""
@@ -49,11 +65,12 @@ MEANINGS = {
     "periods_skipped": "periods of the drive jumped over in a cell that repeats itself",
     "end": "state at the end of the window",
     "end_time": "non-dimensional time at which the cell stopped",
+    "drive_phase": "part of a drive period that had passed at end_time; NaN if the drive has no period, 0 without drive",
     "section_count": "number of section points in the window",
     "section_time": "times of the section points",
     "section": "states at the section points, NaN where there are fewer",
     "trajectory": "states at equally spaced times of the window",
-    "trajectory_time": "times of the trajectory",
+    "time": "times of the trajectory",
     "transversal_exponent": "largest transversal exponent of the synchronous state",
     "transversal_stderr": "standard error of the transversal exponent",
     "ended_early": "1 where the cell ended before its window did, certain to stay synchronous",
@@ -77,6 +94,46 @@ SUMS = {
 """The columns of `counts` and of `sums` by the names of their variables."""
 
 
+@dataclass(frozen=True, slots=True)
+class States:
+    """Where each state of a network stands in a table of components and nodes.
+
+    Attributes
+    ----------
+    components : tuple of str
+    nodes : int
+    rows, columns : ndarray of int, shape (states,)
+        Component and node, counted from 0, of each state in the order of the equations.
+    """
+
+    components: tuple[str, ...]
+    nodes: int
+    rows: np.ndarray
+    columns: np.ndarray
+
+    @classmethod
+    def of(cls, scene: Scene) -> States:
+        """Return the places of a scene's states."""
+        equations = scene.equations
+        holders = [equations.holders(name) for name in equations.components]
+        rows = np.repeat(np.arange(len(holders)), [len(nodes) for nodes in holders])
+        columns = np.array([node for nodes in holders for node in nodes], dtype=int)
+        return cls(tuple(equations.components), equations.n, rows, columns)
+
+    def table(self, values: np.ndarray) -> np.ndarray:
+        """Return states (…, states) as (…, components, nodes); NaN where a node lacks a component."""
+        shape = (*values.shape[:-1], len(self.components), self.nodes)
+        if values.shape[-1] == shape[-2] * shape[-1]:
+            return values.reshape(shape)
+        table = np.full(shape, np.nan)
+        table[..., self.rows, self.columns] = values
+        return table
+
+    def flat(self, table: np.ndarray) -> np.ndarray:
+        """Return states (…, components, nodes) as (…, states); the way back of `table`."""
+        return np.asarray(table[..., self.rows, self.columns])
+
+
 def variables(
     scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: Certificate | None, most: int
 ) -> Iterator[Variable]:
@@ -95,8 +152,10 @@ def variables(
     """
     for name in ("status", "steps", "rejected", "periods_skipped"):
         yield name, (), buffers.counts[:, COUNTS[name]].astype(np.int32)
-    yield "end", ("state",), buffers.end
-    yield "end_time", (), buffers.sums[:, Sum.STOPPED_AT]
+    states = States.of(scene)
+    yield "end", STATE, states.table(buffers.end)
+    yield END_TIME, (), buffers.sums[:, Sum.STOPPED_AT]
+    yield DRIVE_PHASE, (), _drive_phase(scene, spans, buffers.sums[:, Sum.STOPPED_AT])
     if "sync_error" in scene.record:
         for name in ("sync_error", "sync_error_max", "sync_error_end"):
             yield name, (), buffers.sums[:, SUMS[name]]
@@ -109,12 +168,20 @@ def variables(
         points[:, :room] = buffers.points[:, :room]
         yield "section_count", (), buffers.point_counts.astype(np.int32)
         yield "section_time", ("point",), points[:, :, Point.TIME]
-        yield "section", ("point", "state"), points[:, :, Point.STATE :]
+        yield "section", ("point", *STATE), states.table(points[:, :, Point.STATE :])
     if "trajectory" in scene.record:
         parts = np.linspace(0.0, 1.0, scene.samples) if scene.samples > 1 else np.zeros(1)
         start, end = spans[:, Span.START, None], spans[:, Span.END, None]
-        yield "trajectory_time", ("sample",), start + (end - start) * parts
-        yield "trajectory", ("sample", "state"), buffers.samples
+        yield "time", ("sample",), start + (end - start) * parts
+        yield "trajectory", ("sample", *STATE), states.table(buffers.samples)
+
+
+def _drive_phase(scene: Scene, spans: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """How far (cells,) into a period of the drive each cell stopped, from 0 to 1."""
+    if not scene.forced:
+        return np.zeros(len(time))
+    period = np.where(spans[:, Span.PERIOD] > 0.0, spans[:, Span.PERIOD], np.nan)
+    return np.asarray(np.mod(time / period, 1.0))
 
 
 def dimensions(scene: Scene) -> tuple[str, ...]:
@@ -134,11 +201,37 @@ def _certified(scene: Scene, spans: np.ndarray, buffers: Buffers, certificate: C
 
 
 def coordinates(scene: Scene) -> dict[str, Any]:
-    """Return the coordinates of a result: the axes and the names of the states."""
-    coords: dict[str, Any] = {"state": list(scene.equations.state)}
+    """Return the coordinates of a result: the axes, the components and the numbers of the nodes."""
+    coords: dict[str, Any] = {"component": list(scene.equations.components), "node": np.arange(1, scene.n + 1)}
     for axis in scene.axes:
         coords[axis.name] = ("cell" if scene.zipped else axis.name, np.array(axis.values))
     return coords
+
+
+def labelled(
+    scene: Scene, found: Iterable[Variable], shape: tuple[int, ...], attributes: Mapping[str, object]
+) -> xr.Dataset:
+    """Return the dataset of variables with one row for each cell.
+
+    Parameters
+    ----------
+    scene : Scene
+    found : iterable of Variable
+    shape : tuple of int
+        Number of cells along each dimension of the sweep; if it is not that of the scene, the values
+        of the axes are cut to it.
+    attributes : mapping
+    """
+    dims, coords = dimensions(scene), coordinates(scene)
+    for axis in scene.axes:
+        dim, values = coords[axis.name]
+        coords[axis.name] = (dim, values[: shape[dims.index(dim)]])
+    made = {
+        name: ((*dims, *more), values.reshape((*shape, *values.shape[1:])), {"long_name": MEANINGS[name]})
+        for name, more, values in found
+    }
+    coords |= {name: made.pop(name) for name in TIMES if name in made}
+    return xr.Dataset(made, coords, dict(attributes))
 
 
 def scene_of(attributes: Mapping[str, Any]) -> Scene:

@@ -23,7 +23,7 @@ from ..support.files import understood, whole_file
 from ..support.netcdf import Sheet, seal, unsealed
 from .block_log import BlockLog, Description
 from .certificate import VERDICTS, Certificate
-from .labels import MEANINGS, Variable, coordinates, dimensions, scene_of, variables
+from .labels import Variable, labelled, scene_of, variables
 from .result import Result, gather
 
 __all__ = ["certificate_of", "describe_sweep", "layout_of", "partial_path", "read_partial", "write_result"]
@@ -155,18 +155,9 @@ def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> d
 def _template(reader: _Reader) -> xr.Dataset:
     """The result of the first cell alone."""
     scene = reader.scene
-    one = np.arange(1)
     first = Buffers(*(array[:1] for array in reader.buffers(0).arrays()))
-    dims, ones = dimensions(scene), (1,) * len(scene.shape)
-    data = {
-        name: ((*dims, *more), values[:1].reshape((*ones, *values.shape[1:])), {"long_name": MEANINGS[name]})
-        for name, more, values in reader.variables(one, first)
-    }
-    coords = coordinates(scene)
-    for axis in scene.axes:
-        dim, values = coords[axis.name]
-        coords[axis.name] = (dim, values[:1])
-    return unsealed(xr.Dataset(data, coords, reader.log.about["attributes"]))
+    found = reader.variables(np.arange(1), first)
+    return unsealed(labelled(scene, found, (1,) * len(scene.shape), reader.log.about["attributes"]))
 
 
 def _verdicts(name: str, values: np.ndarray) -> list[tuple[str, int]]:

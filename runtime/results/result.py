@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,35 +15,42 @@ from synchain.models.inputs.checks import check_instance
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.buffers import Buffers
-from ..support.files import netcdf_data, understood, whole_file
-from ..support.netcdf import DIGEST, seal, unsealed
+from ..support.files import understood
 from ..support.status import Status
 from .certificate import Certificate
-from .labels import COUNTS, MEANINGS, SUMS, alike, changed, coordinates, dimensions, scene_of, variables
+from .labelled import Labelled
+from .labels import COUNTS, STATE, SUMS, States, alike, changed, dimensions, labelled, scene_of, variables
+from .store import read_data, write_data
 
 if TYPE_CHECKING:
+    import os
+
+    from matplotlib.axes import Axes
+
     from synchain.models.dynamics.equations import Equations
 
-__all__ = ["Result", "attributes_of", "gather", "read_result"]
+__all__ = ["Result", "gather", "read_result", "result_of"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Result:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Result(Labelled):
     """Labelled arrays of a run; a variable `name` of the data is also an attribute:
     `result.sync_error`.
 
     Attributes
     ----------
     data : xarray.Dataset
-        Its dimensions are the names of the axes (or "cell" if the axes are zipped), then "state",
-        "point" or "sample".  Its attributes say how the result came about.
+        Its dimensions are the names of the axes (or "cell" if the axes are zipped), then "sample" or
+        "point" of a record, then "component" and "node" of a state: `result.end.sel(component="v",
+        node=3)`.  A state that a node of another kind does not have is NaN.  The times of samples
+        and points are the coordinates `time` and `section_time`.  Its attributes say how the result
+        came about.
     scene : Scene
         The scene, with its axes.
 
     Notes
     -----
-    Every cell has a `status`; `synchain.runtime.Status` names the codes.  Times are
-    non-dimensional.
+    Every cell has a `status`; `synchain.runtime.Status` names the codes.  Times are non-dimensional.
     """
 
     data: xr.Dataset
@@ -75,17 +80,49 @@ class Result:
         ]
         return "; ".join(parts)
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a netCDF file that opens in xarray and in `open_result`; it appears whole or not at
-        all.
+    @property
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """The scene, the cells and how they ended, the variables."""
+        sizes = ", ".join(f"{name} {size}" for name, size in self.data.sizes.items())
+        cells = self.scene.cells
+        return (
+            ("scene", str(self.data.attrs.get("title", repr(self.scene)))),
+            ("cells", self.message if cells > 1 else self.message.removeprefix("1 cell: ")),
+            ("dimensions", sizes),
+            ("variables", ", ".join(map(str, self.data.data_vars))),
+        )
 
-        Its attribute `digest` is the SHA-256 of the file, by which `open_result` and `stream` see
-        whether it was damaged.
+    def plot(self, ax: Axes | None = None, kind: str | None = None) -> Axes:
+        """Draw the result.
+
+        Parameters
+        ----------
+        ax : Axes, optional
+            Matplotlib axes; by default those of a new figure.
+        kind : {"error", "section", "map", "phase", "end"}, optional
+            Synchronisation error over one axis, section points over one axis or each over the one
+            before, colours over two axes, trajectories, or final states. By default the most
+            specific kind that the axes and records allow.
+
+        Returns
+        -------
+        Axes
+            Nothing is shown on a screen.
+
+        Raises
+        ------
+        ValueError
+            If the kind is unknown, or if the result has no numbers for it.
         """
-        with whole_file(path) as temporary:
-            unsealed(self.data).to_netcdf(temporary, engine="scipy", format="NETCDF3_64BIT")
-            with open(temporary, "r+b") as file:
-                seal(file)
+        return self._drawn(ax, kind=kind)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the data as they are: a result is its dataset (see `Labelled.save` for the forms)."""
+        write_data(self.data, path)
+
+    def states(self, name: str = "end") -> np.ndarray:
+        """Return the states (…, states) of a variable in the order of the equations: x_1 … x_n, v_1 …"""
+        return States.of(self.scene).flat(self.data[name].values)
 
     def belongs_to(self, scene: Scene) -> bool:
         """True if the scene is this result's but for its title."""
@@ -138,49 +175,43 @@ class Result:
     def _fill(self, buffers: Buffers) -> None:
         """Copy all cells into the buffers; the way back of `gather`."""
         cells, data = self.scene.cells, self.data
+        states = States.of(self.scene)
         for source, target in (("end", buffers.end), ("trajectory", buffers.samples)):
             if source in data:
-                target[:] = data[source].values.reshape(target.shape)
+                target[:] = states.flat(data[source].values).reshape(target.shape)
         for table, columns in ((buffers.counts, COUNTS), (buffers.sums, SUMS)):
             for name, column in columns.items():
                 if name in data:
                     table[:, column] = data[name].values.reshape(cells)
         if "section" in data:
-            points = np.concatenate([data.section_time.values[..., None], data.section.values], axis=-1)
+            points = np.concatenate([data.section_time.values[..., None], states.flat(data.section.values)], axis=-1)
             points = points.reshape(cells, -1, points.shape[-1])
             buffers.widen(points.shape[1])
             buffers.points[:, : points.shape[1]] = points
 
 
 def read_result(path: Path) -> Result:
-    """Return the result that a netCDF file holds.
+    """Return the result that a file of `Result.save` or `stream` holds.
 
     Raises
     ------
     OSError, ValueError
         If the file is damaged or holds no result.
     """
-    with netcdf_data(path) as file:
-        data = file.load()
-    data.attrs = attributes_of(data.attrs, path)
+    return result_of(read_data(path), path)
+
+
+def result_of(data: xr.Dataset, path: Path) -> Result:
+    """Return the result of the data of a file; ValueError if they are none."""
     with understood(path):
         scene = scene_of(data.attrs)
         status = data.get("status")
         if status is None or status.dims != dimensions(scene) or status.shape != scene.shape:
             raise ValueError("its variables are not those of its scene")
         list(map(Status, np.unique(status.values).tolist()))
+        if "end" not in data or data.end.dims[-2:] != STATE:
+            raise ValueError("an earlier version wrote it, with states in one row; run its scene again")
     return Result(data, scene)
-
-
-def attributes_of(attributes: Mapping[object, object], path: Path) -> dict[str, object]:
-    """The attributes of a result's file without its digest; a RuntimeWarning says if there is none."""
-    if "scene" in attributes and DIGEST not in attributes:
-        warnings.warn(
-            f"{path} has no digest, so damage of its numbers cannot be seen; open it and save it with Result.save",
-            RuntimeWarning,
-            stacklevel=3,
-        )
-    return {str(name): value for name, value in attributes.items() if name != DIGEST}
 
 
 def gather(
@@ -202,9 +233,5 @@ def gather(
         Results of all cells, of the whole network.
     certificate : Certificate, optional
     """
-    dims, shape = dimensions(scene), scene.shape
-    data = {
-        name: ((*dims, *more), values.reshape((*shape, *values.shape[1:])), {"long_name": MEANINGS[name]})
-        for name, more, values in variables(scene, spans, buffers, certificate, buffers.most_points)
-    }
-    return Result(xr.Dataset(data, coordinates(scene), dict(attributes)), scene)
+    found = list(variables(scene, spans, buffers, certificate, buffers.most_points))
+    return Result(labelled(scene, found, scene.shape, attributes), scene)

@@ -13,12 +13,14 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+import xarray as xr
 
 from synchain.models.dynamics.variational import Variation, clustered
 from synchain.models.graphs.clusters import Clusters, clusters
 from synchain.models.scenes.scene import Scene
 
 from ..cells.initial_modes import with_modes
+from ..results.labelled import Labelled, dataset
 from .averages import Averaging, Batches
 from .exponents import single_cell
 from .orbits import unit_of_time
@@ -35,8 +37,8 @@ class BlockVerdict(StrEnum):
     UNSTABLE = "unstable"
 
 
-@dataclass(frozen=True, slots=True)
-class ClusterExponents:
+@dataclass(frozen=True, slots=True, repr=False)
+class ClusterExponents(Labelled):
     """Transversal exponents of a cluster state.
 
     Parameters
@@ -65,6 +67,39 @@ class ClusterExponents:
     motion_error: float
     separation: np.ndarray
     time: float
+
+    @property
+    def data(self) -> xr.Dataset:
+        """Exponents over the blocks, and the distances of the clusters."""
+        return dataset(
+            {
+                "exponent": (("block",), self.exponent, "largest transversal exponent per unit of time"),
+                "stderr": (("block",), self.stderr, "standard errors"),
+                "verdict": (("block",), [verdict.value for verdict in self.verdicts], "stability of the block"),
+                "separation": (("cluster", "other"), self.separation, "largest distance of two clusters"),
+                "class": (("node",), np.array(self.state.classes), "cluster of each node, counted from 0"),
+                "motion": ((), self.motion, "largest exponent of the clusters' own motion"),
+            },
+            {"node": np.arange(1, len(self.state.classes) + 1)},
+        )
+
+    @property
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """The clusters, each block with its verdict, and what has merged."""
+        members = [", ".join(str(i + 1) for i in nodes) for nodes in self.state.members]
+        blocks = [
+            f"{verdict} ({exponent:.4f} ± {error:.1g}): clusters {', '.join(str(c + 1) for c in block.clusters)}"
+            for block, exponent, error, verdict in zip(
+                self.state.blocks, self.exponent, self.stderr, self.verdicts, strict=True
+            )
+        ]
+        merged = "; ".join(f"{a + 1} and {b + 1}" for a, b in self.merged)
+        return (
+            ("clusters", "; ".join(f"{k}: {nodes}" for k, nodes in enumerate(members, 1))),
+            *((f"block {k}", words) for k, words in enumerate(blocks, 1)),
+            ("own motion", f"{self.motion:.4f} ± {self.motion_error:.1g}"),
+            *([("merged", merged)] if merged else []),
+        )
 
     @property
     def verdicts(self) -> tuple[BlockVerdict, ...]:

@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import xarray as xr
 
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.families import topology
@@ -24,6 +25,7 @@ from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import with_parameters
 from ..prediction.intervals import Interval
+from ..results.labelled import Labelled, dataset, ends_of, words_of
 from ..support.arrays import row as row_of
 from ..support.threads import worker_count
 from .attractor import Attractor, find_attractor
@@ -33,8 +35,8 @@ from .orbits import Orbits
 __all__ = ["Exponents", "coupled_cell", "exponents", "group_by_attractor", "initial_states", "single_cell"]
 
 
-@dataclass(frozen=True, slots=True)
-class Exponents:
+@dataclass(frozen=True, slots=True, repr=False)
+class Exponents(Labelled):
     """Largest transversal exponent at each strength.
 
     The mean is over the starts that reached the attractor found most often.
@@ -65,6 +67,34 @@ class Exponents:
     starts: int
     by_start: np.ndarray = field(repr=False)
     attractors: tuple[Attractor, ...] = ()
+
+    @property
+    def data(self) -> xr.Dataset:
+        """Exponents and their errors over the modes, with alpha and beta as coordinates."""
+        modes = {"alpha": ("mode", self.alpha.real)}
+        if np.iscomplexobj(self.alpha):
+            modes["beta"] = ("mode", self.alpha.imag)
+        return dataset(
+            {
+                "exponent": (("mode",), self.exponent, "largest transversal exponent per unit of time"),
+                "stderr": (("mode",), self.stderr, "standard error of the exponent"),
+                "by_start": (("start", "mode"), self.by_start, "exponents of each start"),
+                "attractor": (("start",), [a.kind for a in self.attractors], "motion of each start"),
+            },
+            modes,
+        )
+
+    @property
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Strengths, stable ranges, motion and the length of the average."""
+        stable = () if np.iscomplexobj(self.alpha) else (("negative for alpha", words_of(self.intervals)),)
+        return (
+            ("strengths", f"{len(self.alpha)}, {ends_of(self.alpha)}"),
+            *stable,
+            ("smallest, largest", f"{self.exponent.min():.4f}, {self.exponent.max():.4f}"),
+            ("motion", ", ".join(dict.fromkeys(a.kind for a in self.attractors))),
+            ("average", f"{self.time:.6g} units of time for each of {self.starts} starts"),
+        )
 
     @property
     def averaged(self) -> int:

@@ -19,12 +19,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import xarray as xr
 
 from synchain.models.dynamics.variational import PHASE, Variation, network_variation, phase_shifted, with_volume
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
 from ..cells.initial_modes import with_modes
+from ..results.labelled import Labelled, dataset
 from .averages import Averaging, Batches
 from .exponents import single_cell
 from .orbits import unit_of_time
@@ -45,8 +47,8 @@ From the first on it is clear of the error, below the second it is lost.
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Lyapunov:
+@dataclass(frozen=True, slots=True, repr=False)
+class Lyapunov(Labelled):
     """Lyapunov exponents of a network.
 
     Exponents that differ by less than about 1/time are not separated yet: they share their sum, and
@@ -82,6 +84,30 @@ class Lyapunov:
     time: float
     block: float
     components: int
+
+    @property
+    def data(self) -> xr.Dataset:
+        """Exponents over their number, and the divergence."""
+        return dataset(
+            {
+                "exponent": (("number",), self.exponent, "Lyapunov exponents per unit of time"),
+                "stderr": (("number",), self.stderr, "standard errors"),
+                "resolved": (("number",), self.resolved, "whether the direction could be followed"),
+                "divergence": ((), self.divergence, "mean divergence along the orbit"),
+            },
+            {"number": np.arange(1, len(self.exponent) + 1)},
+        )
+
+    @property
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """The exponents with errors, their sum, the dimension and the length of the average."""
+        shown = [f"{x:.5g} ± {e:.1g}" for x, e in zip(self.exponent[:8], self.stderr[:8], strict=True)]
+        return (
+            ("exponents", ", ".join([*shown, *(["…"] if len(self.exponent) > len(shown) else [])])),
+            ("divergence", f"{self.divergence:.5g} ± {self.divergence_error:.1g}"),
+            ("Kaplan-Yorke dimension", f"{self.dimension:.4g}"),
+            ("average", f"{self.time:.6g} units of time"),
+        )
 
     @property
     def rest(self) -> float:

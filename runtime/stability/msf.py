@@ -13,12 +13,14 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
+import xarray as xr
 
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..prediction.intervals import Interval
 from ..prediction.synchronisability import Window, windows
+from ..results.labelled import Labelled, dataset, ends_of, words_of
 from ..support.arrays import row
 from .exponents import Exponents, exponents
 
@@ -42,8 +44,8 @@ class StabilityClass(StrEnum):
     SEVERAL = "several intervals"
 
 
-@dataclass(frozen=True, slots=True)
-class MSF:
+@dataclass(frozen=True, slots=True, repr=False)
+class MSF(Labelled):
     """The function on a line of real strengths.
 
     Parameters
@@ -59,6 +61,44 @@ class MSF:
     scene: Scene
     alpha: np.ndarray
     fine: Exponents
+
+    @property
+    def data(self) -> xr.Dataset:
+        """The function over alpha, and the intervals where it is negative."""
+        return dataset(
+            {
+                "exponent": (("alpha",), self.exponent, "largest transversal exponent per unit of time"),
+                "stderr": (("alpha",), self.stderr, "standard error of the exponent"),
+                "interval": (("range", "end"), np.reshape(self.intervals, (-1, 2)), "alpha with a negative exponent"),
+                "interval_error": (("range", "end"), np.reshape(self.uncertainties, (-1, 2)), "standard errors"),
+                "window": (
+                    ("window_number", "end"),
+                    np.reshape([(w.low, w.high) for w in self._known_windows], (-1, 2)),
+                    "sigma at which every mode of the network dies out",
+                ),
+            },
+            {"alpha": self.alpha, "end": ["low", "high"]},
+            self.scene,
+        )
+
+    @property
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Scene, class, stable ranges of alpha and of sigma, motion."""
+        return (
+            ("scene", repr(self.scene)),
+            ("class", f"{self.kind}, for alpha {ends_of(self.fine.alpha)}"),
+            ("negative for alpha", words_of(self.intervals, self.errors)),
+            ("sigma", words_of([(w.low, w.high) for w in self._known_windows])),
+            ("motion", ", ".join(dict.fromkeys(self.attractors))),
+            ("average", f"{self.fine.time:.6g} units of time for each of {self.fine.starts} starts"),
+        )
+
+    @property
+    def _known_windows(self) -> tuple[Window, ...]:
+        """The windows; none if the network is a single node or has complex eigenvalues."""
+        graph = self.scene.topology
+        real = graph.undirected or not any(isinstance(value, complex) for value in graph.spectrum.values)
+        return self.windows if graph.links and real else ()
 
     @property
     def exponent(self) -> np.ndarray:
@@ -143,8 +183,8 @@ class MSF:
         }
 
 
-@dataclass(frozen=True, slots=True)
-class Plane:
+@dataclass(frozen=True, slots=True, repr=False)
+class Plane(Labelled):
     """The function on a rectangle of complex strengths alpha + i beta.
 
     Parameters
@@ -172,6 +212,30 @@ class Plane:
     stderr: np.ndarray
     attractors: tuple[str, ...]
     time: float
+
+    @property
+    def data(self) -> xr.Dataset:
+        """The function over alpha and beta."""
+        return dataset(
+            {
+                "exponent": (("alpha", "beta"), self.exponent, "largest transversal exponent per unit of time"),
+                "stderr": (("alpha", "beta"), self.stderr, "standard error of the exponent"),
+                "attractor": (("start",), list(self.attractors), "motion of each start"),
+            },
+            {"alpha": self.alpha, "beta": self.beta},
+            self.scene,
+        )
+
+    @property
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Scene, grid, share of stable strengths, motion."""
+        return (
+            ("scene", repr(self.scene)),
+            ("grid", f"{len(self.alpha)} alpha {ends_of(self.alpha)}, {len(self.beta)} beta {ends_of(self.beta)}"),
+            ("negative", f"{float((self.exponent < 0).mean()):.1%} of the grid"),
+            ("motion", ", ".join(dict.fromkeys(self.attractors))),
+            ("average", f"{self.time:.6g} units of time for each start"),
+        )
 
     @property
     def contours(self) -> tuple[np.ndarray, ...]:

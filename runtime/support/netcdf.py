@@ -51,7 +51,7 @@ class Sheet:
         with netcdf_file(io.BytesIO(_bytes(template)), mmap=False) as made:
             self.sizes = {name: lengths.get(name, size) for name, size in made.dimensions.items()}
             shapes = {name: tuple(self.sizes[d] for d in v.dimensions) for name, v in made.variables.items()}
-            order = sorted(made.variables, key=lambda name: shapes[name], reverse=True)
+            order = sorted(map(str, template.variables), key=lambda name: shapes[name], reverse=True)
             variables = {name: made.variables[name] for name in order}
             self.types = {name: np.dtype(v.typecode()).newbyteorder(">") for name, v in variables.items()}
             heads = [self._head(name, v, shapes[name]) for name, v in variables.items()]

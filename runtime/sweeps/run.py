@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from concurrent.futures import Executor
 
+import xarray as xr
+
 from synchain.models.inputs.checks import check_instance
-from synchain.models.scenes.scene import Scene
+from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import with_axes
 from ..cells.reduce import Reduction, as_reduction
@@ -14,6 +16,7 @@ from .memory import Memory
 from .pool import Execution
 from .prepare import prepare
 from .progress import Hook
+from .start import started
 
 __all__ = ["run"]
 
@@ -23,6 +26,7 @@ def run(
     *,
     workers: int | None = None,
     resume: Result | None = None,
+    start: Result | xr.DataArray | None = None,
     show_progress: bool | None = None,
     width: int | None = None,
     reduce: bool | Reduction = True,
@@ -40,6 +44,11 @@ def run(
         Number of threads (default: all cores).
     resume : Result, optional
         An earlier, unfinished result of the same scene, whose finished cells are kept.
+    start : Result or DataArray, optional
+        Start from the states at the end of one cell: a result of one cell, or
+        `result.end.isel(sigma=-1)`.  Components and nodes must be those of the scene.  Time counts
+        from 0 again, so the drive must have been at the beginning of a period; the attribute
+        `start_time` of the data says which time of the earlier run that was.
     show_progress : bool, optional
         Whether to show a bar; by default a bar on terminals and a line a minute elsewhere.
     width : int, optional
@@ -66,13 +75,16 @@ def run(
     Raises
     ------
     ValueError
-        If an axis is unknown, if `resume` or `reduce` belongs to another scene, or if the sweep
-        does not fit into memory.
+        If an axis is unknown, if `resume` or `reduce` belongs to another scene, if `start` has
+        other labels or the drive was amid a period, or if the sweep does not fit into memory.
     SweepInterrupted
         On Ctrl-C; its `result` has the cells that had finished.
     SweepFailed
         If the workers are lost; its `result` has the cells that had finished.
     """
+    begun = None
+    if start is not None:
+        scene, begun = started(a_scene(scene), start)
     scene = with_axes(run, scene, axes)
     if resume is not None:
         check_instance("resume", resume, Result, "an earlier Result, e.g. from open_result")
@@ -83,4 +95,5 @@ def run(
     prepared = prepare(reduction, execution, certified, width=width)
     memory = Memory.of(prepared, resume)
     memory.run(reporter)
-    return memory.result()
+    result = memory.result()
+    return result if begun is None else Result(result.data.assign_attrs(start_time=begun), result.scene)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 
 from synchain.codegen.kernels.installation import InstallationError
 from synchain.codegen.kernels.processor import told_apart
@@ -22,9 +23,11 @@ from ..cells.keywords import with_axes
 from ..cells.layout import Layout
 from ..cells.reduce import Reduction, as_reduction
 from ..results.block_log import BlockLog
+from ..results.labelled import Labelled
 from ..results.labels import alike, changed, scene_of
 from ..results.partial import certificate_of, describe_sweep, layout_of, partial_path, write_result
-from ..results.result import attributes_of
+from ..results.result import Result, read_result
+from ..results.store import CHOICES, attributes_of
 from ..support.files import check_replaceable, drop_leftovers, netcdf_data, understood
 from ..support.status import Status
 from .errors import SweepFailed, SweepInterrupted
@@ -37,8 +40,8 @@ from .scheduler import BlockScheduler
 __all__ = ["Streamed", "claim", "stream"]
 
 
-@dataclass(frozen=True, slots=True)
-class Streamed:
+@dataclass(frozen=True, slots=True, repr=False)
+class Streamed(Labelled):
     """A finished run: its file, how its cells ended, and how many have each verdict (certified runs
     only).
     """
@@ -46,6 +49,27 @@ class Streamed:
     path: Path
     progress: Progress
     verdicts: Mapping[str, int]
+
+    @property
+    def result(self) -> Result:
+        """The result in memory, read from its file."""
+        return read_result(self.path)
+
+    @property
+    def data(self) -> xr.Dataset:
+        """The dataset in memory, read from its file."""
+        return self.result.data
+
+    @property
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """File, cells and verdicts."""
+        ended = "; ".join(f"{count} cells: {status.message}" for status, count in self.progress.statuses.items())
+        verdicts = "; ".join(f"{count} {words}" for words, count in self.verdicts.items())
+        return ("file", str(self.path)), ("cells", ended), *([("verdicts", verdicts)] if verdicts else [])
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the result to another file (see `Result.save`); all of it is read into memory."""
+        self.result.save(path)
 
     @property
     def success(self) -> bool:
@@ -154,6 +178,8 @@ def claim(
         check_flag(name, value)
     target = check_path("path", path)
     partial = partial_path(target)
+    if target.suffix.lower() in CHOICES:
+        raise ValueError(f"path: found {str(target)!r}; expected another ending: stream writes netCDF-3; end it in .nc")
     if target.suffix.lower() == partial.suffix:
         raise ValueError(
             f"path: found {str(target)!r}, the name of an unfinished run; expected that of a result; end it in .nc"

@@ -14,6 +14,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import xarray as xr
 
 from synchain.models.inputs.checks import check_integer, check_number, check_table
 from synchain.models.mechanics.friction import SLIP
@@ -22,6 +23,8 @@ from synchain.models.scenes.scene import Scene, a_scene
 from ..cells.keywords import with_parameters
 from ..cells.plan import Planner
 from ..cells.reduce import reduce_scene
+from ..results.labelled import Labelled, dataset
+from ..results.labels import STATE, States
 from ..support.arrays import row
 from ..support.status import Status
 from ..sweeps.pool import Execution
@@ -36,8 +39,8 @@ SAMPLE_LIMIT = 10_000_000
 """Most starts of one call."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Basin:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Basin(Labelled):
     """Which random starts of a scene's network synchronise.
 
     start (samples, dimension), in the order of the state; error (samples,): mean synchronisation
@@ -52,6 +55,26 @@ class Basin:
     start: np.ndarray = field(repr=False)
     error: np.ndarray = field(repr=False)
     status: np.ndarray = field(repr=False)
+
+    @property
+    def data(self) -> xr.Dataset:
+        """Start, error, status and verdict of each sample."""
+        states = States.of(self.scene)
+        return dataset(
+            {
+                "initial": (("sample", *STATE), states.table(self.start), "initial states"),
+                "error": (("sample",), self.error, "mean synchronisation error, inf where a cell did not finish"),
+                "status": (("sample",), self.status, "how the cell ended"),
+                "synchronous": (("sample",), self.synchronous, "whether the start synchronised"),
+            },
+            {"component": list(states.components), "node": np.arange(1, states.nodes + 1)},
+            self.scene,
+        )
+
+    @property
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Scene, share with its interval, how cells ended."""
+        return ("scene", repr(self.scene)), *(("starts", words) for words in self.message.split("; "))
 
     @property
     def samples(self) -> int:

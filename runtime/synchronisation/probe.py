@@ -17,6 +17,7 @@ from fractions import Fraction
 
 import numpy as np
 import sympy as sp
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from synchain.models.dynamics.equations import Equations
@@ -27,6 +28,7 @@ from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.choice import chosen_for_rows
 from ..cells.plan import Plan, Planner, control_of
+from ..results.labelled import Labelled, dataset, ends_of
 from ..support.arrays import numbers
 from ..sweeps.job import RowsSpec
 from ..sweeps.pool import Execution
@@ -41,8 +43,8 @@ MODE_BETA = sp.Symbol("mode_beta", real=True)
 """Real and imaginary part of a mode's strength alpha + i beta = -sigma gamma."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Probe:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Probe(Labelled):
     """Verdicts of the probe over complex strengths alpha + i beta.
 
     alpha, beta, error and share have one shape: error is the median over the starts of the mean
@@ -57,6 +59,29 @@ class Probe:
     error: np.ndarray = field(repr=False)
     share: np.ndarray = field(repr=False)
     status: np.ndarray = field(repr=False)
+
+    @property
+    def data(self) -> xr.Dataset:
+        """Verdicts over the common shape of alpha and beta, which are coordinates."""
+        dims = tuple(f"dim_{k}" for k in range(self.alpha.ndim))
+        return dataset(
+            {
+                "error": (dims, self.error, "median of the mean synchronisation errors"),
+                "share": (dims, self.share, "part of the starts that synchronised"),
+                "status": ((*dims, "start"), self.status, "how the cell ended"),
+            },
+            {"alpha": (dims, self.alpha), "beta": (dims, self.beta)},
+            self.scene,
+        )
+
+    @property
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Scene, strengths and how many synchronise."""
+        return (
+            ("scene", repr(self.scene)),
+            ("strengths", f"{self.alpha.size}: alpha {ends_of(self.alpha)}, beta {ends_of(self.beta)}"),
+            ("synchronous", f"{int(self.synchronous.sum())} of {self.synchronous.size}"),
+        )
 
     @property
     def synchronous(self) -> np.ndarray:

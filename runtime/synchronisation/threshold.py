@@ -15,6 +15,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
 import numpy as np
+import xarray as xr
 
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.families import topology
@@ -27,6 +28,7 @@ from ..cells.keywords import with_parameters
 from ..cells.plan import Planner
 from ..cells.reduce import reduce_scene
 from ..prediction.intervals import Interval, intersect, refine, scale
+from ..results.labelled import Labelled, dataset, ends_of, words_of
 from ..support.arrays import row
 from ..sweeps.pool import Execution
 from ..sweeps.progress import Hook
@@ -103,8 +105,8 @@ class Sweep:
     intervals: tuple[Interval, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Thresholds:
+@dataclass(frozen=True, slots=True, repr=False)
+class Thresholds(Labelled):
     """Synchronous ranges of one network: measured directly and predicted from the probe.
 
     `direct` is in sigma, `probe` in alpha = sigma abs(gamma), `predicted` in sigma.
@@ -116,6 +118,42 @@ class Thresholds:
     direct: Sweep
     criterion: Criterion
     warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def data(self) -> xr.Dataset:
+        """Errors and shares over sigma and over alpha, and the ranges."""
+        ranges = {
+            "interval": self.direct.intervals,
+            "predicted": self.predicted,
+            "probe_interval": self.probe.intervals,
+        }
+        words = ("synchronous sigma, simulated", "synchronous sigma, from the probe", "synchronous alpha of the probe")
+        return dataset(
+            {
+                "error": (("sigma",), self.direct.error, "median of the mean synchronisation errors"),
+                "share": (("sigma",), self.direct.share, "part of the starts that synchronised"),
+                "probe_error": (("alpha",), self.probe.error, "the same of the probe"),
+                "probe_share": (("alpha",), self.probe.share, "the same of the probe"),
+                **{
+                    name: ((f"{name}_number", "end"), np.reshape(found, (-1, 2)), meaning)
+                    for (name, found), meaning in zip(ranges.items(), words, strict=True)
+                },
+            },
+            {"sigma": self.direct.x, "alpha": self.probe.x, "end": ["low", "high"]},
+            self.scene,
+        )
+
+    @property
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Scene and ranges."""
+        return (
+            ("scene", repr(self.scene)),
+            ("sigma, simulated", words_of(self.direct.intervals)),
+            ("sigma, predicted by the probe", words_of(self.predicted)),
+            ("alpha, probe", words_of(self.probe.intervals)),
+            ("grid of sigma", ends_of(self.direct.x)),
+            *(("warning", words) for words in self.warnings),
+        )
 
     def as_dict(self) -> dict[str, object]:
         """JSON-ready: {"intervals", "probe", "predicted"}, sigma for the first and last, alpha for

@@ -54,7 +54,7 @@ def test_large_ring_runs_in_loops_and_keeps_its_symmetry():
     assert "for i in range(NODES)" in kernel_source(scene, width=1, reduce=False).text
     large, small = run(scene, reduce=False), run(pair, reduce=False)
     assert large.status == Status.FINISHED
-    np.testing.assert_allclose(large.end.values.reshape(2, 12)[:, :2], small.end.values.reshape(2, 2), atol=1e-8)
+    np.testing.assert_allclose(large.states("end").reshape(2, 12)[:, :2], small.states("end").reshape(2, 2), atol=1e-8)
 
 
 def strong(equations, shift: float) -> np.ndarray:

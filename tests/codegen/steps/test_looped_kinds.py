@@ -75,6 +75,7 @@ def test_loops_do_what_the_written_statements_do(case: str, method: str) -> None
     assert np.abs(np.array(ends[0]) - y).max() > 0.1
 
 
+@pytest.mark.long
 def test_forty_nodes_of_two_kinds_move_as_their_exported_equations_say() -> None:
     """And from equal starts the nodes of a kind stay equal bit for bit, though each adds up its own links."""
     random = np.random.default_rng(1)
@@ -82,11 +83,11 @@ def test_forty_nodes_of_two_kinds_move_as_their_exported_equations_say() -> None
     scene = pairs(40, integrator="dop853", parameters=numbers, initial={"x": random.uniform(-1, 1, 40), "v": 0})
     found = run(scene, reduce=False)
     assert found.success
-    np.testing.assert_allclose(found.end, by_scipy(scene, 20), atol=3e-8)
+    np.testing.assert_allclose(found.states(), by_scipy(scene, 20), atol=3e-8)
     first = [i for i in range(40) if i % 4 < 2]
     start = {"x": [0.7 if i in first else 0.2 for i in range(40)], "v": 0}
     frequencies = [1.0 if i in first else 1.3 for i in range(40)]
-    end = run(scene.replace(initial=start, omega=frequencies), reduce=False).end.values.reshape(2, 40)
+    end = run(scene.replace(initial=start, omega=frequencies), reduce=False).states("end").reshape(2, 40)
     for kind in (first, [i for i in range(40) if i not in first]):
         assert len(np.unique(end[:, kind], axis=1).T) == 1
     assert abs(end[0, 0] - end[0, 2]) > 0.01
@@ -98,7 +99,7 @@ def kept(scene: Scene, drift: float) -> None:
     function = energy_function(scene)
     zero = {sp.Symbol(name, real=True): 0 for name, value in scene.parameters.items() if value == 0.0}
     assert all(share.power.xreplace(zero) == 0 for share in (*function.exact.nodes, *function.exact.links))
-    start, end = function(scene.y0), function(run(scene, reduce=False).end.values)
+    start, end = function(scene.y0), function(run(scene, reduce=False).states("end"))
     assert abs(end - start) < drift * abs(start)
 
 
@@ -107,7 +108,7 @@ def test_forty_clocks_on_a_beam_move_as_their_exported_equations_say() -> None:
     scene = hanging(40, integrator="rodas5p")
     found = run(scene)
     assert found.success
-    np.testing.assert_allclose(found.end, by_scipy(scene, 20), atol=3e-8)
+    np.testing.assert_allclose(found.states(), by_scipy(scene, 20), atol=3e-8)
     kept(scene.replace(escapement=0.0, drag=0.0), drift=3e-9)
 
 

@@ -83,6 +83,7 @@ def far(x: float, v: float, length: float) -> tuple[mpf, mpf]:
     return reference.x[0], reference.v[0]
 
 
+@pytest.mark.long
 def test_the_propagator_of_a_law_with_a_jump_against_fifty_digits() -> None:
     """A release, slip, a landing and another release: differences of the flow, 1e-15 apart, right to 15 digits."""
     scene = jumping().replace(rtol=1e-12)
@@ -98,6 +99,7 @@ def test_the_propagator_of_a_law_with_a_jump_against_fifty_digits() -> None:
     assert np.all(found[:, 1] == 0.0)  # a deviation of the velocity is lost in stick
 
 
+@pytest.mark.long
 def test_a_pair_out_of_phase_follows_its_mode() -> None:
     """Two coupled oscillators a hair apart, let go one after the other: their difference is the mode alpha = 2 sigma."""
     from synchain.runtime.sweeps.run import run
@@ -107,7 +109,7 @@ def test_a_pair_out_of_phase_follows_its_mode() -> None:
     orbits.block, orbits.integrator = 2.0, orbits.integrator_of(orbits.strengths)
     found = orbits.propagators()[0, 0][:, 0]
     d = 1e-6
-    end = run(scene, reduce=False, show_progress=False, x_1=0.1 + d, x_2=0.1 - d).end.values
+    end = run(scene, reduce=False, show_progress=False, x_1=0.1 + d, x_2=0.1 - d).states("end")
     np.testing.assert_allclose(found, (end[[0, 2]] - end[[1, 3]]) / (2 * d), rtol=1e-4)
 
 

@@ -43,6 +43,7 @@ def test_a_periodic_transient_is_jumped_over():
     assert np.abs(whole.end[0] - whole.end[1]).max() > 0.1, "the two cells end in different halves of a cycle of two"
 
 
+@pytest.mark.long
 def test_sums_over_a_window_are_those_of_every_period():
     spans = [[0.0, 1500 * PERIOD, PERIOD], [333.3 * PERIOD, 1500.5 * PERIOD, PERIOD]]
     start = [[0.3, -0.2, 0.0, 0.1], [0.3, 0.28, 0.0, 0.0]]
@@ -52,6 +53,7 @@ def test_sums_over_a_window_are_those_of_every_period():
     np.testing.assert_allclose(jumped.end, whole.end, rtol=0, atol=1e-11)
 
 
+@pytest.mark.long
 def test_section_points_of_a_window_are_all_there():
     spans = [[1000 * PERIOD, 1064 * PERIOD, PERIOD]]
     jumped, whole = both(1, ("section",), [[0.3, 0.0]], spans)

@@ -157,7 +157,7 @@ def test_what_needs_a_period_refuses_a_drive_without_one(files: Path, name: str,
 
 def test_any_drive_runs_over_plain_times(files: Path) -> None:
     found = scene(files, "two", topology=ALONE, transient=0.0, window=20.0, rtol=1e-10, initial={"x": 0.3, "v": 0.0})
-    end = run(found, show_progress=False).end.values
+    end = run(found, show_progress=False).states("end")
 
     def rates(t: float, y: np.ndarray) -> list[float]:
         return [y[1], y[0] - y[0] ** 3 - 0.15 * y[1] + 0.3 * (np.cos(1.2 * t) + np.cos(t))]

@@ -81,6 +81,7 @@ def test_clocks_on_a_beam_by_lagranges_method() -> None:
         assert sp.simplify((found[name] - e).subs(sigma, 1)) == 0
 
 
+@pytest.mark.long
 def test_clocks_on_a_beam_by_kanes_method() -> None:
     """Kane's equations from the positions of the bobs: no Lagrangian and no kinetic energy."""
     equations, names, thetas, rates = pendulums(1)
@@ -144,7 +145,7 @@ def test_unequal_masses_move_in_the_modes_of_the_generalised_eigenproblem(integr
                   rtol=1e-11)  # fmt: skip
     found = run(scene)
     assert found.success
-    np.testing.assert_allclose(found.end[:3], shapes @ (share * np.cos(np.sqrt(squares) * end)), atol=1e-11)
+    np.testing.assert_allclose(found.states()[:3], shapes @ (share * np.cos(np.sqrt(squares) * end)), atol=1e-11)
 
 
 def one_way(name: str) -> Scene:
@@ -176,16 +177,17 @@ def test_nodes_may_feel_the_inertia_of_one_that_feels_nobody(name: str, integrat
     space: dict = {}
     exec(to_python(scene.equations, {s: scene.parameters[s] for s in scene.equations.parameters}), space)
     known = solve_ivp(space["rhs"], (0, 6), scene.y0, "Radau", jac=space["jac"], rtol=1e-10, atol=1e-12)
-    np.testing.assert_allclose(found.end, known.y[:, -1], atol=1e-7)
+    np.testing.assert_allclose(found.states(), known.y[:, -1], atol=1e-7)
 
 
+@pytest.mark.long
 def test_frictionless_clocks_keep_their_energy_and_their_momentum() -> None:
     """Without escapement, drag and spring energy and the momentum along the beam are constant; swings are large here."""
     free = {"escapement": 0, "drag": 0, "mass": 3}
     scene = load_scene("huygens").replace(
         parameters=free, window=50, samples=51, rtol=1e-11, initial={"theta": [1.5, -0.7], "x": 0, "v": 0.1}
     )
-    x, v, a, b, p, q = run(scene).trajectory.values.T
+    x, v, a, b, p, q = run(scene).states("trajectory").T
     energy = 1.5 * v**2 + ((v + np.cos(a) * p) ** 2 + (np.sin(a) * p) ** 2) / 2 - np.cos(a) - np.cos(b)
     energy += ((v + np.cos(b) * q) ** 2 + (np.sin(b) * q) ** 2) / 2
     momentum = 5 * v + np.cos(a) * p + np.cos(b) * q
@@ -197,7 +199,7 @@ def test_frictionless_clocks_keep_their_energy_and_their_momentum() -> None:
 
 def test_huygens_clocks_end_in_antiphase() -> None:
     """Bennett et al., Proc. R. Soc. Lond. A 458, 563 (2002): started nearly in phase the clocks end in antiphase."""
-    x, _, first, second, _, _ = run(load_scene("huygens")).trajectory.values.T
+    x, _, first, second, _, _ = run(load_scene("huygens")).states("trajectory").T
     early, late = slice(0, 100), slice(5000, 6001)
     assert np.corrcoef(first[early], second[early])[0, 1] > 0.9
     assert np.corrcoef(first[late], second[late])[0, 1] < -0.99

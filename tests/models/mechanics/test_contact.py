@@ -58,11 +58,11 @@ def test_what_has_no_set_valued_form(acceleration: sp.Expr, law: sp.Expr, words:
 def test_the_smooth_law_tends_to_the_exact_one() -> None:
     """Period two at omega = 1.15: the distance after 20 periods falls like 1/sqrt(kappa), the exact law's error does not
     count."""
-    exact = run(scene(rtol=1e-12), show_progress=False).end.values[0]
+    exact = run(scene(rtol=1e-12), show_progress=False).states("end")[0]
     gaps = []
     for kappa in (1e5, 1e7, 1e9):
         smooth = run(scene(contact="atan", rtol=1e-10, parameters={"kappa": kappa}), show_progress=False)
-        gaps.append(abs(smooth.end.values[0] - exact))
+        gaps.append(abs(smooth.states("end")[0] - exact))
     assert gaps[0] < 3e-3
     ratios = [gaps[0] / gaps[1], gaps[1] / gaps[2]]
     assert all(8.0 < ratio < 30.0 for ratio in ratios)
@@ -71,12 +71,12 @@ def test_the_smooth_law_tends_to_the_exact_one() -> None:
 @pytest.mark.long
 def test_results_converge_with_the_tolerance_and_stick_is_exact() -> None:
     ends = [
-        run(scene(2, rtol=rtol, parameters={"sigma": 0.1}), show_progress=False).end.values
+        run(scene(2, rtol=rtol, parameters={"sigma": 0.1}), show_progress=False).states("end")
         for rtol in (1e-6, 1e-9, 1e-13)
     ]
     assert np.abs(ends[0] - ends[2]).max() < 1e-6
     assert np.abs(ends[1] - ends[2]).max() < 1e-9
-    path = run(scene(record=("trajectory",), samples=2001), show_progress=False).data.trajectory.values
+    path = run(scene(record=("trajectory",), samples=2001), show_progress=False).states("trajectory")
     stuck = path[path[:, 2] == 0.0]
     assert 0.1 * len(path) < len(stuck) < 0.9 * len(path)
     assert np.all(stuck[:, 1] == 0.1)
@@ -88,7 +88,7 @@ def test_equal_oscillators_stay_equal_although_the_state_is_unstable() -> None:
     whole = run(scene(3, initial={"x": [0.3, 0.3, 0.3]}, parameters={"sigma": 0.9, "omega": 1.4}, window=300.0),
                 reduce=False, show_progress=False)  # fmt: skip
     assert whole.sync_error.item() == 0.0
-    assert np.ptp(whole.end.values.reshape(3, 3), axis=1).max() == 0.0
+    assert np.ptp(whole.states("end").reshape(3, 3), axis=1).max() == 0.0
 
 
 @pytest.mark.parametrize("width", [1, *(pytest.param(width, marks=pytest.mark.long) for width in (2, 4))])
@@ -111,12 +111,14 @@ def test_exponents_of_the_exact_law_are_the_limit_of_the_smooth_one() -> None:
     assert abs(zeros[1] - zeros[2]) < 3e-7
 
 
+@pytest.mark.long
 def test_starts_on_the_ground_stick_or_slip_by_their_load() -> None:
     cells = run(scene(window=1e-6, time_unit="time", parameters={"u": 0.0}), x_1=[0.0, 0.59, 0.61, -0.61], v_1=0.1,
                 show_progress=False)  # fmt: skip
-    assert list(cells.end.values[:, 2]) == [0.0, 0.0, 1.0, -1.0]
+    assert list(cells.states("end")[:, 2]) == [0.0, 0.0, 1.0, -1.0]
 
 
+@pytest.mark.long
 def test_slip_that_begins_slower_than_a_step_can_tell_does_not_chatter() -> None:
     """The load passes its limit by 9e-6 where the drive turns: the sliding velocity grows from zero at that rate."""
     s = scene(integrator="rodas5p", rtol=1e-6, window=4.0, parameters={"omega": 1.4}, record=())
@@ -124,7 +126,7 @@ def test_slip_that_begins_slower_than_a_step_can_tell_does_not_chatter() -> None
     loose = run(s, show_progress=False, **start)
     tight = run(s.replace(rtol=1e-12, integrator="auto"), show_progress=False, **start)
     assert loose.success
-    assert np.abs(loose.end.values - tight.end.values).max() < 1e-3
+    assert np.abs(loose.states("end") - tight.states("end")).max() < 1e-3
 
 
 def test_a_static_coefficient_below_the_kinetic_one_is_refused() -> None:

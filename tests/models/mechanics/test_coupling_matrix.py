@@ -278,5 +278,5 @@ def test_a_run_agrees_with_a_network_written_by_hand(n: int) -> None:
     expected = solve_ivp(rates, (0, 2), scene.y0, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
     result = run(scene, workers=1, show_progress=False)
     assert result.success
-    assert np.abs(result.end.values - expected).max() < 1e-6
+    assert np.abs(result.states("end") - expected).max() < 1e-6
     assert expected.reshape(3, n).std(axis=1).max() > 1e-2, "the nodes differ, so that links matter"

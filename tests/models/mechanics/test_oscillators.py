@@ -95,6 +95,7 @@ def test_van_der_pol() -> None:
     assert sp.expand(node("van_der_pol").rhs[1] - (MU * (1 - X**2) * V - X + U * sp.cos(OMEGA * TIME))) == 0
 
 
+@pytest.mark.long
 def test_van_der_pol_has_its_limit_cycle() -> None:
     """mu = 1: amplitude 2.008619860874843, period 6.663286859323130, Amore, Physica D 435, 133279 (2022)."""
     scene = Scene(oscillator="van_der_pol", transient=60, window=40, time_unit="time", record=("section",), rtol=1e-11)
@@ -113,7 +114,7 @@ def pair(name: str, sigma: list[float], **changes: object) -> np.ndarray:
     result = run(scene, workers=1, show_progress=False)
     assert result.success, result.message
     synchronous = result.sync_error.values < 1e-3
-    assert np.abs(result.end.values[synchronous]).max() < 100, "the default start leads to the attractor"
+    assert np.abs(result.states("end")[synchronous]).max() < 100, "the default start leads to the attractor"
     return result.sync_error.values
 
 
@@ -136,7 +137,7 @@ def test_two_lorenz_oscillators_synchronise_above_one_threshold() -> None:
 @pytest.mark.long
 def test_chua_visits_both_scrolls() -> None:
     scene = Scene(oscillator="chua", transient=50, window=400, record=("trajectory",), samples=4001)
-    x = run(scene, workers=1, show_progress=False).trajectory.values[:, 0]
+    x = run(scene, workers=1, show_progress=False).states("trajectory")[:, 0]
     assert -3 < x.min() < -1.5
     assert 1.5 < x.max() < 3
 
@@ -259,7 +260,7 @@ def test_two_double_pendulums_in_a_kernel_follow_scipy() -> None:
     rate = sp.lambdify([sp.symbols(scene.equations.state, real=True),
                         sp.symbols(scene.equations.parameters, real=True)], scene.equations.rhs())  # fmt: skip
     there = solve_ivp(lambda _, y: rate(y, values), (0, 12), scene.y0, method="DOP853", rtol=1e-12, atol=1e-13)
-    assert np.abs(found.end.values - there.y[:, -1]).max() < 1e-8
+    assert np.abs(found.states("end") - there.y[:, -1]).max() < 1e-8
     phi = there.y[:2]
     assert np.abs(phi[0] - phi[1]).max() > 0.1
 

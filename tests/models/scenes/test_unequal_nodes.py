@@ -20,7 +20,7 @@ from synchain.models.presentation.equations import text
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.reduce import reduce_scene
-from synchain.runtime.results.open import open_result
+from synchain.runtime.opening.open import open_result
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.certify import certify
 from synchain.runtime.sweeps.run import run
@@ -128,11 +128,11 @@ def test_a_sweep_over_one_node_and_what_it_resumes(tmp_path) -> None:
     made = scene(axes={"delta_2": [0.1, 0.4]})
     found = run(made)
     for k, value in enumerate((0.1, 0.4)):
-        np.testing.assert_allclose(found.end[k], by_scipy(made.replace(axes={}, delta_2=value), 20), atol=2e-8)
+        np.testing.assert_allclose(found.states()[k], by_scipy(made.replace(axes={}, delta_2=value), 20), atol=2e-8)
     found.save(tmp_path / "made.nc")
     again = open_result(tmp_path / "made.nc")
     assert again.scene == made
-    assert run(made, resume=again).end.values.tolist() == found.end.values.tolist()
+    assert run(made, resume=again).states("end").tolist() == found.states("end").tolist()
 
 
 def test_nodes_merge_where_their_parameters_agree() -> None:
@@ -145,7 +145,7 @@ def test_nodes_merge_where_their_parameters_agree() -> None:
     assert reduce_scene(scene(parameters={"sigma": 0.1, "delta": [0.1, 0.2, 0.3, 0.2]}, **given)).equations.n == 3
     swept = scene(parameters={"sigma": 0.1}, axes={"delta_3": [0.1, 0.2]}, **given)
     assert reduce_scene(swept).equations.n == 3
-    np.testing.assert_allclose(run(pairs).end, by_scipy(pairs, 20), atol=2e-8)
+    np.testing.assert_allclose(run(pairs).states(), by_scipy(pairs, 20), atol=2e-8)
 
 
 def test_what_needs_equal_nodes_says_so() -> None:
@@ -173,7 +173,7 @@ def test_nodes_of_two_kinds_move_as_their_own_equations_say() -> None:
     assert made.parameters["u_1"] == 0.3  # each node has the default of its kind
     assert made.parameters["u_2"] == 0.0
     found = run(made)
-    np.testing.assert_allclose(found.end, by_scipy(made, 20), atol=2e-8)
+    np.testing.assert_allclose(found.states(), by_scipy(made, 20), atol=2e-8)
     assert found.sync_error > 0
 
 

@@ -36,6 +36,7 @@ def jacobian(case: Case) -> np.ndarray:
     return found
 
 
+@pytest.mark.long
 def test_the_drift_shrinks_with_the_tolerance() -> None:
     case = CASES[1]
     largest, last, early, steps = drift(case, "dop853", 1e-9, 5)

@@ -81,6 +81,7 @@ def test_the_exact_law_is_another_problem_near_the_smoothed_one():
     assert set(case.states[:, 2]) <= {-1.0, 0.0, 1.0}
 
 
+@pytest.mark.long
 def test_the_exact_law_needs_fewer_steps_and_is_as_right_as_its_tolerance():
     smooth, exact = precision.case_of("friction, n = 1"), precision.case_of("exact law, n = 1")
     steps = {}

@@ -9,6 +9,7 @@ import pytest
 from synchain.runtime.bench import scale
 
 
+@pytest.mark.long
 def test_rows_and_sizes(monkeypatch):
     asked = []
     monkeypatch.setattr(scale, "apart", lambda function, side: asked.append(side) or scale.row(4))

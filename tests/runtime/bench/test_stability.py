@@ -53,7 +53,7 @@ def test_stiff_springs_are_said() -> None:
 def test_a_wrong_law_is_seen() -> None:
     """The reference of another steepness, 1 % away, is further off than what is allowed."""
     case = next(c for c in QUICK if c.name == "kappa = 1e5" and c.scene.rtol == 1e-8)
-    found = run(case.scene, reduce=False, show_progress=False).end.values
+    found = run(case.scene, reduce=False, show_progress=False).states("end")
     right, wrong = (end_state(s, "radau") for s in (case.scene, case.scene.replace(kappa=1.01e5)))
     allowed = stability.row(case)[ALLOWED]
     assert np.abs(found - right).max() < 0.1 * allowed < allowed < np.abs(found - wrong).max()
@@ -79,7 +79,7 @@ def test_growth_is_right_until_it_has_left_double_precision_behind() -> None:
     scene = apart(-20.0, 4.0)
     found, expected = run(scene, reduce=False, show_progress=False), end_state(scene, "growth")
     assert int(found.status) == Status.FINISHED
-    np.testing.assert_allclose(found.end.values, expected, rtol=1e-6)
+    np.testing.assert_allclose(found.states("end"), expected, rtol=1e-6)
     far = run(apart(-20.0, 7.0), reduce=False, show_progress=False)
     assert int(far.status) == Status.DIVERGED
     assert 4.0 < float(far.end_time) < 7.0
@@ -91,7 +91,7 @@ def test_the_phase_of_the_drive_after_a_million_periods(periods: float) -> None:
     scene = next(c.scene for c in QUICK if c.group == "long").replace(transient=periods, rtol=1e-10)
     found = run(scene, show_progress=False)
     assert int(found.status) == Status.FINISHED
-    assert np.abs(found.end.values - end_state(scene, "steady")).max() < 1e-9
+    assert np.abs(found.states("end") - end_state(scene, "steady")).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", names())
@@ -110,7 +110,7 @@ def test_equal_starts_stay_equal_to_the_last_bit(name: str) -> None:
     )
     for width in (1, 8):
         found = run(scene, width=width, show_progress=False)
-        x, v = found.end.values.reshape(2, graph.n)
+        x, v = found.states("end").reshape(2, graph.n)
         assert (x == x[0]).all(), "positions"
         assert (v == v[0]).all(), "velocities"
         assert float(found.sync_error_max) == 0.0
@@ -128,7 +128,7 @@ def test_a_small_difference_follows_the_transversal_exponent(
     Below `least` the difference is made of rounding.
     """
     settled = Scene(parameters={"omega": 1.15}, transient=400.0, window=0.0, record=())
-    x, v = run(settled, show_progress=False).end.values
+    x, v = run(settled, show_progress=False).states("end")
     scene = Scene(
         topology=topology("chain", 2),
         parameters={"omega": 1.15, "sigma": sigma},
@@ -143,7 +143,7 @@ def test_a_small_difference_follows_the_transversal_exponent(
     )
     found = run(scene, reduce=False, show_progress=False)
     assert int(found.status) == Status.FINISHED
-    states, times = found.trajectory.values, found.trajectory_time.values
+    states, times = found.states("trajectory"), found.time.values
     distance = np.hypot(states[:, 0] - states[:, 1], states[:, 2] - states[:, 3])
     linear = (distance > least) & (distance < 2e-3)
     assert linear.sum() >= 3
@@ -168,7 +168,9 @@ def test_many_equal_oscillators_move_as_one_alone() -> None:
     }
     numbers = {"kappa": 1e2}
     many = Scene(topology=topology("chain", 100), parameters={**numbers, "sigma": 1.0}, **settings)
-    ends = [run(s, reduce=False, show_progress=False).end.values for s in (many, Scene(parameters=numbers, **settings))]
+    ends = [
+        run(s, reduce=False, show_progress=False).states("end") for s in (many, Scene(parameters=numbers, **settings))
+    ]
     for place, alone in zip(ends[0].reshape(2, 100), ends[1], strict=True):
         assert (place == place[0]).all()
         assert place[0] == pytest.approx(alone, abs=1e-6)

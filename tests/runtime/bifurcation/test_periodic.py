@@ -49,7 +49,7 @@ def _position(s: Scene, state: np.ndarray, length: float) -> float:
     one = s.replace(
         topology=topology("chain", 1), transient=0.0, window=length, time_unit="time", record=(), rtol=1e-12
     )
-    return float(run(one, x_1=float(state[0]), v_1=float(state[1]), show_progress=False).end.values[0])
+    return float(run(one, x_1=float(state[0]), v_1=float(state[1]), show_progress=False).states("end")[0])
 
 
 def test_a_linear_oscillator_has_the_multipliers_of_its_damping() -> None:
@@ -75,6 +75,7 @@ def test_the_end_of_the_stable_range_to_rounding() -> None:
         stability_end(periodic_orbit(scene(), 2, omega=1.15), 0.6, 0.7)
 
 
+@pytest.mark.long
 def test_a_period_doubling_is_found_where_the_double_period_is_born() -> None:
     first = periodic_orbit(scene(), 2, omega=1.2)
     branch = follow(scene(), "omega", np.linspace(1.2, 1.24, 5), first)
@@ -119,6 +120,7 @@ def test_stops_begin_where_den_hartogs_motion_ends() -> None:
     assert branch.phases[0].landing == pytest.approx(r - load, abs=1e-9)
 
 
+@pytest.mark.long
 def test_a_branch_goes_through_a_graze_to_its_fold() -> None:
     """omega = 0.7: as the drive grows the load in stick of period one comes up to the limit of static friction, at the rate
     at which its gap has fallen; beyond, the orbit lets go twice, and ends where it meets another one."""

@@ -12,7 +12,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.reduce import explain, reduce_scene
 from synchain.runtime.figures.result_plot import draw_result
-from synchain.runtime.results.open import open_result
+from synchain.runtime.opening.open import open_result
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.synchronisation.threshold import Criterion, thresholds
@@ -42,15 +42,15 @@ def cuts_where_the_velocity_falls_through_zero(result, folder: Path) -> None:
     assert result.section_count.values.tolist() == [2] * len(SIGMA)
     times = result.section_time.values
     np.testing.assert_allclose(times[:3, 1] - times[:3, 0], 4 * np.pi / 1.15, rtol=1e-6)
-    velocities = result.section.sel(state="v_1").values
+    velocities = result.section.sel(component="v", node=1).values
     assert np.nanmax(np.abs(velocities)) < 1e-7
 
 
 def samples_the_motion_and_its_modes(result, folder: Path) -> None:
-    path = result.trajectory.values
+    path = result.states("trajectory")
     assert np.all(np.isfinite(path))
     assert set(np.unique(path[..., 4:])) <= {-1.0, 0.0, 1.0}
-    np.testing.assert_array_equal(path[:, -1], result.end.values)
+    np.testing.assert_array_equal(path[:, -1], result.states("end"))
 
 
 def is_resumed(result, folder: Path) -> None:

@@ -104,8 +104,12 @@ def test_mirrored_start_of_a_chain_with_its_synchronisation_error():
     """The class of the first oscillator has two members, which the error does not count: no weights are needed."""
     result = compare(MIRRORED.replace(axes={"sigma": [0.1, 0.3], "omega": [1.0, 1.3]}), nodes=2)
     assert result.sync_error.min() > 0.01
-    np.testing.assert_array_equal(result.trajectory.sel(state="x_1"), result.trajectory.sel(state="x_3"))
-    assert np.abs(result.trajectory.sel(state="x_1") - result.trajectory.sel(state="x_2")).max() > 0.01
+    np.testing.assert_array_equal(
+        result.trajectory.sel(component="x", node=1), result.trajectory.sel(component="x", node=3)
+    )
+    assert (
+        np.abs(result.trajectory.sel(component="x", node=1) - result.trajectory.sel(component="x", node=2)).max() > 0.01
+    )
 
 
 @pytest.mark.long
@@ -116,10 +120,10 @@ def test_synchronisation_error_and_section_of_a_star():
     scene = DUFFING.replace(topology=star(5), initial=start, section="v_3 rising 0.01")
     assert reduce_scene(scene).multiplicity == (1, 3, 1)
     result = compare(scene, nodes=3)
-    trajectory = result.trajectory.values.reshape(scene.samples, 2, scene.n)
+    trajectory = result.states("trajectory").reshape(scene.samples, 2, scene.n)
     distances = np.sqrt(((trajectory - trajectory[:, :, :1]) ** 2).sum(axis=1)).sum(axis=1)
     np.testing.assert_allclose(result.sync_error_end, distances[-1], rtol=1e-9)
-    points = result.section.sel(state="v_3")[: int(result.section_count)]  # of the second class
+    points = result.section.sel(component="v", node=3)[: int(result.section_count)]  # of the second class
     assert len(points) > 2
     np.testing.assert_allclose(points, 0.01, atol=1e-9)
 
@@ -313,7 +317,7 @@ def test_explain_runs_where_there_is_a_folder_and_no_skip_runs_everything(tmp_pa
     assert "stepped as 2" in capsys.readouterr().out
     with xr.open_dataset(tmp_path / "out" / "mirror.nc") as data:
         assert "stepped as 2" in data.attrs["skipped"]
-        assert data.sizes["state"] == 6
+        assert data.sizes["component"] * data.sizes["node"] == 6
     assert main([*words, "--no-skip", "--resume"]) == 2
     assert "left out other parts of its scene: forcing: u = 0" in capsys.readouterr().err
     assert main([*words, "--no-skip", "--overwrite"]) == 0

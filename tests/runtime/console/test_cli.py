@@ -17,11 +17,12 @@ import sympy as sp
 from synchain.models import chain
 from synchain.models.graphs.families import names as families
 from synchain.models.scenes.file import load_scene, scene_names
+from synchain.models.scenes.schema import schema
 from synchain.runtime import commands
 from synchain.runtime.cells import kernels
 from synchain.runtime.cli import main
 from synchain.runtime.console.outcome import print_json
-from synchain.runtime.results.open import open_result
+from synchain.runtime.opening.open import open_result
 from synchain.runtime.sweeps import job, stream
 from synchain.runtime.synchronisation import threshold
 
@@ -106,6 +107,7 @@ def loaded_after(words: str) -> set[str]:
         ("spectrum star 6 --json", {"numpy", "numba", "matplotlib", "scipy", "xarray"}),
         ("equations figure_4a", {"numpy", "numba", "matplotlib", "scipy", "xarray"}),
         ("scenes", {"sympy", "numpy", "numba", "matplotlib"}),
+        ("schema", {"numpy", "numba", "matplotlib", "scipy", "xarray"}),
         ("topologies", {"sympy", "numpy", "numba", "matplotlib"}),
         ("--version", {"sympy", "numpy", "numba", "matplotlib", "argparse.py"}),
     ],
@@ -182,6 +184,11 @@ def test_scenes_and_topologies_list_what_there_is(capsys: pytest.CaptureFixture[
     assert "3 or more" in listed["ring"]
 
 
+def test_the_schema_is_printed_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema"]) == 0
+    assert json.loads(capsys.readouterr().out) == schema()
+
+
 def test_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
     from importlib.metadata import version
 
@@ -233,7 +240,7 @@ def test_run_writes_a_result_and_a_figure(scene: str, tmp_path: Path, capsys: py
     assert result.scene.rtol == 1e-6
     assert result.scene.parameters["omega"] == 1.4
     assert result.data.sigma.values.tolist() == [0.0, 0.25, 0.5]
-    assert float(result.end[0, 0]) != float(result.end[1, 0])
+    assert float(result.states()[0, 0]) != float(result.states()[1, 0])
 
 
 @pytest.mark.usefixtures("compiled")
@@ -486,7 +493,7 @@ WRONG = [
     ("spectrum chain 0", "n = 0; expected at least 1"),
     ("spectrum chain -3", "n = -3; expected at least 1"),
     ("spectrum ring 2", "n = 2; expected at least 3"),
-    ("spectrum rnig 4", "unknown topology 'rnig'; known: chain, circulant, complete"),
+    ("spectrum rnig 4", "unknown topology 'rnig'; known: cayley_abelian, cayley_dihedral, chain"),
     ("spectrum chain 4.0", "expected a whole number"),
     ("spectrum chain 1_000", "expected a whole number"),
     ("spectrum chain 99999999999", "expected at most 100000"),

@@ -133,7 +133,7 @@ def test_records_between_steps_of_straight_lines_are_warned_of():
 def test_a_result_without_its_figure_is_drawn(tmp_path, monkeypatch, capsys):
     target = tmp_path / "a.nc"
     kept = SimpleNamespace(data=SimpleNamespace(attrs={"versions": "v"}), message="m", success=True)
-    monkeypatch.setattr("synchain.runtime.results.open.open_result", lambda path: kept)
+    monkeypatch.setattr("synchain.runtime.results.result.read_result", lambda path: kept)
     monkeypatch.setattr("synchain.runtime.commands.run._draw", lambda path: path.with_suffix(".png").write_text("x"))
     assert _nothing_to_do(target) == 0
     assert target.with_suffix(".png").exists()

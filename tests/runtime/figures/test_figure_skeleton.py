@@ -39,6 +39,7 @@ def test_it_is_made_when_asked_for() -> None:
     assert "skeleton" in names(extra=True)
 
 
+@pytest.mark.long
 def test_the_orbit_runs_through_the_motion_and_beyond() -> None:
     (branch,) = small().branches
     assert [place.kind for place in branch] == [None, None, "period doubling", None]

@@ -9,8 +9,8 @@ import pytest
 
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
+from synchain.runtime.opening.open import open_result
 from synchain.runtime.results.certificate import NEAR, VERDICTS, Certificate
-from synchain.runtime.results.open import open_result
 from synchain.runtime.stability.exponents import exponents
 from synchain.runtime.sweeps.certify import certify
 from synchain.runtime.sweeps.errors import SweepInterrupted
@@ -56,6 +56,7 @@ def test_equal_starts_on_an_unstable_state_are_called_what_they_are() -> None:
     assert VERDICTS[found.data.verdict.item()] == "synchronous by round-off only: the state is unstable"
 
 
+@pytest.mark.long
 def test_a_record_of_sections_is_not_cut_short() -> None:
     s = scene(record=("sync_error", "section"))
     found = run(s, sigma=[0.12], certified=True, show_progress=False)

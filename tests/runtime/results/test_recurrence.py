@@ -20,10 +20,10 @@ def test_the_linear_chain_moves_in_its_normal_modes() -> None:
     gamma, modes = np.linalg.eigh(np.array(scene.topology.matrix.tolist(), dtype=float))
     exact = sorted(float(e.exact) for e in scene.spectrum.eigenvalues)
     assert np.allclose(gamma, exact, rtol=0, atol=1e-14)
-    frequency, t = np.sqrt(1 - scene.parameters["sigma"] * gamma), result.trajectory_time.values[:, None]
+    frequency, t = np.sqrt(1 - scene.parameters["sigma"] * gamma), result.time.values[:, None]
     share = np.array(scene.y0[:4]) @ modes
     x, v = (share * np.cos(frequency * t)) @ modes.T, (-share * frequency * np.sin(frequency * t)) @ modes.T
-    assert np.abs(result.trajectory.values - np.hstack([x, v])).max() < 2e-8
+    assert np.abs(result.states("trajectory") - np.hstack([x, v])).max() < 2e-8
 
 
 K = np.arange(1, 32)
@@ -73,7 +73,7 @@ def test_the_energy_of_the_fput_chain_returns_to_its_first_mode() -> None:
     scene = load_scene("fput_recurrence")
     result = run(scene, workers=1, show_progress=False)
     assert result.success
-    states, t = result.trajectory.values[:-1], result.trajectory_time.values[:-1]
+    states, t = result.states("trajectory")[:-1], result.time.values[:-1]
     assert np.abs(states[:, [0, 32, 64, 96]]).max() < 1e-10, "the walls rest"
     found = energy_function(scene)(states)
     assert np.abs(found / found[0] - 1).max() < 1e-8

@@ -70,7 +70,7 @@ def test_a_trajectory_makes_a_phase_portrait(pair: Callable[..., Result]) -> Non
     axes = result_plot.draw_result(result, given)
     assert axes is given
     assert len(axes.lines) == 2
-    np.testing.assert_array_equal(axes.lines[1].get_ydata(), result.trajectory.sel(state="v_2"))
+    np.testing.assert_array_equal(axes.lines[1].get_ydata(), result.trajectory.sel(component="v", node=2))
 
 
 def test_a_result_with_nothing_but_end_states_is_drawn(pair: Callable[..., Result]) -> None:

@@ -64,7 +64,7 @@ def after(sigma: float, periods: float) -> np.ndarray:
     scene = friction(RING, sigma).replace(
         initial={"x": [0.30, 0.28, 0.30 + 1e-7, 0.28 + 1e-7], "v": 0.0}, transient=0.0, window=periods, record=()
     )
-    return np.asarray(run(scene, reduce=False).end.values.reshape(2, 4))
+    return np.asarray(run(scene, reduce=False).states("end").reshape(2, 4))
 
 
 def test_a_stable_cluster_state_is_reached(ring: dict[float, ClusterExponents]) -> None:

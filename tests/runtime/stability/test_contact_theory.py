@@ -51,7 +51,7 @@ def test_amplitude_under_coulomb_friction(omega: float, r: float) -> None:
         "coulomb", amplitude, 0.1, theta_b=0.0, mu=r, u=1.0, omega=omega, transient=2000, window=3, time_unit="period",
         record=("section",), section="v_1 falling",
     )  # fmt: skip
-    turns = finished(scene).data.section.values[:, 0]
+    turns = finished(scene).states("section")[:, 0]
     assert len(turns) == 3
     np.testing.assert_allclose(turns, amplitude, rtol=0, atol=1e-12)
 
@@ -62,7 +62,7 @@ def test_arcs_on_a_belt() -> None:
     slip, stick = 2.0 * (math.pi - math.atan((hold - drag) / belt)), 2.0 * (hold - drag) / belt
     starts = np.array([-0.5, 0.0, 0.1, 0.2, 0.9])
     scene = block("coulomb_static", 0.0, belt, theta_b=belt, mu_s=hold, mu_k=drag, window=end)
-    found = finished(scene, x_1=starts).data.end.values
+    found = finished(scene, x_1=starts).states("end")
     phase = (end - (hold - starts) / belt) % (slip + stick)
     sliding, circle = phase < slip, math.hypot(hold - drag, belt)
     angle = math.atan2(belt, hold - drag) - phase
@@ -89,7 +89,7 @@ def test_cycle_of_leine() -> None:
     )
     data = finished(scene).data
     np.testing.assert_allclose(np.diff(data.section_time), 12.001031294831, rtol=0, atol=1e-10)
-    top = finished(scene.replace(window=float(data.section_time[-1]))).data.end.values
+    top = finished(scene.replace(window=float(data.section_time[-1]))).states("end")
     assert abs(top[1]) < 1e-7, "where x is stationary: its error is the square of that"
     y, h = np.array([1.0, 0.2]), float(data.section_time[0] - 5.0) / 4000  # slip begins at x = 1, t = 5
     for _ in range(4000):
@@ -117,7 +117,7 @@ def test_free_decay(hold: float) -> None:
     friction, numbers = ("coulomb", {"mu": drag}) if hold == drag else ("coulomb_static", {"mu_k": drag, "mu_s": hold})
     scene = block(friction, theta_b=0.0, window=40.0, **numbers)
     starts = np.linspace(0.05, 1.53, 38)
-    ends = finished(scene, x_1=starts).data.end.values
+    ends = finished(scene, x_1=starts).states("end")
     for x, (end, v, slip) in zip(starts, ends, strict=True):
         rest = x
         while abs(rest) > hold:
@@ -192,7 +192,7 @@ def test_hopf_point(damped: str) -> None:
         turns = 10.0 * 2.0 * math.pi / math.sqrt(1.0 - rate**2)
         # odd parts of the deviation alone: what is left is cubic
         ends = [
-            finished(damped_scene(damped, rest + x, 0.0, turns, 1e-13, speed)).data.end.values[0] for x in (1e-4, -1e-4)
+            finished(damped_scene(damped, rest + x, 0.0, turns, 1e-13, speed)).states("end")[0] for x in (1e-4, -1e-4)
         ]
         assert math.log((ends[0] - ends[1]) / 2e-4) / turns == pytest.approx(rate, abs=2e-8)
 
@@ -204,7 +204,7 @@ def test_share_of_starts_at_rest(damped: str) -> None:
     scene = damped_scene(damped, 0.0, 0.0, 400.0, 1e-7, 1.5)
     starts = {"x_1": numbers.uniform(-2.0, 2.0, count), "v_1": numbers.uniform(0.0, 2.0, count)}
     scene = scene.replace(axes=starts, zipped=True, record=())
-    ends = finished(scene).data.end.values
+    ends = finished(scene).states("end")
     rest = 0.5 + 0.5 * math.exp(-3.0)
     distance = np.hypot(ends[:, 0] - rest, ends[:, 1])
     assert not np.any((distance > 0.05) & (distance < 0.5)), "every start has decided"
@@ -217,7 +217,7 @@ def test_events_keep_their_digits_in_long_runs(damped: str) -> None:
     """Without a drive the clock starts anew every 8 units: the top of the stick-slip cycle is the same at t = 1e3 and
     1e5."""
     scene = damped_scene(damped, 1.0, 0.0, 30.0, 1e-12, 1.0)
-    tops = [finished(scene.replace(transient=t)).data.section.values[:, 0] for t in (1e3, 1e5)]
+    tops = [finished(scene.replace(transient=t)).states("section")[:, 0] for t in (1e3, 1e5)]
     assert min(map(len, tops)) >= 2
     assert np.ptp(np.concatenate(tops)) < 2e-12
 
@@ -226,7 +226,7 @@ def test_events_keep_their_digits_in_long_runs(damped: str) -> None:
 
 
 def flow(scene: Scene, x: float, v: float) -> np.ndarray:
-    return np.asarray(finished(scene, x_1=x, v_1=v).data.end.values[:2])
+    return np.asarray(finished(scene, x_1=x, v_1=v).states("end")[:2])
 
 
 @pytest.mark.parametrize(
@@ -246,7 +246,7 @@ def test_propagator_against_differences_of_the_flow(
         topology=ONE, contact="set-valued", parameters={"epsilon": 1.0, **numbers}, initial={"x": [x], "v": [v]},
         transient=0, window=1.0, rtol=1e-12, record=("trajectory",), samples=400,
     )  # fmt: skip
-    modes = finished(scene).data.trajectory.values[:, 2]
+    modes = finished(scene).states("trajectory")[:, 2]
     assert set(modes) == kinds
     scene = scene.replace(record=(), samples=0)
     pair = scene.replace(topology=topology("chain", 2), initial={"x": [x, x], "v": [v, v]})

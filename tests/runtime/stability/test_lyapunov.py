@@ -63,7 +63,7 @@ def test_the_divergence_is_that_of_a_separate_trajectory(rossler: Lyapunov) -> N
     scene = lone("rossler", c=5.7).replace(
         record=("trajectory",), samples=40_000, transient=200.0, window=4000.0, time_unit="time"
     )
-    x = run(scene, reduce=False).trajectory.sel(state="x_1").values
+    x = run(scene, reduce=False).trajectory.sel(component="x", node=1).values
     assert 0.2 - 5.7 + x.mean() == pytest.approx(rossler.divergence, abs=6 * rossler.divergence_error)
 
 

@@ -36,9 +36,10 @@ def test_a_short_run_moves_a_threshold_that_the_exponent_does_not() -> None:
 def copies() -> np.ndarray:
     """The states (2, 2) of one oscillator on its cycle of two periods of the drive, one period apart."""
     alone = Scene(parameters={"omega": 1.15}, window=0.0, record=())
-    return np.array([run(alone.replace(transient=t), show_progress=False).end.values for t in (400.0, 401.0)])
+    return np.array([run(alone.replace(transient=t), show_progress=False).states("end") for t in (400.0, 401.0)])
 
 
+@pytest.mark.long
 def test_two_copies_of_one_cycle_are_not_synchronous_though_the_state_is_stable(copies: np.ndarray) -> None:
     assert np.abs(copies[0] - copies[1]).max() > 0.05
     near = [copies[0], copies[0] + [1e-3, 0.0]]
@@ -54,7 +55,7 @@ def test_two_copies_of_one_cycle_are_not_synchronous_though_the_state_is_stable(
 def test_exchanged_oscillators_give_exchanged_ends() -> None:
     one = run(pair(initial={"x": [0.3, 0.1]}), sigma=[0.05], show_progress=False)
     two = run(pair(initial={"x": [0.1, 0.3]}), sigma=[0.05], show_progress=False)
-    ends = [found.end.values.reshape(2, 2) for found in (one, two)]
+    ends = [found.states("end").reshape(2, 2) for found in (one, two)]
     np.testing.assert_allclose(ends[0], ends[1][:, ::-1], rtol=0, atol=1e-10)
     assert one.sync_error.item() == pytest.approx(two.sync_error.item(), rel=1e-6)
 
@@ -71,6 +72,7 @@ def test_equal_oscillators_stay_equal_and_are_not_called_stable() -> None:
     assert VERDICTS[found[1].verdict.item()] == "not synchronous, the state is unstable"
 
 
+@pytest.mark.long
 def test_a_mismatch_bursts_near_the_loss_of_stability() -> None:
     """Bubbling: at sigma = 0.295 the exponent is surely negative, and yet a mismatch of 1e-6 bursts to 1e-2.
 

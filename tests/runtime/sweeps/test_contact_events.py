@@ -38,7 +38,7 @@ def ran(made: Scene, **more: Any) -> Result:
 
 
 def ends(made: Scene, **more: Any) -> np.ndarray:
-    return np.asarray(ran(made, **more).data.end.values)
+    return np.asarray(ran(made, **more).states("end"))
 
 
 # -- events that only just happen ------------------------------------------------------------------------------
@@ -129,7 +129,7 @@ def test_lanes_and_threads_do_not_matter() -> None:
 def test_stuck_is_the_speed_of_the_belt_to_the_last_bit() -> None:
     made = scene(THREE, [0.3, -0.2, 0.1], [0.0, 0.2, -0.1], 10, parameters={"omega": 1.15, "sigma": 0.2},
                  record=("trajectory",), samples=3001)  # fmt: skip
-    data = ran(made).data.trajectory.values
+    data = ran(made).states("trajectory")
     slips, speeds = data[:, 6:], data[:, 3:6]
     assert set(np.unique(slips)) <= {-1.0, 0.0, 1.0}
     stuck = slips == 0.0
@@ -218,4 +218,4 @@ def test_against_taylor_series_in_thirty_digits(seed: int) -> None:
         reference.advance(mpf(float(found.data.end_time)))
         expected = [float(q) for q in (*reference.x, *reference.v, *reference.slip)]
     assert len(reference.events) > 30
-    np.testing.assert_allclose(found.data.end.values, expected, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.states("end"), expected, rtol=0, atol=1e-9)

@@ -24,7 +24,7 @@ from synchain.models.graphs.products import cartesian
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.kernels import write_kernel
 from synchain.runtime.cells.reduce import reduce_scene
-from synchain.runtime.results.open import open_result
+from synchain.runtime.opening.open import open_result
 from synchain.runtime.results.result import Result
 from synchain.runtime.sweeps.errors import SweepFailed
 from synchain.runtime.sweeps.job import JobSpec, SweepSpec

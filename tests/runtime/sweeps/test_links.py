@@ -135,7 +135,7 @@ LONG = pytest.mark.long
 )
 def test_links_against_dop853(make: Callable[[int], tuple[Scene, Rhs]], n: int, integrator: str) -> None:
     scene, end = case(make, n)
-    found = run(scene.replace(integrator=integrator)).data.end.values
+    found = run(scene.replace(integrator=integrator)).states()
     assert np.abs(found - end).max() < 2e-11 * np.abs(end).max()
 
 

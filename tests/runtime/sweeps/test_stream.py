@@ -24,8 +24,8 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.figures.result_plot import draw_result
+from synchain.runtime.opening.open import open_result
 from synchain.runtime.results.block_log import HEAD, BlockLog
-from synchain.runtime.results.open import open_result
 from synchain.runtime.support.netcdf import Sheet
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.errors import SweepFailed, SweepInterrupted
@@ -682,6 +682,7 @@ def test_a_result_is_not_saved_over_a_device(tmp_path):
         run(PAIR, show_progress=False).save(tmp_path / "a.nc")
 
 
+@pytest.mark.long
 def test_the_command_says_that_there_is_nothing_to_do(tmp_path, capsys):
     from synchain.runtime.cli import main
 

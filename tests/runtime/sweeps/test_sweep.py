@@ -15,7 +15,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.kernels import kernel
 from synchain.runtime.cells.plan import plan, tolerances
 from synchain.runtime.cells.reduce import reduce_scene
-from synchain.runtime.results.open import open_result
+from synchain.runtime.opening.open import open_result
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.errors import SweepInterrupted
 from synchain.runtime.sweeps.memory import Memory
@@ -113,7 +113,7 @@ def test_continuation_starts_from_the_neighbour(direction):
         start = {name: float(value) for name, value in zip(PAIR.equations.state, state, strict=True)}
         alone = run(SECTIONS, sigma=[0.02, 0.05, 0.08][column], **start)
         np.testing.assert_array_equal(result.end[column], alone.end)
-        state = alone.end.values
+        state = alone.states("end")
 
 
 def test_continuation_keeps_its_states_where_room_grows():
@@ -227,5 +227,5 @@ def test_a_window_of_whole_periods_has_its_last_sample(periods: int) -> None:
     )  # fmt: skip
     for window in (2 * np.pi * periods, np.nextafter(2 * np.pi * periods, 0), np.nextafter(2 * np.pi * periods, 1e9)):
         result = run(scene.replace(window=float(window)), reduce=False, width=1)
-        assert np.isfinite(result.trajectory.values).all(), window
-        np.testing.assert_allclose(result.trajectory.values[-1], result.end.values, rtol=1e-11)
+        assert np.isfinite(result.states("trajectory")).all(), window
+        np.testing.assert_allclose(result.states("trajectory")[-1], result.states("end"), rtol=1e-11)

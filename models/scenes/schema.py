@@ -1,0 +1,205 @@
+"""The JSON Schema of scene files, for editors: from the keywords of `Scene`, their types and their limits."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Mapping
+from typing import Any, TypeAlias, get_args, get_origin, get_type_hints
+
+from ..dynamics.network import KAPPA
+from ..graphs.families import Family, family
+from ..graphs.families import names as families
+from ..inputs import plugins
+from ..inputs.plugins import Kind
+from ..inputs.words import Word
+from ..mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
+from ..mechanics.friction import ContactModel
+from ..mechanics.loader import load_friction_law, load_oscillator, read_coupling
+from ..mechanics.parameter import Parameter
+from .axis import LIMIT as AXIS_LIMIT
+from .complete import LIMITS, integrators
+from .dictionary import NODES
+from .scene import KEYWORDS, Scene
+from .section import Direction
+
+__all__ = ["schema"]
+
+Table: TypeAlias = dict[str, Any]
+
+TEXT: Table = {"type": "string", "maxLength": 200}
+FILE: Table = {"type": "string", "pattern": r"\.py$"}
+"""The path of a part outside the package."""
+
+NUMBER: Table = {"type": ["number", "string"]}
+"""A number, or a constant as text: "2*pi/5"."""
+
+EXPRESSIONS: Table = {"type": "object", "additionalProperties": NUMBER}
+"""Expressions as text, or numbers, by names."""
+
+WHOLE = {"type": "integer", "minimum": 1, "maximum": NODES}
+OPTIONS = {int: ["integer", "string"], str: ["number", "string"]}
+"""The types of an option of a family by the type of its default; other options are lists."""
+
+
+def schema() -> Table:
+    """Return the JSON Schema of scene files, in JSON types.
+
+    The schema knows the keys of every table, their types and ranges, and the names of all parts.  It
+    leaves to `Scene` what hangs on several keys, such as whether an oscillator has a parameter, and the
+    grammar of texts.  It keeps to words that draft 4 and draft 7 share, since editors know either.
+
+    Raises
+    ------
+    ValueError
+        If a plug-in file is wrong.
+
+    References
+    ----------
+    A. Wright, H. Andrews & G. Luff, JSON Schema Validation, draft-handrews-json-schema-validation-01, 2018.
+    """
+    types, defaults, meanings = get_type_hints(Scene), inspect.signature(Scene).parameters, _meanings(Scene)
+    rows = _rows()
+    properties = {}
+    for name in KEYWORDS:
+        row = {"description": meanings.get(name, ""), **(rows[name] if name in rows else _of_type(name, types[name]))}
+        default = defaults[name].default
+        if isinstance(default, bool | int | float | str):
+            row["default"] = default
+        properties["sweep" if name == "axes" else name] = row
+    return {
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        "title": "A scene of synchain",
+        **_table(properties),
+    }
+
+
+def _rows() -> dict[str, Table]:
+    """What is said of the keywords whose type alone does not tell the form of the value in a file."""
+    oscillator, friction = _written_out()
+    group = {"oscillator": oscillator, "friction": friction, "at": {"type": "array", "items": WHOLE, "minItems": 1}}
+    uniform = {"low": NUMBER, "high": NUMBER, "seed": _of_type("seed", int)}
+    span = {"from": NUMBER, "to": NUMBER, "count": {"type": "integer", "minimum": 1, "maximum": AXIS_LIMIT}}
+    numbers = {"type": "array", "items": NUMBER, "minItems": 1}
+    expressions: Table = {"type": "object", "additionalProperties": NUMBER}
+    tables = [
+        _table({"rates": expressions, "parameters": {"type": "object"}}, "rates"),
+        _table({"potential": NUMBER, "parameters": {"type": "object"}}, "potential"),
+    ]
+    words = {"type": "string", "pattern": "->| on "}
+    coupling = {"anyOf": [*_part(COUPLING, "none")["anyOf"], words, *tables]}
+    graph = {"anyOf": _graphs()}
+    return {
+        "oscillator": oscillator,
+        "friction": friction,
+        "coupling": coupling,
+        "links": {"type": "array", "items": _table({"coupling": coupling, "topology": graph}, "coupling", "topology")},
+        "nodes": {"type": "array", "items": _table(group, "oscillator", "at")},
+        "topology": graph,
+        "parameters": {
+            "type": "object",
+            "properties": {name: {"description": words, **_either(numbers)} for name, words in _parameters().items()},
+            "additionalProperties": _either(numbers),
+        },
+        "initial": {"type": "object", "additionalProperties": _either(numbers, _table(uniform, "low", "high"))},
+        "section": {**TEXT, "pattern": rf"^\s*\S+\s+({'|'.join(Direction)})(\s|$)"},
+        "integrator": {"enum": ["auto", *integrators()]},
+        "axes": {
+            "type": "object",
+            "properties": {"zipped": _of_type("zipped", bool)},
+            "additionalProperties": {"anyOf": [numbers, _table(span, *span)]},
+        },
+    }
+
+
+def _of_type(name: str, kind: Any) -> Table:
+    """The row of a keyword by its type: a word, several words, text, a number in its range, true or false."""
+    if isinstance(kind, type) and issubclass(kind, Word):
+        return {"enum": [str(word) for word in kind]}
+    if get_origin(kind) is tuple:
+        return {"type": "array", "items": _of_type(name, get_args(kind)[0]), "uniqueItems": True}
+    if kind in (int, float):
+        low, high = LIMITS[name]
+        span = {"minimum": low, "maximum": high}
+        return {"type": "integer", **span} if kind is int else {"anyOf": [{"type": "number", **span}, TEXT]}
+    if kind not in (bool, str):
+        raise TypeError(f"keyword {name!r}: its type {kind} does not tell its form in a file; expected a row in _rows")
+    return {"type": "boolean"} if kind is bool else TEXT
+
+
+def _table(properties: Mapping[str, Table], *required: str) -> Table:
+    """A table with these keys and no others."""
+    row = {"type": "object", "properties": dict(properties), "additionalProperties": False}
+    return {**row, "required": list(required)} if required else row
+
+
+def _either(*others: Table) -> Table:
+    """A number or something else."""
+    return {"anyOf": [NUMBER, *others]}
+
+
+def _part(kind: Kind, *words: str) -> Table:
+    """The name of a part, a file outside the package, or one of some words."""
+    return {"anyOf": [{"enum": [*plugins.names(kind), *words]}, FILE]}
+
+
+def _written_out() -> tuple[Table, Table]:
+    """An oscillator and a friction law: a name, or a table of expressions."""
+    anything: Table = {"type": "object"}
+    contact = {"enum": [str(word) for word in ContactModel]}
+    law = _part(FRICTION_LAW, "none", "default")
+    keys = {"name": TEXT, "force": NUMBER, "static": NUMBER, "order": {"type": "array"}}
+    own = _table({**keys, "self_exciting": {"type": "boolean"}, "parameters": anything}, "force")
+    friction = {"anyOf": [*law["anyOf"], own]}
+    common = {"name": TEXT, "parameters": anything, "initial": anything}
+    field = _table({**common, "rates": EXPRESSIONS}, "rates")
+    energies = {"coordinates": anything, "kinetic": NUMBER, "potential": NUMBER, "dissipation": NUMBER}
+    more = {"forces": EXPRESSIONS, "friction": friction, "contact": contact}
+    lagrangian = _table({**common, **energies, **more}, "coordinates", "kinetic")
+    return {"anyOf": [*_part(OSCILLATOR)["anyOf"], field, lagrangian]}, friction
+
+
+def _graphs() -> list[Table]:
+    """The tables of a topology: one for each family, a file of code, a matrix, a file of a matrix."""
+    rows = {"type": "array", "minItems": 1, "items": {"type": "array", "items": NUMBER}}
+    outside = {"type": "object", "properties": {"name": FILE, "n": WHOLE}, "required": ["name", "n"]}
+    matrix = {"matrix": rows, "name": TEXT, "n": WHOLE}
+    return [
+        *(_family(family(name)) for name in families()),
+        outside,
+        _table(matrix, "matrix"),
+        _table({"file": {"type": "string"}}, "file"),
+    ]
+
+
+def _family(graphs: Family) -> Table:
+    """The table of one family, its options by the types of their defaults."""
+    options: dict[str, Table] = {
+        name: {"type": OPTIONS.get(type(default), ["array", "integer", "string"])}
+        for name, default in graphs.options.items()
+    }
+    own: dict[str, Table] = {"name": {"enum": [graphs.name]}, "n": {**WHOLE, "minimum": graphs.minimum}, **options}
+    return {"description": graphs.summary, **_table(own, "name", "n")}
+
+
+def _parameters() -> dict[str, str]:
+    """What the parameters of all parts mean, each in the words of the parts that have it."""
+    parts: dict[str, Mapping[str, Parameter]] = {
+        **{name: load_oscillator(name).parameters for name in plugins.names(OSCILLATOR)},
+        **{f"friction {name}": load_friction_law(name).parameters for name in plugins.names(FRICTION_LAW)},
+        **{f"coupling {name}": read_coupling(name).parameters for name in plugins.names(COUPLING)},
+        "contact atan": {"kappa": KAPPA},
+    }
+    words: dict[str, list[str]] = {}
+    for part, parameters in parts.items():
+        for name, parameter in parameters.items():
+            words.setdefault(name, []).append(f"{part}: {parameter.meaning}")
+    return {name: "; ".join(words[name]) for name in sorted(words)}
+
+
+def _meanings(kind: type) -> dict[str, str]:
+    """What the parameters of a class mean, by its NumPy-style docstring."""
+    text = inspect.getdoc(kind) or ""
+    section = text.partition("Parameters\n----------\n")[2].partition("\n\n")[0]
+    rows = re.findall(r"^(\w[\w, ]*) : .*\n((?: {4}.*\n?)+)", section, re.MULTILINE)
+    return {name: " ".join(words.split()) for names, words in rows for name in names.split(", ")}

@@ -1,0 +1,84 @@
+"""`synchain completion`: what a shell needs to complete command lines."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import TypeAlias
+
+from ..console.outcome import FINE
+
+SUMMARY = "print the completion of command lines for a shell"
+EXAMPLES = (
+    "synchain completion bash > ~/.local/share/bash-completion/completions/synchain",
+    "synchain completion zsh > ~/.zfunc/_synchain",
+    "synchain completion fish > ~/.config/fish/completions/synchain.fish",
+)
+
+SHELLS = ("bash", "zsh", "fish")
+
+ByShell: TypeAlias = dict[str, str]
+
+SCENES: ByShell = {"bash": "_synchain_scene_files", "zsh": "_synchain_scene_files", "fish": "(_synchain_scene_files)"}
+"""What completes SCENE: a function of PREAMBLE, which offers the shipped scenes and files."""
+
+PREAMBLE: ByShell = {
+    "bash": """\
+_synchain_scene_files() {{
+  compgen -W "{names}" -- "$1"
+  compgen -f -X '!*.toml' -- "$1"
+  compgen -d -- "$1"
+}}""",
+    "zsh": """\
+_synchain_scene_files() {{
+  compadd {names}
+  _files -g '*.toml'
+}}""",
+    "fish": """\
+function _synchain_scene_files
+  printf '%s\\n' {names}
+  __fish_complete_path (commandline -ct) | string match -er '(\\.toml|/)(\\t|$)'
+end""",
+}
+
+
+def configure(parser: ArgumentParser) -> None:
+    """Add the shell."""
+    parser.add_argument("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))
+
+
+def execute(arguments: Namespace) -> int:
+    """Print the script; the names in it are those of this installation."""
+    import shtab
+
+    from synchain.models.scenes.file import scene_names
+
+    preamble = PREAMBLE[arguments.shell].format(names=" ".join(scene_names()))
+    print(shtab.complete(_whole(), arguments.shell, preamble={arguments.shell: preamble}))
+    return FINE
+
+
+def _whole() -> ArgumentParser:
+    """One parser of all commands, whose arguments say by their placeholders what completes them."""
+    import shtab
+
+    from synchain.models.graphs.families import names as families
+
+    from ..bench import names as benchmarks
+    from ..figures import names as figures
+    from . import command, names
+
+    places = {"DIR": shtab.DIRECTORY, "FILE": shtab.FILE, "XML": shtab.FILE, "SCENE": SCENES}
+    words = {"TOPOLOGY": families(), "FIGURE": figures(extra=True), "BENCHMARK": benchmarks()}
+    whole = ArgumentParser(prog="synchain")
+    whole.add_argument("--version", action="store_true", help="print the version")
+    commands = whole.add_subparsers(dest="command")
+    for name in names():
+        module = command(name)
+        parser = commands.add_parser(name, help=module.SUMMARY, description=module.SUMMARY)
+        module.configure(parser)
+        for action in parser._actions:
+            if action.metavar in places:
+                action.complete = places[action.metavar]  # type: ignore[attr-defined]  # where shtab looks
+            elif action.metavar in words:
+                action.choices = words[action.metavar]
+    return whole

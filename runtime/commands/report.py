@@ -1,0 +1,42 @@
+"""`synchain report`: one page on a scene, to be read in a browser or on paper."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from ..console.arguments import add_scene, add_workers, folder
+from ..console.outcome import FINE, warn, wrong_use
+
+SUMMARY = "write one page on a scene: equations, graph, spectrum, stability, a sweep (HTML)"
+EXAMPLES = (
+    "synchain report figure_4a --out figure_4a.html",
+    "synchain report huygens --out huygens.html --quick",
+)
+
+
+def configure(parser: ArgumentParser) -> None:
+    """Add the scene, the file and the effort."""
+    add_scene(parser)
+    parser.add_argument("--out", metavar="FILE", type=folder, required=True, help="the page, which ends in .html")
+    parser.add_argument("--quick", action="store_true", help="coarse grids: at most 25 values of each axis")
+    add_workers(parser)
+
+
+def execute(arguments: Namespace) -> int:
+    """Compute what there is to say and write the page."""
+    from pathlib import Path
+
+    from synchain.models.scenes.file import load_scene
+
+    from ..seeing.report import QUICK, Effort, report
+    from ..support.files import check_replaceable, output_folder, write_text
+
+    with wrong_use():
+        scene = load_scene(arguments.scene)
+        target = Path(arguments.out)
+        check_replaceable(target)
+        output_folder(target.parent)
+    warn(scene.warnings)
+    write_text(target, report(scene, QUICK if arguments.quick else Effort(), workers=arguments.workers))
+    print(f"  {target}")
+    return FINE

@@ -1,0 +1,207 @@
+"""Plots of every kind of result: functions that take and return axes, and show nothing."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from synchain.models.graphs.topology import Topology
+
+from ..bifurcation.branches import Branch
+from ..bifurcation.periodic import PeriodicOrbit
+from ..bifurcation.skeleton import Skeleton
+from ..figures.exponent import draw_exponent, finite
+from ..figures.plane import draw_plane
+from ..figures.result_plot import draw_result
+from ..figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, bands, note, symbol
+from ..results.result import Result
+from ..stability.clusters import BlockVerdict, ClusterExponents
+from ..stability.exponents import Exponents
+from ..stability.lyapunov import Lyapunov
+from ..stability.msf import MSF, Plane
+from ..sweeps.run import run
+from ..sweeps.stream import Streamed
+from ..synchronisation.basin import Basin
+from ..synchronisation.probe import Probe
+from ..synchronisation.threshold import Thresholds
+from .canvas import canvas
+
+__all__ = ["drawn"]
+
+SAMPLES = 400
+"""Samples of an orbit in a period of the drive."""
+
+DOTS: dict[str, Any] = {"linestyle": "none", "marker": "."}
+
+
+def drawn(value: object, ax: Axes | None, **options: Any) -> Axes:
+    """Draw a value into axes, by default those of a new figure, and return them.
+
+    Raises
+    ------
+    TypeError
+        If values of this type have no plot, or if `ax` is no axes.
+    """
+    with canvas(ax) as axes:
+        return _draw(value, axes, **options)
+
+
+@singledispatch
+def _draw(value: object, axes: Axes) -> Axes:
+    raise TypeError(f"found {type(value).__name__}; expected a value with a plot")
+
+
+@_draw.register
+def _(value: Result, axes: Axes, kind: str | None = None) -> Axes:
+    return draw_result(value, axes, kind)
+
+
+@_draw.register
+def _(value: Streamed, axes: Axes) -> Axes:
+    return draw_result(value.result, axes)
+
+
+@_draw.register
+def _(value: MSF, axes: Axes) -> Axes:
+    return draw_exponent(axes, value)
+
+
+@_draw.register
+def _(value: Plane, axes: Axes) -> Axes:
+    return draw_plane(axes, value)
+
+
+@_draw.register
+def _(value: Exponents, axes: Axes) -> Axes:
+    """Exponents over real strengths as a line, over complex ones as coloured dots."""
+    if not np.iscomplexobj(value.alpha):
+        axes.axhline(0.0, color=BLACK, linewidth=0.6)
+        axes.errorbar(value.alpha, finite(value.exponent), 2 * finite(value.stderr), color=BLUE)
+        axes.set(xlabel=r"strength of a mode $\alpha$", ylabel=r"exponent $\Lambda$ per unit of $\tau$")
+        return axes
+    colour = finite(value.exponent)
+    top = float(np.nanmax(np.abs(colour), initial=0.0)) or 1.0
+    places = value.alpha.real, value.alpha.imag
+    dots = axes.scatter(*places, c=colour, cmap="RdBu_r", vmin=-top, vmax=top, s=14.0, edgecolors=BLACK, linewidths=0.3)
+    axes.set(xlabel=r"$\alpha$", ylabel=r"$\beta$")
+    axes.figure.colorbar(dots, ax=axes, label=r"exponent $\Lambda$ per unit of $\tau$")
+    return axes
+
+
+@_draw.register
+def _(value: Thresholds, axes: Axes) -> Axes:
+    """Share of synchronous starts over sigma; grey: at least half, bar: the probe's prediction."""
+    bands(axes, value.direct.intervals)
+    axes.plot(value.direct.x, value.direct.share, color=BLUE, drawstyle="steps-mid", label="simulated")
+    for k, (low, high) in enumerate(value.predicted):
+        axes.plot([low, high], [1.06, 1.06], color=ORANGE, marker="|", label="" if k else "predicted by the probe")
+    axes.set(xlabel=symbol("sigma"), ylabel="share of synchronous starts", ylim=(-0.05, 1.12))
+    axes.set_xlim(value.direct.x[0], value.direct.x[-1])
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    return axes
+
+
+@_draw.register
+def _(value: Basin, axes: Axes) -> Axes:
+    """First two components of the first node at the start, by what became of it."""
+    initial, names = value.data.initial.values[:, :2, 0], [str(name) for name in value.data.component.values[:2]]
+    across, up = (initial[:, 0], initial[:, -1])
+    for chosen, colour, words in ((value.synchronous, BLUE, "synchronous"), (~value.synchronous, ORANGE, "not")):
+        axes.plot(across[chosen], up[chosen], **DOTS, markersize=2.5, color=colour, label=words)
+    axes.set(xlabel=symbol(f"{names[0]}_1"), ylabel=symbol(f"{names[-1]}_1"))
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    return axes
+
+
+@_draw.register
+def _(value: Lyapunov, axes: Axes) -> Axes:
+    number = np.arange(1, len(value.exponent) + 1)
+    axes.axhline(0.0, color=BLACK, linewidth=0.6)
+    axes.errorbar(number, finite(value.exponent), 2 * value.stderr, color=BLUE, **DOTS)
+    axes.set(xlabel="number", ylabel="Lyapunov exponent per unit of time")
+    lost = int((~value.resolved).sum())
+    note(axes, f"{lost} of {len(number)} decay too fast to be followed" if lost else "")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    return axes
+
+
+@_draw.register
+def _(value: ClusterExponents, axes: Axes) -> Axes:
+    """The exponent of each block with two standard errors, coloured by its verdict."""
+    colours = {BlockVerdict.STABLE: BLUE, BlockVerdict.UNDECIDED: GREY, BlockVerdict.UNSTABLE: ORANGE}
+    axes.axhline(0.0, color=BLACK, linewidth=0.6)
+    for k, verdict in enumerate(value.verdicts):
+        axes.errorbar([k + 1], finite(value.exponent[[k]]), 2 * value.stderr[[k]], color=colours[verdict], fmt="o")
+    names = [f"block {k + 1}\nclusters {', '.join(str(c + 1) for c in own)}" for k, own in enumerate(value.intertwined)]
+    axes.set_xticks(range(1, len(names) + 1), names)
+    axes.set_ylabel("exponent per unit of time")
+    axes.margins(x=0.2)
+    return axes
+
+
+@_draw.register
+def _(value: PeriodicOrbit, axes: Axes) -> Axes:
+    """The closed curve of the first two components; a dot begins each drive period."""
+    start = {name: [x] for name, x in zip(value.components, value.state.tolist(), strict=True)}
+    one = value.scene.replace(
+        topology=Topology("one", 1, ()),
+        record=("trajectory",),
+        samples=SAMPLES * value.periods,
+        transient=0.0,
+        window=float(value.periods),
+        time_unit="period",
+        initial=start,
+    )
+    path = run(one, show_progress=False, workers=1).trajectory.sel(node=1)
+    names = value.components[0], value.components[min(1, len(value.components) - 1)]
+    axes.plot(*(path.sel(component=name) for name in names), color=BLUE)
+    points = value.points
+    axes.plot(points[:, 0], points[:, min(1, points.shape[1] - 1)], **DOTS, markersize=6.0, color=ORANGE)
+    axes.set(xlabel=symbol(names[0]), ylabel=symbol(names[1]))
+    return axes
+
+
+@_draw.register
+def _(value: Branch, axes: Axes) -> Axes:
+    return _branches((value,), axes)
+
+
+@_draw.register
+def _(value: Skeleton, axes: Axes) -> Axes:
+    return _branches(value.branches, axes)
+
+
+def _branches(branches: tuple[Branch, ...], axes: Axes) -> Axes:
+    """First component at the start of a period along the parameter; dashed where unstable."""
+    colours = (PURPLE, BLUE, ORANGE, GREEN)
+    for k, branch in enumerate(branches):
+        colour = colours[k % len(colours)]
+        x = np.array([orbit.state[0] for orbit in branch.orbits])
+        stable = np.array([orbit.stable for orbit in branch.orbits])
+        near = stable | np.roll(stable, 1) | np.roll(stable, -1)
+        axes.plot(branch.values, np.where(near, x, np.nan), color=colour, linewidth=1.2)
+        axes.plot(branch.values, np.where(stable, np.nan, x), color=colour, linestyle="--", linewidth=0.8)
+        for turn in branch.bifurcations:
+            axes.plot([turn.value], [turn.orbit.state[0]], marker="o", markerfacecolor="white", color=colour)
+            place = (turn.value, turn.orbit.state[0])
+            axes.annotate(str(turn.kind), place, (3, 3), textcoords="offset points", fontsize=6)
+    if branches:
+        name = symbol(branches[0].orbits[0].components[0])
+        axes.set(xlabel=symbol(branches[0].name), ylabel=f"{name} at the beginning of a period")
+    return axes
+
+
+@_draw.register
+def _(value: Probe, axes: Axes) -> Axes:
+    """Strengths in the complex plane: filled if synchronous, open if not."""
+    good = value.synchronous
+    axes.plot(value.alpha[good], value.beta[good], **DOTS, markersize=7.0, color=BLUE, label="synchronous")
+    crosses: dict[str, Any] = {"linestyle": "none", "marker": "x", "markersize": 5.0}
+    axes.plot(value.alpha[~good], value.beta[~good], **crosses, color=ORANGE, label="not")
+    axes.set(xlabel=r"$\alpha$", ylabel=r"$\beta$")
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    return axes

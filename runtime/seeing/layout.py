@@ -1,0 +1,162 @@
+"""Where the nodes of a graph are drawn: by its family, or by eigenvectors of its Laplacian.
+
+The eigenvectors of the two smallest eigenvalues above 0 place joined nodes near each other (Hall,
+Management Sci. 17, 219 (1970); Koren, Comput. Math. Appl. 49, 1867 (2005)).  Where eigenvalues are
+equal these places coincide or depend on rounding, so up to DENSE nodes are then moved until their
+distances are like the lengths of the shortest paths between them, by majorisation of the stress
+(Gansner, Koren & North, Lecture Notes in Computer Science 3383, 239 (2005)).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from synchain.models.graphs.families import FamilyRule
+from synchain.models.graphs.partitions import join
+from synchain.models.graphs.topology import Topology
+
+__all__ = ["positions"]
+
+DENSE = 300
+"""Largest graph with dense matrices."""
+
+ROUNDS = 80
+"""Steps of the majorisation."""
+
+
+def positions(graph: Topology) -> np.ndarray:
+    """Return the places (n, 2) of the nodes in a box of side 2 about the origin."""
+    rule = graph.rule
+    layout = _FAMILIES.get(rule.family.name) if isinstance(rule, FamilyRule) else None
+    return _fitted(_spectral(graph) if layout is None else layout(graph))
+
+
+def _circle(count: int) -> np.ndarray:
+    """Points (count, 2) clockwise from the top."""
+    angle = 0.5 * np.pi - 2.0 * np.pi * np.arange(count) / max(count, 1)
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def _ring(graph: Topology) -> np.ndarray:
+    return _circle(graph.n)
+
+
+def _line(graph: Topology) -> np.ndarray:
+    return np.stack([np.linspace(-1.0, 1.0, graph.n), np.zeros(graph.n)], axis=1)
+
+
+def _hub(graph: Topology) -> np.ndarray:
+    """The first node in the middle of the others."""
+    return np.concatenate([np.zeros((1, 2)), _circle(graph.n - 1)])
+
+
+def _lattice(graph: Topology) -> np.ndarray:
+    """Rows and columns; a grid of other than two directions by its eigenvectors."""
+    rule = graph.rule
+    assert isinstance(rule, FamilyRule)
+    sides = dict(rule.options).get("shape") or (rule.family.sides(graph.n) if rule.family.sides else (graph.n,))
+    if not isinstance(sides, tuple) or len(sides) != 2:
+        return _circle(graph.n) if rule.family.name == "torus" and sides == (graph.n,) else _spectral(graph)
+    row, column = np.divmod(np.arange(graph.n), int(sides[1]))
+    return np.stack([column, -row], axis=1).astype(float)
+
+
+def _rails(graph: Topology) -> np.ndarray:
+    """Even nodes above odd ones."""
+    rung, rail = np.divmod(np.arange(graph.n), 2)
+    return np.stack([rung, -rail], axis=1).astype(float)
+
+
+def _levels(graph: Topology) -> np.ndarray:
+    """A binary tree with its root at the top: node i has the children 2 i + 1 and 2 i + 2."""
+    number = np.arange(1, graph.n + 1)
+    level = np.floor(np.log2(number)).astype(int)
+    place = (number - 2**level + 0.5) / 2.0**level
+    return np.stack([2.0 * place - 1.0, -level / max(level.max(initial=0), 1) * 1.2], axis=1)
+
+
+def _sides(graph: Topology) -> np.ndarray:
+    """Two columns, one for each group."""
+    rule = graph.rule
+    assert isinstance(rule, FamilyRule)
+    left = int(str(dict(rule.options).get("left") or graph.n // 2))
+    columns = []
+    for count, x in ((left, -0.7), (graph.n - left, 0.7)):
+        y = np.linspace(1.0, -1.0, count) if count > 1 else np.zeros(1)
+        columns.append(np.stack([np.full(count, x), y], axis=1))
+    return np.concatenate(columns)
+
+
+_FAMILIES: dict[str, Callable[[Topology], np.ndarray]] = {
+    **dict.fromkeys(("ring", "one_way_ring", "complete", "circulant", "small_world"), _ring),
+    **dict.fromkeys(("chain", "feed_forward"), _line),
+    **dict.fromkeys(("star", "wheel"), _hub),
+    **dict.fromkeys(("grid", "torus"), _lattice),
+    "ladder": _rails,
+    "tree": _levels,
+    "complete_bipartite": _sides,
+}
+"""The layout of each family that has one of its own."""
+
+
+def _spectral(graph: Topology) -> np.ndarray:
+    """The connected parts side by side, each by its eigenvectors; nearly no links: a circle."""
+    part = np.array(join(graph.n, ((target, source) for target, source, _ in graph.links)))
+    numbers = np.unique(part)
+    if len(numbers) > graph.n // 2:
+        return _circle(graph.n)
+    place = np.zeros((graph.n, 2))
+    left = 0.0
+    for number in numbers:
+        members = np.flatnonzero(part == number)
+        own = _fitted(_eigenvectors(graph, members)) * np.sqrt(len(members))
+        width = float(np.ptp(own[:, 0]))
+        place[members] = own + np.array([left - own[:, 0].min(), 0.0])
+        left += width + 0.6 * np.sqrt(len(members)) + 0.4
+    return place
+
+
+def _eigenvectors(graph: Topology, members: np.ndarray) -> np.ndarray:
+    """The second and third eigenvector (m, 2) of the Laplacian, without signs and directions."""
+    if len(members) <= 3:
+        return _circle(len(members))
+    index = np.full(graph.n, -1)
+    index[members] = np.arange(len(members))
+    ends = np.array([(index[t], index[s], abs(float(w))) for t, s, w in graph.links if index[t] >= 0])
+    rows, columns, weights = ends[:, 0].astype(int), ends[:, 1].astype(int), ends[:, 2]
+    from scipy.sparse import coo_array, csgraph
+
+    adjacency = coo_array((weights, (rows, columns)), shape=(len(members),) * 2).tocsr()
+    laplacian = csgraph.laplacian(0.5 * (adjacency + adjacency.T))
+    if len(members) <= DENSE:
+        start = _fitted(np.asarray(np.linalg.eigh(laplacian.toarray())[1][:, 1:3]))
+        return _settled(start, csgraph.shortest_path(adjacency, directed=False, unweighted=True))
+    from scipy.sparse.linalg import eigsh
+
+    start = np.random.default_rng(0).normal(size=len(members))
+    shift = -1e-3 * float(weights.mean())
+    values, vectors = eigsh(laplacian.tocsc(), k=3, sigma=shift, v0=start)
+    return np.asarray(vectors[:, np.argsort(values)[1:3]])
+
+
+def _settled(place: np.ndarray, far: np.ndarray) -> np.ndarray:
+    """Places moved until their distances are like `far` (m, m), by ROUNDS of majorisation."""
+    count = len(place)
+    scale = float(far.max()) / 2.0
+    place = scale * place + 0.05 * scale * _circle(count)  # none coincide
+    weight = np.divide(1.0, far**2, where=far > 0.0, out=np.zeros_like(far))
+    inverse = np.linalg.pinv(np.diag(weight.sum(axis=1)) - weight)
+    for _ in range(ROUNDS):
+        now = np.linalg.norm(place[:, None] - place[None], axis=2)
+        pull = np.divide(weight * far, now, where=now > 0.0, out=np.zeros_like(now))
+        place = inverse @ ((np.diag(pull.sum(axis=1)) - pull) @ place)
+    return np.asarray(place)
+
+
+def _fitted(place: np.ndarray) -> np.ndarray:
+    """Places moved and scaled, alike in both directions, into a box of side 2 about the origin."""
+    low, high = place.min(axis=0), place.max(axis=0)
+    size = float((high - low).max()) or 1.0
+    return np.asarray((place - 0.5 * (low + high)) * (2.0 / size))

@@ -1,0 +1,91 @@
+"""Runs that begin where an earlier one ended: states by their labels, and the phase of the drive."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import xarray as xr
+
+from synchain.models.inputs.checks import typed_repr
+from synchain.models.mechanics.friction import SLIP
+from synchain.models.scenes.scene import Scene
+
+from ..results.labels import DRIVE_PHASE, END_TIME, STATE
+from ..results.result import Result
+
+__all__ = ["started"]
+
+WHOLE = 1e-9
+"""Largest distance of a time from a whole number of drive periods, in periods."""
+
+
+def started(scene: Scene, start: Result | xr.DataArray) -> tuple[Scene, float]:
+    """Return the scene with the states of one cell as its start, and when they were reached.
+
+    Parameters
+    ----------
+    scene : Scene
+    start : Result or DataArray
+        A result of one cell, or the states `end` of one, with dimensions component and node.
+
+    Raises
+    ------
+    TypeError
+        If `start` is neither.
+    ValueError
+        If the states are those of several cells or of other components or nodes, if one is not
+        finite, or if the drive was not at the beginning of a period.
+    """
+    if isinstance(start, Result) and not start.success:
+        raise ValueError(f"start: found a result with {start.message}; expected a cell that finished")
+    end = start.end if isinstance(start, Result) else start
+    if not isinstance(end, xr.DataArray):
+        raise TypeError(f"start: found {typed_repr(start)}; expected a Result of one cell, or result.end of one")
+    _check_labels(scene, end)
+    time = float(end.coords[END_TIME]) if END_TIME in end.coords else 0.0
+    _check_phase(scene, end, time)
+    initial = {}
+    for name in scene.components:
+        if name != SLIP.name:  # the modes of contacts follow from the other states
+            nodes = [i + 1 for i in scene.equations.holders(name)]
+            initial[name] = [float(x) for x in end.sel(component=name, node=nodes).values]
+    if not all(math.isfinite(x) for values in initial.values() for x in values):
+        raise ValueError("start: found a state that is not finite; expected those of a cell that finished")
+    return scene.replace(initial=initial), time
+
+
+def _check_labels(scene: Scene, end: xr.DataArray) -> None:
+    """Raise ValueError if the labels are not those of one cell of the scene."""
+    further = [f"{name} ({end.sizes[name]})" for name in end.dims if name not in STATE]
+    if further:
+        axis = next(name for name in end.dims if name not in STATE)
+        raise ValueError(
+            f"start: found the states of several cells, along {', '.join(map(str, further))}; expected those of one; "
+            f"choose it, e.g. result.end.isel({axis}=-1)"
+        )
+    expected = {"component": tuple(scene.equations.components), "node": tuple(range(1, scene.n + 1))}
+    for name, labels in expected.items():
+        found = tuple(end.coords[name].values.tolist()) if name in end.dims and name in end.coords else ()
+        if set(found) != set(labels) or len(found) != len(labels):
+            raise ValueError(
+                f"start: found the {name}s {_listed(found)}; expected {_listed(labels)}, those of the scene"
+            )
+
+
+def _check_phase(scene: Scene, end: xr.DataArray, time: float) -> None:
+    """Raise ValueError if the drive was amid a period, where a run cannot begin."""
+    if not scene.forced or time == 0.0:
+        return
+    phase = float(end.coords[DRIVE_PHASE]) if DRIVE_PHASE in end.coords else np.nan
+    if not abs(phase - round(phase)) < WHOLE:
+        where = "has no period" if math.isnan(phase) else f"is {phase:.6f} into a period"
+        raise ValueError(
+            f"start: the drive {where} at t = {time:.10g}; expected the beginning of one, where a run begins; "
+            "let the first run last a whole number of drive periods"
+        )
+
+
+def _listed(labels: tuple[object, ...]) -> str:
+    words = [str(label) for label in labels[:8]]
+    return ", ".join([*words, *(["…"] if len(labels) > len(words) else [])]) or "none"

@@ -1,0 +1,87 @@
+"""A value of every kind of result, made by hand: nothing is simulated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from synchain.models.graphs.clusters import clusters
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.bifurcation.bifurcations import Bifurcation, BifurcationKind
+from synchain.runtime.bifurcation.branches import Branch
+from synchain.runtime.bifurcation.periodic import PeriodicOrbit
+from synchain.runtime.bifurcation.phases import Phases
+from synchain.runtime.bifurcation.skeleton import Skeleton
+from synchain.runtime.results.labelled import Labelled
+from synchain.runtime.stability.attractor import Attractor, Motion
+from synchain.runtime.stability.clusters import ClusterExponents
+from synchain.runtime.stability.exponents import Exponents
+from synchain.runtime.stability.lyapunov import Lyapunov
+from synchain.runtime.stability.msf import MSF, Plane
+from synchain.runtime.synchronisation.basin import Basin
+from synchain.runtime.synchronisation.probe import Probe
+from synchain.runtime.synchronisation.threshold import Criterion, Sweep, Thresholds
+
+PAIR = Scene(topology=topology("chain", 2), parameters={"omega": 1.15})
+
+
+def exponents_on(alpha: np.ndarray) -> Exponents:
+    """Exponents that are negative below |alpha| = 0.3, of two starts on two kinds of motion."""
+    value = np.abs(alpha) - 0.3
+    spread = np.full(len(alpha), 1e-3)
+    cycle = Attractor(Motion.PERIODIC, 5.46, np.arange(8.0 * len(alpha)).reshape(2, len(alpha), 2, 2), 2)
+    both = np.stack([value, value + 1.0])
+    return Exponents(alpha, value, spread, 100.0, 2, both, (cycle, Attractor(Motion.APERIODIC, 0.0)))
+
+
+def orbit_at(omega: float) -> PeriodicOrbit:
+    """An orbit with a state and complex multipliers."""
+    return PeriodicOrbit(
+        PAIR.replace(omega=omega), 2, np.array([0.1, 0.2 * omega]), np.array([0.5 + 0.25j, 0.5 - 0.25j]), 1e-14, 3
+    )
+
+
+def branch() -> Branch:
+    """A branch of three orbits with a bifurcation and phases."""
+    omegas = np.array([1.1, 1.2, 1.3])
+    turn = Bifurcation(1.25, BifurcationKind.GRAZING, 1e-9, orbit_at(1.25))
+    phases = tuple(Phases((0, 1), gap, np.inf) for gap in (0.1, 0.2, 0.3))
+    return Branch("omega", omegas, tuple(orbit_at(x) for x in omegas), (turn,), phases)
+
+
+def swept(x: np.ndarray, low: float, high: float) -> Sweep:
+    """Verdicts that are good from low to high."""
+    good = (x >= low) & (x <= high)
+    return Sweep(x, np.where(good, 0.0, np.inf), good.astype(float), ((low, high),))
+
+
+def thresholds() -> Thresholds:
+    """Ranges of a pair, with a warning."""
+    sigma = np.linspace(0.0, 0.6, 7)
+    return Thresholds(
+        PAIR, swept(2 * sigma, 0.0, 0.4), ((0.0, 0.2),), swept(sigma, 0.0, 0.2), Criterion(starts=3), ("w",)
+    )
+
+
+def every_kind() -> dict[str, Labelled]:
+    """One value of each kind, by the name of its class."""
+    alpha = np.linspace(0.0, 1.0, 5)
+    state = clusters(topology("chain", 4), [0, 1, 1, 0])
+    values = (
+        exponents_on(alpha + 0.1j),
+        MSF(PAIR, alpha, exponents_on(np.linspace(0.0, 1.0, 21))),
+        Plane(PAIR, alpha, np.array([-0.1, 0.1]), np.outer(alpha, [1.0, -1.0]), np.ones((5, 2)), ("periodic",), 9.0),
+        Lyapunov(np.array([0.1, -np.inf]), np.array([0.01, 0.0]), np.array([True, False]), -3.0, 0.1, 50.0, 0.5, 2),
+        ClusterExponents(
+            state, np.array([-0.1]), np.array([0.01]), 0.0, 0.01, np.array([[0.0, 0.5], [0.5, 0.0]]), 20.0
+        ),
+        orbit_at(1.2),
+        branch(),
+        Skeleton((branch(), branch())),
+        Basin(PAIR, 1e-3, 0.95, np.arange(12.0).reshape(3, 4), np.array([0.0, 0.5, np.inf]), np.array([1, 1, 2])),
+        Probe(
+            PAIR, Criterion(starts=2), alpha, 0.1 * alpha, alpha, np.array([1.0, 1, 0.5, 0, 0]), np.ones((5, 2), int)
+        ),
+        thresholds(),
+    )
+    return {type(value).__name__: value for value in values}

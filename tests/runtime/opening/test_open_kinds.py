@@ -1,0 +1,209 @@
+"""Results of every kind: labelled data, files in every form, and the way back without a difference."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from kept_values import PAIR, every_kind
+
+import synchain.runtime
+from synchain.models.graphs.families import topology
+from synchain.runtime.opening.open import open_result
+from synchain.runtime.results.labelled import Labelled
+from synchain.runtime.results.store import CHOICES
+from synchain.runtime.sweeps.run import run
+from synchain.runtime.sweeps.stream import stream
+
+KINDS = every_kind()
+
+
+def form(ending: str) -> Any:
+    """A form of files; skipped if its package is not installed."""
+    import importlib.util
+
+    package = CHOICES.get(ending)
+    absent = package is not None and importlib.util.find_spec(package) is None
+    return pytest.param(ending, marks=pytest.mark.skipif(absent, reason=f"{package} is not installed"))
+
+
+FORMS = [form(ending) for ending in (".nc", ".nc4", ".zarr")]
+
+
+def differences(first: Any, second: Any, where: str = "") -> list[str]:
+    """Where two frozen values differ, field by field, in types, shapes or bits."""
+    if type(first) is not type(second):
+        return [f"{where}: {type(first).__name__} and {type(second).__name__}"]
+    if is_dataclass(first) and type(first).__name__ not in ("Scene", "Topology"):
+        parts = [own.name for own in fields(first) if own.init]
+        return [
+            line
+            for name in parts
+            for line in differences(getattr(first, name), getattr(second, name), f"{where}.{name}")
+        ]
+    if isinstance(first, tuple):
+        if len(first) != len(second):
+            return [f"{where}: {len(first)} and {len(second)} items"]
+        return [
+            line
+            for k, pair in enumerate(zip(first, second, strict=True))
+            for line in differences(*pair, f"{where}[{k}]")
+        ]
+    if isinstance(first, np.ndarray):
+        same = first.dtype == second.dtype and first.shape == second.shape
+        return [] if same and first.tobytes() == second.tobytes() else [f"{where}: {first!r} and {second!r}"]
+    return [] if first == second else [f"{where}: {first!r} and {second!r}"]
+
+
+def test_every_kind_is_among_the_values() -> None:
+    """A result that is new gets data, a plot and a file, or this fails."""
+    offered = [getattr(synchain.runtime, name) for name in synchain.runtime.__all__]
+    kept = {kind.__name__ for kind in offered if isinstance(kind, type) and issubclass(kind, Labelled)}
+    assert kept == {*KINDS, "Result", "Streamed"}
+
+
+@pytest.mark.parametrize("ending", FORMS)
+@pytest.mark.parametrize("name", KINDS)
+def test_a_value_comes_back_without_a_difference(name: str, ending: str, tmp_path: Path) -> None:
+    path, value = tmp_path / f"value{ending}", KINDS[name]
+    value.save(path)
+    again = open_result(path)
+    assert differences(value, again) == []
+    assert again.data.identical(value.data)
+    assert repr(again) == repr(value)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_data_have_words_and_a_file_opens_in_xarray(name: str, tmp_path: Path) -> None:
+    KINDS[name].save(tmp_path / "a.nc")
+    with xr.open_dataset(tmp_path / "a.nc", engine="scipy") as data:
+        assert set(map(str, KINDS[name].data.data_vars)) <= set(map(str, data.data_vars))
+        assert all("long_name" in values.attrs for values in KINDS[name].data.data_vars.values())
+        assert data.attrs["kind"] == name
+
+
+def test_states_of_a_basin_have_labels() -> None:
+    assert KINDS["Basin"].data.initial.sel(component="v", node=1).values.tolist() == [2.0, 6.0, 10.0]
+
+
+@pytest.fixture(scope="module")
+def result() -> Any:
+    scene = PAIR.replace(topology=topology("chain", 3), transient=0.0, window=2.0, record=("trajectory",), samples=5)
+    scene = scene.replace(initial={"x": [0.1, 0.2, 0.3], "v": [0.0, 0.05, 0.06]})
+    return run(scene, sigma=[0.1, 0.2, 0.3], show_progress=False)
+
+
+def test_states_have_the_dimensions_component_and_node(result: Any) -> None:
+    assert result.end.dims == ("sigma", "component", "node")
+    assert result.trajectory.dims == ("sigma", "sample", "component", "node")
+    assert result.data.time.dims == ("sigma", "sample")
+    first = result.trajectory.isel(sigma=0, sample=0)
+    assert first.sel(component="x").values.tolist() == [0.1, 0.2, 0.3]
+    assert first.sel(component="v").values.tolist() == [0.0, 0.05, 0.06]
+    names = result.scene.equations.state
+    for k, name in enumerate(names):
+        component, node = name.split("_")
+        np.testing.assert_array_equal(result.end.sel(component=component, node=int(node)), result.states("end")[:, k])
+
+
+@pytest.mark.parametrize("ending", FORMS)
+def test_a_result_comes_back_in_every_form(result: Any, ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"a{ending}"
+    result.save(path)
+    result.save(path)  # over an earlier one
+    again = open_result(path)
+    assert again.data.identical(result.data)
+    assert again.scene == result.scene
+    assert run(result.scene, resume=again, show_progress=False).data.identical(result.data)
+
+
+def test_a_streamed_result_has_data_and_is_saved_elsewhere(result: Any, tmp_path: Path) -> None:
+    made = stream(result.scene, tmp_path / "a.nc", show_progress=False)
+    assert made.data.identical(result.data)
+    made.save(tmp_path / "b.nc")
+    assert open_result(tmp_path / "b.nc").data.identical(result.data)
+    assert "a.nc" in repr(made)
+    with pytest.raises(ValueError, match=r"expected another ending: stream writes netCDF-3; end it in \.nc"):
+        stream(result.scene, tmp_path / "a.nc4")
+
+
+@pytest.mark.parametrize("ending", FORMS)
+def test_damage_is_seen(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"a{ending}"
+    KINDS["Plane"].save(path)
+    files = [path] if path.is_file() else sorted(p for p in path.rglob("exponent/*") if not p.name.startswith("."))
+    text = bytearray(files[0].read_bytes())
+    place = text.find(np.array(0.25, ">f8" if ending == ".nc" else "<f8").tobytes())
+    place = place if place >= 0 else len(text) // 2  # compressed
+    text[place] ^= 1
+    files[0].write_bytes(text)
+    with pytest.raises(OSError, match="damaged"):
+        open_result(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda tree: tree["root"].update(value="Popen"), "Popen"),
+        (lambda tree: tree["root"]["fields"].pop("alpha"), "alpha"),
+        (lambda tree: tree["root"]["fields"].update(alpha={"array": "nothing", "dtype": "<f8"}), "nothing"),
+        (lambda tree: tree.update(root={"value": "Criterion", "fields": {}}), "expected a result"),
+        (lambda tree: tree["root"]["fields"].update(scene={"scene": 7}), "index"),
+    ],
+)
+def test_a_forged_file_is_refused_in_one_line(change: Callable[[Any], Any], words: str, tmp_path: Path) -> None:
+    from synchain.runtime.results.store import read_data, write_data
+
+    KINDS["Plane"].save(tmp_path / "a.nc")
+    data = read_data(tmp_path / "a.nc")
+    tree = json.loads(data.attrs["value"])
+    change(tree)
+    write_data(data.assign_attrs(value=json.dumps(tree)), tmp_path / "b.nc")
+    with pytest.raises(ValueError, match=words) as caught:
+        open_result(tmp_path / "b.nc")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_result_of_the_former_layout_is_refused(result: Any, tmp_path: Path) -> None:
+    from synchain.runtime.results.store import write_data
+
+    old = result.data.drop_vars(("end", "trajectory")).assign(end=(("sigma", "state"), result.states("end")))
+    write_data(old, tmp_path / "old.nc")
+    with pytest.raises(ValueError, match="an earlier version wrote it"):
+        open_result(tmp_path / "old.nc")
+
+
+@pytest.mark.parametrize(("ending", "package"), CHOICES.items())
+def test_an_absent_package_is_named_in_one_line(ending: str, package: str, tmp_path: Path) -> None:
+    code = (
+        f"import sys; sys.modules[{package!r}] = None\n"
+        "from kept_values import every_kind\n"
+        "try:\n"
+        f"    every_kind()['Plane'].save({str(tmp_path / ('a' + ending))!r})\n"
+        "except ModuleNotFoundError as error:\n"
+        "    print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(__file__).parents[2])
+    assert done.stdout.count("\n") == 1, done.stderr
+    assert (
+        f"needs the package {package}; install it: python -m pip install {package}, or end the name in .nc"
+        in done.stdout
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_another_folder_is_not_replaced(tmp_path: Path) -> None:
+    pytest.importorskip("zarr")
+    (tmp_path / "a.zarr").mkdir()
+    (tmp_path / "a.zarr" / "mine.txt").write_text("x")
+    with pytest.raises(FileExistsError, match="is no Zarr folder"):
+        KINDS["Plane"].save(tmp_path / "a.zarr")
+    assert (tmp_path / "a.zarr" / "mine.txt").read_text() == "x"

@@ -1,0 +1,96 @@
+"""Runs that go on from the end of another: the same motion, labels and the phase of the drive checked."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.results.result import Result
+from synchain.runtime.sweeps.run import run
+
+DRIVEN = Scene(
+    oscillator="duffing",
+    topology=topology("chain", 3),
+    parameters={"omega": 1.15, "sigma": 0.1},
+    initial={"x": [0.1, 0.2, 0.3], "v": [0.0, 0.0, 0.1]},
+    transient=3.0,
+    window=4.0,
+    rtol=1e-11,
+)
+FREE = Scene(
+    oscillator="harmonic", topology=topology("chain", 2), transient=0.0, window=3.7, time_unit="time", rtol=1e-11
+)
+
+
+def ran(scene: Scene, **more: Any) -> Result:
+    return run(scene, workers=1, show_progress=False, **more)
+
+
+@pytest.fixture(scope="module")
+def first() -> Result:
+    return ran(DRIVEN)
+
+
+def test_two_runs_in_a_row_are_one(first: Result) -> None:
+    second = ran(DRIVEN.replace(transient=0.0), start=first)
+    np.testing.assert_allclose(second.end, ran(DRIVEN.replace(transient=7.0)).end, rtol=0, atol=1e-8)
+    assert np.abs(second.end - first.end).max() > 1e-3
+    assert second.data.attrs["start_time"] == first.end_time.item() == pytest.approx(7 * 2 * np.pi / 1.15)
+    assert second.scene.initial["v"] == tuple(first.end.sel(component="v").values)
+
+
+def test_equations_without_drive_go_on_from_any_time() -> None:
+    second = ran(FREE, start=ran(FREE))
+    np.testing.assert_allclose(second.end, ran(FREE.replace(window=7.4)).end, rtol=0, atol=1e-8)
+
+
+def test_one_cell_of_a_sweep_in_any_order_of_its_labels(first: Result) -> None:
+    swept = ran(DRIVEN, sigma=[0.05, 0.1])
+    turned = swept.end.isel(sigma=-1, node=[2, 0, 1], component=[1, 0])
+    np.testing.assert_array_equal(ran(DRIVEN, start=turned, x_1=0.5).scene.y0[1:], first.states("end")[1:])
+    assert ran(DRIVEN, start=turned).end.identical(ran(DRIVEN, start=swept.end.isel(sigma=-1)).end)
+
+
+def test_modes_of_contacts_follow_from_the_other_states() -> None:
+    scene = Scene(topology=topology("chain", 2), contact="set-valued", transient=5.0, window=5.0)
+    first = ran(scene)
+    again = ran(scene.replace(transient=0.0, window=1.0), start=first)
+    whole = ran(scene.replace(transient=5.0, window=6.0))
+    np.testing.assert_allclose(again.end, whole.end, rtol=0, atol=1e-7)
+
+
+def test_kinds_of_nodes_have_their_own_components() -> None:
+    scene = FREE.replace(nodes=[{"at": [2], "oscillator": "rossler"}], coupling="x->x", initial=None)
+    first = ran(scene)
+    assert np.isnan(first.end.sel(component="z", node=1))
+    second = ran(scene, start=first)
+    np.testing.assert_allclose(second.states("end"), ran(scene.replace(window=7.4)).states("end"), rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("start", "error", "words"),
+    [
+        (lambda: ran(DRIVEN, sigma=[0.05, 0.1]), ValueError, r"several cells, along sigma \(2\); .*\.isel\(sigma=-1\)"),
+        (
+            lambda: ran(DRIVEN.replace(topology=topology("chain", 2), initial=None)),
+            ValueError,
+            "nodes 1, 2; expected 1, 2, 3",
+        ),
+        (lambda: ran(DRIVEN).end.sel(component=["x"]), ValueError, "components x; expected x, v, those of the scene"),
+        (lambda: ran(DRIVEN).end.isel(node=0), ValueError, "nodes none; expected 1, 2, 3"),
+        (lambda: ran(DRIVEN.replace(window=4.3)), ValueError, "is 0.300000 into a period at t = 39.88"),
+        (lambda: ran(DRIVEN.replace(max_steps=3)), ValueError, "a result with 1 cell: used up max_steps"),
+        (lambda: ran(DRIVEN).end * np.nan, ValueError, "a state that is not finite"),
+        (lambda: [0.1, 0.2], TypeError, r"found \[0.1, 0.2\] \(list\); expected a Result of one cell"),
+        (lambda: xr.DataArray([1.0, 2.0]), ValueError, r"along dim_0 \(2\)"),
+    ],
+)
+def test_what_is_refused(start: Any, error: type[Exception], words: str) -> None:
+    with pytest.raises(error, match=words) as caught:
+        ran(DRIVEN, start=start())
+    assert "\n" not in str(caught.value)
