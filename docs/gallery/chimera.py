@@ -46,9 +46,9 @@ def rates(t, z):
     return (field - field.conj() * z**2) / 2
 
 
-times = result.trajectory_time.values
+times = result.time.values
 theory = abs(solve_ivp(rates, (0, 200), [np.exp(-0.1j), 0.7 + 0j], "DOP853", times, rtol=1e-10, atol=1e-12).y)
-r = abs(np.exp(1j * result.trajectory.values).reshape(-1, 2, n).mean(axis=2)).T
+r = abs(np.exp(1j * result.states("trajectory")).reshape(-1, 2, n).mean(axis=2)).T
 print(f"r = {r[0, -1]:.6f} and {r[1, -1]:.6f}; difference from the theory {abs(r - theory).max():.0e}")
 np.testing.assert_allclose(r, theory, atol=1e-3)
 assert r[0, -1] > 0.999
@@ -64,6 +64,6 @@ left.plot(times, r[0], times, r[1])
 left.plot(times[::10], theory[1, ::10], "k.", label="theory")
 left.set(xlabel="time", ylabel="order parameters", ylim=(0, 1.05))
 left.legend()
-right.plot(np.angle(np.exp(1j * (result.end - result.end[0]))), ".")
+right.plot(np.angle(np.exp(1j * (result.states("end") - result.end.values.flat[0]))), ".")
 right.set(xlabel="phase number", ylabel="phase − phase of number 1")
 plt.show()

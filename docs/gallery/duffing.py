@@ -33,17 +33,17 @@ downwards = sc.run(scene.replace(continuation="down"))
 # SciPy gives the same amplitude from the first sample of a cell.
 from scipy.integrate import solve_ivp
 
-up, down = (abs(result.trajectory[:, :, 0]).max("sample").values for result in (upwards, downwards))
+up, down = (abs(result.trajectory.sel(component="x", node=1)).max("sample").values for result in (upwards, downwards))
 for result in (upwards, downwards):
     for k in (10, 40, 70):
-        w, times = frequencies[k], result.trajectory_time.values[k]
+        w, times = frequencies[k], result.time.values[k]
 
         def rates(t, y):
             return [y[1], -y[0] - y[0] ** 3 - 0.1 * y[1] + 0.3 * np.cos(w * t)]
 
-        start = result.trajectory.values[k, 0]
+        start = result.states("trajectory")[k, 0]
         y = solve_ivp(rates, times[[0, -1]], start, "DOP853", times, rtol=1e-10, atol=1e-12).y
-        np.testing.assert_allclose(result.trajectory.values[k], y.T, atol=1e-5)
+        np.testing.assert_allclose(result.states("trajectory")[k], y.T, atol=1e-5)
 print(f"largest amplitude: {up.max():.3f} upwards at ω = {frequencies[up.argmax()]:.3f}, {down.max():.3f} downwards")
 assert up.max() > 1.5 * down.max()
 

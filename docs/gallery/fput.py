@@ -54,12 +54,12 @@ def rates(t, y):
     return np.concatenate([y[n:], pull - np.roll(pull, 1)])
 
 
-y = result.trajectory.values
+y = result.states("trajectory")
 drift = np.ptp(energy(y)) / energy(y)[0]
 end = solve_ivp(rates, (0, 1000), np.concatenate([wave, 0 * wave]), "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
-print(f"drift of the energy {drift:.1e}, difference from SciPy {abs(result.end.values - end).max():.1e}")
+print(f"drift of the energy {drift:.1e}, difference from SciPy {abs(result.states('end') - end).max():.1e}")
 assert drift < 1e-7
-np.testing.assert_allclose(result.end.values, end, atol=1e-6)
+np.testing.assert_allclose(result.states("end"), end, atol=1e-6)
 
 # %%
 # Figure
@@ -71,7 +71,7 @@ frequency = 2 * np.sin(np.pi * np.arange(1, 5) / n)
 q, p = (np.fft.fft(part, axis=1)[:, 1:5] for part in (y[:, :n], y[:, n:]))
 modes = (abs(p) ** 2 + frequency**2 * abs(q) ** 2) / n
 _, axes = plt.subplots(figsize=(8, 3.4), layout="constrained")
-axes.plot(result.trajectory_time, modes, label=[f"mode {k}" for k in range(1, 5)])
+axes.plot(result.time, modes, label=[f"mode {k}" for k in range(1, 5)])
 axes.set(xlabel="time", ylabel="energy")
 axes.legend(ncols=4)
 plt.show()

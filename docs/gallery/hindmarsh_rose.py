@@ -59,8 +59,8 @@ def rates(t, s):
 
 begin = np.concatenate([start["x"], np.full(5, 1), np.full(5, 4)])
 end = solve_ivp(rates, (0, 300), begin, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
-print(f"difference from SciPy {abs(result.end.values - end).max():.0e}")
-np.testing.assert_allclose(result.end.values, end, atol=1e-5)
+print(f"difference from SciPy {abs(result.states('end') - end).max():.0e}")
+np.testing.assert_allclose(result.states("end"), end, atol=1e-5)
 for gk, found in exponents.items():
     print(f"g k = {gk}: exponents from {found.exponent.min():.4f} to {found.exponent.max():.4f}")
     assert np.all(np.sign(found.exponent) == (1 if gk < 1.25 else -1))
@@ -71,7 +71,7 @@ for gk, found in exponents.items():
 import matplotlib.pyplot as plt
 
 _, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
-left.plot(result.trajectory_time, result.trajectory[:, :5], linewidth=0.8)
+left.plot(result.time, result.trajectory.sel(component="x"), linewidth=0.8)
 left.set(xlabel="time", ylabel="x", xlim=(0, 150), title="five neurons, two layers of links")
 for gk, found in exponents.items():
     right.errorbar(modes, found.exponent, found.stderr, label=f"g k = {gk}")

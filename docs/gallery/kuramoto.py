@@ -53,9 +53,9 @@ def rates(t, y):
 
 
 end = solve_ivp(rates, (0, 60), phases, "DOP853", rtol=1e-11, atol=1e-11).y[:, -1]
-print(f"difference from SciPy {abs(result.end.values[-1] - end).max():.1e}")
-np.testing.assert_allclose(result.end.values[-1], end, atol=1e-4)
-r = abs(np.exp(1j * result.trajectory.values[:, 120:]).mean(axis=2)).mean(axis=1)
+print(f"difference from SciPy {abs(result.states('end')[-1] - end).max():.1e}")
+np.testing.assert_allclose(result.states("end")[-1], end, atol=1e-4)
+r = abs(np.exp(1j * result.states("trajectory")[:, 120:]).mean(axis=2)).mean(axis=1)
 theory = np.sqrt(np.maximum(0, 1 - 2 * width / result.K.values))
 print(np.round(r - theory, 3))
 assert abs(r - theory)[result.K.values > 1.5].max() < 0.05

@@ -51,9 +51,9 @@ begin = [2, 1.9, 1.8, 2.1, 2.2, *[0] * n]
 end = solve_ivp(rates, (0, 520), begin, "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
 errors = result.sync_error.values.reshape(len(sizes), sets)
 slopes = np.log(errors[-1] / errors[0]) / np.log(sizes[-1] / sizes[0])
-print(f"difference from SciPy {abs(result.end.values[-1] - end).max():.0e}")
+print(f"difference from SciPy {abs(result.states('end')[-1] - end).max():.0e}")
 print(f"slopes from {slopes.min():.3f} to {slopes.max():.3f}")
-np.testing.assert_allclose(result.end.values[-1], end, atol=1e-6)
+np.testing.assert_allclose(result.states("end")[-1], end, atol=1e-6)
 np.testing.assert_allclose(slopes, 1, atol=0.01)
 
 # %%

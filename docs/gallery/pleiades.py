@@ -49,7 +49,7 @@ published = """
     0.3425581707156584  1.562172101400631 -0.7003092922212495
     -3.943437585517392 -3.271380973972550  5.225081843456543 -2.590612434977470
     1.198213693392275 -0.2429682344935824  1.091449240428980"""
-found = result.end.values[:14]
+found = result.states("end")[:14]
 error = abs(found - np.array(published.split(), dtype=float)).max()
 print(f"{int(result.steps)} steps, largest error of the positions {error:.1e}")
 assert error < 1e-7
@@ -61,7 +61,8 @@ import matplotlib.pyplot as plt
 
 _, axes = plt.subplots(figsize=(6, 5), layout="constrained")
 for k in range(7):
-    axes.plot(result.trajectory[:, k], result.trajectory[:, 7 + k], linewidth=1, label=f"m = {k + 1}")
+    path = result.trajectory.sel(node=k + 1)
+    axes.plot(path.sel(component="x"), path.sel(component="y"), linewidth=1, label=f"m = {k + 1}")
 axes.set(xlabel="x", ylabel="y", aspect="equal")
 axes.legend(fontsize="small")
 plt.show()

@@ -48,7 +48,7 @@ published = {
     "Oregonator": [0.1000814870318523e1, 0.1228178521549917e4, 0.1320554942846706e3],
 }
 for name, result in results.items():
-    error = abs(result.end.values / published[name] - 1).max()
+    error = abs(result.states("end") / published[name] - 1).max()
     print(f"{name:12} {int(result.steps)} steps, largest relative error {error:.1e}")
     assert error < 1e-6
 
@@ -59,8 +59,8 @@ import matplotlib.pyplot as plt
 
 _, panels = plt.subplots(1, 3, figsize=(10, 3), layout="constrained")
 for axes, (name, result) in zip(panels, results.items()):
-    y = result.trajectory.values
-    axes.plot(result.trajectory_time[1:], y[1:] / abs(y).max(axis=0))
+    y = result.states("trajectory")
+    axes.plot(result.time[1:], y[1:] / abs(y).max(axis=0))
     axes.set(title=name, xlabel="time")
 panels[0].set_ylabel("states over their largest values")
 panels[1].set_xscale("log")

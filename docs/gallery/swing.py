@@ -61,12 +61,12 @@ def rates(t, y):
 
 
 end = solve_ivp(rates, (0, 60), np.zeros(28), "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
-np.testing.assert_allclose(result.end.values, end, atol=1e-6)
+np.testing.assert_allclose(result.states("end"), end, atol=1e-6)
 rest = fsolve(lambda angles: surplus(np.append(0, angles))[1:], np.zeros(13), xtol=1e-12)
-found = np.degrees(result.end.values[1:14] - result.end.values[0])
+found = np.degrees(result.states("end")[1:14] - result.states("end")[0])
 np.testing.assert_allclose(found, np.degrees(rest), atol=0.05)
 listed = np.array([-4.98, -12.72, -10.33, -8.78, -14.22, -13.37, -13.36, -14.94, -15.1, -14.79, -15.07, -15.16, -16.04])
-print(f"difference from SciPy {abs(result.end.values - end).max():.0e}")
+print(f"difference from SciPy {abs(result.states('end') - end).max():.0e}")
 print(f"from the listed angles {abs(found - listed).max():.1f}° at most")
 assert abs(found - listed).max() < 1.5
 
@@ -76,7 +76,8 @@ assert abs(found - listed).max() < 1.5
 import matplotlib.pyplot as plt
 
 _, axes = plt.subplots(figsize=(8, 3.4), layout="constrained")
-axes.plot(result.trajectory_time, np.degrees(result.trajectory[:, 1:14] - result.trajectory[:, :1].values))
+angles = result.trajectory.sel(component="theta")
+axes.plot(result.time, np.degrees(angles - angles.sel(node=1))[:, 1:])
 axes.plot(np.full(13, 60), listed, "k.", label="listed, with losses")
 axes.set(xlabel="time", ylabel="angle to bus 1 in degrees")
 axes.legend()

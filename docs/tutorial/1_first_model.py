@@ -53,10 +53,7 @@ result = sc.run(scene, sigma=0.05)
 print(result.message)
 
 _, axes = plt.subplots(figsize=(7, 3), layout="constrained")
-for state in ("x_1", "x_2"):
-    axes.plot(result.trajectory_time, result.trajectory.sel(state=state), label=state)
-axes.set(xlabel="time")
-axes.legend()
+result.trajectory.sel(component="x").plot.line(x="time", ax=axes)
 plt.show()
 
 # %%
