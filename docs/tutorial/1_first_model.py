@@ -38,35 +38,38 @@ except ValueError as error:
 # A network
 # ---------
 # A scene joins nodes by a link and a graph.  Its equations are derived, and those are what runs.
-scene = sc.Scene(node, "spring", sc.ring(4), record=("sync_error", "trajectory"), samples=401, transient=50, window=5)
+scene = sc.Scene(node, "spring", sc.ring(4), record=("sync_error", "trajectory"), samples=801)
 print(sc.text(scene.equations))
 print("parameters:", scene.parameters)
 
 # %%
 # A run
 # -----
-# `sigma` is the stiffness of the springs.  A number sets a parameter.  The first run compiles a
+# ``sigma`` is the stiffness of the springs.  A number sets a parameter, or a setting of the scene:
+# here, nothing is waited for, and ten periods of the drive are recorded.  The first run compiles a
 # kernel, in some seconds; every later one finds it in a cache.
 import matplotlib.pyplot as plt
 
-result = sc.run(scene, sigma=0.05)
+result = sc.run(scene, sigma=0.05, transient=0, window=10)
 print(result.message)
 
 _, axes = plt.subplots(figsize=(7, 3), layout="constrained")
 result.trajectory.sel(component="x").plot.line(x="time", ax=axes)
+axes.set(title="", xlabel="time", ylabel="x")
 plt.show()
 
 # %%
 # A sweep
 # -------
-# A sequence makes an axis.  All cells run at once, several to a core.
+# A sequence makes an axis.  All cells run at once, several to a core.  The error is the mean
+# distance of the oscillators from each other, once the transient is over.
 import numpy as np
 
-sweep = sc.run(scene, sigma=np.linspace(0, 0.3, 31), u=[0.0, 0.5])
+sweep = sc.run(scene, sigma=np.linspace(0, 0.03, 31), u=[0.0, 0.5], transient=100, window=20)
 print(sweep.message)
 
 _, axes = plt.subplots(figsize=(7, 3), layout="constrained")
-sweep.sync_error.plot(ax=axes, hue="u", marker=".")
+sweep.sync_error.plot(ax=axes, hue="u", marker=".", yscale="log")
 plt.show()
 
 # %%
