@@ -38,7 +38,8 @@ except ValueError as error:
 # A network
 # ---------
 # A scene joins nodes by a link and a graph.  Its equations are derived, and those are what runs.
-scene = sc.Scene(node, "spring", sc.ring(4), record=("sync_error", "trajectory"), samples=801)
+start = {"x": [1.5, 0.5, -0.5, -1.5]}
+scene = sc.Scene(node, "spring", sc.ring(4), initial=start, record=("sync_error", "trajectory"), samples=801)
 print(sc.text(scene.equations))
 print("parameters:", scene.parameters)
 
