@@ -33,7 +33,7 @@ settings = {
     "time_unit": "time",
     "record": ("trajectory",),
     "samples": 1501,
-    "integrator": "dop853",
+    "integrator": "cash_karp",
 }
 parameters = {"m": list(range(1, 8))}
 scene = sc.Scene(star, gravity, sc.complete(7), parameters=parameters, initial=initial, rtol=1e-11, **settings)
