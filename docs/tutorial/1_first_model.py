@@ -38,7 +38,7 @@ except ValueError as error:
 # A network
 # ---------
 # A scene joins nodes by a link and a graph.  Its equations are derived, and those are what runs.
-start = {"x": [1.5, 0.5, -0.5, -1.5]}
+start = {"x": [1.2, 0.8, 0.4, 0.0]}
 scene = sc.Scene(node, "spring", sc.ring(4), initial=start, record=("sync_error", "trajectory"), samples=801)
 print(sc.text(scene.equations))
 print("parameters:", scene.parameters)
@@ -47,11 +47,11 @@ print("parameters:", scene.parameters)
 # A run
 # -----
 # ``sigma`` is the stiffness of the springs.  A number sets a parameter, or a setting of the scene:
-# here, nothing is waited for, and ten periods of the drive are recorded.  The first run compiles a
+# here, nothing is waited for, and twelve periods of the drive are recorded.  The first run compiles a
 # kernel, in some seconds; every later one finds it in a cache.
 import matplotlib.pyplot as plt
 
-result = sc.run(scene, sigma=0.05, transient=0, window=10)
+result = sc.run(scene, sigma=0.05, transient=0, window=12)
 print(result.message)
 
 _, axes = plt.subplots(figsize=(7, 3), layout="constrained")
