@@ -47,8 +47,8 @@ print("parameters:", scene.parameters)
 # A run
 # -----
 # ``sigma`` is the stiffness of the springs.  A number sets a parameter, or a setting of the scene:
-# here, nothing is waited for, and twelve periods of the drive are recorded.  The first run compiles a
-# kernel, in some seconds; every later one finds it in a cache.
+# here, nothing is waited for, and twelve periods of the drive are recorded.  The first run compiles
+# a kernel, in some seconds; every later one finds it in a cache.
 import matplotlib.pyplot as plt
 
 result = sc.run(scene, sigma=0.05, transient=0, window=12)
