@@ -14,7 +14,11 @@ from mutants import TESTS
 from synchain.runtime.cli import parser
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+RECIPES = sorted((ROOT / "docs" / "how-to").glob("*.md"))
+EXAMPLES = sorted((ROOT / "docs" / "gallery").glob("*.py"))
+MOST_LINES = 25
+"""Lines of model and run of an example, without those that are empty."""
 FILES = {path.stem for path in (ROOT / "tests").rglob("*.py")}
 pages = pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
 
@@ -71,6 +75,32 @@ def test_imports_can_be_made(page: Path) -> None:
 def test_command_lines_can_be_read(page: Path) -> None:
     for command, *words in commands(page.read_text(encoding="utf-8")):
         parser(command).read(words)
+
+
+@pytest.mark.parametrize("page", RECIPES, ids=lambda path: path.stem)
+def test_recipes_run(page: Path) -> None:
+    blocks = re.findall(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    namespace: dict[str, object] = {}
+    for block in blocks:
+        exec(compile(block, str(page), "exec"), namespace)
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_have_a_short_model_a_check_and_a_figure(example: Path) -> None:
+    """The site runs them, and stops if a check fails."""
+    parts = re.split(r"^# %%\n# (.+)\n# -+\n", example.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    sections = dict(zip(parts[1::2], parts[2::2], strict=True))
+    assert list(sections) == ["Model and run", "Check", "Figure"]
+    assert len(re.findall(r"^[^#\n].*", sections["Model and run"], re.MULTILINE)) <= MOST_LINES
+    assert re.search(r"^ *(assert|np\.testing\.assert_\w+\()", sections["Check"], re.MULTILINE)
+    assert "plt.show()" in sections["Figure"]
+
+
+@pytest.mark.parametrize("package", ["synchain.models", "synchain.runtime"])
+def test_the_reference_holds_all_public_names(package: str) -> None:
+    pages = "\n".join(path.read_text(encoding="utf-8") for path in sorted((ROOT / "docs" / "reference").glob("*.rst")))
+    entries = set(re.findall(r"^\.\. auto(?:class|function|exception|data):: (\w+)", pages, re.MULTILINE))
+    assert not set(importlib.import_module(package).__all__) - entries
 
 
 def test_mutants_name_modules_and_tests() -> None:

@@ -13,7 +13,8 @@ __all__ = ["Word"]
 class Word(StrEnum):
     """One of a few words: it equals its text and is written as its text."""
 
-    __repr__ = str.__repr__
+    def __repr__(self) -> str:
+        return str.__repr__(self)
 
     @classmethod
     def parse(cls, what: str, value: object) -> Self:

@@ -19,10 +19,10 @@ from .section import Section
 __all__ = ["TAKEN", "observables", "sections", "stop"]
 
 TAKEN = frozenset(
-    {"cell", "component", "data", "end", "end_time", "ended_early", "kind", "link", "message", "name", "names", "node",
+    {"cell", "component", "data", "drive_phase", "end", "end_time", "ended_early", "kind", "link", "message", "name", "names", "node",
      "periods_skipped", "plot", "point", "realisation", "rejected", "sample", "save", "scene", "section",
      "section_count", "section_time", "state", "status", "steps", "success", "sync_error", "sync_error_end",
-     "sync_error_max", "trajectory", "trajectory_time", "transversal_exponent", "transversal_stderr", "verdict"}
+     "sync_error_max", "time", "trajectory", "transversal_exponent", "transversal_stderr", "verdict"}
 )  # fmt: skip
 """What results have under these names already."""
 

@@ -345,7 +345,7 @@ def plane(
     alpha : array_like, shape (a,)
         Increasing real parts.
     beta : array_like, shape (b,)
-        Increasing imaginary parts. Conjugate strengths have the same exponent, so that only |beta|
+        Increasing imaginary parts. Conjugate strengths have the same exponent, so that only abs(beta)
         is integrated.
     precision, periods, transient, starts, rtol, seed, workers, show_progress
         See `synchain.runtime.exponents`.

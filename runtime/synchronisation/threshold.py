@@ -109,7 +109,7 @@ class Sweep:
 class Thresholds(Labelled):
     """Synchronous ranges of one network: measured directly and predicted from the probe.
 
-    `direct` is in sigma, `probe` in alpha = sigma |gamma|, `predicted` in sigma.
+    `direct` is in sigma, `probe` in alpha = sigma abs(gamma), `predicted` in sigma.
     """
 
     scene: Scene
@@ -188,7 +188,7 @@ def thresholds(
         The network; its axes and records are not used.
     sigma : sequence of float, optional
         An increasing grid on which ranges are looked for (default: `default_grid`); narrower ranges
-        are not seen.  The probe's grid in alpha covers every sigma |gamma|.
+        are not seen.  The probe's grid in alpha covers every sigma abs(gamma).
     resolution : float
         Ends of ranges are refined to this width in sigma, those of the probe to twice as much in
         alpha.

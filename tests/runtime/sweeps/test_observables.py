@@ -139,7 +139,7 @@ def test_order_parameter_and_frequencies_of_rotors(rotors: Result) -> None:
     order = sp.sqrt(sum(map(sp.cos, xs)) ** 2 + sum(map(sp.sin, xs)) ** 2) / 10
     one = ROTORS.replace(axes={}, sigma=0.3)
     assert float(rotors.r[2]) == pytest.approx(float(integrals(one, [order])[0]), abs=1e-10)
-    moved = rotors.trajectory.values[:, -1, :10] - rotors.trajectory.values[:, 0, :10]
+    moved = rotors.states("trajectory")[:, -1, :10] - rotors.states("trajectory")[:, 0, :10]
     np.testing.assert_allclose(rotors.frequency, moved / 9.0, rtol=0, atol=1e-13)
     np.testing.assert_allclose(rotors.frequency, rotors.speed, rtol=0, atol=1e-10)
 
@@ -148,9 +148,9 @@ def test_values_at_the_end(rotors: Result) -> None:
     state = [sp.Symbol(name, real=True) for name in (*ROTORS.equations.state, *ROTORS.equations.parameters)]
     field = sp.lambdify(state, ROTORS.equations.rhs()[10:], "numpy", cse=True)
     numbers = [ROTORS.parameters[name] for name in ROTORS.equations.parameters[:-1]]
-    np.testing.assert_array_equal(rotors.last, rotors.end.values[:, :10])
+    np.testing.assert_array_equal(rotors.last, rotors.states()[:, :10])
     for cell, sigma in enumerate((0.05, 0.1, 0.3)):
-        force = field(*rotors.end.values[cell], *numbers, sigma)
+        force = field(*rotors.states()[cell], *numbers, sigma)
         np.testing.assert_allclose(rotors.force[cell], force, rtol=0, atol=1e-6)  # the dense output has order 7
 
 
@@ -206,7 +206,7 @@ def test_the_mean_speed_is_the_distance_over_the_time(contact: str, integrator: 
     )  # fmt: skip
     found = run(scene, show_progress=False, sigma=[0.1, 0.2])
     span = 20.0 * scene.period
-    moved = found.end.values[:, :3] - np.array(scene.y0[:3])
+    moved = found.states()[:, :3] - np.array(scene.y0[:3])
     np.testing.assert_allclose(found.speed, moved / span, rtol=0, atol=2e-9)
     assert (found.square.values[:, 0] == 0.0).all()
     assert (found.square.values[:, 2] > 0.0).all()

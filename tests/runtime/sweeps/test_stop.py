@@ -34,15 +34,15 @@ def test_the_end_is_where_the_function_is_zero(integrator: str) -> None:
     assert int(found.status) == Status.STOPPED
     assert found.message == "1 cell: met the stop condition of the scene before the end of the window"
     assert float(found.end_time) == pytest.approx(last, abs=near)
-    np.testing.assert_allclose(found.end, [-0.5, -np.sin(last)], rtol=0, atol=near)
+    np.testing.assert_allclose(found.states(), [-0.5, -np.sin(last)], rtol=0, atol=near)
     assert float(found.place[0]) == pytest.approx(np.sin(last) / last, abs=near)
     assert float(found.square[0]) == pytest.approx((last / 2 - np.sin(2 * last) / 4) / last, abs=near)
-    assert float(found.data["speed"][0]) == float(found.end[1])
-    assert float(found.slope[0]) == pytest.approx(float(found.end[1]), abs=1e-6)
-    kept = np.isfinite(found.trajectory.values[:, 0])
+    assert float(found.data["speed"][0]) == float(found.states()[1])
+    assert float(found.slope[0]) == pytest.approx(float(found.states()[1]), abs=1e-6)
+    kept = np.isfinite(found.states("trajectory")[:, 0])
     assert kept.sum() == 21  # samples 0.1 apart: the last one is at 2.0
-    times = found.trajectory_time.values[kept]
-    np.testing.assert_allclose(found.trajectory.values[kept, 0], np.cos(times), rtol=0, atol=1e-8)
+    times = found.time.values[kept]
+    np.testing.assert_allclose(found.states("trajectory")[kept, 0], np.cos(times), rtol=0, atol=1e-8)
     assert int(found.turn_count) == 0  # cos t = -sin t at 3 pi/4, which is later
 
 

@@ -1,0 +1,60 @@
+r"""
+Duffing's resonance curve
+=========================
+
+The amplitude of :math:`\ddot x = -x - \beta x^3 - \delta\dot x + u\cos\omega t` over the frequency
+has two stable branches: a sweep upwards and a sweep downwards disagree (Duffing (1918); Kovacic &
+Brennan, *The Duffing Equation* (Wiley, 2011), chapter 5).
+"""
+
+# %%
+# Model and run
+# -------------
+import numpy as np
+
+import synchain as sc
+
+frequencies = np.linspace(0.5, 2.5, 81)
+scene = sc.Scene(
+    oscillator="duffing",
+    parameters={"delta": 0.1, "beta": 1, "u": 0.3},
+    axes={"omega": frequencies},
+    record=("trajectory",),
+    transient=100,
+    window=1,
+    samples=201,
+)
+upwards = sc.run(scene.replace(continuation="up"))
+downwards = sc.run(scene.replace(continuation="down"))
+
+# %%
+# Check
+# -----
+# SciPy gives the same amplitude from the first sample of a cell.
+from scipy.integrate import solve_ivp
+
+up, down = (abs(result.trajectory.sel(component="x", node=1)).max("sample").values for result in (upwards, downwards))
+for result in (upwards, downwards):
+    for k in (10, 40, 70):
+        w, times = frequencies[k], result.time.values[k]
+
+        def rates(t, y):
+            return [y[1], -y[0] - y[0] ** 3 - 0.1 * y[1] + 0.3 * np.cos(w * t)]
+
+        start = result.states("trajectory")[k, 0]
+        y = solve_ivp(rates, times[[0, -1]], start, "DOP853", times, rtol=1e-10, atol=1e-12).y
+        np.testing.assert_allclose(result.states("trajectory")[k], y.T, atol=1e-5)
+print(f"largest amplitude: {up.max():.3f} upwards at ω = {frequencies[up.argmax()]:.3f}, {down.max():.3f} downwards")
+assert up.max() > 1.5 * down.max()
+
+# %%
+# Figure
+# ------
+import matplotlib.pyplot as plt
+
+_, axes = plt.subplots(figsize=(8, 3.4), layout="constrained")
+axes.plot(frequencies, up, label="frequency rising")
+axes.plot(frequencies, down, "--", label="frequency falling")
+axes.set(xlabel="ω", ylabel="largest |x|")
+axes.legend()
+plt.show()

@@ -1,0 +1,81 @@
+r"""
+Bursting neurons: electrical and chemical synapses
+==================================================
+
+Hindmarsh-Rose neurons,
+
+.. math::
+   \dot x = a x^2 - x^3 - y - z, \quad \dot y = (a + \alpha) x^2 - y, \quad
+   \dot z = \mu(b x + c - z),
+
+receive pulses through chemical synapses,
+:math:`-g(x_i - V_s)\sum_j W_{ij}/(1 + e^{-\lambda(x_j - \Theta_s)})`.  Belykh, de Lange & Hasler,
+Phys. Rev. Lett. 94, 188101 (2005), found that the stability of their synchrony depends on the
+number k of signals that each neuron receives and on nothing else of the graph: the threshold of
+g k is one number.
+"""
+
+# %%
+# Model and run
+# -------------
+import numpy as np
+import sympy as sp
+
+import synchain as sc
+
+x, y, z, g, k = sp.symbols("x y z g k")
+cell = sc.Field(
+    {x: 2.8 * x**2 - x**3 - y - z, y: 4.4 * x**2 - y, z: 0.001 * (9 * x + 5 - z)},
+    initial={x: -0.5, y: 1, z: 4},
+)
+i, j, W = sc.ends(cell)
+pulse = 1 / (1 + sp.exp(-10 * (j.x + 0.25)))
+chemical = sc.Rates({i.x: -g * W * (i.x - 2) * pulse}, {g: 0.3})
+electrical = sc.Rates({i.x: k * W * (j.x - i.x)}, {k: 0.1})
+start = {"x": [-0.5, 0, 0.5, 1, -1], "y": 1, "z": 4}
+settings = {"transient": 0, "window": 300, "time_unit": "time", "record": ("trajectory",), "samples": 3001}
+both = sc.Scene(cell, links=[(electrical, sc.chain(5)), (chemical, sc.star(5))], initial=start, rtol=1e-10, **settings)
+result = sc.run(both)
+pair = sc.Scene(cell, chemical, sc.chain(2), time_unit="time")
+modes = np.linspace(0.25, 2, 8)  # -γ/k of the modes of undirected graphs lies between 0 and 2
+exponents = {gk: sc.exponents(pair, gk * modes, g=gk, starts=1, periods=10000) for gk in (1, 1.2, 1.3, 1.5)}
+
+# %%
+# Check
+# -----
+# The five neurons of two layers against SciPy; and the sign of the exponent, which changes between
+# g k = 1.2 and 1.3 for the modes of all graphs together.
+from scipy.integrate import solve_ivp
+
+star, path = (np.array(graph.matrix, dtype=float) for graph in (sc.star(5), sc.chain(5)))
+np.fill_diagonal(star, 0)
+
+
+def rates(t, s):
+    x, y, z = s.reshape(3, 5)
+    links = 0.1 * path @ x - 0.3 * (x - 2) * (star @ (1 / (1 + np.exp(-10 * (x + 0.25)))))
+    return np.concatenate([2.8 * x**2 - x**3 - y - z + links, 4.4 * x**2 - y, 0.001 * (9 * x + 5 - z)])
+
+
+begin = np.concatenate([start["x"], np.full(5, 1), np.full(5, 4)])
+end = solve_ivp(rates, (0, 300), begin, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+print(f"difference from SciPy {abs(result.states('end') - end).max():.0e}")
+np.testing.assert_allclose(result.states("end"), end, atol=1e-5)
+for gk, found in exponents.items():
+    print(f"g k = {gk}: exponents from {found.exponent.min():.4f} to {found.exponent.max():.4f}")
+    assert np.all(np.sign(found.exponent) == (1 if gk < 1.25 else -1))
+
+# %%
+# Figure
+# ------
+import matplotlib.pyplot as plt
+
+_, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
+left.plot(result.time, result.trajectory.sel(component="x"), linewidth=0.8)
+left.set(xlabel="time", ylabel="x", xlim=(0, 150), title="five neurons, two layers of links")
+for gk, found in exponents.items():
+    right.errorbar(modes, found.exponent, found.stderr, label=f"g k = {gk}")
+right.axhline(0, color="black", linewidth=0.5)
+right.set(xlabel="−γ/k", ylabel="exponent", title="modes of all graphs")
+right.legend()
+plt.show()
