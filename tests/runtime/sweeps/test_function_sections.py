@@ -82,7 +82,7 @@ def test_the_section_on_a_state_is_one_of_these(found: Result) -> None:
     )
     count = int(old.section_count[0])
     np.testing.assert_allclose(points(found, "turn", 0), old.section_time[0, :count], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(found.turn[0, :count], old.section[0, :count], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(found.turn[0, :count], old.states("section")[0, :count], rtol=0, atol=1e-11)
 
 
 def test_large_networks_have_sections() -> None:
