@@ -13,10 +13,10 @@ import sympy as sp
 from parts import oscillator_of
 from sympy.physics import mechanics
 
+from synchain.models.definitions.definition import COUPLING, OSCILLATOR
 from synchain.models.graphs.topology import Topology
 from synchain.models.inputs.plugins import call, load
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.definition import COUPLING, OSCILLATOR
 from synchain.models.mechanics.nondimensional import magnitude, nondimensional
 
 T = mechanics.dynamicsymbols._t

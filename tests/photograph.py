@@ -67,9 +67,9 @@ from synchain.codegen.export.numba import to_numba
 from synchain.codegen.export.python import to_python
 
 from synchain.models.inputs.plugins import load  # isort: skip
+from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.graphs.families import TOPOLOGY
 from synchain.models.inputs.plugins import names
-from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 
 from synchain.models.presentation.equations import latex  # isort: skip
 from synchain.models.presentation.equations import text

@@ -129,7 +129,7 @@ def test_a_star_import_brings_the_contract() -> None:
     assert done.stdout.split() == ["3"]
 
 
-@pytest.mark.parametrize("name", ["mechanics.inline", "mechanics.oscillator"])
+@pytest.mark.parametrize("name", ["definitions.inline", "mechanics.oscillator"])
 def test_examples_of_docstrings_run(name: str) -> None:
     found = doctest.testmod(importlib.import_module(f"synchain.models.{name}"))
     assert found.attempted > 3

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.inputs.arithmetic import constant
 from synchain.models.inputs.plugins import Kind, load, names
-from synchain.models.mechanics.coupling import STRENGTH
-from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
+from synchain.models.interactions.coupling import STRENGTH
 from synchain.models.mechanics.friction import KAPPA
 
 MANUAL = (Path(__file__).parent.parent / "docs" / "scenes.md").read_text("utf-8")

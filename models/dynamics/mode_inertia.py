@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..mechanics.link import strength
+from ..interactions.link import strength
 from .equations import Equations
 
 __all__ = ["effective_slope", "inertia_of_modes"]

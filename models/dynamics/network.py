@@ -14,16 +14,16 @@ from functools import lru_cache
 
 import sympy as sp
 
+from ..definitions.definition import FRICTION_LAW
 from ..graphs.links import Link
 from ..graphs.topology import Topology
 from ..inputs.plugins import names
+from ..interactions.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling
+from ..interactions.link import edge
 from ..mechanics.calculus import cancelled, expanded
 from ..mechanics.components import SLIDING, Block, Edge, Node
-from ..mechanics.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling
-from ..mechanics.definition import FRICTION_LAW
 from ..mechanics.friction import KAPPA, SLIP, ContactModel, FrictionLaw, set_valued
 from ..mechanics.lagrangian import LARGEST_BY_MINORS, Mechanics, check_masses_exist, coupled, solve_masses
-from ..mechanics.link import edge
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
 from ..mechanics.oscillator import FieldModel, Oscillator
 from ..mechanics.parameter import Parameter
@@ -155,7 +155,7 @@ def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str,
     Notes
     -----
     If a link tells its ends apart, its weight becomes the sign of its direction
-    (`synchain.models.mechanics.link`).
+    (`synchain.models.interactions.link`).
     """
     apart = Equations.of_equal_nodes(single, None, graph.n, (), varied)
     return apart if link is None else replace(apart, layers=(_layer(link, graph, varied),))

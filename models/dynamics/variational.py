@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import sympy as sp
 
+from ..interactions.link import strength
 from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Edge, Node
-from ..mechanics.link import strength
 from .equations import Equations
 from .mode_inertia import effective_slope
 from .reduction import collapse

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from ..definitions.table import as_name_or_table
 from ..graphs.families import family, names, topology
 from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import check_integer, check_keys, check_table, check_text, short_repr
 from ..inputs.plugins import part
-from ..mechanics.coupling import Coupling, Potential, Rates, split
-from ..mechanics.table import as_name_or_table
+from ..interactions.coupling import Coupling, Potential, Rates, split
 from .draw import Draw
 from .parameters import collected
 

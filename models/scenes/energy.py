@@ -16,10 +16,10 @@ import sympy as sp
 from ..dynamics.equations import Equations
 from ..graphs.links import Link
 from ..graphs.topology import Topology
+from ..interactions.coupling import Coupling, LagrangianCoupling, Potential
+from ..interactions.ends import Pair, Terms
 from ..mechanics.calculus import derivative
 from ..mechanics.components import TIME, Edge
-from ..mechanics.coupling import Coupling, LagrangianCoupling, Potential
-from ..mechanics.ends import Pair, Terms
 from ..mechanics.friction import ContactModel
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
 from ..mechanics.oscillator import FieldModel

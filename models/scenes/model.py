@@ -8,6 +8,8 @@ from fractions import Fraction
 from functools import lru_cache
 from itertools import islice
 
+from ..definitions.loader import load_friction_law, load_oscillator, read_coupling
+from ..definitions.table import as_name_or_table, law_of_table, oscillator_of_table
 from ..dynamics import network
 from ..dynamics.equations import Equations
 from ..graphs import readers
@@ -17,12 +19,10 @@ from ..inputs.checks import check_integer, check_keys, check_number, check_table
 from ..inputs.frozen import Frozen
 from ..inputs.node_name import NodeName
 from ..inputs.plugins import part
-from ..mechanics.coupling import COUPLINGS, Coupling, from_table
+from ..interactions.coupling import COUPLINGS, Coupling, from_table
 from ..mechanics.friction import ContactModel, FrictionLaw
-from ..mechanics.loader import load_friction_law, load_oscillator, read_coupling
 from ..mechanics.oscillator import Oscillator
 from ..mechanics.parameter import Parameter
-from ..mechanics.table import as_name_or_table, law_of_table, oscillator_of_table
 
 __all__ = [
     "Group",

@@ -19,9 +19,9 @@ from ..inputs.checks import check_instance, check_table, check_text, suggestion
 from ..inputs.frozen import Frozen
 from ..inputs.node_name import NodeName
 from ..inputs.shown import Drawn, Written
-from ..mechanics.coupling import Coupling
+from ..interactions.coupling import Coupling
+from ..interactions.link import strength
 from ..mechanics.friction import SLIP, ContactModel, FrictionLaw
-from ..mechanics.link import strength
 from ..mechanics.oscillator import Oscillator
 from .axis import Axis
 from .complete import TimeUnit, complete

@@ -7,15 +7,15 @@ import re
 from collections.abc import Mapping
 from typing import Any, TypeAlias, get_args, get_origin, get_type_hints
 
+from ..definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
+from ..definitions.loader import load_friction_law, load_oscillator, read_coupling
 from ..dynamics.network import KAPPA
 from ..graphs.families import Family, family
 from ..graphs.families import names as families
 from ..inputs import plugins
 from ..inputs.plugins import Kind
 from ..inputs.words import Word
-from ..mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from ..mechanics.friction import ContactModel
-from ..mechanics.loader import load_friction_law, load_oscillator, read_coupling
 from ..mechanics.parameter import Parameter
 from .axis import LIMIT as AXIS_LIMIT
 from .complete import LIMITS, integrators

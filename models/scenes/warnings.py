@@ -9,7 +9,7 @@ from typing import Any
 from ..dynamics.synchrony import NoSynchrony, synchronous_node
 from ..graphs.topology import Topology
 from ..inputs.node_name import NodeName
-from ..mechanics.coupling import MatrixCoupling
+from ..interactions.coupling import MatrixCoupling
 from .model import Model
 
 __all__ = ["warnings", "zero_multiplicity"]

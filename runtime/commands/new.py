@@ -55,9 +55,9 @@ def _check(kind: str, name: str) -> None:
             f"name {name!r}; expected small letters, digits and underscores, a letter first, at most {LENGTH}, no word "
             "of Python, and neither 'default' nor 'none': e.g. my_law"
         )
+    from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
     from synchain.models.graphs.families import TOPOLOGY
     from synchain.models.inputs import plugins
-    from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 
     made = {own.name: own for own in (TOPOLOGY, OSCILLATOR, FRICTION_LAW, COUPLING)}[kind]
     known = plugins.names(made)

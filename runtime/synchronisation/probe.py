@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.families import topology
+from synchain.models.interactions.link import strength
 from synchain.models.mechanics.components import Edge
-from synchain.models.mechanics.link import strength
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.choice import chosen_for_rows

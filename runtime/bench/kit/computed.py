@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from synchain.models.definitions.inline import Lagrangian
 from synchain.models.graphs.families import topology
-from synchain.models.mechanics.inline import Lagrangian
 from synchain.models.scenes.scene import Scene
 
 from ...stability.orbits import unit_of_time

@@ -11,15 +11,15 @@ from effort import effort
 from parts import connectivity, coupling_of, edge, is_lagrangian, law_of, node, oscillator_of, parameters
 from sympy.physics import mechanics
 
+from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.network import network
 from synchain.models.graphs.families import names as families
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.inputs.plugins import call, load, names
+from synchain.models.interactions.coupling import Coupling
 from synchain.models.mechanics.components import TIME, Node
-from synchain.models.mechanics.coupling import Coupling
-from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.mechanics.friction import ContactModel
 from synchain.models.mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, static_coefficient
 from synchain.models.mechanics.oscillator import Oscillator

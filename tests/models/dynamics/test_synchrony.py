@@ -9,10 +9,10 @@ import pytest
 import sympy as sp
 
 from synchain.models import Rates, Scene, Topology, chain, complete, ends, from_matrix, ring
+from synchain.models.definitions.loader import load_oscillator
 from synchain.models.dynamics.synchrony import NoSynchrony, expect_vanishing, synchronous_node
 from synchain.models.dynamics.variational import clustered, mode
 from synchain.models.graphs.clusters import clusters
-from synchain.models.mechanics.loader import load_oscillator
 
 G, LAM = sp.symbols("g lam")
 

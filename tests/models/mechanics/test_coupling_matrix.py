@@ -19,12 +19,12 @@ from variational_reference import ALPHA, deviation_names, transversal_equations
 from synchain.codegen.program.lowering import lower
 from synchain.codegen.program.printers import LANES
 from synchain.models import chain, ring
+from synchain.models.definitions.definition import OSCILLATOR
 from synchain.models.dynamics.network import network
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.plugins import names
+from synchain.models.interactions.coupling import MatrixCoupling
 from synchain.models.mechanics.components import Node
-from synchain.models.mechanics.coupling import MatrixCoupling
-from synchain.models.mechanics.definition import OSCILLATOR
 from synchain.models.mechanics.oscillator import FieldModel
 from synchain.models.presentation.equations import text
 from synchain.models.scenes.file import load_scene

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from parts import coupling_of, law_of
 
+from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.inputs.frozen import Frozen
 from synchain.models.inputs.plugins import load, names
-from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.mechanics.friction import KAPPA, ContactModel, FrictionLaw, regularise
 from synchain.models.mechanics.nondimensional import friction_coefficient
 from synchain.models.mechanics.parameter import Parameter

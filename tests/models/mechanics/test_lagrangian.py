@@ -8,9 +8,9 @@ from mechanics_proof import vanishes
 from parts import is_lagrangian, oscillator_of
 from sympy.physics import mechanics
 
+from synchain.models.definitions.definition import OSCILLATOR
 from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.definition import OSCILLATOR
 from synchain.models.mechanics.lagrangian import Mechanics, energy_rate, equations_of_motion, total_derivative
 from synchain.models.mechanics.nondimensional import nondimensional, physical
 

@@ -11,12 +11,12 @@ from mechanics_proof import T, by_kane, by_lagrange, residual, vanishes, whole
 from parts import edge, is_lagrangian, node, oscillator_of
 from parts import law_of as friction_law
 
+from synchain.models.definitions.definition import COUPLING, OSCILLATOR
 from synchain.models.dynamics.network import network
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import Topology, from_matrix
 from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.definition import COUPLING, OSCILLATOR
 from synchain.models.mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
 
 FORCES = [c for c in names(COUPLING) if not hasattr(load(COUPLING, c), "kinetic")]

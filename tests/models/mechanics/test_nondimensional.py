@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from parts import edge, is_lagrangian, node, oscillator_of, parameters
 
 from synchain.models import oscillators
+from synchain.models.definitions.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.inputs.plugins import Kind, call, load, names
 from synchain.models.mechanics.calculus import cancelled, operations
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.definition import COUPLING, FRICTION_LAW, OSCILLATOR
 from synchain.models.mechanics.nondimensional import FRICTION, nondimensional, physical, scale
 from synchain.models.mechanics.oscillator import Oscillator
 from synchain.models.mechanics.parameter import Parameter, dimension

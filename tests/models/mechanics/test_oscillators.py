@@ -12,13 +12,13 @@ from parts import is_lagrangian, node, oscillator_of
 from scipy.integrate import solve_ivp
 
 from synchain.models import chain, ring, star
+from synchain.models.definitions.definition import OSCILLATOR
 from synchain.models.dynamics.network import oriented_links
 from synchain.models.dynamics.variational import source_slope
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.frozen import Frozen
 from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.definition import OSCILLATOR
 from synchain.models.scenes.energy import energy
 from synchain.models.scenes.scene import Scene
 from synchain.models.scenes.section import Section

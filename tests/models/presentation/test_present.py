@@ -13,12 +13,12 @@ from parts import edge, is_lagrangian, node, oscillator_of
 from variational_reference import tangent_equations, transversal_equations
 
 from synchain.models import Rates, Scene, ring, star
+from synchain.models.definitions.definition import FRICTION_LAW, OSCILLATOR
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.families import topology
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.plugins import names
 from synchain.models.mechanics.components import TIME, Edge, Node
-from synchain.models.mechanics.definition import FRICTION_LAW, OSCILLATOR
 from synchain.models.mechanics.friction import ContactModel
 from synchain.models.presentation.equations import LARGEST, as_dict, latex, text
 

@@ -10,11 +10,11 @@ from mechanics_proof import vanishes
 from parts import is_lagrangian, oscillator_of
 
 from synchain.models import Parameter, Potential, Rates, chain, complete, ends, ring
+from synchain.models.definitions.definition import COUPLING, OSCILLATOR
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.frozen import Frozen
 from synchain.models.inputs.plugins import load, names
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.definition import COUPLING, OSCILLATOR
 from synchain.models.mechanics.lagrangian import total_derivative
 from synchain.models.mechanics.oscillator import Coordinate, LagrangianModel, Oscillator
 from synchain.models.scenes.energy import energy

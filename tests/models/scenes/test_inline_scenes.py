@@ -125,7 +125,7 @@ def test_a_scene_is_saved_under_a_name_of_toml(tmp_path: Path) -> None:
 def test_a_model_with_scales_is_named_or_refused() -> None:
     from dataclasses import replace
 
-    from synchain.models.mechanics.loader import load_oscillator
+    from synchain.models.definitions.loader import load_oscillator
 
     other = replace(load_oscillator("friction"), name="mine")
     with pytest.raises(ValueError, match="oscillator 'mine': found scales of its quantities and no file"):

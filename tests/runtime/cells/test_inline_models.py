@@ -10,7 +10,7 @@ import sympy as sp
 from sympy.physics.mechanics import dynamicsymbols
 
 import synchain as sc
-from synchain.models.mechanics.loader import load_oscillator
+from synchain.models.definitions.loader import load_oscillator
 from synchain.models.mechanics.oscillator import Oscillator
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.kernels import kernel_source

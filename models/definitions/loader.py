@@ -15,11 +15,11 @@ import sympy as sp
 
 from ..inputs.frozen import Frozen
 from ..inputs.plugins import call, load
-from .components import SLIDING, TIME
-from .coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling, split
+from ..interactions.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling, split
+from ..mechanics.components import SLIDING, TIME
+from ..mechanics.friction import FrictionLaw
+from ..mechanics.oscillator import Coordinate, FieldModel, LagrangianModel, Oscillator, Scaling
 from .definition import COUPLING, FRICTION_LAW, OSCILLATOR, coordinates_of, lagrangian_symbols
-from .friction import FrictionLaw
-from .oscillator import Coordinate, FieldModel, LagrangianModel, Oscillator, Scaling
 
 __all__ = ["load_friction_law", "load_oscillator", "read_coupling"]
 

@@ -10,11 +10,11 @@ import pytest
 import sympy as sp
 
 from synchain.models import Potential, Rates, Scene, chain, complete, ends, ring, star
+from synchain.models.definitions.loader import load_oscillator
 from synchain.models.inputs.frozen import Frozen
+from synchain.models.interactions.coupling import from_table
+from synchain.models.interactions.link import edge, strength
 from synchain.models.mechanics.components import TIME
-from synchain.models.mechanics.coupling import from_table
-from synchain.models.mechanics.link import edge, strength
-from synchain.models.mechanics.loader import load_oscillator
 from synchain.models.mechanics.oscillator import Coordinate, FieldModel, LagrangianModel, Oscillator
 from synchain.models.mechanics.parameter import Parameter
 

@@ -1,7 +1,7 @@
 """What a link between two nodes adds, as a value: entries of a matrix, energies of two ends, or any rates or potential.
 
 Every coupling has parameters, checks the nodes that it joins (`check_ends`), and turns the two ends of a link into what
-the link adds there (`terms`); `synchain.models.mechanics.link` derives the equations from that.
+the link adds there (`terms`); `synchain.models.interactions.link` derives the equations from that.
 
 The text "y->x" lets the difference of y between two nodes enter the rate of x.  A link of weight w from node j to
 node i adds sigma w H (s_j - s_i) to the rates of the states s_i, so the entry "1/2 y->x" is 1/2 in the row of x and
@@ -19,10 +19,10 @@ import sympy as sp
 
 from ..inputs.checks import check_text, short_repr, suggestion
 from ..inputs.frozen import Frozen
-from .components import Node
+from ..mechanics.components import Node
+from ..mechanics.parameter import Parameter
 from .ends import WEIGHT, Pair, Terms
 from .interaction import Potential, Rates, from_table
-from .parameter import Parameter
 
 __all__ = [
     "COUPLINGS",
@@ -309,7 +309,7 @@ def _symmetric(energy: sp.Expr, at: Mapping[sp.Symbol, sp.Symbol]) -> bool:
 def _link_energy(energy: sp.Expr, at: Mapping[sp.Symbol, sp.Symbol]) -> sp.Expr:
     """The energy (or Rayleigh function) of one link, in the symbols `at` its two ends, target first.
 
-    One that changes in the exchange of the ends is W^2 V_even + W V_odd (`synchain.models.mechanics.link`).
+    One that changes in the exchange of the ends is W^2 V_even + W V_odd (`synchain.models.interactions.link`).
     """
     if _symmetric(energy, at):
         return energy.xreplace(dict(at))

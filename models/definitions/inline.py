@@ -29,13 +29,13 @@ from ..inputs.checks import (
     typed_repr,
 )
 from ..inputs.frozen import Frozen
-from .components import SLIDING, TIME
-from .expression import FUNCTIONS, RESERVED, exact
-from .friction import ContactModel, FrictionLaw
-from .lagrangian import check_masses_exist, mass_matrix
+from ..mechanics.components import SLIDING, TIME
+from ..mechanics.expression import FUNCTIONS, RESERVED, exact
+from ..mechanics.friction import ContactModel, FrictionLaw
+from ..mechanics.lagrangian import check_masses_exist, mass_matrix
+from ..mechanics.oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel, Oscillator
+from ..mechanics.parameter import Parameter
 from .loader import load_friction_law
-from .oscillator import FRICTION, Coordinate, FieldModel, LagrangianModel, Oscillator
-from .parameter import Parameter
 
 __all__ = ["Field", "Lagrangian", "friction_law"]
 

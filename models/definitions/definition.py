@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..inputs.plugin_file import PluginFile
 from ..inputs.plugins import Kind
-from .parameter import Parameter
+from ..mechanics.parameter import Parameter
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -89,8 +89,8 @@ class _PartFile(PluginFile):
 
 def lagrangian_symbols(module: ModuleType) -> dict[str, Any]:
     """Return what the functions of a Lagrangian may ask for, by name, in physical symbols."""
-    from .components import TIME
-    from .oscillator import FRICTION
+    from ..mechanics.components import TIME
+    from ..mechanics.oscillator import FRICTION
 
     physical = getattr(module, "PHYSICAL", {})
     states = [name for c, (velocity, _) in coordinates_of(module).items() for name in (c, velocity)]
@@ -139,7 +139,7 @@ def check_oscillator(module: ModuleType, where: str, text: bytes) -> None:
 
 def _field(file: _PartFile) -> tuple[list[sp.Expr], tuple[str, ...]]:
     """The rates of a vector field and the names of its states."""
-    from .components import TIME
+    from ..mechanics.components import TIME
 
     state = file.get("STATE")
     if not isinstance(state, tuple | list) or not all(isinstance(s, str) and s.isidentifier() for s in state):
@@ -191,7 +191,7 @@ def _check_units(file: _PartFile) -> None:
 
 def _check_friction(file: _PartFile, found: Iterable[sp.Expr]) -> None:
     """FRICTION says whether there is a friction law in the forces."""
-    from .oscillator import FRICTION
+    from ..mechanics.oscillator import FRICTION
 
     rubs = any(e.has(FRICTION) for e in found)
     if rubs != file.get("FRICTION"):

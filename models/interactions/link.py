@@ -15,13 +15,13 @@ from functools import lru_cache
 
 import sympy as sp
 
-from .components import TIME, Block, Edge, Node
+from ..mechanics.components import TIME, Block, Edge, Node
+from ..mechanics.friction import SLIP
+from ..mechanics.lagrangian import balance, mass_matrix, solve_masses
+from ..mechanics.nondimensional import nondimensional
+from ..mechanics.oscillator import FieldModel, Oscillator
 from .coupling import WEIGHT, Coupling
 from .ends import Pair, Terms
-from .friction import SLIP
-from .lagrangian import balance, mass_matrix, solve_masses
-from .nondimensional import nondimensional
-from .oscillator import FieldModel, Oscillator
 
 __all__ = ["edge", "strength"]
 

@@ -9,13 +9,13 @@ from typing import Any
 import sympy as sp
 
 from ..inputs.checks import check_keys, check_table, check_text, short_repr, typed_repr
-from .components import SLIDING, TIME
-from .expression import read, written
-from .friction import ContactModel, FrictionLaw
+from ..mechanics.components import SLIDING, TIME
+from ..mechanics.expression import read, written
+from ..mechanics.friction import ContactModel, FrictionLaw
+from ..mechanics.oscillator import FieldModel, LagrangianModel, Oscillator
+from ..mechanics.parameter import Parameter
 from .inline import Field, Lagrangian, friction_law
 from .loader import load_friction_law, load_oscillator
-from .oscillator import FieldModel, LagrangianModel, Oscillator
-from .parameter import Parameter
 
 __all__ = ["as_name_or_table", "law_of_table", "oscillator_of_table"]
 

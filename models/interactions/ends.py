@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import sympy as sp
 
 from ..inputs.checks import check_instance, suggestion
-from .components import TIME, Node
-from .oscillator import FieldModel, Oscillator
+from ..mechanics.components import TIME, Node
+from ..mechanics.oscillator import FieldModel, Oscillator
 
 __all__ = ["WEIGHT", "End", "Pair", "Terms", "ends"]
 
@@ -65,7 +65,7 @@ def ends(node: Oscillator, source: Oscillator | None = None) -> tuple[End, End, 
     Examples
     --------
     >>> from synchain.models import ends
-    >>> from synchain.models.mechanics.loader import load_oscillator
+    >>> from synchain.models.definitions.loader import load_oscillator
     >>> i, j, W = ends(load_oscillator("harmonic"))
     >>> W * (j.x - i.x)
     weight*(-x_i + x_j)
@@ -86,7 +86,7 @@ def ends(node: Oscillator, source: Oscillator | None = None) -> tuple[End, End, 
 class Terms:
     """What one link adds: energies in the symbols of both ends, or rates of the states of its target.
 
-    `oriented` is True if an energy changes in the exchange of the ends (`synchain.models.mechanics.link`).
+    `oriented` is True if an energy changes in the exchange of the ends (`synchain.models.interactions.link`).
     """
 
     kinetic: sp.Expr = sp.S.Zero

@@ -23,10 +23,10 @@ from ..inputs.checks import (
     typed_repr,
 )
 from ..inputs.frozen import Frozen
-from .components import TIME, Node
+from ..mechanics.components import TIME, Node
+from ..mechanics.expression import FRICTION_NAME, FUNCTIONS, LENGTH, exact, read, written
+from ..mechanics.parameter import Parameter
 from .ends import WEIGHT, Pair, Terms
-from .expression import FRICTION_NAME, FUNCTIONS, LENGTH, exact, read, written
-from .parameter import Parameter
 
 __all__ = ["Potential", "Rates"]
 
@@ -62,7 +62,7 @@ class Rates:
     --------
     >>> import sympy as sp
     >>> from synchain.models import Rates, ends
-    >>> from synchain.models.mechanics.loader import load_oscillator
+    >>> from synchain.models.definitions.loader import load_oscillator
     >>> i, j, W = ends(load_oscillator("rossler"))
     >>> K = sp.Symbol("K")
     >>> str(Rates({i.x: K * W * (j.x - i.x)}, {K: 0.1}))
@@ -132,7 +132,7 @@ class Potential:
     """A link with a potential of any coordinates and parameters of its two ends: forces on both.
 
     A link of weight W between i and j stores the energy V(i, j).  If V changes in the exchange of its ends, a link has a
-    direction, as `synchain.models.mechanics.link` says, and weights other than 1 are refused.
+    direction, as `synchain.models.interactions.link` says, and weights other than 1 are refused.
 
     Parameters
     ----------
