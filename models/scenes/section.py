@@ -47,7 +47,7 @@ class Section:
     keep: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.variable, str):
+        if isinstance(self.variable, sp.Expr):
             object.__setattr__(self, "variable", _text("section", self.variable))
         check_text("section variable", self.variable, LENGTH)
         object.__setattr__(self, "direction", Direction.parse("section direction", self.direction))

@@ -37,7 +37,8 @@ def with_axes(function: Callable[..., object], scene: Scene, axes: Mapping[str, 
     for name, value in axes.items():
         if (
             isinstance(value, Iterable)
-            and not isinstance(value, str | bytes | Mapping)
+            and not isinstance(value, str | bytes)
+            and not (isinstance(value, Mapping) and name in KEYWORDS)
             and getattr(value, "ndim", 1) > 0
         ):
             swept[name] = value

@@ -58,8 +58,8 @@ from synchain.codegen.simd import address, broadcast
 
 @njit(error_model="numpy", nogil=True, cache=True)
 def drive(
-    step, step_smooth, section, pushes, dims, multiplicity, network, first, last, start, numbers, spans, control, end, sums,
-    counts, points, samples,
+    step, step_smooth, section, values, pushes, dims, multiplicity, rule, network, first, last, start, numbers, spans,
+    control, end, sums, counts, points, samples,
 ):
     old, new, zero = np.zeros(dims.dimension), np.zeros(dims.dimension), broadcast(0.0, 1)
     y, y_new = address(old, 0), address(new, 0)
