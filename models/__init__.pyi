@@ -1,6 +1,9 @@
 # What `__init__.py` loads on first use; tests/test_front.py writes it with --update.
 from collections.abc import Iterable
 
+from .definitions.inline import Field as Field
+from .definitions.inline import Lagrangian as Lagrangian
+from .definitions.inline import friction_law as friction_law
 from .dynamics.observable import Observable as Observable
 from .dynamics.observable import end as end
 from .dynamics.observable import maximum as maximum
@@ -29,12 +32,9 @@ from .inputs.options import integers_option as integers_option
 from .inputs.options import probability_option as probability_option
 from .inputs.plugins import allow_code as allow_code
 from .interactions.ends import ends as ends
-from .mechanics.friction import FrictionLaw as FrictionLaw
-from .definitions.inline import Field as Field
-from .definitions.inline import Lagrangian as Lagrangian
-from .definitions.inline import friction_law as friction_law
 from .interactions.interaction import Potential as Potential
 from .interactions.interaction import Rates as Rates
+from .mechanics.friction import FrictionLaw as FrictionLaw
 from .mechanics.oscillator import Oscillator as Oscillator
 from .mechanics.oscillator import friction as friction
 from .mechanics.parameter import Parameter as Parameter

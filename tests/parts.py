@@ -6,8 +6,8 @@ from fractions import Fraction
 
 from synchain.models.dynamics import network
 from synchain.models.graphs.topology import Topology
+from synchain.models.interactions import link
 from synchain.models.interactions.coupling import Coupling
-from synchain.models.mechanics import link
 from synchain.models.mechanics.components import Edge, Node
 from synchain.models.mechanics.friction import FrictionLaw
 from synchain.models.mechanics.oscillator import LagrangianModel, Oscillator

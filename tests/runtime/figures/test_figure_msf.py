@@ -111,7 +111,7 @@ def test_the_plane_shows_contour_rays_and_dots(simulation: Simulation, tmp_path:
     assert axes.get_xlim() == (0.0, 1.2)
     make(["msf_plane"], tmp_path)
     found = rows(tmp_path / "msf_plane.csv")
-    assert len(found) == 13 * 7
+    assert len(found) == 7 * 4
     last = found[-1]
     assert float(last["exponent"]) == pytest.approx((1.2 - 0.09) * (1.2 - 0.6) + 0.6**2)
     assert {"line", "alpha", "beta"} == set(rows(tmp_path / "msf_plane_ranges.csv")[0])
@@ -171,7 +171,7 @@ def test_the_map_is_that_of_most_starts() -> None:
 def test_the_map_is_written_with_a_column_for_each_network(simulation: Simulation, tmp_path: Path) -> None:
     make(["synchronisability_map"], tmp_path)
     found = rows(tmp_path / "synchronisability_map.csv")
-    assert len(found) == 7 * 4
+    assert len(found) == 7 * 13
     assert list(found[0]) == [
         "omega",
         "sigma",
