@@ -19,7 +19,6 @@ from family_sizes import size
 
 import synchain.models
 
-ROOT = Path(next(iter(synchain.models.__path__))).resolve().parent
 PROJECT = Path(__file__).resolve().parents[1]
 PACKAGES = ("models", "codegen", "runtime")
 
@@ -83,19 +82,19 @@ FRONT = {"models", "codegen", "runtime"}
 
 
 def sources() -> list[Path]:
-    return sorted(p for package in PACKAGES for p in (ROOT / package).rglob("*.py") if "__pycache__" not in p.parts)
+    return sorted(p for package in PACKAGES for p in (PROJECT / package).rglob("*.py") if "__pycache__" not in p.parts)
 
 
 def rooms() -> set[str]:
     """Every folder with sources, as a dotted name."""
-    return {".".join(path.relative_to(ROOT).parts[:-1]) for path in sources()}
+    return {".".join(path.relative_to(PROJECT).parts[:-1]) for path in sources()}
 
 
 def imported(path: Path, tree: ast.AST) -> Iterator[tuple[int, str]]:
     """Yield (line, absolute dotted name) of every import in a file, at any depth, those for type
     checks too.
     """
-    package = ("synchain", *path.relative_to(ROOT).parts[:-1])
+    package = ("synchain", *path.relative_to(PROJECT).parts[:-1])
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
@@ -125,15 +124,15 @@ def allowed(room: str) -> set[str]:
 
 
 def wrong_imports(path: Path, text: str) -> list[str]:
-    room = ".".join(path.relative_to(ROOT).parts[:-1])
+    room = ".".join(path.relative_to(PROJECT).parts[:-1])
     found = []
     for line, name in imported(path, ast.parse(text)):
         top = name.partition(".")[0]
-        door = (path.relative_to(ROOT).as_posix(), room_of(name)) in DOORS
+        door = (path.relative_to(PROJECT).as_posix(), room_of(name)) in DOORS
         if top == "synchain" and room not in FRONT and room_of(name) not in allowed(room) and not door:
-            found.append(f"{path.relative_to(ROOT)}:{line} imports {name} of {room_of(name) or 'synchain'}")
+            found.append(f"{path.relative_to(PROJECT)}:{line} imports {name} of {room_of(name) or 'synchain'}")
         if room.startswith("models") and top not in sys.stdlib_module_names | {"synchain", "sympy", "flint"}:
-            found.append(f"{path.relative_to(ROOT)}:{line} imports {name}")
+            found.append(f"{path.relative_to(PROJECT)}:{line} imports {name}")
     return found
 
 
@@ -171,14 +170,14 @@ def test_the_table_of_arrows_has_no_circle() -> None:
     ],
 )
 def test_a_wrong_import_is_seen(place: str, text: str) -> None:
-    assert wrong_imports(ROOT / place / "planted.py", text) != []
+    assert wrong_imports(PROJECT / place / "planted.py", text) != []
 
 
 def test_every_room_says_what_it_may_know() -> None:
     silent = [
         room
         for room in KNOWN
-        if not ast.get_docstring(ast.parse((ROOT / room.replace(".", "/") / "__init__.py").read_text("utf-8")))
+        if not ast.get_docstring(ast.parse((PROJECT / room.replace(".", "/") / "__init__.py").read_text("utf-8")))
     ]
     assert silent == []
 
@@ -192,8 +191,8 @@ def test_every_room_is_installed() -> None:
 
 def test_values_of_the_models_cannot_be_changed() -> None:
     found = []
-    for path in sorted((ROOT / "models").rglob("*.py")):
-        dotted = ".".join(("synchain", *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(".__init__")
+    for path in sorted((PROJECT / "models").rglob("*.py")):
+        dotted = ".".join(("synchain", *path.relative_to(PROJECT).with_suffix("").parts)).removesuffix(".__init__")
         module = importlib.import_module(dotted)
         kinds = [kind for kind in vars(module).values() if isinstance(kind, type) and is_dataclass(kind)]
         found += [kind for kind in kinds if kind.__module__ == dotted]
@@ -244,7 +243,7 @@ def test_the_package_offers_its_names_on_first_use() -> None:
     for name in synchain.models.__all__:
         value = getattr(synchain.models, name)
         assert getattr(value, "__name__", name) == name  # `nodes` is a value
-    families = {path.stem for path in (ROOT / "models" / "topologies").glob("*.py")} - {"__init__"}
+    families = {path.stem for path in (PROJECT / "models" / "topologies").glob("*.py")} - {"__init__"}
     assert families
     assert families | set(synchain.models.__all__) <= set(dir(synchain.models))
     for name in families:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
@@ -25,7 +26,7 @@ from ..program.expressions import Expression, Load, Name, Number, call, plus
 from ..program.lowering import lower
 from ..program.statements import Function, Loop, Statement, let, store
 
-__all__ = ["count_values", "rule_of", "values_function", "with_rows"]
+__all__ = ["UNWATCHED", "Watched", "rule_of", "with_rows"]
 
 LARGEST = 1.7976931348623157e308
 BEGINS = {NodeSum: 0.0, NodeMean: 0.0, NodeMaximum: -LARGEST, NodeMinimum: LARGEST}
@@ -56,15 +57,70 @@ def with_rows(equations: Equations, value: sp.Expr) -> bool:
     return any(s.name in own for s in node_symbols(value))
 
 
-def count_values(equations: Equations, observed: Iterable[sp.Expr]) -> int:
-    """Return how many numbers the values of some expressions are."""
-    return sum(equations.n if with_rows(equations, value) else 1 for value in observed)
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """Functions of the state that a kernel watches beside its records.
+
+    Parameters
+    ----------
+    observed
+        Values that the kernel tallies over the window (`synchain.models.dynamics.observable`).
+    sections
+        Functions of which points are taken when they pass zero, each followed by the values that its points keep.
+    stop
+        A function that ends a cell when it passes zero.
+    """
+
+    observed: tuple[sp.Expr, ...] = ()
+    sections: tuple[tuple[sp.Expr, ...], ...] = ()
+    stop: sp.Expr | None = None
+
+    @property
+    def kept(self) -> int:
+        """The largest number of values that the points of a section keep."""
+        return max((len(parts) - 1 for parts in self.sections), default=0)
+
+    @property
+    def events(self) -> tuple[sp.Expr, ...]:
+        """The section functions, what each keeps, filled up with zeros, and what ends a cell."""
+        rows = [[*parts[1:], *[sp.S.Zero] * (self.kept + 1 - len(parts))] for parts in self.sections]
+        last = [] if self.stop is None else [self.stop]
+        return (*(parts[0] for parts in self.sections), *(e for row in rows for e in row), *last)
+
+    @property
+    def has_rates(self) -> bool:
+        """True if a rate of a state occurs."""
+        return any(e.has(Rate) for e in (*self.observed, *self.events))
+
+    def __bool__(self) -> bool:
+        return bool(self.observed or self.events)
+
+    def count(self, equations: Equations) -> int:
+        """Return how many numbers the observed values are."""
+        return sum(equations.n if with_rows(equations, value) else 1 for value in self.observed)
+
+    def words(self, equations: Equations) -> tuple[str, ...]:
+        """Return what is watched, in words."""
+        found = [(self.count(equations), "observed values"), (len(self.sections), "sections")]
+        stop = () if self.stop is None else ("a stop",)
+        return (*(f"{number} {what}" for number, what in found if number), *stop)
+
+    def functions(self, equations: Equations, plain: Equations) -> list[Function]:
+        """Return the functions that compute what is watched inside a step, in the names of `plain`."""
+        what = "The section functions at the fraction theta of the step, what their points keep, and what ends a cell."
+        parts = (
+            ("values", self.observed, "The observed values at the fraction theta of the step."),
+            ("section", self.events, what),
+        )
+        return [_function(equations, plain, values, name, about) for name, values, about in parts if values]
 
 
-def values_function(
-    equations: Equations, plain: Equations, observed: Sequence[sp.Expr], name: str, about: str
-) -> Function:
-    """Return a function that writes values at the fraction theta of a step, in the names of `plain`."""
+UNWATCHED = Watched()
+"""Nothing beside the records."""
+
+
+def _function(equations: Equations, plain: Equations, observed: Sequence[sp.Expr], name: str, about: str) -> Function:
+    """A function that writes values at the fraction theta of a step."""
     writer = _Writer(equations, plain)
     return Function(
         name,

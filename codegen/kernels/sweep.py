@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
-from synchain.models.dynamics.observable import Rate
 from synchain.models.dynamics.periodicity import angular_frequency
 from synchain.models.dynamics.record import Record
 
@@ -31,7 +30,7 @@ from ..steps.step import PAIR, SCALED, Step, function_name, node_function
 from ..steps.unrolled import Unrolled
 from ..taylor import write_looped, write_step
 from .driver import Driver, KernelKind, imports
-from .observed import count_values, rule_of, values_function
+from .observed import UNWATCHED, Watched, rule_of
 
 __all__ = [
     "KernelSource",
@@ -109,9 +108,7 @@ def emit(
     width: int | None = None,
     multiplicity: Sequence[int] | None = None,
     *,
-    observed: Sequence[sp.Expr] = (),
-    sections: Sequence[tuple[sp.Expr, ...]] = (),
-    stop: sp.Expr | None = None,
+    watched: Watched = UNWATCHED,
     unroll: int = LARGEST_UNROLLED,
     fill: float = FILL_LIMIT,
 ) -> KernelSource:
@@ -131,12 +128,8 @@ def emit(
         Cells that one register holds; by default what suits the processor.
     multiplicity
         How many oscillators each node stands for in the synchronisation error; by default one.
-    observed
-        Values that the kernel tallies over the window (`synchain.models.dynamics.observable`).
-    sections
-        Functions of which points are taken when they pass zero, each followed by the values that its points keep.
-    stop
-        A function that ends a cell when it passes zero.
+    watched
+        Functions of the state that the kernel watches beside its records.
     unroll
         Nodes up to which a step is written out; the steps of a larger network, or of more than MOST_OF_LINKS operations in
         its links, run in loops.
@@ -158,20 +151,10 @@ def emit(
     """
     method = AUTO if method == "auto" else method
     method = integrator(method) if isinstance(method, str) else method
-    unknown = [r for r in records if r not in list(Record)]
-    if unknown:
-        raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(Record)}")
-    if "section" in records and (sections or stop is not None):
-        raise ValueError("the record 'section' beside functions of the state: found both; expected one of them")
-    if "section" in records and section is None:
-        raise ValueError("the record 'section' needs a section function, for example v_1")
+    _check_records(equations, records, section, watched, multiplicity)
     width = default_width(equations, method) if width is None else width
     ordered = tuple(r for r in Record if r in records)
     weights = tuple(multiplicity) if multiplicity is not None and "sync_error" in ordered else None
-    if "sync_error" in ordered and not equations.common:
-        raise ValueError("the record 'sync_error' compares states of one name, and these nodes have none in common")
-    if weights is not None and len(weights) != equations.n:
-        raise ValueError(f"multiplicity has {len(weights)} entries; expected one for each of {equations.n} nodes")
     looped = equations.n > unroll or (not method.inexact and _of_links(equations) > MOST_OF_LINKS)
     looped = looped or (method.series and equations.inertial and not equations.links)
     if looped:
@@ -188,49 +171,63 @@ def emit(
         plain.sticks,
         method.series,
         kinks,
-        bool(observed),
-        bool(sections),
-        stop is not None,
+        bool(watched.observed),
+        bool(watched.sections),
+        watched.stop is not None,
     )
     chosen = Driver(KernelKind.SWEEP, width, ordered, *traits)
     events = [
         *push_functions(plain, names, looped),
         *_section(equations, plain, section if "section" in ordered else None),
+        *watched.functions(equations, plain),
     ]
-    if observed:
-        about = "The observed values at the fraction theta of the step."
-        events.append(values_function(equations, plain, observed, "values", about))
-    functional = [*_padded(sections), *([] if stop is None else [stop])]
-    if functional:
-        about = "The section functions at the fraction theta of the step, what their points keep, and what ends a cell."
-        events.append(values_function(equations, plain, functional, "section", about))
-    if chosen.cuts or observed or functional:
+    if chosen.cuts or watched:
         functions.append(driver.text("dense"))
-    if any(e.has(Rate) for e in (*observed, *functional)):
+    if watched.has_rates:
         functions.append(driver.text("slope"))
     text = "\n\n\n".join([*functions, *map(LANES.function, events)]) + "\n"
     constants = {
         "WIDTH": width,
-        "DENSE": bool(ordered or observed or functional) or plain.sticks,
+        "DENSE": bool(ordered or watched) or plain.sticks,
         "SERIES": method.series,
     }
     if elimination is not None:
         solves = method.implicit or plain.inertial
         constants |= {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": method.dense_rows}
         constants |= {"ENTRIES": elimination.entries if solves else 0}
-    watched = count_values(equations, observed)
-    more = [f"{watched} observed values"] * bool(watched) + [f"{len(sections)} sections"] * bool(sections)
-    more += ["a stop"] * (stop is not None)
-    head = describe(equations, plain, method, (*ordered, *more), count)
+    head = describe(equations, plain, method, (*ordered, *watched.words(equations)), count)
     named = "\n".join(f"{name} = {value!r}" for name, value in constants.items())
     text = "\n\n\n".join([head, imports(text), named, text])
     sizes = _dimensions(plain, method, scratch)._replace(
-        observed=watched,
-        sections=len(sections) or int("section" in ordered),
-        kept=max((len(parts) - 1 for parts in sections), default=0),
+        observed=watched.count(equations),
+        sections=len(watched.sections) or int("section" in ordered),
+        kept=watched.kept,
     )
-    rule = rule_of(method) if observed else ()
+    rule = rule_of(method) if watched.observed else ()
     return KernelSource(text, equations, method, chosen, sizes, weights or (1,) * equations.n, elimination, rule)
+
+
+def _check_records(
+    equations: Equations,
+    records: Sequence[str],
+    section: sp.Expr | None,
+    watched: Watched,
+    multiplicity: Sequence[int] | None,
+) -> None:
+    """Raise ValueError for records that are unknown, lack what they need, or do not go together."""
+    unknown = [r for r in records if r not in list(Record)]
+    if unknown:
+        raise ValueError(f"unknown record {unknown[0]!r}; known: {', '.join(Record)}")
+    if "section" in records and watched.events:
+        raise ValueError("the record 'section' beside functions of the state: found both; expected one of them")
+    if "section" in records and section is None:
+        raise ValueError("the record 'section' needs a section function, for example v_1")
+    if "sync_error" not in records:
+        return
+    if not equations.common:
+        raise ValueError("the record 'sync_error' compares states of one name, and these nodes have none in common")
+    if multiplicity is not None and len(multiplicity) != equations.n:
+        raise ValueError(f"multiplicity has {len(multiplicity)} entries; expected one for each of {equations.n} nodes")
 
 
 def default_width(equations: Equations, method: Integrator) -> int:
@@ -247,13 +244,6 @@ def _of_links(equations: Equations) -> int:
     """The number of operations that the right-hand sides of all links take."""
     size = {edge: sum(int(sp.count_ops(e)) for e in edge.rhs) for edge in equations.edges}
     return sum(size[edge] for _, edge in equations.linked()) if equations.n <= LARGEST_UNROLLED else 0
-
-
-def _padded(sections: Sequence[tuple[sp.Expr, ...]]) -> list[sp.Expr]:
-    """The section functions, then what each keeps, filled up with zeros."""
-    kept = max((len(parts) - 1 for parts in sections), default=0)
-    rows = [[*parts[1:], *[sp.S.Zero] * (kept + 1 - len(parts))] for parts in sections]
-    return [*(parts[0] for parts in sections), *(e for row in rows for e in row)]
 
 
 def _series(

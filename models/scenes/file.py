@@ -9,16 +9,13 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..inputs.checks import check_path, short_repr, suggestion
-from .toml import toml
+from ..inputs.checks import short_repr, suggestion
+from .toml import BYTES
 
 if TYPE_CHECKING:
     from .scene import Scene
 
-__all__ = ["load_scene", "save_scene", "scene_names"]
-
-BYTES = 1_000_000
-"""Largest scene file that is read."""
+__all__ = ["load_scene", "scene_names"]
 
 KEY_PARTS = 8
 """Most parts of a dotted key in a scene file."""
@@ -64,17 +61,6 @@ def load_scene(name_or_path: str | os.PathLike[str]) -> Scene:
         )
     source = resources.files(f"{__package__}.library").joinpath(f"{name}.toml")
     return _scene(f"{name}.toml", source.read_bytes(), None)
-
-
-def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
-    """Write a scene to a TOML file of which `load_scene` makes an equal one; see `Scene.save`."""
-    place = check_path("scene file", path)
-    if place.suffix != ".toml":
-        raise ValueError(f"scene file: found {short_repr(str(place))}; expected a name that ends in .toml")
-    content = toml(scene.as_dict()).encode()
-    if len(content) > BYTES:
-        raise ValueError(f"scene file: found {len(content)} bytes; expected at most {BYTES}; use fewer values")
-    place.write_bytes(content)
 
 
 def _read(path: Path) -> bytes:

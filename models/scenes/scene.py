@@ -27,11 +27,11 @@ from .axis import Axis
 from .complete import TimeUnit, complete
 from .dictionary import arguments, as_dict
 from .draw import Draws, drawn_axes
-from .file import save_scene
 from .model import Group, Model, as_oscillator, as_topology
 from .parameters import drive, varied, without
 from .section import Section
 from .sweep import Continuation
+from .toml import write
 from .warnings import warnings
 
 if TYPE_CHECKING:
@@ -358,7 +358,7 @@ class Scene(Drawn, Written):
         ValueError
             For another ending, more than a megabyte, and parts that no file can say.
         """
-        save_scene(self, path)
+        write(self.as_dict(), path)
 
     @classmethod
     def from_dict(cls, values: Mapping[str, object], folder: Path | None = None) -> Scene:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Iterator, Mapping
 
-from ..inputs.checks import typed_repr
+from ..inputs.checks import check_path, short_repr, typed_repr
 
-__all__ = ["toml"]
+__all__ = ["BYTES", "toml", "write"]
+
+BYTES = 1_000_000
+"""Most bytes of a scene file."""
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -27,6 +31,23 @@ def toml(table: Mapping[str, object]) -> str:
         For a value of another type.
     """
     return "\n".join(_lines(table, ())).strip() + "\n"
+
+
+def write(table: Mapping[str, object], path: str | os.PathLike[str]) -> None:
+    """Write a table to a scene file.
+
+    Raises
+    ------
+    ValueError, TypeError
+        For a path that is none or does not end in .toml, a table that `toml` refuses, and more than BYTES bytes.
+    """
+    place = check_path("scene file", path)
+    if place.suffix != ".toml":
+        raise ValueError(f"scene file: found {short_repr(str(place))}; expected a name that ends in .toml")
+    content = toml(table).encode()
+    if len(content) > BYTES:
+        raise ValueError(f"scene file: found {len(content)} bytes; expected at most {BYTES}; use fewer values")
+    place.write_bytes(content)
 
 
 def _lines(table: Mapping[str, object], path: tuple[str, ...]) -> Iterator[str]:

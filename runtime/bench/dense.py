@@ -8,7 +8,7 @@ end, as in a sweep.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -18,7 +18,7 @@ from .kit.cases import Case
 from .kit.clock import Point, best_time, curve
 from .kit.computed import computed_case, solved
 from .kit.own_program import full_width, prepare
-from .precision import COLUMNS, TOLERANCES, notes, row
+from .precision import COLUMNS, TOLERANCES, draw, notes, row, summary
 
 __all__ = ["CASES", "COLUMNS", "METHODS", "case_of", "draw", "measure", "notes", "summary"]
 
@@ -38,7 +38,7 @@ def case_of(name: str, periods: int = PERIODS) -> Case:
 
 def measure(quick: bool = False) -> list[tuple[object, ...]]:
     """Return the rows of the table, in the order of COLUMNS."""
-    present = [peer for peer in map(peers.load, peers.names()) if not peers.absent(peer)]
+    present = peers.present(peers.names())
     rows: list[tuple[object, ...]] = []
     for name in CASES[:1] if quick else CASES:
         case = case_of(name, 4 if quick else PERIODS)
@@ -60,17 +60,3 @@ def own_points(case: Case, quick: bool) -> Iterator[Point]:
             error = float(np.abs(states[0, 1:] - case.states).max())
             steps = float(counts[0, 1] + counts[0, 2]) / case.periods
             yield Point(method, lanes, rtol, atol, error, seconds / (case.periods * lanes), case.periods, 0.0, steps)
-
-
-def summary(rows: Sequence[Sequence[object]]) -> str:
-    """Times at equal error, and their ratio to the fastest row."""
-    from .kit.compare import table
-
-    return table([dict(zip(COLUMNS, row, strict=False)) for row in rows], own=set(METHODS))
-
-
-def draw(rows: Sequence[Sequence[object]]) -> object:
-    """A figure with one panel a case: time against error."""
-    from .kit.figure import figure
-
-    return figure([dict(zip(COLUMNS, row, strict=False)) for row in rows], own=set(METHODS))

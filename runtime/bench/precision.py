@@ -107,13 +107,12 @@ def case_of(name: str) -> Case:
 
 def notes() -> list[str]:
     """A line for each peer that cannot run here, with the reason and the remedy."""
-    found = [(peer.NAME, peers.absent(peer)) for peer in map(peers.load, peers.names())]
-    return [f"skipped: {name} ({why})" for name, why in found if why]
+    return peers.skipped(peers.names())
 
 
 def measure(quick: bool = False) -> list[tuple[object, ...]]:
     """Return the rows of the table, in the order of COLUMNS."""
-    present = [peer for peer in map(peers.load, peers.names()) if not peers.absent(peer)]
+    present = peers.present(peers.names())
     rows: list[tuple[object, ...]] = []
     with tqdm(total=len(CASES) * (1 + len(present)), unit="curve", disable=None) as bar:
         for name in CASES:

@@ -68,8 +68,7 @@ print(json.dumps([[time.perf_counter() - begin], False]))
 
 def notes() -> list[str]:
     """A line for each peer that cannot run here, with the reason and the remedy."""
-    found = [(peer.NAME, peers.absent(peer)) for peer in map(peers.load, COMPILING)]
-    return [f"skipped: {name} ({why})" for name, why in found if why]
+    return peers.skipped(COMPILING)
 
 
 def measure(quick: bool = False) -> list[tuple[object, ...]]:
@@ -98,11 +97,10 @@ def peer_times(n: int) -> list[tuple[str, float]]:
     scene = Scene(topology=topology("chain", n))
     end = np.array([unit_of_time(scene)])
     found = []
-    for peer in map(peers.load, COMPILING):
-        if not peers.absent(peer):
-            begin = time.perf_counter()
-            peer.prepare(Problem(scene))(*peer.TOLERANCES[0], end)
-            found.append((peer.NAME, time.perf_counter() - begin))
+    for peer in peers.present(COMPILING):
+        begin = time.perf_counter()
+        peer.prepare(Problem(scene))(*peer.TOLERANCES[0], end)
+        found.append((peer.NAME, time.perf_counter() - begin))
     return found
 
 

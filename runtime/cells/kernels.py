@@ -9,6 +9,7 @@ import sympy as sp
 
 from synchain.codegen.integrators import Integrator
 from synchain.codegen.kernels.compile import Kernel, load
+from synchain.codegen.kernels.observed import Watched
 from synchain.codegen.kernels.sweep import KernelSource, default_width, emit
 from synchain.codegen.simd.lane_types import WIDTHS
 from synchain.models.dynamics.equations import Equations
@@ -65,7 +66,8 @@ def write_kernel(reduction: Reduction, width: int | None = None) -> KernelSource
     width = default_width(reduction.equations, method) if width is None else width
     sections = Sections(scene)
     recorded = (reduction.records, section, width, reduction.multiplicity)
-    return _emitted(reduction.equations, method, recorded, (Observed(scene).values, sections.values, sections.stop))
+    watched = Watched(Observed(scene).values, sections.values, sections.stop)
+    return _emitted(reduction.equations, method, recorded, watched)
 
 
 @lru_cache(maxsize=32)
@@ -73,11 +75,10 @@ def _emitted(
     equations: Equations,
     method: Integrator,
     recorded: tuple[tuple[str, ...], sp.Expr | None, int, tuple[int, ...] | None],
-    functions: tuple[tuple[sp.Expr, ...], tuple[tuple[sp.Expr, ...], ...], sp.Expr | None],
+    watched: Watched,
 ) -> KernelSource:
     """The text of a kernel; runs that differ in numbers alone share it."""
-    observed, sections, stop = functions
-    return emit(equations, method, *recorded, observed=observed, sections=sections, stop=stop)
+    return emit(equations, method, *recorded, watched=watched)
 
 
 def warn_of_chords(source: KernelSource) -> None:

@@ -72,8 +72,8 @@ class Case:
         return "kappa" in self.scene.parameters
 
     def within(self, periods: int) -> Case:
-        """The same case, shortened to its first periods."""
-        count = int(np.count_nonzero(self.times <= periods * self.period * (1.0 + 1e-12)))
+        """The same case, shortened to its first periods; its first time stays."""
+        count = max(1, int(np.count_nonzero(self.times <= periods * self.period * (1.0 + 1e-12))))
         return Case(self.name, self.scene, self.times[:count], self.states[:count])
 
 

@@ -12,6 +12,7 @@ from .compare import curves
 __all__ = ["figure"]
 
 COLOURS = (ORANGE, GREEN, PURPLE, SKY, BLACK)
+OWN = "o*hdp"
 MARKERS = ("s", "^", "v", "D", "P", "X")
 
 
@@ -50,7 +51,7 @@ def _looks(
     for name, lanes in keys:
         label = f"{name}, {lanes} lanes" if lanes > 1 else name
         if name in own:
-            style, marker = ("-" if lanes > 1 else "--"), "o*h"[integrators.index(name) % 3]
+            style, marker = ("-" if lanes > 1 else "--"), OWN[integrators.index(name) % len(OWN)]
             looks[name, lanes] = {"color": BLUE, "linestyle": style, "marker": marker, "label": f"synchain {label}"}
         else:
             place = peers.index((name, lanes))

@@ -14,9 +14,10 @@ from __future__ import annotations
 import importlib
 import pkgutil
 import shutil
+from collections.abc import Iterable
 from types import ModuleType
 
-__all__ = ["absent", "load", "names"]
+__all__ = ["absent", "load", "names", "present", "skipped"]
 
 
 def names() -> tuple[str, ...]:
@@ -42,3 +43,14 @@ def absent(peer: ModuleType) -> str:
         except (ImportError, OSError) as problem:  # OSError: a shared library that does not load
             return f"{' '.join(str(problem).split())}; install {peer.PACKAGE}"
     return str(peer.missing()) if hasattr(peer, "missing") else ""
+
+
+def present(chosen: Iterable[str]) -> list[ModuleType]:
+    """The peers of these names that can run here."""
+    return [peer for peer in map(load, chosen) if not absent(peer)]
+
+
+def skipped(chosen: Iterable[str]) -> list[str]:
+    """A line for each of these peers that cannot run here, with the reason and the remedy."""
+    found = [(peer.NAME, absent(peer)) for peer in map(load, chosen)]
+    return [f"skipped: {name} ({why})" for name, why in found if why]
