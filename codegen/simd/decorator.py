@@ -6,15 +6,67 @@ from collections.abc import Callable
 from typing import Any
 
 import numba
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.typed_passes import NativeLowering
 
 __all__ = ["njit"]
 
-UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+class _Linked(JITCodeLibrary):
+    """LLVM code of a function that only others of its module call: they link it, and it is optimised with them.
+
+    Numba optimises a function and makes machine code of it before it links it into those that call it, and there it does
+    so again.  Nothing calls this machine code, so all of it waits for the entry point.
+    """
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Finish the code; there is no machine code to point to."""
+        self._ensure_finalized()
+        return 0
+
+    @property
+    def codegen(self) -> _Linked:
+        return self
+
+    def set_env(self, name: str, environment: object) -> None:
+        """Do nothing; only machine code has a place for objects of Python."""
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _LinkedLowering(NativeLowering):
+    """Lowering into a `_Linked` library."""
+
+    _name = "linked_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        state.library = _Linked(state.targetctx.codegen(), state.func_id.func_qualname)
+        return bool(super().run_pass(state))
+
+
+class _LinkedCompiler(CompilerBase):
+    """Numba's compiler with that lowering."""
+
+    def define_pipelines(self) -> list[PassManager]:
+        manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        manager.passes = [(_LinkedLowering if p is NativeLowering else p, why) for p, why in manager.passes]
+        manager.finalize()
+        return [manager]
+
+
+INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": _LinkedCompiler}
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return `numba.njit(**options)`; a function that is not cached is no entry point, and is not made callable from Python.
+    """Return `numba.njit(**options)`; a function that is not cached is no entry point, and cannot be called from Python.
 
-    A kernel has some eighty functions and one entry point; wrappers of them all are a seventh of its compilation.
+    A kernel has some eighty functions and one entry point; wrappers and machine code of them all are half of its compilation.
     """
-    return numba.njit(**(options if options.get("cache") else {**options, **UNWRAPPED}))
+    return numba.njit(**(options if options.get("cache") else {**options, **INNER}))

@@ -35,6 +35,24 @@ def test_inner_functions_have_no_wrappers() -> None:
     assert description.llvm_cfunc_wrapper_name not in text
 
 
+def _machine_code(symbol: str) -> bool:
+    return bool(cpu_target.target_context.codegen()._engine.is_symbol_defined(symbol))
+
+
+def test_inner_functions_have_no_machine_code_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "two_functions.py").write_text(
+        "from synchain.codegen.simd.decorator import njit\n\n\n"
+        '@njit(error_model="numpy")\ndef third(x):\n    return x / 3.0\n\n\n'
+        '@njit(error_model="numpy", cache=True)\ndef ninth(x):\n    return third(third(x))\n'
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    module = importlib.import_module("two_functions")
+    assert module.ninth(18.0) == 2.0
+    (inner,), (entry,) = module.third.overloads.values(), module.ninth.overloads.values()
+    assert not _machine_code(inner.fndesc.llvm_func_name)
+    assert _machine_code(entry.fndesc.llvm_func_name)
+
+
 def test_entry_points_are_callable_from_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "entry_point.py").write_text("def double(x):\n    return 2.0 * x\n")
     monkeypatch.syspath_prepend(tmp_path)
