@@ -50,7 +50,7 @@ class Reference:
         return cls(np.array([float.fromhex(t) for t in data["t"]]), np.array(data["state"], float))
 
 
-@pytest.mark.parametrize("n", [1, 2])
+@pytest.mark.parametrize("n", [pytest.param(1, marks=pytest.mark.long), 2])
 def test_end_states_keep_to_the_tolerance_and_follow_it(n):
     reference = Reference.read(n)
     errors = []

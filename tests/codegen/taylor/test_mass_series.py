@@ -38,7 +38,9 @@ def rates_of(equations: Equations, numbers: list[float]):
     return lambda t, y: np.linalg.solve(mass(*y, *numbers), np.array(forces(t, *y, *numbers), float))
 
 
-@pytest.mark.parametrize("looped", [False, True], ids=["written out", "looped"])
+@pytest.mark.parametrize(
+    "looped", [pytest.param(False, marks=pytest.mark.long, id="written out"), pytest.param(True, id="looped")]
+)
 def test_a_pendulum_of_many_links_moves_as_its_matrices_say(looped):
     lanes = compiled(alone(LINKS), 8, looped=looped)
     found, _ = lanes.run(START, [1.3, 0.2], 0.5, 1e-13)

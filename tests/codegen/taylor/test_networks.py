@@ -52,7 +52,7 @@ def test_networks_follow_their_equations(name, shape):
     assert steps < 60
 
 
-@pytest.mark.parametrize("name", ["own parameters", "two kinds", "set-valued"])
+@pytest.mark.parametrize("name", [pytest.param("own parameters", marks=pytest.mark.long), "two kinds", "set-valued"])
 def test_dense_output_of_loops_is_that_of_lines(name):
     eq = CASES[name]
     rows = [

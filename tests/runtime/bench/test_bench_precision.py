@@ -71,6 +71,7 @@ def test_normal_modes_solve_the_equations(omega):
         assert np.abs(out - rate).max() < 1e-8
 
 
+@pytest.mark.long
 def test_the_exact_law_is_another_problem_near_the_smoothed_one():
     smooth = read_case("friction, n = 1")
     case = precision.case_of("exact law, n = 1")

@@ -110,6 +110,7 @@ def test_changing_sides_changes_nothing(alone_switching, width, size):
     same(run(width, chunks(size), method="switching"), alone_switching)
 
 
+@pytest.mark.long
 def test_the_order_of_cells_changes_nothing_where_they_change_sides(alone_switching):
     order = np.random.default_rng(3).permutation(CELLS)
     same(run(8, chunks(29), order=order, method="switching"), alone_switching, order)

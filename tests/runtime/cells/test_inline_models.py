@@ -91,7 +91,7 @@ def test_an_inline_model_has_the_kernel_of_the_plug_in_file(name: str) -> None:
     assert mine.initial == shipped.initial
 
 
-@pytest.mark.parametrize("name", ["set-valued", "duffing"])
+@pytest.mark.parametrize("name", [pytest.param("set-valued", marks=pytest.mark.long), "duffing"])
 def test_an_inline_model_has_the_bits_of_the_plug_in_file(name: str) -> None:
     mine, shipped = (sc.run(scene, sigma=[0.1, 0.2]).data for scene in PAIRS[name])
     assert set(mine.data_vars) == set(shipped.data_vars)

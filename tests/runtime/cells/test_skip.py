@@ -92,6 +92,7 @@ def test_all_fixed_numbers_folded():
     assert reduce_scene(scene, fold_all=True).equations.parameters == ("omega",)
 
 
+@pytest.mark.long
 def test_equal_starts_are_one_oscillator_without_synchronisation_error():
     scene = DUFFING.replace(initial={"x": 0.5, "v": 0.1}, axes={"sigma": [0.1, 0.3]})
     result = compare(scene, nodes=1)

@@ -85,6 +85,7 @@ def test_the_section_on_a_state_is_one_of_these(found: Result) -> None:
     np.testing.assert_allclose(found.turn[0, :count], old.states("section")[0, :count], rtol=0, atol=1e-11)
 
 
+@pytest.mark.long
 def test_large_networks_have_sections() -> None:
     """In loops over nodes: the mean speed of a free oscillator falls where its mean position is largest."""
     scene = Scene(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from synchain.models import Scene, chain, ring
 from synchain.runtime import run
@@ -35,6 +36,7 @@ def test_a_cell_does_not_depend_on_its_neighbours():
     assert together[[0, 5, 10]].tolist() == [end.tolist() for end in alone]
 
 
+@pytest.mark.long
 def test_loops_and_lines_agree_in_a_large_network():
     given = {"record": (), "transient": 0, "window": 2, "initial": {"x": 0.3, "v": 0.0}}
     starts = {"x": tuple(0.3 + 0.02 * i for i in range(12)), "v": 0.0}

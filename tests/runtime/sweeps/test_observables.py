@@ -84,8 +84,11 @@ def of_duffing(n: int) -> np.ndarray:
     return integrals(duffing(n), [energy, power, spread, *own])
 
 
-@pytest.mark.parametrize("integrator", ["rodas5p", "dop853", "taylor"])
-@pytest.mark.parametrize("n", [3, 12])
+@pytest.mark.parametrize(
+    ("integrator", "n"),
+    [("rodas5p", 3), ("taylor", 12), *(pytest.param(*other, marks=pytest.mark.long) for other in
+     [("rodas5p", 12), ("dop853", 3), ("dop853", 12), ("taylor", 3)])],
+)  # fmt: skip
 def test_means_are_the_integrals_that_scipy_finds(integrator: str, n: int) -> None:
     """Of a driven network, written out and in loops; the near kink of the spread needs panels that are halved."""
     found = run(duffing(n, integrator=integrator), show_progress=False)
@@ -95,7 +98,7 @@ def test_means_are_the_integrals_that_scipy_finds(integrator: str, n: int) -> No
     np.testing.assert_allclose(values, of_duffing(n), rtol=0, atol=1e-10)
 
 
-@pytest.mark.parametrize("integrator", ["dop853", "taylor"])
+@pytest.mark.parametrize("integrator", [pytest.param("dop853", marks=pytest.mark.long), "taylor"])
 def test_kinks_are_found(integrator: str) -> None:
     """The mean of |cos t| over whole periods is 2/pi, and that of cos^2 t is 1/2; each step meets a kink."""
     scene = Scene(
@@ -167,7 +170,7 @@ def test_the_synchronisation_error_is_an_observable() -> None:
 
 
 def test_observables_do_not_depend_on_lanes_workers_and_other_records(rotors: Result) -> None:
-    other = run(ROTORS.replace(record=(), samples=0), show_progress=False, width=2, workers=1)
+    other = run(ROTORS.replace(record=(), samples=0), show_progress=False, width=1, workers=1)
     for name in ROTORS.observe:
         np.testing.assert_array_equal(other.data[name], rotors.data[name])
 
@@ -195,7 +198,11 @@ def test_a_resumed_run_keeps_what_was_observed(rotors: Result) -> None:
 
 @pytest.mark.parametrize(
     ("contact", "integrator"),
-    [("atan", "rodas5p"), ("atan", "switching"), ("set-valued", "rodas5p"), ("set-valued", "taylor")],
+    [
+        *(pytest.param("atan", method, marks=pytest.mark.long) for method in ("rodas5p", "switching")),
+        ("set-valued", "rodas5p"),
+        ("set-valued", "taylor"),
+    ],
 )
 def test_the_mean_speed_is_the_distance_over_the_time(contact: str, integrator: str) -> None:
     """Of oscillators that slip and stick, by every kind of step; cells jump over no cycle of the window."""
