@@ -35,9 +35,9 @@ if TYPE_CHECKING:
     from .stability.exponents import Exponents, exponents
     from .stability.lyapunov import Lyapunov, lyapunov_spectrum
     from .stability.msf import MSF, Plane, msf, plane
+    from .support.progress import Progress
     from .support.status import Status
     from .sweeps.errors import SweepFailed, SweepInterrupted
-    from .sweeps.progress import Progress
     from .sweeps.run import run
     from .sweeps.stream import Streamed, stream
     from .synchronisation.basin import Basin, basin
@@ -89,7 +89,7 @@ _HOME = {
     "PeriodicOrbit": "bifurcation.periodic",
     "Plane": "stability.msf",
     "Probe": "synchronisation.probe",
-    "Progress": "sweeps.progress",
+    "Progress": "support.progress",
     "Result": "results.result",
     "Skeleton": "bifurcation.skeleton",
     "Status": "support.status",

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from synchain.runtime.cells.layout import Layout, block_size
+from synchain.runtime.support.progress import Progress, Reporter, duration
 from synchain.runtime.support.status import CODES, Status
-from synchain.runtime.sweeps.progress import Progress, Reporter, duration
 
 
 def counts(**named: int) -> np.ndarray:

@@ -13,8 +13,8 @@ from synchain.models.graphs.topology import from_matrix
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
 from synchain.runtime.stability.exponents import exponents
+from synchain.runtime.support.execution import Execution
 from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.pool import Execution
 from synchain.runtime.synchronisation import threshold
 from synchain.runtime.synchronisation.threshold import (
     Criterion,
