@@ -123,7 +123,8 @@ def with_numbers(scene: Scene, values: Mapping[str, object], **settings: object)
     """Return a scene with some parameters changed, whatever they are called, and some settings."""
     if values:
         known: Mapping[object, object] = scene.given["parameters"] or {}
-        numbers: dict[object, object] = {**without(scene.model, known, values), **values}
+        numbers = without(scene.model, known, values)
+        numbers.update(values.items())
         settings["parameters"] = numbers
     return scene.replace(**settings) if settings else scene
 

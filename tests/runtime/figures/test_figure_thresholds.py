@@ -16,6 +16,7 @@ from synchain.runtime.figures import threshold_table as tables_of_thresholds
 from synchain.runtime.figures.figure_runs import FigureRuns
 from synchain.runtime.figures.make import make
 from synchain.runtime.prediction.intervals import scale
+from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
 from synchain.runtime.synchronisation.threshold import project
 
 
@@ -117,7 +118,10 @@ def test_table_of_thresholds(simulation: Simulation, tmp_path: Path) -> None:
     assert "none predicted, none measured" in five["remark"]
     assert (first["tolerance"], first["starts"], first["transient"]) == ("0.001", "1", "1000")
     text = (tmp_path / "thresholds.md").read_text()
-    assert "| 3 | 1.55 | [0.1760, 0.1980] | [0.1760, 0.1980] | [0.1760, 0.1960] | +0.0000, +0.0020 |" in text
+    assert (
+        "| 3 | 1.55 | [0.1760, 0.1980] | [0.1760, 0.1980] | [0.1760 ± 0.0024, 0.1980 ± 0.0008] | [0.1760, 0.1960] |"
+        in text
+    )
     assert "at least half of 1 starts" in text
 
 
@@ -134,7 +138,7 @@ def test_ragged_ranges_are_joined_over_narrow_gaps_only() -> None:
     assert tables_of_thresholds.joined(found) == ((0.1, 0.14), (0.142, 0.15))
     assert tables_of_thresholds.joined(found, 0.0) == found
     assert tables_of_thresholds.joined(()) == ()
-    row = tables_of_thresholds.Row(4, 1.4, found, (), published.published(4, 1.4), 0, 9)
+    row = tables_of_thresholds.Row(4, 1.4, found, (), ExponentWindows(), published.published(4, 1.4), 0, 9)
     assert "2 narrow gaps bridged; 1 more range measured" in row.remark
 
 
