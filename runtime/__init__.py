@@ -41,14 +41,17 @@ if TYPE_CHECKING:
     from .sweeps.run import run
     from .sweeps.stream import Streamed, stream
     from .synchronisation.basin import Basin, basin
+    from .synchronisation.exponent_windows import ExponentWindows
     from .synchronisation.probe import Probe, universal_probe
-    from .synchronisation.threshold import Thresholds, thresholds
+    from .synchronisation.threshold import Criterion, Thresholds, thresholds
 
 __all__ = [
     "MSF",
     "Basin",
     "Branch",
     "ClusterExponents",
+    "Criterion",
+    "ExponentWindows",
     "Exponents",
     "Lyapunov",
     "PeriodicOrbit",
@@ -83,6 +86,8 @@ _HOME = {
     "Basin": "synchronisation.basin",
     "Branch": "bifurcation.branches",
     "ClusterExponents": "stability.clusters",
+    "Criterion": "synchronisation.threshold",
+    "ExponentWindows": "synchronisation.exponent_windows",
     "Exponents": "stability.exponents",
     "Lyapunov": "stability.lyapunov",
     "MSF": "stability.msf",

@@ -21,7 +21,19 @@ from .published import NOT_PERIODIC, PUBLISHED, Published, published
 from .style import BLACK, BLUE, COLUMN, GREEN, ORANGE, PURPLE, failures
 from .tables import Table
 
-__all__ = ["NAMES", "SIZE", "Row", "compute", "document", "draw", "joined", "nearest", "scene_of", "table"]
+__all__ = [
+    "NAMES",
+    "SIZE",
+    "Row",
+    "compute",
+    "document",
+    "draw",
+    "joined",
+    "nearest",
+    "scene_of",
+    "table",
+    "windows_of",
+]
 
 NAMES = ("thresholds",)
 SIZE = (COLUMN, 4.8)
@@ -121,9 +133,14 @@ def _row(n: int, omega: float, runs: FigureRuns) -> Row:
     scene = scene_of(n, omega, runs)
     found = runs.network(scene)
     predicted = tuple(runs.predicted(scene))
-    windows = ExponentWindows.of(replace(curve(scene, runs), scene=scene))
+    windows = windows_of(scene, runs)
     failed = int((~np.isfinite(found.error)).sum())
     return Row(n, omega, found.intervals, predicted, windows, published(n, omega), failed, len(found.x))
+
+
+def windows_of(scene: Scene, runs: FigureRuns) -> ExponentWindows:
+    """Return the windows of a network from the exponents of its oscillator, which networks share."""
+    return ExponentWindows.of(replace(curve(scene, runs), scene=scene))
 
 
 def scene_of(n: int, omega: float, runs: FigureRuns) -> Scene:
