@@ -59,7 +59,11 @@ def topology(
 ) -> Topology: ...
 @overload
 def topology(
-    name: Literal["cayley_dihedral"], n: int, *, rotations: Iterable[int] = (1,), reflections: Iterable[int] = (0,)
+    name: Literal["cayley_dihedral"],
+    n: int,
+    *,
+    rotations: Iterable[int] = (1,),
+    reflections: Iterable[int] = (0,),
 ) -> Topology: ...
 @overload
 def topology(
@@ -91,7 +95,11 @@ def topology(name: Literal["complete_bipartite"], n: int, *, left: int | None = 
 def topology(name: Literal["complete_multipartite"], n: int, *, parts: Iterable[int] | None = None) -> Topology: ...
 @overload
 def topology(
-    name: Literal["erdos_renyi", "gnp_random"], n: int, *, p: float | str = "1/2", seed: int = 0
+    name: Literal["erdos_renyi", "gnp_random"],
+    n: int,
+    *,
+    p: float | str = "1/2",
+    seed: int = 0,
 ) -> Topology: ...
 @overload
 def topology(name: Literal["generalized_petersen", "petersen"], n: int, *, step: int = 2) -> Topology: ...
@@ -114,7 +122,12 @@ def topology(
 ) -> Topology: ...
 @overload
 def topology(name: str, n: int, **options: object) -> Topology: ...
-def cayley_abelian(n: int, *, shape: Iterable[int] | None = None, generators: Iterable[int] | None = None) -> Topology:
+def cayley_abelian(
+    n: int,
+    *,
+    shape: Iterable[int] | None = None,
+    generators: Iterable[int] | None = None,
+) -> Topology:
     """Cayley graph of a product of cyclic groups (shape: their orders; one of order n); generators: their numbers one after another (the unit of each group)."""
 
 def cayley_dihedral(n: int, *, rotations: Iterable[int] = (1,), reflections: Iterable[int] = (0,)) -> Topology:

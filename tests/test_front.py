@@ -10,6 +10,7 @@ import re
 import subprocess
 import sys
 import zipfile
+from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 
@@ -36,6 +37,9 @@ CONTRACT = [
     ),
     *("run", "stream", "msf", "thresholds", "open_result", "kernel"),
 ]
+WIDE = 120
+"""Longest line of code."""
+
 TYPES = {"tuple[int, ...]": "Iterable[int]", "str": "float | str"}
 """What options accept beside what they are stored as; every option that is kept as text is a probability."""
 
@@ -62,7 +66,7 @@ def file_of(name: str) -> ModuleType:
     return load(families.TOPOLOGY, families.TOPOLOGY.also.get(name, name))
 
 
-def arguments(module: ModuleType) -> str:
+def arguments(module: ModuleType) -> tuple[str, ...]:
     """What a family takes, from its plug-in file."""
     given = inspect.signature(module.edges).parameters.values()
     options = [
@@ -70,22 +74,39 @@ def arguments(module: ModuleType) -> str:
         for p in given
         if p.kind is inspect.Parameter.KEYWORD_ONLY
     ]
-    return ", ".join(["n: int", *(["*"] if options else []), *options])
+    return "n: int", *(["*"] if options else []), *options
+
+
+def head(name: str, parts: Iterable[str]) -> str:
+    """The first line of a function, or as many as the formatter makes of it."""
+    line = f"def {name}({', '.join(parts)}) -> Topology:"
+    if len(line) + len(" ...") <= WIDE:
+        return line
+    lines = [f"    {part},\n" for part in parts]
+    lines = [line if len(line) <= WIDE else listed(line) for line in lines]
+    return f"def {name}(\n{''.join(lines)}) -> Topology:"
+
+
+def listed(line: str) -> str:
+    """A line with a list in brackets, an entry a line."""
+    begin, entries = line.split("[", 1)
+    inner = "".join(f"        {entry},\n" for entry in entries.rstrip("],\n").split(", "))
+    return f"{begin}[\n{inner}    ],\n"
 
 
 def function_stub(name: str) -> str:
     """The stub of a family."""
     module = file_of(name)
-    return f'def {name}({arguments(module)}) -> Topology:\n    """{module.SUMMARY.replace(chr(34), chr(39))}."""\n'
+    return f'{head(name, arguments(module))}\n    """{module.SUMMARY.replace(chr(34), chr(39))}."""\n'
 
 
 def topology_stub() -> str:
     """What `topology` takes, by the name of the family; the last form is for files and installed families."""
-    takes: dict[str, list[str]] = {}
+    takes: dict[tuple[str, ...], list[str]] = {}
     for name in shipped():
         takes.setdefault(arguments(file_of(name)), []).append(f'"{name}"')
     overloads = [
-        f"@overload\ndef topology(name: Literal[{', '.join(names)}], {given}) -> Topology: ...\n"
+        "@overload\n" + head("topology", (f"name: Literal[{', '.join(names)}]", *given)) + " ...\n"
         for given, names in sorted(takes.items(), key=lambda each: each[1])
     ]
     return "".join([*overloads, "@overload\ndef topology(name: str, n: int, **options: object) -> Topology: ...\n"])
@@ -94,10 +115,10 @@ def topology_stub() -> str:
 def models_stub() -> str:
     homes = sorted((home, name) for name, home in models._HOMES.items() if name != "topology")
     lines = [f"from .{home} import {name} as {name}" for home, name in homes]
-    stubs = [topology_stub(), *map(function_stub, shipped())]
+    stubs = topology_stub() + "\n".join(map(function_stub, shipped()))
     head = "# What `__init__.py` loads on first use; tests/test_front.py writes it with --update.\n"
     needed = "from collections.abc import Iterable\nfrom typing import Literal, overload\n\n"
-    return f"{head}{needed}" + "\n".join(lines) + "\n\n" + "\n".join(stubs)
+    return f"{head}{needed}" + "\n".join(lines) + "\n\n" + stubs
 
 
 def front_stub() -> str:

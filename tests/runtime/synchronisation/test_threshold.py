@@ -231,8 +231,13 @@ def test_direct_range_of_a_star_lies_where_the_probe_says():
     )
     assert found.predicted[0][1] == pytest.approx(found.probe.intervals[0][1] / 4, abs=1e-9)
     assert found.direct.intervals[0][1] == pytest.approx(found.predicted[0][1], abs=0.01)
+    ((_, high),), ((low_error, high_error),) = found.exponents.intervals, found.exponents.errors
+    assert high == pytest.approx(0.4653 / 4, abs=1e-4)
+    assert 0.0 == low_error < high_error < 1e-6  # the motion is periodic
+    assert found.direct.intervals[0][1] == pytest.approx(high, abs=0.01)
     numbers = found.as_dict()
-    assert set(numbers) == {"intervals", "probe", "predicted", "warnings"}
+    kinds = {"intervals", "probe", "predicted", "exponents", "exponent_errors", "no_exponents", "warnings"}
+    assert set(numbers) == kinds
     assert numbers["intervals"][0][1] == found.direct.intervals[0][1]
 
 
