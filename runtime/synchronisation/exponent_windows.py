@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,9 @@ from synchain.models.scenes.scene import Scene
 from ..prediction.intervals import Interval
 from ..prediction.synchronisability import Window
 from ..results.labelled import words_of
+from ..stability.exponents import initial_states
 from ..stability.msf import MSF, msf
+from ..stability.orbits import Orbits
 from ..support.execution import Execution
 
 __all__ = ["ExponentWindows", "exponent_windows"]
@@ -63,11 +64,13 @@ class ExponentWindows:
 
 def _errors(window: Window, known: bool) -> Interval:
     """Errors of both ends; of an end that no mode decides, 0."""
-    low, high = ((window.low_mode, window.low_error), (window.high_mode, window.high_error))
-    return tuple(0.0 if mode is None else error if known else math.inf for mode, error in (low, high))  # type: ignore[return-value]
+    low, high = (error if known else math.inf for error in (window.low_error, window.high_error))
+    return 0.0 if window.low_mode is None else low, 0.0 if window.high_mode is None else high
 
 
-def exponent_windows(scene: Scene, alpha: np.ndarray, execution: Execution, **effort: Any) -> ExponentWindows:
+def exponent_windows(
+    scene: Scene, alpha: np.ndarray, execution: Execution, precision: float, periods: float, seed: int
+) -> ExponentWindows:
     """Compute the windows of a scene's network.
 
     Parameters
@@ -78,11 +81,24 @@ def exponent_windows(scene: Scene, alpha: np.ndarray, execution: Execution, **ef
         Increasing strengths; the exponents count as positive beyond them.
     execution : Execution
         Its threads do the work; its bar and its hook count periods.
-    **effort
-        Checked numbers for `msf`.
+    precision, periods, seed
+        As for `exponents`, checked.
     """
-    told: dict[str, Any] = {"show_progress": execution.show_progress, "progress": execution.progress}
     try:
-        return ExponentWindows.of(msf(scene, alpha, workers=execution.workers, **told, **effort))
-    except (ValueError, FloatingPointError) as problem:
+        Orbits.make(scene, alpha, initial_states(scene, 1, seed), 1)
+    except ValueError as problem:
         return ExponentWindows(absent=str(problem))
+    try:
+        function = msf(
+            scene,
+            alpha,
+            precision=precision,
+            periods=periods,
+            seed=seed,
+            workers=execution.workers,
+            show_progress=execution.show_progress,
+            progress=execution.progress,
+        )
+    except FloatingPointError as problem:
+        return ExponentWindows(absent=str(problem))
+    return ExponentWindows.of(function)

@@ -246,8 +246,7 @@ def thresholds(
     resolution = check_positive("resolution", resolution)
     precision, periods = check_number("precision", precision, 0.0), check_positive("periods", periods)
     alpha = _probe_grid(grid, spectrum)
-    effort = {"precision": precision, "periods": periods, "seed": criterion.seed}
-    stable = exponent_windows(scene, alpha, execution, **effort)
+    stable = exponent_windows(scene, alpha, execution, precision, periods, criterion.seed)
     pair = probe(scene, alpha, criterion, resolution, execution)
     direct = simulate(scene, grid, criterion, resolution, execution)
     predicted = project(pair.intervals, spectrum, float(grid[-1]))

@@ -75,6 +75,22 @@ def test_a_terminal_has_a_bar_with_the_failures(monkeypatch):
     assert "1 diverged" in shown.text
 
 
+def test_periods_and_values_are_counted_without_a_status(monkeypatch):
+    shown, heard = Terminal(True), []
+    monkeypatch.setattr(sys, "stderr", shown)
+    with Reporter(10, hook=heard.append, unit="period") as reporter:
+        reporter.advance(0.25)
+        assert list(reporter.each("ab")) == ["a", "b"]
+        assert [p.done for p in heard] == [0, 0.25, 1.25, 2.25]
+    assert "period/s" in shown.text
+    assert str(heard[-1]).startswith("2.25 of 10 periods (22 %), ")
+    assert (heard[-1].statuses, heard[-1].kept, heard[-1].unit) == ({}, 0, "period")
+    stopped = Reporter(3, show=False, hook=heard.append, unit="value")
+    next(values := stopped.each("ab"))
+    values.close()
+    assert stopped.done == 0  # a branch that ends at a value has not got beyond it
+
+
 def test_a_pipe_has_a_line_now_and_then_and_nothing_in_a_short_run(monkeypatch):
     shown = Terminal(False)
     monkeypatch.setattr(sys, "stderr", shown)

@@ -95,7 +95,7 @@ def swept(monkeypatch):
         return Sweep(sigma, np.zeros(len(sigma)), np.ones(len(sigma)), ((0.1, 0.2),))
 
     monkeypatch.setattr(threshold, "simulate", fake)
-    monkeypatch.setattr(threshold, "exponent_windows", lambda *_, **__: ExponentWindows())
+    monkeypatch.setattr(threshold, "exponent_windows", lambda *_: ExponentWindows())
     return calls
 
 
@@ -299,12 +299,12 @@ def test_windows_of_exponents_are_those_of_the_network():
 
 def test_the_effort_of_the_exponents_can_be_chosen(monkeypatch):
     asked = []
-    monkeypatch.setattr(threshold, "exponent_windows", lambda *_, **effort: asked.append(effort) or ExponentWindows())
+    monkeypatch.setattr(threshold, "exponent_windows", lambda *all_: asked.append(all_[3:]) or ExponentWindows())
     monkeypatch.setattr(threshold, "simulate", lambda scene, sigma, *_: Sweep(sigma, 0 * sigma, 0 * sigma, ()))
     scene = Scene(topology=chain(2))
     thresholds(scene, sigma=[0.1, 0.2])
     thresholds(scene, sigma=[0.1, 0.2], precision=0.1, periods=50, criterion=Criterion(seed=3))
-    assert asked == [{"precision": 1e-3, "periods": 5000, "seed": 0}, {"precision": 0.1, "periods": 50, "seed": 3}]
+    assert asked == [(1e-3, 5000, 0), (0.1, 50, 3)]
     for bad in ({"precision": "a"}, {"periods": 0}):
         with pytest.raises(ValueError, match=r"precision|periods"):
             thresholds(scene, sigma=[0.1, 0.2], **bad)
@@ -327,6 +327,7 @@ def test_the_effort_of_the_exponents_can_be_chosen(monkeypatch):
             Scene(friction="coulomb_static", contact="set-valued", coupling="damper", topology=chain(2)),
             "links act on velocities",
         ),
+        (Scene(Field({"x": "x"}), "x->x", chain(2), time_unit="time"), "the state grew without bound"),
     ],
 )
 def test_exponents_that_do_not_apply_say_why(scene, why):
@@ -337,6 +338,15 @@ def test_exponents_that_do_not_apply_say_why(scene, why):
     assert dict(found.summary)["sigma, negative exponents"] == f"not computed: {found.exponents.absent}"
     assert found.as_dict()["no_exponents"] == found.exponents.absent
     assert "exponents: not computed" in [text.get_text() for text in found.plot().texts]
+
+
+def test_an_error_of_the_callers_hook_is_no_reason():
+    def wrong(progress):
+        raise ValueError("of the hook")
+
+    scene = Scene(Field({"x": "-x"}), "x->x", chain(2), time_unit="time")
+    with pytest.raises(ValueError, match="of the hook"):
+        thresholds(scene, sigma=[0.0, 0.1], progress=wrong, **ASKED)
 
 
 def test_windows_without_an_estimate_of_their_error_say_so():
