@@ -12,6 +12,7 @@ import pytest
 
 from synchain import runtime
 from synchain.models import Field, Scene, chain
+from synchain.runtime.bifurcation import skeleton as skeletons
 from synchain.runtime.cells.keywords import Given
 from synchain.runtime.support.progress import Progress
 from synchain.runtime.synchronisation.threshold import Criterion
@@ -238,14 +239,16 @@ def test_what_tells_and_what_works_is_checked_in_all_functions(tmp_path: Any) ->
 
 
 def test_seed_and_transient_of_a_skeleton_are_used(monkeypatch: pytest.MonkeyPatch) -> None:
-    from synchain.runtime.bifurcation import skeleton as module
-
-    asked: list[tuple[float, int]] = []
+    asked: list[tuple[str, float]] = []
+    states, settle = skeletons.initial_states, skeletons.Orbits.settle
     monkeypatch.setattr(
-        module, "_path", lambda scene, transient, seed: asked.append((transient, seed)) or np.ones((3, 1, 2))
+        skeletons, "initial_states", lambda s, n, seed: asked.append(("seed", seed)) or states(s, n, seed)
+    )
+    monkeypatch.setattr(
+        skeletons.Orbits, "settle", lambda own, length: asked.append(("transient", length)) or settle(own, length)
     )
     runtime.skeleton(DRIVEN, "omega", [1.3], (1,), 1, transient=7, seed=3, show_progress=False)
-    assert asked == [(7.0, 3)]
+    assert asked == [("seed", 3), ("transient", 7.0)]
 
 
 def test_an_executor_runs_the_cells_of_the_probe_and_parameters_reach_it() -> None:

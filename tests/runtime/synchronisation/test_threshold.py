@@ -12,6 +12,7 @@ from synchain.models import Field, chain, complete, star
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
+from synchain.runtime.figures.style import GREEN
 from synchain.runtime.stability.exponents import Exponents, exponents
 from synchain.runtime.stability.msf import MSF
 from synchain.runtime.support.execution import Execution
@@ -295,6 +296,10 @@ def test_windows_of_exponents_are_those_of_the_network():
     assert found.data["window_error"].dims == found.data["window"].dims == ("window_number", "end")
     assert dict(found.summary)["sigma, negative exponents"] == "0.0000 … 0.3333"
     assert found.as_dict()["no_exponents"] is None
+    axes = found.plot()
+    assert "negative exponents" in [text.get_text() for text in axes.get_legend().get_texts()]
+    ends = next(line.get_xdata() for line in axes.lines if line.get_color() == GREEN)
+    np.testing.assert_allclose(ends, [0.0, 1 / 3], rtol=1e-9)
 
 
 def test_the_effort_of_the_exponents_can_be_chosen(monkeypatch):
@@ -342,7 +347,8 @@ def test_exponents_that_do_not_apply_say_why(scene, why):
 
 def test_an_error_of_the_callers_hook_is_no_reason():
     def wrong(progress):
-        raise ValueError("of the hook")
+        if progress.unit == "period":
+            raise ValueError("of the hook")
 
     scene = Scene(Field({"x": "-x"}), "x->x", chain(2), time_unit="time")
     with pytest.raises(ValueError, match="of the hook"):
