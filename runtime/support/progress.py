@@ -32,7 +32,8 @@ class Progress:
     ----------
     total, done, kept : float
         How many there are, how many have ended, and how many of these an earlier run had finished;
-        whole numbers but for periods. An average, or a branch, may end before all of them are done.
+        whole numbers but for periods. If an average is precise enough, or a branch ends, the total
+        becomes what is done.
     statuses : mapping of Status to int
         How many cells ended how; empty if no cells are counted.
     compiling : float
@@ -56,6 +57,11 @@ class Progress:
     unit: str = "cell"
 
     @property
+    def share(self) -> float:
+        """Part that is done, from 0 to 1."""
+        return self.done / self.total if self.total > 0 else 1.0
+
+    @property
     def rate(self) -> float:
         """How many a second in this run."""
         return (self.done - self.kept) / self.running if self.running > 0.0 else 0.0
@@ -74,7 +80,7 @@ class Progress:
         return ", ".join(f"{n} {s.name.lower().replace('_', ' ')}" for s, n in bad)
 
     def __str__(self) -> str:
-        parts = f"{self.done:.12g} of {self.total:.12g} {self.unit}s ({100.0 * self.done / self.total:.0f} %)"
+        parts = f"{self.done:.12g} of {self.total:.12g} {self.unit}s ({100.0 * self.share:.0f} %)"
         parts += f", {self.rate:.3g} {self.unit}s/s, {duration(self.left)} left"
         return f"{parts}; {self.failures}" if self.failures else parts
 
@@ -115,7 +121,13 @@ class Reporter:
         self.start()
         return self
 
-    def __exit__(self, *problem: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *problem: object) -> None:
+        if kind is None and self.done < self.total:
+            self.total = self.done
+            if self._bar is not None:
+                self._bar.total = self.done
+                self._bar.refresh()
+            self._tell()
         self.close()
 
     def start(self, counts: np.ndarray | None = None, compiling: float = 0.0) -> None:

@@ -82,9 +82,17 @@ def test_periods_and_values_are_counted_without_a_status(monkeypatch):
         reporter.advance(0.25)
         assert list(reporter.each("ab")) == ["a", "b"]
         assert [p.done for p in heard] == [0, 0.25, 1.25, 2.25]
+        assert str(heard[-1]).startswith("2.25 of 10 periods (22 %), ")
+    assert (heard[-1].done, heard[-1].total, heard[-1].share) == (2.25, 2.25, 1.0)  # no more was needed
+    assert "2.25/2.25" in shown.text
     assert "period/s" in shown.text
-    assert str(heard[-1]).startswith("2.25 of 10 periods (22 %), ")
     assert (heard[-1].statuses, heard[-1].kept, heard[-1].unit) == ({}, 0, "period")
+    with pytest.raises(KeyError), Reporter(10, show=False, hook=heard.append, unit="period") as broken:
+        raise KeyError
+    assert (broken.done, broken.total) == (0, 10)
+    with Reporter(10, show=False, hook=heard.append):
+        pass
+    assert str(heard[-1]).startswith("0 of 0 cells (100 %), ")
     stopped = Reporter(3, show=False, hook=heard.append, unit="value")
     next(values := stopped.each("ab"))
     values.close()
