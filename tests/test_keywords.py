@@ -112,6 +112,7 @@ def test_every_function_refuses_in_one_line_what_is_no_parameter(name: str, tmp_
         ({"parameters": {"mu_s": 1.0}, "mu_s": 1.0}, f"{name}: found 'mu_s' in `parameters` and as a keyword"),
         ({"parameters": {"parameters": 1.0}}, f"{name}: found its keyword 'parameters' in `parameters`"),
         ({"parameters": 3}, "parameters: found 3"),
+        ({"parameters": {3: 1.0}}, r"parameters: found 3 \(int\); expected text"),
     ]
     if "progress" in TAKEN[name]:
         refused.append(({"progres": print}, f"'progres' of {name}; .*did you mean 'progress'"))

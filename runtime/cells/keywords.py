@@ -8,7 +8,7 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
-from synchain.models.inputs.checks import check_number, check_table, suggestion
+from synchain.models.inputs.checks import check_number, check_table, check_text, suggestion
 from synchain.models.inputs.node_name import NodeName
 from synchain.models.scenes.parameters import without
 from synchain.models.scenes.scene import KEYWORDS, Scene, a_scene
@@ -52,7 +52,7 @@ class Given:
             raise ValueError(
                 f"{self.function.__name__}: found {twice!r} in `parameters` and as a keyword; expected it once"
             )
-        return {str(name): value for given in (table, self.keywords) for name, value in given.items()}
+        return {check_text("parameters", name): value for name, value in (*table.items(), *self.keywords.items())}
 
     def scene(self, scene: Scene, **settings: object) -> Scene:
         """Return a scene with these parameters and with settings that the function needs.
