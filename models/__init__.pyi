@@ -1,5 +1,6 @@
 # What `__init__.py` loads on first use; tests/test_front.py writes it with --update.
 from collections.abc import Iterable
+from typing import Literal, overload
 
 from .definitions.inline import Field as Field
 from .definitions.inline import Lagrangian as Lagrangian
@@ -12,7 +13,6 @@ from .dynamics.observable import minimum as minimum
 from .dynamics.observable import nodes as nodes
 from .dynamics.observable import rate as rate
 from .dynamics.observable import variance as variance
-from .graphs.families import topology as topology
 from .graphs.products import cartesian as cartesian
 from .graphs.products import complement as complement
 from .graphs.products import kronecker as kronecker
@@ -49,7 +49,85 @@ from .scenes.scene import Scene as Scene
 from .scenes.section import Section as Section
 from .spectra.spectrum import Spectrum as Spectrum
 
-def cayley_abelian(n: int, *, shape: Iterable[int] | None = None, generators: Iterable[int] | None = None) -> Topology:
+@overload
+def topology(
+    name: Literal["cayley_abelian"],
+    n: int,
+    *,
+    shape: Iterable[int] | None = None,
+    generators: Iterable[int] | None = None,
+) -> Topology: ...
+@overload
+def topology(
+    name: Literal["cayley_dihedral"],
+    n: int,
+    *,
+    rotations: Iterable[int] = (1,),
+    reflections: Iterable[int] = (0,),
+) -> Topology: ...
+@overload
+def topology(
+    name: Literal[
+        "chain",
+        "circular_ladder",
+        "complete",
+        "cycle",
+        "feed_forward",
+        "hypercube",
+        "ladder",
+        "one_way_ring",
+        "paley",
+        "path",
+        "prism",
+        "random_cubic",
+        "ring",
+        "star",
+        "tree",
+        "wheel",
+    ],
+    n: int,
+) -> Topology: ...
+@overload
+def topology(name: Literal["circulant"], n: int, *, offsets: Iterable[int] = (1, 2)) -> Topology: ...
+@overload
+def topology(name: Literal["complete_bipartite"], n: int, *, left: int | None = None) -> Topology: ...
+@overload
+def topology(name: Literal["complete_multipartite"], n: int, *, parts: Iterable[int] | None = None) -> Topology: ...
+@overload
+def topology(
+    name: Literal["erdos_renyi", "gnp_random"],
+    n: int,
+    *,
+    p: float | str = "1/2",
+    seed: int = 0,
+) -> Topology: ...
+@overload
+def topology(name: Literal["generalized_petersen", "petersen"], n: int, *, step: int = 2) -> Topology: ...
+@overload
+def topology(name: Literal["grid", "torus"], n: int, *, shape: Iterable[int] | None = None) -> Topology: ...
+@overload
+def topology(name: Literal["hamming"], n: int, *, d: int = 2) -> Topology: ...
+@overload
+def topology(name: Literal["johnson", "kneser"], n: int, *, k: int = 2) -> Topology: ...
+@overload
+def topology(name: Literal["random_regular"], n: int, *, degree: int = 4, seed: int = 0) -> Topology: ...
+@overload
+def topology(
+    name: Literal["small_world", "watts_strogatz"],
+    n: int,
+    *,
+    neighbours: int = 4,
+    p: float | str = "1/10",
+    seed: int = 0,
+) -> Topology: ...
+@overload
+def topology(name: str, n: int, **options: object) -> Topology: ...
+def cayley_abelian(
+    n: int,
+    *,
+    shape: Iterable[int] | None = None,
+    generators: Iterable[int] | None = None,
+) -> Topology:
     """Cayley graph of a product of cyclic groups (shape: their orders; one of order n); generators: their numbers one after another (the unit of each group)."""
 
 def cayley_dihedral(n: int, *, rotations: Iterable[int] = (1,), reflections: Iterable[int] = (0,)) -> Topology:
@@ -73,11 +151,20 @@ def complete_bipartite(n: int, *, left: int | None = None) -> Topology:
 def complete_multipartite(n: int, *, parts: Iterable[int] | None = None) -> Topology:
     """complete multipartite graph: all nodes of each group with all of the others (parts: sizes; three, as equal as n allows)."""
 
+def cycle(n: int) -> Topology:
+    """closed ring (cycle graph)."""
+
 def erdos_renyi(n: int, *, p: float | str = "1/2", seed: int = 0) -> Topology:
     """random graph: each pair joined with probability p (1/2), fixed by seed (0); it may fall into parts."""
 
 def feed_forward(n: int) -> Topology:
     """feed-forward (one-way) chain: every node but the first feels the one before it."""
+
+def generalized_petersen(n: int, *, step: int = 2) -> Topology:
+    """generalised Petersen graph: a ring joined node by node to a star polygon (step, 2); n = 10: the Petersen graph."""
+
+def gnp_random(n: int, *, p: float | str = "1/2", seed: int = 0) -> Topology:
+    """random graph: each pair joined with probability p (1/2), fixed by seed (0); it may fall into parts."""
 
 def grid(n: int, *, shape: Iterable[int] | None = None) -> Topology:
     """grid with open ends, as square as n allows (a prime n: a chain); shape: nodes in each of any number of directions."""
@@ -103,8 +190,14 @@ def one_way_ring(n: int) -> Topology:
 def paley(n: int) -> Topology:
     """Paley graph: the elements of a finite field (n a prime power 5, 9, 13 …), joined if they differ by a square."""
 
+def path(n: int) -> Topology:
+    """open chain (path graph)."""
+
 def petersen(n: int, *, step: int = 2) -> Topology:
     """generalised Petersen graph: a ring joined node by node to a star polygon (step, 2); n = 10: the Petersen graph."""
+
+def prism(n: int) -> Topology:
+    """circular ladder, or prism: two rings joined node by node (n is even)."""
 
 def random_cubic(n: int) -> Topology:
     """random graph: three neighbours each (where n is odd, one node has two), always the same for one n."""
@@ -126,6 +219,9 @@ def torus(n: int, *, shape: Iterable[int] | None = None) -> Topology:
 
 def tree(n: int) -> Topology:
     """balanced binary tree, filled level by level."""
+
+def watts_strogatz(n: int, *, neighbours: int = 4, p: float | str = "1/10", seed: int = 0) -> Topology:
+    """ring with several neighbours (4), each edge led elsewhere with probability p (1/10), fixed by seed (0)."""
 
 def wheel(n: int) -> Topology:
     """wheel: a hub (the first node) joined to every node of a ring."""

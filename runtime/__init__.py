@@ -35,20 +35,23 @@ if TYPE_CHECKING:
     from .stability.exponents import Exponents, exponents
     from .stability.lyapunov import Lyapunov, lyapunov_spectrum
     from .stability.msf import MSF, Plane, msf, plane
+    from .support.progress import Progress
     from .support.status import Status
     from .sweeps.errors import SweepFailed, SweepInterrupted
-    from .sweeps.progress import Progress
     from .sweeps.run import run
     from .sweeps.stream import Streamed, stream
     from .synchronisation.basin import Basin, basin
+    from .synchronisation.exponent_windows import ExponentWindows
     from .synchronisation.probe import Probe, universal_probe
-    from .synchronisation.threshold import Thresholds, thresholds
+    from .synchronisation.threshold import Criterion, Thresholds, thresholds
 
 __all__ = [
     "MSF",
     "Basin",
     "Branch",
     "ClusterExponents",
+    "Criterion",
+    "ExponentWindows",
     "Exponents",
     "Lyapunov",
     "PeriodicOrbit",
@@ -83,13 +86,15 @@ _HOME = {
     "Basin": "synchronisation.basin",
     "Branch": "bifurcation.branches",
     "ClusterExponents": "stability.clusters",
+    "Criterion": "synchronisation.threshold",
+    "ExponentWindows": "synchronisation.exponent_windows",
     "Exponents": "stability.exponents",
     "Lyapunov": "stability.lyapunov",
     "MSF": "stability.msf",
     "PeriodicOrbit": "bifurcation.periodic",
     "Plane": "stability.msf",
     "Probe": "synchronisation.probe",
-    "Progress": "sweeps.progress",
+    "Progress": "support.progress",
     "Result": "results.result",
     "Skeleton": "bifurcation.skeleton",
     "Status": "support.status",

@@ -19,6 +19,7 @@ from synchain.runtime.stability.exponents import Exponents
 from synchain.runtime.stability.lyapunov import Lyapunov
 from synchain.runtime.stability.msf import MSF, Plane
 from synchain.runtime.synchronisation.basin import Basin
+from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
 from synchain.runtime.synchronisation.probe import Probe
 from synchain.runtime.synchronisation.threshold import Criterion, Sweep, Thresholds
 
@@ -59,7 +60,13 @@ def thresholds() -> Thresholds:
     """Ranges of a pair, with a warning."""
     sigma = np.linspace(0.0, 0.6, 7)
     return Thresholds(
-        PAIR, swept(2 * sigma, 0.0, 0.4), ((0.0, 0.2),), swept(sigma, 0.0, 0.2), Criterion(starts=3), ("w",)
+        PAIR,
+        swept(2 * sigma, 0.0, 0.4),
+        ((0.0, 0.2),),
+        swept(sigma, 0.0, 0.2),
+        Criterion(starts=3),
+        ExponentWindows(((0.0, 0.2),), ((0.0, 0.01),)),
+        ("w",),
     )
 
 

@@ -15,7 +15,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.kernels import kernel
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.opening.open import open_result
-from synchain.runtime.sweeps.progress import Progress
+from synchain.runtime.support.progress import Progress
 from synchain.runtime.sweeps.stream import stream
 
 RECORDS = ("sync_error", "section", "trajectory")

@@ -5,10 +5,12 @@ from __future__ import annotations
 import doctest
 import importlib
 import inspect
+import os
 import re
 import subprocess
 import sys
 import zipfile
+from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 
@@ -35,13 +37,21 @@ CONTRACT = [
     ),
     *("run", "stream", "msf", "thresholds", "open_result", "kernel"),
 ]
+WIDE = 120
+"""Longest line of code."""
+
 TYPES = {"tuple[int, ...]": "Iterable[int]", "str": "float | str"}
 """What options accept beside what they are stored as; every option that is kept as text is a probability."""
 
 
-def shipped() -> list[str]:
+def files() -> list[str]:
     folder = Path(models.__file__).parent / "topologies"
     return sorted(path.stem for path in folder.glob("*.py") if path.stem != "__init__")
+
+
+def shipped() -> list[str]:
+    """The names of all families, those of networkx among them."""
+    return sorted({*files(), *families.TOPOLOGY.also})
 
 
 def written(default: object) -> str:
@@ -52,24 +62,63 @@ def accepted(annotation: str) -> str:
     return " | ".join(TYPES.get(part, part) for part in annotation.split(" | "))
 
 
-def function_stub(name: str, module: ModuleType) -> str:
-    """The stub of a family, from its plug-in file."""
+def file_of(name: str) -> ModuleType:
+    return load(families.TOPOLOGY, families.TOPOLOGY.also.get(name, name))
+
+
+def arguments(module: ModuleType) -> tuple[str, ...]:
+    """What a family takes, from its plug-in file."""
     given = inspect.signature(module.edges).parameters.values()
     options = [
         f"{p.name}: {accepted(p.annotation)} = {written(p.default)}"
         for p in given
         if p.kind is inspect.Parameter.KEYWORD_ONLY
     ]
-    arguments = ", ".join(["n: int", *(["*"] if options else []), *options])
-    return f'def {name}({arguments}) -> Topology:\n    """{module.SUMMARY.replace(chr(34), chr(39))}."""\n'
+    return "n: int", *(["*"] if options else []), *options
+
+
+def head(name: str, parts: Iterable[str]) -> str:
+    """The first line of a function, or as many as the formatter makes of it."""
+    line = f"def {name}({', '.join(parts)}) -> Topology:"
+    if len(line) + len(" ...") <= WIDE:
+        return line
+    lines = [f"    {part},\n" for part in parts]
+    lines = [line if len(line) <= WIDE else listed(line) for line in lines]
+    return f"def {name}(\n{''.join(lines)}) -> Topology:"
+
+
+def listed(line: str) -> str:
+    """A line with a list in brackets, an entry a line."""
+    begin, entries = line.split("[", 1)
+    inner = "".join(f"        {entry},\n" for entry in entries.rstrip("],\n").split(", "))
+    return f"{begin}[\n{inner}    ],\n"
+
+
+def function_stub(name: str) -> str:
+    """The stub of a family."""
+    module = file_of(name)
+    return f'{head(name, arguments(module))}\n    """{module.SUMMARY.replace(chr(34), chr(39))}."""\n'
+
+
+def topology_stub() -> str:
+    """What `topology` takes, by the name of the family; the last form is for files and installed families."""
+    takes: dict[tuple[str, ...], list[str]] = {}
+    for name in shipped():
+        takes.setdefault(arguments(file_of(name)), []).append(f'"{name}"')
+    overloads = [
+        "@overload\n" + head("topology", (f"name: Literal[{', '.join(names)}]", *given)) + " ...\n"
+        for given, names in sorted(takes.items(), key=lambda each: each[1])
+    ]
+    return "".join([*overloads, "@overload\ndef topology(name: str, n: int, **options: object) -> Topology: ...\n"])
 
 
 def models_stub() -> str:
-    homes = sorted((home, name) for name, home in models._HOMES.items())
+    homes = sorted((home, name) for name, home in models._HOMES.items() if name != "topology")
     lines = [f"from .{home} import {name} as {name}" for home, name in homes]
-    stubs = [function_stub(name, load(families.TOPOLOGY, name)) for name in shipped()]
+    stubs = topology_stub() + "\n".join(map(function_stub, shipped()))
     head = "# What `__init__.py` loads on first use; tests/test_front.py writes it with --update.\n"
-    return f"{head}from collections.abc import Iterable\n\n" + "\n".join(lines) + "\n\n" + "\n".join(stubs)
+    needed = "from collections.abc import Iterable\nfrom typing import Literal, overload\n\n"
+    return f"{head}{needed}" + "\n".join(lines) + "\n\n" + stubs
 
 
 def front_stub() -> str:
@@ -103,6 +152,43 @@ def test_the_front_offers_every_name_of_both_packages_once() -> None:
     assert synchain.__version__ == importlib.import_module("importlib.metadata").version("synchain")
     with pytest.raises(AttributeError, match="module 'synchain' has no attribute 'chian'"):
         _ = synchain.chian
+
+
+EDITED = """
+from synchain import circulant, gnp_random, msf, path, run, topology
+from synchain.models import Scene, chain
+
+path(4)
+gnp_random(6, p="1/3", seed=2)
+topology("circulant", 6, offsets=(1, 3))
+topology("own.py", 6, whatever=2)
+circulant(6, offset=(1, 3))  # wrong
+path(4, seed=1)  # wrong
+msf(Scene(), [0.0, 1.0], seed="a")  # wrong
+run(Scene(), parameters={"omega": 1.2}, executer=3, workers="two")  # wrong
+reveal_type(topology("grid", 6, shape=(2, 3)))
+"""
+"""What a user writes in an editor; lines that an editor marks are marked."""
+
+
+@pytest.mark.long
+def test_a_type_checker_sees_what_an_editor_completes(tmp_path: Path) -> None:
+    pytest.importorskip("mypy")
+    file = tmp_path / "edited.py"
+    file.write_text(EDITED)
+    known = tmp_path / "known" / "synchain"
+    known.mkdir(parents=True)
+    for room in ("models", "codegen", "runtime"):
+        (known / room).symlink_to(ROOT / room)
+    for part in ("__init__.py", "__init__.pyi"):
+        (known / part).symlink_to(ROOT / "runtime" / "front" / part)
+    words = [sys.executable, "-m", "mypy", "--follow-imports=silent", "--cache-dir", str(tmp_path / "mypy"), str(file)]
+    paths = {**os.environ, "MYPYPATH": str(tmp_path / "known")}
+    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, env=paths, timeout=600)
+    found = {int(line.split(":")[1]) for line in done.stdout.splitlines() if ": error:" in line}
+    wrong = {k for k, line in enumerate(EDITED.splitlines(), 1) if line.endswith("# wrong")}
+    assert found == wrong, done.stdout
+    assert 'Revealed type is "synchain.models.graphs.topology.Topology"' in done.stdout
 
 
 @pytest.mark.parametrize("name", shipped())

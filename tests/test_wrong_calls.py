@@ -19,7 +19,7 @@ from synchain.models.scenes.energy import energy
 from synchain.models.scenes.scene import Scene
 from synchain.models.scenes.section import Section
 from synchain.models.spectra.spectrum import Spectrum
-from synchain.runtime.cells.keywords import with_axes
+from synchain.runtime.cells.keywords import Given
 from synchain.runtime.results.energy import energy_function
 from synchain.runtime.support.threads import worker_count
 from synchain.runtime.synchronisation.agreement import agreement
@@ -124,11 +124,17 @@ CALLS = [
     (lambda: runtime.run(PAIR, sgima=2), "'sgima' of run.*did you mean 'sigma'"),
     (lambda: runtime.stream(PAIR, "a.nc", overwrit=True), "'overwrit' of stream.*did you mean 'overwrite'"),
     (lambda: runtime.thresholds(PAIR, resolutoin=1), "'resolutoin' of thresholds.*did you mean 'resolution'"),
-    (lambda: runtime.thresholds(PAIR, record=()), "unknown parameter or keyword 'record' of thresholds"),
+    (
+        lambda: runtime.thresholds(PAIR, record=()),
+        r"thresholds: 'record' is a field of the scene.*write scene\.replace\(record=…\)",
+    ),
     (lambda: runtime.exponents(PAIR, 0.1, perods=5), "'perods' of exponents.*did you mean 'periods'"),
-    (lambda: runtime.exponents(PAIR, 0.1, atol=5), "unknown parameter or keyword 'atol' of exponents"),
-    (lambda: runtime.msf(PAIR, [0, 1], perods=5), "did you mean 'periods'"),
-    (lambda: runtime.plane(PAIR, [0, 1], [0, 1], perods=5), "did you mean 'periods'"),
+    (
+        lambda: runtime.exponents(PAIR, 0.1, atol=5),
+        r"exponents: 'atol' is a field of the scene; expected parameters; write scene\.replace\(atol=…\)",
+    ),
+    (lambda: runtime.msf(PAIR, [0, 1], perods=5), "'perods' of msf.*did you mean 'periods'"),
+    (lambda: runtime.plane(PAIR, [0, 1], [0, 1], perods=5), "'perods' of plane.*did you mean 'periods'"),
     (lambda: runtime.lyapunov_spectrum(PAIR, cuont=5), "'cuont' of lyapunov_spectrum.*did you mean 'count'"),
     (lambda: runtime.cluster_exponents(PAIR, [0, 0], perods=5), "of cluster_exponents.*did you mean 'periods'"),
     (lambda: agreement(PAIR, [0.1], criterium=3), "'criterium' of agreement.*did you mean 'criterion'"),
@@ -197,7 +203,7 @@ def test_a_wrong_argument_is_refused_in_one_line(call, words, monkeypatch, tmp_p
 
 def test_what_is_right_is_taken():
     """Numbers of other types, and what only looks wrong."""
-    assert with_axes(runtime.run, PAIR, {"sigma": range(2), "x_1": "sqrt(4)"}).axes[0].values == (0.0, 1.0)
+    assert Given(runtime.run, {"sigma": range(2), "x_1": "sqrt(4)"}).sweep(PAIR).axes[0].values == (0.0, 1.0)
     assert worker_count(np.int64(2)) == 2
     assert models.from_edges([[0, 1], (1, 2, "1/2"), np.array([2, 3])]).n == 4
     assert clusters(star(5), "hpppp").quotient.n == 2

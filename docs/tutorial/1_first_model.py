@@ -46,12 +46,12 @@ print("parameters:", scene.parameters)
 # %%
 # A run
 # -----
-# ``sigma`` is the stiffness of the springs.  A number sets a parameter, or a setting of the scene:
-# here, nothing is waited for, and twelve periods of the drive are recorded.  The first run compiles
-# a kernel, in some seconds; every later one finds it in a cache.
+# ``sigma`` is the stiffness of the springs.  A number sets a parameter; what else a scene says is
+# changed by ``replace``: here, nothing is waited for, and twelve periods of the drive are recorded.
+# The first run compiles a kernel, in some seconds; every later one finds it in a cache.
 import matplotlib.pyplot as plt
 
-result = sc.run(scene, sigma=0.05, transient=0, window=12)
+result = sc.run(scene.replace(transient=0, window=12), sigma=0.05)
 print(result.message)
 
 _, axes = plt.subplots(figsize=(7, 3), layout="constrained")
@@ -66,7 +66,8 @@ plt.show()
 # distance of the oscillators from each other, once the transient is over.
 import numpy as np
 
-sweep = sc.run(scene, sigma=np.linspace(0, 0.03, 31), u=[0.0, 0.5], transient=100, window=20)
+settled = scene.replace(transient=100, window=20)
+sweep = sc.run(settled, sigma=np.linspace(0, 0.03, 31), u=[0.0, 0.5])
 print(sweep.message)
 
 _, axes = plt.subplots(figsize=(7, 3), layout="constrained")

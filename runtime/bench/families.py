@@ -27,7 +27,7 @@ from synchain.models.scenes.scene import Scene
 from ..prediction.families import CLOSED, LargestNetwork, largest_network
 from ..prediction.synchronisability import Verdict, verdict
 from ..stability.msf import MSF, msf
-from ..sweeps.pool import Execution
+from ..support.execution import Execution
 from ..synchronisation.threshold import Criterion, simulate
 from .kit.tables import markdown
 

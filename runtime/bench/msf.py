@@ -33,6 +33,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
 from ..cells.kernels import kernel
+from ..cells.keywords import Given
 from ..cells.plan import control_array, plan, tolerances
 from ..stability.averages import Batches
 from ..stability.exponents import coupled_cell, exponents
@@ -174,7 +175,7 @@ def _span(values: Sequence[float] | np.ndarray) -> str:
 
 def _settled(omega: float, values: np.ndarray) -> Orbits:
     """One orbit with its modes, behind the transient."""
-    scene = coupled_cell(exponents, Scene(topology=topology("chain", 2), record=()), RTOL, {"omega": omega})
+    scene = coupled_cell(Given(exponents, {"omega": omega}), Scene(topology=topology("chain", 2), record=()), RTOL)
     start = np.array([[numbers[0] for numbers in scene.initial.values()]])
     orbits = Orbits.make(scene, values, start, workers=1)
     orbits.settle(SETTLED)
@@ -243,7 +244,7 @@ def _own_rows(case: Case, quick: bool) -> list[Row]:
 
 
 def _own_row(case: Case, values: Sequence[float] | np.ndarray, quick: bool) -> Row:
-    options = {"transient": SETTLED, "starts": 1, "rtol": RTOL, "workers": 1}
+    options = {"transient": SETTLED, "starts": 1, "rtol": RTOL, "workers": 1, "show_progress": False}
     exponents(case.scene, values, precision=1.0, periods=64, **options)  # type: ignore[arg-type]  # compiles
     found = []
     for scene in _starts(case, quick):

@@ -146,7 +146,7 @@ def _birth(arc: Arc, beyond: float) -> Bifurcation | None:
         middle = 0.5 * (last.state + strobe(last.scene, last.state, half)[0])
         single = Arc(arc.scene, arc.name, half)
         for value in (arc.values[-1], beyond):
-            orbit = periodic_orbit(arc.scene, half, middle, **{arc.name: value})
+            orbit = periodic_orbit(arc.scene, half, middle, parameters={arc.name: value})
             middle = orbit.state
             single.take(value, orbit, orbit.phases)
         crossings = _crossings(single, (single.values[0], beyond), (single.orbits[0], single.orbits[1]))

@@ -10,7 +10,7 @@ at the landing passes the limit of static friction.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 
@@ -20,13 +20,16 @@ import xarray as xr
 from synchain.models.inputs.checks import check_instance, short_repr
 from synchain.models.scenes.scene import Scene
 
+from ..cells.keywords import Given
 from ..results.labelled import Labelled, dataset, ends_of
+from ..support.execution import Execution
+from ..support.progress import Hook
 from .bifurcations import Bifurcation, bifurcations_at_end, bifurcations_between
 from .continuation import Arc
-from .periodic import PeriodicOrbit, periodic_orbit
+from .periodic import NEWTON, PeriodicOrbit, periodic_orbit
 from .phases import Phases
 
-__all__ = ["Branch", "checked_values", "follow"]
+__all__ = ["Branch", "checked_values", "follow", "others", "traced"]
 
 SHORTEST = 1.0 / 32.0
 """Shortest piece of a step, relative to the step, before the branch ends.
@@ -102,7 +105,17 @@ class Branch(Labelled):
         )
 
 
-def follow(scene: Scene, name: str, values: Sequence[float] | np.ndarray, first: PeriodicOrbit) -> Branch:
+def follow(
+    scene: Scene,
+    name: str,
+    values: Sequence[float] | np.ndarray,
+    first: PeriodicOrbit,
+    *,
+    show_progress: bool | None = None,
+    progress: Hook | None = None,
+    parameters: Mapping[str, float] | None = None,
+    **more: float,
+) -> Branch:
     """Follow a periodic orbit along a parameter and locate its bifurcations.
 
     Parameters
@@ -115,6 +128,14 @@ def follow(scene: Scene, name: str, values: Sequence[float] | np.ndarray, first:
         Monotonic values of the parameter.
     first : PeriodicOrbit
         Orbit at or near values[0].
+    show_progress : bool, optional
+        Whether to show a bar; by default a bar on terminals and a line a minute elsewhere.
+    progress : callable, optional
+        Is called with a `Progress`, which counts values of the parameter.
+    parameters : mapping of str to float, optional
+        Other parameters of the scene to set, for names that are keywords already.
+    **more : float
+        Other parameters of the scene to set.
 
     Returns
     -------
@@ -131,19 +152,42 @@ def follow(scene: Scene, name: str, values: Sequence[float] | np.ndarray, first:
     """
     check_instance("first", first, PeriodicOrbit, "a PeriodicOrbit, such as periodic_orbit(scene) returns")
     wanted = checked_values(first.scene, name, values)
+    scene = others(Given(follow, parameters, more, NEWTON), scene, name)
+    with Execution(1, None, show_progress, progress).reporter(len(wanted), "value") as reporter:
+        return traced(scene, name, reporter.each(wanted), first)
+
+
+def others(given: Given, scene: Scene, name: str) -> Scene:
+    """Return a scene with parameters beside the one that is swept.
+
+    Raises
+    ------
+    ValueError
+        If the swept one is among them.
+    """
+    if name in given.values:
+        raise ValueError(f"{given.function.__name__}: {name!r} takes its values one after the other; expected others")
+    return given.scene(scene)
+
+
+def traced(scene: Scene, name: str, values: Iterable[float], first: PeriodicOrbit) -> Branch:
+    """Follow a periodic orbit along checked values of a parameter, as `follow` does."""
     tracer = BranchTracer(Arc(scene, name, first.periods))
-    start = periodic_orbit(scene, first.periods, first.state, **{name: wanted[0]})
-    orbits = [tracer.take(wanted[0], start, start.phases)]
-    for value in wanted[1:]:
-        orbit = tracer.on(value)
+    orbits: dict[float, PeriodicOrbit] = {}
+    for value in values:
+        if orbits:
+            orbit = tracer.on(value)
+        else:
+            start = periodic_orbit(scene, first.periods, first.state, parameters={name: value})
+            orbit = tracer.take(value, start, start.phases)
         if orbit is None:
             break
-        orbits.append(orbit)
-    phases = [tracer.phases[value] for value in wanted[: len(orbits)]]
+        orbits[value] = orbit
+    phases = [tracer.phases[value] for value in orbits]
     return Branch(
         name,
-        np.array(wanted[: len(orbits)]),
-        tuple(orbits),
+        np.array(list(orbits)),
+        tuple(orbits.values()),
         tuple(tracer.bifurcations),
         tuple(each for each in phases if each is not None),
     )

@@ -112,7 +112,7 @@ class Arc:
         ArithmeticError
             If Newton's method does not find it.
         """
-        return periodic_orbit(self.scene, self.periods, self.guess(value), **{self.name: value})
+        return periodic_orbit(self.scene, self.periods, self.guess(value), parameters={self.name: value})
 
 
 def find_fold(arc: Arc, beyond: float) -> tuple[float, PeriodicOrbit] | None:
@@ -179,7 +179,7 @@ class ArclengthStep:
 
     def orbit(self, point: np.ndarray) -> PeriodicOrbit:
         """Return the periodic orbit at a point."""
-        return orbit_through(self.arc.scene, self.arc.periods, point[:-1], **{self.arc.name: float(point[-1])})
+        return orbit_through(self.arc.scene, self.arc.periods, point[:-1], {self.arc.name: float(point[-1])})
 
     def side(self, point: np.ndarray) -> float:
         """Return det(M - 1) of the monodromy matrix M at a point: zero at a fold."""
@@ -231,7 +231,7 @@ class ArclengthStep:
 
     def _image(self, state: np.ndarray, value: float) -> tuple[np.ndarray, np.ndarray]:
         """The state some periods later, and its derivative by the state."""
-        image, matrix = strobe(self.arc.scene, state, self.arc.periods, **{self.arc.name: value})
+        image, matrix = strobe(self.arc.scene, state, self.arc.periods, {self.arc.name: value})
         return image[: len(state)], matrix
 
     def _slope(self, point: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ for orbits with stick, Leine & Nijmeijer, Dynamics and Bifurcations of Non-Smoot
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Integral, Real
 
@@ -24,16 +24,33 @@ from synchain.models.inputs.checks import short_repr
 from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene
 
+from ..cells.keywords import Given
 from ..results.labelled import Labelled, dataset
 from ..stability.attractor import cycle_propagators
 from ..stability.exponents import coupled_cell, single_cell
 from ..stability.orbits import Orbits, unit_of_time
 from .phases import Phases, phases_of
 
-__all__ = ["SAME", "PeriodicOrbit", "check_periods", "orbit_through", "periodic_orbit", "stability_end", "strobe"]
+__all__ = [
+    "NEWTON",
+    "SAME",
+    "PeriodicOrbit",
+    "check_periods",
+    "orbit_through",
+    "periodic_orbit",
+    "stability_end",
+    "strobe",
+]
 
 TOLERANCE = 1e-12
 """Relative tolerance of the integration."""
+
+NEWTON = {
+    "rtol": f"orbits are integrated with rtol = {TOLERANCE:g}, on which the comparison of orbits rests",
+    "workers": "each step of Newton's method needs the one before",
+    "executor": "each step of Newton's method needs the one before",
+}
+"""What functions of periodic orbits do not take, and why."""
 
 SAME = 1e-7
 """Largest distance of two orbits that count as one."""
@@ -145,7 +162,12 @@ class PeriodicOrbit(Labelled):
 
 
 def periodic_orbit(
-    scene: Scene, periods: int = 1, start: Sequence[float] | np.ndarray | None = None, **parameters: float
+    scene: Scene,
+    periods: int = 1,
+    start: Sequence[float] | np.ndarray | None = None,
+    *,
+    parameters: Mapping[str, float] | None = None,
+    **more: float,
 ) -> PeriodicOrbit:
     """Find a periodic orbit of a scene's oscillator.
 
@@ -157,7 +179,9 @@ def periodic_orbit(
         Number of drive periods after which the orbit repeats itself.
     start : array_like, shape (components,), optional
         Start of Newton's method; by default the scene's initial state after its transient.
-    **parameters : float
+    parameters : mapping of str to float, optional
+        Parameters of the scene to set, for names that are keywords already.
+    **more : float
         Parameters of the scene to set.
 
     Returns
@@ -172,7 +196,8 @@ def periodic_orbit(
     ArithmeticError
         If Newton's method does not converge.
     """
-    scene = _driven(periodic_orbit, scene, parameters)
+    few = {name: "a few steps of Newton's method are soon done" for name in ("show_progress", "progress")}
+    scene = _driven(Given(periodic_orbit, parameters, more, {**NEWTON, **few}), scene)
     check_periods(periods)
     state = _settled(scene) if start is None else _state(scene, start)
     best, steps, kept = np.inf, 0, state
@@ -212,7 +237,7 @@ def check_periods(periods: object) -> None:
         raise ValueError(f"periods = {short_repr(periods)}; expected a whole number, at least 1, at most {LONGEST}")
 
 
-def orbit_through(scene: Scene, periods: int, state: np.ndarray, **parameters: float) -> PeriodicOrbit:
+def orbit_through(scene: Scene, periods: int, state: np.ndarray, parameters: Mapping[str, float]) -> PeriodicOrbit:
     """Return the orbit through a state that is known to return to itself.
 
     Parameters
@@ -223,7 +248,7 @@ def orbit_through(scene: Scene, periods: int, state: np.ndarray, **parameters: f
         Number of drive periods.
     state : ndarray, shape (components,)
         State at the beginning of a period of the drive.
-    **parameters : float
+    parameters : mapping of str to float
         Parameters of the scene to set.
 
     Returns
@@ -231,12 +256,14 @@ def orbit_through(scene: Scene, periods: int, state: np.ndarray, **parameters: f
     PeriodicOrbit
         Its residual says how well the state returns.
     """
-    scene = _driven(orbit_through, scene, parameters)
+    scene = _driven(Given(orbit_through, parameters), scene)
     image, matrix = _strobe(scene, state, periods, 0.0)
     return PeriodicOrbit(scene, periods, state, _sorted(matrix), float(np.abs(image[: len(state)] - state).max()), 0)
 
 
-def strobe(scene: Scene, state: np.ndarray, periods: int, **parameters: float) -> tuple[np.ndarray, np.ndarray]:
+def strobe(
+    scene: Scene, state: np.ndarray, periods: int, parameters: Mapping[str, float] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Evaluate the stroboscopic map and its derivative.
 
     Parameters
@@ -247,7 +274,7 @@ def strobe(scene: Scene, state: np.ndarray, periods: int, **parameters: float) -
         State at the beginning of a period of the drive.
     periods : int
         Number of drive periods.
-    **parameters : float
+    parameters : mapping of str to float, optional
         Parameters of the scene to set.
 
     Returns
@@ -257,19 +284,19 @@ def strobe(scene: Scene, state: np.ndarray, periods: int, **parameters: float) -
     matrix : ndarray, shape (components, components)
         Derivative of `image` by `state`.
     """
-    image, matrix = _strobe(_driven(strobe, scene, parameters), state, periods, 0.0)
+    image, matrix = _strobe(_driven(Given(strobe, parameters), scene), state, periods, 0.0)
     return image[: len(state)], matrix
 
 
-def _driven(function: Callable[..., object], scene: Scene, parameters: dict[str, float]) -> Scene:
+def _driven(given: Given, scene: Scene) -> Scene:
     """Scene with its parameters at the tolerance of orbits; ValueError if it has no drive."""
-    scene = single_cell(function, scene, TOLERANCE, parameters)
+    scene = single_cell(given, scene, TOLERANCE)
     unit_of_time(scene)
     if not scene.period:
         raise ValueError(
             "periodic orbits are looked for on the stroboscopic map of a drive; found an oscillator without one"
         )
-    return coupled_cell(function, scene, TOLERANCE, {})
+    return coupled_cell(Given(given.function), scene, TOLERANCE)
 
 
 def _settled(scene: Scene) -> np.ndarray:

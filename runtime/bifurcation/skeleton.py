@@ -9,23 +9,25 @@ Source: Auerbach, Cvitanovic, Eckmann, Gunaratne & Procaccia, Phys. Rev. Lett. 5
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Integral
 
 import numpy as np
 import xarray as xr
-from tqdm import tqdm
 
-from synchain.models.inputs.checks import short_repr
+from synchain.models.inputs.checks import check_integer, check_number, short_repr
 from synchain.models.scenes.scene import Scene, a_scene
 
+from ..cells.keywords import Given, with_numbers
 from ..results.labelled import Labelled, dataset
 from ..stability.exponents import coupled_cell, initial_states
 from ..stability.orbits import Orbits
+from ..support.execution import Execution
+from ..support.progress import Hook
 from .bifurcations import BifurcationKind
-from .branches import Branch, checked_values, follow
-from .periodic import SAME, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit
+from .branches import Branch, checked_values, others, traced
+from .periodic import NEWTON, SAME, TOLERANCE, PeriodicOrbit, check_periods, periodic_orbit
 
 __all__ = ["Skeleton", "near_returns", "skeleton"]
 
@@ -106,7 +108,12 @@ def skeleton(
     periods: Sequence[int] = (1, 2),
     looks: int = 8,
     *,
-    show_progress: bool | None = False,
+    transient: float = DROPPED,
+    seed: int = 0,
+    show_progress: bool | None = None,
+    progress: Hook | None = None,
+    parameters: Mapping[str, float] | None = None,
+    **more: float,
 ) -> Skeleton:
     """Find the skeleton of a bifurcation diagram.
 
@@ -126,8 +133,18 @@ def skeleton(
         Numbers of drive periods of the orbits.
     looks : int
         Number of values at which orbits are searched.
-    show_progress : bool or None
-        Whether to show a progress bar; None shows it on terminals only.
+    transient : float
+        Drive periods before the search.
+    seed : int
+        Seed of the initial states of the search.
+    show_progress : bool, optional
+        Whether to show a bar; by default a bar on terminals and a line a minute elsewhere.
+    progress : callable, optional
+        Is called with a `Progress`, which counts the values at which orbits are searched.
+    parameters : mapping of str to float, optional
+        Other parameters of the scene to set, for names that are keywords already.
+    **more : float
+        Other parameters of the scene to set.
 
     Returns
     -------
@@ -142,7 +159,7 @@ def skeleton(
     grid = sorted(checked_values(a_scene(scene), name, values))
     if isinstance(periods, Integral | str) or len(periods) == 0:
         raise ValueError(f"periods = {short_repr(periods)}; expected numbers of drive periods, e.g. (1, 2)")
-    scene = coupled_cell(skeleton, scene, TOLERANCE, {})
+    scene = coupled_cell(Given(skeleton), others(Given(skeleton, parameters, more, NEWTON), scene, name), TOLERANCE)
     if not isinstance(looks, Integral) or looks < 1:
         raise ValueError(f"looks = {short_repr(looks)}; expected a whole number, at least 1")
     for each in periods:
@@ -159,14 +176,17 @@ def skeleton(
 
     count = min(looks, len(grid))
     places = sorted({int((2 * j + 1) * len(grid) / (2 * count)) for j in range(count)})
-    hidden = None if show_progress is None else not show_progress
-    for k in tqdm(places, unit="value", disable=hidden):
-        for orbit in near_returns(scene, periods, **{name: grid[k]}):
-            take(k, orbit)
+    transient, seed = check_number("transient", transient, 0.0), check_integer("seed", seed, 0)
+    with Execution(1, None, show_progress, progress).reporter(len(places), "value") as reporter:
+        for k in reporter.each(places):
+            for orbit in near_returns(with_numbers(scene, {name: grid[k]}), periods, transient, seed):
+                take(k, orbit)
     return Skeleton(tuple(sorted(branches, key=lambda branch: (branch.orbits[0].periods, branch.values[0]))))
 
 
-def near_returns(scene: Scene, periods: Sequence[int], **parameters: float) -> list[PeriodicOrbit]:
+def near_returns(
+    scene: Scene, periods: Sequence[int], transient: float = DROPPED, seed: int = 0
+) -> list[PeriodicOrbit]:
     """Find the periodic orbits to which motions from several starts nearly return.
 
     Parameters
@@ -175,16 +195,17 @@ def near_returns(scene: Scene, periods: Sequence[int], **parameters: float) -> l
         Source of the driven oscillator.
     periods : sequence of int
         Numbers of drive periods of the orbits.
-    **parameters : float
-        Parameters of the scene to set.
+    transient : float
+        Drive periods before the search.
+    seed : int
+        Seed of the initial states.
 
     Returns
     -------
     list of PeriodicOrbit
         Each orbit once.
     """
-    scene = coupled_cell(near_returns, scene, TOLERANCE, parameters)
-    path = _path(scene)
+    path = _path(scene, transient, seed)
     orbits: list[PeriodicOrbit] = []
     for count in periods:
         for start in _returning(path, count):
@@ -198,11 +219,11 @@ def near_returns(scene: Scene, periods: Sequence[int], **parameters: float) -> l
     return orbits
 
 
-def _path(scene: Scene) -> np.ndarray:
+def _path(scene: Scene, transient: float, seed: int) -> np.ndarray:
     """States (LENGTH + 1, starts, components) at the beginning of each period of the drive."""
     loose = scene.replace(rtol=1e-8)
-    orbits = Orbits.make(loose, np.zeros(1), initial_states(loose, STARTS, 0), 1)
-    orbits.settle(DROPPED)
+    orbits = Orbits.make(loose, np.zeros(1), initial_states(loose, STARTS, seed), 1)
+    orbits.settle(transient)
     integrator = orbits.integrator_of(orbits.strengths)
     states = [integrator.state]
     for _ in range(LENGTH):
@@ -238,7 +259,7 @@ def _passes(branch: Branch, value: float, orbit: PeriodicOrbit) -> bool:
 
 def _both_ways(scene: Scene, name: str, grid: list[float], k: int, orbit: PeriodicOrbit) -> Branch:
     """Branch through an orbit at grid[k], in one piece."""
-    up, down = (follow(scene, name, part, orbit) for part in (grid[k:], grid[k::-1]))
+    up, down = (traced(scene, name, part, orbit) for part in (grid[k:], grid[k::-1]))
     return Branch(
         name,
         np.concatenate([down.values[:0:-1], up.values]),
@@ -266,8 +287,8 @@ def _other_sheets(scene: Scene, branch: Branch) -> list[tuple[float, PeriodicOrb
             way = [fold + 4.0**-j * (end - fold) for j in range(NEARER, -1, -1)]
             try:
                 start = turn.orbit.state - 2.0**-NEARER * (last.state - turn.orbit.state)
-                first = periodic_orbit(scene, last.periods, start, **{branch.name: way[0]})
-                sheet = follow(scene, branch.name, way, first)
+                first = periodic_orbit(scene, last.periods, start, parameters={branch.name: way[0]})
+                sheet = traced(scene, branch.name, way, first)
             except ArithmeticError:
                 continue
             sheets += [(end, sheet.orbits[-1])] if len(sheet.orbits) == len(way) else []

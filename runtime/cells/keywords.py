@@ -1,96 +1,132 @@
-"""Keywords of functions that take parameters of a scene beside keywords of their own: run(scene,
-workers=2, omega=1.2).
+"""Parameters of a scene that a public function takes beside keywords of its own: as keywords,
+run(scene, workers=2, omega=1.2), or as a mapping, run(scene, parameters={"omega": 1.2}).
 """
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 
-from synchain.models.inputs.checks import check_number, suggestion
+from synchain.models.inputs.checks import check_number, check_table, check_text, suggestion
 from synchain.models.inputs.node_name import NodeName
+from synchain.models.scenes.parameters import without
 from synchain.models.scenes.scene import KEYWORDS, Scene, a_scene
 
-__all__ = ["check_keywords", "with_axes", "with_parameters"]
+__all__ = ["ONE_ORBIT", "ORBITS", "Given", "with_numbers"]
+
+ORBITS = {"executor": "its orbits advance on threads of this process, as many as `workers` says"}
+"""What functions that advance several orbits at once do not take, and why."""
+
+ONE_ORBIT = {name: "it advances one orbit, step after step, on one thread" for name in ("workers", "executor")}
+"""What functions that advance a single orbit do not take, and why."""
 
 
-def with_axes(function: Callable[..., object], scene: Scene, axes: Mapping[str, object]) -> Scene:
-    """Return a scene with parameters and initial states fixed or swept.
+@dataclass(frozen=True, slots=True)
+class Given:
+    """Parameters of a scene as the caller of a public function gave them.
 
     Parameters
     ----------
     function : callable
-        The function whose keywords they are; an error names it.
-    scene : Scene
-    axes : mapping of str to number or sequence
-        A number fixes a parameter, a setting or an initial state; a sequence makes an axis of it,
-        after those of the scene.
-
-    Raises
-    ------
-    ValueError
-        If a name is no parameter, setting or initial state.
+        The function; errors name it and know its keywords.
+    table : mapping, optional
+        What was given as `parameters`.
+    keywords : mapping
+        What was given as further keywords.
+    refused : mapping of str to str
+        Keywords of other functions that this one does not take, and why.
     """
-    fixed: dict[str, object] = {}
-    swept: dict[str, object] = {axis.name: axis.values for axis in a_scene(scene).axes}
-    start = {name: list(values) for name, values in scene.initial.items()}
-    for name, value in axes.items():
-        if (
-            isinstance(value, Iterable)
-            and not isinstance(value, str | bytes)
-            and not (isinstance(value, Mapping) and name in KEYWORDS)
-            and getattr(value, "ndim", 1) > 0
-        ):
-            swept[name] = value
-        elif state := _state(scene, name):
-            start[state.base][scene.equations.holders(state.base).index(state.index)] = check_number(name, value)
+
+    function: Callable[..., object]
+    table: Mapping[str, object] | None = None
+    keywords: Mapping[str, object] = field(default_factory=dict)
+    refused: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def values(self) -> dict[str, object]:
+        """All names with their values; ValueError for a name that is given twice."""
+        table = {} if self.table is None else check_table("parameters", self.table)
+        twice = next((name for name in table if name in self.keywords), None)
+        if twice is not None:
+            raise ValueError(
+                f"{self.function.__name__}: found {twice!r} in `parameters` and as a keyword; expected it once"
+            )
+        return {check_text("parameters", name): value for name, value in (*table.items(), *self.keywords.items())}
+
+    def scene(self, scene: Scene, **settings: object) -> Scene:
+        """Return a scene with these parameters and with settings that the function needs.
+
+        Raises
+        ------
+        TypeError
+            If `scene` is no Scene.
+        ValueError
+            If a name is no parameter of the scene, or is given twice.
+        """
+        return with_numbers(scene, self._checked(a_scene(scene)), **settings)
+
+    def sweep(self, scene: Scene, **settings: object) -> Scene:
+        """Return a scene with parameters and initial states fixed, by a number, or swept, by a
+        sequence, which makes an axis after those of the scene, and with those settings that are
+        not None.
+
+        Raises
+        ------
+        TypeError
+            If `scene` is no Scene.
+        ValueError
+            If a name is neither a parameter nor an initial state, or is given twice.
+        """
+        fixed: dict[str, object] = {}
+        swept: dict[str, object] = {axis.name: axis.values for axis in a_scene(scene).axes}
+        start = {name: list(values) for name, values in scene.initial.items()}
+        given = self._checked(scene, states=True)
+        for name, value in given.items():
+            if isinstance(value, Iterable) and not isinstance(value, str | bytes) and getattr(value, "ndim", 1) > 0:
+                swept[name] = value
+                continue
+            if state := _state(scene, name):
+                start[state.base][scene.equations.holders(state.base).index(state.index)] = check_number(name, value)
+            else:
+                fixed[name] = value
             swept.pop(name, None)
-        else:
-            fixed[name] = value
-            swept.pop(name, None)
-    check_keywords(function, scene, fixed, states=True)
-    return scene.replace(axes=swept, initial=start, **fixed) if axes else scene
+        settings = {name: value for name, value in settings.items() if value is not None}
+        if given:
+            settings |= {"axes": swept, "initial": start}
+        return with_numbers(scene, fixed, **settings)
 
+    def _checked(self, scene: Scene, states: bool = False) -> dict[str, object]:
+        """The values; ValueError for an unknown name; with `states`, initial states are known too."""
+        values = self.values
+        for name in values:
+            if not (scene.takes(name) or (states and _state(scene, name))):
+                raise ValueError(self._refusal(scene, name, states))
+        return values
 
-def with_parameters(
-    function: Callable[..., object], scene: Scene, parameters: Mapping[str, object], **settings: object
-) -> Scene:
-    """Return the scene with the settings that a function needs and the parameters that its caller
-    passed.
-
-    Raises
-    ------
-    ValueError
-        If a name is no parameter or setting of the scene, or a setting that the function sets
-        itself.
-    """
-    check_keywords(function, a_scene(scene), parameters, taken=settings)
-    return scene.replace(**settings, **parameters)
-
-
-def check_keywords(
-    function: Callable[..., object],
-    scene: Scene,
-    names: Iterable[str],
-    *,
-    states: bool = False,
-    taken: Iterable[str] = (),
-) -> None:
-    """Raise ValueError for a name that is no parameter or setting of the scene nor, with `states`,
-    an initial state.
-
-    The function's own keywords are among the known names, since one of them may be what was meant;
-    settings that are `taken` are not.
-    """
-    settings = [name for name in KEYWORDS if name not in taken]
-    strange = next((n for n in names if not (scene.takes(n) or n in settings or (states and _state(scene, n)))), None)
-    if strange is not None:
+    def _refusal(self, scene: Scene, name: str, states: bool) -> str:
+        """Why a name is refused."""
+        of, own = self.function.__name__, _own(self.function)
+        if name in own:
+            return f"{of}: found its keyword {name!r} in `parameters`; expected parameters of the scene"
+        if name in self.refused:
+            return f"{of} takes no {name!r}: {self.refused[name]}"
+        if name in KEYWORDS:
+            return f"{of}: {name!r} is a field of the scene; expected parameters; write scene.replace({name}=…)"
         initial = scene.equations.state if states else ()
-        known = dict.fromkeys((*scene.parameters, *initial, *_own(function), *settings))
-        raise ValueError(
-            f"unknown parameter or keyword {strange!r} of {function.__name__}; known: {', '.join(known)}"
-            f"{suggestion(strange, known)}"
-        )
+        known = dict.fromkeys((*scene.parameters, *initial, *own))
+        words = suggestion(name, known) or suggestion(name, KEYWORDS)
+        return f"unknown parameter or keyword {name!r} of {of}; known: {', '.join(known)}{words}"
+
+
+def with_numbers(scene: Scene, values: Mapping[str, object], **settings: object) -> Scene:
+    """Return a scene with some parameters changed, whatever they are called, and some settings."""
+    if values:
+        known: Mapping[object, object] = scene.given["parameters"] or {}
+        numbers = without(scene.model, known, values)
+        numbers.update(values.items())
+        settings["parameters"] = numbers
+    return scene.replace(**settings) if settings else scene
 
 
 def _state(scene: Scene, name: str) -> NodeName | None:

@@ -121,7 +121,7 @@ def changed_scene(arguments: Namespace) -> Scene:
     """The scene with the changes of --set and --rtol; ValueError where they do not fit."""
     from synchain.models.scenes.file import load_scene
 
-    from ..cells.keywords import with_axes
+    from ..cells.keywords import Given
     from ..sweeps.run import run
 
     scene = load_scene(arguments.scene)
@@ -130,7 +130,9 @@ def changed_scene(arguments: Namespace) -> Scene:
         if name in changes:
             raise WrongUse(f"--set gives {name} twice; expected it once")
         changes[name] = _fitting(scene, name, value)
-    scene = with_axes(run, scene, changes)
+    settings = {name: changes[name] for name in SETTINGS if name in changes and not scene.takes(name)}
+    own = {name: value for name, value in changes.items() if name not in settings}
+    scene = Given(run, own).sweep(scene.replace(**settings))
     if changes:
         scene = scene.replace(title=f"{scene.title or arguments.scene}, changed: {', '.join(changes)}")
     return scene if arguments.rtol is None else scene.replace(rtol=arguments.rtol)

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from ..prediction.intervals import Interval
     from ..synchronisation.threshold import Criterion, Thresholds
 
-SUMMARY = "measure for which coupling a network synchronises, beside the prediction of the two-oscillator probe"
+SUMMARY = (
+    "measure for which coupling a network synchronises, beside the exponents of its modes and the two-oscillator probe"
+)
 EXAMPLES = (
     "synchain thresholds --n 4 --omega 1.15",
     "synchain thresholds --n 6 --topology star --omega 1.4 --sigma 0:0.3:121 --json",
@@ -51,7 +53,7 @@ def configure(parser: ArgumentParser) -> None:
         action="store_true",
         help=f"defaults of {QUICK['starts']} starts, {QUICK['transient']:g} periods, half the grid; ends to {COARSE:g}",
     )
-    parser.add_argument("--json", action="store_true", help="print JSON: intervals, probe, predicted, warnings")
+    parser.add_argument("--json", action="store_true", help="print JSON: intervals, probe, predicted, exponents ...")
     add_allow_code(parser)
     add_workers(parser)
 
@@ -114,6 +116,7 @@ def report(result: Thresholds, criterion: Criterion) -> str:
         (f"{scene.strength}, simulated", _written(result.direct.intervals, end)),
         (f"{scene.strength}, predicted by the probe", _written(result.predicted, min(end, reach / steepest))),
         *_wu_chua(result),
+        (f"{scene.strength}, negative exponents", _with_errors(result, min(end, reach / steepest))),
         (f"alpha = {scene.strength} |gamma|, probe", _written(result.probe.intervals, reach)),
     ]
     wide = max(len(name) for name, _ in rows)
@@ -145,6 +148,26 @@ def _wu_chua(result: Thresholds) -> list[tuple[str, str]]:
     return [(f"{result.scene.strength}, Wu-Chua conjecture", _written([(0.0, end)], float("inf")))]
 
 
+def _with_errors(result: Thresholds, end: float) -> str:
+    """The windows of the exponents with the errors of their ends, or why there are none."""
+    found = result.exponents
+    if found.absent:
+        return found.words
+    words = [
+        f"[{low:.4f}{_error(errors[0])}, {high:.4f}{_error(errors[1])}{_onwards(high, end)}]"
+        for (low, high), errors in zip(found.intervals, found.errors, strict=True)
+    ]
+    return ", ".join(words) or "none"
+
+
+def _error(error: float) -> str:
+    return f" ± {error:.1g}" if error else ""
+
+
+def _onwards(high: float, end: float) -> str:
+    return "..." if high >= end * (1 - 1e-12) else ""
+
+
 def _written(ranges: Sequence[Interval], end: float) -> str:
-    words = [f"[{low:.4f}, {high:.4f}{'...' if high >= end * (1 - 1e-12) else ''}]" for low, high in ranges]
+    words = [f"[{low:.4f}, {high:.4f}{_onwards(high, end)}]" for low, high in ranges]
     return ", ".join(words) or "none"

@@ -14,7 +14,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..prediction.intervals import Interval, scale
 from ..results.result import Result
-from ..sweeps.pool import Execution
+from ..support.execution import Execution
 from ..sweeps.run import run
 from ..synchronisation.threshold import Criterion, Sweep, probe, project, simulate
 

@@ -1,8 +1,10 @@
-"""The table of synchronous ranges: measured by simulation, predicted from the probe, published."""
+"""The table of synchronous ranges: measured by simulation, predicted from the probe, where exponents
+are negative, published.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,17 +13,37 @@ from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 
 from ..prediction.intervals import Interval, intersect
+from ..synchronisation.exponent_windows import ExponentWindows
 from . import projection
+from .exponent import curve, finite
 from .figure_runs import FigureRuns, Quality
 from .published import NOT_PERIODIC, PUBLISHED, Published, published
-from .style import BLUE, COLUMN, GREEN, ORANGE, failures
+from .style import BLACK, BLUE, COLUMN, GREEN, ORANGE, PURPLE, failures
 from .tables import Table
 
-__all__ = ["NAMES", "SIZE", "Row", "compute", "document", "draw", "joined", "nearest", "scene_of", "table"]
+__all__ = [
+    "NAMES",
+    "SIZE",
+    "Row",
+    "compute",
+    "document",
+    "draw",
+    "joined",
+    "nearest",
+    "scene_of",
+    "table",
+    "windows_of",
+]
 
 NAMES = ("thresholds",)
-SIZE = (COLUMN, 4.1)
-KINDS = (("measured", BLUE, 0.26), ("predicted", GREEN, 0.0), ("published", ORANGE, -0.26))
+SIZE = (COLUMN, 4.8)
+KINDS = (
+    ("measured", BLUE, 0.3),
+    ("predicted", GREEN, 0.1),
+    ("exponents", PURPLE, -0.1),
+    ("published", ORANGE, -0.3),
+)
+FOUND = ("measured", "predicted", "exponents")
 GAP = 0.001
 """Largest gap in sigma that is bridged, since the ends of chaotic ranges are ragged."""
 
@@ -38,6 +60,8 @@ class Row:
         Drive frequency.
     measured, predicted : tuple of Interval
         Ranges of sigma.
+    windows : ExponentWindows
+        Ranges of sigma with negative exponents.
     published : Published or None
         Published ranges.
     failed, cells : int
@@ -48,6 +72,7 @@ class Row:
     omega: float
     measured: tuple[Interval, ...]
     predicted: tuple[Interval, ...]
+    windows: ExponentWindows
     published: Published | None
     failed: int
     cells: int
@@ -56,6 +81,17 @@ class Row:
     def printed(self) -> tuple[Interval, ...]:
         """The published ranges."""
         return self.published.intervals if self.published else ()
+
+    @property
+    def exponents(self) -> tuple[Interval, ...]:
+        """The ranges with negative exponents."""
+        return self.windows.intervals
+
+    @property
+    def errors(self) -> tuple[float | None, float | None]:
+        """Standard errors of the ends of the nearest range with negative exponents."""
+        found = nearest(self.exponents, self.printed)
+        return (None, None) if found is None else self.windows.errors[self.exponents.index(found)]
 
     @property
     def remark(self) -> str:
@@ -71,6 +107,8 @@ class Row:
             words.append(f"{more} more range{'s' * (more > 1)} measured")
         if not self.measured and not self.predicted:
             words.append("none predicted, none measured")
+        if self.windows.absent:
+            words.append(f"exponents {self.windows.words}")
         if self.failed:
             words.append(failures(self.failed, self.cells))
         return "; ".join(words)
@@ -95,8 +133,14 @@ def _row(n: int, omega: float, runs: FigureRuns) -> Row:
     scene = scene_of(n, omega, runs)
     found = runs.network(scene)
     predicted = tuple(runs.predicted(scene))
+    windows = windows_of(scene, runs)
     failed = int((~np.isfinite(found.error)).sum())
-    return Row(n, omega, found.intervals, predicted, published(n, omega), failed, len(found.x))
+    return Row(n, omega, found.intervals, predicted, windows, published(n, omega), failed, len(found.x))
+
+
+def windows_of(scene: Scene, runs: FigureRuns) -> ExponentWindows:
+    """Return the windows of a network from the exponents of its oscillator, which networks share."""
+    return ExponentWindows.of(replace(curve(scene, runs), scene=scene))
 
 
 def scene_of(n: int, omega: float, runs: FigureRuns) -> Scene:
@@ -130,27 +174,25 @@ def table(data: Comparison) -> Table:
     """Return one row for each chain: nearest ranges, differences, all ranges, the criterion."""
     columns = ["n", "omega"]
     columns += [f"{kind}_{end}" for kind, _, _ in KINDS for end in ("low", "high")]
-    columns += [f"{kind}_minus_published_{end}" for kind in ("measured", "predicted") for end in ("low", "high")]
-    columns += ["all_measured", "all_predicted", "status", "remark", "resolution"]
+    columns += ["exponents_low_error", "exponents_high_error"]
+    columns += [f"{kind}_minus_published_{end}" for kind in FOUND for end in ("low", "high")]
+    columns += [*(f"all_{kind}" for kind in FOUND), "status", "remark", "resolution"]
     columns += [field.name for field in fields(data.quality.criterion)]
     criterion = [getattr(data.quality.criterion, field.name) for field in fields(data.quality.criterion)]
     rows = []
     for row in data.rows:
-        measured, predicted, printed = _ends(row)
-        differences = [
-            _difference(a, b) for found in (measured, predicted) for a, b in zip(found, printed, strict=True)
-        ]
+        *found, printed = _ends(row)
+        differences = [_difference(a, b) for ends in found for a, b in zip(ends, printed, strict=True)]
         status = f"{row.failed} of {row.cells} failed" if row.failed else "finished"
         rows.append(
             (
                 row.n,
                 row.omega,
-                *measured,
-                *predicted,
+                *(end for ends in found for end in ends),
                 *printed,
+                *row.errors,
                 *differences,
-                _listed(row.measured, 6),
-                _listed(row.predicted, 6),
+                *(_listed(getattr(row, kind), 6) for kind in FOUND),
                 status,
                 row.remark,
                 data.quality.resolution,
@@ -163,8 +205,9 @@ def table(data: Comparison) -> Table:
 def _ends(row: Row) -> tuple[tuple[float | None, float | None], ...]:
     none = (None, None)
     printed = row.printed[0] if row.printed else none
-    measured, predicted = (nearest(joined(found), row.printed) for found in (row.measured, row.predicted))
-    return measured or none, predicted or none, printed
+    gaps = {"exponents": 0.0}
+    found = (nearest(joined(getattr(row, kind), gaps.get(kind, GAP)), row.printed) for kind in FOUND)
+    return *(ends or none for ends in found), printed
 
 
 def _difference(found: float | None, printed: float | None) -> float | None:
@@ -180,14 +223,15 @@ def document(data: Comparison) -> str:
     lines = [
         "# Synchronous ranges of the coupling sigma in chains of n friction oscillators",
         "",
-        "| n | omega | measured | predicted | published | measured - published | predicted - published | remark |",
-        "|---|---|---|---|---|---|---|---|",
+        "| n | omega | measured | predicted | exponents | published | measured - published | predicted - published "
+        "| exponents - published | remark |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in data.rows:
-        measured, predicted, printed = _ends(row)
-        cells = [str(row.n), f"{row.omega:.2f}", _shown(measured), _shown(predicted), _shown(printed)]
-        for found in (measured, predicted):
-            pairs = [_difference(a, b) for a, b in zip(found, printed, strict=True)]
+        *found, printed = _ends(row)
+        cells = [str(row.n), f"{row.omega:.2f}", *map(_shown, found[:2]), _with_errors(row, found[2]), _shown(printed)]
+        for ends in found:
+            pairs = [_difference(a, b) for a, b in zip(ends, printed, strict=True)]
             cells.append(", ".join(f"{d:+.4f}" for d in pairs if d is not None) or "-")
         lines.append("| " + " | ".join([*cells, row.remark]) + " |")
     return "\n".join([*lines, "", _how(data.quality), ""])
@@ -195,6 +239,14 @@ def document(data: Comparison) -> str:
 
 def _shown(ends: tuple[float | None, float | None]) -> str:
     return "none" if None in ends else f"[{ends[0]:.4f}, {ends[1]:.4f}]"
+
+
+def _with_errors(row: Row, ends: tuple[float | None, float | None]) -> str:
+    if row.windows.absent:
+        return "not computed"
+    pairs = zip(ends, row.errors, strict=True)
+    words = [f"{end:.4f}" + (f" ± {error:.1g}" if error else "") for end, error in pairs if end is not None]
+    return f"[{', '.join(words)}]" if words else "none"
 
 
 def _how(quality: Quality) -> str:
@@ -205,13 +257,15 @@ def _how(quality: Quality) -> str:
         f"{c.tolerance:g}, over {c.window:g} drive periods after a transient of {c.transient:g}, with rtol = {c.rtol:g}. "
         f"Ends are refined to {quality.resolution:g} in sigma.\n\n"
         "Measured: direct simulation of the chain. Predicted: the two-oscillator probe's ranges of alpha, projected "
-        f"through every non-zero eigenvalue of the chain. Gaps of up to {GAP:g} within a range are bridged; where there "
-        "are several ranges, the one nearest to the published is shown. `thresholds.csv` lists all ranges as found."
+        "through every non-zero eigenvalue of the chain. Exponents: the ranges of alpha with a negative transversal "
+        "exponent, projected in the same way, with the standard errors of their ends (0 at sigma = 0); they know neither "
+        f"transient nor tolerance. Gaps of up to {GAP:g} within a measured or predicted range are bridged; where there are "
+        "several ranges, the one nearest to the published is shown. `thresholds.csv` lists all ranges as found."
     )
 
 
 def draw(axes: Axes, data: Comparison) -> Axes:
-    """Draw bars over sigma, three for each chain: measured, predicted, published."""
+    """Draw bars over sigma, one of each kind for each chain, with two standard errors of exponents."""
     rows = data.rows
     for k, row in enumerate(rows):
         for kind, color, shift in KINDS:
@@ -228,15 +282,18 @@ def draw(axes: Axes, data: Comparison) -> Axes:
                     markersize=3.6,
                     markeredgewidth=0.8,
                 )
-        if not (row.measured or row.predicted or row.printed):
-            axes.annotate("none measured, predicted or published", (0.004, len(rows) - k), fontsize=6.5, va="center")
+        for window, errors in zip(row.exponents, row.windows.errors, strict=True):
+            places, spread = [len(rows) - k - 0.1] * 2, 2 * finite(np.array(errors))
+            axes.errorbar(window, places, xerr=spread, fmt="none", ecolor=BLACK, elinewidth=0.6)
+        if not any(getattr(row, kind) for kind in (*FOUND, "printed")):
+            axes.annotate("none of any kind", (0.004, len(rows) - k), fontsize=6.5, va="center")
     for kind, color, _ in KINDS:
         axes.plot([], [], color=color, linewidth=3.0, label=kind)
     for k in range(len(rows) - 1):
         axes.axhline(len(rows) - k - 0.5, color="0.85", linewidth=0.5)
-    ends = [b for row in rows for _, b in (*row.measured, *row.predicted, *row.printed)]
+    ends = [b for row in rows for _, b in (*row.measured, *row.predicted, *row.exponents, *row.printed)]
     axes.set(xlim=(0.0, 1.08 * max(ends, default=1.0)), ylim=(0.4, len(rows) + 0.6), xlabel=r"coupling $\sigma$")
     axes.set_yticks([len(rows) - k for k in range(len(rows))], [rf"$n={r.n}$, $\omega={r.omega:.2f}$" for r in rows])
     axes.tick_params(axis="y", length=0)
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, handlelength=1.2, columnspacing=1.0)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, handlelength=1.2, columnspacing=1.0)
     return axes

@@ -24,6 +24,7 @@ from synchain.models import complement as complement
 from synchain.models import complete as complete
 from synchain.models import complete_bipartite as complete_bipartite
 from synchain.models import complete_multipartite as complete_multipartite
+from synchain.models import cycle as cycle
 from synchain.models import end as end
 from synchain.models import ends as ends
 from synchain.models import erdos_renyi as erdos_renyi
@@ -35,6 +36,8 @@ from synchain.models import from_graph as from_graph
 from synchain.models import from_matrix as from_matrix
 from synchain.models import from_sparse as from_sparse
 from synchain.models import from_symbols as from_symbols
+from synchain.models import generalized_petersen as generalized_petersen
+from synchain.models import gnp_random as gnp_random
 from synchain.models import grid as grid
 from synchain.models import hamming as hamming
 from synchain.models import hypercube as hypercube
@@ -53,7 +56,9 @@ from synchain.models import nodes as nodes
 from synchain.models import normal as normal
 from synchain.models import one_way_ring as one_way_ring
 from synchain.models import paley as paley
+from synchain.models import path as path
 from synchain.models import petersen as petersen
+from synchain.models import prism as prism
 from synchain.models import probability_option as probability_option
 from synchain.models import random_cubic as random_cubic
 from synchain.models import random_regular as random_regular
@@ -72,11 +77,14 @@ from synchain.models import tree as tree
 from synchain.models import uniform as uniform
 from synchain.models import union as union
 from synchain.models import variance as variance
+from synchain.models import watts_strogatz as watts_strogatz
 from synchain.models import weighted as weighted
 from synchain.models import wheel as wheel
 from synchain.runtime import Basin as Basin
 from synchain.runtime import Branch as Branch
 from synchain.runtime import ClusterExponents as ClusterExponents
+from synchain.runtime import Criterion as Criterion
+from synchain.runtime import ExponentWindows as ExponentWindows
 from synchain.runtime import Exponents as Exponents
 from synchain.runtime import Lyapunov as Lyapunov
 from synchain.runtime import MSF as MSF

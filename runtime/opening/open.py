@@ -40,12 +40,14 @@ def _classes() -> dict[str, type]:
     from ..stability.lyapunov import Lyapunov
     from ..stability.msf import MSF, Plane
     from ..synchronisation.basin import Basin
+    from ..synchronisation.exponent_windows import ExponentWindows
     from ..synchronisation.probe import Probe
     from ..synchronisation.threshold import Criterion, Sweep, Thresholds
 
     exponents = (ClusterExponents, Exponents, Lyapunov, MSF, Plane)
     kept = (Basin, Branch, PeriodicOrbit, Probe, Skeleton, Thresholds, *exponents)
-    parts = (Attractor, Bifurcation, BifurcationKind, Block, Clusters, Criterion, Motion, Phases, Sweep)
+    motions = (Attractor, Bifurcation, BifurcationKind, Block, Clusters, Motion, Phases)
+    parts = (*motions, Criterion, ExponentWindows, Sweep)
     return {kind.__name__: kind for kind in (*kept, *parts)}
 
 

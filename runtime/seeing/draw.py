@@ -94,14 +94,20 @@ def _(value: Exponents, axes: Axes) -> Axes:
 
 @_draw.register
 def _(value: Thresholds, axes: Axes) -> Axes:
-    """Share of synchronous starts over sigma; grey: at least half, bar: the probe's prediction."""
+    """Share of synchronous starts over sigma; grey: at least half; bars: the probe's prediction,
+    and where exponents are negative, with two standard errors.
+    """
     bands(axes, value.direct.intervals)
     axes.plot(value.direct.x, value.direct.share, color=BLUE, drawstyle="steps-mid", label="simulated")
     for k, (low, high) in enumerate(value.predicted):
         axes.plot([low, high], [1.06, 1.06], color=ORANGE, marker="|", label="" if k else "predicted by the probe")
-    axes.set(xlabel=symbol("sigma"), ylabel="share of synchronous starts", ylim=(-0.05, 1.12))
+    for k, (ends, errors) in enumerate(zip(value.exponents.intervals, value.exponents.errors, strict=True)):
+        spread = 2 * finite(np.array(errors))
+        axes.errorbar(ends, [1.12, 1.12], xerr=spread, color=GREEN, capsize=2, label="" if k else "negative exponents")
+    axes.set(xlabel=symbol(value.scene.strength), ylabel="share of synchronous starts", ylim=(-0.05, 1.18))
     axes.set_xlim(value.direct.x[0], value.direct.x[-1])
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
+    note(axes, "exponents: not computed" if value.exponents.absent else "")
     return axes
 
 

@@ -7,9 +7,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from tqdm import tqdm
 
-from synchain.models.inputs.checks import check_flag, check_integer, check_number, check_positive
+from synchain.models.inputs.checks import check_integer, check_number, check_positive
+
+from ..support.execution import Execution
+from ..support.progress import Reporter
 
 __all__ = ["Averaging", "Batches"]
 
@@ -31,25 +33,29 @@ class Averaging:
         Transient before the average, in the same units.
     seed : int
         Seed of what is drawn at random before the orbit begins.
-    show_progress : bool or None
-        Whether to show a progress bar; None shows it on terminals only.
+    execution : Execution
+        Who does the work, and who hears how many periods are done.
     """
 
     precision: float
     periods: float
     transient: float
     seed: int
-    show_progress: bool | None = False
+    execution: Execution
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "precision", check_number("precision", self.precision, 0.0))
         object.__setattr__(self, "periods", check_positive("periods", self.periods))
         object.__setattr__(self, "transient", check_number("transient", self.transient, 0.0))
         object.__setattr__(self, "seed", check_integer("seed", self.seed, 0))
-        if self.show_progress is not None:
-            check_flag("show_progress", self.show_progress)
 
-    def rounds(self, batches: Batches, step: float, error: Callable[[], np.ndarray]) -> Iterator[None]:
+    def reporter(self) -> Reporter:
+        """Return the reporter of the transient and the longest average; its time begins now."""
+        return self.execution.reporter(round(self.transient) + math.ceil(self.periods), "period")
+
+    def rounds(
+        self, batches: Batches, step: float, error: Callable[[], np.ndarray], reporter: Reporter
+    ) -> Iterator[None]:
         """Yield until the average is long or precise enough; each time one block must be added.
 
         Parameters
@@ -60,14 +66,14 @@ class Averaging:
             Length of a block in periods.
         error : callable
             Returns the standard errors (m,) that must become small.
+        reporter : Reporter
+            Counts the periods.
         """
-        hidden = None if self.show_progress is None else not self.show_progress
-        with tqdm(total=math.ceil(self.periods), unit="period", disable=hidden) as bar:
-            while batches.blocks * step < self.periods:
-                yield
-                bar.update(step)
-                if batches.due and np.all(error() <= self.precision):
-                    return
+        while batches.blocks * step < self.periods:
+            yield
+            reporter.advance(step)
+            if batches.due and np.all(error() <= self.precision):
+                return
 
 
 @dataclass(slots=True)

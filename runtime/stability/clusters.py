@@ -8,7 +8,7 @@ Source: Pecora, Sorrentino, Hagerstrom, Murphy & Roy, Nat. Commun. 5, 4079 (2014
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -20,7 +20,10 @@ from synchain.models.graphs.clusters import Clusters, clusters
 from synchain.models.scenes.scene import Scene
 
 from ..cells.initial_modes import with_modes
+from ..cells.keywords import ONE_ORBIT, Given
 from ..results.labelled import Labelled, dataset
+from ..support.execution import Execution
+from ..support.progress import Hook
 from .averages import Averaging, Batches
 from .exponents import single_cell
 from .orbits import unit_of_time
@@ -159,8 +162,10 @@ def cluster_exponents(
     transient: float = 300,
     rtol: float = 1e-8,
     seed: int = 0,
-    show_progress: bool | None = False,
-    **parameters: float,
+    show_progress: bool | None = None,
+    progress: Hook | None = None,
+    parameters: Mapping[str, float] | None = None,
+    **more: float,
 ) -> ClusterExponents:
     """Compute the transversal exponents of a cluster state of a scene's network.
 
@@ -181,9 +186,13 @@ def cluster_exponents(
         Relative tolerance of the integration. The friction law may require a smaller one.
     seed : int
         Seed of the initial deviations.
-    show_progress : bool or None
-        Whether to show a progress bar; None shows it on terminals only.
-    **parameters : float
+    show_progress : bool, optional
+        Whether to show a bar; by default a bar on terminals and a line a minute elsewhere.
+    progress : callable, optional
+        Is called with a `Progress`, which counts periods of the drive.
+    parameters : mapping of str to float, optional
+        Parameters of the scene to set, for names that are keywords already.
+    **more : float
         Parameters of the scene to set.
 
     Returns
@@ -199,17 +208,20 @@ def cluster_exponents(
     FloatingPointError
         If the integration fails.
     """
-    settings = Averaging(precision, periods, transient, seed, show_progress)
-    scene = single_cell(cluster_exponents, scene, rtol, parameters)
+    averaging = Averaging(precision, periods, transient, seed, Execution(1, None, show_progress, progress))
+    scene = single_cell(Given(cluster_exponents, parameters, more, ONE_ORBIT), scene, rtol)
     partition = _of_graph(scene, state)
     variation, unit = clustered(scene.equations, partition), unit_of_time(scene)
-    integrator = _integrator(scene, partition, variation, settings.seed)
-    for _ in range(round(settings.transient)):
-        integrator.advance(unit)
+    reporter = averaging.reporter()
+    integrator = _integrator(scene, partition, variation, averaging.seed)
     batches, apart = Batches(unit), np.zeros((partition.quotient.n,) * 2)
-    for _ in settings.rounds(batches, 1.0, batches.error):
-        batches.add(integrator.advance(unit))
-        apart = np.maximum(apart, _differences(integrator.state[0], partition.quotient.n, _deviating(variation)))
+    with reporter:
+        for _ in range(round(averaging.transient)):
+            integrator.advance(unit)
+            reporter.advance(1)
+        for _ in averaging.rounds(batches, 1.0, batches.error, reporter):
+            batches.add(integrator.advance(unit))
+            apart = np.maximum(apart, _differences(integrator.state[0], partition.quotient.n, _deviating(variation)))
     mean, error, time = batches.mean()[0], batches.error_by_start()[0], batches.blocks * unit
     return ClusterExponents(partition, mean[1:], error[1:], float(mean[0]), float(error[0]), apart, time)
 

@@ -12,7 +12,7 @@ Strelcyn, Meccanica 15, 9 (1980); batch means: Flyvbjerg & Petersen, J. Chem. Ph
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,16 +23,25 @@ from synchain.models.graphs.families import topology
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene, a_scene
 
-from ..cells.keywords import with_parameters
+from ..cells.keywords import ORBITS, Given
 from ..prediction.intervals import Interval
 from ..results.labelled import Labelled, dataset, ends_of, words_of
 from ..support.arrays import row as row_of
-from ..support.threads import worker_count
+from ..support.execution import Execution
+from ..support.progress import Hook, Reporter
 from .attractor import Attractor, find_attractor
 from .averages import Averaging, Batches
 from .orbits import Orbits
 
-__all__ = ["Exponents", "coupled_cell", "exponents", "group_by_attractor", "initial_states", "single_cell"]
+__all__ = [
+    "Exponents",
+    "coupled_cell",
+    "exponents",
+    "group_by_attractor",
+    "initial_states",
+    "single_cell",
+    "transversal",
+]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -149,8 +158,10 @@ def exponents(
     rtol: float = 1e-6,
     seed: int = 0,
     workers: int | None = None,
-    show_progress: bool | None = False,
-    **parameters: float,
+    show_progress: bool | None = None,
+    progress: Hook | None = None,
+    parameters: Mapping[str, float] | None = None,
+    **more: float,
 ) -> Exponents:
     """Compute the largest transversal exponent of an oscillator and coupling at each strength.
 
@@ -175,9 +186,13 @@ def exponents(
         Seed of the displacements.
     workers : int, optional
         Number of threads; all cores by default.
-    show_progress : bool or None
-        Whether to show a progress bar; None shows it on terminals only.
-    **parameters : float
+    show_progress : bool, optional
+        Whether to show a bar; by default a bar on terminals and a line a minute elsewhere.
+    progress : callable, optional
+        Is called with a `Progress`, which counts periods of the drive.
+    parameters : mapping of str to float, optional
+        Parameters of the scene to set, for names that are keywords already.
+    **more : float
         Parameters of the scene to set.
 
     Returns
@@ -192,19 +207,45 @@ def exponents(
     FloatingPointError
         If an integration fails.
     """
-    scene, strengths = coupled_cell(exponents, scene, rtol, parameters), row_of("alpha", alpha, complex_too=True)
-    settings = Averaging(precision, periods, transient, seed, show_progress)
-    orbits = Orbits.make(scene, strengths, initial_states(scene, starts, settings.seed), worker_count(workers))
-    orbits.settle(settings.transient)
-    attractors = tuple(find_attractor(orbits, row, settings.transient) for row in range(starts))
-    by_start, error, length = _by_start(orbits, attractors, settings)
+    given = Given(exponents, parameters, more, ORBITS)
+    averaging = Averaging(precision, periods, transient, seed, Execution(workers, None, show_progress, progress))
+    return transversal(given, scene, row_of("alpha", alpha, complex_too=True), starts, rtol, averaging)
+
+
+def transversal(
+    given: Given, scene: Scene, strengths: np.ndarray, starts: int, rtol: float, averaging: Averaging
+) -> Exponents:
+    """Compute what `exponents` returns, for whichever public function was called.
+
+    Parameters
+    ----------
+    given : Given
+        Parameters of the scene to set.
+    scene : Scene
+        Source of the oscillator and the coupling.
+    strengths : ndarray, shape (m,)
+        Strengths, real or complex.
+    starts : int
+        Number of initial states.
+    rtol : float
+        Relative tolerance.
+    averaging : Averaging
+        How long to average, and who does it.
+    """
+    scene = coupled_cell(given, scene, rtol)
+    reporter = averaging.reporter()
+    orbits = Orbits.make(scene, strengths, initial_states(scene, starts, averaging.seed), averaging.execution.size)
+    with reporter:
+        orbits.settle(averaging.transient, reporter.advance)
+        attractors = tuple(find_attractor(orbits, row, averaging.transient) for row in range(starts))
+        by_start, error, length = _by_start(orbits, attractors, averaging, reporter)
     largest = max(group_by_attractor(attractors, by_start), key=len)
     mean, spread = by_start[largest].mean(axis=0), np.sqrt((error[largest] ** 2).sum(axis=0)) / len(largest)
     return Exponents(strengths, mean, spread, length, starts, by_start, attractors)
 
 
 def _by_start(
-    orbits: Orbits, attractors: Sequence[Attractor], settings: Averaging
+    orbits: Orbits, attractors: Sequence[Attractor], averaging: Averaging, reporter: Reporter
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Exponents and errors (starts, m) from eigenvalues or averages, and the time averaged over."""
     exponent = np.empty((len(attractors), len(orbits.strengths)))
@@ -215,45 +256,41 @@ def _by_start(
             exponent[row], error[row] = attractor.exponents()
     length = max(attractor.cycle for attractor in attractors)
     if rest:
-        exponent[rest], error[rest], length = _average(orbits.part(rest), settings)
+        exponent[rest], error[rest], length = _average(orbits.part(rest), averaging, reporter)
     return exponent, error, length
 
 
-def coupled_cell(function: Callable[..., object], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
+def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
     """Return a single cell whose network has a coupling: a lone oscillator gets a partner.
 
     Parameters
     ----------
-    function : callable
-        Public function that took the parameters; error messages name it.
+    given : Given
+        Parameters to set.
     scene : Scene
         Scene to change.
     rtol : float
         Relative tolerance.
-    parameters : dict of str to float
-        Parameters to set.
     """
     if a_scene(scene).model.linked:
         coupled = scene.replace(axes=(), zipped=False, continuation="none")
     else:
         coupled = scene.replace(topology=topology("chain", 2), axes=(), zipped=False, continuation="none")
         expect_vanishing("a lone oscillator gets a partner", coupled.equations)
-    return single_cell(function, coupled, rtol, parameters)
+    return single_cell(given, coupled, rtol)
 
 
-def single_cell(function: Callable[..., object], scene: Scene, rtol: float, parameters: dict[str, float]) -> Scene:
+def single_cell(given: Given, scene: Scene, rtol: float) -> Scene:
     """Return a scene without axes and records, with the parameters passed to a public function.
 
     Parameters
     ----------
-    function : callable
-        Public function that took the parameters; error messages name it.
+    given : Given
+        Parameters to set.
     scene : Scene
         Scene to change.
     rtol : float
         Relative tolerance.
-    parameters : dict of str to float
-        Parameters to set.
 
     Raises
     ------
@@ -262,9 +299,7 @@ def single_cell(function: Callable[..., object], scene: Scene, rtol: float, para
     ValueError
         If a parameter is unknown.
     """
-    return with_parameters(
-        function, scene, parameters, axes=(), zipped=False, continuation="none", record=(), rtol=rtol, atol=None
-    )
+    return given.scene(scene, axes=(), zipped=False, continuation="none", record=(), rtol=rtol, atol=None)
 
 
 def initial_states(scene: Scene, starts: int, seed: int) -> np.ndarray:
@@ -321,11 +356,11 @@ def group_by_attractor(attractors: Sequence[Attractor], by_start: np.ndarray) ->
     return groups
 
 
-def _average(orbits: Orbits, settings: Averaging) -> tuple[np.ndarray, np.ndarray, float]:
+def _average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[np.ndarray, np.ndarray, float]:
     """Mean growth rates (starts, m), their standard errors and the time averaged over."""
     orbits.prepare()
     batches = Batches(orbits.unit * orbits.block)
-    for _ in settings.rounds(batches, orbits.block, batches.error):
+    for _ in averaging.rounds(batches, orbits.block, batches.error, reporter):
         batches.add(orbits.advance())
     mean, error = batches.mean(), batches.error_by_start()
     return mean, error, batches.blocks * batches.length

@@ -16,6 +16,7 @@ Source: Benettin, Galgani, Giorgilli & Strelcyn, Meccanica 15, 9 (1980).
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +27,10 @@ from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
 from ..cells.initial_modes import with_modes
+from ..cells.keywords import ONE_ORBIT, Given
 from ..results.labelled import Labelled, dataset
+from ..support.execution import Execution
+from ..support.progress import Hook
 from .averages import Averaging, Batches
 from .exponents import single_cell
 from .orbits import unit_of_time
@@ -135,12 +139,14 @@ def lyapunov_spectrum(
     *,
     count: int | None = None,
     precision: float = 1e-3,
-    periods: float = 2000,
+    periods: float = 5000,
     transient: float = 300,
     rtol: float = 1e-8,
     seed: int = 0,
-    show_progress: bool | None = False,
-    **parameters: float,
+    show_progress: bool | None = None,
+    progress: Hook | None = None,
+    parameters: Mapping[str, float] | None = None,
+    **more: float,
 ) -> Lyapunov:
     """Compute the Lyapunov exponents of a scene's network along the motion from its own start.
 
@@ -160,9 +166,13 @@ def lyapunov_spectrum(
         Relative tolerance of the integration. The friction law may require a smaller one.
     seed : int
         Seed of the initial directions.
-    show_progress : bool or None
-        Whether to show a progress bar; None shows it on terminals only.
-    **parameters : float
+    show_progress : bool, optional
+        Whether to show a bar; by default a bar on terminals and a line a minute elsewhere.
+    progress : callable, optional
+        Is called with a `Progress`, which counts periods of the drive.
+    parameters : mapping of str to float, optional
+        Parameters of the scene to set, for names that are keywords already.
+    **more : float
         Parameters of the scene to set.
 
     Returns
@@ -177,17 +187,20 @@ def lyapunov_spectrum(
     FloatingPointError
         If the integration fails.
     """
-    settings = Averaging(precision, periods, transient, seed, show_progress)
-    scene = single_cell(lyapunov_spectrum, scene, rtol, parameters)
-    frame = TangentFrame.make(scene, _counted(scene, count), settings.seed)
-    for _ in range(round(settings.transient)):
-        frame.advance()
-    frame.choose_block()
-    batches, lost = Batches(frame.unit / frame.parts), np.zeros(frame.count, dtype=bool)
-    for _ in settings.rounds(batches, 1.0 / frame.parts, lambda: batches.error()[:-1][~lost]):
-        growth, share, volume = frame.advance()
-        np.logical_or(lost, share < LOST * frame.rtol, out=lost)
-        batches.add(np.append(np.where(np.isfinite(growth), growth, 0.0), volume)[None])
+    averaging = Averaging(precision, periods, transient, seed, Execution(1, None, show_progress, progress))
+    scene = single_cell(Given(lyapunov_spectrum, parameters, more, ONE_ORBIT), scene, rtol)
+    reporter = averaging.reporter()
+    frame = TangentFrame.make(scene, _counted(scene, count), averaging.seed)
+    with reporter:
+        for _ in range(round(averaging.transient)):
+            frame.advance()
+            reporter.advance(1)
+        frame.choose_block()
+        batches, lost = Batches(frame.unit / frame.parts), np.zeros(frame.count, dtype=bool)
+        for _ in averaging.rounds(batches, 1.0 / frame.parts, lambda: batches.error()[:-1][~lost], reporter):
+            growth, share, volume = frame.advance()
+            np.logical_or(lost, share < LOST * frame.rtol, out=lost)
+            batches.add(np.append(np.where(np.isfinite(growth), growth, 0.0), volume)[None])
     return _report(frame, batches, lost)
 
 

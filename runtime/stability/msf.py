@@ -8,7 +8,7 @@ Sources: classes by the zeros of the function on alpha > 0, Huang, Chen, Lai & P
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -18,11 +18,15 @@ import xarray as xr
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.scenes.scene import Scene, a_scene
 
+from ..cells.keywords import ORBITS, Given, with_numbers
 from ..prediction.intervals import Interval
 from ..prediction.synchronisability import Window, windows
 from ..results.labelled import Labelled, dataset, ends_of, words_of
 from ..support.arrays import row
-from .exponents import Exponents, exponents
+from ..support.execution import Execution
+from ..support.progress import Hook
+from .averages import Averaging
+from .exponents import Exponents, transversal
 
 __all__ = ["MSF", "Plane", "StabilityClass", "classify", "msf", "plane"]
 
@@ -51,7 +55,7 @@ class MSF(Labelled):
     Parameters
     ----------
     scene : Scene
-        Scene with the oscillator, the coupling and a network.
+        Scene with the oscillator, the coupling, their parameters and a network.
     alpha : ndarray, shape (m,)
         Requested strengths.
     fine : Exponents
@@ -275,8 +279,10 @@ def msf(
     rtol: float = 1e-6,
     seed: int = 0,
     workers: int | None = None,
-    show_progress: bool | None = False,
-    **parameters: float,
+    show_progress: bool | None = None,
+    progress: Hook | None = None,
+    parameters: Mapping[str, float] | None = None,
+    **more: float,
 ) -> MSF:
     """Compute the master stability function of an oscillator and coupling on a line.
 
@@ -286,10 +292,10 @@ def msf(
         Source of the oscillator and the coupling.
     alpha : array_like, shape (m,)
         Increasing real strengths alpha = -sigma gamma.
-    precision, periods, transient, starts, rtol, seed, workers, show_progress
+    precision, periods, transient, starts, rtol, seed
         See `synchain.runtime.exponents`.
-    **parameters : float
-        Parameters of the scene to set.
+    workers, show_progress, progress, parameters, **more
+        See `synchain.runtime.exponents`.
 
     Returns
     -------
@@ -305,20 +311,9 @@ def msf(
     expect_vanishing("msf", a_scene(scene).equations)
     line = row("alpha", alpha, 2, rising=True)
     fine = np.union1d(line, np.linspace(line[0], line[-1], FINE))
-    fine_exponents = exponents(
-        scene,
-        fine,
-        precision=precision,
-        periods=periods,
-        transient=transient,
-        starts=starts,
-        rtol=rtol,
-        seed=seed,
-        workers=workers,
-        show_progress=show_progress,
-        **parameters,
-    )
-    return MSF(scene, line, fine_exponents)
+    given = Given(msf, parameters, more, ORBITS)
+    averaging = Averaging(precision, periods, transient, seed, Execution(workers, None, show_progress, progress))
+    return MSF(_known(given, scene), line, transversal(given, scene, fine, starts, rtol, averaging))
 
 
 def plane(
@@ -333,8 +328,10 @@ def plane(
     rtol: float = 1e-6,
     seed: int = 0,
     workers: int | None = None,
-    show_progress: bool | None = False,
-    **parameters: float,
+    show_progress: bool | None = None,
+    progress: Hook | None = None,
+    parameters: Mapping[str, float] | None = None,
+    **more: float,
 ) -> Plane:
     """Compute the master stability function on the rectangle alpha + i beta = -sigma gamma.
 
@@ -347,10 +344,10 @@ def plane(
     beta : array_like, shape (b,)
         Increasing imaginary parts. Conjugate strengths have the same exponent, so that only abs(beta)
         is integrated.
-    precision, periods, transient, starts, rtol, seed, workers, show_progress
+    precision, periods, transient, starts, rtol, seed
         See `synchain.runtime.exponents`.
-    **parameters : float
-        Parameters of the scene to set.
+    workers, show_progress, progress, parameters, **more
+        See `synchain.runtime.exponents`.
 
     Returns
     -------
@@ -366,22 +363,18 @@ def plane(
     expect_vanishing("plane", a_scene(scene).equations)
     across, up = row("alpha", alpha, 2, rising=True), row("beta", beta, 2, rising=True)
     heights, place = np.unique(np.abs(up), return_inverse=True)
-    half_plane = exponents(
-        scene,
-        (across[:, None] + 1j * heights).reshape(-1),
-        precision=precision,
-        periods=periods,
-        transient=transient,
-        starts=starts,
-        rtol=rtol,
-        seed=seed,
-        workers=workers,
-        show_progress=show_progress,
-        **parameters,
-    )
+    given = Given(plane, parameters, more, ORBITS)
+    averaging = Averaging(precision, periods, transient, seed, Execution(workers, None, show_progress, progress))
+    strengths = (across[:, None] + 1j * heights).reshape(-1)
+    half_plane = transversal(given, scene, strengths, starts, rtol, averaging)
     table, error = (row.reshape(len(across), -1)[:, place] for row in (half_plane.exponent, half_plane.stderr))
     kinds = tuple(a.kind for a in half_plane.attractors)
-    return Plane(scene, across, up, table, error, kinds, half_plane.time)
+    return Plane(_known(given, scene), across, up, table, error, kinds, half_plane.time)
+
+
+def _known(given: Given, scene: Scene) -> Scene:
+    """The scene with its parameters; a lone oscillator has none of the links."""
+    return with_numbers(scene, {name: value for name, value in given.values.items() if scene.takes(name)})
 
 
 def classify(intervals: Sequence[Interval], end: float, begin: float = 0.0) -> StabilityClass:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -136,11 +137,21 @@ class Orbits:
             self.scene, self.variation, self.state, numbers, rows, self.workers, looseness, self.method
         )
 
-    def settle(self, periods: float) -> None:
-        """Advance all orbits over a transient of a number of units."""
+    def settle(self, periods: float, advanced: Callable[[float], object] | None = None) -> None:
+        """Advance all orbits over a transient of a number of units.
+
+        Parameters
+        ----------
+        periods : float
+            Length of the transient in units.
+        advanced : callable, optional
+            Hears the length of each stretch of it.
+        """
         integrator = self.integrator_of(self.strengths[:1])
         for length in _stretches(round(periods)):
             integrator.advance(length * self.unit)
+            if advanced is not None:
+                advanced(length)
         self.state = integrator.state
 
     def prepare(self) -> None:

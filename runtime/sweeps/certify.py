@@ -17,6 +17,7 @@ from synchain.models.dynamics.variational import mode
 from synchain.models.scenes.scene import Scene
 from synchain.models.scenes.sweep import rest_in_sweep
 
+from ..cells.keywords import with_numbers
 from ..cells.plan import Planner
 from ..results.certificate import Certificate
 from ..stability.exponents import Exponents, exponents
@@ -59,8 +60,9 @@ def certify(scene: Scene, *, precision: float = 2e-3, periods: float = 2000, wor
     for values, cells in groups.items():
         asked = -sigma[cells][:, None] * gamma
         strengths, place = np.unique(asked, return_inverse=True)
-        single = scene.replace(axes=(), zipped=False, continuation="none", **dict(zip(own, values, strict=True)))
-        found = exponents(single, strengths, precision=precision, periods=periods, workers=workers)
+        numbers = dict(zip(own, values, strict=True))
+        single = with_numbers(scene, numbers, axes=(), zipped=False, continuation="none")
+        found = exponents(single, strengths, precision=precision, periods=periods, workers=workers, show_progress=False)
         worst, error = _least_stable(found)
         table = worst[place].reshape(asked.shape)
         rows, worst_mode = np.arange(len(cells)), table.argmax(axis=1)

@@ -11,12 +11,12 @@ from ..cells.choice import warn_of_stiffness
 from ..cells.layout import Layout
 from ..cells.observed import Sections
 from ..results.result import Result, gather
+from ..support.progress import Reporter
 from ..support.status import tally
 from .errors import SweepFailed, SweepInterrupted
 from .job import Start
 from .pool import Task, worker_lost
 from .prepare import PreparedRun
-from .progress import Reporter
 from .scheduler import BlockScheduler
 
 __all__ = ["Memory"]

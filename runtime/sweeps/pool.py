@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, CancelledError, Future, ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 
 import numpy as np
 
-from synchain.models.inputs.checks import check_callable, check_flag, check_instance
-
 from ..cells.buffers import Buffers
-from ..support.threads import worker_count
+from ..support.execution import Execution
 from .job import Job
-from .progress import Hook, Reporter
 from .worker import forget, run_block
 
-__all__ = ["Execution", "Task", "WorkerPool", "worker_lost"]
+__all__ = ["Task", "WorkerPool", "worker_lost"]
 
 LOOK = 0.2
 """Seconds after which a wait for a block looks whether Ctrl-C was pressed."""
@@ -42,48 +39,6 @@ Running = Future[Buffers | None]
 
 Finish = Callable[[Task, Buffers], Task | None]
 """Takes the results of a task; returns the task that has waited for it, if there is one."""
-
-
-@dataclass(frozen=True, slots=True)
-class Execution:
-    """Who runs the blocks of a job, and who hears how far they are; checked.
-
-    Parameters
-    ----------
-    workers : int, optional
-        Number of threads (default: all cores).
-    executor : concurrent.futures.Executor, optional
-        Runs the blocks in place of threads (docs/scale.md).
-    show_progress : bool, optional
-        Whether to show a bar; by default a bar on terminals and a line a minute elsewhere.
-    progress : callable, optional
-        Is called with a `Progress` after each block.
-
-    Attributes
-    ----------
-    size : int
-        Blocks that run at a time.
-    """
-
-    workers: int | None = None
-    executor: Executor | None = None
-    show_progress: bool | None = None
-    progress: Hook | None = None
-    size: int = field(init=False)
-
-    def __post_init__(self) -> None:
-        if self.progress is not None:
-            check_callable("progress", self.progress)
-        if self.show_progress is not None:
-            check_flag("show_progress", self.show_progress)
-        if self.executor is not None:
-            expected = "a concurrent.futures.Executor, e.g. ProcessPoolExecutor(2)"
-            check_instance("executor", self.executor, Executor, expected)
-        object.__setattr__(self, "size", _size(self.executor, self.workers))
-
-    def reporter(self, cells: int) -> Reporter:
-        """Return the reporter of so many cells; its time begins now."""
-        return Reporter(cells, self.show_progress, self.progress)
 
 
 class WorkerPool:
@@ -168,19 +123,6 @@ class WorkerPool:
             if task is None:
                 return
             send(task)
-
-
-def _size(executor: Executor | None, workers: int | None) -> int:
-    """How many blocks can run at a time: `workers`, else as far as the executor tells, else all
-    cores.
-    """
-    if executor is None or workers is not None:
-        return worker_count(workers)
-    client = getattr(executor, "_client", None)  # of dask.distributed
-    if client is not None:
-        return max(1, int(sum(client.nthreads().values())))
-    count = getattr(executor, "_max_workers", 0) or getattr(executor, "num_workers", 0) or worker_count(None)
-    return max(1, int(count))
 
 
 def _next(arrived: SimpleQueue[Running]) -> Running:

@@ -17,9 +17,9 @@ from ..cells.layout import Layout, block_size
 from ..cells.reduce import Reduction
 from ..results.certificate import Certificate
 from ..results.labels import provenance
+from ..support.execution import Execution
 from .certify import certify
 from .job import JobSpec, SweepJob, SweepSpec
-from .pool import Execution
 
 __all__ = ["PreparedRun", "prepare"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from concurrent.futures import Executor
 
 import xarray as xr
@@ -9,13 +10,13 @@ import xarray as xr
 from synchain.models.inputs.checks import check_instance
 from synchain.models.scenes.scene import Scene, a_scene
 
-from ..cells.keywords import with_axes
+from ..cells.keywords import Given
 from ..cells.reduce import Reduction, as_reduction
 from ..results.result import Result
+from ..support.execution import Execution
+from ..support.progress import Hook
 from .memory import Memory
-from .pool import Execution
 from .prepare import prepare
-from .progress import Hook
 from .start import started
 
 __all__ = ["run"]
@@ -24,15 +25,19 @@ __all__ = ["run"]
 def run(
     scene: Scene,
     *,
-    workers: int | None = None,
     resume: Result | None = None,
     start: Result | xr.DataArray | None = None,
-    show_progress: bool | None = None,
     width: int | None = None,
     reduce: bool | Reduction = True,
     certified: bool = False,
+    realisations: int | None = None,
+    draws: Mapping[str, object] | None = None,
+    rng: int | None = None,
+    workers: int | None = None,
     executor: Executor | None = None,
+    show_progress: bool | None = None,
     progress: Hook | None = None,
+    parameters: Mapping[str, object] | None = None,
     **axes: object,
 ) -> Result:
     """Run every cell of a scene.
@@ -40,8 +45,6 @@ def run(
     Parameters
     ----------
     scene : Scene
-    workers : int, optional
-        Number of threads (default: all cores).
     resume : Result, optional
         An earlier, unfinished result of the same scene, whose finished cells are kept.
     start : Result or DataArray, optional
@@ -49,8 +52,6 @@ def run(
         `result.end.isel(sigma=-1)`.  Components and nodes must be those of the scene.  Time counts
         from 0 again, so the drive must have been at the beginning of a period; the attribute
         `start_time` of the data says which time of the earlier run that was.
-    show_progress : bool, optional
-        Whether to show a bar; by default a bar on terminals and a line a minute elsewhere.
     width : int, optional
         Number of lanes: 1, 2, 4, 8 or 16 (default: what the processor has, one for a single cell).
     reduce : bool or Reduction
@@ -59,13 +60,21 @@ def run(
     certified : bool
         Add the transversal exponent of every cell and a verdict on its synchronisation, and end
         cells early that are certain to stay synchronous (see `synchain.runtime.sweeps.certify`).
+    realisations, draws, rng : optional
+        As for `Scene`: a further dimension of the sweep (docs/observing.md).
+    workers : int, optional
+        Number of threads (default: all cores).
     executor : concurrent.futures.Executor, optional
         Runs the blocks in place of threads (docs/scale.md).
+    show_progress : bool, optional
+        Whether to show a bar; by default a bar on terminals and a line a minute elsewhere.
     progress : callable, optional
         Is called with a `Progress` after each block.
+    parameters : mapping of str to number or sequence, optional
+        The same as `axes`, for names that are keywords already.
     **axes : number or sequence
-        Parameters, initial states or settings of the scene.  A number fixes one; a sequence makes
-        it an axis of the sweep, after those of the scene, and replaces an axis of the same name.
+        Parameters and initial states of the scene.  A number fixes one; a sequence makes it an axis
+        of the sweep, after those of the scene, and replaces an axis of the same name.
 
     Returns
     -------
@@ -75,8 +84,9 @@ def run(
     Raises
     ------
     ValueError
-        If an axis is unknown, if `resume` or `reduce` belongs to another scene, if `start` has
-        other labels or the drive was amid a period, or if the sweep does not fit into memory.
+        If a name is unknown, given twice, or that of a field of the scene (see `Scene.replace`), if
+        `resume` or `reduce` belongs to another scene, if `start` has other labels or the drive was
+        amid a period, or if the sweep does not fit into memory.
     SweepInterrupted
         On Ctrl-C; its `result` has the cells that had finished.
     SweepFailed
@@ -85,7 +95,7 @@ def run(
     begun = None
     if start is not None:
         scene, begun = started(a_scene(scene), start)
-    scene = with_axes(run, scene, axes)
+    scene = Given(run, parameters, axes).sweep(scene, realisations=realisations, draws=draws, rng=rng)
     if resume is not None:
         check_instance("resume", resume, Result, "an earlier Result, e.g. from open_result")
     execution = Execution(workers, executor, show_progress, progress)

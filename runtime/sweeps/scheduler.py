@@ -12,11 +12,11 @@ import numpy as np
 
 from ..cells.buffers import Buffers
 from ..cells.layout import Layout
+from ..support.progress import Reporter
 from ..support.status import tally
 from .job import Start
 from .pool import Task, WorkerPool
 from .prepare import PreparedRun
-from .progress import Reporter
 
 __all__ = ["BlockScheduler", "Sink"]
 

@@ -19,7 +19,7 @@ from synchain.models.inputs.checks import check_flag, check_path, short_repr
 from synchain.models.scenes.scene import Scene
 
 from ..cells.buffers import Buffers
-from ..cells.keywords import with_axes
+from ..cells.keywords import Given
 from ..cells.layout import Layout
 from ..cells.reduce import Reduction, as_reduction
 from ..results.block_log import BlockLog
@@ -28,13 +28,14 @@ from ..results.labels import alike, changed, scene_of
 from ..results.partial import certificate_of, describe_sweep, layout_of, partial_path, write_result
 from ..results.result import Result, read_result
 from ..results.store import CHOICES, attributes_of
+from ..support.execution import Execution
 from ..support.files import check_replaceable, drop_leftovers, netcdf_data, understood
+from ..support.progress import Hook, Progress, Reporter
 from ..support.status import Status
 from .errors import SweepFailed, SweepInterrupted
 from .job import Start
-from .pool import Execution, Task, worker_lost
+from .pool import Task, worker_lost
 from .prepare import PreparedRun, prepare
-from .progress import Hook, Progress, Reporter
 from .scheduler import BlockScheduler
 
 __all__ = ["Streamed", "claim", "stream"]
@@ -74,7 +75,7 @@ class Streamed(Labelled):
     @property
     def success(self) -> bool:
         """True if every cell reached the end of its window."""
-        return self.progress.statuses.get(Status.FINISHED, 0) == self.progress.cells
+        return self.progress.statuses.get(Status.FINISHED, 0) == self.progress.total
 
 
 def stream(
@@ -83,13 +84,17 @@ def stream(
     *,
     resume: bool = False,
     overwrite: bool = False,
-    workers: int | None = None,
-    show_progress: bool | None = None,
     width: int | None = None,
     reduce: bool | Reduction = True,
     certified: bool = False,
+    realisations: int | None = None,
+    draws: Mapping[str, object] | None = None,
+    rng: int | None = None,
+    workers: int | None = None,
     executor: Executor | None = None,
+    show_progress: bool | None = None,
     progress: Hook | None = None,
+    parameters: Mapping[str, object] | None = None,
     **axes: object,
 ) -> Streamed:
     """Run every cell of a scene and write its result to a netCDF file, block by block.
@@ -107,7 +112,9 @@ def stream(
         interruption.
     overwrite : bool
         Replace what is there already.
-    workers, show_progress, width, reduce, certified, executor, progress, **axes
+    width, reduce, certified, realisations, draws, rng, parameters, **axes
+        As for `run`.
+    workers, executor, show_progress, progress
         As for `run`.
 
     Returns
@@ -128,7 +135,7 @@ def stream(
     SweepFailed
         If the workers are lost or the disk is full.
     """
-    scene = with_axes(stream, scene, axes)
+    scene = Given(stream, parameters, axes).sweep(scene, realisations=realisations, draws=draws, rng=rng)
     reduction = as_reduction(scene, reduce)
     execution = Execution(workers, executor, show_progress, progress)
     reporter = execution.reporter(scene.cells)

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,10 +23,11 @@ from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 
-from ..cells.keywords import with_parameters
+from ..cells.keywords import Given
 from ..stability.exponents import Exponents, exponents
-from ..sweeps.pool import Execution
-from .threshold import Criterion, check_probe, checked, simulate
+from ..support.execution import Execution
+from ..support.progress import Hook
+from .threshold import IN_CRITERION, Criterion, check_probe, checked, simulate
 
 __all__ = ["CAUSES", "OUTCOMES", "Agreement", "Cell", "agreement", "strengths"]
 
@@ -114,8 +116,11 @@ def agreement(
     line: Exponents | None = None,
     criterion: Criterion | None = None,
     workers: int | None = None,
-    show_progress: bool | None = False,
-    **parameters: float,
+    executor: Executor | None = None,
+    show_progress: bool | None = None,
+    progress: Hook | None = None,
+    parameters: Mapping[str, float] | None = None,
+    **more: float,
 ) -> Agreement:
     """Judge synchronisation by exponents and by direct simulation for each sigma.
 
@@ -130,10 +135,10 @@ def agreement(
         parameters; by default they are computed.
     criterion : Criterion, optional
         When a simulation counts as synchronous.
-    workers, show_progress
-        As for `run`.
-    **parameters : float
-        Override the parameters of the scene.
+    workers, executor, show_progress, progress
+        As for `run`; exponents are computed in this process.
+    parameters, **more
+        Override the parameters of the scene, as for `exponents`.
 
     Raises
     ------
@@ -142,16 +147,16 @@ def agreement(
         `strengths` does.
     """
     fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ()}
-    scene = with_parameters(agreement, scene, parameters, **fixed)
+    scene = Given(agreement, parameters, more, IN_CRITERION).scene(scene, **fixed)
     expect_vanishing("agreement", scene.equations)
     check_probe(scene.topology, scene.spectrum)
     scene = scene.replace(record=("sync_error",))
     grid = np.atleast_1d(np.asarray(sigma, dtype=float))
     if grid.ndim != 1 or not (np.all(np.isfinite(grid)) and np.all(np.diff(grid) > 0.0) and np.all(grid >= 0.0)):
         raise ValueError("sigma: expected finite numbers from 0 up that increase")
-    simulation = DirectSimulation(scene, checked(criterion), Execution(workers, show_progress=show_progress))
+    simulation = DirectSimulation(scene, checked(criterion), Execution(workers, executor, show_progress, progress))
     alpha = strengths(scene.topology, grid)
-    line = line or exponents(scene, np.unique(alpha), workers=workers, show_progress=show_progress)
+    line = line or exponents(scene, np.unique(alpha), workers=workers, show_progress=show_progress, progress=progress)
     places = _places(line, alpha)
     share, error = simulation.simulate(grid)
     projected = [_projected(line.exponent[row], line.stderr[row]) for row in places]

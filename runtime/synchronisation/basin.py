@@ -20,15 +20,15 @@ from synchain.models.inputs.checks import check_integer, check_number, check_tab
 from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene, a_scene
 
-from ..cells.keywords import with_parameters
+from ..cells.keywords import Given
 from ..cells.plan import Planner
 from ..cells.reduce import reduce_scene
 from ..results.labelled import Labelled, dataset
 from ..results.labels import STATE, States
 from ..support.arrays import row
+from ..support.execution import Execution
+from ..support.progress import Hook
 from ..support.status import Status
-from ..sweeps.pool import Execution
-from ..sweeps.progress import Hook
 from .trials import Trials
 
 __all__ = ["Basin", "basin", "random_starts"]
@@ -135,7 +135,8 @@ def basin(
     executor: Executor | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
-    **parameters: float,
+    parameters: Mapping[str, float] | None = None,
+    **more: float,
 ) -> Basin:
     """Start a scene's network from random states and count those that synchronise.
 
@@ -160,8 +161,8 @@ def basin(
         Level of the confidence interval.
     workers, executor, show_progress, progress
         As for `run`.
-    **parameters : float
-        Override the parameters of the scene.
+    parameters, **more
+        Override the parameters of the scene, as for `exponents`.
 
     Raises
     ------
@@ -173,7 +174,7 @@ def basin(
     _check(scene, samples, tolerance, confidence, seed)
     execution = Execution(workers, executor, show_progress, progress)
     fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ("sync_error",)}
-    scene = with_parameters(basin, scene, parameters, **fixed, transient=transient, window=window)
+    scene = Given(basin, parameters, more).scene(scene, **fixed, transient=transient, window=window)
     planner = Planner(random_starts(scene, samples, ranges, seed))
     whole = replace(reduce_scene(planner.scene, reduce=False), jumps=True)
     with Trials.of(whole, execution) as trials:

@@ -11,6 +11,7 @@ b are parameters of one kernel, so that a whole plane needs one compilation.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -24,16 +25,17 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.families import topology
 from synchain.models.interactions.link import strength
 from synchain.models.mechanics.components import Edge
-from synchain.models.scenes.scene import Scene, a_scene
+from synchain.models.scenes.scene import Scene
 
 from ..cells.choice import chosen_for_rows
+from ..cells.keywords import Given
 from ..cells.plan import Plan, Planner, control_of
 from ..results.labelled import Labelled, dataset, ends_of
 from ..support.arrays import numbers
+from ..support.execution import Execution
+from ..support.progress import Hook
 from ..sweeps.job import RowsSpec
-from ..sweeps.pool import Execution
-from ..sweeps.progress import Hook
-from .threshold import Criterion, checked, offsets
+from .threshold import IN_CRITERION, Criterion, checked, offsets
 from .trials import Trials
 
 __all__ = ["MODE_ALPHA", "MODE_BETA", "Probe", "ring_of_three", "universal_probe"]
@@ -101,6 +103,8 @@ def universal_probe(
     executor: Executor | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
+    parameters: Mapping[str, float] | None = None,
+    **more: float,
 ) -> Probe:
     """Simulate three oscillators at the mode strengths alpha + i beta.
 
@@ -115,6 +119,8 @@ def universal_probe(
         Starts, tolerance and times, as for `thresholds`.
     workers, executor, show_progress, progress
         As for `run`.
+    parameters, **more
+        Override the parameters of the scene, as for `exponents`.
 
     Returns
     -------
@@ -129,7 +135,8 @@ def universal_probe(
     """
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     real, imaginary = _broadcast(alpha, beta)
-    ring = a_scene(scene).replace(
+    scene = Given(universal_probe, parameters, more, IN_CRITERION).scene(scene)
+    ring = scene.replace(
         topology=topology("ring", 3),
         initial=None,
         axes=(),

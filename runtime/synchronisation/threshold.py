@@ -4,15 +4,16 @@ simulation.
 The two-oscillator probe tells for which alpha = sigma |gamma| the mode of a network dies out: in
 its own network the one non-zero eigenvalue is -2.  Any other network synchronises where every
 non-zero |sigma gamma_k| lies in the probe's ranges (Pecora & Carroll, Phys. Rev. Lett. 80, 2109
-(1998); Fink et al., Phys. Rev. E 61, 5080 (2000)).
+(1998); Fink et al., Phys. Rev. E 61, 5080 (2000)).  Transversal exponents give the same ranges
+without a transient or a tolerance, and with error bars.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 import xarray as xr
@@ -24,17 +25,19 @@ from synchain.models.inputs.checks import check_instance, check_integer, check_n
 from synchain.models.scenes.scene import Scene, a_scene
 from synchain.models.spectra.spectrum import Spectrum
 
-from ..cells.keywords import with_parameters
+from ..cells.keywords import Given
 from ..cells.plan import Planner
 from ..cells.reduce import reduce_scene
 from ..prediction.intervals import Interval, intersect, refine, scale
 from ..results.labelled import Labelled, dataset, ends_of, words_of
 from ..support.arrays import row
-from ..sweeps.pool import Execution
-from ..sweeps.progress import Hook
+from ..support.execution import Execution
+from ..support.progress import Hook
+from .exponent_windows import ExponentWindows, exponent_windows
 from .trials import Trials
 
 __all__ = [
+    "IN_CRITERION",
     "Criterion",
     "Sweep",
     "Thresholds",
@@ -84,6 +87,12 @@ class Criterion:
         check_integer("criterion: seed", self.seed, 0)
 
 
+IN_CRITERION = {
+    own.name: f"it is one of the criterion; write criterion=Criterion({own.name}=…)" for own in fields(Criterion)
+}
+"""What functions with a criterion do not take themselves, and why."""
+
+
 def checked(criterion: Criterion | None) -> Criterion:
     """Return the criterion, or the default one for None; TypeError for anything else."""
     if criterion is None:
@@ -107,9 +116,10 @@ class Sweep:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Thresholds(Labelled):
-    """Synchronous ranges of one network: measured directly and predicted from the probe.
+    """Synchronous ranges of one network: measured directly, predicted from the probe, and from the
+    exponents of its modes.
 
-    `direct` is in sigma, `probe` in alpha = sigma abs(gamma), `predicted` in sigma.
+    `direct` is in sigma, `probe` in alpha = sigma abs(gamma), `predicted` and `exponents` in sigma.
     """
 
     scene: Scene
@@ -117,17 +127,19 @@ class Thresholds(Labelled):
     predicted: tuple[Interval, ...]
     direct: Sweep
     criterion: Criterion
+    exponents: ExponentWindows
     warnings: tuple[str, ...] = field(default=())
 
     @property
     def data(self) -> xr.Dataset:
-        """Errors and shares over sigma and over alpha, and the ranges."""
+        """Errors and shares over sigma and over alpha, the ranges, and the errors of their ends."""
+        found = self.exponents
         ranges = {
-            "interval": self.direct.intervals,
-            "predicted": self.predicted,
-            "probe_interval": self.probe.intervals,
+            "interval": (self.direct.intervals, "synchronous sigma, simulated"),
+            "predicted": (self.predicted, "synchronous sigma, from the probe"),
+            "probe_interval": (self.probe.intervals, "synchronous alpha of the probe"),
+            "window": (found.intervals, f"sigma with negative exponents{found.absent and f', {found.words}'}"),
         }
-        words = ("synchronous sigma, simulated", "synchronous sigma, from the probe", "synchronous alpha of the probe")
         return dataset(
             {
                 "error": (("sigma",), self.direct.error, "median of the mean synchronisation errors"),
@@ -135,9 +147,10 @@ class Thresholds(Labelled):
                 "probe_error": (("alpha",), self.probe.error, "the same of the probe"),
                 "probe_share": (("alpha",), self.probe.share, "the same of the probe"),
                 **{
-                    name: ((f"{name}_number", "end"), np.reshape(found, (-1, 2)), meaning)
-                    for (name, found), meaning in zip(ranges.items(), words, strict=True)
+                    name: ((f"{name}_number", "end"), np.reshape(ends, (-1, 2)), meaning)
+                    for name, (ends, meaning) in ranges.items()
                 },
+                "window_error": (("window_number", "end"), np.reshape(found.errors, (-1, 2)), "standard errors"),
             },
             {"sigma": self.direct.x, "alpha": self.probe.x, "end": ["low", "high"]},
             self.scene,
@@ -150,19 +163,25 @@ class Thresholds(Labelled):
             ("scene", repr(self.scene)),
             ("sigma, simulated", words_of(self.direct.intervals)),
             ("sigma, predicted by the probe", words_of(self.predicted)),
+            ("sigma, negative exponents", self.exponents.words),
             ("alpha, probe", words_of(self.probe.intervals)),
             ("grid of sigma", ends_of(self.direct.x)),
             *(("warning", words) for words in self.warnings),
         )
 
     def as_dict(self) -> dict[str, object]:
-        """JSON-ready: {"intervals", "probe", "predicted"}, sigma for the first and last, alpha for
-        the probe.
+        """JSON-ready: {"intervals", "probe", "predicted", "exponents", "exponent_errors",
+        "no_exponents", "warnings"}, alpha for the probe, sigma for the others; an unknown error is
+        None, and so is "no_exponents" if there are exponents.
         """
+        errors = [[error if math.isfinite(error) else None for error in pair] for pair in self.exponents.errors]
         return {
             "intervals": [list(i) for i in self.direct.intervals],
             "probe": [list(i) for i in self.probe.intervals],
             "predicted": [list(i) for i in self.predicted],
+            "exponents": [list(i) for i in self.exponents.intervals],
+            "exponent_errors": errors,
+            "no_exponents": self.exponents.absent or None,
             "warnings": list(self.warnings),
         }
 
@@ -173,14 +192,17 @@ def thresholds(
     sigma: Sequence[float] | np.ndarray | None = None,
     resolution: float = RESOLUTION,
     criterion: Criterion | None = None,
+    precision: float = 1e-3,
+    periods: float = 5000,
     workers: int | None = None,
     executor: Executor | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
-    **parameters: float,
+    parameters: Mapping[str, float] | None = None,
+    **more: float,
 ) -> Thresholds:
-    """Find where a scene's network synchronises: by the probe, by projection, and by direct
-    simulation.
+    """Find where a scene's network synchronises: by exponents, by the probe with its projection,
+    and by direct simulation.
 
     Parameters
     ----------
@@ -193,11 +215,13 @@ def thresholds(
         Ends of ranges are refined to this width in sigma, those of the probe to twice as much in
         alpha.
     criterion : Criterion, optional
-        When a value of sigma counts as synchronous.
+        When a value of sigma counts as synchronous; it holds rtol, seed and transient of all cells.
+    precision, periods : float
+        Standard error and longest average of the exponents, as for `exponents`.
     workers, executor, show_progress, progress
-        As for `run`; each round has a bar of its own.
-    **parameters : float
-        Override the parameters of the scene.
+        As for `run`; each round has a bar of its own.  Exponents are computed in this process.
+    parameters, **more
+        Override the parameters of the scene, as for `exponents`.
 
     Returns
     -------
@@ -213,17 +237,20 @@ def thresholds(
     a_scene(scene).equations.expect_alike("thresholds")
     expect_vanishing("thresholds", scene.equations)
     fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ()}
-    scene = with_parameters(thresholds, scene, parameters, **fixed)
+    scene = Given(thresholds, parameters, more, IN_CRITERION).scene(scene, **fixed)
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     spectrum = scene.topology.spectrum
     check_probe(scene.topology, spectrum)
     scene = scene.replace(record=("sync_error",))
     grid = default_grid(spectrum) if sigma is None else row("sigma", sigma, 2, rising=True)
     resolution = check_positive("resolution", resolution)
-    pair = probe(scene, _probe_grid(grid, spectrum), criterion, resolution, execution)
+    precision, periods = check_number("precision", precision, 0.0), check_positive("periods", periods)
+    alpha = _probe_grid(grid, spectrum)
+    stable = exponent_windows(scene, alpha, execution, precision, periods, criterion.seed)
+    pair = probe(scene, alpha, criterion, resolution, execution)
     direct = simulate(scene, grid, criterion, resolution, execution)
     predicted = project(pair.intervals, spectrum, float(grid[-1]))
-    return Thresholds(scene, pair, tuple(predicted), direct, criterion, scene.warnings)
+    return Thresholds(scene, pair, tuple(predicted), direct, criterion, stable, scene.warnings)
 
 
 def default_grid(spectrum: Spectrum, step: float = 0.0025) -> np.ndarray:

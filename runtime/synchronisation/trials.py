@@ -19,10 +19,11 @@ from ..cells.kernels import write_kernel
 from ..cells.layout import block_size
 from ..cells.plan import Plan, Planner, control_of
 from ..cells.reduce import Reduction
+from ..support.execution import Execution
 from ..support.status import CODES, Status, tally
 from ..sweeps.errors import SweepFailed, SweepInterrupted
 from ..sweeps.job import JobSpec, RowsSpec
-from ..sweeps.pool import Execution, Task, WorkerPool, worker_lost
+from ..sweeps.pool import Task, WorkerPool, worker_lost
 
 __all__ = ["Trials", "mean_errors"]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -25,6 +26,7 @@ from synchain.runtime.console.outcome import print_json
 from synchain.runtime.opening.open import open_result
 from synchain.runtime.sweeps import job, stream
 from synchain.runtime.synchronisation import threshold
+from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
 
 SCENE = """
 title = "short"
@@ -363,7 +365,11 @@ def fake_thresholds(found: list[dict[str, Any]]) -> Any:
         nothing = np.zeros(3)
         pair = threshold.Sweep(2 * x, nothing, nothing, ((0.0, 0.466), (0.9, 1.2)))
         direct = threshold.Sweep(x, nothing, nothing, ((0.0, 0.15), (0.3, 0.6)))
-        return threshold.Thresholds(scene, pair, ((0.0, 0.155), (0.3, 0.4)), direct, criterion, ("a warning",))
+        windows = ExponentWindows(((0.0, 0.1551), (0.3, 0.4)), ((0.0, 2e-4), (math.inf, 0.0)))
+        if scene.topology.name == "ring":
+            windows = ExponentWindows(absent="a contact without a jump")
+        ranges = ((0.0, 0.155), (0.3, 0.4))
+        return threshold.Thresholds(scene, pair, ranges, direct, criterion, windows, ("a warning",))
 
     return thresholds
 
@@ -377,6 +383,9 @@ def test_thresholds_as_json_and_as_a_table(monkeypatch: pytest.MonkeyPatch, caps
         "intervals": [[0.0, 0.15], [0.3, 0.6]],
         "probe": [[0.0, 0.466], [0.9, 1.2]],
         "predicted": [[0.0, 0.155], [0.3, 0.4]],
+        "exponents": [[0.0, 0.1551], [0.3, 0.4]],
+        "exponent_errors": [[0.0, 2e-4], [None, 0.0]],
+        "no_exponents": None,
         "warnings": ["a warning"],
     }
     assert main(words) == 0
@@ -385,6 +394,11 @@ def test_thresholds_as_json_and_as_a_table(monkeypatch: pytest.MonkeyPatch, caps
     assert lines[1].split(maxsplit=2)[2] == "[0.0000, 0.1500], [0.3000, 0.6000...]"
     assert lines[2].endswith("[0.0000, 0.1550], [0.3000, 0.4000...]")  # the probe ends at 1.2 / 3
     assert next(line for line in lines if "Wu-Chua" in line).endswith(" [0.0000, 0.1553]")  # 0.466 / 3
+    exponents = next(line for line in lines if "negative exponents" in line)
+    assert exponents.endswith("  [0.0000, 0.1551 ± 0.0002], [0.3000 ± inf, 0.4000...]")
+    assert main([*words, "--topology", "ring"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert next(line for line in lines if "exponents" in line).endswith("  not computed: a contact without a jump")
     assert asked[0]["sigma"] == (0.0, 0.1, 0.2, 0.3, 0.4)
     assert asked[0]["workers"] == 2
     assert asked[0]["scene"].topology == chain(3)
@@ -437,7 +451,9 @@ def test_thresholds_really_simulates(capsys: pytest.CaptureFixture[str]) -> None
     words = "thresholds --n 2 --omega 1.15 --sigma 0.1:0.15:2 --transient 5 --starts 1 --workers 1 --json"
     assert main(words.split()) == 0
     found = json.loads(capsys.readouterr().out)
-    assert set(found) == {"intervals", "probe", "predicted", "warnings"}
+    kinds = {"intervals", "probe", "predicted", "exponents", "exponent_errors", "no_exponents", "warnings"}
+    assert set(found) == kinds
+    assert found["exponents"] == [[0.1, 0.15]]  # the exponent at rest is negative all over this grid
     assert all(0.2 <= low <= high <= 0.3 for low, high in found["probe"])
 
 

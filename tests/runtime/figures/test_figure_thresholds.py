@@ -13,9 +13,10 @@ from synchain.models import chain
 from synchain.models.scenes.file import load_scene
 from synchain.runtime.figures import load, published
 from synchain.runtime.figures import threshold_table as tables_of_thresholds
-from synchain.runtime.figures.figure_runs import FigureRuns
+from synchain.runtime.figures.figure_runs import QUICK, FigureRuns
 from synchain.runtime.figures.make import make
 from synchain.runtime.prediction.intervals import scale
+from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
 from synchain.runtime.synchronisation.threshold import project
 
 
@@ -117,8 +118,47 @@ def test_table_of_thresholds(simulation: Simulation, tmp_path: Path) -> None:
     assert "none predicted, none measured" in five["remark"]
     assert (first["tolerance"], first["starts"], first["transient"]) == ("0.001", "1", "1000")
     text = (tmp_path / "thresholds.md").read_text()
-    assert "| 3 | 1.55 | [0.1760, 0.1980] | [0.1760, 0.1980] | [0.1760, 0.1960] | +0.0000, +0.0020 |" in text
+    assert (
+        "| 3 | 1.55 | [0.1760, 0.1980] | [0.1760, 0.1980] | [0.1761 ± 0.002, 0.1980 ± 0.0008] | [0.1760, 0.1960] |"
+        in text
+    )
     assert "at least half of 1 starts" in text
+
+
+def test_exponents_are_right_where_the_quick_probe_is_not() -> None:
+    """At n = 4, omega = 1.40 the quick probe finds [0.178, 0.179]."""
+    runs = FigureRuns(QUICK)
+    scene = tables_of_thresholds.scene_of(4, 1.4, runs)
+    found = tables_of_thresholds.windows_of(scene, runs)
+    ((low, high),), ((low_error, high_error),) = found.intervals, found.errors
+    assert (low, high) == pytest.approx((0.153, 0.177), abs=0.006)
+    assert 0.0 < high_error < low_error < 0.01
+    assert abs(low - 0.153) < 2 * low_error
+    assert abs(high - 0.177) < 2 * high_error
+
+
+def test_the_table_has_the_windows_of_the_exponents(simulation: Simulation, tmp_path: Path) -> None:
+    make(["thresholds"], tmp_path)
+    found = rows(tmp_path / "thresholds.csv")
+    three = found[4]
+    assert (float(three["exponents_low"]), float(three["exponents_high"])) == pytest.approx((0.176, 0.198), abs=1e-4)
+    slope = 0.594 - 0.176  # of the parabola that stands in for the exponents
+    assert float(three["exponents_low_error"]) == pytest.approx(1e-3 / slope, rel=0.05)
+    assert float(three["exponents_high_error"]) == pytest.approx(1e-3 / slope / 3, rel=0.05)
+    assert float(three["exponents_minus_published_high"]) == pytest.approx(0.198 - 0.196, abs=1e-4)
+    assert found[-1]["exponents_low"] == found[-1]["exponents_low_error"] == ""
+    assert three["all_exponents"].startswith("[0.1760")
+    (axes, _) = drawn("thresholds", FigureRuns(TINY))
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == list(
+        ("measured", "predicted", "exponents", "published")
+    )
+
+
+def test_a_row_without_exponents_says_why() -> None:
+    row = tables_of_thresholds.Row(4, 1.4, (), (), ExponentWindows(absent="no drive"), None, 0, 9)
+    assert "exponents not computed: no drive" in row.remark
+    data = tables_of_thresholds.Comparison((row,), TINY)
+    assert "| none | none | not computed | none |" in tables_of_thresholds.document(data)
 
 
 def test_the_range_compared_is_the_one_that_shares_most() -> None:
@@ -134,7 +174,7 @@ def test_ragged_ranges_are_joined_over_narrow_gaps_only() -> None:
     assert tables_of_thresholds.joined(found) == ((0.1, 0.14), (0.142, 0.15))
     assert tables_of_thresholds.joined(found, 0.0) == found
     assert tables_of_thresholds.joined(()) == ()
-    row = tables_of_thresholds.Row(4, 1.4, found, (), published.published(4, 1.4), 0, 9)
+    row = tables_of_thresholds.Row(4, 1.4, found, (), ExponentWindows(), published.published(4, 1.4), 0, 9)
     assert "2 narrow gaps bridged; 1 more range measured" in row.remark
 
 

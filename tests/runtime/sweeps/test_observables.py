@@ -227,7 +227,7 @@ def test_a_periodic_cell_leaves_out_no_cycle_of_the_window() -> None:
     )  # fmt: skip
     found = run(scene, show_progress=False, omega=[0.5, 2.0])
     plain = run(scene, show_progress=False, omega=[0.5, 2.0], reduce=False)
-    early = run(scene, show_progress=False, omega=[0.5, 2.0], transient=200.0, window=1.0)
+    early = run(scene.replace(transient=200.0, window=1.0), show_progress=False, omega=[0.5, 2.0])
     assert (early.periods_skipped > 100).all()
     assert (found.periods_skipped == 0).all()
     assert (plain.periods_skipped == 0).all()
@@ -256,6 +256,6 @@ def test_a_cell_that_ends_early_says_what_it_saw() -> None:
         oscillator="harmonic", integrator="dop853", record=(), transient=5.0, window=5.0, time_unit="time",
         observe={"speed": mean(v)},
     )  # fmt: skip
-    early = run(scene, show_progress=False, max_steps=3)
+    early = run(scene.replace(max_steps=3), show_progress=False)
     assert int(early.status) == Status.STEP_BUDGET
     assert np.isnan(early.speed.values).all()

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from synchain.runtime.cells.layout import Layout, block_size
+from synchain.runtime.support.progress import Progress, Reporter, duration
 from synchain.runtime.support.status import CODES, Status
-from synchain.runtime.sweeps.progress import Progress, Reporter, duration
 
 
 def counts(**named: int) -> np.ndarray:
@@ -73,6 +73,30 @@ def test_a_terminal_has_a_bar_with_the_failures(monkeypatch):
     assert "15/20" in shown.text
     assert "cell/s" in shown.text
     assert "1 diverged" in shown.text
+
+
+def test_periods_and_values_are_counted_without_a_status(monkeypatch):
+    shown, heard = Terminal(True), []
+    monkeypatch.setattr(sys, "stderr", shown)
+    with Reporter(10, hook=heard.append, unit="period") as reporter:
+        reporter.advance(0.25)
+        assert list(reporter.each("ab")) == ["a", "b"]
+        assert [p.done for p in heard] == [0, 0.25, 1.25, 2.25]
+        assert str(heard[-1]).startswith("2.25 of 10 periods (22 %), ")
+    assert (heard[-1].done, heard[-1].total, heard[-1].share) == (2.25, 2.25, 1.0)  # no more was needed
+    assert "2.25/2.25" in shown.text
+    assert "period/s" in shown.text
+    assert (heard[-1].statuses, heard[-1].kept, heard[-1].unit) == ({}, 0, "period")
+    with pytest.raises(KeyError), Reporter(10, show=False, hook=heard.append, unit="period") as broken:
+        raise KeyError
+    assert (broken.done, broken.total) == (0, 10)
+    with Reporter(10, show=False, hook=heard.append):
+        pass
+    assert str(heard[-1]).startswith("0 of 0 cells (100 %), ")
+    stopped = Reporter(3, show=False, hook=heard.append, unit="value")
+    next(values := stopped.each("ab"))
+    values.close()
+    assert stopped.done == 0  # a branch that ends at a value has not got beyond it
 
 
 def test_a_pipe_has_a_line_now_and_then_and_nothing_in_a_short_run(monkeypatch):

@@ -16,12 +16,12 @@ from synchain.runtime.cells.kernels import kernel
 from synchain.runtime.cells.plan import plan, tolerances
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.opening.open import open_result
+from synchain.runtime.support.execution import Execution
+from synchain.runtime.support.progress import Reporter
 from synchain.runtime.support.status import Status
 from synchain.runtime.sweeps.errors import SweepInterrupted
 from synchain.runtime.sweeps.memory import Memory
-from synchain.runtime.sweeps.pool import Execution
 from synchain.runtime.sweeps.prepare import prepare
-from synchain.runtime.sweeps.progress import Reporter
 from synchain.runtime.sweeps.run import run
 
 PAIR = Scene(topology=chain(2), transient=5, window=10, parameters={"sigma": 0.1})

@@ -72,7 +72,7 @@ def test_equal_oscillators_are_a_merger() -> None:
 def test_two_copies_of_an_orbit_shifted_by_a_period_of_the_drive_coexist() -> None:
     """The orbit has two drive periods: the other copy attracts as well while the coupling is weak."""
     lone = Scene(parameters={"omega": 1.15}, record=())
-    phases = [run(lone, transient=0.0, window=periods).states("end") for periods in (600.0, 601.0)]
+    phases = [run(lone.replace(transient=0.0, window=periods)).states("end") for periods in (600.0, 601.0)]
     initial = {name: [float(state[k]) for state in phases] for k, name in enumerate(("x", "v"))}
     criterion = Criterion(transient=300, window=20, starts=1)
     (cell,) = agreement(friction(initial=initial), [0.005], line=line(0.01), criterion=criterion).cells

@@ -8,14 +8,17 @@ import numpy as np
 import pytest
 
 from synchain.codegen.driver.columns import Count, Sum
-from synchain.models import chain, complete, star
+from synchain.models import Field, chain, complete, star
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cells.buffers import Buffers
-from synchain.runtime.stability.exponents import exponents
+from synchain.runtime.figures.style import GREEN
+from synchain.runtime.stability.exponents import Exponents, exponents
+from synchain.runtime.stability.msf import MSF
+from synchain.runtime.support.execution import Execution
 from synchain.runtime.support.status import Status
-from synchain.runtime.sweeps.pool import Execution
 from synchain.runtime.synchronisation import threshold
+from synchain.runtime.synchronisation.exponent_windows import ExponentWindows
 from synchain.runtime.synchronisation.threshold import (
     Criterion,
     Sweep,
@@ -93,6 +96,7 @@ def swept(monkeypatch):
         return Sweep(sigma, np.zeros(len(sigma)), np.ones(len(sigma)), ((0.1, 0.2),))
 
     monkeypatch.setattr(threshold, "simulate", fake)
+    monkeypatch.setattr(threshold, "exponent_windows", lambda *_: ExponentWindows())
     return calls
 
 
@@ -228,8 +232,13 @@ def test_direct_range_of_a_star_lies_where_the_probe_says():
     )
     assert found.predicted[0][1] == pytest.approx(found.probe.intervals[0][1] / 4, abs=1e-9)
     assert found.direct.intervals[0][1] == pytest.approx(found.predicted[0][1], abs=0.01)
+    ((_, high),), ((low_error, high_error),) = found.exponents.intervals, found.exponents.errors
+    assert high == pytest.approx(0.4653 / 4, abs=1e-4)
+    assert 0.0 == low_error < high_error < 1e-6  # the motion is periodic
+    assert found.direct.intervals[0][1] == pytest.approx(high, abs=0.01)
     numbers = found.as_dict()
-    assert set(numbers) == {"intervals", "probe", "predicted", "warnings"}
+    kinds = {"intervals", "probe", "predicted", "exponents", "exponent_errors", "no_exponents", "warnings"}
+    assert set(numbers) == kinds
     assert numbers["intervals"][0][1] == found.direct.intervals[0][1]
 
 
@@ -270,6 +279,93 @@ def test_exponent_changes_sign_where_the_probe_does():
     assert found.intervals[0][1] == pytest.approx(0.4653, abs=2e-3)
     assert np.all(np.diff(found.exponent) > 0)
     assert np.all(found.stderr < 2e-3)
+
+
+INSTANT = Criterion(starts=1, transient=0.01, window=0.01)
+ASKED = {"criterion": INSTANT, "resolution": 0.1, "workers": 1, "show_progress": False}
+
+
+def test_windows_of_exponents_are_those_of_the_network():
+    """Of x' = -x, y' = -y with links across, a mode grows at alpha - 1: chain(3) has the eigenvalues -1 and -3."""
+    scene = Scene(Field({"x": "-x", "y": "-y"}), "x->y, y->x", chain(3), time_unit="time")
+    found = thresholds(scene, sigma=[0.0, 1.0, 2.0], **ASKED)
+    assert found.exponents.absent == ""
+    np.testing.assert_allclose(found.exponents.intervals, [(0.0, 1 / 3)], rtol=1e-9)
+    np.testing.assert_allclose(found.exponents.errors, [(0.0, 0.0)], atol=1e-9)
+    np.testing.assert_allclose(found.data["window"], [(0.0, 1 / 3)], rtol=1e-9)
+    assert found.data["window_error"].dims == found.data["window"].dims == ("window_number", "end")
+    assert dict(found.summary)["sigma, negative exponents"] == "0.0000 … 0.3333"
+    assert found.as_dict()["no_exponents"] is None
+    axes = found.plot()
+    assert "negative exponents" in [text.get_text() for text in axes.get_legend().get_texts()]
+    ends = next(line.get_xdata(orig=False) for line in axes.lines if line.get_color() == GREEN)
+    np.testing.assert_allclose(ends, [0.0, 1 / 3], rtol=1e-9)
+
+
+def test_the_effort_of_the_exponents_can_be_chosen(monkeypatch):
+    asked = []
+    monkeypatch.setattr(threshold, "exponent_windows", lambda *all_: asked.append(all_[3:]) or ExponentWindows())
+    monkeypatch.setattr(threshold, "simulate", lambda scene, sigma, *_: Sweep(sigma, 0 * sigma, 0 * sigma, ()))
+    scene = Scene(topology=chain(2))
+    thresholds(scene, sigma=[0.1, 0.2])
+    thresholds(scene, sigma=[0.1, 0.2], precision=0.1, periods=50, criterion=Criterion(seed=3))
+    assert asked == [(1e-3, 5000, 0), (0.1, 50, 3)]
+    for bad in ({"precision": "a"}, {"periods": 0}):
+        with pytest.raises(ValueError, match=r"precision|periods"):
+            thresholds(scene, sigma=[0.1, 0.2], **bad)
+    assert len(asked) == 2
+
+
+@pytest.mark.parametrize(
+    ("scene", "why"),
+    [
+        (
+            Scene(
+                Field({"x": "v", "v": "-x - v + cos(t) + cos(w*t)"}, parameters={"w": 1.3}),
+                "x->v",
+                chain(2),
+                time_unit="time",
+            ),
+            "which have no common period",
+        ),
+        (
+            Scene(friction="coulomb_static", contact="set-valued", coupling="damper", topology=chain(2)),
+            "links act on velocities",
+        ),
+        (Scene(Field({"x": "x"}), "x->x", chain(2), time_unit="time"), "the state grew without bound"),
+    ],
+)
+def test_exponents_that_do_not_apply_say_why(scene, why):
+    found = thresholds(scene, sigma=[0.0, 0.1], **ASKED)
+    assert found.exponents.intervals == ()
+    assert why in found.exponents.absent
+    assert why in found.data["window"].attrs["long_name"]
+    assert dict(found.summary)["sigma, negative exponents"] == f"not computed: {found.exponents.absent}"
+    assert found.as_dict()["no_exponents"] == found.exponents.absent
+    assert "exponents: not computed" in [text.get_text() for text in found.plot().texts]
+
+
+def test_an_error_of_the_callers_hook_is_no_reason():
+    def wrong(progress):
+        if progress.unit == "period":
+            raise ValueError("of the hook")
+
+    scene = Scene(Field({"x": "-x"}), "x->x", chain(2), time_unit="time")
+    with pytest.raises(ValueError, match="of the hook"):
+        thresholds(scene, sigma=[0.0, 0.1], progress=wrong, **ASKED)
+
+
+def test_windows_without_an_estimate_of_their_error_say_so():
+    alpha = np.linspace(0.0, 1.0, 11)
+    one = np.full(11, np.inf)
+    function = MSF(Scene(topology=chain(2)), alpha, Exponents(alpha, 0.25 - alpha, one, 1.0, 1, (0.25 - alpha)[None]))
+    found = ExponentWindows.of(function)
+    np.testing.assert_allclose(found.intervals, [(0.125, 0.5)])
+    assert found.errors == ((np.inf, 0.0),)  # the upper end is that of the grid
+    with pytest.raises(ValueError, match="0 pairs of errors; expected one for each of 1 windows"):
+        ExponentWindows(((0.0, 1.0),), ())
+    with pytest.raises(ValueError, match="expected one of the two"):
+        ExponentWindows(((0.0, 1.0),), ((0.0, 0.0),), "no drive")
 
 
 @pytest.mark.parametrize("changed", [{"coupling": "inerter"}, {"parameters": {"mu_k": [0.15, 0.16, 0.14]}}])

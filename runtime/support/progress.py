@@ -1,21 +1,24 @@
-"""Progress of a sweep: a bar on a terminal, a line a minute elsewhere, and a value for a hook of
-the caller.
+"""Progress of a long call: a bar on a terminal, a line a minute elsewhere, and a value for a hook
+of the caller.
 """
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import TypeVar
 
 import numpy as np
 from tqdm import tqdm
 
-from ..support.status import CODES, Status
+from .status import CODES, Status
 
 __all__ = ["Hook", "Progress", "Reporter", "duration"]
+
+T = TypeVar("T")
 
 EVERY = 60.0
 """Seconds between two lines if stderr is no terminal."""
@@ -23,40 +26,50 @@ EVERY = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """State of a sweep.
+    """How far a call is: the cells of a sweep, the periods of an average, the values of a parameter.
 
     Attributes
     ----------
-    cells, done, kept : int
-        Cells in all, those that have ended, and those of them that an earlier run had finished.
+    total, done, kept : float
+        How many there are, how many have ended, and how many of these an earlier run had finished;
+        whole numbers but for periods. If an average is precise enough, or a branch ends, the total
+        becomes what is done.
     statuses : mapping of Status to int
-        How many cells ended how.
+        How many cells ended how; empty if no cells are counted.
     compiling : float
-        Seconds that the compilation of the kernel took, or its loading.
+        Seconds that the compilation of a sweep's kernel took, or its loading.
     running : float
-        Seconds since the first cell began.
+        Seconds since the first one began.
     preparing : float
-        Seconds before that without the compilation: equations, text of the kernel, exponents of a
-        certified run.
+        Seconds before that: equations, text of the kernel, exponents of a certified run; the
+        compilation too if it is not in `compiling`.
+    unit : str
+        What is counted: "cell", "period" or "value".
     """
 
-    cells: int
-    done: int
-    kept: int
+    total: float
+    done: float
+    kept: float
     statuses: Mapping[Status, int]
     compiling: float
     running: float
     preparing: float = 0.0
+    unit: str = "cell"
+
+    @property
+    def share(self) -> float:
+        """Part that is done, from 0 to 1."""
+        return self.done / self.total if self.total > 0 else 1.0
 
     @property
     def rate(self) -> float:
-        """Cells a second in this run."""
+        """How many a second in this run."""
         return (self.done - self.kept) / self.running if self.running > 0.0 else 0.0
 
     @property
     def left(self) -> float:
-        """Seconds left at this rate; infinite before the first cell has ended."""
-        return (self.cells - self.done) / self.rate if self.rate > 0.0 else float("inf")
+        """Seconds left at this rate; infinite before the first one has ended."""
+        return (self.total - self.done) / self.rate if self.rate > 0.0 else float("inf")
 
     @property
     def failures(self) -> str:
@@ -67,8 +80,8 @@ class Progress:
         return ", ".join(f"{n} {s.name.lower().replace('_', ' ')}" for s, n in bad)
 
     def __str__(self) -> str:
-        parts = f"{self.done} of {self.cells} cells ({100.0 * self.done / self.cells:.0f} %)"
-        parts += f", {self.rate:.3g} cells/s, {duration(self.left)} left"
+        parts = f"{self.done:.12g} of {self.total:.12g} {self.unit}s ({100.0 * self.share:.0f} %)"
+        parts += f", {self.rate:.3g} {self.unit}s/s, {duration(self.left)} left"
         return f"{parts}; {self.failures}" if self.failures else parts
 
 
@@ -86,15 +99,17 @@ def duration(seconds: float) -> str:
 
 @dataclass(slots=True)
 class Reporter:
-    """Counts cells as they end and shows a bar on a terminal, else a line every minute; `show`
-    False shows nothing.
+    """Counts what has ended and shows a bar on a terminal, else a line every minute; `show` False
+    shows nothing.
     """
 
-    cells: int
+    total: float
     show: bool | None = None
     hook: Hook | None = None
+    unit: str = "cell"
     counts: np.ndarray = field(default_factory=lambda: np.zeros(CODES, dtype=np.int64))
-    kept: int = 0
+    done: float = 0
+    kept: float = 0
     preparing: float = 0.0
     compiling: float = 0.0
     began: float = field(default_factory=time.perf_counter)
@@ -102,12 +117,25 @@ class Reporter:
     _said: float = 0.0
     _bar: tqdm | None = None
 
-    def start(self, counts: np.ndarray, compiling: float = 0.0) -> None:
-        """Begin to count cells.
+    def __enter__(self) -> Reporter:
+        self.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *problem: object) -> None:
+        if kind is None and self.done < self.total:
+            self.total = self.done
+            if self._bar is not None:
+                self._bar.total = self.done
+                self._bar.refresh()
+            self._tell()
+        self.close()
+
+    def start(self, counts: np.ndarray | None = None, compiling: float = 0.0) -> None:
+        """Begin to count.
 
         Parameters
         ----------
-        counts : ndarray, shape (CODES,)
+        counts : ndarray, shape (CODES,), optional
             Cells that are kept from an earlier run.
         compiling : float
             Seconds of the time since this reporter was made that the compilation took.
@@ -115,31 +143,43 @@ class Reporter:
         now = time.perf_counter()
         self.preparing, self.compiling = now - self.began - compiling, compiling
         self.began, self._said = now, now
-        self.counts = self.counts + counts
-        self.kept = int(self.counts.sum())
+        if counts is not None:
+            self.counts = self.counts + counts
+            self.done = self.kept = int(counts.sum())
         terminal = bool(getattr(sys.stderr, "isatty", bool)())
         if self.show or (self.show is None and terminal):
-            self._bar = tqdm(total=self.cells, initial=self.kept, unit="cell", file=sys.stderr)
+            self._bar = tqdm(total=self.total, initial=self.kept, unit=self.unit, file=sys.stderr)
         self._tell()
 
     def add(self, counts: np.ndarray) -> None:
         """Count cells that have ended; counts (CODES,)."""
         self.counts = self.counts + counts
+        self.advance(int(counts.sum()))
+
+    def advance(self, amount: float) -> None:
+        """Count what has ended, in units."""
+        self.done += amount
         if self._bar is not None:
             self._bar.set_postfix_str(self.now.failures, refresh=False)
-            self._bar.update(int(counts.sum()))
+            self._bar.update(amount)
         elif self.show is None and time.perf_counter() - self._said > self.every and sys.stderr is not None:
             self._said = time.perf_counter()
             print(self.now, file=sys.stderr, flush=True)
         self._tell()
 
+    def each(self, values: Iterable[T]) -> Iterator[T]:
+        """Yield values and count each of them when the next one is asked for."""
+        for value in values:
+            yield value
+            self.advance(1)
+
     @property
     def now(self) -> Progress:
-        """The state of the sweep."""
+        """How far the call is."""
         found = {status: int(self.counts[status]) for status in Status if self.counts[status]}
         running = time.perf_counter() - self.began
-        done = int(self.counts.sum())
-        return Progress(self.cells, done, self.kept, MappingProxyType(found), self.compiling, running, self.preparing)
+        ended = MappingProxyType(found)
+        return Progress(self.total, self.done, self.kept, ended, self.compiling, running, self.preparing, self.unit)
 
     def close(self) -> None:
         """Leave the bar as it stands."""

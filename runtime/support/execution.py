@@ -1,0 +1,68 @@
+"""Who does the work of a call, and who hears how far it is."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+
+from synchain.models.inputs.checks import check_callable, check_flag, check_instance
+
+from .progress import Hook, Reporter
+from .threads import worker_count
+
+__all__ = ["Execution"]
+
+
+@dataclass(frozen=True, slots=True)
+class Execution:
+    """Who does the work of a call, and who hears how far it is; checked.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Number of threads (default: all cores).
+    executor : concurrent.futures.Executor, optional
+        Runs the blocks in place of threads (docs/scale.md).
+    show_progress : bool, optional
+        Whether to show a bar; by default a bar on terminals and a line a minute elsewhere.
+    progress : callable, optional
+        Is called with a `Progress` after each block of cells, periods or values.
+
+    Attributes
+    ----------
+    size : int
+        Blocks that run at a time.
+    """
+
+    workers: int | None = None
+    executor: Executor | None = None
+    show_progress: bool | None = None
+    progress: Hook | None = None
+    size: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        if self.progress is not None:
+            check_callable("progress", self.progress)
+        if self.show_progress is not None:
+            check_flag("show_progress", self.show_progress)
+        if self.executor is not None:
+            expected = "a concurrent.futures.Executor, e.g. ProcessPoolExecutor(2)"
+            check_instance("executor", self.executor, Executor, expected)
+        object.__setattr__(self, "size", _size(self.executor, self.workers))
+
+    def reporter(self, total: float, unit: str = "cell") -> Reporter:
+        """Return the reporter of so many cells, periods or values; its time begins now."""
+        return Reporter(total, self.show_progress, self.progress, unit)
+
+
+def _size(executor: Executor | None, workers: int | None) -> int:
+    """How many blocks can run at a time: `workers`, else as far as the executor tells, else all
+    cores.
+    """
+    if executor is None or workers is not None:
+        return worker_count(workers)
+    client = getattr(executor, "_client", None)  # of dask.distributed
+    if client is not None:
+        return max(1, int(sum(client.nthreads().values())))
+    count = getattr(executor, "_max_workers", 0) or getattr(executor, "num_workers", 0) or worker_count(None)
+    return max(1, int(count))

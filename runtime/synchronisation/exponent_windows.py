@@ -1,0 +1,104 @@
+"""Windows of sigma from transversal exponents, or why there are none."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from synchain.models.scenes.scene import Scene
+
+from ..prediction.intervals import Interval
+from ..prediction.synchronisability import Window
+from ..results.labelled import words_of
+from ..stability.exponents import initial_states
+from ..stability.msf import MSF, msf
+from ..stability.orbits import Orbits
+from ..support.execution import Execution
+
+__all__ = ["ExponentWindows", "exponent_windows"]
+
+
+@dataclass(frozen=True, slots=True)
+class ExponentWindows:
+    """Ranges of sigma in which every transversal exponent of a network is negative.
+
+    Parameters
+    ----------
+    intervals : tuple of (float, float)
+        Lower and upper end of each window, in ascending order.
+    errors : tuple of (float, float)
+        Standard errors of the ends: 0 at sigma = 0 and at an end of the grid, inf if the average is
+        too short for an estimate.
+    absent : str
+        Why exponents say nothing about the network; empty if they do.
+    """
+
+    intervals: tuple[Interval, ...] = ()
+    errors: tuple[Interval, ...] = ()
+    absent: str = ""
+
+    def __post_init__(self) -> None:
+        if len(self.errors) != len(self.intervals):
+            raise ValueError(
+                f"{len(self.errors)} pairs of errors; expected one for each of {len(self.intervals)} windows"
+            )
+        if self.absent and self.intervals:
+            raise ValueError(f"found windows and the reason {self.absent!r} for their absence; expected one of the two")
+
+    @classmethod
+    def of(cls, function: MSF) -> ExponentWindows:
+        """Return the windows of a master stability function for the network of its scene."""
+        found = function.windows
+        return cls(
+            tuple((window.low, window.high) for window in found),
+            tuple(_errors(window, function.errors is not None) for window in found),
+        )
+
+    @property
+    def words(self) -> str:
+        """The windows with their errors, or why there are none."""
+        return f"not computed: {self.absent}" if self.absent else words_of(self.intervals, self.errors)
+
+
+def _errors(window: Window, known: bool) -> Interval:
+    """Errors of both ends; of an end that no mode decides, 0."""
+    low, high = (error if known else math.inf for error in (window.low_error, window.high_error))
+    return 0.0 if window.low_mode is None else low, 0.0 if window.high_mode is None else high
+
+
+def exponent_windows(
+    scene: Scene, alpha: np.ndarray, execution: Execution, precision: float, periods: float, seed: int
+) -> ExponentWindows:
+    """Compute the windows of a scene's network.
+
+    Parameters
+    ----------
+    scene : Scene
+        Network with real eigenvalues.
+    alpha : ndarray, shape (m,)
+        Increasing strengths; the exponents count as positive beyond them.
+    execution : Execution
+        Its threads do the work; its bar and its hook count periods.
+    precision, periods, seed
+        As for `exponents`, checked.
+    """
+    try:
+        Orbits.make(scene, alpha, initial_states(scene, 1, seed), 1)
+    except ValueError as problem:
+        return ExponentWindows(absent=str(problem))
+    try:
+        function = msf(
+            scene,
+            alpha,
+            precision=precision,
+            periods=periods,
+            seed=seed,
+            workers=execution.workers,
+            show_progress=execution.show_progress,
+            progress=execution.progress,
+        )
+    except FloatingPointError as problem:
+        return ExponentWindows(absent=str(problem))
+    return ExponentWindows.of(function)

@@ -1,0 +1,260 @@
+"""The keywords that public functions share: their names and defaults, parameters in two forms, and what is refused."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+
+from synchain import runtime
+from synchain.models import Field, Scene, chain
+from synchain.runtime.bifurcation import skeleton as skeletons
+from synchain.runtime.cells.keywords import Given
+from synchain.runtime.support.progress import Progress
+from synchain.runtime.synchronisation.threshold import Criterion
+
+SHARED = {
+    "workers": None,
+    "executor": None,
+    "show_progress": None,
+    "progress": None,
+    "parameters": None,
+    "seed": 0,
+    "precision": 1e-3,
+    "periods": 5000,
+    "transient": 300,
+}
+"""The defaults wherever a function has the keyword."""
+
+CELLS = {"workers", "executor", "show_progress", "progress", "parameters"}
+ORBITS = {"workers", "show_progress", "progress", "parameters", "seed", "precision", "periods", "transient", "rtol"}
+TAKEN = {
+    "run": CELLS,
+    "stream": CELLS,
+    "basin": CELLS | {"seed", "transient"},
+    "thresholds": CELLS | {"precision", "periods"},
+    "universal_probe": CELLS,
+    "exponents": ORBITS,
+    "msf": ORBITS,
+    "plane": ORBITS,
+    "cluster_exponents": ORBITS - {"workers"},
+    "lyapunov_spectrum": ORBITS - {"workers"},
+    "periodic_orbit": {"parameters", "periods"},
+    "follow": {"show_progress", "progress", "parameters"},
+    "skeleton": {"show_progress", "progress", "parameters", "seed", "transient", "periods"},
+}
+"""What each function that computes takes of the shared keywords."""
+
+OTHER = {
+    ("basin", "transient"): 1000.0,  # of a cell, as in Criterion
+    ("periodic_orbit", "periods"): 1,  # of the orbit
+    ("skeleton", "periods"): (1, 2),  # of the orbits
+    ("skeleton", "transient"): 20,  # of the search
+}
+"""Defaults that have another value, as the same word has another task."""
+
+RTOL = {"exponents": 1e-6, "msf": 1e-6, "plane": 1e-6, "cluster_exponents": 1e-8, "lyapunov_spectrum": 1e-8}
+
+PAIR = Scene(oscillator="harmonic", topology=chain(2), transient=1, window=1)
+SHORT = Criterion(starts=1, transient=2, window=1)
+DRIVEN = Scene(oscillator="duffing", topology=chain(2), parameters={"omega": 1.3}, transient=20.0)
+
+
+@pytest.mark.parametrize("name", sorted(TAKEN))
+def test_the_shared_keywords_have_the_same_names_and_defaults(name: str) -> None:
+    own = inspect.signature(getattr(runtime, name)).parameters
+    assert {word for word in (*SHARED, "rtol") if word in own} == TAKEN[name]
+    for word in TAKEN[name] - {"rtol"}:
+        assert own[word].default == OTHER.get((name, word), SHARED[word])
+    assert "rtol" not in own or own["rtol"].default == RTOL[name]
+    assert [p.name for p in own.values() if p.kind is p.VAR_KEYWORD] == [
+        "axes" if name in ("run", "stream") else "more"
+    ]
+
+
+def test_every_function_that_computes_is_in_the_table() -> None:
+    functions = {name for name in runtime.__all__ if inspect.isfunction(getattr(runtime, name))}
+    assert functions - {"kernel", "open_result"} == set(TAKEN)
+
+
+def calls(scene: Scene, path: Any) -> dict[str, Callable[..., object]]:
+    """Each function with what it cannot do without."""
+    first = runtime.PeriodicOrbit(scene, 1, np.zeros(2), np.zeros(2), 0.0, 0)
+    return {
+        "run": lambda **words: runtime.run(scene, **words),
+        "stream": lambda **words: runtime.stream(scene, path, **words),
+        "basin": lambda **words: runtime.basin(scene, **words),
+        "thresholds": lambda **words: runtime.thresholds(scene, **words),
+        "universal_probe": lambda **words: runtime.universal_probe(scene, 0.1, 0.1, **words),
+        "exponents": lambda **words: runtime.exponents(scene, [0.1], **words),
+        "msf": lambda **words: runtime.msf(scene, [0.1, 0.2], **words),
+        "plane": lambda **words: runtime.plane(scene, [0.1, 0.2], [0.0, 0.1], **words),
+        "cluster_exponents": lambda **words: runtime.cluster_exponents(scene, [0, 0], **words),
+        "lyapunov_spectrum": lambda **words: runtime.lyapunov_spectrum(scene, **words),
+        "periodic_orbit": lambda **words: runtime.periodic_orbit(scene, **words),
+        "follow": lambda **words: runtime.follow(scene, "omega", [1.3], first, **words),
+        "skeleton": lambda **words: runtime.skeleton(scene, "omega", [1.3], **words),
+    }
+
+
+@pytest.mark.parametrize("name", sorted(TAKEN))
+def test_every_function_refuses_in_one_line_what_is_no_parameter(name: str, tmp_path: Any) -> None:
+    call = calls(DRIVEN, tmp_path / "a.nc")[name]
+    refused = [
+        ({"window_": 3.0}, rf"unknown parameter or keyword 'window_' of {name}; known: .*; did you mean 'window'\?"),
+        ({"paramters": {}}, f"'paramters' of {name}; .*did you mean 'parameters'"),
+        ({"initial": {"x": 0.0}}, rf"{name}: 'initial' is a field of the scene; .*write scene\.replace\(initial=…\)"),
+        ({"parameters": {"topology": chain(3)}}, rf"{name}: 'topology' is a field .*scene\.replace\(topology=…\)"),
+        ({"parameters": {"mu_s": 1.0}, "mu_s": 1.0}, f"{name}: found 'mu_s' in `parameters` and as a keyword"),
+        ({"parameters": {"parameters": 1.0}}, f"{name}: found its keyword 'parameters' in `parameters`"),
+        ({"parameters": 3}, "parameters: found 3"),
+        ({"parameters": {3: 1.0}}, r"parameters: found 3 \(int\); expected text"),
+    ]
+    if "progress" in TAKEN[name]:
+        refused.append(({"progres": print}, f"'progres' of {name}; .*did you mean 'progress'"))
+    for words, message in refused:
+        with pytest.raises((TypeError, ValueError), match=message) as caught:
+            call(**words)
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "word", "why"),
+    [
+        *((name, "executor", "orbits advance on threads of this process") for name in ("exponents", "msf", "plane")),
+        *((n, w, "one orbit") for n in ("cluster_exponents", "lyapunov_spectrum") for w in ("workers", "executor")),
+        *(
+            (n, w, "needs the one before")
+            for n in ("periodic_orbit", "follow", "skeleton")
+            for w in ("workers", "executor")
+        ),
+        *((name, "rtol", "rtol = 1e-12") for name in ("periodic_orbit", "follow", "skeleton")),
+        *(
+            (n, w, rf"Criterion\({w}=…\)")
+            for n in ("thresholds", "universal_probe")
+            for w in ("rtol", "seed", "transient")
+        ),
+    ],
+)
+def test_what_a_function_cannot_use_is_refused_with_the_reason(name: str, word: str, why: str, tmp_path: Any) -> None:
+    with pytest.raises(ValueError, match=f"{name} takes no '{word}': .*{why}"):
+        calls(DRIVEN, tmp_path / "a.nc")[name](**{word: 1})
+
+
+def made(name: str) -> Scene:
+    """Two equal nodes x' = -s x with a link, whose parameter s is called otherwise."""
+    node = Field({"x": f"-{name}*x"}, parameters={name: 2.0})
+    return Scene(node, "x->x", chain(2), initial={"x": [1.0, 1.0]}, transient=0.0, window=1.0, time_unit="time")
+
+
+COLLIDING = (
+    "seed",
+    "rtol",
+    "periods",
+    "transient",
+    "workers",
+    "parameters",
+    "alpha",
+    "window",
+    "scene",
+    "name",
+    "start",
+)
+
+
+@pytest.mark.parametrize("name", COLLIDING)
+def test_parameters_with_the_names_of_keywords_go_into_the_mapping(name: str) -> None:
+    scene = made(name)
+    found = runtime.exponents(scene, [0.0, 0.5], parameters={name: 3.0}, starts=1)
+    np.testing.assert_allclose(found.exponent, [-3.0, -3.5], rtol=1e-9)
+    end = runtime.run(scene, parameters={name: [1.0, 2.0]}, show_progress=False).end
+    np.testing.assert_allclose(end.sel(component="x", node=1), np.exp([-1.0, -2.0]), rtol=1e-7)
+    assert Given(runtime.run, {name: 1.5}).sweep(scene).parameters[name] == 1.5
+    assert runtime.msf(scene, [0.0, 0.5], parameters={name: 3.0}, starts=1).scene.parameters[name] == 3.0
+
+
+def test_certificates_take_parameters_with_the_names_of_fields() -> None:
+    scene = made("seed").replace(record=("sync_error",))
+    found = runtime.run(scene, parameters={"seed": [1.0, 2.0]}, sigma=0.5, certified=True, show_progress=False)
+    np.testing.assert_allclose(found.data["transversal_exponent"], [-2.0, -3.0], rtol=1e-9)
+
+
+def test_branches_follow_parameters_with_the_names_of_keywords() -> None:
+    """x'' = -x - x' + a cos(t): x = a sin(t)."""
+    node = Field({"x": "v", "v": "-x - v + start*cos(omega*t)"}, parameters={"start": 0.5, "omega": 1.0})
+    scene = Scene(node, "x->x", transient=30.0)
+    first = runtime.periodic_orbit(scene, parameters={"start": 0.1})
+    branch = runtime.follow(scene, "start", [0.1, 0.2], first, show_progress=False)
+    np.testing.assert_allclose([orbit.state[1] for orbit in branch.orbits], [0.1, 0.2], atol=1e-9)
+    with pytest.raises(ValueError, match="follow: 'start' takes its values one after the other; expected others"):
+        runtime.follow(scene, "start", [0.1, 0.2], first, parameters={"start": 0.3})
+
+
+def test_mapping_and_keywords_say_the_same() -> None:
+    both = {"omega": 1.2, "kappa": 1e4}
+    assert Given(runtime.msf, both, {}).scene(Scene()) == Given(runtime.msf, {"omega": 1.2}, {"kappa": 1e4}).scene(
+        Scene()
+    )
+    by_name = runtime.run(PAIR, sigma=[0.1, 0.2], x_1=0.5, show_progress=False)
+    by_table = runtime.run(PAIR, parameters={"sigma": [0.1, 0.2], "x_1": 0.5}, show_progress=False)
+    mixed = runtime.run(PAIR, sigma=[0.1, 0.2], parameters={"x_1": 0.5}, show_progress=False)
+    assert by_name.data.identical(by_table.data)
+    assert by_name.data.identical(mixed.data)
+    assert by_name.scene.initial["x"][0] == 0.5
+
+
+def test_progress_of_orbits_counts_periods_and_values() -> None:
+    heard: list[Progress] = []
+    options = {"show_progress": False, "progress": heard.append}
+    rossler = Scene(oscillator="rossler", coupling="x->x", topology=chain(2))
+    for call in (
+        lambda: runtime.exponents(rossler, [0.1], starts=1, transient=10, periods=20, **options),
+        lambda: runtime.msf(rossler, [0.1, 0.2], starts=1, transient=10, periods=20, **options),
+        lambda: runtime.plane(rossler, [0.1, 0.2], [0.0, 0.1], starts=1, transient=10, periods=20, **options),
+        lambda: runtime.cluster_exponents(rossler, [0, 0], transient=10, periods=20, **options),
+        lambda: runtime.lyapunov_spectrum(rossler, transient=10, periods=20, **options),
+    ):
+        heard.clear()
+        call()
+        assert (heard[0].done, heard[-1].done, heard[-1].total, heard[-1].unit) == (0, 30, 30, "period")
+        assert [p.done for p in heard] == sorted({p.done for p in heard})
+    orbit = runtime.periodic_orbit(DRIVEN)
+    heard.clear()
+    runtime.follow(DRIVEN, "omega", [1.3, 1.31, 1.32], orbit, **options)
+    assert [(p.done, p.total, p.unit) for p in heard] == [(k, 3, "value") for k in range(4)]
+    heard.clear()
+    runtime.skeleton(DRIVEN, "omega", [1.3, 1.31], (1,), 2, **options)
+    assert [(p.done, p.total) for p in heard] == [(0, 2), (1, 2), (2, 2)]
+    assert "2 of 2 values (100 %)" in str(heard[-1])
+
+
+def test_what_tells_and_what_works_is_checked_in_all_functions(tmp_path: Any) -> None:
+    for name, call in calls(DRIVEN, tmp_path / "a.nc").items():
+        for word in {"progress", "show_progress", "executor", "workers"} & TAKEN[name]:
+            with pytest.raises((TypeError, ValueError), match=f"{word}( =|:)"):
+                call(**{word: "x"})
+
+
+def test_seed_and_transient_of_a_skeleton_are_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[str, float]] = []
+    states, settle = skeletons.initial_states, skeletons.Orbits.settle
+    monkeypatch.setattr(
+        skeletons, "initial_states", lambda s, n, seed: asked.append(("seed", seed)) or states(s, n, seed)
+    )
+    monkeypatch.setattr(
+        skeletons.Orbits, "settle", lambda own, length: asked.append(("transient", length)) or settle(own, length)
+    )
+    runtime.skeleton(DRIVEN, "omega", [1.3], (1,), 1, transient=7, seed=3, show_progress=False)
+    assert asked == [("seed", 3), ("transient", 7.0)]
+
+
+def test_an_executor_runs_the_cells_of_the_probe_and_parameters_reach_it() -> None:
+    with ThreadPoolExecutor(1) as pool:
+        found = runtime.universal_probe(
+            DRIVEN, [0.1], [0.0], criterion=SHORT, executor=pool, parameters={"delta": 0.7}, show_progress=False
+        )
+    assert found.scene.parameters["delta"] == 0.7
