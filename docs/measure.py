@@ -1,7 +1,8 @@
-"""The table of docs/problems.md: ``python docs/measure.py [EXAMPLE ...]``, for the whole gallery if none is named.
+"""The table of docs/problems.md, made by ``python docs/measure.py [EXAMPLE ...]``.
 
-Each example runs in two fresh processes: one with an empty cache of kernels, one with the kernels that the first has left.
-Counted are the sections *Model and run* and *Figure* with their imports; the check runs, and its time is not counted.
+Each example of the gallery, or each one named, runs in two fresh processes: the first has an empty
+cache of kernels, the second has the kernels of the first.  Counted are the sections *Model and run*
+and *Figure* with their imports; the check runs too, and its time is not counted.
 """
 
 from __future__ import annotations
@@ -31,8 +32,13 @@ def lines(example: Path) -> int:
     return len(re.findall(r"^[^#\n].*", sections(example)["Model and run"], re.MULTILINE))
 
 
+def title(example: Path) -> str:
+    """Return what the page of an example is called."""
+    return example.read_text(encoding="utf-8").splitlines()[1]
+
+
 def measure(example: Path) -> dict[str, list[float]]:
-    """Run an example in this process and return wall and processor time of its sections in s, and its difference."""
+    """Run an example here; return wall and CPU seconds of its sections, and its difference."""
     namespace: dict[str, object] = {"__name__": "__main__"}
     found: dict[str, list[float]] = {}
     for heading, text in sections(example).items():
@@ -55,12 +61,13 @@ def row(example: Path) -> str:
     times = [[sum(run[part][k] for part in ("Model and run", "Figure")) for k in (0, 1)] for run in runs]
     digits = math.floor(-math.log10(runs[0]["difference"][0]))
     numbers = " | ".join(f"{wall:.1f} | {processor:.1f}" for wall, processor in times)
-    return f"| [{example.stem}](built/gallery/{example.stem}) | {lines(example)} | {digits} | {numbers} |"
+    return f"| [{title(example)}](built/gallery/{example.stem}) | {lines(example)} | {digits} | {numbers} |"
 
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--here"]:
         print(json.dumps(measure(GALLERY / f"{sys.argv[2]}.py")))
     else:
+        print("| example | lines | digits | first run: s | CPU s | later: s | CPU s |\n|---|---|---|---|---|---|---|")
         for name in sys.argv[1:] or sorted(path.stem for path in GALLERY.glob("*.py")):
             print(row(GALLERY / f"{name}.py"), flush=True)

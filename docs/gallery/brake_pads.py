@@ -8,11 +8,11 @@ A pad on springs is dragged along by a disc of speed :math:`v_d`,
    \ddot x = -x - 2\xi\dot x + \mu(v_d - \dot x), \qquad
    \mu(w) = \Big(\mu_k + (\mu_s - \mu_k) e^{-a|w|}\Big)\operatorname{sgn} w .
 
-It slides steadily, or it sticks and slips: both are stable in a range of speeds.  Stender & Hoffmann,
-Nonlinear Dyn. 107, 1451 (2022), measured with their program bSTAB how many of 5000 random starts end
-in steady sliding.  Pads in a ring that are weakly joined can squeal one by one (Papangelo, Hoffmann,
-Grolet, Stender & Ciavarella, J. Sound Vib. 417, 56 (2018)).  The contact is set-valued here: a pad
-sticks exactly.
+It slides steadily, or it sticks and slips: both are stable in a range of speeds.  How many of 5000
+random starts end in steady sliding was counted with the program bSTAB (Stender & Hoffmann,
+Nonlinear Dyn. 107, 1451 (2022)).  Pads in a ring that are weakly joined can squeal one by one
+(Papangelo, Hoffmann, Grolet, Stender & Ciavarella, J. Sound Vib. 417, 56 (2018)).  The contact is
+set-valued here: a pad sticks exactly.
 """
 
 # %%
@@ -84,13 +84,13 @@ while t < 220:
     sticks = (y[n:] > 1.5 - 1e-9) & (drag(y) > 1e-9 - 1)
     y[n:][sticks] = 1.5
 difference = abs(pushed.states("end")[k][: 2 * n] - y).max()
-print(f"a ring in which {k} pads squeal: difference from SciPy {difference:.0e}")
+print(f"a ring in which {k} pads were pushed: difference from SciPy {difference:.0e}")
 assert difference < 1e-8
 
 # %%
 # Figure
 # ------
-# Left: one pad.  Right: rings in which none to all of the pads were pushed; which of them squeal.
+# Left: one pad.  Right: rings of which none to all pads were pushed, and which of them squeal.
 import matplotlib.pyplot as plt
 
 _, (left_axes, right_axes) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")

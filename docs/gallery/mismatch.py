@@ -65,9 +65,8 @@ import matplotlib.pyplot as plt
 
 _, axes = plt.subplots(figsize=(7, 3.4), layout="constrained")
 axes.loglog(sizes, result.sync_error, color="C0", linewidth=0.5, alpha=0.5)
-axes.errorbar(
-    sizes, result.sync_error.mean("realisation"), result.sync_error.std("realisation"), fmt="ko", label="mean and spread"
-)
+mean, spread = result.sync_error.mean("realisation"), result.sync_error.std("realisation")
+axes.errorbar(sizes, mean, spread, fmt="ko", label="mean and spread")
 axes.set(xlabel="size s of the deviations", ylabel="synchronisation error")
 axes.legend()
 plt.show()

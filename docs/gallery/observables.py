@@ -7,10 +7,10 @@ Kuramoto's phases with inertia (Tanaka, Lichtenberg & Oishi, Phys. Rev. Lett. 78
 .. math::
    \ddot\theta_i = P_i - D\dot\theta_i + \frac{K}{n}\sum_j \sin(\theta_j - \theta_i) ,
 
-are looked at through values that are said as expressions: the order parameter, the mean frequency of
-each node, the spread of the velocities, the largest kinetic energy, and the times at which the
-fastest phase overtakes the slowest.  They are compiled into the kernel, which integrates them with
-the accuracy of its steps and keeps nothing else.
+are observed through expressions: the order parameter, the mean frequency of each node, the spread
+of the velocities, the largest kinetic energy, and the times at which the fastest phase overtakes
+the slowest.  They are compiled into the kernel, which integrates them with the accuracy of its
+steps and keeps nothing else.
 """
 
 # %%
