@@ -16,7 +16,8 @@ from sphinx.writers.html5 import HTML5Translator
 
 
 def _spaced(formula: str) -> str:
-    """Set names of functions apart from what they stand beside, as TeX does; brackets are near."""
+    """Set names of functions apart from what they stand beside, and signs near, as TeX does."""
+    formula = re.sub(r"(=|&#x0003D;)</mo><mo>&#x02212;", r'\1</mo><mo form="prefix">&#x02212;', formula)
     thin = '<mspace width="0.17em"/>'
     name = r"(<m[io]>[a-z]{2,}</m[io]>)"
     before = r"(</(?:mi|mn|mrow|msub|msup|mfrac)>|\)</mo>)"
