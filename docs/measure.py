@@ -68,6 +68,7 @@ if __name__ == "__main__":
     if sys.argv[1:2] == ["--here"]:
         print(json.dumps(measure(GALLERY / f"{sys.argv[2]}.py")))
     else:
-        print("| example | lines | digits | first run: s | CPU s | later: s | CPU s |\n|---|---:|---:|---:|---:|---:|---:|")
+        print("| example | lines | digits | first run: s | CPU s | later: s | CPU s |")
+        print("|---|---:|---:|---:|---:|---:|---:|")
         for name in sys.argv[1:] or sorted(path.stem for path in GALLERY.glob("*.py")):
             print(row(GALLERY / f"{name}.py"), flush=True)
