@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+import runpy
 import shlex
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,6 +20,7 @@ RECIPES = sorted((ROOT / "docs" / "how-to").glob("*.md"))
 EXAMPLES = sorted((ROOT / "docs" / "gallery").glob("*.py"))
 MOST_LINES = 25
 """Lines of model and run of an example, without those that are empty."""
+MEASURE = runpy.run_path(str(ROOT / "docs" / "measure.py"))
 FILES = {path.stem for path in (ROOT / "tests").rglob("*.py")}
 pages = pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
 
@@ -88,12 +90,18 @@ def test_recipes_run(page: Path) -> None:
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_examples_have_a_short_model_a_check_and_a_figure(example: Path) -> None:
     """The site runs them, and stops if a check fails."""
-    parts = re.split(r"^# %%\n# (.+)\n# -+\n", example.read_text(encoding="utf-8"), flags=re.MULTILINE)
-    sections = dict(zip(parts[1::2], parts[2::2], strict=True))
+    sections = MEASURE["sections"](example)
     assert list(sections) == ["Model and run", "Check", "Figure"]
-    assert len(re.findall(r"^[^#\n].*", sections["Model and run"], re.MULTILINE)) <= MOST_LINES
+    assert MEASURE["lines"](example) <= MOST_LINES
+    assert re.search(r"^difference = ", sections["Check"], re.MULTILINE)
     assert re.search(r"^ *(assert|np\.testing\.assert_\w+\()", sections["Check"], re.MULTILINE)
     assert "plt.show()" in sections["Figure"]
+
+
+def test_the_table_of_problems_holds_all_examples() -> None:
+    table = (ROOT / "docs" / "problems.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| \[(.+)\]\(built/gallery/(\w+)\) \| (\d+) \|", table, re.MULTILINE)
+    assert sorted(rows) == sorted((MEASURE["title"](path), path.stem, str(MEASURE["lines"](path))) for path in EXAMPLES)
 
 
 @pytest.mark.parametrize("package", ["synchain.models", "synchain.runtime"])

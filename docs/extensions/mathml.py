@@ -6,6 +6,8 @@ A formula with a command that it does not know is a warning.
 
 from __future__ import annotations
 
+import re
+
 from docutils import nodes
 from latex2mathml.converter import convert
 from sphinx.application import Sphinx
@@ -13,10 +15,19 @@ from sphinx.util import logging
 from sphinx.writers.html5 import HTML5Translator
 
 
+def _spaced(formula: str) -> str:
+    """Set names of functions apart from what they stand beside, and signs near, as TeX does."""
+    formula = re.sub(r"(=|&#x0003D;)</mo><mo>&#x02212;", r'\1</mo><mo form="prefix">&#x02212;', formula)
+    thin = '<mspace width="0.17em"/>'
+    name = r"(<m[io]>[a-z]{2,}</m[io]>)"
+    before = r"(</(?:mi|mn|mrow|msub|msup|mfrac)>|\)</mo>)"
+    return re.sub(f"{name}(?!<mo[^>]*>&#x00028;)", rf"\1{thin}", re.sub(before + name, rf"\1{thin}\2", formula))
+
+
 def _write(translator: HTML5Translator, node: nodes.math | nodes.math_block, display: str) -> None:
     text = node.astext()
     try:
-        formula = convert(text, display=display)
+        formula = _spaced(convert(text, display=display))
         unknown = "\\" in formula
     except Exception as error:  # the converter has no common class of errors
         formula, unknown = str(error), True

@@ -49,8 +49,9 @@ def rates(t, z):
 times = result.time.values
 theory = abs(solve_ivp(rates, (0, 200), [np.exp(-0.1j), 0.7 + 0j], "DOP853", times, rtol=1e-10, atol=1e-12).y)
 r = abs(np.exp(1j * result.states("trajectory")).reshape(-1, 2, n).mean(axis=2)).T
-print(f"r = {r[0, -1]:.6f} and {r[1, -1]:.6f}; difference from the theory {abs(r - theory).max():.0e}")
-np.testing.assert_allclose(r, theory, atol=1e-3)
+difference = abs(r - theory).max()
+print(f"r = {r[0, -1]:.6f} and {r[1, -1]:.6f}; difference from the theory {difference:.0e}")
+assert difference < 1e-4
 assert r[0, -1] > 0.999
 assert r[1].max() < 0.9
 

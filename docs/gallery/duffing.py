@@ -34,6 +34,7 @@ downwards = sc.run(scene.replace(continuation="down"))
 from scipy.integrate import solve_ivp
 
 up, down = (abs(result.trajectory.sel(component="x", node=1)).max("sample").values for result in (upwards, downwards))
+difference = 0
 for result in (upwards, downwards):
     for k in (10, 40, 70):
         w, times = frequencies[k], result.time.values[k]
@@ -43,8 +44,10 @@ for result in (upwards, downwards):
 
         start = result.states("trajectory")[k, 0]
         y = solve_ivp(rates, times[[0, -1]], start, "DOP853", times, rtol=1e-10, atol=1e-12).y
-        np.testing.assert_allclose(result.states("trajectory")[k], y.T, atol=1e-5)
+        difference = max(difference, abs(result.states("trajectory")[k] - y.T).max())
 print(f"largest amplitude: {up.max():.3f} upwards at ω = {frequencies[up.argmax()]:.3f}, {down.max():.3f} downwards")
+print(f"difference from SciPy {difference:.0e}")
+assert difference < 1e-6
 assert up.max() > 1.5 * down.max()
 
 # %%

@@ -50,9 +50,9 @@ published = """
     -3.943437585517392 -3.271380973972550  5.225081843456543 -2.590612434977470
     1.198213693392275 -0.2429682344935824  1.091449240428980"""
 found = result.states("end")[:14]
-error = abs(found - np.array(published.split(), dtype=float)).max()
-print(f"{int(result.steps)} steps, largest error of the positions {error:.1e}")
-assert error < 1e-7
+difference = abs(found - np.array(published.split(), dtype=float)).max()
+print(f"{int(result.steps)} steps, largest error of the positions {difference:.0e}")
+assert difference < 1e-7
 
 # %%
 # Figure

@@ -51,9 +51,8 @@ plt.show()
 # With the eigenvalues it becomes a range of σ: all three modes must lie where Λ is negative.  The
 # mode with the largest eigenvalue is the first to be lost.
 (window,) = function.windows
-print(
-    f"synchronous for {window.low:.4f} < σ < {window.high:.4f}; then γ = {window.high_mode.eigenvalue.number} is lost"
-)
+lost = window.high_mode.eigenvalue.number
+print(f"synchronous for {window.low:.4f} < σ < {window.high:.4f}; then γ = {lost} is lost")
 
 # %%
 # The simulation agrees
