@@ -35,10 +35,11 @@ observe = {
     "energy": sc.maximum(sc.nodes.sum(v**2 / 2)),
 }
 lap = sc.Section(sin((sc.nodes[n](theta) - sc.nodes[1](theta)) / 2), "both", keep=(v,))
-settings = {"observe": observe, "sections": {"lap": lap}, "record": (), "time_unit": "time", "rtol": 1e-11}
+times = {"time_unit": "time", "transient": 50, "window": 100, "rtol": 1e-11}
 start = {"theta": np.linspace(0, 3, n).tolist(), "v": 0}
-scene = sc.Scene(rotor, link, sc.complete(n), parameters={"P": powers}, initial=start, **settings)
-result = sc.run(scene, K=np.linspace(0.1, 3, 30), transient=50, window=100)
+watched = {"observe": observe, "sections": {"lap": lap}, "record": ()}
+scene = sc.Scene(rotor, link, sc.complete(n), parameters={"P": powers}, initial=start, **times, **watched)
+result = sc.run(scene, K=np.linspace(0.1, 3, 30))
 
 # %%
 # Check
