@@ -19,6 +19,7 @@ from ..program.lowering import lower
 from ..program.passes import Body
 from ..program.statements import Assign, Do, If, Return, Statement, accumulate, let, store, whole
 from .blocks import NodeBlocks
+from .fields import mean_fields
 from .mass import added_masses, momentum_slopes, turned_masses
 from .names import NAMES
 from .places import Joint, Kind, link_ends, named, places, span
@@ -69,6 +70,8 @@ class Looped(Step):
         for kind in self.places.kinds:
             self.node_slopes(kind, base, out)
         self.links(base, out)
+        for field in mean_fields(self.equations):
+            self.put(*field.statements(self.places, base, out))
 
     def node_slopes(self, kind: Kind, base: str, out: str) -> None:
         """The right-hand side of the nodes of one kind."""

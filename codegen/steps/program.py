@@ -58,15 +58,19 @@ def block_pattern(block: Iterable[Iterable[object]]) -> tuple[Entry, ...]:
     return tuple((a, b) for a, row in enumerate(block) for b, e in enumerate(row) if e != 0)
 
 
-def program(equations: Equations, fill: float = FILL_LIMIT) -> Program:
+def program(equations: Equations, fill: float = FILL_LIMIT, solves: bool = True) -> Program:
     """Plan the elimination of (s - J) for a network; time and memory grow with its links.
 
     Equations that differ only in what their symbols are called, or in numbers, share the program.  The factors are exact
-    unless they would have more than `fill` entries for each entry of the matrix.
+    unless they would have more than `fill` entries for each entry of the matrix.  A method that `solves` nothing has a
+    matrix without entries.
     """
     size = max(len(node.state) for node in equations.nodes)
-    own = tuple(_node_pattern(node) for node in equations.nodes)
-    joined = tuple(tuple(tuple(sorted(pattern)) for pattern in _link_patterns(edge)) for edge in equations.edges)
+    edges = [edge for layer in equations.listed for _, edge in layer.edge_of]
+    own = tuple(_node_pattern(node) if solves else () for node in equations.nodes)
+    joined = tuple(
+        tuple(tuple(sorted(pattern)) if solves else () for pattern in _link_patterns(edge)) for edge in edges
+    )
     where = tuple(table(equations).tolist()) if equations.mixed else ()
     numbers = {i: k for k, i in enumerate(by_kind(equations))}
     links = tuple((numbers[target], numbers[source], weight) for target, source, weight in by_joint(equations))
@@ -168,6 +172,8 @@ def _spans(counts: Sequence[int]) -> tuple[slice, ...]:
 def _factors(dimension: int, pattern: np.ndarray, fill: float) -> tuple[np.ndarray, np.ndarray, bool]:
     """Pivots, off-diagonal entries (2, count) of the factors, and whether they are exact."""
     off = pattern[:, pattern[0] != pattern[1]]
+    if not off.size:
+        return np.arange(dimension), off, True
     rows, columns = off.tolist()
     listed = set(pattern[0, pattern[0] == pattern[1]].tolist())
     found = _eliminate_all(dimension, rows, columns, listed, fill * (dimension + len(rows)) - dimension)

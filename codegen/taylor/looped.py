@@ -457,7 +457,7 @@ def write_looped(equations: Equations, order: int) -> TaylorStep:
     ValueError
         As `write_step`, and for a mass matrix beside links: the loop over nodes solves before links are added.
     """
-    if equations.inertial and equations.links:
+    if equations.inertial and equations.link_count:
         found = "links with inertia" if equations.inertial_links else "links of nodes with a mass matrix"
         raise ValueError(f"taylor: found {found} in a network that is stepped in loops; use dop853 or rodas5p")
     writer = LoopWriter(equations, order)

@@ -141,7 +141,7 @@ class Model:
         model = cls(kinds, tuple(numbers[own] for own in nodes), contact, tuple((None, graph) for _, graph in layers))
         spelt = []
         for coupling, graph in layers:
-            if coupling is None and graph.links:
+            if coupling is None and graph.link_count:
                 raise ValueError(
                     f"coupling: found none for {graph.name}({graph.n}), which has links; "
                     "expected the name of a coupling, e.g. 'spring'"
@@ -160,7 +160,7 @@ class Model:
     @property
     def linked(self) -> tuple[tuple[Coupling, Topology], ...]:
         """The layers that have links."""
-        return tuple((coupling, graph) for coupling, graph in self.layers if coupling is not None and graph.links)
+        return tuple((coupling, graph) for coupling, graph in self.layers if coupling is not None and graph.link_count)
 
     @property
     def topology(self) -> Topology:
@@ -218,7 +218,7 @@ class Model:
         """Return the sentence that refuses a name; a parameter of the coupling without links has its own."""
         known = tuple(known)
         for coupling, graph in self.layers:
-            if not graph.links and coupling is not None and name in coupling.parameters:
+            if not graph.link_count and coupling is not None and name in coupling.parameters:
                 return (
                     f"{what} {name!r} couples oscillators, but {graph.name}({graph.n}) has no links: "
                     f"there is nothing to couple; leave it out or take at least two oscillators, e.g. chain(2)"
@@ -244,8 +244,11 @@ def _unlinked(kinds: tuple[NodeKind, ...], kind_of: tuple[int, ...], contact: Co
 @lru_cache(maxsize=64)
 def _union(graphs: tuple[Topology, ...]) -> Topology:
     """The union of graphs: a link of weight 1 wherever one of them has a link."""
+    name, n = " and ".join(graph.name for graph in graphs), graphs[0].n
+    if any(graph.all_to_all is not None for graph in graphs):
+        return Topology(name, n, rule=topology("complete", n).rule)
     pairs = sorted({link[:2] for graph in graphs for link in graph.links})
-    return Topology(" and ".join(graph.name for graph in graphs), graphs[0].n, tuple((*p, Fraction(1)) for p in pairs))
+    return Topology(name, n, tuple((*p, Fraction(1)) for p in pairs))
 
 
 @lru_cache(maxsize=64)

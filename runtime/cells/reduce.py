@@ -290,11 +290,11 @@ def _observed_parameters(scene: Scene) -> set[str]:
 def _present(scene: Scene, equations: Equations) -> list[str]:
     """What has to be integrated, in words."""
     found = ["forcing: time occurs in the equations"] if equations.forced else []
-    if equations.links:
+    if equations.link_count:
         fixed = _fixed(scene)
         names = [*dict.fromkeys(symbol.name for edge in equations.edges for symbol in edge.parameters)]
         strengths = [f"{name} = {fixed[name]:g}" if name in fixed else f"{name} is swept" for name in names]
-        found.append(f"coupling: {', '.join([f'{len(equations.links)} links', *strengths])}")
+        found.append(f"coupling: {', '.join([f'{equations.link_count} links', *strengths])}")
     return found
 
 
@@ -304,7 +304,7 @@ def _consequence(before: Equations, after: Equations, name: str, value: float) -
     too = f" together with {', '.join(gone)}" if gone else ""
     if before.forced and not after.forced:
         return f"forcing: {name} = {value:g} in every cell, left out{too}; no time terms"
-    if before.links and not after.links:
+    if before.link_count and not after.link_count:
         return f"coupling: {name} = {value:g} in every cell, left out{too}; no links"
     return f"parameter: {name} = {value:g} in every cell, now a number of the equations{too and f'; left out{too}'}"
 
@@ -398,7 +398,7 @@ def _unwritten(reduction: Reduction) -> list[str]:
     scene, found = reduction.scene, []
     if not scene.forced:
         found.append("forcing: time does not occur in the equations; no time terms")
-    if not scene.equations.links:
+    if not scene.equations.link_count:
         found.append("coupling: no links")
     if "sync_error" not in scene.record:
         found.append("synchronisation error: not recorded")
