@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import count
 
 import sympy as sp
 
@@ -15,66 +16,68 @@ from synchain.models.graphs.links import AllPairs
 from synchain.models.interactions.separation import Separated, separated
 from synchain.models.mechanics.components import Edge, Node
 
-from ..program.expressions import Expression, Name, plus
+from ..program.expressions import Name, Value, as_expression, plus
 from ..program.lowering import lower
 from ..program.passes import Body, share
 from ..program.statements import Statement, accumulate, let
 from .places import Joint, Places, named, span
-from .step import NOW, lane
+from .step import NOW
 
 __all__ = ["MeanField", "compensated", "mean_fields"]
 
 
 @dataclass(frozen=True, slots=True)
 class MeanField:
-    """The links of all pairs as sums of products; `edge` and `node` are their template and that of the nodes."""
+    """The links of all pairs of a network, as what is done with them: sums, factors that all nodes share, and rates.
+
+    sums: the functions of the source that are summed, by names.  shared: sums of these with factors that no node has for
+    itself, by names.  rates: what is added to the rates of a node, in these names and functions of the node.
+    """
 
     edge: Edge
     node: Node
-    pairs: AllPairs
-    parts: Separated
+    shifted: tuple[int, ...]
+    sums: dict[sp.Symbol, sp.Expr]
+    shared: dict[sp.Symbol, sp.Expr]
+    rates: tuple[sp.Expr, ...]
 
-    def totals(self) -> list[sp.Symbol]:
-        """What the sums of the source functions are called."""
-        return [sp.Symbol(f"sum_{m}", real=True) for m in range(len(self.parts.sources))]
-
-    def added(self) -> dict[sp.Symbol, int]:
-        """The sums to be formed, and which source function each is of; the sum of ones is the number of nodes."""
-        return {s: m for m, s in enumerate(self.totals()) if self.parts.sources[m] != 1}
-
-    def rates(self) -> list[sp.Expr]:
-        """What the field adds to the rates of a node, in the names of the sums; the node's own part is subtracted."""
-        known = {s: sp.Integer(self.pairs.n) for s in self.totals() if s not in self.added()}
-        totals = [known.get(s, s) for s in self.totals()]
-        weight = {self.edge.weight: sp.Rational(self.pairs.weight.numerator, self.pairs.weight.denominator)}
-        found = (
-            sp.Add(*(a * s for a, s in zip(row, totals, strict=True))) - own
-            for row, own in zip(self.parts.factors, self.parts.own, strict=True)
-        )
-        return [e.xreplace(weight) for e in found]
+    @classmethod
+    def of(cls, number: int, edge: Edge, node: Node, pairs: AllPairs, parts: Separated) -> MeanField:
+        """The mean field of this number among those of a network."""
+        weight = {edge.weight: sp.Rational(pairs.weight.numerator, pairs.weight.denominator)}
+        symbols = {e: sp.Symbol(f"sum_{number}_{k}", real=True) for k, e in enumerate(parts.sources) if e != 1}
+        totals = {sp.S.One: sp.Integer(pairs.n), **symbols}
+        shared: dict[sp.Expr, sp.Symbol] = {}
+        rates = []
+        for own, row in zip(parts.own, parts.products, strict=True):
+            grouped: dict[sp.Expr, sp.Expr] = {}
+            for factor, target, source in row:
+                grouped[target] = grouped.get(target, sp.S.Zero) + factor.xreplace(weight) * totals[source]
+            rate = -own.xreplace(weight)
+            for target, total in grouped.items():
+                s = shared.setdefault(total, sp.Symbol(f"sum_{number}_of_{len(shared)}", real=True))
+                rate += target.xreplace(weight) * s
+            rates.append(rate)
+        sums = {s: e.xreplace(weight) for e, s in symbols.items()}
+        return cls(edge, node, parts.shifted, sums, {s: e for e, s in shared.items()}, tuple(rates))
 
     def statements(self, places: Places, base: str, out: str) -> list[Statement]:
         """Both loops, at one vector of states; they add to the slopes in `out`."""
-        names = (sp.Symbol(f"sum_part_{k}", real=True) for k in range(10**9))
+        names = (sp.Symbol(f"sum_part_{k}", real=True) for k in count())
         swap = named(Joint(self.edge, self.node, self.node, span("e", 0))) | NOW
-        weight = {self.edge.weight: sp.Rational(self.pairs.weight.numerator, self.pairs.weight.denominator)}
-        added = self.added()
-        sources = [self.parts.sources[m].xreplace(weight).xreplace(swap) for m in added.values()]
-        totals = [s.name for s in added]
-        found: list[Statement] = []
-        if self.parts.shifted:
-            found += places.read(self.node, base, "_first", "0")
-        for total in totals:
-            found += [let(total, 0.0 * Name("h")), let(f"{total}_rest", 0.0 * Name("h"))]
-        body = share(sources, names)
+        found = places.read(self.node, base, "_first", "0") if self.shifted else []
+        used = {s for e in self.sums.values() for s in e.free_symbols}
+        body = share([e.xreplace(swap) for e in self.sums.values()], names)
         there = self.states(places, base, "_there", "j")
-        there += [let(name, load) for name, load in places.of_source(self.edge, self.used(sources, swap))]
+        there += [let(name, load) for name, load in places.of_source(self.edge, used)]
         there += assigned(body)
-        for total, e in zip(totals, body.results, strict=True):
-            there += compensated(total, lane(lower(e)))
-        if totals:
+        for total, e in zip(self.sums, body.results, strict=True):
+            found += [let(total.name, 0.0 * Name("h")), let(f"{total}_rest", 0.0 * Name("h"))]
+            there += compensated(total.name, lower(e))
+        if self.sums:
             found.append(span("j", "NODES").over(there))
-        body = share([e.xreplace(swap) for e in self.rates()], names)
+        found += [let(s.name, lower(e.xreplace(NOW))) for s, e in self.shared.items()]
+        body = share([e.xreplace(swap) for e in self.rates], names)
         here = self.states(places, base, "_here", "i") + places.own(body) + assigned(body)
         for c, e in enumerate(body.results):
             if e != 0:
@@ -84,32 +87,27 @@ class MeanField:
     def states(self, places: Places, base: str, suffix: str, index: str) -> list[Statement]:
         """Load the states of a node; those of which differences alone matter are counted from the first node's."""
         found = places.read(self.node, base, suffix, index)
-        for k in self.parts.shifted:
+        for k in self.shifted:
             name = self.node.state[k].name
             found.append(let(f"{name}{suffix}", Name(f"{name}{suffix}") - Name(f"{name}_first")))
         return found
-
-    def used(self, sources: list[sp.Expr], swap: dict[sp.Symbol, sp.Symbol]) -> set[sp.Symbol]:
-        """The parameters of the source that the source functions use."""
-        symbols = {s for e in sources for s in e.free_symbols}
-        return {s for s, _ in self.edge.theirs if swap[s] in symbols}
 
 
 def mean_fields(equations: Equations) -> list[MeanField]:
     """Return the mean fields of a network of equal nodes."""
     found = []
-    for edge, pairs in equations.fields:
+    for number, (edge, pairs) in enumerate(equations.fields):
         parts = separated(edge, equations.varied)
         if parts is None:
             raise RuntimeError(f"the rates {edge.rhs} of links of all pairs do not separate; this is a mistake in the program")
-        found.append(MeanField(edge, equations.node, pairs, parts))
+        found.append(MeanField.of(number, edge, equations.node, pairs, parts))
     return found
 
 
-def compensated(total: str, value: Expression) -> Iterator[Statement]:
+def compensated(total: str, value: Value) -> Iterator[Statement]:
     """Add a value to a sum and keep what rounding cuts off for the next one."""
     rest, part, new = (f"{total}_{word}" for word in ("rest", "part", "new"))
-    yield let(part, value - Name(rest))
+    yield let(part, as_expression(value) - Name(rest))
     yield let(new, Name(total) + part)
     yield let(rest, (Name(new) - Name(total)) - Name(part))
     yield let(total, new)

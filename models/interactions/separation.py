@@ -29,10 +29,13 @@ _THEOREMS: dict[type[sp.Expr], Callable[[sp.Expr, sp.Expr], tuple[tuple[sp.Expr,
 }
 """Addition theorems: f(a + b) as a sum of products."""
 
+_SLOPES = {sp.sin: (sp.cos, 1), sp.cos: (sp.sin, -1)}
+"""The derivatives of waves, with their signs: f(x + lag) = cos(lag) f(x) + sin(lag) f'(x)."""
+
 Symbols = frozenset[sp.Symbol]
 
-Products = dict[sp.Expr, sp.Expr]
-"""Functions of the target by the functions of the source that they are multiplied with."""
+Products = dict[tuple[sp.Expr, sp.Expr], sp.Expr]
+"""What all nodes share, by the functions of target and source that it multiplies."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,10 +44,9 @@ class Separated:
 
     Parameters
     ----------
-    sources : tuple of Expr
-        Functions of the source, and of what all nodes share.
-    factors : tuple of tuple of Expr
-        For each state of the target the functions of the target that multiply these.
+    products : tuple of tuple of (Expr, Expr, Expr)
+        For each state of the target the terms of its rate: what all nodes share, a function of the target, and one of the
+        source.
     own : tuple of Expr
         What the link would add between a node and itself: a sum over all nodes has it too much.
     shifted : tuple of int
@@ -52,10 +54,14 @@ class Separated:
         so that sums of powers and of exponentials keep their digits however far all nodes have moved together.
     """
 
-    sources: tuple[sp.Expr, ...]
-    factors: tuple[tuple[sp.Expr, ...], ...]
+    products: tuple[tuple[tuple[sp.Expr, sp.Expr, sp.Expr], ...], ...]
     own: tuple[sp.Expr, ...]
     shifted: tuple[int, ...]
+
+    @property
+    def sources(self) -> tuple[sp.Expr, ...]:
+        """The functions of the source, each once."""
+        return tuple(dict.fromkeys(source for row in self.products for _, _, source in row))
 
 
 @lru_cache(maxsize=64)
@@ -74,33 +80,35 @@ def separated(edge: Edge, varied: tuple[str, ...] = ()) -> Separated | None:
     theirs = dict(edge.theirs)
     source = frozenset((*edge.there, *theirs))
     target = frozenset((*edge.here, *(s for s in edge.parameters if s.name in varied)))
-    found = [_products(e, target, source) for e in edge.rhs]
-    if any(products is None or len(products) > MOST_PRODUCTS for products in found):
-        return None
-    rows = [products for products in found if products is not None]
-    if not all(_vanishes(e - sum(a * b for b, a in row.items())) for e, row in zip(edge.rhs, rows, strict=True)):
-        return None
-    sources = tuple(dict.fromkeys(b for row in rows for b in row))
-    factors = tuple(tuple(row.get(b, sp.S.Zero) for b in sources) for row in rows)
+    rows = []
+    for e in edge.rhs:
+        row = _products(e, target, source)
+        if row is None or len(row) > MOST_PRODUCTS or not _vanishes(e - sum(c * a * b for (a, b), c in row.items())):
+            return None
+        rows.append(tuple((c, a, b) for (a, b), c in row.items()))
     itself = {**dict(zip(edge.there, edge.here, strict=True)), **theirs}
-    return Separated(sources, factors, tuple(e.xreplace(itself) for e in edge.rhs), _shifted(edge, sources))
+    own = tuple(e.xreplace(itself) for e in edge.rhs)
+    return Separated(tuple(rows), own, _shifted(edge, {b for row in rows for _, _, b in row}))
 
 
 def _products(e: sp.Expr, target: Symbols, source: Symbols) -> Products | None:
     """An expression as a sum of products, None if it is not seen to be one."""
-    if not e.free_symbols & source:
-        return {sp.S.One: e}
-    if e.is_Add:
-        return _sum([_products(part, target, source) for part in e.args])
+    here, there = bool(e.free_symbols & target), bool(e.free_symbols & source)
+    if not here and not there:
+        return {(sp.S.One, sp.S.One): e}
     if e.is_Mul:
-        found: Products | None = {sp.S.One: sp.S.One}
+        found: Products | None = {(sp.S.One, sp.S.One): sp.S.One}
         for part in e.args:
             found = _times(found, _products(part, target, source))
         return found
-    if not e.free_symbols & target:
-        return _scaled(e, sp.S.One)
+    if not there:
+        return {(e, sp.S.One): sp.S.One}
+    if e.is_Add:
+        return _sum([_products(part, target, source) for part in e.args])
+    if not here:
+        return {(sp.S.One, e): sp.S.One}
     if e.is_Pow and e.exp.is_Integer and 1 < e.exp <= MOST_PRODUCTS:
-        base, found = _products(e.base, target, source), {sp.S.One: sp.S.One}
+        base, found = _products(e.base, target, source), {(sp.S.One, sp.S.One): sp.S.One}
         for _ in range(int(e.exp)):
             found = _times(found, base)
         return found
@@ -108,34 +116,30 @@ def _products(e: sp.Expr, target: Symbols, source: Symbols) -> Products | None:
 
 
 def _by_theorem(e: sp.Expr, target: Symbols, source: Symbols) -> Products | None:
-    """A function with an addition theorem whose argument is a function of the target plus one of the source."""
+    """A function with an addition theorem whose argument is a function of the target plus one of the source.
+
+    What all nodes share in the argument of a sine or cosine becomes factors: a lag costs nothing at the nodes.
+    """
     theorem = _THEOREMS.get(e.func)
     if theorem is None:
         return None
     terms = sp.Add.make_args(sp.expand(e.args[0]))
     theirs = sp.Add(*(part for part in terms if part.free_symbols & source))
-    own = sp.Add(*terms) - theirs
+    own = sp.Add(*(part for part in terms if part.free_symbols & target))
+    lag = sp.Add(*terms) - theirs - own
     if theirs.free_symbols & target:
         return None
-    return _sum([_scaled(b, _without_lag(a, target)) for a, b in theorem(own, theirs)])
+    if e.func not in _SLOPES:
+        return _sum([_one(sp.S.One, a, b) for a, b in theorem(own + lag, theirs)])
+    slope, sign = _SLOPES[e.func]
+    turned = ((sp.cos(lag), e.func), (sign * sp.sin(lag), slope))
+    return _sum([_one(c, a, b) for c, wave in turned for a, b in _THEOREMS[wave](own, theirs)])
 
 
-def _without_lag(e: sp.Expr, target: Symbols) -> sp.Expr:
-    """A sine or cosine with what all nodes share in its argument as a factor: sin(x + a) = cos a sin x + sin a cos x."""
-    wave = next(iter(e.atoms(sp.sin, sp.cos)), None)
-    if wave is None:
-        return e
-    terms = sp.Add.make_args(wave.args[0])
-    lag = sp.Add(*(part for part in terms if not part.free_symbols & target))
-    if lag == 0:
-        return e
-    return e.xreplace({wave: sum(a * b for a, b in _THEOREMS[wave.func](sp.Add(*terms) - lag, lag))})
-
-
-def _scaled(b: sp.Expr, a: sp.Expr) -> Products:
-    """One product; a number in front of the source's function belongs to the target's."""
-    number, rest = b.as_coeff_Mul()
-    return {rest: number * a}
+def _one(c: sp.Expr, a: sp.Expr, b: sp.Expr) -> Products:
+    """One product, its numbers in front."""
+    (p, a), (q, b) = a.as_coeff_Mul(), b.as_coeff_Mul()
+    return {(a, b): p * q * c}
 
 
 def _sum(parts: list[Products | None]) -> Products | None:
@@ -143,15 +147,15 @@ def _sum(parts: list[Products | None]) -> Products | None:
     for part in parts:
         if part is None:
             return None
-        for b, a in part.items():
-            total[b] = total.get(b, sp.S.Zero) + a
-    return {b: a for b, a in total.items() if a != 0}
+        for key, c in part.items():
+            total[key] = total.get(key, sp.S.Zero) + c
+    return {key: c for key, c in total.items() if c != 0}
 
 
 def _times(left: Products | None, right: Products | None) -> Products | None:
     if left is None or right is None or len(left) * len(right) > MOST_PRODUCTS**2:
         return None
-    return _sum([{b * d: a * c} for b, a in left.items() for d, c in right.items()])
+    return _sum([_one(c * d, a * g, b * h) for (a, b), c in left.items() for (g, h), d in right.items()])
 
 
 def _vanishes(e: sp.Expr) -> bool:
@@ -159,7 +163,7 @@ def _vanishes(e: sp.Expr) -> bool:
     return bool(sp.expand(e.rewrite([sp.sin, sp.cos, sp.sinh, sp.cosh], sp.exp)) == 0)
 
 
-def _shifted(edge: Edge, sources: tuple[sp.Expr, ...]) -> tuple[int, ...]:
+def _shifted(edge: Edge, sources: set[sp.Expr]) -> tuple[int, ...]:
     """States whose common shift changes nothing, but those that enter sines and cosines alone, which stay small."""
     distance = sp.Dummy("shift", real=True)
     found = []

@@ -225,7 +225,7 @@ def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> R
         equations,
         tuple(r for r in scene.record if not (together and r == "sync_error")),
         _node_merge(whole, equations, classes, together),
-        np.array([whole.parameters.index(_column(name, equations, first)) for name in equations.parameters], dtype=int),
+        _columns(whole, equations, first),
         _multiplicity(scene, classes),
         tuple(skipped),
         tuple(kept),
@@ -242,6 +242,12 @@ def _node_merge(whole: Equations, reduced: Equations, classes: tuple[int, ...], 
             states[list(reduced.places[k])] = whole.places[node]
         places[list(whole.places[node])] = reduced.places[k]
     return NodeMerge(states, places, together)
+
+
+def _columns(whole: Equations, reduced: Equations, first: list[int]) -> np.ndarray:
+    """The columns of the whole network's parameters that a reduced one has; its node k stands for first[k]."""
+    column = {name: k for k, name in enumerate(whole.parameters)}
+    return np.array([column[_column(name, reduced, first)] for name in reduced.parameters], dtype=int)
 
 
 def _column(name: str, equations: Equations, first: list[int]) -> str:
@@ -261,7 +267,7 @@ def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> 
     """Fold parameters one after the other, and say what each of them took along."""
     equations, fixed, observed = scene.equations, _fixed(scene), _observed_parameters(scene)
     for name, value in fixed.items():
-        if name not in equations.parameters or (value != 0.0 and not fold_all):
+        if (value != 0.0 and not fold_all) or name not in equations.parameters:
             continue
         try:
             made = substitute_constants(equations, {name: Fraction(repr(value))})
