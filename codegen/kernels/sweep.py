@@ -11,6 +11,7 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import angular_frequency
 from synchain.models.dynamics.record import Record
+from synchain.models.graphs.links import LINK_LIMIT
 
 from .. import driver
 from ..driver.dimensions import Dimensions, ModeDimensions
@@ -294,6 +295,11 @@ def _for_many(method: Integrator, equations: Equations, unroll: int) -> Integrat
     """The method as looped kernels have it; ValueError for what only written-out kernels can."""
     if method.inexact:
         raise ValueError(f"integrator {method.name}: steps at most {unroll} nodes, found {equations.n}; use rodas5p")
+    if method.implicit and any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
+        raise ValueError(
+            f"integrator {method.name}: found a mean field of {equations.n} nodes, whose Jacobian has an entry for each pair; "
+            f"expected at most {LINK_LIMIT} pairs; use dop853 or taylor"
+        )
     return replace(method, smooth=None)
 
 

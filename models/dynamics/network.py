@@ -174,8 +174,8 @@ def _layer(apart: Equations, link: Edge, graph: Topology) -> Layer:
         return Layer((((0, 0), shared),), AllPairs(graph.n, weight))
     if weight is not None and graph.link_count > LINK_LIMIT:
         raise ValueError(
-            f"links of {graph.name}({graph.n}): found {graph.link_count}, whose rates {', '.join(map(str, link.rhs))} are no "
-            f"finite sum of products of target and source; expected such a sum, or at most {LINK_LIMIT} links"
+            f"mean field of {graph}: found the rates {', '.join(map(str, link.rhs))}; expected a finite sum of products, "
+            f"functions of the target times functions of the source, or at most {LINK_LIMIT} links, which can be listed"
         )
     return Layer((((0, 0), shared),), oriented_links(graph) if graph.link_count and link.oriented else graph.links)
 

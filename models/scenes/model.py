@@ -14,6 +14,7 @@ from ..dynamics import network
 from ..dynamics.equations import Equations
 from ..graphs import readers
 from ..graphs.families import topology
+from ..graphs.links import LINK_LIMIT
 from ..graphs.topology import Topology
 from ..inputs.checks import check_integer, check_keys, check_number, check_table, short_repr, suggestion
 from ..inputs.frozen import Frozen
@@ -188,10 +189,9 @@ class Model:
 
     def check_links(self) -> None:
         """Raise ValueError if a coupling cannot join the oscillators of a graph with links."""
-        if self.linked and len(self.kinds) > 1:
+        if self.linked and (len(self.kinds) > 1 or any(graph.link_count > LINK_LIMIT for _, graph in self.linked)):
             self.equations()
-            return
-        for coupling, _ in self.linked:
+        for coupling, _ in self.linked if len(self.kinds) == 1 else ():
             coupling.check_ends(self.unlinked.node)
 
     def holders(self, name: str) -> tuple[int, ...]:
