@@ -95,7 +95,7 @@ def _products(e: sp.Expr, target: Symbols, source: Symbols) -> Products | None:
     """An expression as a sum of products, None if it is not seen to be one."""
     here, there = bool(e.free_symbols & target), bool(e.free_symbols & source)
     if not here and not there:
-        return {(sp.S.One, sp.S.One): e}
+        return {(sp.S.One, sp.S.One): e} if e != 0 else {}
     if e.is_Mul:
         found: Products | None = {(sp.S.One, sp.S.One): sp.S.One}
         for part in e.args:
