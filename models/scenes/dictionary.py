@@ -182,9 +182,12 @@ def _coupling(coupling: Coupling | None) -> object:
 
 
 def graph_table(graph: Topology) -> dict[str, object]:
-    """Return a graph in JSON types: its family and options, the operation that made it, or its matrix; `graph_of` reads it."""
+    """Return a graph in JSON types: its family and options, or its matrix; `graph_of` reads it.
+
+    Of a weighted complete graph, whose matrix may be too large, it is the text of the operation.
+    """
     try:
-        composed = is_composed(graph.name) and not graph.options
+        composed = graph.all_to_all is not None and is_composed(graph.name)
         same = (read_graph(graph.name) if composed else topology(graph.name, graph.n, **dict(graph.options))) == graph
     except (ValueError, TypeError):
         same = False
