@@ -16,10 +16,10 @@ from synchain.models.graphs.links import AllPairs
 from synchain.models.interactions.separation import Separated, separated
 from synchain.models.mechanics.components import Edge, Node
 
-from ..program.expressions import Name, Value, as_expression, plus
+from ..program.expressions import Load, Name, Value, as_expression, plus
 from ..program.lowering import lower
 from ..program.passes import Body, share
-from ..program.statements import Statement, accumulate, let
+from ..program.statements import Statement, accumulate, let, store
 from .places import Joint, Places, named, span
 from .step import NOW
 
@@ -61,11 +61,22 @@ class MeanField:
         sums = {s: e.xreplace(weight) for e, s in symbols.items()}
         return cls(edge, node, parts.shifted, sums, {s: e for e, s in shared.items()}, tuple(rates))
 
-    def statements(self, places: Places, base: str, out: str) -> list[Statement]:
-        """Both loops, at one vector of states; they add to the slopes in `out`."""
+    @property
+    def alike(self) -> dict[sp.Symbol, sp.Expr]:
+        """The functions of the source that occur as functions of the target too, by the names of their sums."""
+        swap = {**dict(zip(self.edge.there, self.edge.here, strict=True)), **dict(self.edge.theirs)}
+        found = {s: e.xreplace(swap) for s, e in self.sums.items()}
+        return {s: e for s, e in found.items() if not e.is_Symbol and any(rate.has(e) for rate in self.rates)}
+
+    def statements(self, places: Places, base: str, out: str, kept: int = 0) -> list[Statement]:
+        """Both loops, at one vector of states; they add to the slopes in `out`.
+
+        What a node is as a source and as a target is computed once, and stands in FIELD behind `kept` others meanwhile.
+        """
         names = (sp.Symbol(f"sum_part_{k}", real=True) for k in count())
         swap = named(Joint(self.edge, self.node, self.node, span("e", 0))) | NOW
         found = places.read(self.node, base, "_first", "0") if self.shifted else []
+        at = {s: Name("FIELD") + k * Name("NODES") for k, s in enumerate(self.alike, start=kept)}
         used = {s for e in self.sums.values() for s in e.free_symbols}
         body = share([e.xreplace(swap) for e in self.sums.values()], names)
         there = self.states(places, base, "_there", "j")
@@ -73,12 +84,18 @@ class MeanField:
         there += assigned(body)
         for total, e in zip(self.sums, body.results, strict=True):
             found += [let(total.name, 0.0 * Name("h")), let(f"{total}_rest", 0.0 * Name("h"))]
+            if total in at:
+                there += [let(f"{total}_own", lower(e)), store("dense", at[total] + "j", f"{total}_own")]
+                e = sp.Symbol(f"{total}_own", real=True)
             there += compensated(total.name, lower(e))
         if self.sums:
             found.append(span("j", "NODES").over(there))
         found += [let(s.name, lower(e.xreplace(NOW))) for s, e in self.shared.items()]
-        body = share([e.xreplace(swap) for e in self.rates], names)
-        here = self.states(places, base, "_here", "i") + places.own(body) + assigned(body)
+        own = {e: sp.Symbol(f"{s}_own", real=True) for s, e in self.alike.items()}
+        body = share([e.xreplace(own).xreplace(swap) for e in self.rates], names)
+        here = self.states(places, base, "_here", "i") + places.own(body)
+        here += [let(f"{s}_own", Load("dense", place + "i")) for s, place in at.items()]
+        here += assigned(body)
         for c, e in enumerate(body.results):
             if e != 0:
                 here.append(accumulate("dense", plus(Name(out), places.place(c)), lower(e)))
@@ -99,7 +116,9 @@ def mean_fields(equations: Equations) -> list[MeanField]:
     for number, (edge, pairs) in enumerate(equations.fields):
         parts = separated(edge, equations.varied)
         if parts is None:
-            raise RuntimeError(f"the rates {edge.rhs} of links of all pairs do not separate; this is a mistake in the program")
+            raise RuntimeError(
+                f"the rates {edge.rhs} of links of all pairs do not separate; this is a mistake in the program"
+            )
         found.append(MeanField.of(number, edge, equations.node, pairs, parts))
     return found
 

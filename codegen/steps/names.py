@@ -23,7 +23,7 @@ NAMES = (
 
 RESERVED = frozenset(
     {"i", "j", "k", "e", "old", "new", "graph", "weights", "pair", "factorise", "solve", "NODES", "DIMENSION",
-     "DENSE_ROWS",
+     "DENSE_ROWS", "FIELD",
      "ENTRIES", "STATE", "SLOPE", "TIME_SLOPE", "MATRIX", *(f"K{i}" for i in range(1, 32)),
      "MASS", "RATES", "where", "t", "h", "y", "y_new", "dense",
      "shift", "reach", "rate", "error", "size", "rtol", "atol", "node", "node_linear",

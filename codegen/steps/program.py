@@ -23,6 +23,7 @@ from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import Edge, Node
 
 from .elimination import Entry, Plan
+from .fields import mean_fields
 from .mass import added_masses, momentum_slopes, turned_masses
 from .places import by_joint, by_kind, joint_numbers, table
 from .step import Step
@@ -270,9 +271,10 @@ def workspace(w: Step, elimination: Program) -> int:
     """Groups of scratch memory: stages, stage state, slopes, time slopes and, for implicit methods, the matrix.
 
     Factors of an incomplete elimination stand beside the matrix, exact ones replace it.  Where M depends on the state, an
-    implicit method keeps the rates at the start and a second matrix.
+    implicit method keeps the rates at the start and a second matrix.  A mean field keeps what nodes are as sources.
     """
     vectors = (len(w.method.c) + 3) * w.equations.dimension
+    vectors += sum(len(field.alike) for field in mean_fields(w.equations)) * w.equations.n
     if not w.method.implicit and not w.equations.inertial:
         return vectors
     matrix = elimination.entries if elimination.exact else 2 * elimination.entries

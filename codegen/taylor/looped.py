@@ -208,7 +208,10 @@ class Totals(Section):
         for name, rate in self.rates:
             value = self.start(rate) if first else self.of(rate)
             if value != ZERO:
-                self.lines += [*statement(Assign(f"{name}_value", value)), *LANES.lines(compensated(name, f"{name}_value"))]
+                self.lines += [
+                    *statement(Assign(f"{name}_value", value)),
+                    *LANES.lines(compensated(name, f"{name}_value")),
+                ]
 
     @property
     def remembered(self) -> set[Series]:
@@ -250,8 +253,8 @@ class LoopWriter:
             self.waves.waves[self.time] = self.waves
         self.sections = [self.node(kind, *found) for kind, found in zip(kinds, nodes, strict=True)]
         self.sections += [self.link(joint, *found) for joint, found in zip(joints, links, strict=True)]
-        for field, found in zip(self.fields, fields, strict=True):
-            self.sections += self.field(field, *found)
+        for mean, parts in zip(self.fields, fields, strict=True):
+            self.sections += self.field(mean, *parts)
         self.kinks = any(section.graph.kinks for section in (self.waves, *self.sections))
         self.orders = order + 1 if self.kinks else order
 
@@ -294,7 +297,8 @@ class LoopWriter:
         """What a mean field sums, what all nodes make of that, and what it adds, parted like the rates of links."""
         sums, shared = list(field.sums.values()), list(field.shared.values())
         more = (*field.sums, *field.shared)
-        return tuple(self.of_links(field.edge, e, more) for e in (sums, shared, field.rates))
+        first, second, third = (self.of_links(field.edge, e, more) for e in (sums, shared, field.rates))
+        return first, second, third
 
     def link(
         self,
@@ -323,7 +327,12 @@ class LoopWriter:
         return section
 
     def end(
-        self, section: Section, symbols: Sequence[sp.Symbol], node: Node, at: tuple[str, str], used: Container[sp.Symbol]
+        self,
+        section: Section,
+        symbols: Sequence[sp.Symbol],
+        node: Node,
+        at: tuple[str, str],
+        used: Container[sp.Symbol],
     ) -> tuple[dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]:
         """The states at one end of a link that are used: series of those that move, names of those at rest.
 
@@ -366,9 +375,8 @@ class LoopWriter:
         combined.rates = [("", series) for series in common.values() if not isinstance(series, Constant)]
         yield combined
         target = Section(Graph(self.names), head_of(nodes), "i", self.equations.n, adds=True)
-        alike = {**dict(zip(edge.there, edge.here, strict=True)), **dict(edge.theirs)}
-        pairs = zip(sums[0], found, strict=True)
-        lent = {e.xreplace(alike): series for e, series in pairs if series in totals.graph.series}
+        made = dict(zip(field.sums, found, strict=True))
+        lent = {e: made[s] for s, e in field.alike.items() if made[s] in totals.graph.series}
         borrowed = {e: sp.Symbol(series.name, real=True) for e, series in lent.items()}
         wanted = [e.xreplace(borrowed) for e in rates[0]]
         used = {s for e in wanted for s in e.free_symbols}
@@ -395,9 +403,7 @@ class LoopWriter:
                 moving[symbols[k]] = section.graph.sum([(ONE, state), (Number(-1.0), first)])
         return moving, fixed
 
-    def seen(
-        self, section: Section, other: Section, series: Mapping[sp.Symbol, Series]
-    ) -> dict[sp.Symbol, Series]:
+    def seen(self, section: Section, other: Section, series: Mapping[sp.Symbol, Series]) -> dict[sp.Symbol, Series]:
         """The series of another section as this one reads them; constants are no different."""
         fixed: dict[sp.Symbol, Series] = {symbol: s for symbol, s in series.items() if isinstance(s, Constant)}
         found: dict[sp.Symbol, Series] = {s: State(name=own.name) for s, own in series.items() if s not in fixed}
@@ -505,7 +511,9 @@ class LoopWriter:
             }
             sizes |= {name: self.orders * section.count for name in sorted(kept - {"t", ""})}
             sizes |= {name: section.count for name in section.kept}
-            sizes |= dict.fromkeys((name for name, _ in section.rates), self.orders) if isinstance(section, Totals) else {}
+            sizes |= (
+                dict.fromkeys((name for name, _ in section.rates), self.orders) if isinstance(section, Totals) else {}
+            )
         lines, size = [], 0
         for name, groups in sizes.items():
             lines.append(f"at_{name} = DENSE_ROWS*DIMENSION + {size}")

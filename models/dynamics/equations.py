@@ -92,7 +92,7 @@ class Equations(_Cached, Written):
 
     @classmethod
     def of_equal_nodes(
-        cls, node: Node, edge: Edge | None, n: int, links: tuple[Link, ...] = (), varied: tuple[str, ...] = ()
+        cls, node: Node, edge: Edge | None, n: int, links: Links = (), varied: tuple[str, ...] = ()
     ) -> Equations:
         """Return the equations of a network of equal nodes.
 

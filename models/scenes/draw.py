@@ -119,9 +119,7 @@ def _drawn(what: str, value: object, count: int) -> Draws:
         return _read(what, value)
     listed = value.tolist() if hasattr(value, "tolist") else value
     if not isinstance(listed, Sequence) or len(listed) != count:
-        raise ValueError(
-            f"{what}: found {short_repr(listed)}; expected {KNOWN} or {count} entries"
-        )
+        raise ValueError(f"{what}: found {short_repr(listed)}; expected {KNOWN} or {count} entries")
     rows = [row if isinstance(row, Sequence) and not isinstance(row, str) else (row,) for row in listed]
     if len({len(row) for row in rows}) != 1:
         raise ValueError(f"{what}: found rows of different lengths; expected one number, or one for each node, in each")
@@ -136,9 +134,7 @@ class _Distributions(Algebra[Draw]):
     deepest = 2
 
     def refuse(self, node: ast.expr, reason: str) -> NoReturn:
-        raise ValueError(
-            f"{self.what}: found {short_repr(ast.unparse(node))}; expected {KNOWN}"
-        )
+        raise ValueError(f"{self.what}: found {short_repr(ast.unparse(node))}; expected {KNOWN}")
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[None]:
         if function not in tuple(Distribution) or count != 2 or options:

@@ -174,7 +174,7 @@ def _graphs() -> list[Table]:
     rows = {"type": "array", "minItems": 1, "items": {"type": "array", "items": NUMBER}}
     outside = {"type": "object", "properties": {"name": FILE, "n": WHOLE}, "required": ["name", "n"]}
     matrix = {"matrix": rows, "name": TEXT, "n": WHOLE}
-    composed = {"name": {"type": "string", "pattern": r"\("}, "n": WHOLE}
+    composed: dict[str, Table] = {"name": {"type": "string", "pattern": r"\("}, "n": WHOLE}
     return [
         *(_family(family(name)) for name in families()),
         outside,

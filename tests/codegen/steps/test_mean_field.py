@@ -106,7 +106,9 @@ def test_equations_of_a_million_nodes_list_no_link() -> None:
     assert field.link_count == 10**6 * (10**6 - 1)
     assert "999999000000 links" in repr(field)
     assert len(field.digest) == 64
-    with pytest.raises(ValueError, match=f"found 999999000000 links between 1000000 nodes; expected at most {LINK_LIMIT}"):
+    with pytest.raises(
+        ValueError, match=f"found 999999000000 links between 1000000 nodes; expected at most {LINK_LIMIT}"
+    ):
         field.without_fields()
 
 

@@ -18,7 +18,9 @@ GAP = X_J - X
 def edge(*rates: sp.Expr, theirs: bool = False, **options: object) -> Edge:
     """A link between nodes of two states."""
     pairs = ((OMEGA_J, OMEGA),) if theirs else ()
-    return Edge((X, Y), (X_J, Y_J), W, (*rates, *[sp.S.Zero] * (2 - len(rates))), (K, A, OMEGA), theirs=pairs, **options)
+    return Edge(
+        (X, Y), (X_J, Y_J), W, (*rates, *[sp.S.Zero] * (2 - len(rates))), (K, A, OMEGA), theirs=pairs, **options
+    )
 
 
 SEPARATE = {
@@ -58,7 +60,9 @@ def test_products_are_the_link(name: str) -> None:
     symbols = (X, Y, X_J, Y_J, W, K, A, OMEGA, OMEGA_J, TIME)
     values = dict(zip(symbols, np.random.default_rng(3).uniform(0.2, 1.0, len(symbols)), strict=True))
     for rate, row in zip(link.rhs, found.products, strict=True):
-        assert float(sum(c * a * b for c, a, b in row).subs(values) if row else 0) == pytest.approx(float(rate.subs(values)))
+        assert float(sum(c * a * b for c, a, b in row).subs(values) if row else 0) == pytest.approx(
+            float(rate.subs(values))
+        )
         for shared, target, source in row:
             assert not shared.free_symbols & {X, Y, X_J, Y_J, OMEGA, OMEGA_J}
             assert not target.free_symbols & {X_J, Y_J, OMEGA_J}
@@ -83,6 +87,9 @@ def test_a_parameter_that_all_share_may_stand_anywhere() -> None:
 
 @pytest.mark.parametrize("name", ["sine", "lag", "hyperbolic", "exponential"])
 def test_a_wrong_theorem_does_not_pass_the_proof(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    wrong = {f: lambda a, b, theorem=theorem: tuple((-g, h) for g, h in theorem(a, b)) for f, theorem in separation._THEOREMS.items()}
+    wrong = {
+        f: lambda a, b, theorem=theorem: tuple((-g, h) for g, h in theorem(a, b))
+        for f, theorem in separation._THEOREMS.items()
+    }
     monkeypatch.setattr(separation, "_THEOREMS", wrong)
     assert separated.__wrapped__(SEPARATE[name][0]) is None

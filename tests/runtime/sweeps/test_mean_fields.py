@@ -16,8 +16,8 @@ from synchain.runtime.cells.reduce import reduce_scene
 
 THETA, OMEGA, K, LAG = sp.symbols("theta omega K lag")
 PHASE = sc.Field({THETA: OMEGA}, parameters={OMEGA: 0})
-I, J, W = sc.ends(PHASE)
-SINE = sc.Rates({I.theta: K * W * sp.sin(J.theta - I.theta - LAG)}, {K: 1, LAG: 0})
+HERE, THERE, W = sc.ends(PHASE)
+SINE = sc.Rates({HERE.theta: K * W * sp.sin(THERE.theta - HERE.theta - LAG)}, {K: 1, LAG: 0})
 ORDER = sc.end(abs(sc.nodes.mean(sp.exp(sp.I * THETA))))
 LARGE = 3000
 """Nodes whose links are more than can be listed."""
@@ -68,7 +68,9 @@ def test_a_scene_of_many_phases_lists_no_link(tmp_path, monkeypatch: pytest.Monk
         raise AssertionError("the links were run through")
 
     monkeypatch.setattr(AllPairs, "__iter__", refuse)
-    large = scene(LARGE, window=0.1, integrator="dop853", record=("sync_error",), observe={"r": "end(nodes.mean(cos(theta)))"})
+    large = scene(
+        LARGE, window=0.1, integrator="dop853", record=("sync_error",), observe={"r": "end(nodes.mean(cos(theta)))"}
+    )
     result = sc.run(large)
     assert float(result.r) == pytest.approx(np.cos(result.states("end")).mean(), abs=1e-12)
     result.save(tmp_path / "large.nc")
@@ -82,15 +84,18 @@ def test_a_scene_of_many_phases_lists_no_link(tmp_path, monkeypatch: pytest.Monk
 
 
 def test_a_link_that_does_not_separate_is_refused_where_it_cannot_be_listed() -> None:
-    steep = sc.Rates({I.theta: K * W * sp.tanh(J.theta - I.theta)}, {K: 1})
-    with pytest.raises(ValueError, match=f"mean field of .*tanh.* expected a finite sum of products, .* or at most {LINK_LIMIT} links"):
+    steep = sc.Rates({HERE.theta: K * W * sp.tanh(THERE.theta - HERE.theta)}, {K: 1})
+    with pytest.raises(
+        ValueError, match=f"mean field of .*tanh.* expected a finite sum of products, .* or at most {LINK_LIMIT} links"
+    ):
         scene(LARGE, steep)
     assert scene(20, steep).equations.fields == ()
 
 
 def test_auto_takes_explicit_steps_where_the_jacobian_cannot_be_listed() -> None:
     small, large = (
-        scene(n, integrator="auto", parameters={"K": 1e4}, initial={"theta": np.linspace(0.0, 0.5, n)}) for n in (20, LARGE)
+        scene(n, integrator="auto", parameters={"K": 1e4}, initial={"theta": np.linspace(0.0, 0.5, n)})
+        for n in (20, LARGE)
     )
     assert stiffness(small) == pytest.approx(2e4 * 0.95, rel=0.05)
     assert stiffness(large) == pytest.approx(2e4, rel=0.05)
@@ -110,7 +115,7 @@ def test_equal_starts_of_many_are_stepped_one_by_one() -> None:
 
 def test_layers_beside_a_mean_field_keep_their_links() -> None:
     n = 12
-    ring = sc.Rates({I.theta: sp.Symbol("c") * W * sp.sin(J.theta - I.theta) ** 3}, {"c": 0.4})
+    ring = sc.Rates({HERE.theta: sp.Symbol("c") * W * sp.sin(THERE.theta - HERE.theta) ** 3}, {"c": 0.4})
     given = {"parameters": {"K": 1.5, "omega": np.linspace(-1, 1, n)}, "initial": {"theta": np.linspace(0, 5, n)}}
     more = {"transient": 0, "window": 1, "time_unit": "time", "integrator": "dop853", "rtol": 1e-11, "record": ()}
     both = sc.Scene(PHASE, links=[(SINE, mean_field(n)), (ring, sc.ring(n))], **given, **more)
