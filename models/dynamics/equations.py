@@ -26,6 +26,9 @@ Ends = tuple[int, int]
 
 Entry = tuple[tuple[int, int], sp.Expr]
 
+DIGEST_LIMIT = 10_000
+"""Most links of all pairs that a digest lists, to be that of the same links in a list."""
+
 
 class _Cached:
     """Gives a value with slots a dictionary for its cached properties, which pickles do not hold."""
@@ -424,7 +427,8 @@ class Equations(_Cached, Written):
     def digest(self) -> str:
         """Hexadecimal SHA-256 of the equations; equal equations have equal digests."""
         first, *others = self.nodes
-        links = repr([layer.links for layer in self.layers]) if self.fields else repr(self.links)
+        large = any(len(pairs) > DIGEST_LIMIT for _, pairs in self.fields)
+        links = repr([layer.links for layer in self.layers] if large else tuple(self.links))
         parts = [_text(first.state, first.rhs, first.parameters), str(self.n), links]
         if first.contact is not None:
             parts.append("; ".join(map(sp.srepr, first.contact.expressions)))
