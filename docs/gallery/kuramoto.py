@@ -6,9 +6,9 @@ Kuramoto's transition
 
 With natural frequencies of a Lorentzian distribution g of half width γ, the order parameter
 :math:`r = |\sum_j e^{i\theta_j}|/n` of infinitely many phases is :math:`\sqrt{1 - K_c/K}` above
-:math:`K_c = 2/(\pi g(0)) = 2γ` (Kuramoto, Chemical Oscillations, Waves, and Turbulence, Springer 1984;
-Strogatz, Physica D 143, 1 (2000)).  On the complete graph the sine is a mean field: a step costs n,
-not n².
+:math:`K_c = 2/(\pi g(0)) = 2γ` (Kuramoto, Chemical Oscillations, Waves, and Turbulence, Springer
+1984; Strogatz, Physica D 143, 1 (2000)).  On the complete graph the sine is a mean field: a step
+costs n, not n².
 """
 
 # %%
@@ -43,8 +43,8 @@ result = sc.run(scene, K=[0.5, 1, 1.5, 2, 3, 4], realisations=realisations, draw
 # %%
 # Check
 # -----
-# One cell against SciPy, and r against the theory for infinitely many, with the standard errors over
-# the realisations.
+# One cell against SciPy, and r against the theory for infinitely many, with the standard errors
+# over the realisations.
 from scipy.integrate import solve_ivp
 
 cell = result.data.isel(K=-1, realisation=0)

@@ -53,7 +53,9 @@ Row = tuple[object, ...]
 def measure(quick: bool = False) -> list[Row]:
     """Return the rows of the table, in the order of COLUMNS; `quick` takes small networks."""
     return [
-        apart(network_row, name, n, method) for name, n in (QUICK if quick else CASES) for method in ("dop853", "taylor")
+        apart(network_row, name, n, method)
+        for name, n in (QUICK if quick else CASES)
+        for method in ("dop853", "taylor")
     ]
 
 

@@ -235,6 +235,9 @@ def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> R
 
 def _node_merge(whole: Equations, reduced: Equations, classes: tuple[int, ...], together: bool) -> NodeMerge:
     """The columns of both states, from the class of each oscillator of the whole network."""
+    if reduced.n == whole.n:
+        same = np.arange(whole.dimension)
+        return NodeMerge(same, same, together)
     first: dict[int, int] = {}
     states, places = np.empty(reduced.dimension, dtype=int), np.empty(whole.dimension, dtype=int)
     for node, k in enumerate(classes):
@@ -328,8 +331,8 @@ def _merge(
     if scene.observe or scene.sections or scene.stop:
         kept.append(f"quotient: the {n} oscillators are observed one by one")
         return equations, alone
-    colours = _colours(scene)
-    different = len(set(colours))
+    colours = [] if _all_apart(scene) else _colours(scene)
+    different = len(set(colours)) or n
     words = f"quotient: {n} oscillators with {different} different starts"
     if different == n:
         if n > 1:
@@ -347,6 +350,12 @@ def _merge(
         words = f"quotient: {n} oscillators that all start equal"
     skipped.append(f"{words} are stepped as {made.n}; the links treat equal starts alike, so they stay equal")
     return made, classes
+
+
+def _all_apart(scene: Scene) -> bool:
+    """True if the starts of a component differ at all nodes in every cell, which a large network shows soon."""
+    moved = {parts.base for axis in (*scene.axes, *scene.drawn) if (parts := NodeName.parse(axis.name))}
+    return any(len(set(x)) == scene.n for name, x in scene.initial.items() if name not in moved)
 
 
 def _colours(scene: Scene) -> list[Hashable]:
