@@ -41,6 +41,7 @@ from .mechanics.parameter import Parameter as Parameter
 from .presentation.equations import latex as latex
 from .presentation.equations import text as text
 from .scenes.axis import Axis as Axis
+from .scenes.draw import lorentzian as lorentzian
 from .scenes.draw import normal as normal
 from .scenes.draw import uniform as uniform
 from .scenes.file import load_scene as load_scene

@@ -22,7 +22,7 @@ def header(
         states = [*states[:3], "…", *states[-3:]]
     names = [f"{name} = {values[name]!r}" if name in values else name for name in model.parameters]
     lines = [
-        f"{equations.n} oscillator{'s' * (equations.n != 1)}, {len(equations.links)} links, written by synchain",
+        f"{equations.n} oscillator{'s' * (equations.n != 1)}, {equations.link_count} links, written by synchain",
         "",
         *_equations(equations),
         "",

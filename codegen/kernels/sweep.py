@@ -11,6 +11,7 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.periodicity import angular_frequency
 from synchain.models.dynamics.record import Record
+from synchain.models.graphs.links import LINK_LIMIT
 
 from .. import driver
 from ..driver.dimensions import Dimensions, ModeDimensions
@@ -156,10 +157,11 @@ def emit(
     ordered = tuple(r for r in Record if r in records)
     weights = tuple(multiplicity) if multiplicity is not None and "sync_error" in ordered else None
     looped = equations.n > unroll or (not method.inexact and _of_links(equations) > MOST_OF_LINKS)
-    looped = looped or (method.series and equations.inertial and not equations.links)
+    looped = looped or (method.series and equations.inertial and not equations.link_count)
     if looped:
         method = _for_many(method, equations, unroll)
-    elimination = program(equations, fill) if looped else None
+        equations = equations.without_fields() if method.implicit else equations
+    elimination = program(equations, fill, method.implicit or equations.inertial) if looped else None
     plain = tidy(equations)
     weight = [edge.weight.name for edge in plain.edges]
     states = [s.name for node in plain.nodes for s in node.state]
@@ -293,6 +295,11 @@ def _for_many(method: Integrator, equations: Equations, unroll: int) -> Integrat
     """The method as looped kernels have it; ValueError for what only written-out kernels can."""
     if method.inexact:
         raise ValueError(f"integrator {method.name}: steps at most {unroll} nodes, found {equations.n}; use rodas5p")
+    if method.implicit and any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
+        raise ValueError(
+            f"integrator {method.name}: found a mean field of {equations.n} nodes, whose Jacobian has an entry for each pair; "
+            f"expected at most {LINK_LIMIT} pairs; use dop853 or taylor"
+        )
     return replace(method, smooth=None)
 
 
@@ -340,7 +347,7 @@ def describe(
     named, written = ((*eq.state, *eq.parameters) for eq in (equations, plain))
     swapped = tuple(f"{a} as {b}" for a, b in zip(named, written, strict=True) if a != b)
     rows = [
-        f"Generated kernel: {equations.n} oscillator{'s' * (equations.n > 1)}, {len(equations.links)} links, {method.name}.",
+        f"Generated kernel: {equations.n} oscillator{'s' * (equations.n > 1)}, {equations.link_count} links, {method.name}.",
         "",
         f"Equations   {equations.digest[:16]}",
         f"Integrator  {method.name}, order {method.order}: {method.source}",

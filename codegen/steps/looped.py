@@ -19,6 +19,7 @@ from ..program.lowering import lower
 from ..program.passes import Body
 from ..program.statements import Assign, Do, If, Return, Statement, accumulate, let, store, whole
 from .blocks import NodeBlocks
+from .fields import mean_fields
 from .mass import added_masses, momentum_slopes, turned_masses
 from .names import NAMES
 from .places import Joint, Kind, link_ends, named, places, span
@@ -42,7 +43,7 @@ class Looped(Step):
         self, equations: Equations, kinds: Sequence[NodeBlocks], method: Integrator, elimination: Program
     ) -> None:
         super().__init__(equations, kinds, method)
-        self.places, self.elimination = places(equations), elimination
+        self.places, self.elimination, self.fields = places(equations), elimination, mean_fields(equations)
         self.mass = LoopMass(self)
 
     def opening(self) -> None:
@@ -50,6 +51,9 @@ class Looped(Step):
         stages = [f"K{j + 1}" for j in range(len(self.method.c))]
         vectors = [*stages, "STATE", "SLOPE", "TIME_SLOPE", "MATRIX"]
         base = {name: vector(i) for i, name in enumerate(vectors)} | self.mass.bases(len(vectors) - 1)
+        if any(field.alike for field in self.fields):
+            matrix = Name("ENTRIES") if self.elimination.exact else 2 * Name("ENTRIES")
+            base["FIELD"] = base["MATRIX"] + matrix
         self.put(*(whole(name, place) for name, place in base.items()))
         self.put(Assign(NAMES, Name("graph"), whole=True))
         self.parameters(but={f"{name}_{i + 1}" for name in self.equations.varied for i in range(self.equations.n)})
@@ -69,6 +73,10 @@ class Looped(Step):
         for kind in self.places.kinds:
             self.node_slopes(kind, base, out)
         self.links(base, out)
+        kept = 0
+        for field in self.fields:
+            self.put(*field.statements(self.places, base, out, kept))
+            kept += len(field.alike)
 
     def node_slopes(self, kind: Kind, base: str, out: str) -> None:
         """The right-hand side of the nodes of one kind."""

@@ -23,7 +23,7 @@ NAMES = (
 
 RESERVED = frozenset(
     {"i", "j", "k", "e", "old", "new", "graph", "weights", "pair", "factorise", "solve", "NODES", "DIMENSION",
-     "DENSE_ROWS",
+     "DENSE_ROWS", "FIELD",
      "ENTRIES", "STATE", "SLOPE", "TIME_SLOPE", "MATRIX", *(f"K{i}" for i in range(1, 32)),
      "MASS", "RATES", "where", "t", "h", "y", "y_new", "dense",
      "shift", "reach", "rate", "error", "size", "rtol", "atol", "node", "node_linear",
@@ -39,10 +39,10 @@ RESERVED = frozenset(
 
 PREFIXES = (
     "m_", "l_", "inv_", "k1", "k2", "k3", "k4", "k5", "k6", "k7", "k8", "k9", "u_", "f_", "r_", "at_", "ft_", "n_", "j_",
-    "e_", "_", "along_", "value_", "bend_", "steady_", "g_", "mass_", *(f"node{k}" for k in range(2, 10)),
+    "e_", "_", "along_", "value_", "bend_", "steady_", "g_", "mass_", "sum_", *(f"node{k}" for k in range(2, 10)),
 )  # fmt: skip
 
-SUFFIXES = ("_here", "_there")
+SUFFIXES = ("_here", "_there", "_first")
 
 NUMBERED = re.compile(r"_\d+$")
 """The end of a name that numbers a node: x_1 is x of the first one."""

@@ -91,8 +91,9 @@ class Places:
         parts = zip(equations.nodes, self.spans("i", "NODES", counts), strict=True)
         self.kinds = tuple(Kind(node, k, part) for k, (node, part) in enumerate(parts))
         numbers, nodes = Counter(joint_numbers(equations)), equations.nodes
-        shares = [numbers[k] for k in range(len(equations.edge_of))]
-        ends = zip(equations.edge_of, self.spans("e", "target.size", shares), strict=True)
+        templates = [pair for layer in equations.listed for pair in layer.edge_of]
+        shares = [numbers[k] for k in range(len(templates))]
+        ends = zip(templates, self.spans("e", "target.size", shares), strict=True)
         self.joints = tuple(Joint(edge, nodes[a], nodes[b], part) for ((a, b), edge), part in ends)
 
     def spans(self, index: str, stop: str, counts: Sequence[int]) -> list[Span]:
@@ -190,9 +191,9 @@ def named(joint: Joint) -> dict[sp.Symbol, sp.Symbol]:
 
 
 def joint_numbers(equations: Equations) -> list[int]:
-    """Return which joint each link is of, by its number."""
+    """Return which joint each listed link is of, by its number."""
     found, first = list[int](), 0
-    for layer in (layer for layer in equations.layers if layer.links):
+    for layer in equations.listed:
         number = {ends: k for k, (ends, _) in enumerate(layer.edge_of, start=first)}
         found += [number[equations.ends(link)] for link in layer.links]
         first += len(number)
@@ -205,8 +206,9 @@ def by_kind(equations: Equations) -> list[int]:
 
 
 def by_joint(equations: Equations) -> tuple[Link, ...]:
-    """Return the links in the order in which a kernel numbers them: joint after joint."""
-    pairs = zip(joint_numbers(equations), equations.links, strict=True)
+    """Return the listed links in the order in which a kernel numbers them: joint after joint."""
+    links = (link for layer in equations.listed for link in layer.links)
+    pairs = zip(joint_numbers(equations), links, strict=True)
     return tuple(link for _, link in sorted(pairs, key=lambda pair: pair[0]))
 
 

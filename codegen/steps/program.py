@@ -23,6 +23,7 @@ from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import Edge, Node
 
 from .elimination import Entry, Plan
+from .fields import mean_fields
 from .mass import added_masses, momentum_slopes, turned_masses
 from .places import by_joint, by_kind, joint_numbers, table
 from .step import Step
@@ -58,15 +59,19 @@ def block_pattern(block: Iterable[Iterable[object]]) -> tuple[Entry, ...]:
     return tuple((a, b) for a, row in enumerate(block) for b, e in enumerate(row) if e != 0)
 
 
-def program(equations: Equations, fill: float = FILL_LIMIT) -> Program:
+def program(equations: Equations, fill: float = FILL_LIMIT, solves: bool = True) -> Program:
     """Plan the elimination of (s - J) for a network; time and memory grow with its links.
 
     Equations that differ only in what their symbols are called, or in numbers, share the program.  The factors are exact
-    unless they would have more than `fill` entries for each entry of the matrix.
+    unless they would have more than `fill` entries for each entry of the matrix.  A method that `solves` nothing has a
+    matrix without entries.
     """
     size = max(len(node.state) for node in equations.nodes)
-    own = tuple(_node_pattern(node) for node in equations.nodes)
-    joined = tuple(tuple(tuple(sorted(pattern)) for pattern in _link_patterns(edge)) for edge in equations.edges)
+    edges = [edge for layer in equations.listed for _, edge in layer.edge_of]
+    own = tuple(_node_pattern(node) if solves else () for node in equations.nodes)
+    joined = tuple(
+        tuple(tuple(sorted(pattern)) if solves else () for pattern in _link_patterns(edge)) for edge in edges
+    )
     where = tuple(table(equations).tolist()) if equations.mixed else ()
     numbers = {i: k for k, i in enumerate(by_kind(equations))}
     links = tuple((numbers[target], numbers[source], weight) for target, source, weight in by_joint(equations))
@@ -168,6 +173,8 @@ def _spans(counts: Sequence[int]) -> tuple[slice, ...]:
 def _factors(dimension: int, pattern: np.ndarray, fill: float) -> tuple[np.ndarray, np.ndarray, bool]:
     """Pivots, off-diagonal entries (2, count) of the factors, and whether they are exact."""
     off = pattern[:, pattern[0] != pattern[1]]
+    if not off.size:
+        return np.arange(dimension), off, True
     rows, columns = off.tolist()
     listed = set(pattern[0, pattern[0] == pattern[1]].tolist())
     found = _eliminate_all(dimension, rows, columns, listed, fill * (dimension + len(rows)) - dimension)
@@ -264,9 +271,10 @@ def workspace(w: Step, elimination: Program) -> int:
     """Groups of scratch memory: stages, stage state, slopes, time slopes and, for implicit methods, the matrix.
 
     Factors of an incomplete elimination stand beside the matrix, exact ones replace it.  Where M depends on the state, an
-    implicit method keeps the rates at the start and a second matrix.
+    implicit method keeps the rates at the start and a second matrix.  A mean field keeps what nodes are as sources.
     """
     vectors = (len(w.method.c) + 3) * w.equations.dimension
+    vectors += sum(len(field.alike) for field in mean_fields(w.equations)) * w.equations.n
     if not w.method.implicit and not w.equations.inertial:
         return vectors
     matrix = elimination.entries if elimination.exact else 2 * elimination.entries

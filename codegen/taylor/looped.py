@@ -7,7 +7,7 @@ what depends on time alone at `at_… + k`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import sympy as sp
@@ -17,13 +17,14 @@ from synchain.models.mechanics.components import TIME, Block, Edge, Node
 
 from ..program.passes import Body, Hoist, Names
 from ..program.printers import LANES
+from ..steps.fields import MeanField, compensated, mean_fields
 from ..steps.names import NAMES
 from ..steps.places import Joint, Kind, Span, places
 from .graph import Graph, Template
 from .masses import moved, solved
 from .series import Constant, Series, State, Time
 from .step import TaylorStep, called, ended, finished, lane, returned
-from .terms import ZERO, Assign, Expr, Name, Number, add, show, statement
+from .terms import ONE, ZERO, Assign, Expr, Name, Number, add, show, statement
 
 __all__ = ["write_looped"]
 
@@ -161,6 +162,11 @@ class Section:
             self.values[s] = value
             if s in remembered:
                 self.lines.append(f"store(dense, {self.slot(s.name, order)}, {lane(value)})")
+        self.finish(first)
+        return self.turns(self.lines)
+
+    def finish(self, first: bool) -> None:
+        """Append the statements that use coefficient 0, or k, of the rates."""
         for place, rate in self.rates if self.index else ():
             value = self.start(rate) if first else self.of(rate)
             if not self.adds:
@@ -169,7 +175,6 @@ class Section:
             elif value != ZERO:
                 self.lines += statement(Assign("rate", add(Name(f"load(dense, at_rates + {place}, WIDTH)"), value)))
                 self.lines.append(f"store(dense, at_rates + {place}, rate)")
-        return self.turns(self.lines)
 
     def passages(self, degree: int) -> list[str]:
         """The statements that end the step at the kinks of this section."""
@@ -185,6 +190,36 @@ class Section:
         return [self.head, *(f"    {line}" for line in lines)] if self.index else lines
 
 
+@dataclass(slots=True)
+class Totals(Section):
+    """The sums over all nodes of some series, by their names in `rates`; `lent` are series that the targets need too."""
+
+    lent: set[Series] = field(default_factory=set)
+
+    def text(self, order: str) -> list[str]:
+        """The statements for coefficients `order`, with the sums before and behind the loop."""
+        names = [name for name, _ in self.rates]
+        before = [f"{name}{rest} = 0.0*scale" for name in names for rest in ("", "_rest")]
+        # a class with slots has no cell for super()
+        return [*before, *Section.text(self, order), *(f"store(dense, at_{name} + {order}, {name})" for name in names)]
+
+    def finish(self, first: bool) -> None:
+        """Add the coefficients to the sums; those of a constant beyond the first are zero."""
+        for name, rate in self.rates:
+            value = self.start(rate) if first else self.of(rate)
+            if value != ZERO:
+                self.lines += [
+                    *statement(Assign(f"{name}_value", value)),
+                    *LANES.lines(compensated(name, f"{name}_value")),
+                ]
+
+    @property
+    def remembered(self) -> set[Series]:
+        """Series whose earlier coefficients are needed here, or by the targets."""
+        own = {used for s in self.graph.series for used in s.convolved} | self.lent
+        return own - set(self.places) - set(self.waves)
+
+
 def head_of(span: Span) -> str:
     """The head of the loop over a part of a numbering."""
     return LANES.loop(span.index, span.start, span.stop) + ":"
@@ -195,6 +230,8 @@ class LoopWriter:
 
     def __init__(self, equations: Equations, order: int) -> None:
         self.equations, self.order, self.places = equations, order, places(equations)
+        self.fields = mean_fields(equations)
+        self.links = sum(len(layer.links) for layer in equations.listed)
         eq = equations
         named = {s for node in eq.nodes for s in (*node.state, *node.parameters)}
         named |= {s for edge in eq.edges for s in (edge.weight, *edge.parameters)}
@@ -209,12 +246,15 @@ class LoopWriter:
         self.waves = Section(Graph(self.names), "", "", 1)
         kinds, joints = self.places.kinds, self.places.joints
         nodes = [self.hoisted(kind.node.rhs, [*kind.node.state, *self.varied()]) for kind in kinds]
-        links = [self.of_links(joint.edge) for joint in joints]
+        links = [self.of_links(joint.edge, joint.edge.rhs) for joint in joints]
+        fields = [self.of_field(field) for field in self.fields]
         self.waves.graph.settle([s for _, s in self.waves.rates])
         if self.waves.rates:
             self.waves.waves[self.time] = self.waves
         self.sections = [self.node(kind, *found) for kind, found in zip(kinds, nodes, strict=True)]
         self.sections += [self.link(joint, *found) for joint, found in zip(joints, links, strict=True)]
+        for mean, parts in zip(self.fields, fields, strict=True):
+            self.sections += self.field(mean, *parts)
         self.kinks = any(section.graph.kinks for section in (self.waves, *self.sections))
         self.orders = order + 1 if self.kinks else order
 
@@ -241,18 +281,24 @@ class LoopWriter:
         moving = {s: State(name=self.swap[s].name) for s in states}
         component = {s: c for c, s in enumerate(kind.node.state)}
         section.places = {state: self.place(component[s]) for s, state in moving.items()}
-        seen: dict[sp.Symbol, Series] = {symbol: State(name=series.name) for symbol, series in waves.items()}
-        section.waves = dict.fromkeys(seen.values(), self.waves)
+        seen = self.seen(section, self.waves, waves)
         found = self.read(section, rates, {**moving, **seen}, constants, kind.node.inertia)
         section.rates = [(self.place(c), rate) for c, rate in enumerate(found)]
         return section
 
-    def of_links(self, edge: Edge) -> Hoisted:
-        """The rates of links, parted like those of nodes if time enters them."""
+    def of_links(self, edge: Edge, rates: Sequence[sp.Expr], more: Iterable[sp.Symbol] = ()) -> Hoisted:
+        """Rates by links, and of `more` symbols that move, parted like those of nodes if time enters them."""
         if not edge.forced:
-            return list(edge.rhs), {}, {}
-        own = (edge.weight, *edge.here, *edge.there, *(s for s, _ in edge.theirs), *self.varied())
-        return self.hoisted(edge.rhs, own)
+            return list(rates), {}, {}
+        own = (edge.weight, *edge.here, *edge.there, *(s for s, _ in edge.theirs), *self.varied(), *more)
+        return self.hoisted(rates, own)
+
+    def of_field(self, field: MeanField) -> tuple[Hoisted, Hoisted, Hoisted]:
+        """What a mean field sums, what all nodes make of that, and what it adds, parted like the rates of links."""
+        sums, shared = list(field.sums.values()), list(field.shared.values())
+        more = (*field.sums, *field.shared)
+        first, second, third = (self.of_links(field.edge, e, more) for e in (sums, shared, field.rates))
+        return first, second, third
 
     def link(
         self,
@@ -263,35 +309,106 @@ class LoopWriter:
     ) -> Section:
         """What the links of a joint add."""
         edge = joint.edge
-        section = Section(Graph(self.names), head_of(joint.span), "e", len(self.equations.links), adds=True)
+        section = Section(Graph(self.names), head_of(joint.span), "e", self.links, adds=True)
         weight = self.called[edge.weight.name]
         section.setting += ["i, j_there = target[e], source[e]", f"{weight} = weights[e]"]
-        moving: dict[sp.Symbol, Series] = {}
-        swap: dict[sp.Symbol, sp.Expr] = dict(constants)
         used = {s for e in edge.rhs for s in e.free_symbols}
-        for symbols, node, suffix, index in (
-            (edge.here, joint.target, "_here", "i"),
-            (edge.there, joint.source, "_there", "j_there"),
-        ):
-            for c, (s, own, moves) in enumerate(zip(symbols, node.state, self.moves(node), strict=True)):
-                name = f"{self.called[own.name]}{suffix}"
-                if s not in used:
-                    continue
-                if moves:
-                    moving[s] = State(name=name)
-                    section.places[moving[s]] = self.place(c, index)
-                else:
-                    swap[s] = sp.Symbol(name, real=True)
-                    section.setting.append(f"{name} = load(y, {self.place(c, index)}, WIDTH)")
+        moving, fixed = self.end(section, edge.here, joint.target, ("_here", "i"), used)
+        others, more = self.end(section, edge.there, joint.source, ("_there", "j_there"), used)
+        moving |= others
+        swap: dict[sp.Symbol, sp.Expr] = {**constants, **fixed, **more}
         section.setting += self.own(edge.rhs, [], joint.target, "i", "_here")
         for name, load in self.places.of_source(edge, used, "j_there"):
             section.setting.append(f"{name} = {LANES.text(load)}")
         swap |= {s: sp.Symbol(f"{own.name}_there", real=True) for s, own in edge.theirs}
-        seen: dict[sp.Symbol, Series] = {symbol: State(name=series.name) for symbol, series in waves.items()}
-        section.waves = dict.fromkeys(seen.values(), self.waves)
+        seen = self.seen(section, self.waves, waves)
         found = self.read(section, rates, {**moving, **seen}, swap)
         section.rates = [(self.place(c), rate) for c, rate in enumerate(found)]
         return section
+
+    def end(
+        self,
+        section: Section,
+        symbols: Sequence[sp.Symbol],
+        node: Node,
+        at: tuple[str, str],
+        used: Container[sp.Symbol],
+    ) -> tuple[dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]:
+        """The states at one end of a link that are used: series of those that move, names of those at rest.
+
+        `at` is what stands behind their names, and the number of the node there.
+        """
+        moving: dict[sp.Symbol, Series] = {}
+        fixed: dict[sp.Symbol, sp.Expr] = {}
+        suffix, index = at
+        for c, (s, own, moves) in enumerate(zip(symbols, node.state, self.moves(node), strict=True)):
+            name = f"{self.called[own.name]}{suffix}"
+            if s not in used:
+                continue
+            if moves:
+                moving[s] = State(name=name)
+                section.places[moving[s]] = self.place(c, index)
+            else:
+                fixed[s] = sp.Symbol(name, real=True)
+                section.setting.append(f"{name} = load(y, {self.place(c, index)}, WIDTH)")
+        return moving, fixed
+
+    def field(self, field: MeanField, sums: Hoisted, shared: Hoisted, rates: Hoisted) -> Iterator[Section]:
+        """The sums over the nodes, what all nodes make of them, and what is added to the rates.
+
+        Source functions that are functions of the target too are series once.
+        """
+        edge, node, nodes = field.edge, field.node, self.places.kinds[0].span
+        totals = Totals(Graph(self.names), head_of(nodes), "i", self.equations.n)
+        used = {s for e in sums[0] for s in e.free_symbols}
+        moving, fixed = self.field_end(totals, field, "_there", used)
+        for name, load in self.places.of_source(edge, used, "i"):
+            totals.setting.append(f"{name} = {LANES.text(load)}")
+        swap = {**sums[2], **fixed, **{s: sp.Symbol(f"{own.name}_there", real=True) for s, own in edge.theirs}}
+        found = self.read(totals, sums[0], {**moving, **self.seen(totals, self.waves, sums[1])}, swap)
+        totals.rates = [(s.name, series) for s, series in zip(field.sums, found, strict=True)]
+        yield totals
+        combined = Section(Graph(self.names), "", "", 1)
+        moving = self.seen(combined, self.waves, shared[1])
+        moving |= self.seen(combined, combined, {s: State(name=s.name) for s in field.sums})
+        common = dict(zip(field.shared, self.read(combined, shared[0], moving, shared[2]), strict=True))
+        combined.rates = [("", series) for series in common.values() if not isinstance(series, Constant)]
+        yield combined
+        target = Section(Graph(self.names), head_of(nodes), "i", self.equations.n, adds=True)
+        made = dict(zip(field.sums, found, strict=True))
+        lent = {e: made[s] for s, e in field.alike.items() if made[s] in totals.graph.series}
+        borrowed = {e: sp.Symbol(series.name, real=True) for e, series in lent.items()}
+        wanted = [e.xreplace(borrowed) for e in rates[0]]
+        used = {s for e in wanted for s in e.free_symbols}
+        moving, fixed = self.field_end(target, field, "_here", used)
+        target.setting += self.own(wanted, [], node, "i", "_here")
+        lent = {e: series for e, series in lent.items() if borrowed[e] in used}
+        totals.lent |= set(lent.values())
+        moving |= self.seen(target, totals, {borrowed[e]: series for e, series in lent.items()})
+        moving |= self.seen(target, combined, common) | self.seen(target, self.waves, rates[1])
+        found = self.read(target, wanted, moving, {**rates[2], **fixed})
+        target.rates = [(self.place(c), rate) for c, rate in enumerate(found)]
+        yield target
+
+    def field_end(
+        self, section: Section, field: MeanField, suffix: str, used: Container[sp.Symbol]
+    ) -> tuple[dict[sp.Symbol, Series], dict[sp.Symbol, sp.Expr]]:
+        """The states of a node in a mean field; those of which differences alone matter are counted from the first node's."""
+        symbols = field.edge.there if suffix == "_there" else field.edge.here
+        moving, fixed = self.end(section, symbols, field.node, (suffix, "i"), used)
+        for k in field.shifted:
+            if (state := moving.get(symbols[k])) is not None:
+                first = State(name=f"{self.called[field.node.state[k].name]}_first")
+                section.places[first] = self.place(k, "0")
+                moving[symbols[k]] = section.graph.sum([(ONE, state), (Number(-1.0), first)])
+        return moving, fixed
+
+    def seen(self, section: Section, other: Section, series: Mapping[sp.Symbol, Series]) -> dict[sp.Symbol, Series]:
+        """The series of another section as this one reads them; constants are no different."""
+        fixed: dict[sp.Symbol, Series] = {symbol: s for symbol, s in series.items() if isinstance(s, Constant)}
+        found: dict[sp.Symbol, Series] = {s: State(name=own.name) for s, own in series.items() if s not in fixed}
+        section.waves |= dict.fromkeys(found.values(), other)
+        return fixed | found
 
     def place(self, c: int, index: str = "i") -> str:
         """Where state c of a node stands."""
@@ -300,6 +417,7 @@ class LoopWriter:
     def moves(self, node: Node) -> tuple[bool, ...]:
         """Which states of a node move: one at rest, such as the mode of a contact, is a constant of the step."""
         found = [moved(node)] + [moved(joint.edge) for joint in self.places.joints if joint.target == node]
+        found += [moved(field.edge) for field in self.fields]
         return tuple(map(any, zip(*found, strict=True)))
 
     def own(
@@ -360,7 +478,7 @@ class LoopWriter:
         orders = [self.waves.text("0"), *(section.text("0") for section in self.sections)]
         later = [self.waves.text("k"), *(section.text("k") for section in self.sections)]
         bases, size = self.bases()
-        lines = [*bases, f"{', '.join(NAMES)} = graph", f"LINKS = {len(eq.links)}"]
+        lines = [*bases, f"{', '.join(NAMES)} = graph", f"LINKS = {self.links}"]
         own = {f"{name}_{i + 1}" for name in eq.varied for i in range(eq.n)}
         for slot, name in enumerate(eq.parameters, start=eq.dimension):
             if name not in own:
@@ -393,6 +511,9 @@ class LoopWriter:
             }
             sizes |= {name: self.orders * section.count for name in sorted(kept - {"t", ""})}
             sizes |= {name: section.count for name in section.kept}
+            sizes |= (
+                dict.fromkeys((name for name, _ in section.rates), self.orders) if isinstance(section, Totals) else {}
+            )
         lines, size = [], 0
         for name, groups in sizes.items():
             lines.append(f"at_{name} = DENSE_ROWS*DIMENSION + {size}")
@@ -457,7 +578,7 @@ def write_looped(equations: Equations, order: int) -> TaylorStep:
     ValueError
         As `write_step`, and for a mass matrix beside links: the loop over nodes solves before links are added.
     """
-    if equations.inertial and equations.links:
+    if equations.inertial and equations.link_count:
         found = "links with inertia" if equations.inertial_links else "links of nodes with a mass matrix"
         raise ValueError(f"taylor: found {found} in a network that is stepped in loops; use dop853 or rodas5p")
     writer = LoopWriter(equations, order)

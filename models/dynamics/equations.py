@@ -13,8 +13,9 @@ from functools import cached_property
 
 import sympy as sp
 
-from ..graphs.links import Link
+from ..graphs.links import AllPairs, Link, Links
 from ..inputs.shown import Written
+from ..interactions.separation import separated
 from ..mechanics.components import Block, Edge, Node
 from ..mechanics.friction import Contact
 
@@ -24,6 +25,9 @@ Ends = tuple[int, int]
 """The kinds of a link's target and source."""
 
 Entry = tuple[tuple[int, int], sp.Expr]
+
+DIGEST_LIMIT = 10_000
+"""Most links of all pairs that a digest lists, to be that of the same links in a list."""
 
 
 class _Cached:
@@ -38,12 +42,13 @@ class Layer:
     ----------
     edge_of : tuple of ((int, int), Edge)
         The templates of the links, by the kinds of their targets and sources.
-    links : tuple of (int, int, Fraction)
-        Target and source (0-based) and weight of each link.
+    links : tuple of (int, int, Fraction), or AllPairs
+        Target and source (0-based) and weight of each link.  Links of all pairs make a mean field
+        of an edge that separates (`synchain.models.interactions.separation`).
     """
 
     edge_of: tuple[tuple[Ends, Edge], ...]
-    links: tuple[Link, ...]
+    links: Links
 
     def map(self, change: Callable[[Edge], Edge]) -> Layer:
         """The same links with changed templates."""
@@ -86,11 +91,11 @@ class Equations(_Cached, Written):
     def __repr__(self) -> str:
         kinds = f", {len(self.nodes)} kinds of nodes" if self.mixed else ""
         names = f"states {', '.join(self.components)}, {len(self.parameters)} parameters"
-        return f"Equations({self.n} node{'s' * (self.n > 1)}, {len(self.links)} links, {names}{kinds})"
+        return f"Equations({self.n} node{'s' * (self.n > 1)}, {self.link_count} links, {names}{kinds})"
 
     @classmethod
     def of_equal_nodes(
-        cls, node: Node, edge: Edge | None, n: int, links: tuple[Link, ...] = (), varied: tuple[str, ...] = ()
+        cls, node: Node, edge: Edge | None, n: int, links: Links = (), varied: tuple[str, ...] = ()
     ) -> Equations:
         """Return the equations of a network of equal nodes.
 
@@ -136,9 +141,30 @@ class Equations(_Cached, Written):
         return self.layers[0].edge_of[0][1] if self.layers else None
 
     @property
-    def links(self) -> tuple[Link, ...]:
+    def links(self) -> Links:
         """Target, source and weight of each link, layer by layer."""
         return self.layers[0].links if len(self.layers) == 1 else tuple(k for own in self.layers for k in own.links)
+
+    @property
+    def link_count(self) -> int:
+        """Number of links, which are not listed for it."""
+        return sum(len(layer.links) for layer in self.layers)
+
+    @property
+    def listed(self) -> tuple[Layer, ...]:
+        """The layers whose links stand in a list."""
+        return tuple(layer for layer in self.layers if layer.links and not isinstance(layer.links, AllPairs))
+
+    @property
+    def fields(self) -> tuple[tuple[Edge, AllPairs], ...]:
+        """The mean fields: templates with the links of all pairs."""
+        found = ((layer.edge_of[0][1], layer.links) for layer in self.layers)
+        return tuple((edge, links) for edge, links in found if isinstance(links, AllPairs) and links)
+
+    def without_fields(self) -> Equations:
+        """Return the same equations with every link in a list; ValueError for more than LINK_LIMIT links."""
+        layers = (replace(layer, links=tuple(layer.links)) for layer in self.layers)
+        return replace(self, layers=tuple(layers)) if self.fields else self
 
     @cached_property
     def edge_of(self) -> tuple[tuple[Ends, Edge], ...]:
@@ -401,7 +427,9 @@ class Equations(_Cached, Written):
     def digest(self) -> str:
         """Hexadecimal SHA-256 of the equations; equal equations have equal digests."""
         first, *others = self.nodes
-        parts = [_text(first.state, first.rhs, first.parameters), str(self.n), repr(self.links)]
+        large = any(len(pairs) > DIGEST_LIMIT for _, pairs in self.fields)
+        links = repr([layer.links for layer in self.layers] if large else tuple(self.links))
+        parts = [_text(first.state, first.rhs, first.parameters), str(self.n), links]
         if first.contact is not None:
             parts.append("; ".join(map(sp.srepr, first.contact.expressions)))
         parts += [sp.srepr(sp.Matrix(node.inertia)) for node in self.nodes if node.inertia]
@@ -469,7 +497,13 @@ def _check_kinds(eq: Equations) -> None:
 
 
 def _check_links(eq: Equations) -> None:
-    for layer in eq.layers:
+    for edge, pairs in eq.fields:
+        if pairs.n != eq.n or eq.mixed or separated(edge, eq.varied) is None:
+            raise ValueError(
+                f"links of all pairs: found {pairs.n} of {eq.n} nodes; expected all of them, of one kind, and an edge that is "
+                "a finite sum of products of target and source"
+            )
+    for layer in eq.listed:
         seen = set()
         for target, source, _ in layer.links:
             if not (0 <= target < eq.n and 0 <= source < eq.n) or target == source:

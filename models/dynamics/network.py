@@ -15,11 +15,12 @@ from functools import lru_cache
 import sympy as sp
 
 from ..definitions.definition import FRICTION_LAW
-from ..graphs.links import Link
+from ..graphs.links import LINK_LIMIT, AllPairs, Link
 from ..graphs.topology import Topology
 from ..inputs.plugins import names
 from ..interactions.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling
 from ..interactions.link import edge
+from ..interactions.separation import separated
 from ..mechanics.calculus import cancelled, expanded
 from ..mechanics.components import SLIDING, Block, Edge, Node
 from ..mechanics.friction import KAPPA, SLIP, ContactModel, FrictionLaw, set_valued
@@ -158,13 +159,25 @@ def network(single: Node, link: Edge | None, graph: Topology, varied: tuple[str,
     (`synchain.models.interactions.link`).
     """
     apart = Equations.of_equal_nodes(single, None, graph.n, (), varied)
-    return apart if link is None else replace(apart, layers=(_layer(link, graph, varied),))
+    return apart if link is None else replace(apart, layers=(_layer(apart, link, graph),))
 
 
-def _layer(link: Edge, graph: Topology, varied: tuple[str, ...]) -> Layer:
-    """The links of a graph between equal nodes."""
-    links = oriented_links(graph) if graph.links and link.oriented else graph.links
-    return Layer((((0, 0), link.with_shared(varied)),), links)
+FEW = 8
+"""Most nodes of a complete graph whose links are always listed."""
+
+
+def _layer(apart: Equations, link: Edge, graph: Topology) -> Layer:
+    """The links of a graph between equal nodes: all pairs, if these make a mean field, or a list."""
+    shared = link.with_shared(apart.varied)
+    weight = None if graph.n <= FEW or apart.sticks else graph.all_to_all
+    if weight is not None and separated(shared, apart.varied) is not None:
+        return Layer((((0, 0), shared),), AllPairs(graph.n, weight))
+    if weight is not None and graph.link_count > LINK_LIMIT:
+        raise ValueError(
+            f"mean field of {graph}: found the rates {', '.join(map(str, link.rhs))}; expected a finite sum of products, "
+            f"functions of the target times functions of the source, or at most {LINK_LIMIT} links, which can be listed"
+        )
+    return Layer((((0, 0), shared),), oriented_links(graph) if graph.link_count and link.oriented else graph.links)
 
 
 def layered_network(
@@ -197,7 +210,7 @@ def layered_network(
     apart = Equations(tuple(singles), tuple(kinds), (), varied)
     if not apart.mixed:
         edges = ((edge(coupling, singles[0], oscillators[0]), graph) for coupling, graph in layers)
-        return replace(apart, layers=tuple(_layer(link, graph, varied) for link, graph in edges))
+        return replace(apart, layers=tuple(_layer(apart, link, graph) for link, graph in edges))
     return replace(apart, layers=tuple(_mixed_layer(apart, oscillators, *layer) for layer in layers))
 
 

@@ -21,6 +21,7 @@ from functools import lru_cache, partial
 
 import sympy as sp
 
+from ..graphs.links import LINK_LIMIT
 from ..graphs.partitions import class_links, coarsest_balanced
 from ..mechanics.components import Edge
 from .equations import Equations
@@ -115,6 +116,8 @@ def quotient(equations: Equations, colours: Sequence[Hashable]) -> tuple[Equatio
     ValueError
         If there is not one colour for each node.
     """
+    if any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
+        raise NoQuotient(f"quotient: the {equations.link_count} links of all pairs are too many to be listed")
     classes = _balanced(equations, colours)
     return collapse(equations, classes), classes
 

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import sympy as sp
 
+from ..graphs.links import AllPairs
 from ..mechanics.components import Edge, Node
 from .equations import Equations, Layer
 
@@ -68,9 +69,12 @@ def expect_vanishing(what: str, equations: Equations) -> None:
 
 def _with_links(node: Node, layer: Layer, edge: Edge, n: int) -> Node:
     """The node with what its links add between equal states."""
-    weights: list[list[Fraction]] = [[] for _ in range(n)]
-    for target, _, weight in layer.links:
-        weights[target].append(weight)
+    if isinstance(layer.links, AllPairs):
+        weights = [[layer.links.weight] * (n - 1)]
+    else:
+        weights = [[] for _ in range(n)]
+        for target, _, weight in layer.links:
+            weights[target].append(weight)
     equal = dict(zip((*edge.here, *edge.there), node.state * 2, strict=True))
     felt = [e.xreplace(equal) for e in edge.rhs]
     if any(e.has(sp.nan, sp.zoo, sp.oo, -sp.oo) for e in felt):

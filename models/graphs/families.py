@@ -30,7 +30,7 @@ Edges: TypeAlias = "Callable[..., Iterable[tuple[int, int, int | str | Fraction]
 Eigenvalues: TypeAlias = "Sequence[tuple[sp.Expr, int]] | None"
 
 KNOWN = (
-    *("SUMMARY", "SOURCE", "MINIMUM", "TOO_SMALL", "DIRECTED", "CONNECTED"),
+    *("SUMMARY", "SOURCE", "MINIMUM", "TOO_SMALL", "DIRECTED", "CONNECTED", "ALL_TO_ALL"),
     *("edges", "settle", "count", "expected", "spectrum", "formula", "sides"),
 )
 """The public names that the file of a topology may define."""
@@ -145,6 +145,8 @@ class Family:
         True if links are one-way.
     connected : bool, optional
         False if a graph may fall into parts.
+    all_to_all : bool, optional
+        True if every pair of nodes is joined by an edge of weight 1.
     options : mapping, optional
         The options with their defaults; None if an option is not stored unless it is set.
     settle : callable, optional
@@ -172,6 +174,7 @@ class Family:
     too_small: str = "choose a larger n"
     directed: bool = False
     connected: bool = True
+    all_to_all: bool = False
     options: Mapping[str, object] = field(default_factory=dict)
     settle: Callable[..., object] | None = None
     count: Callable[..., int] | None = None
@@ -264,6 +267,11 @@ class FamilyRule:
         """True if the family joins nodes both ways."""
         return not self.family.directed
 
+    @property
+    def all_to_all(self) -> Fraction | None:
+        """1 if the family joins all pairs of nodes."""
+        return Fraction(1) if self.family.all_to_all else None
+
     def links(self) -> tuple[Link, ...]:
         """Build the sorted links; ValueError if they are too many."""
         family, one = self.family, Fraction(1)
@@ -342,6 +350,7 @@ _ATTRIBUTES = {
     "TOO_SMALL": "too_small",
     "DIRECTED": "directed",
     "CONNECTED": "connected",
+    "ALL_TO_ALL": "all_to_all",
     "settle": "settle",
     "formula": "formula",
     "sides": "sides",

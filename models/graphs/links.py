@@ -1,14 +1,60 @@
-"""The links of a graph: their type and their greatest number."""
+"""The links of a graph: their type, their greatest number, and the links of all pairs, which are not listed."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from fractions import Fraction
+from itertools import islice
 from typing import TypeAlias
 
-__all__ = ["LINK_LIMIT", "Link"]
+__all__ = ["LINK_LIMIT", "AllPairs", "Link", "Links"]
 
 LINK_LIMIT = 4_000_000
 """Greatest number of links of a graph: more take above 600 MB."""
 
 Link: TypeAlias = tuple[int, int, Fraction]
 """(target, source, weight): node `target` feels node `source`; indices start at 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class AllPairs:
+    """The links between each node and every other one, all of one weight, sorted; they take no memory.
+
+    Parameters
+    ----------
+    n : int
+        Number of nodes.
+    weight : Fraction
+        The weight of every link.
+
+    Raises
+    ------
+    ValueError
+        When more than LINK_LIMIT links are run through.
+    """
+
+    n: int
+    weight: Fraction
+
+    def __len__(self) -> int:
+        return self.n * (self.n - 1)
+
+    def __iter__(self) -> Iterator[Link]:
+        if len(self) > LINK_LIMIT:
+            raise ValueError(
+                f"links of all pairs: found {len(self)} links between {self.n} nodes; expected at most {LINK_LIMIT} where "
+                "they are listed; reduce n"
+            )
+        return self._all()
+
+    def _all(self) -> Iterator[Link]:
+        return ((i, j, self.weight) for i in range(self.n) for j in range(self.n) if i != j)
+
+    def first(self, count: int) -> tuple[Link, ...]:
+        """Return the first `count` links, however many there are."""
+        return tuple(islice(self._all(), count))
+
+
+Links: TypeAlias = tuple[Link, ...] | AllPairs
+"""Links in a list, or those of all pairs."""

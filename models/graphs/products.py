@@ -123,6 +123,11 @@ class _OfTwo:
         """True if both graphs are known to be symmetric."""
         return self.first.undirected and self.second.undirected
 
+    @property
+    def all_to_all(self) -> Fraction | None:
+        """None: pairs of nodes are not joined alike."""
+        return None
+
     def spectra(self) -> tuple[Listed, Listed] | None:
         """The closed spectra of both graphs; None if one of them has none."""
         a, b = listed(self.first), listed(self.second)
@@ -213,6 +218,11 @@ class Complement:
         """True: only undirected graphs have a complement here."""
         return True
 
+    @property
+    def all_to_all(self) -> Fraction | None:
+        """1 for the complement of a graph without links."""
+        return None if self.graph.link_count else Fraction(1)
+
     def links(self) -> tuple[Link, ...]:
         """Build the sorted links."""
         n, present = self.graph.n, {(i, j) for i, j, _ in self.graph.links}
@@ -247,6 +257,12 @@ class Weighted:
         """True if the graph is known to be symmetric."""
         return self.graph.undirected
 
+    @property
+    def all_to_all(self) -> Fraction | None:
+        """The weight of the graph's links times the factor, if it joins all pairs alike."""
+        weight = self.graph.all_to_all
+        return None if weight is None else weight * self.factor
+
     def links(self) -> tuple[Link, ...]:
         """Build the sorted links."""
         return tuple((i, j, w * self.factor) for i, j, w in self.graph.links)
@@ -270,7 +286,8 @@ def _small(name: str, links: int) -> None:
 
 
 def _made(name: str, n: int, rule: Rule) -> Topology:
-    _small(name, rule.link_count or 0)
+    if rule.all_to_all is None:
+        _small(name, rule.link_count or 0)
     return Topology(name, n, rule=rule)
 
 

@@ -47,6 +47,10 @@ class Rule(Protocol):
     def undirected(self) -> bool:
         """True if G is known to be symmetric."""
 
+    @property
+    def all_to_all(self) -> Fraction | None:
+        """The weight of every link if each node is known to feel every other one alike; else None."""
+
     def links(self) -> tuple[Link, ...]:
         """Build the sorted links."""
 
@@ -129,6 +133,14 @@ class Topology(Drawn):
         """True if G is known to be symmetric: by its rule, or else by its links."""
         return self.symmetric if self.rule is None else self.rule.undirected
 
+    @property
+    def all_to_all(self) -> Fraction | None:
+        """The weight of every link if the rule says that each node feels every other one alike; else None.
+
+        No link is listed for the answer; mean fields rest on it (docs/links.md).
+        """
+        return None if self.rule is None else self.rule.all_to_all
+
     def closed_form(self) -> Sequence[tuple[sp.Expr, int]] | None:
         """List the eigenvalues of G with multiplicities, each once; None without a closed form."""
         return None if self.rule is None else self.rule.eigenvalues()
@@ -136,12 +148,16 @@ class Topology(Drawn):
     @property
     def symmetric(self) -> bool:
         """True if every link has its mirror image of equal weight, so that G = transpose(G)."""
+        if self.all_to_all is not None:
+            return True
         known = {(target, source): weight for target, source, weight in self.links}
         return all(known.get((source, target)) == weight for (target, source), weight in known.items())
 
     @property
     def components(self) -> int:
         """Number of weakly connected parts; above 1, complete synchronisation is impossible."""
+        if self.all_to_all is not None:
+            return 1
         return 1 + max(join(self.n, ((target, source) for target, source, _ in self.links)))
 
     @property
@@ -152,6 +168,8 @@ class Topology(Drawn):
         earlier one.  A second search takes these starts backwards: each start that is not reached
         yet is in a group of its own.
         """
+        if self.all_to_all is not None:
+            return 1
         followers: list[list[int]] = [[] for _ in range(self.n)]
         for target, source, _ in self.links:
             followers[source].append(target)

@@ -17,7 +17,7 @@ from .plugins import call
 
 __all__ = ["PluginFile"]
 
-_FLAGS = ("FRICTION", "ODD", "SELF_EXCITING", "DIRECTED", "CONNECTED")
+_FLAGS = ("FRICTION", "ODD", "SELF_EXCITING", "DIRECTED", "CONNECTED", "ALL_TO_ALL")
 _TEXTS = ("SUMMARY", "SOURCE", "TOO_SMALL")
 
 

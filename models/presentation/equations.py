@@ -130,7 +130,7 @@ def lines(equations: Equations, style: Style) -> Iterator[str]:
     if sticks:
         yield style.words("at zero sliding velocity f is what holds the body, up to the static coefficient")
     if generic:
-        count, meaning = len(equations.links), ""
+        count, meaning = equations.link_count, ""
         layers = (layer for layer in equations.layers if layer.links)
         for layer, (_, name) in zip(layers, _weights(equations), strict=True):
             meaning += f", {style.letter(name, 'ij')}" + style.words(f" the weights of the {len(layer.links)} links")

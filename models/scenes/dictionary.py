@@ -8,6 +8,7 @@ from typing import Any
 
 from ..definitions.table import as_name_or_table
 from ..graphs.families import family, names, topology
+from ..graphs.graph_text import is_composed, read_graph
 from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import check_integer, check_keys, check_table, check_text, short_repr
 from ..inputs.plugins import part
@@ -17,7 +18,7 @@ from .parameters import collected
 
 __all__ = ["arguments", "as_dict", "graph_of", "graph_table"]
 
-NODES = 100_000
+NODES = 1_000_000
 """Largest number of oscillators that a scene file may ask for."""
 
 
@@ -102,8 +103,19 @@ def graph_of(given: Mapping[object, Any], folder: Path | None = None) -> Topolog
         if key not in given:
             found = short_repr(dict(given))
             raise ValueError(f"topology: {key!r} is missing in {found}; expected name and n, or matrix, or file")
+    n = check_integer("topology n", given["n"], 0, NODES)
+    if not known and is_composed(part("topology name", name)):
+        return _composed(str(name), n)
     chosen = {key: given[key] for key in options if key in given}
-    return topology(part("topology name", name), check_integer("topology n", given["n"], 0, NODES), **chosen)
+    return topology(part("topology name", name), n, **chosen)
+
+
+def _composed(name: str, n: int) -> Topology:
+    """The graph of a text such as "weighted(complete(100), 1/100)"."""
+    graph = read_graph(name, NODES)
+    if graph.n != n:
+        raise ValueError(f"topology: n = {n} but {short_repr(name)} has {graph.n} nodes; expected n = {graph.n}")
+    return graph
 
 
 def _of_file(given: Mapping[object, Any], folder: Path | None) -> Topology:
@@ -170,9 +182,13 @@ def _coupling(coupling: Coupling | None) -> object:
 
 
 def graph_table(graph: Topology) -> dict[str, object]:
-    """Return a graph in JSON types: its family and options, or its matrix; `graph_of` reads it."""
+    """Return a graph in JSON types: its family and options, or its matrix; `graph_of` reads it.
+
+    Of a weighted complete graph, whose matrix may be too large, it is the text of the operation.
+    """
     try:
-        same = topology(graph.name, graph.n, **dict(graph.options)) == graph
+        composed = graph.all_to_all is not None and is_composed(graph.name)
+        same = (read_graph(graph.name) if composed else topology(graph.name, graph.n, **dict(graph.options))) == graph
     except (ValueError, TypeError):
         same = False
     if same:

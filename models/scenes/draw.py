@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 import random
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +20,11 @@ from ..inputs.words import Word
 from .axis import LIMIT, Axis
 from .model import Model
 
-__all__ = ["Distribution", "Draw", "Draws", "drawn_axes", "draws", "normal", "uniform"]
+__all__ = ["Distribution", "Draw", "Draws", "drawn_axes", "draws", "lorentzian", "normal", "uniform"]
+
+
+KNOWN = "normal(mean, deviation), uniform(low, high), lorentzian(centre, half width)"
+"""What may be drawn from, in messages."""
 
 
 class Distribution(Word):
@@ -27,14 +32,15 @@ class Distribution(Word):
 
     NORMAL = "normal"
     UNIFORM = "uniform"
+    LORENTZIAN = "lorentzian"
 
 
 @dataclass(frozen=True, slots=True)
 class Draw:
-    """A distribution: normal with mean and standard deviation, or uniform between two ends.
+    """A distribution: normal with mean and standard deviation, uniform between two ends, or Lorentzian with its half width.
 
-    Raises ValueError or TypeError on anything but finite numbers, a deviation that is not positive, and ends that do
-    not rise.
+    Raises ValueError or TypeError on anything but finite numbers, a deviation or a half width that is not positive, and
+    ends that do not rise.
     """
 
     distribution: Distribution
@@ -47,6 +53,8 @@ class Draw:
         object.__setattr__(self, "second", check_number(f"{self.distribution}: second", self.second))
         if self.distribution is Distribution.NORMAL:
             check_positive("normal: standard deviation", self.second)
+        elif self.distribution is Distribution.LORENTZIAN:
+            check_positive("lorentzian: half width", self.second)
         elif not self.first < self.second:
             raise ValueError(f"uniform: found the ends {self.first!r} and {self.second!r}; expected rising ends")
 
@@ -54,6 +62,8 @@ class Draw:
         """Return the value below which a share `chance` of the distribution lies."""
         if self.distribution is Distribution.NORMAL:
             return NormalDist(self.first, self.second).inv_cdf(chance)
+        if self.distribution is Distribution.LORENTZIAN:
+            return self.first + self.second * math.tan(math.pi * (chance - 0.5))
         return self.first + (self.second - self.first) * chance
 
     def __str__(self) -> str:
@@ -68,6 +78,11 @@ def normal(mean: float, deviation: float) -> Draw:
 def uniform(low: float, high: float) -> Draw:
     """Return the uniform distribution between two numbers."""
     return Draw(Distribution.UNIFORM, low, high)
+
+
+def lorentzian(centre: float, half_width: float) -> Draw:
+    """Return the distribution of Lorentz, or Cauchy, of a centre and a half width at half maximum."""
+    return Draw(Distribution.LORENTZIAN, centre, half_width)
 
 
 Draws = Draw | tuple[tuple[float, ...], ...]
@@ -104,9 +119,7 @@ def _drawn(what: str, value: object, count: int) -> Draws:
         return _read(what, value)
     listed = value.tolist() if hasattr(value, "tolist") else value
     if not isinstance(listed, Sequence) or len(listed) != count:
-        raise ValueError(
-            f"{what}: found {short_repr(listed)}; expected normal(mean, deviation), uniform(low, high) or {count} entries"
-        )
+        raise ValueError(f"{what}: found {short_repr(listed)}; expected {KNOWN} or {count} entries")
     rows = [row if isinstance(row, Sequence) and not isinstance(row, str) else (row,) for row in listed]
     if len({len(row) for row in rows}) != 1:
         raise ValueError(f"{what}: found rows of different lengths; expected one number, or one for each node, in each")
@@ -121,9 +134,7 @@ class _Distributions(Algebra[Draw]):
     deepest = 2
 
     def refuse(self, node: ast.expr, reason: str) -> NoReturn:
-        raise ValueError(
-            f"{self.what}: found {short_repr(ast.unparse(node))}; expected normal(mean, deviation) or uniform(low, high)"
-        )
+        raise ValueError(f"{self.what}: found {short_repr(ast.unparse(node))}; expected {KNOWN}")
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[None]:
         if function not in tuple(Distribution) or count != 2 or options:
@@ -138,7 +149,7 @@ class _Distributions(Algebra[Draw]):
 def _read(what: str, text: str) -> Draw:
     expression = parse(check_text(what, text))
     if expression is None:
-        raise ValueError(f"{what}: found {short_repr(text)}; expected normal(mean, deviation) or uniform(low, high)")
+        raise ValueError(f"{what}: found {short_repr(text)}; expected {KNOWN}")
     try:
         return expression.evaluate(_Distributions(what))
     except ValueError as error:

@@ -14,6 +14,7 @@ from ..dynamics import network
 from ..dynamics.equations import Equations
 from ..graphs import readers
 from ..graphs.families import topology
+from ..graphs.links import LINK_LIMIT
 from ..graphs.topology import Topology
 from ..inputs.checks import check_integer, check_keys, check_number, check_table, short_repr, suggestion
 from ..inputs.frozen import Frozen
@@ -141,7 +142,7 @@ class Model:
         model = cls(kinds, tuple(numbers[own] for own in nodes), contact, tuple((None, graph) for _, graph in layers))
         spelt = []
         for coupling, graph in layers:
-            if coupling is None and graph.links:
+            if coupling is None and graph.link_count:
                 raise ValueError(
                     f"coupling: found none for {graph.name}({graph.n}), which has links; "
                     "expected the name of a coupling, e.g. 'spring'"
@@ -160,7 +161,7 @@ class Model:
     @property
     def linked(self) -> tuple[tuple[Coupling, Topology], ...]:
         """The layers that have links."""
-        return tuple((coupling, graph) for coupling, graph in self.layers if coupling is not None and graph.links)
+        return tuple((coupling, graph) for coupling, graph in self.layers if coupling is not None and graph.link_count)
 
     @property
     def topology(self) -> Topology:
@@ -188,10 +189,9 @@ class Model:
 
     def check_links(self) -> None:
         """Raise ValueError if a coupling cannot join the oscillators of a graph with links."""
-        if self.linked and len(self.kinds) > 1:
+        if self.linked and (len(self.kinds) > 1 or any(graph.link_count > LINK_LIMIT for _, graph in self.linked)):
             self.equations()
-            return
-        for coupling, _ in self.linked:
+        for coupling, _ in self.linked if len(self.kinds) == 1 else ():
             coupling.check_ends(self.unlinked.node)
 
     def holders(self, name: str) -> tuple[int, ...]:
@@ -218,7 +218,7 @@ class Model:
         """Return the sentence that refuses a name; a parameter of the coupling without links has its own."""
         known = tuple(known)
         for coupling, graph in self.layers:
-            if not graph.links and coupling is not None and name in coupling.parameters:
+            if not graph.link_count and coupling is not None and name in coupling.parameters:
                 return (
                     f"{what} {name!r} couples oscillators, but {graph.name}({graph.n}) has no links: "
                     f"there is nothing to couple; leave it out or take at least two oscillators, e.g. chain(2)"
@@ -244,8 +244,11 @@ def _unlinked(kinds: tuple[NodeKind, ...], kind_of: tuple[int, ...], contact: Co
 @lru_cache(maxsize=64)
 def _union(graphs: tuple[Topology, ...]) -> Topology:
     """The union of graphs: a link of weight 1 wherever one of them has a link."""
+    name, n = " and ".join(graph.name for graph in graphs), graphs[0].n
+    if any(graph.all_to_all is not None for graph in graphs):
+        return Topology(name, n, rule=topology("complete", n).rule)
     pairs = sorted({link[:2] for graph in graphs for link in graph.links})
-    return Topology(" and ".join(graph.name for graph in graphs), graphs[0].n, tuple((*p, Fraction(1)) for p in pairs))
+    return Topology(name, n, tuple((*p, Fraction(1)) for p in pairs))
 
 
 @lru_cache(maxsize=64)

@@ -104,7 +104,7 @@ class Scene(Drawn, Written):
     realisations : int
         Realisations of what is drawn, a further dimension of the sweep; 0 for none.
     draws : mapping, optional
-        What is drawn, by the names of parameters and initial states: `normal`, `uniform` (of each node by itself), or a
+        What is drawn, by the names of parameters and initial states: `normal`, `uniform`, `lorentzian` (of each node by itself), or a
         list with one entry for each realisation.
     rng : int
         Seed of what is drawn.

@@ -174,9 +174,11 @@ def _graphs() -> list[Table]:
     rows = {"type": "array", "minItems": 1, "items": {"type": "array", "items": NUMBER}}
     outside = {"type": "object", "properties": {"name": FILE, "n": WHOLE}, "required": ["name", "n"]}
     matrix = {"matrix": rows, "name": TEXT, "n": WHOLE}
+    composed: dict[str, Table] = {"name": {"type": "string", "pattern": r"\("}, "n": WHOLE}
     return [
         *(_family(family(name)) for name in families()),
         outside,
+        _table(composed, "name", "n"),
         _table(matrix, "matrix"),
         _table({"file": {"type": "string"}}, "file"),
     ]

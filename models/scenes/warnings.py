@@ -29,7 +29,7 @@ def zero_multiplicity(graph: Topology) -> int:
     Electron. J. Combin. 13, R39, 2006).  With negative weights it is at least that; up to COUNTED nodes it is exact.
     """
     leading = graph.leading_groups
-    if graph.n > COUNTED or all(weight > 0 for _, _, weight in graph.links):
+    if graph.n > COUNTED or not _has_negative(graph):
         return leading
     from ..spectra.characteristic import characteristic
 
@@ -80,7 +80,7 @@ def _in_parts(graph: Topology) -> str:
 
 def _negative_weights(graph: Topology) -> str:
     """A sentence if a weight is negative."""
-    if all(weight > 0 for _, _, weight in graph.links):
+    if not _has_negative(graph):
         return ""
     return (
         f"topology {graph.name}({graph.n}) has negative weights, which drive oscillators apart; if its matrix is a "
@@ -88,9 +88,15 @@ def _negative_weights(graph: Topology) -> str:
     )
 
 
+def _has_negative(graph: Topology) -> bool:
+    """True if a weight is negative."""
+    weight = graph.all_to_all
+    return any(w < 0 for _, _, w in graph.links) if weight is None else bool(graph.link_count and weight < 0)
+
+
 def _different_nodes(graph: Topology, varied: tuple[str, ...]) -> str:
     """A sentence if joined nodes differ in parameters."""
-    if not varied or not graph.links:
+    if not varied or not graph.link_count:
         return ""
     return (
         f"the nodes differ in {', '.join(varied)}: equal states are no solution of this network, so there is no "
@@ -123,10 +129,7 @@ def _stiff_springs(model: Model, values: Mapping[str, Any], duration: float) -> 
         return ""
     swept = (value for axis in values["axes"] if axis.name == "sigma" for value in axis.values)
     sigma = max([values["parameters"]["sigma"], *swept])
-    weights = [0.0] * model.n
-    for target, _, weight in model.topology.links:
-        weights[target] += abs(float(weight))
-    fastest = math.sqrt(1.0 + 2.0 * sigma * max(weights))
+    fastest = math.sqrt(1.0 + 2.0 * sigma * _largest_degree(model.topology))
     swings = fastest * duration / (2.0 * math.pi)
     if fastest < STIFF or swings < STIFF:
         return ""
@@ -134,6 +137,16 @@ def _stiff_springs(model: Model, values: Mapping[str, Any], duration: float) -> 
         f"stiff springs: a mode of frequency {fastest:.3g} swings {swings:.3g} times, and the errors of its phase add up "
         "to more than rtol; tighten rtol until the result no longer changes"
     )
+
+
+def _largest_degree(graph: Topology) -> float:
+    """The largest sum of the sizes of the weights that a node feels."""
+    if graph.all_to_all is not None:
+        return abs(float(graph.all_to_all)) * (graph.n - 1)
+    weights = [0.0] * graph.n
+    for target, _, weight in graph.links:
+        weights[target] += abs(float(weight))
+    return max(weights)
 
 
 def _equal_starts(values: Mapping[str, Any]) -> str:

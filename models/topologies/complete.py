@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 SUMMARY = "complete graph: all to all"
 MINIMUM = 1
+ALL_TO_ALL = True
 SOURCE = "A. E. Brouwer, W. H. Haemers, Spectra of Graphs (Springer, 2012), section 1.4.1"
 
 

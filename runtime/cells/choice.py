@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import lru_cache
 from itertools import islice
 
@@ -18,7 +19,8 @@ from synchain.codegen.steps.mass import turned_masses
 from synchain.codegen.taylor import is_analytic, is_linear, jump, order_for
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
-from synchain.models.mechanics.components import TIME
+from synchain.models.graphs.links import LINK_LIMIT, Link
+from synchain.models.mechanics.components import TIME, Edge
 from synchain.models.scenes.scene import Scene
 
 from .buffers import Buffers
@@ -55,7 +57,8 @@ def chosen_integrator(reduction: Reduction) -> Integrator:
     Power series where all functions are continuous, and analytic between kinks, and the equations are
     not stiff, in the extreme cells of the sweep; between the events of set-valued friction too.  Nodes with a mass matrix
     take explicit steps in their place: the recurrences of a dense matrix take longer to compile than most runs.  Otherwise
-    Rosenbrock steps, or a switching pair of methods for two oscillators at a tight tolerance.
+    Rosenbrock steps, or a switching pair of methods for two oscillators at a tight tolerance.  A mean field of more nodes
+    than Rosenbrock steps can take, whose Jacobian has an entry for each pair, takes explicit steps however stiff it is.
 
     Parameters
     ----------
@@ -87,7 +90,7 @@ def _chosen(scene: Scene, equations: Equations, stiffness_of: Callable[[], float
         return integrator(scene.integrator)
     if not equations.inertial_links and jump(equations) is None and (equations.sticks or stiffness_of() < STIFF):
         return integrator("dop853") if equations.inertial else _taylor(scene, equations)
-    if equations.sticks:
+    if equations.sticks or any(len(pairs) > LINK_LIMIT for _, pairs in equations.fields):
         return integrator("dop853")
     pair = equations.n == 2 and not (equations.mixed or equations.inertial) and scene.rtol <= 1e-9
     return integrator("switching" if pair else AUTO)
@@ -244,10 +247,10 @@ def _eigenvalue_parts(blocks: Iterable[np.ndarray]) -> tuple[float, float]:
 def _blocks(equations: Equations, values: Mapping[str, float]) -> list[np.ndarray]:
     """The blocks of the Jacobian of the first nodes, with twice what their links add."""
     blocks = [_block(equations, i, values) for i in range(min(equations.n, NODES))]
-    for link, edge in islice(equations.linked(), LINKS):
+    for link, edge, share in _links(equations):
         if link[0] < len(blocks):
             found = _value(edge.jacobian_here(), equations.at_link(link, edge), values)
-            blocks[link[0]] = blocks[link[0]] + 2.0 * found
+            blocks[link[0]] = blocks[link[0]] + 2.0 * share * found
     return [_by_masses(equations, i, values, block) for i, block in enumerate(blocks)]
 
 
@@ -275,16 +278,30 @@ def _by_masses(equations: Equations, i: int, values: Mapping[str, float], right:
         return np.full(right.shape, math.nan)
 
 
+def _links(equations: Equations) -> Iterator[tuple[Link, Edge, float]]:
+    """The links that are looked at with their templates, and how many links each stands for."""
+    large = [(edge, pairs) for edge, pairs in equations.fields if len(pairs) > LINKS]
+    if not large:
+        yield from ((link, edge, 1.0) for link, edge in islice(equations.linked(), LINKS))
+        return
+    yield from ((link, edge, 1.0) for link, edge in islice(replace(equations, layers=equations.listed).linked(), LINKS))
+    each = LINKS // NODES
+    for edge, pairs in large:
+        gaps = [1 + k * (pairs.n - 1) // each for k in range(each)]
+        links = ((i, (i + gap) % pairs.n, pairs.weight) for i in range(min(pairs.n, NODES)) for gap in gaps)
+        yield from ((link, edge, (pairs.n - 1) / each) for link in links)
+
+
 def _bends(equations: Equations, values: Mapping[str, float]) -> Iterator[np.ndarray]:
     """The blocks of the nodes and of the links in the layers of their turning functions, one state moved there."""
     for i in range(min(equations.n, NODES)):
         node = equations.node_at(i)
         for moved in _turned(node.rhs, node.state, equations.at_node(i), values):
             yield _by_masses(equations, i, moved, _block(equations, i, moved))
-    for link, edge in islice(equations.linked(), LINKS):
+    for link, edge, share in _links(equations):
         at = equations.at_link(link, edge)
         for moved in _turned(edge.rhs, edge.here, at, values):
-            yield 2.0 * _by_masses(equations, link[0], moved, _value(edge.jacobian_here(), at, moved))
+            yield 2.0 * share * _by_masses(equations, link[0], moved, _value(edge.jacobian_here(), at, moved))
 
 
 def _turned(

@@ -95,6 +95,8 @@ class Planner:
         self.equations = scene.equations
         self.values = {axis.name: np.array(axis.values) for axis in scene.axes}
         self.drawn = {axis.name: np.array(axis.values) for axis in scene.drawn}
+        self.slots = {name: k for k, name in enumerate(self.equations.parameters)}
+        self.places = {name: k for k, name in enumerate(self.equations.state)}
 
     def columns(self, cells: np.ndarray) -> dict[str, np.ndarray]:
         """Return the value of each axis, and of what is drawn, in each of these cells."""
@@ -109,13 +111,13 @@ class Planner:
         """Return the rows of these cells; `near` (cells,) is the last column of their spans
         (default: 0).
         """
-        columns, state = self.columns(cells), self.equations.state
+        columns = self.columns(cells)
         numbers = self._numbers(columns, len(cells))
         start = np.empty((len(cells), len(self.scene.y0)))
         start[:] = self.scene.y0
         for name, values in columns.items():
-            if name not in self.equations.parameters:
-                start[:, state.index(name)] = values
+            if name not in self.slots:
+                start[:, self.places[name]] = values
         return Plan(with_modes(self.equations, start, numbers), numbers, self._spans(numbers, near))
 
     def spans(self, cells: np.ndarray) -> np.ndarray:
@@ -124,12 +126,11 @@ class Planner:
 
     def _numbers(self, columns: Mapping[str, np.ndarray], cells: int) -> np.ndarray:
         """The parameters of cells in which the axes have these values."""
-        names = self.equations.parameters
-        numbers = np.empty((cells, len(names)))
-        numbers[:] = [self.scene.parameters[name] for name in names]
+        numbers = np.empty((cells, len(self.slots)))
+        numbers[:] = [self.scene.parameters[name] for name in self.slots]
         for name, values in columns.items():
-            if name in names:
-                numbers[:, names.index(name)] = values
+            if name in self.slots:
+                numbers[:, self.slots[name]] = values
         return numbers
 
     def _spans(self, numbers: np.ndarray, near: np.ndarray | None) -> np.ndarray:

@@ -225,7 +225,7 @@ def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> R
         equations,
         tuple(r for r in scene.record if not (together and r == "sync_error")),
         _node_merge(whole, equations, classes, together),
-        np.array([whole.parameters.index(_column(name, equations, first)) for name in equations.parameters], dtype=int),
+        _columns(whole, equations, first),
         _multiplicity(scene, classes),
         tuple(skipped),
         tuple(kept),
@@ -235,6 +235,9 @@ def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> R
 
 def _node_merge(whole: Equations, reduced: Equations, classes: tuple[int, ...], together: bool) -> NodeMerge:
     """The columns of both states, from the class of each oscillator of the whole network."""
+    if reduced.n == whole.n:
+        same = np.arange(whole.dimension)
+        return NodeMerge(same, same, together)
     first: dict[int, int] = {}
     states, places = np.empty(reduced.dimension, dtype=int), np.empty(whole.dimension, dtype=int)
     for node, k in enumerate(classes):
@@ -242,6 +245,12 @@ def _node_merge(whole: Equations, reduced: Equations, classes: tuple[int, ...], 
             states[list(reduced.places[k])] = whole.places[node]
         places[list(whole.places[node])] = reduced.places[k]
     return NodeMerge(states, places, together)
+
+
+def _columns(whole: Equations, reduced: Equations, first: list[int]) -> np.ndarray:
+    """The columns of the whole network's parameters that a reduced one has; its node k stands for first[k]."""
+    column = {name: k for k, name in enumerate(whole.parameters)}
+    return np.array([column[_column(name, reduced, first)] for name in reduced.parameters], dtype=int)
 
 
 def _column(name: str, equations: Equations, first: list[int]) -> str:
@@ -261,7 +270,7 @@ def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> 
     """Fold parameters one after the other, and say what each of them took along."""
     equations, fixed, observed = scene.equations, _fixed(scene), _observed_parameters(scene)
     for name, value in fixed.items():
-        if name not in equations.parameters or (value != 0.0 and not fold_all):
+        if (value != 0.0 and not fold_all) or name not in equations.parameters:
             continue
         try:
             made = substitute_constants(equations, {name: Fraction(repr(value))})
@@ -290,11 +299,11 @@ def _observed_parameters(scene: Scene) -> set[str]:
 def _present(scene: Scene, equations: Equations) -> list[str]:
     """What has to be integrated, in words."""
     found = ["forcing: time occurs in the equations"] if equations.forced else []
-    if equations.links:
+    if equations.link_count:
         fixed = _fixed(scene)
         names = [*dict.fromkeys(symbol.name for edge in equations.edges for symbol in edge.parameters)]
         strengths = [f"{name} = {fixed[name]:g}" if name in fixed else f"{name} is swept" for name in names]
-        found.append(f"coupling: {', '.join([f'{len(equations.links)} links', *strengths])}")
+        found.append(f"coupling: {', '.join([f'{equations.link_count} links', *strengths])}")
     return found
 
 
@@ -304,7 +313,7 @@ def _consequence(before: Equations, after: Equations, name: str, value: float) -
     too = f" together with {', '.join(gone)}" if gone else ""
     if before.forced and not after.forced:
         return f"forcing: {name} = {value:g} in every cell, left out{too}; no time terms"
-    if before.links and not after.links:
+    if before.link_count and not after.link_count:
         return f"coupling: {name} = {value:g} in every cell, left out{too}; no links"
     return f"parameter: {name} = {value:g} in every cell, now a number of the equations{too and f'; left out{too}'}"
 
@@ -322,8 +331,8 @@ def _merge(
     if scene.observe or scene.sections or scene.stop:
         kept.append(f"quotient: the {n} oscillators are observed one by one")
         return equations, alone
-    colours = _colours(scene)
-    different = len(set(colours))
+    colours = [] if _all_apart(scene) else _colours(scene)
+    different = len(set(colours)) or n
     words = f"quotient: {n} oscillators with {different} different starts"
     if different == n:
         if n > 1:
@@ -341,6 +350,12 @@ def _merge(
         words = f"quotient: {n} oscillators that all start equal"
     skipped.append(f"{words} are stepped as {made.n}; the links treat equal starts alike, so they stay equal")
     return made, classes
+
+
+def _all_apart(scene: Scene) -> bool:
+    """True if the starts of a component differ at all nodes in every cell, which a large network shows soon."""
+    moved = {parts.base for axis in (*scene.axes, *scene.drawn) if (parts := NodeName.parse(axis.name))}
+    return any(len(set(x)) == scene.n for name, x in scene.initial.items() if name not in moved)
 
 
 def _colours(scene: Scene) -> list[Hashable]:
@@ -398,7 +413,7 @@ def _unwritten(reduction: Reduction) -> list[str]:
     scene, found = reduction.scene, []
     if not scene.forced:
         found.append("forcing: time does not occur in the equations; no time terms")
-    if not scene.equations.links:
+    if not scene.equations.link_count:
         found.append("coupling: no links")
     if "sync_error" not in scene.record:
         found.append("synchronisation error: not recorded")

@@ -108,11 +108,11 @@ def _scene(arguments: Namespace) -> tuple[Scene, bool]:
 
     scene = None if arguments.scene is None else load_scene(arguments.scene)
     network = named_network(arguments, scene)
-    if network is not None and not network.links:
+    if network is not None and not network.link_count:
         raise WrongUse(
             f"{network.name}({network.n}) has no links; expected a network of at least two coupled oscillators"
         )
-    if network is None and scene is not None and scene.topology.links:
+    if network is None and scene is not None and scene.topology.link_count:
         network = scene.topology
     stand_in = scene.topology if scene is not None else topology("chain", 2)
     return scene_on(network or stand_in, scene, arguments), network is not None
@@ -130,7 +130,7 @@ def _check(scene: Scene, network: bool, arguments: Namespace) -> None:
 
     if scene.coupling is None and not scene.model.linked:
         raise WrongUse("the scene has no coupling, by which modes differ; expected one, e.g. coupling = 'spring'")
-    one = scene if scene.topology.links else scene.replace(topology=topology("chain", 2))
+    one = scene if scene.topology.link_count else scene.replace(topology=topology("chain", 2))
     strength = np.zeros(1, dtype=float if arguments.beta is None else complex)
     Orbits.make(one, strength, np.zeros((1, len(one.components))), None)
     if len(arguments.alpha or [0] * 241) * len(arguments.beta or [0]) > POINTS:

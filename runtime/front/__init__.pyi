@@ -49,6 +49,7 @@ from synchain.models import kronecker as kronecker
 from synchain.models import ladder as ladder
 from synchain.models import latex as latex
 from synchain.models import load_scene as load_scene
+from synchain.models import lorentzian as lorentzian
 from synchain.models import maximum as maximum
 from synchain.models import mean as mean
 from synchain.models import minimum as minimum

@@ -181,7 +181,7 @@ def _oscillators(scene: Scene) -> str:
         f"{kind.oscillator.name} with {kind.friction.name} friction" if kind.friction else kind.oscillator.name
         for kind in scene.model.kinds
     ]
-    coupling = f", {scene.coupling} coupling" if scene.coupling and scene.topology.links else ""
+    coupling = f", {scene.coupling} coupling" if scene.coupling and scene.topology.link_count else ""
     return " and ".join(dict.fromkeys(kinds)) + coupling
 
 

@@ -102,7 +102,7 @@ class MSF(Labelled):
         """The windows; none if the network is a single node or has complex eigenvalues."""
         graph = self.scene.topology
         real = graph.undirected or not any(isinstance(value, complex) for value in graph.spectrum.values)
-        return self.windows if graph.links and real else ()
+        return self.windows if graph.link_count and real else ()
 
     @property
     def exponent(self) -> np.ndarray:

@@ -74,7 +74,7 @@ def certify(scene: Scene, *, precision: float = 2e-3, periods: float = 2000, wor
 
 def check_certifiable(scene: Scene) -> None:
     """Raise ValueError if the synchronous state of a scene has no transversal exponents."""
-    if not scene.equations.links:
+    if not scene.equations.link_count:
         raise ValueError("a certificate needs coupled oscillators; found a scene without links")
     if scene.cells > MOST:
         raise ValueError(f"a certificate needs memory for every cell; found {scene.cells}, expected at most {MOST}")

@@ -273,7 +273,7 @@ def _probe_grid(sigma: np.ndarray, spectrum: Spectrum) -> np.ndarray:
 
 def check_probe(graph: Topology, spectrum: Spectrum) -> None:
     """Raise ValueError if the two-oscillator probe says nothing about a network."""
-    if graph.n < 2 or not graph.links:
+    if graph.n < 2 or not graph.link_count:
         raise ValueError(f"{graph.name}({graph.n}) has no links; thresholds need at least two coupled oscillators")
     if any(isinstance(value, complex) for value in spectrum.values):
         raise ValueError(

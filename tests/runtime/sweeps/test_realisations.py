@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import end, mean, nodes, normal, rate, ring, uniform
+from synchain.models import end, lorentzian, mean, nodes, normal, rate, ring, uniform
 from synchain.models.scenes.draw import Draw
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.opening.open import open_result
@@ -75,6 +75,12 @@ def test_numbers_have_their_distribution() -> None:
     assert statistics.mean(places) == pytest.approx(1.0, abs=4 * (4 / 12**0.5) / 20_000**0.5)
     assert -1.0 < min(places) < -0.99
     assert 2.99 < max(places) < 3.0
+    lorentz = scene.replace(draws={"power": lorentzian(0.5, 2.0)})
+    wide = [value for axis in lorentz.drawn for value in axis.values]
+    for chance, distance in ((0.25, -2.0), (0.5, 0.0), (0.75, 2.0)):  # half of the numbers lie within the half width
+        error = 4 * (chance * (1 - chance) / 20_000) ** 0.5 * np.pi * 2.0 * (1 + (distance / 2.0) ** 2)
+        assert np.quantile(wide, chance) == pytest.approx(0.5 + distance, abs=error)
+    assert max(wide) > 1000
     assert abs(np.corrcoef(drawn["power_1"], drawn["power_2"])[0, 1]) < 4 / 5000**0.5
 
 
@@ -129,7 +135,10 @@ def test_distributions_refuse_what_they_are_not() -> None:
         normal(0.0, 0.0)
     with pytest.raises(ValueError, match="rising ends"):
         uniform(1.0, 1.0)
+    with pytest.raises(ValueError, match="half width"):
+        lorentzian(0.0, -1.0)
     assert str(normal(0, 0.5)) == "normal(0.0, 0.5)"
+    assert SCENE.replace(realisations=2, draws={"x": "lorentzian(0, 1/2)"}).draws["x"] == lorentzian(0, 0.5)
     assert isinstance(normal(0, 1), Draw)
 
 

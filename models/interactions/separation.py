@@ -1,0 +1,177 @@
+"""Links whose rates are finite sums of products: a function of the target times a function of the source.
+
+Between all pairs of nodes such a link needs the sums of its source functions alone, a mean field: one loop over the nodes
+adds them up, another one applies them (Y. Kuramoto, Chemical Oscillations, Waves, and Turbulence, Springer, 1984, section
+5.4, for the sine).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import sympy as sp
+
+from ..mechanics.components import Edge
+
+__all__ = ["MOST_PRODUCTS", "Separated", "separated"]
+
+MOST_PRODUCTS = 32
+"""Most products in the rate of one state, and highest power of a sum that is multiplied out."""
+
+_THEOREMS: dict[type[sp.Expr], Callable[[sp.Expr, sp.Expr], tuple[tuple[sp.Expr, sp.Expr], ...]]] = {
+    sp.sin: lambda a, b: ((sp.sin(a), sp.cos(b)), (sp.cos(a), sp.sin(b))),
+    sp.cos: lambda a, b: ((sp.cos(a), sp.cos(b)), (-sp.sin(a), sp.sin(b))),
+    sp.sinh: lambda a, b: ((sp.sinh(a), sp.cosh(b)), (sp.cosh(a), sp.sinh(b))),
+    sp.cosh: lambda a, b: ((sp.cosh(a), sp.cosh(b)), (sp.sinh(a), sp.sinh(b))),
+    sp.exp: lambda a, b: ((sp.exp(a), sp.exp(b)),),
+}
+"""Addition theorems: f(a + b) as a sum of products."""
+
+_SLOPES = {sp.sin: (sp.cos, 1), sp.cos: (sp.sin, -1)}
+"""The derivatives of waves, with their signs: f(x + lag) = cos(lag) f(x) + sin(lag) f'(x)."""
+
+Symbols = frozenset[sp.Symbol]
+
+Products = dict[tuple[sp.Expr, sp.Expr], sp.Expr]
+"""What all nodes share, by the functions of target and source that it multiplies."""
+
+
+@dataclass(frozen=True, slots=True)
+class Separated:
+    """A link as sums of products.
+
+    Parameters
+    ----------
+    products : tuple of tuple of (Expr, Expr, Expr)
+        For each state of the target the terms of its rate: what all nodes share, a function of the target, and one of the
+        source.
+    own : tuple of Expr
+        What the link would add between a node and itself: a sum over all nodes has it too much.
+    shifted : tuple of int
+        States of which the link feels differences alone.  All values of such a state may be counted from that of one node,
+        so that sums of powers and of exponentials keep their digits however far all nodes have moved together.
+    """
+
+    products: tuple[tuple[tuple[sp.Expr, sp.Expr, sp.Expr], ...], ...]
+    own: tuple[sp.Expr, ...]
+    shifted: tuple[int, ...]
+
+    @property
+    def sources(self) -> tuple[sp.Expr, ...]:
+        """The functions of the source, each once."""
+        return tuple(dict.fromkeys(source for row in self.products for _, _, source in row))
+
+
+@lru_cache(maxsize=64)
+def separated(edge: Edge, varied: tuple[str, ...] = ()) -> Separated | None:
+    """Return a link as sums of products, None if none is found; the expanded difference is proved to be zero.
+
+    Parameters
+    ----------
+    edge : Edge
+        What a link adds.
+    varied : tuple of str
+        Parameters that have a value for each node.
+    """
+    if edge.inertia or edge.oriented:
+        return None
+    theirs = dict(edge.theirs)
+    source = frozenset((*edge.there, *theirs))
+    target = frozenset((*edge.here, *(s for s in edge.parameters if s.name in varied)))
+    rows = []
+    for e in edge.rhs:
+        row = _products(e, target, source)
+        if row is None or len(row) > MOST_PRODUCTS or not _vanishes(e - sum(c * a * b for (a, b), c in row.items())):
+            return None
+        rows.append(tuple((c, a, b) for (a, b), c in row.items()))
+    itself = {**dict(zip(edge.there, edge.here, strict=True)), **theirs}
+    own = tuple(e.xreplace(itself) for e in edge.rhs)
+    return Separated(tuple(rows), own, _shifted(edge, {b for row in rows for _, _, b in row}))
+
+
+def _products(e: sp.Expr, target: Symbols, source: Symbols) -> Products | None:
+    """An expression as a sum of products, None if it is not seen to be one."""
+    here, there = bool(e.free_symbols & target), bool(e.free_symbols & source)
+    if not here and not there:
+        return {(sp.S.One, sp.S.One): e} if e != 0 else {}
+    if e.is_Mul:
+        found: Products | None = {(sp.S.One, sp.S.One): sp.S.One}
+        for part in e.args:
+            found = _times(found, _products(part, target, source))
+        return found
+    if not there:
+        return {(e, sp.S.One): sp.S.One}
+    if e.is_Add:
+        return _sum([_products(part, target, source) for part in e.args])
+    if not here:
+        return {(sp.S.One, e): sp.S.One}
+    if e.is_Pow and e.exp.is_Integer and 1 < e.exp <= MOST_PRODUCTS:
+        base, found = _products(e.base, target, source), {(sp.S.One, sp.S.One): sp.S.One}
+        for _ in range(int(e.exp)):
+            found = _times(found, base)
+        return found
+    return _by_theorem(e, target, source)
+
+
+def _by_theorem(e: sp.Expr, target: Symbols, source: Symbols) -> Products | None:
+    """A function with an addition theorem whose argument is a function of the target plus one of the source.
+
+    What all nodes share in the argument of a sine or cosine becomes factors: a lag costs nothing at the nodes.
+    """
+    theorem = _THEOREMS.get(e.func)
+    if theorem is None:
+        return None
+    terms = sp.Add.make_args(sp.expand(e.args[0]))
+    theirs = sp.Add(*(part for part in terms if part.free_symbols & source))
+    own = sp.Add(*(part for part in terms if part.free_symbols & target))
+    lag = sp.Add(*terms) - theirs - own
+    if theirs.free_symbols & target:
+        return None
+    if e.func not in _SLOPES:
+        return _sum([_one(sp.S.One, a, b) for a, b in theorem(own + lag, theirs)])
+    slope, sign = _SLOPES[e.func]
+    turned = ((sp.cos(lag), e.func), (sign * sp.sin(lag), slope))
+    return _sum([_one(c, a, b) for c, wave in turned for a, b in _THEOREMS[wave](own, theirs)])
+
+
+def _one(c: sp.Expr, a: sp.Expr, b: sp.Expr) -> Products:
+    """One product, its numbers in front."""
+    (p, a), (q, b) = a.as_coeff_Mul(), b.as_coeff_Mul()
+    return {(a, b): p * q * c}
+
+
+def _sum(parts: list[Products | None]) -> Products | None:
+    total: Products = {}
+    for part in parts:
+        if part is None:
+            return None
+        for key, c in part.items():
+            total[key] = total.get(key, sp.S.Zero) + c
+    return {key: c for key, c in total.items() if c != 0}
+
+
+def _times(left: Products | None, right: Products | None) -> Products | None:
+    if left is None or right is None or len(left) * len(right) > MOST_PRODUCTS**2:
+        return None
+    return _sum([_one(c * d, a * g, b * h) for (a, b), c in left.items() for (g, h), d in right.items()])
+
+
+def _vanishes(e: sp.Expr) -> bool:
+    """True if an expression is proved to be zero: its expansion in exponentials has no term."""
+    return bool(sp.expand(e.rewrite([sp.sin, sp.cos, sp.sinh, sp.cosh], sp.exp)) == 0)
+
+
+def _shifted(edge: Edge, sources: set[sp.Expr]) -> tuple[int, ...]:
+    """States whose common shift changes nothing, but those that enter sines and cosines alone, which stay small."""
+    distance = sp.Dummy("shift", real=True)
+    found = []
+    for k, (here, there) in enumerate(zip(edge.here, edge.there, strict=True)):
+        waves = {wave: sp.Dummy(real=True) for b in sources for wave in b.atoms(sp.sin, sp.cos)}
+        if not any(b.xreplace(waves).has(there) for b in sources):
+            continue
+        moved: Mapping[sp.Expr, sp.Expr] = {here: here + distance, there: there + distance}
+        if all(_vanishes(e.xreplace(moved) - e) for e in edge.rhs):
+            found.append(k)
+    return tuple(found)

@@ -1,0 +1,127 @@
+"""Mean fields from the scene to the result: against SciPy, and in sizes whose links cannot be listed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.integrate import solve_ivp
+
+import synchain as sc
+from synchain.models.dynamics.network import FEW
+from synchain.models.graphs.links import LINK_LIMIT, AllPairs
+from synchain.runtime.cells.choice import chosen_integrator, stiffness
+from synchain.runtime.cells.kernels import kernel_source
+from synchain.runtime.cells.reduce import reduce_scene
+
+THETA, OMEGA, K, LAG = sp.symbols("theta omega K lag")
+PHASE = sc.Field({THETA: OMEGA}, parameters={OMEGA: 0})
+HERE, THERE, W = sc.ends(PHASE)
+SINE = sc.Rates({HERE.theta: K * W * sp.sin(THERE.theta - HERE.theta - LAG)}, {K: 1, LAG: 0})
+ORDER = sc.end(abs(sc.nodes.mean(sp.exp(sp.I * THETA))))
+LARGE = 3000
+"""Nodes whose links are more than can be listed."""
+
+
+def mean_field(n: int) -> sc.Topology:
+    return sc.weighted(sc.complete(n), f"1/{n}")
+
+
+def scene(n: int, coupling: object = SINE, **changes: object) -> sc.Scene:
+    rng = np.random.default_rng(1)
+    given = {
+        "parameters": {"omega": rng.normal(size=n), "K": 1.5},
+        "initial": {"theta": rng.uniform(0.0, 6.0, n)},
+        "transient": 0, "window": 2, "time_unit": "time", "record": (), "rtol": 1e-10,
+    }  # fmt: skip
+    return sc.Scene(PHASE, coupling, mean_field(n), **{**given, **changes})
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "taylor"])
+def test_two_hundred_phases_follow_scipy(integrator: str) -> None:
+    kuramoto = scene(200, integrator=integrator, observe={"r": ORDER})
+    kuramoto = kuramoto.replace(lag=0.3)
+    assert len(kuramoto.equations.fields) == 1
+    frequencies = np.array([kuramoto.parameters[f"omega_{i + 1}"] for i in range(200)])
+
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        return frequencies + 1.5 * np.mean(np.sin(y[None, :] - y[:, None] - 0.3), axis=1) + 1.5 / 200 * np.sin(0.3)
+
+    end = solve_ivp(rates, (0, 2), kuramoto.y0, "DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
+    result = sc.run(kuramoto)
+    np.testing.assert_allclose(result.states("end"), end, atol=2e-9)
+    assert float(result.r) == pytest.approx(abs(np.exp(1j * end).mean()), abs=1e-9)
+
+
+def test_small_complete_graphs_list_their_links() -> None:
+    assert scene(FEW).equations.fields == ()
+    assert len(scene(FEW + 1).equations.fields) == 1
+
+
+def test_set_valued_friction_lists_its_links() -> None:
+    assert sc.Scene(topology=sc.complete(9), contact="set-valued").equations.fields == ()
+    assert len(sc.Scene(topology=sc.complete(9)).equations.fields) == 1
+
+
+def test_a_scene_of_many_phases_lists_no_link(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(pairs: AllPairs) -> None:
+        raise AssertionError("the links were run through")
+
+    monkeypatch.setattr(AllPairs, "__iter__", refuse)
+    large = scene(
+        LARGE, window=0.1, integrator="dop853", record=("sync_error",), observe={"r": "end(nodes.mean(cos(theta)))"}
+    )
+    result = sc.run(large)
+    assert float(result.r) == pytest.approx(np.cos(result.states("end")).mean(), abs=1e-12)
+    result.save(tmp_path / "large.nc")
+    again = sc.open_result(tmp_path / "large.nc")
+    assert again.scene == large
+    np.testing.assert_array_equal(again.states("end"), result.states("end"))
+    assert "8997000 links" in repr(large.equations)
+    assert "8997000" in large._repr_html_()
+    assert large.spectrum.multiplicities == (1, LARGE - 1)
+    assert large.warnings == scene(100, record=("sync_error",)).warnings
+
+
+def test_a_link_that_does_not_separate_is_refused_where_it_cannot_be_listed() -> None:
+    steep = sc.Rates({HERE.theta: K * W * sp.tanh(THERE.theta - HERE.theta)}, {K: 1})
+    with pytest.raises(
+        ValueError, match=f"mean field of .*tanh.* expected a finite sum of products, .* or at most {LINK_LIMIT} links"
+    ):
+        scene(LARGE, steep)
+    assert scene(20, steep).equations.fields == ()
+
+
+def test_auto_takes_explicit_steps_where_the_jacobian_cannot_be_listed() -> None:
+    small, large = (
+        scene(n, integrator="auto", parameters={"K": 1e4}, initial={"theta": np.linspace(0.0, 0.5, n)})
+        for n in (20, LARGE)
+    )
+    assert stiffness(small) == pytest.approx(2e4 * 0.95, rel=0.05)
+    assert stiffness(large) == pytest.approx(2e4, rel=0.05)
+    assert chosen_integrator(reduce_scene(small)).name == "rodas5p"
+    assert chosen_integrator(reduce_scene(large)).name == "dop853"
+    assert chosen_integrator(reduce_scene(large.replace(parameters={"K": 0.1}))).name == "taylor"
+    with pytest.raises(ValueError, match=r"rodas5p: found a mean field of 3000 nodes"):
+        kernel_source(large.replace(integrator="rodas5p"))
+
+
+def test_equal_starts_of_many_are_stepped_one_by_one() -> None:
+    large = scene(LARGE, initial={"theta": 0.0}, parameters={"K": 1.0, "omega": 1.0})
+    assert any("too many to be listed" in words for words in reduce_scene(large).kept)
+    small = reduce_scene(scene(30, initial={"theta": 0.0}, parameters={"K": 1.0, "omega": 1.0}))
+    assert small.equations.n == 1
+
+
+def test_layers_beside_a_mean_field_keep_their_links() -> None:
+    n = 12
+    ring = sc.Rates({HERE.theta: sp.Symbol("c") * W * sp.sin(THERE.theta - HERE.theta) ** 3}, {"c": 0.4})
+    given = {"parameters": {"K": 1.5, "omega": np.linspace(-1, 1, n)}, "initial": {"theta": np.linspace(0, 5, n)}}
+    more = {"transient": 0, "window": 1, "time_unit": "time", "integrator": "dop853", "rtol": 1e-11, "record": ()}
+    both = sc.Scene(PHASE, links=[(SINE, mean_field(n)), (ring, sc.ring(n))], **given, **more)
+    assert (len(both.equations.fields), len(both.equations.listed)) == (1, 1)
+    listed = sc.Topology("listed", n, tuple(AllPairs(n, mean_field(n).all_to_all)))
+    same = sc.Scene(PHASE, links=[(SINE, listed), (ring, sc.ring(n))], **given, **more)
+    assert same.equations.fields == ()
+    assert both.topology.link_count == n * (n - 1)
+    np.testing.assert_allclose(sc.run(both).states("end"), sc.run(same).states("end"), atol=1e-10)
