@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 
 import sympy as sp
 
@@ -22,8 +23,21 @@ from ..steps.places import Joint, Kind, Span, places
 from .graph import Graph, Template
 from .masses import moved, solved
 from .series import Constant, Series, State, Time
-from .step import TaylorStep, called, ended, finished, lane, returned
-from .terms import ZERO, Assign, Expr, Name, Number, add, show, statement
+from .step import (
+    DIGITS,
+    TaylorStep,
+    called,
+    ended,
+    falling,
+    finished,
+    lane,
+    largest,
+    measured,
+    reach_of,
+    returned,
+    unseen,
+)
+from .terms import ZERO, Assign, Call, Expr, Name, Number, add, show, statement
 
 __all__ = ["write_looped"]
 
@@ -139,7 +153,8 @@ class Section:
     @property
     def remembered(self) -> set[Series]:
         """Series whose earlier coefficients are needed."""
-        return {used for s in self.graph.series for used in s.convolved} - set(self.places) - set(self.waves)
+        used = {used for s in self.graph.series for used in s.convolved} | set(self.graph.watched)
+        return used - set(self.places) - set(self.waves)
 
     # -- text -----------------------------------------------------------------------------------------------------
 
@@ -178,6 +193,19 @@ class Section:
             f"{self.where(kink.base, '0')}, {self.stride(kink.base)}, {degree}, passed)"
             for kink in self.graph.kinks
         ]
+        return self.turns([*self.setting, *found]) if found else []
+
+    def lengths(self, order: int, orders: Sequence[int]) -> list[str]:
+        """The statements that make the step no longer than the series of this section let it be."""
+        at = {s: lambda k, s=s: Name(self.load(s, str(k))) for s in (*self.graph.gaps, *self.graph.watched)}
+        found = []
+        for s in self.graph.gaps:
+            found += statement(Assign("largest", largest(Call("absolute", (at[s](k),)) for k in range(3))))
+            found.append("weight = 1.0/(atol + rtol*largest)")
+            for k in orders:
+                found.append(f"size_{k} = maximum(size_{k}, absolute({show(at[s](k))})*weight)")
+        for s in self.graph.watched:
+            found += unseen(order, at[s])
         return self.turns([*self.setting, *found]) if found else []
 
     def turns(self, lines: list[str]) -> list[str]:
@@ -420,19 +448,24 @@ class LoopWriter:
         """Step length, new state and dense output."""
         p = self.order
         at = "load(dense, at_states + {k}*DIMENSION + {{0}}, WIDTH)"
-        lines = ["# step length", *(f"size_{k} = 0.0*scale" for k in (p, p - 1, p - 2))]
+        sections = (self.waves, *self.sections)
+        watching = any(section.graph.watched for section in sections)
+        orders = measured(p, watching)
+        lines = ["# step length", *(f"size_{k} = 0.0*scale" for k in orders)]
         largest = "absolute(load(y, {0}, WIDTH))"
         for k in (1, 2):
             largest = f"maximum({largest}, absolute({at.format(k=k)}))"
         lines += self.states(
             f"weight = 1.0/(atol + rtol*{largest})",
-            *(f"size_{k} = maximum(size_{k}, absolute({at.format(k=k)})*weight)" for k in (p, p - 1, p - 2)),
+            *(f"size_{k} = maximum(size_{k}, absolute({at.format(k=k)})*weight)" for k in orders),
         )
-        reaches = [f"{-1.0 / k!r}*log(size_{k})" for k in (p, p - 1, p - 2)]
-        lines.append(f"reach = minimum({reaches[0]}, minimum({reaches[1]}, {reaches[2]}))")
-        lines += finished(p)
+        lines += [DIGITS, "unseen = 0.0*scale"] if watching else []
+        lines += [line for section in sections for line in section.lengths(p, orders)]
+        reaches = [reach_of(k, p) for k in orders]
+        lines.append(f"reach = {reduce(lambda rest, text: f'minimum({text}, {rest})', reversed(reaches))}")
+        lines += [falling(p)] if watching else []
+        lines += finished(p, watching)
         if self.kinks:
-            sections = (self.waves, *self.sections)
             found = [line for section in sections for line in section.passages(p)]
             lines += ["# first passage of a kink", "passed = ratio", *found, *ended()]
         lines += ["# new state", "total = 0.0*scale"]

@@ -7,7 +7,7 @@ coefficients, so that no series that has zeros at every second or third place is
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -23,6 +23,7 @@ from .series import Constant, Series, State, Time
 from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
 
 __all__ = [
+    "DIGITS",
     "StepWriter",
     "TaylorStep",
     "Written",
@@ -30,19 +31,40 @@ __all__ = [
     "check_order",
     "ended",
     "extreme",
+    "falling",
     "finished",
     "lane",
     "largest",
+    "measured",
     "polynomial",
+    "reach_of",
     "returned",
+    "unseen",
     "write_step",
 ]
 
 FARTHEST = 16.0
 """How many times longer than `scale` a step may be."""
 
+NEXT = 2.0
+"""The same where series are watched, so that what is zero in double precision now is seen when it has begun."""
+
+SLACK = 0.1
+"""By how much, in logarithms, earlier coefficients may say less than the last ones."""
+
+DIGITS = "digits = -log(max(rtol, atol) + 0.0*scale)"
+
+LOW = (1, 2, 3)
+"""The low orders, beside half the highest, with which high ones are compared."""
+
+HIDDEN, LOST = 1e-9, 1e-110
+"""Least that the low coefficients of a series are taken for: shares of the high ones, and of the absolute tolerance.
+
+The first is for zeros of the low ones alone, the second for zeros of high order, which no step would reach otherwise.
+"""
+
 WORDS = frozenset(
-    {"scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
+    {"unseen", "high", "low", "largest", "digits", "scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
      "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", *STARTS.values()}
 )  # fmt: skip
 PREFIXES = ("i_", "e_", "half_", "w_", "n_", "size_", "odd_")
@@ -300,23 +322,31 @@ class StepWriter:
         """The length of the step."""
         p = self.order
         self.put("# step length")
-        sizes: dict[int, list[Expr]] = {p: [], p - 1: [], p - 2: []}
-        for slot, state in self.states.items():
-            last = {k: e for k in sizes if (e := self.state_at(slot, k)) != ZERO}
+        sizes: dict[int, list[Expr]] = {k: [] for k in measured(p, bool(self.graph.watched))}
+        for series in (*self.states.values(), *self.graph.gaps):
+            last = {k: e for k in sizes if (e := self.at.at(series, k)) != ZERO}
             if not last:
                 continue
-            size = largest(Call("absolute", (e,)) for k in range(3) if (e := self.state_at(slot, k)) != ZERO)
-            self.put(f"w_{state.name} = 1.0/(atol + rtol*{show(size)})")
+            size = largest(Call("absolute", (e,)) for k in range(3) if (e := self.at.at(series, k)) != ZERO)
+            self.put(f"w_{series.name} = 1.0/(atol + rtol*{show(size)})")
             for k, e in last.items():
-                sizes[k].append(times(Call("absolute", (e,)), Name(f"w_{state.name}")))
+                sizes[k].append(times(Call("absolute", (e,)), Name(f"w_{series.name}")))
         reaches: list[Expr] = []
         for k, found in sizes.items():
             if found:
                 self.put(*statement(Assign(f"size_{k}", largest(found))))
-                reaches.append(times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))))
+                reaches.append(Name(reach_of(k, p)))
         if not reaches:
             reaches = [Name("-log(0.0*scale)")]
-        self.put(*statement(Assign("reach", extreme("minimum", reaches))), *finished(p))
+        if self.graph.watched:
+            self.put(DIGITS)
+        self.put(*statement(Assign("reach", extreme("minimum", reaches))))
+        if self.graph.watched:
+            self.put("unseen = 0.0*scale")
+            for s in self.graph.watched:
+                self.put(*unseen(p, lambda k, s=s: self.at.at(s, k)))
+            self.put(falling(p))
+        self.put(*finished(p, bool(self.graph.watched)))
 
     def passages(self) -> None:
         """End the step where a series passes a kink."""
@@ -404,12 +434,50 @@ def check_order(order: int) -> None:
         raise ValueError(f"taylor: found order {order}; expected at least 6")
 
 
-def finished(order: int) -> list[str]:
-    """The length of the step from the logarithm of its share of `scale`."""
+def unseen(order: int, coefficient: Callable[[int], Expr]) -> list[str]:
+    """How much larger the high coefficients of a series are than its low ones, the largest so far."""
+    low, high = (
+        [Call("absolute", (e,)) for k in places if (e := coefficient(k)) != ZERO]
+        for places in ((*LOW, order // 2), range(order // 2 + 1, order))
+    )
+    if not (low and high):
+        return []
+    return [
+        *statement(Assign("high", largest(high))),
+        *statement(Assign("low", largest(low))),
+        f"unseen = maximum(unseen, high/(low + ({HIDDEN!r}*high + {LOST!r}*atol)))",
+    ]
+
+
+def measured(order: int, watched: bool) -> list[int]:
+    """The orders whose coefficients say how long a step is.
+
+    The last three do in general. The series of x' = v, v' = -x**n from x = 0 has its coefficients n + 1 orders apart.
+    """
+    return list(range(order, order // 2 if watched else order - 3, -1))
+
+
+def reach_of(k: int, order: int) -> str:
+    """The text of the logarithm of how far a step reaches by coefficients k, those of the last three orders neglected.
+
+    What an earlier one says of the radius of convergence is what counts: at that radius it would be as large as the state.
+    """
+    text = f"{-1.0 / k!r}*log(size_{k})"
+    return text if k > order - 3 else f"({text} + {1.0 / k - 1.0 / order!r}*digits + {SLACK!r})"
+
+
+def falling(order: int) -> str:
+    """No step goes on behind the place where the terms of a watched series stop falling."""
+    reaches = (f"{-1.0 / k!r}*log(unseen)" for k in (order - 2, order - 1 - order // 2))
+    return f"reach = minimum(reach, minimum({', '.join(reaches)}))"
+
+
+def finished(order: int, watched: bool = False) -> list[str]:
+    """The length of the step from the logarithm of its share of `scale`; see `Graph.watched`."""
     return [
         # weights are those of a step as long as `scale`; a shorter one changes the states less
         f"reach = minimum(reach, {(order - 2) / (order - 4)!r}*reach)",
-        f"length = minimum(truncated(scale*exp(reach)), {FARTHEST!r}*scale)",
+        f"length = minimum(truncated(scale*exp(reach)), {NEXT if watched else FARTHEST!r}*scale)",
         "length = minimum(length, h)",
         "ratio = length/scale",
     ]
