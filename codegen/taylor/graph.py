@@ -288,6 +288,20 @@ class Graph:
         """The series in which kinks are looked for, less those that are as right as the states."""
         return list(dict.fromkeys(kink.base for kink in self.kinks if not _is_affine(kink.base)))
 
+    @property
+    def positive(self) -> list[Series]:
+        """The series that cannot pass zero: roots, and what roots, powers and logarithms are taken of."""
+        found: list[Series] = []
+        for s in self.series:
+            match s:
+                case SquareRoot():
+                    found.append(s)
+                case Power():
+                    found += [s, s.base]
+                case QuotientIntegral() if s.function == "log":
+                    found.append(s.argument)
+        return list(dict.fromkeys(found))
+
     def behind(self, roots: Iterable[Series]) -> list[Series]:
         """The series that some need for a coefficient, and they themselves, in the order of `series`."""
         needed = _needed(roots)

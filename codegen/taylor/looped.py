@@ -26,6 +26,7 @@ from .series import Constant, Series, State, Time
 from .step import (
     DIGITS,
     TaylorStep,
+    broken,
     called,
     ended,
     falling,
@@ -153,7 +154,7 @@ class Section:
     @property
     def remembered(self) -> set[Series]:
         """Series whose earlier coefficients are needed."""
-        used = {used for s in self.graph.series for used in s.convolved} | set(self.graph.watched)
+        used = {used for s in self.graph.series for used in s.convolved} | {*self.graph.watched, *self.graph.positive}
         return used - set(self.places) - set(self.waves)
 
     # -- text -----------------------------------------------------------------------------------------------------
@@ -185,6 +186,14 @@ class Section:
                 self.lines += statement(Assign("rate", add(Name(f"load(dense, at_rates + {place}, WIDTH)"), value)))
                 self.lines.append(f"store(dense, at_rates + {place}, rate)")
         return self.turns(self.lines)
+
+    def ends(self, order: int) -> list[str]:
+        """The statements that make the step NaN where a series of this section has passed a zero that it cannot pass."""
+        found = []
+        for s in self.graph.positive:
+            found += [f"value = {self.load(s, str(order - 1))}", f"for k in range({order - 2}, -1, -1):"]
+            found += [f"    value = value*ratio + {self.load(s, 'k')}", broken("value", self.load(s, "0"))]
+        return self.turns([*self.setting, *found]) if found else []
 
     def passages(self, degree: int) -> list[str]:
         """The statements that end the step at the kinks of this section."""
@@ -476,6 +485,7 @@ class LoopWriter:
             "store(y_new, {0}, new)",
             "total = total + new",
         )
+        lines += [line for section in sections for line in section.ends(p)]
         lines += ["if DENSE:", "    raised = ratio", f"    for k in range(1, {p + 1}):"]
         inner = self.states(f"store(dense, (k - 1)*DIMENSION + {{0}}, raised*{at.format(k='k')})")
         lines += [f"        {line}" for line in (*inner, "raised = raised*ratio")]

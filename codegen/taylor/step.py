@@ -27,6 +27,7 @@ __all__ = [
     "StepWriter",
     "TaylorStep",
     "Written",
+    "broken",
     "called",
     "check_order",
     "ended",
@@ -67,7 +68,7 @@ WORDS = frozenset(
     {"unseen", "high", "low", "largest", "digits", "scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
      "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", *STARTS.values()}
 )  # fmt: skip
-PREFIXES = ("i_", "e_", "half_", "w_", "n_", "size_", "odd_")
+PREFIXES = ("positive_", "i_", "e_", "half_", "w_", "n_", "size_", "odd_")
 """Names of the step; a user's symbol of that name is called otherwise within the step."""
 
 COUNTED = re.compile(r"[rs]\d+$")
@@ -370,7 +371,11 @@ class StepWriter:
             self.put(
                 *polynomial(name, [self.state_at(slot, k) for k in range(p + 1)]), f"store(y_new, {slot}, n_{name})"
             )
-        self.put(f"total = {' + '.join(f'n_{name}' for name in self.names)}", "if DENSE:")
+        self.put(f"total = {' + '.join(f'n_{name}' for name in self.names)}")
+        for which, s in enumerate(self.graph.positive):
+            self.put(*polynomial(f"positive_{which}", [self.at.at(s, k) for k in range(p)]))
+            self.put(broken(f"n_positive_{which}", show(times(ONE, self.at.at(s, 0)))))
+        self.put("if DENSE:")
         for k in range(1, p + 1):
             self.put(f"    raised = {'ratio' if k == 1 else 'raised*ratio'}")
             for slot in range(eq.dimension):
@@ -378,6 +383,11 @@ class StepWriter:
                 value = "0.0*raised" if e == ZERO else show(times(e, Name("raised")))
                 self.put(f"    store(dense, {(k - 1) * eq.dimension + slot}, {value})")
         self.put(returned(bool(self.graph.kinks)))
+
+
+def broken(end: str, start: str) -> str:
+    """The text that makes a step NaN if a series that cannot pass zero has done so: a root of a polynomial may be one."""
+    return f"total = total + 0.0*log({end}/({start}))"
 
 
 def polynomial(name: str, coefficients: Sequence[Expr]) -> list[str]:
