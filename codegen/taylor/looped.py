@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import reduce
 
 import sympy as sp
 
@@ -24,7 +23,6 @@ from .graph import Graph, Template
 from .masses import moved, solved
 from .series import Constant, Series, State, Time
 from .step import (
-    DIGITS,
     TaylorStep,
     broken,
     called,
@@ -33,8 +31,6 @@ from .step import (
     finished,
     lane,
     largest,
-    measured,
-    reach_of,
     returned,
     unseen,
 )
@@ -459,7 +455,7 @@ class LoopWriter:
         at = "load(dense, at_states + {k}*DIMENSION + {{0}}, WIDTH)"
         sections = (self.waves, *self.sections)
         watching = any(section.graph.watched for section in sections)
-        orders = measured(p, watching)
+        orders = (p, p - 1, p - 2)
         lines = ["# step length", *(f"size_{k} = 0.0*scale" for k in orders)]
         largest = "absolute(load(y, {0}, WIDTH))"
         for k in (1, 2):
@@ -468,10 +464,10 @@ class LoopWriter:
             f"weight = 1.0/(atol + rtol*{largest})",
             *(f"size_{k} = maximum(size_{k}, absolute({at.format(k=k)})*weight)" for k in orders),
         )
-        lines += [DIGITS, "unseen = 0.0*scale"] if watching else []
+        lines += ["unseen = 0.0*scale"] if watching else []
         lines += [line for section in sections for line in section.lengths(p, orders)]
-        reaches = [reach_of(k, p) for k in orders]
-        lines.append(f"reach = {reduce(lambda rest, text: f'minimum({text}, {rest})', reversed(reaches))}")
+        reaches = [f"{-1.0 / k!r}*log(size_{k})" for k in orders]
+        lines.append(f"reach = minimum({reaches[0]}, minimum({reaches[1]}, {reaches[2]}))")
         lines += [falling(p)] if watching else []
         lines += finished(p, watching)
         if self.kinks:

@@ -23,7 +23,6 @@ from .series import Constant, Series, State, Time
 from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
 
 __all__ = [
-    "DIGITS",
     "StepWriter",
     "TaylorStep",
     "Written",
@@ -36,9 +35,7 @@ __all__ = [
     "finished",
     "lane",
     "largest",
-    "measured",
     "polynomial",
-    "reach_of",
     "returned",
     "unseen",
     "write_step",
@@ -50,13 +47,11 @@ FARTHEST = 16.0
 NEXT = 2.0
 """The same where series are watched, so that what is zero in double precision now is seen when it has begun."""
 
-SLACK = 0.1
-"""By how much, in logarithms, earlier coefficients may say less than the last ones."""
-
-DIGITS = "digits = -log(max(rtol, atol) + 0.0*scale)"
-
 LOW = (1, 2, 3)
-"""The low orders, beside half the highest, with which high ones are compared."""
+"""The low orders with which high ones are compared, beside the last one below half the highest.
+
+The series of x' = v, v' = -x**n from x = 0 has its coefficients n + 1 orders apart: of those of x**n, n or 2 n + 1 is high.
+"""
 
 HIDDEN, LOST = 1e-9, 1e-110
 """Least that the low coefficients of a series are taken for: shares of the high ones, and of the absolute tolerance.
@@ -65,7 +60,7 @@ The first is for zeros of the low ones alone, the second for zeros of high order
 """
 
 WORDS = frozenset(
-    {"unseen", "high", "low", "largest", "digits", "scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
+    {"unseen", "high", "low", "largest", "scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
      "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", *STARTS.values()}
 )  # fmt: skip
 PREFIXES = ("positive_", "i_", "e_", "half_", "w_", "n_", "size_", "odd_")
@@ -323,7 +318,7 @@ class StepWriter:
         """The length of the step."""
         p = self.order
         self.put("# step length")
-        sizes: dict[int, list[Expr]] = {k: [] for k in measured(p, bool(self.graph.watched))}
+        sizes: dict[int, list[Expr]] = {p: [], p - 1: [], p - 2: []}
         for series in (*self.states.values(), *self.graph.gaps):
             last = {k: e for k in sizes if (e := self.at.at(series, k)) != ZERO}
             if not last:
@@ -336,11 +331,9 @@ class StepWriter:
         for k, found in sizes.items():
             if found:
                 self.put(*statement(Assign(f"size_{k}", largest(found))))
-                reaches.append(Name(reach_of(k, p)))
+                reaches.append(times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))))
         if not reaches:
             reaches = [Name("-log(0.0*scale)")]
-        if self.graph.watched:
-            self.put(DIGITS)
         self.put(*statement(Assign("reach", extreme("minimum", reaches))))
         if self.graph.watched:
             self.put("unseen = 0.0*scale")
@@ -448,7 +441,7 @@ def unseen(order: int, coefficient: Callable[[int], Expr]) -> list[str]:
     """How much larger the high coefficients of a series are than its low ones, the largest so far."""
     low, high = (
         [Call("absolute", (e,)) for k in places if (e := coefficient(k)) != ZERO]
-        for places in ((*LOW, order // 2), range(order // 2 + 1, order))
+        for places in ((*LOW, order // 2 - 1), range(order // 2, order))
     )
     if not (low and high):
         return []
@@ -459,26 +452,9 @@ def unseen(order: int, coefficient: Callable[[int], Expr]) -> list[str]:
     ]
 
 
-def measured(order: int, watched: bool) -> list[int]:
-    """The orders whose coefficients say how long a step is.
-
-    The last three do in general. The series of x' = v, v' = -x**n from x = 0 has its coefficients n + 1 orders apart.
-    """
-    return list(range(order, order // 2 if watched else order - 3, -1))
-
-
-def reach_of(k: int, order: int) -> str:
-    """The text of the logarithm of how far a step reaches by coefficients k, those of the last three orders neglected.
-
-    What an earlier one says of the radius of convergence is what counts: at that radius it would be as large as the state.
-    """
-    text = f"{-1.0 / k!r}*log(size_{k})"
-    return text if k > order - 3 else f"({text} + {1.0 / k - 1.0 / order!r}*digits + {SLACK!r})"
-
-
 def falling(order: int) -> str:
     """No step goes on behind the place where the terms of a watched series stop falling."""
-    reaches = (f"{-1.0 / k!r}*log(unseen)" for k in (order - 2, order - 1 - order // 2))
+    reaches = (f"{-1.0 / k!r}*log(unseen)" for k in (order - 2, order // 2))
     return f"reach = minimum(reach, minimum({', '.join(reaches)}))"
 
 

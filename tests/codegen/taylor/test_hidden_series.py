@@ -66,13 +66,14 @@ def test_a_pulse_beside_a_large_motion_counts():
     assert found == pytest.approx(slow + 10 * math.pi * special.i0e(200.0), abs=3e-7)
 
 
-@pytest.mark.parametrize("power", [5, 7, 9, 15])
+@pytest.mark.parametrize("power", [4, 5, 6, 7, 8, 9, 10, 11, 12, 15])
 @pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-6, 1e-8, 1e-11, 1e-13])
 def test_a_spring_without_a_linear_term_keeps_its_energy(power, rtol):
     """Near x = 0 the coefficients of x'' = -x**n stand n + 1 orders apart: the last three say nothing."""
+    force = X**power if power % 2 else X ** (power - 1) * sp.Abs(X)
     for start in ([0.0, 1.0], [1.0, 0.0], [1e-3, 1.0]):
-        end = run(alone([X, V], [V, -(X**power)]), start, 30.0, rtol)
-        before, after = (v**2 / 2 + x ** (power + 1) / (power + 1) for x, v in (start, end))
+        end = run(alone([X, V], [V, -force]), start, 30.0, rtol)
+        before, after = (v**2 / 2 + abs(x) ** (power + 1) / (power + 1) for x, v in (start, end))
         assert after == pytest.approx(before, rel=100 * rtol)
 
 
