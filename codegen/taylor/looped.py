@@ -202,15 +202,14 @@ class Section:
 
     def lengths(self, order: int, orders: Sequence[int]) -> list[str]:
         """The statements that make the step no longer than the series of this section let it be."""
-        at = {s: lambda k, s=s: Name(self.load(s, str(k))) for s in (*self.graph.gaps, *self.graph.watched)}
         found = []
         for s in self.graph.gaps:
-            found += statement(Assign("largest", largest(Call("absolute", (at[s](k),)) for k in range(3))))
+            sizes = {k: Call("absolute", (Name(self.load(s, str(k))),)) for k in (0, 1, 2, *orders)}
+            found += statement(Assign("largest", largest(sizes[k] for k in range(3))))
             found.append("weight = 1.0/(atol + rtol*largest)")
-            for k in orders:
-                found.append(f"size_{k} = maximum(size_{k}, absolute({show(at[s](k))})*weight)")
+            found += [f"size_{k} = maximum(size_{k}, {show(sizes[k])}*weight)" for k in orders]
         for s in self.graph.watched:
-            found += unseen(order, at[s])
+            found += unseen([Name(self.load(s, str(k))) for k in range(order)])
         return self.turns([*self.setting, *found]) if found else []
 
     def turns(self, lines: list[str]) -> list[str]:

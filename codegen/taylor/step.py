@@ -7,7 +7,7 @@ coefficients, so that no series that has zeros at every second or third place is
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -338,7 +338,7 @@ class StepWriter:
         if self.graph.watched:
             self.put("unseen = 0.0*scale")
             for s in self.graph.watched:
-                self.put(*unseen(p, lambda k, s=s: self.at.at(s, k)))
+                self.put(*unseen([self.at.at(s, k) for k in range(p)]))
             self.put(falling(p))
         self.put(*finished(p, bool(self.graph.watched)))
 
@@ -437,11 +437,12 @@ def check_order(order: int) -> None:
         raise ValueError(f"taylor: found order {order}; expected at least 6")
 
 
-def unseen(order: int, coefficient: Callable[[int], Expr]) -> list[str]:
+def unseen(coefficients: Sequence[Expr]) -> list[str]:
     """How much larger the high coefficients of a series are than its low ones, the largest so far."""
+    half = len(coefficients) // 2
     low, high = (
-        [Call("absolute", (e,)) for k in places if (e := coefficient(k)) != ZERO]
-        for places in ((*LOW, order // 2 - 1), range(order // 2, order))
+        [Call("absolute", (e,)) for k in places if (e := coefficients[k]) != ZERO]
+        for places in ((*LOW, half - 1), range(half, len(coefficients)))
     )
     if not (low and high):
         return []

@@ -13,6 +13,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.interactions.ends import ends
 from synchain.models.interactions.interaction import Potential, Rates
 from synchain.models.mechanics.components import TIME
+from synchain.models.mechanics.oscillator import Oscillator
 from synchain.models.scenes.scene import Scene
 
 __all__ = ["said"]
@@ -63,7 +64,7 @@ def said(quick: bool) -> Iterator[tuple[str, str, Scene, str]]:
         length = 2.0 if name == "Lorenz" else LENGTH
         initial: dict[str, object] = {s.name: a for s, a in zip(rates, start, strict=True)}
         for method in SMOOTH[:1] if quick else SMOOTH:
-            for digits in (8,) if quick else DIGITS:
+            for digits in DIGITS if method == "taylor" and not quick else (8,):
                 yield "said", f"{name}, {method}", _scene(node, method, length, initial, rtol=10.0**-digits), "explicit"
     for name, (rates, start) in {} if quick else SINGULAR.items():
         initial = {s.name: a for s, a in zip(rates, start, strict=True)}
@@ -73,7 +74,7 @@ def said(quick: bool) -> Iterator[tuple[str, str, Scene, str]]:
     yield from () if quick else _scaled()
 
 
-def _scene(node: Field | Lagrangian, method: str, length: float, initial: dict[str, object], **more: object) -> Scene:
+def _scene(node: Oscillator, method: str, length: float, initial: dict[str, object], **more: object) -> Scene:
     given: dict[str, object] = {
         "coupling": None, "topology": topology("chain", 1), "record": (), "time_unit": "time", "transient": 0.0,
         "integrator": method, "window": length, "max_steps": 2_000_000, "initial": initial,
