@@ -23,6 +23,8 @@ from .graph import Graph, Template
 from .masses import moved, solved
 from .series import Constant, Series, State, Time
 from .step import (
+    FARTHEST,
+    NEXT,
     TaylorStep,
     broken,
     called,
@@ -468,7 +470,7 @@ class LoopWriter:
         reaches = [f"{-1.0 / k!r}*log(size_{k})" for k in orders]
         lines.append(f"reach = minimum({reaches[0]}, minimum({reaches[1]}, {reaches[2]}))")
         lines += [falling(p)] if watching else []
-        lines += finished(p, watching)
+        lines += finished(p, NEXT if watching and not self.equations.sticks else FARTHEST)
         if self.kinks:
             found = [line for section in sections for line in section.passages(p)]
             lines += ["# first passage of a kink", "passed = ratio", *found, *ended()]

@@ -23,6 +23,8 @@ from .series import Constant, Series, State, Time
 from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
 
 __all__ = [
+    "FARTHEST",
+    "NEXT",
     "StepWriter",
     "TaylorStep",
     "Written",
@@ -45,7 +47,10 @@ FARTHEST = 16.0
 """How many times longer than `scale` a step may be."""
 
 NEXT = 2.0
-"""The same where series are watched, so that what is zero in double precision now is seen when it has begun."""
+"""The same where series are watched, so that what is zero in double precision now is seen when it has begun.
+
+Contacts end their slips by events: the first steps behind one would be a third of all steps.
+"""
 
 LOW = (1, 2, 3)
 """The low orders with which high ones are compared, beside the last one below half the highest.
@@ -340,7 +345,7 @@ class StepWriter:
             for s in self.graph.watched:
                 self.put(*unseen([self.at.at(s, k) for k in range(p)]))
             self.put(falling(p))
-        self.put(*finished(p, bool(self.graph.watched)))
+        self.put(*finished(p, NEXT if self.graph.watched and not self.equations.sticks else FARTHEST))
 
     def passages(self) -> None:
         """End the step where a series passes a kink."""
@@ -459,12 +464,12 @@ def falling(order: int) -> str:
     return f"reach = minimum(reach, minimum({', '.join(reaches)}))"
 
 
-def finished(order: int, watched: bool = False) -> list[str]:
-    """The length of the step from the logarithm of its share of `scale`; see `Graph.watched`."""
+def finished(order: int, farthest: float = FARTHEST) -> list[str]:
+    """The length of the step from the logarithm of its share of `scale`."""
     return [
         # weights are those of a step as long as `scale`; a shorter one changes the states less
         f"reach = minimum(reach, {(order - 2) / (order - 4)!r}*reach)",
-        f"length = minimum(truncated(scale*exp(reach)), {NEXT if watched else FARTHEST!r}*scale)",
+        f"length = minimum(truncated(scale*exp(reach)), {farthest!r}*scale)",
         "length = minimum(length, h)",
         "ratio = length/scale",
     ]

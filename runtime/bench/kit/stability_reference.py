@@ -85,9 +85,8 @@ def _explicit(scene: Scene) -> np.ndarray:
 
     space: dict[str, Any] = {}
     exec(to_python(scene.equations, {name: scene.parameters[name] for name in scene.equations.parameters}), space)
-    start, shortest = np.array(scene.y0), scene.window / 2000.0
-    tight = {"rtol": 3e-13, "atol": 3e-14 * float(np.abs(start).max(initial=1e-300)), "max_step": shortest}
-    done = solve_ivp(space["rhs"], (0.0, scene.window), start, method="DOP853", **tight)
+    tight = {"rtol": 3e-13, "atol": min(3e-14, 1e-5 * scene.atol), "max_step": scene.window / 2000.0}
+    done = solve_ivp(space["rhs"], (0.0, scene.window), np.array(scene.y0), method="DOP853", **tight)
     if not done.success:
         raise RuntimeError(f"DOP853 stopped at t = {done.t[-1]:g}: {done.message}")
     return np.array(done.y[:, -1])
