@@ -5,6 +5,7 @@ A template of a node or a link is read for each of them in the same way, so that
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
@@ -35,6 +36,8 @@ from .series import (
     Slope,
     Square,
     SquareRoot,
+    State,
+    Time,
     Unknown,
 )  # fmt: skip
 from .terms import ONE, ZERO, Expr, Name, Number, add, times
@@ -58,6 +61,12 @@ KINKED = (sp.Abs, sp.Max, sp.Min)
 """Functions with a kink where an argument, or the difference of two, is zero."""
 
 JUMPING = (sp.sign, sp.floor, sp.ceiling, sp.Heaviside)
+
+STEADY = ("sin", "cos")
+"""Functions of which some low coefficient is always as large as the argument makes the high ones."""
+
+PLAIN = 3
+"""Degree up to which the low coefficients of a polynomial of states tell how large the high ones become."""
 
 
 def jump(equations: Equations) -> sp.Expr | None:
@@ -149,6 +158,9 @@ class Graph:
         All that were made, each behind those whose coefficients of the same order it needs.
     inline, inline_start : set of Series
         Those whose coefficients, or first coefficients, are written where they are used.
+    watched : list of Series
+        Those that can be small to all orders and large soon after, such as exp(-x**2) far from 0: no step is right behind
+        the place where their terms stop falling, however small these are now.
     constants : dict
         The text of what depends on parameters alone, by the name under which it is computed once.
     """
@@ -157,6 +169,7 @@ class Graph:
         self.series: list[Series] = []
         self.inline: set[Series] = set()
         self.inline_start: set[Series] = set()
+        self.watched: list[Series] = []
         self.constants: dict[str, str] = {}
         self.known: dict[tuple[object, ...], Series] = {}
         self.numbers: dict[Series, int] = {}
@@ -178,6 +191,8 @@ class Graph:
     def settle(self, roots: Sequence[Series]) -> None:
         """Leave out what no root needs, name the rest, and find sums that are used once."""
         self.series = self.behind(roots)
+        hiding = _hiding([*roots, *(kink.base for kink in self.kinks)])
+        self.watched = [s for s in self.series if s in hiding]
         uses = Counter([*roots, *(used for s in self.series for used in s.linear)])
         starts = uses + Counter(used for s in self.series for used in s.started)
         convolved = {used for s in self.series for used in s.convolved}
@@ -267,6 +282,25 @@ class Graph:
     def kinks(self) -> list[Kink]:
         """The kinks of all series."""
         return [s for s in self.series if isinstance(s, Kink)]
+
+    @property
+    def gaps(self) -> list[Series]:
+        """The series in which kinks are looked for, less those that are as right as the states."""
+        return list(dict.fromkeys(kink.base for kink in self.kinks if not _is_affine(kink.base)))
+
+    @property
+    def positive(self) -> list[Series]:
+        """The series that cannot pass zero: roots, and what roots, powers and logarithms are taken of."""
+        found: list[Series] = []
+        for s in self.series:
+            match s:
+                case SquareRoot():
+                    found.append(s)
+                case Power():
+                    found += [s, s.base]
+                case QuotientIntegral() if s.function == "log":
+                    found.append(s.argument)
+        return list(dict.fromkeys(found))
 
     def behind(self, roots: Iterable[Series]) -> list[Series]:
         """The series that some need for a coefficient, and they themselves, in the order of `series`."""
@@ -429,6 +463,53 @@ def _needed(roots: Iterable[Series]) -> set[Series]:
             needed.add(s)
             open_ends += [*s.linear, *s.convolved, *s.started]
     return needed
+
+
+def _is_affine(series: Series) -> bool:
+    """True for a sum of states and time with constant factors."""
+    if isinstance(series, Linear):
+        return all(map(_is_affine, series.linear))
+    return isinstance(series, State | Time | Constant)
+
+
+def _hiding(roots: Iterable[Series]) -> set[Series]:
+    """The series among the terms of some, and among those of what they are functions of, that are no plain polynomials."""
+    found, seen, open_ends = set[Series](), set[Series](), list(roots)
+    while open_ends:
+        s = open_ends.pop()
+        if s in seen:
+            continue
+        seen.add(s)
+        match s:
+            case Linear() | Choice():
+                open_ends += s.linear
+            case Integral() | QuotientIntegral():
+                open_ends.append(s.argument)
+            case Product() | Square() | Ratio() | SquareRoot() | Power():
+                parts = {*s.linear, *s.convolved} - {s}
+                open_ends += [part for factor in parts for part in factor.linear if isinstance(factor, Linear)]
+        if (
+            isinstance(s, Integral | QuotientIntegral | Product | Square | Ratio | SquareRoot | Power)
+            and _degree(s) > PLAIN
+        ):
+            found.add(s)
+    return found
+
+
+def _degree(series: Series) -> float:
+    """The degree of a series as a polynomial in states, time, and sines and cosines of such; inf if it is none."""
+    match series:
+        case Linear() | Choice():
+            return max(map(_degree, series.linear), default=0.0)
+        case Product():
+            return _degree(series.left) + _degree(series.right)
+        case Square():
+            return 2.0 * _degree(series.base)
+        case Integral() if series.function in STEADY:
+            return _degree(series.argument)
+        case Integral() | QuotientIntegral() | Ratio() | SquareRoot() | Power():
+            return math.inf
+    return 1.0
 
 
 def split(series: Series) -> tuple[Expr, Series]:

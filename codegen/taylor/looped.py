@@ -23,8 +23,21 @@ from ..steps.places import Joint, Kind, Span, places
 from .graph import Graph, Template
 from .masses import moved, solved
 from .series import Constant, Series, State, Time
-from .step import TaylorStep, called, ended, finished, lane, returned
-from .terms import ONE, ZERO, Assign, Expr, Name, Number, add, show, statement
+from .step import (
+    FARTHEST,
+    NEXT,
+    TaylorStep,
+    broken,
+    called,
+    ended,
+    falling,
+    finished,
+    lane,
+    largest,
+    returned,
+    unseen,
+)
+from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement
 
 __all__ = ["write_looped"]
 
@@ -48,7 +61,8 @@ class Section:
     """What is done alike for all nodes of a kind, for all links of a joint, or once.
 
     head, index, count: the loop, its variable and the number of its turns in the whole numbering; `setting` loads what the
-    turn needs at any order, `places` are the states that it reads, and where they stand.
+    turn needs at any order, `places` are the states that it reads, and where they stand, `lent` are series that other
+    sections need too.
     """
 
     graph: Graph
@@ -58,6 +72,7 @@ class Section:
     setting: list[str] = field(default_factory=list)
     places: dict[Series, str] = field(default_factory=dict)
     rates: list[tuple[str, Series]] = field(default_factory=list)
+    lent: set[Series] = field(default_factory=set)
     adds: bool = False
     waves: dict[Series, Section] = field(default_factory=dict)
     kept: list[str] = field(default_factory=list)
@@ -140,7 +155,8 @@ class Section:
     @property
     def remembered(self) -> set[Series]:
         """Series whose earlier coefficients are needed."""
-        return {used for s in self.graph.series for used in s.convolved} - set(self.places) - set(self.waves)
+        used = {used for s in self.graph.series for used in s.convolved}
+        return (used | {*self.graph.watched, *self.graph.positive} | self.lent) - set(self.places) - set(self.waves)
 
     # -- text -----------------------------------------------------------------------------------------------------
 
@@ -176,6 +192,14 @@ class Section:
                 self.lines += statement(Assign("rate", add(Name(f"load(dense, at_rates + {place}, WIDTH)"), value)))
                 self.lines.append(f"store(dense, at_rates + {place}, rate)")
 
+    def ends(self, order: int) -> list[str]:
+        """The statements that make the step NaN where a series of this section has passed a zero that it cannot pass."""
+        found = []
+        for s in self.graph.positive:
+            found += [f"value = {self.load(s, str(order - 1))}", f"for k in range({order - 2}, -1, -1):"]
+            found += [f"    value = value*ratio + {self.load(s, 'k')}", broken("value", self.load(s, "0"))]
+        return self.turns([*self.setting, *found]) if found else []
+
     def passages(self, degree: int) -> list[str]:
         """The statements that end the step at the kinks of this section."""
         found = [
@@ -185,6 +209,18 @@ class Section:
         ]
         return self.turns([*self.setting, *found]) if found else []
 
+    def lengths(self, order: int, orders: Sequence[int]) -> list[str]:
+        """The statements that make the step no longer than the series of this section let it be."""
+        found = []
+        for s in self.graph.gaps:
+            sizes = {k: Call("absolute", (Name(self.load(s, str(k))),)) for k in (0, 1, 2, *orders)}
+            found += statement(Assign("largest", largest(sizes[k] for k in range(3))))
+            found.append("weight = 1.0/(atol + rtol*largest)")
+            found += [f"size_{k} = maximum(size_{k}, {show(sizes[k])}*weight)" for k in orders]
+        for s in self.graph.watched:
+            found += unseen([Name(self.load(s, str(k))) for k in range(order)])
+        return self.turns([*self.setting, *found]) if found else []
+
     def turns(self, lines: list[str]) -> list[str]:
         """Statements that are run through in the section's loop."""
         return [self.head, *(f"    {line}" for line in lines)] if self.index else lines
@@ -192,9 +228,7 @@ class Section:
 
 @dataclass(slots=True)
 class Totals(Section):
-    """The sums over all nodes of some series, by their names in `rates`; `lent` are series that the targets need too."""
-
-    lent: set[Series] = field(default_factory=set)
+    """The sums over all nodes of some series, by their names in `rates`."""
 
     def text(self, order: str) -> list[str]:
         """The statements for coefficients `order`, with the sums before and behind the loop."""
@@ -212,12 +246,6 @@ class Totals(Section):
                     *statement(Assign(f"{name}_value", value)),
                     *LANES.lines(compensated(name, f"{name}_value")),
                 ]
-
-    @property
-    def remembered(self) -> set[Series]:
-        """Series whose earlier coefficients are needed here, or by the targets."""
-        own = {used for s in self.graph.series for used in s.convolved} | self.lent
-        return own - set(self.places) - set(self.waves)
 
 
 def head_of(span: Span) -> str:
@@ -541,19 +569,24 @@ class LoopWriter:
         """Step length, new state and dense output."""
         p = self.order
         at = "load(dense, at_states + {k}*DIMENSION + {{0}}, WIDTH)"
-        lines = ["# step length", *(f"size_{k} = 0.0*scale" for k in (p, p - 1, p - 2))]
+        sections = (self.waves, *self.sections)
+        watching = any(section.graph.watched for section in sections)
+        orders = (p, p - 1, p - 2)
+        lines = ["# step length", *(f"size_{k} = 0.0*scale" for k in orders)]
         largest = "absolute(load(y, {0}, WIDTH))"
         for k in (1, 2):
             largest = f"maximum({largest}, absolute({at.format(k=k)}))"
         lines += self.states(
             f"weight = 1.0/(atol + rtol*{largest})",
-            *(f"size_{k} = maximum(size_{k}, absolute({at.format(k=k)})*weight)" for k in (p, p - 1, p - 2)),
+            *(f"size_{k} = maximum(size_{k}, absolute({at.format(k=k)})*weight)" for k in orders),
         )
-        reaches = [f"{-1.0 / k!r}*log(size_{k})" for k in (p, p - 1, p - 2)]
+        lines += ["unseen = 0.0*scale"] if watching else []
+        lines += [line for section in sections for line in section.lengths(p, orders)]
+        reaches = [f"{-1.0 / k!r}*log(size_{k})" for k in orders]
         lines.append(f"reach = minimum({reaches[0]}, minimum({reaches[1]}, {reaches[2]}))")
-        lines += finished(p)
+        lines += [falling(p)] if watching else []
+        lines += finished(p, NEXT if watching and not self.equations.sticks else FARTHEST)
         if self.kinks:
-            sections = (self.waves, *self.sections)
             found = [line for section in sections for line in section.passages(p)]
             lines += ["# first passage of a kink", "passed = ratio", *found, *ended()]
         lines += ["# new state", "total = 0.0*scale"]
@@ -564,6 +597,7 @@ class LoopWriter:
             "store(y_new, {0}, new)",
             "total = total + new",
         )
+        lines += [line for section in sections for line in section.ends(p)]
         lines += ["if DENSE:", "    raised = ratio", f"    for k in range(1, {p + 1}):"]
         inner = self.states(f"store(dense, (k - 1)*DIMENSION + {{0}}, raised*{at.format(k='k')})")
         lines += [f"        {line}" for line in (*inner, "raised = raised*ratio")]

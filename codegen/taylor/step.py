@@ -23,29 +23,52 @@ from .series import Constant, Series, State, Time
 from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
 
 __all__ = [
+    "FARTHEST",
+    "NEXT",
     "StepWriter",
     "TaylorStep",
     "Written",
+    "broken",
     "called",
     "check_order",
     "ended",
     "extreme",
+    "falling",
     "finished",
     "lane",
     "largest",
     "polynomial",
     "returned",
+    "unseen",
     "write_step",
 ]
 
 FARTHEST = 16.0
 """How many times longer than `scale` a step may be."""
 
+NEXT = 2.0
+"""The same where series are watched, so that what is zero in double precision now is seen when it has begun.
+
+Contacts end their slips by events: the first steps behind one would be a third of all steps.
+"""
+
+LOW = (1, 2, 3)
+"""The low orders with which high ones are compared, beside the last one below half the highest.
+
+The series of x' = v, v' = -x**n from x = 0 has its coefficients n + 1 orders apart: of those of x**n, n or 2 n + 1 is high.
+"""
+
+HIDDEN, LOST = 1e-9, 1e-110
+"""Least that the low coefficients of a series are taken for: shares of the high ones, and of the absolute tolerance.
+
+The first is for zeros of the low ones alone, the second for zeros of high order, which no step would reach otherwise.
+"""
+
 WORDS = frozenset(
-    {"scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
+    {"unseen", "high", "low", "largest", "scale", "ratio", "reach", "length", "total", "raised", "square", "power", "weight", "number", "inverse", "LINKS", "j_there",
      "slope_scale", "convolution", "passed", "until", "passage", "side_of", "PASSED", "ROUNDING", "NEAREST", *STARTS.values()}
 )  # fmt: skip
-PREFIXES = ("i_", "e_", "half_", "w_", "n_", "size_", "odd_")
+PREFIXES = ("positive_", "i_", "e_", "half_", "w_", "n_", "size_", "odd_")
 """Names of the step; a user's symbol of that name is called otherwise within the step."""
 
 COUNTED = re.compile(r"[rs]\d+$")
@@ -301,14 +324,14 @@ class StepWriter:
         p = self.order
         self.put("# step length")
         sizes: dict[int, list[Expr]] = {p: [], p - 1: [], p - 2: []}
-        for slot, state in self.states.items():
-            last = {k: e for k in sizes if (e := self.state_at(slot, k)) != ZERO}
+        for series in (*self.states.values(), *self.graph.gaps):
+            last = {k: e for k in sizes if (e := self.at.at(series, k)) != ZERO}
             if not last:
                 continue
-            size = largest(Call("absolute", (e,)) for k in range(3) if (e := self.state_at(slot, k)) != ZERO)
-            self.put(f"w_{state.name} = 1.0/(atol + rtol*{show(size)})")
+            size = largest(Call("absolute", (e,)) for k in range(3) if (e := self.at.at(series, k)) != ZERO)
+            self.put(f"w_{series.name} = 1.0/(atol + rtol*{show(size)})")
             for k, e in last.items():
-                sizes[k].append(times(Call("absolute", (e,)), Name(f"w_{state.name}")))
+                sizes[k].append(times(Call("absolute", (e,)), Name(f"w_{series.name}")))
         reaches: list[Expr] = []
         for k, found in sizes.items():
             if found:
@@ -316,7 +339,13 @@ class StepWriter:
                 reaches.append(times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))))
         if not reaches:
             reaches = [Name("-log(0.0*scale)")]
-        self.put(*statement(Assign("reach", extreme("minimum", reaches))), *finished(p))
+        self.put(*statement(Assign("reach", extreme("minimum", reaches))))
+        if self.graph.watched:
+            self.put("unseen = 0.0*scale")
+            for s in self.graph.watched:
+                self.put(*unseen([self.at.at(s, k) for k in range(p)]))
+            self.put(falling(p))
+        self.put(*finished(p, NEXT if self.graph.watched and not self.equations.sticks else FARTHEST))
 
     def passages(self) -> None:
         """End the step where a series passes a kink."""
@@ -340,7 +369,11 @@ class StepWriter:
             self.put(
                 *polynomial(name, [self.state_at(slot, k) for k in range(p + 1)]), f"store(y_new, {slot}, n_{name})"
             )
-        self.put(f"total = {' + '.join(f'n_{name}' for name in self.names)}", "if DENSE:")
+        self.put(f"total = {' + '.join(f'n_{name}' for name in self.names)}")
+        for which, s in enumerate(self.graph.positive):
+            self.put(*polynomial(f"positive_{which}", [self.at.at(s, k) for k in range(p)]))
+            self.put(broken(f"n_positive_{which}", show(times(ONE, self.at.at(s, 0)))))
+        self.put("if DENSE:")
         for k in range(1, p + 1):
             self.put(f"    raised = {'ratio' if k == 1 else 'raised*ratio'}")
             for slot in range(eq.dimension):
@@ -348,6 +381,11 @@ class StepWriter:
                 value = "0.0*raised" if e == ZERO else show(times(e, Name("raised")))
                 self.put(f"    store(dense, {(k - 1) * eq.dimension + slot}, {value})")
         self.put(returned(bool(self.graph.kinks)))
+
+
+def broken(end: str, start: str) -> str:
+    """The text that makes a step NaN if a series that cannot pass zero has done so: a root of a polynomial may be one."""
+    return f"total = total + 0.0*log({end}/({start}))"
 
 
 def polynomial(name: str, coefficients: Sequence[Expr]) -> list[str]:
@@ -404,12 +442,34 @@ def check_order(order: int) -> None:
         raise ValueError(f"taylor: found order {order}; expected at least 6")
 
 
-def finished(order: int) -> list[str]:
+def unseen(coefficients: Sequence[Expr]) -> list[str]:
+    """How much larger the high coefficients of a series are than its low ones, the largest so far."""
+    half = len(coefficients) // 2
+    low, high = (
+        [Call("absolute", (e,)) for k in places if (e := coefficients[k]) != ZERO]
+        for places in ((*LOW, half - 1), range(half, len(coefficients)))
+    )
+    if not (low and high):
+        return []
+    return [
+        *statement(Assign("high", largest(high))),
+        *statement(Assign("low", largest(low))),
+        f"unseen = maximum(unseen, high/(low + ({HIDDEN!r}*high + {LOST!r}*atol)))",
+    ]
+
+
+def falling(order: int) -> str:
+    """No step goes on behind the place where the terms of a watched series stop falling."""
+    reaches = (f"{-1.0 / k!r}*log(unseen)" for k in (order - 2, order // 2))
+    return f"reach = minimum(reach, minimum({', '.join(reaches)}))"
+
+
+def finished(order: int, farthest: float = FARTHEST) -> list[str]:
     """The length of the step from the logarithm of its share of `scale`."""
     return [
         # weights are those of a step as long as `scale`; a shorter one changes the states less
         f"reach = minimum(reach, {(order - 2) / (order - 4)!r}*reach)",
-        f"length = minimum(truncated(scale*exp(reach)), {FARTHEST!r}*scale)",
+        f"length = minimum(truncated(scale*exp(reach)), {farthest!r}*scale)",
         "length = minimum(length, h)",
         "ratio = length/scale",
     ]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import sympy as sp
+from sympy.core.relational import Relational
 
 from ..mechanics.components import TIME, Edge, Node
 from .equations import Equations
@@ -23,6 +24,9 @@ class Drive:
     ----------
     waves : tuple of Expr
         Angular frequencies of the sines and cosines of time, expressions of the parameters.
+    bends : tuple of Expr
+        pi over the lengths in which other functions of time can rise and fall again, expressions of
+        the parameters: sqrt(pi)/w for exp(-(t/w)**2).
     frequency : Expr or None
         The largest angular frequency of which all waves are whole multiples, so that the right-hand
         side has the period 2 pi over its absolute value; None if there is no such frequency.
@@ -33,6 +37,12 @@ class Drive:
     waves: tuple[sp.Expr, ...] = ()
     frequency: sp.Expr | None = None
     problem: str = ""
+    bends: tuple[sp.Expr, ...] = ()
+
+    @property
+    def paces(self) -> tuple[sp.Expr, ...]:
+        """pi over each of the lengths in which the drive can rise and fall again."""
+        return (*self.waves, *self.bends)
 
 
 def angular_frequency(equations: Equations) -> sp.Expr | None:
@@ -53,6 +63,11 @@ def drive_of(templates: tuple[Node | Edge, ...], varied: tuple[str, ...] = ()) -
     """
     if not any(template.forced for template in templates):
         return Drive(problem="is not driven")
+    return replace(_periodic(templates, varied), bends=tuple(sorted(_bends(templates), key=sp.default_sort_key)))
+
+
+def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Drive:
+    """The waves of a driven network and their common frequency."""
     waves: set[sp.Expr] = set()
     rest = [_without_waves(e, _local(template), waves) for template in templates for e in template.rhs]
     found = tuple(sorted(waves, key=sp.default_sort_key))
@@ -80,14 +95,61 @@ def _without_waves(e: sp.Expr, states: set[sp.Symbol], found: set[sp.Expr]) -> s
     """Replace each sine and cosine of a t + b by a symbol; collect the frequencies a."""
 
     def note(wave: sp.Expr) -> sp.Expr:
-        phase = wave.args[0]
-        slope = sp.diff(phase, TIME)
-        if slope.has(TIME, *states) or slope == 0 or sp.expand(phase - slope * TIME).has(TIME):
+        slope = _slope(wave, states)
+        if slope is None:
             return wave
         found.add(slope)
         return sp.Symbol("wave")
 
     return e.replace(lambda a: isinstance(a, sp.sin | sp.cos) and a.has(TIME), note)
+
+
+def _slope(wave: sp.Expr, states: set[sp.Symbol]) -> sp.Expr | None:
+    """The constant a of a function of a t + b; None for any other argument."""
+    slope = sp.diff(wave.args[0], TIME)
+    steady = slope != 0 and not slope.has(TIME, *states)
+    return slope if steady and not sp.expand(wave.args[0] - slope * TIME).has(TIME) else None
+
+
+def _bends(templates: tuple[Node | Edge, ...]) -> set[sp.Expr]:
+    """pi over the lengths in which functions of time alone can rise and fall again, sines and cosines left out."""
+    found: set[sp.Expr] = set()
+    for template in templates:
+        states = _local(template)
+        for e in template.rhs:
+            for part in e.atoms(sp.Function, sp.Max, sp.Min, sp.Pow, Relational):
+                for inner, power in _bent(part):
+                    if inner.has(TIME) and not inner.free_symbols & states:
+                        found |= set(_paces(sp.expand(inner), power, isinstance(part, sp.cosh)))
+    return found
+
+
+def _bent(part: sp.Basic) -> Iterator[tuple[sp.Expr, int]]:
+    """What a part is a function of that is not linear, and to what power it raises it."""
+    if isinstance(part, Relational):
+        yield part.lhs - part.rhs, 1
+    elif isinstance(part, sp.Pow):
+        if part.exp.is_negative or (part.exp.is_Integer and part.exp > 3):
+            yield part.base, int(part.exp) if part.exp.is_positive else 1
+    elif not isinstance(part, sp.sin | sp.cos | sp.log | sp.Piecewise):
+        yield from ((a, 1) for a in part.args)
+
+
+def _paces(inner: sp.Expr, power: int, even: bool) -> Iterator[sp.Expr]:
+    """pi over the lengths in which a function bends whose argument is made of waves, or is a polynomial in time.
+
+    In that length waves leave their crests by pi, and a polynomial of second or higher degree, or of the first in an
+    `even` function, changes by pi.
+    """
+    slopes = {wave: slope for wave in inner.atoms(sp.sin, sp.cos) if (slope := _slope(wave, set())) is not None}
+    sizes = {wave: sp.Abs(inner.coeff(wave)) for wave in slopes}
+    if sizes and not any(size.has(TIME) for size in sizes.values()):
+        yield sp.sqrt(sp.pi * power * sum(sizes[wave] * slope**2 for wave, slope in slopes.items()))
+    if power == 1 and inner.is_polynomial(TIME):
+        polynomial = sp.Poly(inner, TIME)
+        degree = polynomial.degree()
+        if degree > 1 or (degree == 1 and even):
+            yield sp.pi * (sp.Abs(polynomial.LC()) / sp.pi) ** sp.Rational(1, degree)
 
 
 @lru_cache(maxsize=64)

@@ -23,6 +23,7 @@ from synchain.models.graphs.links import LINK_LIMIT, Link
 from synchain.models.mechanics.components import TIME, Edge
 from synchain.models.scenes.scene import Scene
 
+from ..support.status import Status
 from .buffers import Buffers
 from .plan import Plan, Planner
 from .reduce import Reduction
@@ -199,7 +200,7 @@ def _stiffest(rates: Iterable[tuple[float, float]]) -> float:
 def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[[np.ndarray], Plan]) -> None:
     """Warn if Taylor steps of some cells were short because the equations are stiff, not because the motion is fast.
 
-    The three cells with the shortest steps are looked at, where they ended.
+    The three cells with the shortest steps are looked at, where they ended, unless they ended at a singularity.
 
     Parameters
     ----------
@@ -211,7 +212,8 @@ def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[
     """
     steps = buffers.counts[:, Count.ACCEPTED] + buffers.counts[:, Count.REJECTED]
     times = buffers.sums[:, Sum.STOPPED_AT]
-    lengths = np.where((steps > 0) & (times > 0.0), times / np.maximum(steps, 1), math.inf)
+    broken = np.isin(buffers.counts[:, Count.STATUS], (Status.STEP_UNDERFLOW, Status.DIVERGED))
+    lengths = np.where((steps > 0) & (times > 0.0) & ~broken, times / np.maximum(steps, 1), math.inf)
     cells = np.argsort(lengths)[:3]
     for cell, numbers in zip(cells, rows_of(cells).numbers, strict=True):
         if not math.isfinite(lengths[cell]) or not np.isfinite(buffers.end[cell]).all():

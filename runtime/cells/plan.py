@@ -188,13 +188,14 @@ def _sizes(frequency: sp.Expr, values: Mapping[str, np.ndarray], rows: int) -> n
 
 
 def half_swing(equations: Equations, values: Mapping[str, np.ndarray]) -> float:
-    """Return half the period of the fastest sine or cosine of time; inf without a drive.
+    """Return half the period of the fastest sine or cosine of time, or the length in which another
+    function of time can rise and fall again (`Drive.bends`), if shorter; inf without a drive.
 
-    No step may be longer, so that none can miss a whole swing of the drive.
+    No step may be longer, so that none can miss a whole swing of the drive, or a pulse.
     """
     rows = max((len(column) for column in values.values()), default=1)
-    waves = drive_of((*equations.nodes, *equations.edges), equations.varied).waves
-    fastest = max((float(np.max(_sizes(wave, values, rows), initial=0.0)) for wave in waves), default=0.0)
+    paces = drive_of((*equations.nodes, *equations.edges), equations.varied).paces
+    fastest = max((float(np.max(_sizes(pace, values, rows), initial=0.0)) for pace in paces), default=0.0)
     return math.pi / fastest if fastest > 0.0 else math.inf
 
 
@@ -202,7 +203,7 @@ def longest_step(scene: Scene) -> float:
     """Return the half swing at the extremes of the drive's parameters over all nodes and axes of a
     scene.
     """
-    known = dict.fromkeys(name for wave in scene.drive.waves for name in names_in(wave))
+    known = dict.fromkeys(name for pace in scene.drive.paces for name in names_in(pace))
     ends = []
     for names in (parameter_names(scene, name) for name in known):
         values = [scene.parameters[name] for name in names]

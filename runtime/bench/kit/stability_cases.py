@@ -17,6 +17,8 @@ from synchain.models.graphs.families import topology
 from synchain.models.inputs.plugins import allow_code
 from synchain.models.scenes.scene import Scene
 
+from .stability_models import said
+
 __all__ = ["BUDGET", "Case", "cases"]
 
 BUDGET = 2_000_000
@@ -57,6 +59,8 @@ def cases(quick: bool = False) -> Iterator[Case]:
     yield from _linear(quick)
     yield from _sizes(quick)
     yield from _long(quick)
+    for group, name, scene, reference in said(quick):
+        yield Case(group, name, scene, reference)
 
 
 def _scene(n: int = 1, **changes: object) -> Scene:

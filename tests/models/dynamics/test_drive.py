@@ -9,6 +9,7 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
+from synchain.models.definitions.inline import Field
 from synchain.models.graphs.families import topology
 from synchain.models.inputs.plugins import allow_code
 from synchain.models.scenes.scene import Scene
@@ -117,6 +118,38 @@ def test_the_fastest_wave_of_a_drive_limits_the_step(files: Path) -> None:
     assert comb.period == pytest.approx(2 * np.pi / 0.6)
     assert longest_step(comb) == pytest.approx(np.pi / 1.8)
     assert longest_step(comb.replace(axes={"Omega": [-1.0, 0.1]})) == pytest.approx(np.pi / 3.0)
+
+
+@pytest.mark.parametrize(
+    ("drive", "longest"),
+    [
+        ("exp(-(t - 60)**2/4)", 2 * np.sqrt(np.pi)), ("exp(20*(cos(2*t) - 1))", np.sqrt(np.pi / 80)),
+        ("(1 - cos(t))**10", np.sqrt(np.pi / 10)), ("max(0, sin(t) - 0.9)", np.sqrt(np.pi)), ("1/cosh(3*t - 1)**2", np.pi / 3),
+        ("1/(1 + 25*(t - 3)**2)", np.sqrt(np.pi) / 5), ("cos(t)", np.pi), ("cos(t)**3", np.pi), ("tanh(30*t)", np.inf),
+        ("exp(-1000*t)", np.inf), ("sqrt(1 + t**2)", np.inf), ("t**2", np.inf),
+    ],
+)  # fmt: skip
+def test_no_step_is_longer_than_a_pulse_of_the_drive(drive: str, longest: float) -> None:
+    """Functions of the states are not asked: they are seen by the step control."""
+    for rate in (drive, f"({drive})*x"):
+        driven = Scene(Field({"x": rate}), None, ALONE, transient=0.0, window=1.0, time_unit="time")
+        assert longest_step(driven) == pytest.approx(longest)
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853", "rodas5p"])
+def test_a_pulse_of_the_drive_is_not_stepped_over(integrator: str) -> None:
+    """x' = exp(-(t - 60)**2) is zero in double precision up to t = 33; its integral is sqrt(pi)."""
+    pulse = Scene(
+        Field({"x": "exp(-(t - 60)**2)"}),
+        None,
+        ALONE,
+        transient=0.0,
+        window=100.0,
+        time_unit="time",
+        integrator=integrator,
+        initial={"x": 0.0},
+    )
+    assert run(pulse, show_progress=False).states("end")[0] == pytest.approx(np.sqrt(np.pi), rel=1e-6)
 
 
 def test_a_drive_that_stands_still_in_a_cell_has_no_period(files: Path) -> None:

@@ -7,12 +7,13 @@ import warnings
 import numpy as np
 import pytest
 
-from synchain.models import Scene, chain
+from synchain.models import Field, Scene, chain
 from synchain.runtime import run
 from synchain.runtime.cells.choice import STIFF, chosen_for_rows, stiffness
 from synchain.runtime.cells.kernels import kernel_source
 from synchain.runtime.cells.plan import Plan
 from synchain.runtime.stability.orbits import Orbits
+from synchain.runtime.support.status import Status
 from synchain.runtime.synchronisation.probe import ring_of_three
 
 
@@ -139,6 +140,18 @@ def test_stiffness_that_appears_is_said():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         run(scene, mu=[1.0, 2.0], show_progress=False)
+
+
+def test_a_singularity_is_not_called_stiff():
+    """x' = x**2 - c from 1: for c = 0 it grows without bound at t = 1, where its rate is as large as its steps are short."""
+    blowing = Scene(
+        Field({"x": "x**2 - c"}, parameters={"c": 0}), None, chain(1), initial={"x": 1.0}, record=(), transient=0,
+        window=2, time_unit="time", integrator="taylor",
+    )  # fmt: skip
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = run(blowing, c=[0.0, 2.0], show_progress=False)
+    assert found.status.values.tolist() == [Status.DIVERGED, Status.FINISHED]
 
 
 def test_modes_that_become_stiff_are_said():

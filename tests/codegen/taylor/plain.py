@@ -1,0 +1,65 @@
+"""The text of Taylor steps on plain double precision: no compiler, so that hundreds of models can be tried in a minute.
+
+What a driver does around a step is written once more, in a few lines.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from scipy import special
+
+from synchain.codegen.steps.names import tidy
+from synchain.codegen.taylor import write_step
+from synchain.models.dynamics.equations import Equations
+
+BUDGET = 20_000
+
+
+def _kept(bits: int) -> Callable[[float], np.float64]:
+    """Cut a number to the bits of a mask."""
+    return lambda a: (np.float64(a).view(np.int64) & np.int64(bits)).view(np.float64)
+
+
+def _store(array: np.ndarray, slot: int, value: float) -> None:
+    array[slot] = value
+
+
+WORDS: dict[str, Any] = {
+    "load": lambda array, slot, width: array[slot], "store": _store, "broadcast": lambda a, width: np.float64(a),
+    "select": lambda mask, yes, no: yes if mask else no, "any_lane": bool, "njit": lambda **options: lambda f: f,
+    "absolute": np.abs, "maximum": np.fmax, "minimum": np.fmin, "fma": lambda a, b, c: a * b + c, "truncated": _kept(-(1 << 44)),
+    "power": np.power, "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan,
+    "sinh": np.sinh, "cosh": np.cosh, "tanh": np.tanh, "atan": np.arctan, "asin": np.arcsin, "acos": np.arccos,
+    "erf": special.erf, "math": math, "WIDTH": 1, "DENSE": False,
+}  # fmt: skip
+
+
+def march(
+    equations: Equations, order: int, start: Sequence[float], end: float, rtol: float, longest: float = math.inf
+) -> tuple[np.ndarray, int]:
+    """The state at the end, NaN where steps vanish or are too many, and the number of steps; atol is a tenth of rtol."""
+    written = write_step(tidy(equations), order)
+    space = {**WORDS, "DIMENSION": equations.dimension}
+    exec(written.text, space)
+    work = np.zeros(order * equations.dimension + written.workspace)
+    y, new = np.array(start, dtype=float), np.zeros(len(start))
+    t, scale, power_of_two = np.float64(0.0), np.float64(1e-4), _kept(0x7FF << 52)
+    with np.errstate(all="ignore"):
+        for steps in range(BUDGET):
+            if t >= end:
+                return y, steps
+            limit = np.float64(min(end - t, longest))
+            found = space["step"](t, limit, scale, y, (), new, work, rtol, rtol / 10)
+            h, reach = found if written.kinks else (found, found)
+            if not reach > 0.0:
+                scale = 0.0625 * scale
+            else:
+                y, t = new.copy(), np.float64(end) if h >= end - t else t + h
+                scale = power_of_two(reach) if reach < limit else np.maximum(scale, power_of_two(reach))
+            if not (scale > 4e-16 * max(1.0, t) and np.abs(y).max() < 2.0**53):
+                break
+    return np.full(len(y), math.nan), steps

@@ -1,0 +1,130 @@
+"""Series that are small to all orders now and large soon after, that have their terms far apart, or that pass where they end.
+
+The steps run as plain Python (`plain.march`), some in compiled loops.
+"""
+
+from __future__ import annotations
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+from march import alone, compiled, step_of
+from plain import march
+from scipy import special
+
+from synchain.codegen.taylor import order_for
+from synchain.models.dynamics.equations import Equations
+from synchain.models.mechanics.components import TIME as T
+
+X, V, A = sp.symbols("x v a", real=True)
+PULSE = alone([A, X], [sp.S.One, sp.exp(200 * (sp.cos(A) - 1)) / 100])
+"""A phase that turns evenly, and a narrow pulse in each turn, of which a step beside it sees nothing above 1e-170."""
+
+
+def run(equations: Equations, start: list[float], end: float, rtol: float) -> np.ndarray:
+    return march(equations, order_for(rtol, rtol / 10), start, end, rtol)[0]
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-8, 1e-12])
+def test_a_pulse_of_a_phase_is_not_stepped_over(rtol):
+    """Each turn adds the integral 2 pi exp(-200) I0(200)/100."""
+    end = run(PULSE, [1.0, 0.0], 10 * math.pi + 1.0, rtol)
+    assert end[1] == pytest.approx(5 * 2 * math.pi * special.i0e(200.0) / 100.0, abs=30 * rtol)
+
+
+def test_a_pulse_of_a_phase_is_not_stepped_over_in_loops():
+    end, _ = compiled(PULSE, 16, looped=True).run([1.0, 0.0], [], 10 * math.pi + 1.0, 1e-8)
+    assert end[0, 1] == pytest.approx(math.pi * special.i0e(200.0) / 10.0, abs=1e-7)
+
+
+@pytest.mark.parametrize(("power", "rtol"), [(10, 1e-3), (10, 1e-8), (7, 1e-2), (30, 1e-4)])
+def test_a_zero_of_high_order_is_left_and_reached(power, rtol):
+    """(1 - cos a)**n and its first 2n - 1 derivatives are zero in each turn; the mean of it is binomial(2n, n)/2**n."""
+    mean = sp.Rational(math.comb(2 * power, power), 2**power)
+    equations = alone([A, X], [sp.S.One, (1 - sp.cos(A)) ** power / mean])
+    assert run(equations, [0.0, 0.0], 6 * math.pi, rtol)[1] == pytest.approx(6 * math.pi, rel=30 * rtol)
+
+
+def test_a_soft_wall_turns_a_body_back():
+    """x'' = exp(-50 x) from x = 3 with v = -1: at the start the force is 7e-66; the motion is log cosh."""
+    b, energy = 50.0, 0.5
+    speed, nearest = math.sqrt(2.0 * energy), -math.log(b * energy) / b
+    turn = (3.0 - nearest + 2.0 * math.log(2.0) / b) / speed
+    found = run(alone([X, V], [V, sp.exp(-50 * X)]), [3.0, -1.0], 6.0, 1e-8)
+    exact = nearest + 2.0 / b * math.log(math.cosh(b * speed * (6.0 - turn) / 2.0))
+    assert found.tolist() == pytest.approx([exact, speed], abs=1e-6)
+
+
+def test_a_pulse_beside_a_large_motion_counts():
+    """x' = cos(a/3)/10 + exp(200 (cos a - 1)): what else moves the state hides nothing."""
+    equations = alone([A, X], [sp.S.One, sp.cos(A / 3) / 10 + sp.exp(200 * (sp.cos(A) - 1))])
+    found = run(equations, [1.0, 0.0], 10 * math.pi + 1.0, 1e-9)[1]
+    slow = 0.3 * (math.sin((10 * math.pi + 2.0) / 3) - math.sin(1.0 / 3))
+    assert found == pytest.approx(slow + 10 * math.pi * special.i0e(200.0), abs=3e-7)
+
+
+@pytest.mark.parametrize("power", [4, 5, 6, 7, 8, 9, 10, 11, 12, 15])
+@pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-6, 1e-8, 1e-11, 1e-13])
+def test_a_spring_without_a_linear_term_keeps_its_energy(power, rtol):
+    """Near x = 0 the coefficients of x'' = -x**n stand n + 1 orders apart: the last three say nothing."""
+    force = X**power if power % 2 else X ** (power - 1) * sp.Abs(X)
+    for start in ([0.0, 1.0], [1.0, 0.0], [1e-3, 1.0]):
+        end = run(alone([X, V], [V, -force]), start, 30.0, rtol)
+        before, after = (v**2 / 2 + abs(x) ** (power + 1) / (power + 1) for x, v in (start, end))
+        assert after == pytest.approx(before, rel=100 * rtol)
+
+
+@pytest.mark.parametrize("looped", [False, True], ids=["lines", "loops"])
+def test_a_kink_of_a_function_that_hides(looped):
+    """x' = -1, y' = |exp(-30 x**2) - 1/2| from x = 3 to -3."""
+    equations = alone([X, V], [-sp.S.One, sp.Abs(sp.exp(-30 * X**2) - sp.Rational(1, 2))])
+    end = (
+        compiled(equations, 16, looped=True).run([3.0, 0.0], [], 6.0, 1e-9)[0][0]
+        if looped
+        else run(equations, [3.0, 0.0], 6.0, 1e-9)
+    )
+    edge = math.sqrt(math.log(2.0) / 30.0)
+    inner = 2.0 * float(mpmath.quad(lambda x: mpmath.exp(-30 * x**2) - 0.5, [0, edge]))
+    outer = 2.0 * float(mpmath.quad(lambda x: 0.5 - mpmath.exp(-30 * x**2), [edge, 2 * edge, 3]))
+    assert end[1] == pytest.approx(inner + outer, abs=1e-8)
+
+
+def test_a_kink_of_a_wave_is_found_where_the_state_rests():
+    """x' = max(0, sin a - 9/10) from x = 0: nothing moves x until the kink, which the polynomial of sin a must find."""
+    end = run(alone([A, X], [sp.S.One, sp.Max(0, sp.sin(A) - sp.Rational(9, 10))]), [0.0, 0.0], 10 * math.pi, 1e-10)
+    edge = math.asin(0.9)
+    assert end[1] == pytest.approx(5 * (2 * math.cos(edge) - 0.9 * (math.pi - 2 * edge)), abs=1e-8)
+
+
+@pytest.mark.parametrize("looped", [False, True], ids=["lines", "loops"])
+def test_the_root_of_what_has_run_out_is_no_number(looped):
+    """x' = -sqrt(x) is (1 - t/2)**2 up to t = 2, and its series go on: a tank cannot run empty and fill again."""
+    tank = alone([X], [-sp.sqrt(X)])
+    if looped:
+        kernel = compiled(tank, 12, looped=True)
+        assert np.isnan(kernel.step([1.0], [], scale=2.0)[0][0])
+        assert kernel.run([1.0], [], 1.5, 1e-9)[0][0, 0] == pytest.approx(0.0625, abs=1e-9)
+    else:
+        assert run(tank, [1.0], 1.5, 1e-9)[0] == pytest.approx(0.0625, abs=1e-9)
+        assert np.isnan(run(tank, [1.0], 3.0, 1e-9)[0])
+
+
+@pytest.mark.parametrize("rate", [-3 * X ** sp.Rational(2, 3), -4 * X ** sp.Rational(3, 4), -sp.S.One, -1 / X])
+def test_powers_and_poles_are_not_passed(rate):
+    extra = [sp.log(X)] if rate == -1 else []
+    equations = alone([X, V][: 1 + len(extra)], [rate, *extra])
+    assert np.isnan(run(equations, [1.0, 0.0][: 1 + len(extra)], 3.0, 1e-9)).all()
+
+
+@pytest.mark.parametrize(
+    ("rates", "watched"),
+    [
+        ([V, -sp.sin(X) - V / 10 + sp.cos(T)], False), ([V, X - X**3], False), ([X * V, 1 - X**2 * V], False),
+        ([V, sp.exp(-X)], True), ([V, -(X**5)], True), ([V, -sp.atan(10 * X)], True), ([V, sp.exp(-(T**2))], True),
+    ],
+)  # fmt: skip
+def test_polynomials_and_waves_pay_nothing(rates, watched):
+    assert ("unseen" in step_of(alone([X, V], rates), 16).text) == watched
