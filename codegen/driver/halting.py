@@ -7,7 +7,7 @@ from numba import njit
 from ..simd.lanes import any_lane, broadcast, load, select, store
 from .dense import inside
 from .names import SERIES, WIDTH
-from .recording import BASE, HALTED, crosses, locate
+from .recording import BASE, HALTED, LOOKS, crosses, locate, turning
 from .sections import surface
 
 
@@ -35,20 +35,29 @@ def shorten(hits, part, y, y_new, dense, dims):
 def halt(accept, t, h, clock, y, y_new, dense, found, dims, section):
     """End the step of a lane where the last section function passes zero, and mark the lane; returns the lengths."""
     now, k = load(clock, BASE, WIDTH) + t, dims.sections * (1 + dims.kept)
-    zero, half, one = broadcast(0.0, WIDTH), broadcast(0.5, WIDTH), broadcast(1.0, WIDTH)
-    g0 = surface(k, zero, now, h, y, y_new, dense, found, dims, section)
-    g1 = surface(k, half, now, h, y, y_new, dense, found, dims, section)
-    g2 = surface(k, one, now, h, y, y_new, dense, found, dims, section)
-    early = crosses(g0, g1, 0.0) & accept
-    late = crosses(g1, g2, 0.0) & accept & ~early
-    hits, part = early | late, one
+    zero, part = broadcast(0.0, WIDTH), broadcast(1.0, WIDTH)
+    before, g0 = zero / zero, surface(k, zero, now, h, y, y_new, dense, found, dims, section)
+    g1 = surface(k, zero + 1.0 / LOOKS, now, h, y, y_new, dense, found, dims, section)
+    hits = accept & (zero > 0.0)
+    for i in range(LOOKS):
+        low, high, behind = zero + i / LOOKS, zero + (i + 1) / LOOKS, zero / zero
+        if i + 2 <= LOOKS:
+            behind = surface(k, zero + (i + 2) / LOOKS, now, h, y, y_new, dense, found, dims, section)
+        passes = crosses(g0, g1, 0.0) & accept & ~hits
+        if any_lane(passes):
+            place = locate(k, passes, low, high, g0, g1, now, h, y, y_new, dense, found, dims, section)
+            part, hits = select(passes, place, part), hits | passes
+        turn = turning(i, before, g0, g1, behind)
+        turns = (g0 * g1 > 0.0) & (turn > 0.0) & accept & ~hits
+        if any_lane(turns):
+            middle = select(turns, turn, high)
+            g = surface(k, middle, now, h, y, y_new, dense, found, dims, section)
+            passes = crosses(g0, g, 0.0) & turns
+            if any_lane(passes):
+                place = locate(k, passes, low, middle, g0, g, now, h, y, y_new, dense, found, dims, section)
+                part, hits = select(passes, place, part), hits | passes
+        before, g0, g1 = g0, g1, behind
     if any_lane(hits):
-        if any_lane(early):
-            place = locate(k, early, zero, half, g0, g1, now, h, y, y_new, dense, found, dims, section)
-            part = select(early, place, part)
-        if any_lane(late):
-            place = locate(k, late, half, one, g1, g2, now, h, y, y_new, dense, found, dims, section)
-            part = select(late, place, part)
         shorten(hits, part, y, y_new, dense, dims)
-        store(clock, HALTED, select(hits, one, load(clock, HALTED, WIDTH)))
+        store(clock, HALTED, select(hits, 1.0, load(clock, HALTED, WIDTH)))
     return part * h

@@ -33,6 +33,8 @@ FAR = 9007199254740992.0
 # The two ways to step.
 STIFF, SMOOTH = 0, 1
 ALL = (1 << WIDTH) - 1
+# Pieces of a step between which a section function is looked at; a Taylor step is several times longer than others.
+LOOKS = 8 if SERIES else 2
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -120,22 +122,53 @@ def keep_points(k, theta, hits, t, h, y, y_new, dense, found, cell, counts, poin
                     points[cell[which], place, c + 1] = where[c * WIDTH + which]
 
 
+@njit(error_model="numpy", forceinline=True)
+def turning(i, before, first, last, behind):
+    """Where a parabola through three of four equidistant values turns between the inner two, as the fraction of the step.
+
+    `first` is the value at look i; the outer ones are NaN where the step ends.  Zero where nothing turns.
+    """
+    left, right = (
+        0.5 * (before - last) / (before - 2.0 * first + last),
+        0.5 * (first - behind) / (first - 2.0 * last + behind),
+    )
+    low, high = 0.5 if i > 0 else 0.0, 0.5 if i + 2 <= LOOKS else 1.0  # each turn is seen from the nearer look
+    place = select((left > 0.0) & (left < high), left, 0.0)
+    place = select((right + 1.0 > low) & (right < 0.0), right + 1.0, place)
+    return select(place > 0.0, (i + place) / LOOKS, 0.0)
+
+
 @njit(error_model="numpy")
 def cut(k, counted, t, h, y, y_new, dense, found, cell, counts, points, direction, dims, section):
-    """Find points of section k in either half of the step."""
-    zero, half, one = broadcast(0.0, WIDTH), broadcast(0.5, WIDTH), broadcast(1.0, WIDTH)
-    g0 = surface(k, zero, t, h, y, y_new, dense, found, dims, section)
-    g1 = surface(k, half, t, h, y, y_new, dense, found, dims, section)
-    g2 = surface(k, one, t, h, y, y_new, dense, found, dims, section)
-    early, late = crosses(g0, g1, direction) & counted, crosses(g1, g2, direction) & counted
-    if any_lane(early):
-        theta = locate(k, early, zero, half, g0, g1, t, h, y, y_new, dense, found, dims, section)
-        bits = lane_bits(early)
-        keep_points(k, theta, bits, t, h, y, y_new, dense, found, cell, counts, points, dims, section)
-    if any_lane(late):
-        theta = locate(k, late, half, one, g1, g2, t, h, y, y_new, dense, found, dims, section)
-        bits = lane_bits(late)
-        keep_points(k, theta, bits, t, h, y, y_new, dense, found, cell, counts, points, dims, section)
+    """Find points of section k between the looks into a step, and beside an extremum between two of them."""
+    zero = broadcast(0.0, WIDTH)
+    before, g0 = zero / zero, surface(k, zero, t, h, y, y_new, dense, found, dims, section)
+    g1 = surface(k, zero + 1.0 / LOOKS, t, h, y, y_new, dense, found, dims, section)
+    for i in range(LOOKS):
+        low, high, behind = zero + i / LOOKS, zero + (i + 1) / LOOKS, zero / zero
+        if i + 2 <= LOOKS:
+            behind = surface(k, zero + (i + 2) / LOOKS, t, h, y, y_new, dense, found, dims, section)
+        hits = crosses(g0, g1, direction) & counted
+        if any_lane(hits):
+            theta = locate(k, hits, low, high, g0, g1, t, h, y, y_new, dense, found, dims, section)
+            keep_points(k, theta, lane_bits(hits), t, h, y, y_new, dense, found, cell, counts, points, dims, section)
+        turn = turning(i, before, g0, g1, behind)
+        turns = (g0 * g1 > 0.0) & (turn > 0.0) & counted
+        if any_lane(turns):
+            middle = select(turns, turn, high)
+            g = surface(k, middle, t, h, y, y_new, dense, found, dims, section)
+            there, back = crosses(g0, g, direction) & turns, crosses(g, g1, direction) & turns
+            if any_lane(there):
+                theta = locate(k, there, low, middle, g0, g, t, h, y, y_new, dense, found, dims, section)
+                keep_points(
+                    k, theta, lane_bits(there), t, h, y, y_new, dense, found, cell, counts, points, dims, section
+                )
+            if any_lane(back):
+                theta = locate(k, back, middle, high, g, g1, t, h, y, y_new, dense, found, dims, section)
+                keep_points(
+                    k, theta, lane_bits(back), t, h, y, y_new, dense, found, cell, counts, points, dims, section
+                )
+        before, g0, g1 = g0, g1, behind
 
 
 @njit(error_model="numpy")

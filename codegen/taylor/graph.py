@@ -35,6 +35,7 @@ from .series import (
     Series,
     Slope,
     Square,
+    SquaredSecant,
     SquareRoot,
     State,
     Time,
@@ -428,6 +429,8 @@ class Graph:
         name, key = STARTS[function], (function, argument)
         if key in self.known:
             return self.known[key]
+        if function is sp.tanh:
+            return self.saturating(argument)
         place = sp.Dummy("a", real=True)
         derivative = function(place).diff(place)
         number = sp.Mul(*(f for f in sp.Mul.make_args(derivative) if f.is_number))
@@ -445,6 +448,16 @@ class Graph:
         self.series.append(integral)
         integral.factor = self.inside(derivative, place, argument)
         return integral
+
+    def saturating(self, argument: Series) -> Series:
+        """tanh of a series; its slope is a series of its own, because 1 - tanh**2 has no digits where tanh is nearly 1."""
+        slope = self.slope(argument)
+        found = Integral("tanh", argument, slope, name=self.fresh("tanh"))
+        bell = SquaredSecant("cosh", argument, slope, -2.0, name=self.fresh("squaredsecant"))
+        self.known[sp.tanh, argument] = found
+        self.series += [found, bell]
+        found.factor, bell.factor = bell, self.product(found, bell)
+        return found
 
     def inside(self, e: sp.Expr, place: sp.Symbol, argument: Series) -> Series:
         """The series of an expression in one symbol that stands for a series."""
@@ -533,7 +546,7 @@ def _negative(e: Expr) -> bool:
 
 def _words() -> tuple[str, ...]:
     """What names of series begin with."""
-    kinds = (Choice, Kink, Linear, Power, Product, Ratio, Row, Slope, Square, SquareRoot, Unknown)
+    kinds = (Choice, Kink, Linear, Power, Product, Ratio, Row, Slope, Square, SquaredSecant, SquareRoot, Unknown)
     return (*(kind.__name__.lower() for kind in kinds), *STARTS.values())
 
 

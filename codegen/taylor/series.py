@@ -234,6 +234,10 @@ class Slope(Series):
         return times(at.number, at.of(self.of))
 
 
+FAINT = 1e-100
+"""Least that the slope of a saturated function is taken for; no digit of anything depends on it, but the length of a step."""
+
+
 @dataclass(eq=False, slots=True)
 class Integral(Series):
     """u = f(a) from u' = c g a' with f'(a) = c g, c a number: exp, sin, tan, sinh, tanh, erf and the like.
@@ -262,6 +266,18 @@ class Integral(Series):
         if self.factor is None:
             raise RuntimeError(f"{self.name} has no derivative yet; this is a mistake in the program")
         return times(Number(self.number), at.inverse, at.sum(self.slope, self.factor, 1, 0))
+
+
+@dataclass(eq=False, slots=True)
+class SquaredSecant(Integral):
+    """u = 1/cosh(a)**2 from u' = -2 u tanh(a) a'.
+
+    Where tanh(a) is 1 to the last digit u is small and not zero, so that the series tell how far away the layer is.
+    """
+
+    def begin(self, at: Start) -> Expr:
+        secant = Name(at.keep(f"i_{self.name}", over(ONE, Call("cosh", (at.start(self.argument),)))))
+        return Call("maximum", (times(secant, secant), Number(FAINT)))
 
 
 @dataclass(eq=False, slots=True)

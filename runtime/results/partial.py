@@ -78,7 +78,9 @@ class _Reader:
         self.log, self.scene = log, scene
         self.layout, self.certificate = layout_of(about, scene), certificate_of(about)
         self.planner = Planner(scene)
-        same = np.arange(int(about["dimension"]))
+        if check_integer("dimension", about["dimension"], 1) > len(scene.y0):
+            raise ValueError(f"found {about['dimension']} states; expected at most the {len(scene.y0)} of its scene")
+        same = np.arange(about["dimension"])
         states, places = (same, same) if about["merged"] is None else map(np.array, about["merged"])
         self.merge = NodeMerge(states, places, bool(about["together"]))
 

@@ -1,0 +1,56 @@
+"""Passages of a function near its extremum, which the ends of a step do not show, and layers far from the state."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.integrate import solve_ivp
+
+import synchain as sc
+
+x_1 = sp.Symbol("x_1")
+CIRCLE = sc.Scene(
+    sc.Field({"x": "y", "y": "-x"}), initial={"x": [0.0], "y": [1.0]}, transient=0, window=50, time_unit="time",
+    record=(), rtol=1e-10,
+)  # fmt: skip
+NEAR, FAR = 0.999, -0.95
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853"])
+def test_sections_near_an_extremum_have_all_their_points(integrator: str) -> None:
+    sections = {"near": sc.Section(x_1 - NEAR, "both"), "far": sc.Section(x_1 - FAR, "rising")}
+    data = sc.run(CIRCLE.replace(integrator=integrator, sections=sections), show_progress=False).data
+    turns = 2 * math.pi * np.arange(8)
+    near = np.sort(np.concatenate([math.asin(NEAR) + turns, math.pi - math.asin(NEAR) + turns]))
+    far = 2 * math.pi + math.asin(FAR) + turns
+    for name, times in (("near", near), ("far", far[far < 50])):
+        assert int(data[f"{name}_count"]) == len(times)
+        np.testing.assert_allclose(data[f"{name}_time"].values[: len(times)], times, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "dop853"])
+def test_a_stop_near_an_extremum_ends_its_cell_the_first_time(integrator: str) -> None:
+    found = sc.run(CIRCLE.replace(integrator=integrator, stop=x_1 - NEAR), show_progress=False)
+    np.testing.assert_allclose(found.states(), [NEAR, math.sqrt(1 - NEAR**2)], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("steepness", [5, 20, 100])
+def test_a_layer_that_is_saturated_now_is_not_stepped_over(steepness: int) -> None:
+    """In double precision tanh is 1 and its slope 0 when |v| > 19/steepness: a mass with steep friction crosses v = 0."""
+    node = sc.Lagrangian(
+        "v**2/2", "x**2/2", {"x": f"-3*tanh({steepness}*v)/10 - v/10 + cos(t)"}, coordinates=["x"]
+    )  # fmt: skip
+    scene = sc.Scene(
+        node, initial={"x": 0.5, "v": 0.0}, transient=0, window=20, time_unit="time", record=(), rtol=1e-9,
+        integrator="taylor",
+    )  # fmt: skip
+    found = sc.run(scene, show_progress=False).states()
+
+    def rates(t: float, state: np.ndarray) -> list[float]:
+        return [state[1], -state[0] - 0.3 * math.tanh(steepness * state[1]) - 0.1 * state[1] + math.cos(t)]
+
+    expected = solve_ivp(rates, (0, 20), [0.5, 0.0], "Radau", rtol=1e-11, atol=1e-12).y[:, -1]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-7)
