@@ -89,7 +89,7 @@ def from_edges(
     return _graph(name, size, weights)
 
 
-def from_graph(graph: Any, weight: str = "weight", name: str = "graph") -> Topology:
+def from_graph(graph: Any, weight: str | None = "weight", name: str = "graph") -> Topology:
     """Return the graph of a networkx graph, nodes in its order.
 
     Edges of a directed graph act from their first node on their second; parallel edges of a
@@ -99,8 +99,9 @@ def from_graph(graph: Any, weight: str = "weight", name: str = "graph") -> Topol
     ----------
     graph : networkx graph
         An object with nodes, edges and is_directed.
-    weight : str, optional
-        The edge attribute that holds the weight, read through its decimal text; 1 without.
+    weight : str or None, optional
+        The edge attribute that holds the weight, read through its decimal text; an edge without it has weight 1, and
+        every edge for None.
     name : str, optional
         What the graph is called.
 
@@ -109,7 +110,7 @@ def from_graph(graph: Any, weight: str = "weight", name: str = "graph") -> Topol
     TypeError
         On another object.
     ValueError
-        On loops and on weights that are not rational.
+        On loops, on weights that are not rational, and if no edge has an attribute that was named.
     """
     if not _is_graph(graph):
         raise TypeError(f"{name} is a {type(graph).__name__}; expected a networkx graph (nodes, edges, is_directed)")
@@ -117,7 +118,11 @@ def from_graph(graph: Any, weight: str = "weight", name: str = "graph") -> Topol
     place = {node: k for k, node in enumerate(nodes)}
     many = bool(graph.is_multigraph()) if hasattr(graph, "is_multigraph") else False
     weights, called = Weights(), _Names(name, [repr(node) for node in nodes])
-    for u, v, data in graph.edges(data=True):
+    edges = list(graph.edges(data=True))
+    known = sorted({str(key) for *_, data in edges for key in data})
+    if edges and weight not in (None, "weight", *known):
+        raise ValueError(f"{name}: no edge has the attribute {weight!r}; found {', '.join(known) or 'no attributes'}")
+    for u, v, data in edges:
         value = rational(data.get(weight, 1), f"{name}: weight of edge {u!r} - {v!r}")
         _put(weights, place[v], place[u], value, graph.is_directed(), called, many)
     return _graph(name, len(nodes), weights)

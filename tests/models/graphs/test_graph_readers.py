@@ -67,7 +67,9 @@ def test_networkx_graphs() -> None:
     named.add_weighted_edges_from([("b", "a", 0.1), ("a", "c", 2)])
     found = from_graph(named)
     assert found.links == ((0, 1, ONE / 10), (1, 0, ONE / 10), (1, 2, ONE * 2), (2, 1, ONE * 2))
-    assert from_graph(named, weight="other").links[0][2] == 1
+    assert from_graph(named, weight=None).links[0][2] == 1
+    with pytest.raises(ValueError, match="no edge has the attribute 'weigth'; found weight"):
+        from_graph(named, weight="weigth")
     many = nx.MultiGraph([(0, 1), (0, 1), (1, 2)])
     assert from_graph(many).links[0] == (0, 1, ONE * 2)
     empty = nx.Graph()
