@@ -71,7 +71,7 @@ PLAIN = 3
 
 
 def jump(equations: Equations) -> sp.Expr | None:
-    """Return a part of some equations that is not continuous in the states or in time, None if there is none."""
+    """Return a part of some equations that jumps in the states or in time, or is a root at a kink; None if there is none."""
     return next((part for own, moving in _templates(equations) for part in _jumps(own, moving)), None)
 
 
@@ -101,6 +101,9 @@ def is_linear(equations: Equations) -> bool:
 def _jumps(expressions: Sequence[sp.Expr], moving: Set[sp.Symbol]) -> list[sp.Expr]:
     parts = {part for e in expressions for part in e.atoms(*JUMPING, Piecewise) if part.free_symbols & moving}
     found = [part for part in parts if not (isinstance(part, Piecewise) and _joins(part, moving))]
+    powers = {part for e in expressions for part in e.atoms(sp.Pow) if part.base.free_symbols & moving}
+    roots = [p for p in powers if p.exp.is_integer is not True]
+    found += [p for p in roots if any(isinstance(f, (*KINKED, Piecewise)) for f in sp.Mul.make_args(p.base))]
     return sorted(found, key=sp.default_sort_key)
 
 
@@ -134,8 +137,8 @@ class Template:
         symbols = frozenset(moving)
         for part in _jumps(expressions, symbols):
             raise ValueError(
-                f"taylor: a function that jumps; found {part}; expected continuous functions, analytic between kinks; "
-                f"use integrator dop853 or rodas5p"
+                f"taylor: a function that jumps, or has no series at its kink; found {part}; expected continuous functions, "
+                f"analytic on either side of a kink; use integrator dop853 or rodas5p"
             )
         shared, reduced = sp.cse(expressions, symbols=supply, order="canonical")
         constant: dict[sp.Symbol, sp.Expr] = {}
