@@ -17,7 +17,7 @@ from typing import NoReturn
 import sympy as sp
 
 from ..algebra.equality import check_size, equal
-from ..inputs.reader import Algebra, NoMeaning, parse, stray_character
+from ..inputs.reader import Algebra, Arithmetic, NoMeaning, parse, stray_character
 
 __all__ = ["GRAMMAR", "exact_number", "whole_number"]
 
@@ -89,7 +89,7 @@ def whole_number(text: str, values: Mapping[str, int] | None = None) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class _ExactNumbers(Algebra[sp.Expr]):
+class _ExactNumbers(Arithmetic[sp.Expr]):
     """SymPy numbers without floats; in an argument of sin, cos, exp (`angle`) pi times one too."""
 
     text: str
@@ -128,22 +128,10 @@ class _ExactNumbers(Algebra[sp.Expr]):
             return sp.I
         raise NoMeaning
 
-    def positive(self, value: sp.Expr) -> sp.Expr:
-        return value
-
-    def negative(self, value: sp.Expr) -> sp.Expr:
-        return -value
-
-    def add(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
-        return self._checked(a + b)
-
-    def multiply(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
-        return self._checked(a * b)
-
     def divide(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
         if b.has(_PI):
             raise ValueError(f"number {self.text!r} divides by pi; expected a rational times pi")
-        return self._checked(a / self._divisor(b))
+        return self.checked(a / self._divisor(b))
 
     def power(self, base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
         if base.has(_PI) or exponent.has(_PI):
@@ -156,7 +144,7 @@ class _ExactNumbers(Algebra[sp.Expr]):
             self._divisor(base)
         if base.is_Rational and abs(exponent.p) * math.log2(max(abs(base.p), base.q, 2)) > BITS:
             self._refuse_size()
-        return self._checked(base**exponent)
+        return self.checked(base**exponent)
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Expr]]:
         if function not in ("sqrt", "sin", "cos", "exp") or count != 1 or options:
@@ -186,7 +174,7 @@ class _ExactNumbers(Algebra[sp.Expr]):
             raise ValueError(f"number {self.text!r} divides by zero; correct it")
         return b
 
-    def _checked(self, result: sp.Expr) -> sp.Expr:
+    def checked(self, result: sp.Expr) -> sp.Expr:
         if result.is_Rational and max(int(result.p).bit_length(), int(result.q).bit_length()) > BITS:
             self._refuse_size()
         return sp.expand(result) if self.angle else result

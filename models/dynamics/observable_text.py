@@ -11,7 +11,7 @@ from typing import Any, NoReturn, TypeVar
 import sympy as sp
 
 from ..inputs.checks import check_text, short_repr, suggestion
-from ..inputs.reader import Algebra, Expression, NoMeaning, parse
+from ..inputs.reader import Algebra, Arithmetic, Expression, NoMeaning, parse
 from .observable import Observable, Window, nodes, rate, real
 
 __all__ = ["FUNCTIONS", "as_observable", "as_value"]
@@ -130,7 +130,7 @@ class _Windows(Algebra[Observable]):
 
 
 @dataclass(frozen=True, slots=True)
-class _Values(Algebra[sp.Expr]):
+class _Values(Arithmetic[sp.Expr]):
     """Expressions of states; constants are checked after every operation, so that none grows."""
 
     what: str
@@ -152,27 +152,15 @@ class _Values(Algebra[sp.Expr]):
     def name(self, name: str) -> sp.Expr:
         return sp.pi if name == "pi" else sp.Symbol(name, real=True)
 
-    def positive(self, value: sp.Expr) -> sp.Expr:
-        return value
-
-    def negative(self, value: sp.Expr) -> sp.Expr:
-        return -value
-
-    def add(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
-        return self._checked(a + b)
-
-    def multiply(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
-        return self._checked(a * b)
-
     def divide(self, a: sp.Expr, b: sp.Expr) -> sp.Expr:
         if b == 0:
             raise NoMeaning("found a division by zero; expected finite values")
-        return self._checked(a / b)
+        return self.checked(a / b)
 
     def power(self, base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
         if not (exponent.is_Rational and abs(exponent) <= EXPONENT and exponent.q <= 2):
             raise NoMeaning(f"found the exponent {short_repr(exponent)}; expected halves up to {EXPONENT}")
-        made = self._checked(base**exponent)
+        made = self.checked(base**exponent)
         if made.is_Pow and made.exp.is_Rational and abs(made.exp) > EXPONENT:
             raise NoMeaning(f"found the exponent {made.exp}; expected at most {EXPONENT}")
         return made
@@ -197,9 +185,9 @@ class _Values(Algebra[sp.Expr]):
             return OF_NODES[name](arguments[0])
         if one := ONE_NODE.fullmatch(name):
             return nodes[int(one[1])](arguments[0])
-        return self._checked(FUNCTIONS[name](*arguments))
+        return self.checked(FUNCTIONS[name](*arguments))
 
-    def _checked(self, e: sp.Expr) -> sp.Expr:
+    def checked(self, e: sp.Expr) -> sp.Expr:
         """The expression, if the constants at its top are finite and not too large."""
         parts = (e,) if e.is_number else e.args if isinstance(e, sp.Add | sp.Mul | sp.Pow) else ()
         for number in (part for part in parts if part.is_number):

@@ -12,9 +12,9 @@ import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, NoReturn, TypeVar
+from typing import Any, Generic, NoReturn, TypeVar, cast
 
-__all__ = ["Algebra", "Expression", "NoMeaning", "parse", "stray_character"]
+__all__ = ["Algebra", "Arithmetic", "Expression", "NoMeaning", "parse", "stray_character"]
 
 V = TypeVar("V")
 
@@ -142,6 +142,30 @@ class Algebra(Generic[V]):
     def choice(self, condition: V, value: V, otherwise: V) -> V:
         """The value "value if condition else otherwise"."""
         raise NoMeaning
+
+
+class Arithmetic(Algebra[V]):
+    """An algebra whose values Python adds and multiplies; sums and products are checked."""
+
+    def checked(self, value: Any) -> V:
+        """The value of an operation, if it is not too large."""
+        raise NoMeaning
+
+    def positive(self, value: V) -> V:
+        """+ value."""
+        return value
+
+    def negative(self, value: Any) -> V:
+        """- value."""
+        return cast("V", -value)
+
+    def add(self, a: Any, b: Any) -> V:
+        """a + b."""
+        return self.checked(a + b)
+
+    def multiply(self, a: Any, b: Any) -> V:
+        """a * b."""
+        return self.checked(a * b)
 
 
 @dataclass(frozen=True, slots=True)
