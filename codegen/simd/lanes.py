@@ -2,8 +2,9 @@
 
 Kernels are written once on lane values.  Width 1 is the scalar kernel, wider ones run several cells of a sweep in
 step with each other in one vector register.  Operators and the functions below are branch-free: both sides of a
-`select` are computed.  Multiplications and additions may be contracted to fused multiply-adds; nothing else about
-the arithmetic is relaxed, so infinities and NaN mean what they mean in IEEE 754.
+`select` are computed.  A sum or a difference of which one side is a product is one fused multiply-add; the first product
+is taken if both sides are.  The text alone decides it, so that every width has the same bits; LLVM, which may choose
+otherwise from one width to the next, is allowed nothing, and infinities and NaN mean what they mean in IEEE 754.
 """
 
 from __future__ import annotations
@@ -26,8 +27,6 @@ __all__ = [
     "maximum", "minimum", "native_width", "one_lane", "round_even",
     "scale_binary", "select", "split_binary", "sqrt", "store", "truncated",
 ]  # fmt: skip
-
-CONTRACT = ("contract",)
 
 FIRST = {"target": "cpu"}
 """Metadata of the operators of lanes: Numba tries what is made for the CPU before its own, which are for any target.
@@ -58,10 +57,44 @@ def _define_operator(function: Callable, emit: Callable, result: type) -> None:
         lower_builtin(function, left, right)(lower)
 
 
-for _function, _name in (
-    (operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"), (operator.truediv, "fdiv"),
-):  # fmt: skip
-    _define_operator(_function, lambda b, x, y, _n=_name: getattr(b, _n)(x, y, flags=CONTRACT), Lane)
+def _factors(value: Any) -> tuple[Any, Any] | None:
+    """The factors of what this block has multiplied."""
+    return tuple(value.operands) if getattr(value, "opname", None) == "fmul" else None
+
+
+def _call(builder: Any, name: str, *values: Any) -> Any:
+    """llvm.<name> of values of one type."""
+    kind = values[0].type
+    suffix = f"v{kind.count}f64" if isinstance(kind, ir.VectorType) else "f64"
+    signed = ir.FunctionType(kind, [kind] * len(values))
+    return builder.call(cgutils.get_or_insert_function(builder.module, signed, f"llvm.{name}.{suffix}"), values)
+
+
+def _sum(builder: Any, x: Any, y: Any) -> Any:
+    """x + y; the first product of the two is fused."""
+    if product := _factors(x):
+        return _call(builder, "fma", *product, y)
+    if product := _factors(y):
+        return _call(builder, "fma", *product, x)
+    return builder.fadd(x, y)
+
+
+def _difference(builder: Any, x: Any, y: Any) -> Any:
+    """x - y; the first product of the two is fused."""
+    if product := _factors(x):
+        return _call(builder, "fma", *product, builder.fneg(y))
+    if product := _factors(y):
+        return _call(builder, "fma", builder.fneg(product[0]), product[1], x)
+    return builder.fsub(x, y)
+
+
+for _function, _emit in (
+    (operator.add, _sum),
+    (operator.sub, _difference),
+    (operator.mul, lambda b, x, y: b.fmul(x, y)),
+    (operator.truediv, lambda b, x, y: b.fdiv(x, y)),
+):
+    _define_operator(_function, _emit, Lane)
 for _function, _name in (
     (operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="), (operator.eq, "=="),
 ):  # fmt: skip
@@ -117,12 +150,9 @@ def _llvm_function(name: str, arity: int) -> Any:
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         width = sig.return_type.width
-        lane = vector(DOUBLE, width)
-        values = [as_lane(context, builder, v, t, width) for v, t in zip(args, sig.args, strict=True)]
-        kind = ir.FunctionType(lane, [lane] * arity)
-        suffix = "f64" if width == 1 else f"v{width}f64"
-        function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.{suffix}")
-        return builder.call(function, values)
+        return _call(
+            builder, name, *(as_lane(context, builder, v, t, width) for v, t in zip(args, sig.args, strict=True))
+        )
 
     def typed(*arguments: Any) -> Any:
         width = common_width(arguments)

@@ -134,7 +134,12 @@ OTHERS = {
     "maximum": lambda a, b, c: maximum(a, b),
     "capped": lambda a, b, c: minimum(a, 2),
     "fma": lambda a, b, c: fma(a, b, c),
-    "contracted": lambda a, b, c: a * b + c,
+    "product and term": lambda a, b, c: a * b + c,
+    "term and product": lambda a, b, c: c + a * b,
+    "product less term": lambda a, b, c: a * b - c,
+    "term less product": lambda a, b, c: c - a * b,
+    "sum of products": lambda a, b, c: a * b + c * a,
+    "difference of products": lambda a, b, c: a * b - c * a,
     "long expression": long_expression,
     "scaled": lambda a, b, c: scale_binary(a, b),
     "mantissa": lambda a, b, c: split_binary(a, 0.7071067811865476)[0],
@@ -191,14 +196,15 @@ def test_fma_rounds_once(width):
     np.testing.assert_allclose(exact[middle], wide.astype(float), rtol=3e-16)
 
 
-def test_contraction_is_the_same_at_every_width():
-    first = applied("contracted", 1)
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_first_product_of_a_sum_is_rounded_with_it(width):
     with np.errstate(all="ignore"):
-        apart, once = A * B + C, applied("fma", 1)
-    either = (first == apart) | (first == once) | np.isnan(first)
-    assert either.all()
-    for width in WIDTHS[1:]:
-        same(applied("contracted", width), first)
+        other = C * A
+    for name, factor, term in (
+        ("product and term", A, C), ("term and product", A, C), ("product less term", A, -C),
+        ("term less product", -A, C), ("sum of products", A, other), ("difference of products", A, -other),
+    ):  # fmt: skip
+        same(applied(name, width), applied("fma", 1, factor, B, term))
 
 
 @pytest.mark.parametrize("width", WIDTHS[1:])

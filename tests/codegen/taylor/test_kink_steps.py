@@ -14,6 +14,7 @@ from samples import path, spring
 
 from synchain.codegen.steps.names import tidy
 from synchain.codegen.taylor import jump, write_looped
+from synchain.models import Scene, chain
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME as T
 from synchain.models.mechanics.components import Edge, Node
@@ -188,6 +189,18 @@ def test_lanes_pass_kinks_at_times_of_their_own():
     start = [[0.1 * lane, 1.0 - 0.2 * lane] for lane in range(8)]
     many, _ = springs(width=8).run(start, [3.0], 17.0, 1e-11)
     assert [springs().run(row, [3.0], 17.0, 1e-11)[0][0].tolist() for row in start] == many.tolist()
+
+
+def test_coefficients_have_the_same_bits_at_every_width():
+    """A smoothed friction pair, whose series of |w| are sums of two products in the order of four and more."""
+    scene = Scene(topology=chain(2), parameters={"kappa": 10.0})
+    values = [scene.parameters[name] for name in scene.equations.parameters]
+    single, many = (compiled(scene.equations, 12, width, True) for width in (1, 8))
+    starts = np.random.default_rng(1).normal(size=(8, 4)) * [0.3, 0.3, 0.05, 0.05]
+    _, _, together = many.step(starts, values, 0.3, scale=0.25, rtol=1e-12)
+    for lane, start in enumerate(starts):
+        _, _, alone = single.step([start], values, 0.3, scale=0.25, rtol=1e-12)
+        assert alone[..., 0].tolist() == together[..., lane].tolist()
 
 
 @BOTH
