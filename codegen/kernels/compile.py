@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import functools
+import gc
 import hashlib
 import importlib.metadata
 import logging
@@ -19,6 +20,8 @@ import sys
 import tempfile
 import threading
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import ModuleType
@@ -366,6 +369,19 @@ class _MachineCode:
         return dumps(self.known)
 
 
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """Pause the collection of cycles, which takes an eighth of a compilation to find that all is in use."""
+    running = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if running:
+            gc.enable()
+
+
+@_without_collection()
 def _compile(text: str, path: Path, wanted: dict[str, Any], code: _MachineCode) -> Compiled:
     """Compile the functions `wanted` of a module.
 

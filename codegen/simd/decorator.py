@@ -9,7 +9,8 @@ import numba
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
-from numba.core.typed_passes import NativeLowering
+from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites
+from numba.core.untyped_passes import InlineClosureLikes, InlineInlinables, WithLifting
 
 __all__ = ["njit"]
 
@@ -51,16 +52,33 @@ class _LinkedLowering(NativeLowering):
         return bool(super().run_pass(state))
 
 
-class _LinkedCompiler(CompilerBase):
-    """Numba's compiler with that lowering."""
+class _Compiler(CompilerBase):
+    """Numba's compiler without the passes for what kernels have none of."""
+
+    unused = (InlineClosureLikes, InlineInlinables, InlineOverloads, NopythonRewrites, WithLifting)
+    """Closures, functions that are inlined by Numba, expressions of whole arrays, `with`."""
 
     def define_pipelines(self) -> list[PassManager]:
         manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        manager.passes = [(_LinkedLowering if p is NativeLowering else p, why) for p, why in manager.passes]
+        manager.passes = [(self.instead(p), why) for p, why in manager.passes if p not in self.unused]
         manager.finalize()
         return [manager]
 
+    @staticmethod
+    def instead(one: type) -> type:
+        """Return the pass that stands in the place of one of Numba's."""
+        return one
 
+
+class _LinkedCompiler(_Compiler):
+    """The compiler with that lowering."""
+
+    @staticmethod
+    def instead(one: type) -> type:
+        return _LinkedLowering if one is NativeLowering else one
+
+
+ENTRY = {"pipeline_class": _Compiler}
 INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": _LinkedCompiler}
 
 
@@ -69,4 +87,4 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
     A kernel has some eighty functions and one entry point; wrappers and machine code of them all are half of its compilation.
     """
-    return numba.njit(**(options if options.get("cache") else {**options, **INNER}))
+    return numba.njit(**{**options, **(ENTRY if options.get("cache") else INNER)})

@@ -15,9 +15,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
 from numba.extending import intrinsic
 
+from .decorator import njit
 from .lane_types import INT64, Lane, constant, vector
 from .lanes import (
     absolute,
@@ -64,7 +64,7 @@ EXP = (
 
 def lane_function(function: Any) -> Any:
     """Compile for lanes and always inline."""
-    return njit(function, error_model="numpy", forceinline=True)
+    return njit(error_model="numpy", forceinline=True)(function)
 
 
 @intrinsic
