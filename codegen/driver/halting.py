@@ -7,7 +7,7 @@ from numba import njit
 from ..simd.lanes import any_lane, broadcast, load, select, store
 from .dense import inside
 from .names import SERIES, WIDTH
-from .recording import BASE, HALTED, LOOKS, crosses, locate, turning
+from .recording import BASE, HALTED, LOOKS, between, crosses, locate
 from .sections import surface
 
 
@@ -40,22 +40,14 @@ def halt(accept, t, h, clock, y, y_new, dense, found, dims, section):
     g1 = surface(k, zero + 1.0 / LOOKS, now, h, y, y_new, dense, found, dims, section)
     hits = accept & (zero > 0.0)
     for i in range(LOOKS):
-        low, high, behind = zero + i / LOOKS, zero + (i + 1) / LOOKS, zero / zero
+        low, behind = zero + i / LOOKS, zero / zero
         if i + 2 <= LOOKS:
             behind = surface(k, zero + (i + 2) / LOOKS, now, h, y, y_new, dense, found, dims, section)
-        passes = crosses(g0, g1, 0.0) & accept & ~hits
+        middle, g = between(k, i, accept & ~hits, before, g0, g1, behind, now, h, y, y_new, dense, found, dims, section)
+        passes = crosses(g0, g, 0.0) & accept & ~hits
         if any_lane(passes):
-            place = locate(k, passes, low, high, g0, g1, now, h, y, y_new, dense, found, dims, section)
+            place = locate(k, passes, low, middle, g0, g, now, h, y, y_new, dense, found, dims, section)
             part, hits = select(passes, place, part), hits | passes
-        turn = turning(i, before, g0, g1, behind)
-        turns = (g0 * g1 > 0.0) & (turn > 0.0) & accept & ~hits
-        if any_lane(turns):
-            middle = select(turns, turn, high)
-            g = surface(k, middle, now, h, y, y_new, dense, found, dims, section)
-            passes = crosses(g0, g, 0.0) & turns
-            if any_lane(passes):
-                place = locate(k, passes, low, middle, g0, g, now, h, y, y_new, dense, found, dims, section)
-                part, hits = select(passes, place, part), hits | passes
         before, g0, g1 = g0, g1, behind
     if any_lane(hits):
         shorten(hits, part, y, y_new, dense, dims)

@@ -139,6 +139,17 @@ def turning(i, before, first, last, behind):
 
 
 @njit(error_model="numpy")
+def between(k, i, wanted, before, first, last, behind, t, h, y, y_new, dense, found, dims, section):
+    """Where section function k turns between looks i and i + 1, and its value there; look i + 1 where it does not turn."""
+    turn, place = turning(i, before, first, last, behind), broadcast((i + 1) / LOOKS, WIDTH)
+    turns = (first * last > 0.0) & (turn > 0.0) & wanted
+    if any_lane(turns):
+        place = select(turns, turn, place)
+        return place, select(turns, surface(k, place, t, h, y, y_new, dense, found, dims, section), last)
+    return place, last
+
+
+@njit(error_model="numpy")
 def cut(k, counted, t, h, y, y_new, dense, found, cell, counts, points, direction, dims, section):
     """Find points of section k between the looks into a step, and beside an extremum between two of them."""
     zero = broadcast(0.0, WIDTH)
@@ -148,25 +159,13 @@ def cut(k, counted, t, h, y, y_new, dense, found, cell, counts, points, directio
         low, high, behind = zero + i / LOOKS, zero + (i + 1) / LOOKS, zero / zero
         if i + 2 <= LOOKS:
             behind = surface(k, zero + (i + 2) / LOOKS, t, h, y, y_new, dense, found, dims, section)
-        hits = crosses(g0, g1, direction) & counted
-        if any_lane(hits):
-            theta = locate(k, hits, low, high, g0, g1, t, h, y, y_new, dense, found, dims, section)
-            keep_points(k, theta, lane_bits(hits), t, h, y, y_new, dense, found, cell, counts, points, dims, section)
-        turn = turning(i, before, g0, g1, behind)
-        turns = (g0 * g1 > 0.0) & (turn > 0.0) & counted
-        if any_lane(turns):
-            middle = select(turns, turn, high)
-            g = surface(k, middle, t, h, y, y_new, dense, found, dims, section)
-            there, back = crosses(g0, g, direction) & turns, crosses(g, g1, direction) & turns
-            if any_lane(there):
-                theta = locate(k, there, low, middle, g0, g, t, h, y, y_new, dense, found, dims, section)
+        middle, g = between(k, i, counted, before, g0, g1, behind, t, h, y, y_new, dense, found, dims, section)
+        for left, right, g_left, g_right in ((low, middle, g0, g), (middle, high, g, g1)):
+            hits = crosses(g_left, g_right, direction) & counted
+            if any_lane(hits):
+                theta = locate(k, hits, left, right, g_left, g_right, t, h, y, y_new, dense, found, dims, section)
                 keep_points(
-                    k, theta, lane_bits(there), t, h, y, y_new, dense, found, cell, counts, points, dims, section
-                )
-            if any_lane(back):
-                theta = locate(k, back, middle, high, g, g1, t, h, y, y_new, dense, found, dims, section)
-                keep_points(
-                    k, theta, lane_bits(back), t, h, y, y_new, dense, found, cell, counts, points, dims, section
+                    k, theta, lane_bits(hits), t, h, y, y_new, dense, found, cell, counts, points, dims, section
                 )
         before, g0, g1 = g0, g1, behind
 

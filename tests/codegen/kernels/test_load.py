@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import errno
+import gc
 import importlib.util
 import json
 import math
@@ -554,6 +555,7 @@ def test_a_kernel_that_cannot_be_compiled_is_an_error(folder):
     broken = dataclasses.replace(SOURCE, text=TINY.replace("2.0", "undefined_name"))
     with pytest.raises(Exception, match="undefined_name"):
         fresh(broken)
+    assert gc.isenabled()  # it pauses while kernels are compiled
 
 
 def test_a_step_of_other_types_than_the_driver_calls_is_an_error(folder):
