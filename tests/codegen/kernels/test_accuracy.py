@@ -225,11 +225,14 @@ def stopped(n: int) -> Equations:
 
 
 OTHERS = [
-    *((method, None, 2) for method in integrators.names() if method != "rodas5p"),
+    *((method, None, 2) for method in integrators.names() if method not in ("rodas5p", "taylor")),
     ("rodas5p", 1, 2),
     ("rodas5p", 4, 9),
 ]
-"""Kernels whose single steps tests/codegen/steps/test_emit.py compares with their definition, choices among them."""
+"""Kernels whose single steps tests/codegen/steps/test_emit.py compares with their definition, choices among them.
+
+Taylor steps refuse these choices, which jump.
+"""
 
 
 @pytest.mark.parametrize(
