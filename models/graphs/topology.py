@@ -257,16 +257,16 @@ class Topology(Drawn):
     def spanning_trees(self) -> Fraction:
         """The number of spanning trees, each counted with the product of its weights.
 
-        See `synchain.models.graphs.trees`.
+        See `synchain.models.spectra.trees`.
         """
-        from .trees import spanning_trees
+        from ..spectra.trees import spanning_trees
 
         return spanning_trees(self)
 
     @property
     def kirchhoff_index(self) -> Fraction:
-        """The sum of the resistances between all pairs of nodes; see `synchain.models.graphs.trees`."""
-        from .trees import kirchhoff_index
+        """The sum of the resistances between all pairs of nodes; see `synchain.models.spectra.trees`."""
+        from ..spectra.trees import kirchhoff_index
 
         return kirchhoff_index(self)
 

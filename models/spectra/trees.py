@@ -8,16 +8,25 @@ the sum of their reciprocals is c_2 / c_1 (A. E. Brouwer, W. H. Haemers, Spectra
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Protocol
 
 from ..algebra.rationals import to_fraction
-from ..spectra.characteristic import characteristic
-from ..spectra.solve import DENSE_LIMIT
-from .topology import Topology
+from .characteristic import characteristic
+from .matrix import Matrix
+from .solve import DENSE_LIMIT
 
 __all__ = ["kirchhoff_index", "spanning_trees"]
 
 
-def spanning_trees(graph: Topology) -> Fraction:
+class Graph(Matrix, Protocol):
+    """The matrix G of a graph: weights of links, with rows that sum to 0."""
+
+    @property
+    def symmetric(self) -> bool:
+        """True if every link acts both ways with one weight."""
+
+
+def spanning_trees(graph: Graph) -> Fraction:
     """Return the sum over all spanning trees of the products of their weights, by the matrix-tree theorem.
 
     Of a graph with weights of 1 it is the number of its spanning trees; it is 0 if the graph falls
@@ -32,7 +41,7 @@ def spanning_trees(graph: Topology) -> Fraction:
     return first / graph.n
 
 
-def kirchhoff_index(graph: Topology) -> Fraction:
+def kirchhoff_index(graph: Graph) -> Fraction:
     """Return the sum of the resistances between all pairs of nodes, weights taken for conductances.
 
     It is n Σ 1/μ over the nonzero eigenvalues μ of -G (D. J. Klein, M. Randić, J. Math. Chem. 12,
@@ -52,7 +61,7 @@ def kirchhoff_index(graph: Topology) -> Fraction:
     return graph.n * second / first
 
 
-def _lowest(graph: Topology, what: str) -> tuple[Fraction, Fraction]:
+def _lowest(graph: Graph, what: str) -> tuple[Fraction, Fraction]:
     """The coefficients of z and z² of det(z - G)."""
     if not graph.symmetric:
         raise ValueError(f"{what}: found one-way links in {graph.name}; expected an undirected graph")
