@@ -129,7 +129,7 @@ def follow(
     first : PeriodicOrbit
         Orbit at or near values[0].
     show_progress : bool, optional
-        Whether to show a bar; by default a bar on terminals and a line a minute elsewhere.
+        Whether to show a bar; by default a bar on terminals and in notebooks, a line a minute elsewhere.
     progress : callable, optional
         Is called with a `Progress`, which counts values of the parameter.
     parameters : mapping of str to float, optional

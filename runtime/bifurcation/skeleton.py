@@ -138,7 +138,7 @@ def skeleton(
     seed : int
         Seed of the initial states of the search.
     show_progress : bool, optional
-        Whether to show a bar; by default a bar on terminals and a line a minute elsewhere.
+        Whether to show a bar; by default a bar on terminals and in notebooks, a line a minute elsewhere.
     progress : callable, optional
         Is called with a `Progress`, which counts the values at which orbits are searched.
     parameters : mapping of str to float, optional

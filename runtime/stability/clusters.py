@@ -187,7 +187,7 @@ def cluster_exponents(
     seed : int
         Seed of the initial deviations.
     show_progress : bool, optional
-        Whether to show a bar; by default a bar on terminals and a line a minute elsewhere.
+        Whether to show a bar; by default a bar on terminals and in notebooks, a line a minute elsewhere.
     progress : callable, optional
         Is called with a `Progress`, which counts periods of the drive.
     parameters : mapping of str to float, optional

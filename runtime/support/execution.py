@@ -24,7 +24,7 @@ class Execution:
     executor : concurrent.futures.Executor, optional
         Runs the blocks in place of threads (docs/scale.md).
     show_progress : bool, optional
-        Whether to show a bar; by default a bar on terminals and a line a minute elsewhere.
+        Whether to show a bar; by default a bar on terminals and in notebooks, a line a minute elsewhere.
     progress : callable, optional
         Is called with a `Progress` after each block of cells, periods or values.
 

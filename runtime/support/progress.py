@@ -1,4 +1,4 @@
-"""Progress of a long call: a bar on a terminal, a line a minute elsewhere, and a value for a hook
+"""Progress of a long call: a bar on a terminal and in a notebook, a line a minute elsewhere, and a value for a hook
 of the caller.
 """
 
@@ -9,12 +9,14 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-from tqdm import tqdm
 
 from .status import CODES, Status
+
+if TYPE_CHECKING:
+    from tqdm import tqdm
 
 __all__ = ["Hook", "Progress", "Reporter", "duration"]
 
@@ -97,9 +99,15 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
+def _has_bars() -> bool:
+    """Whether stderr is a terminal, or this process the kernel of a notebook."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return bool(getattr(sys.stderr, "isatty", bool)()) or "IPKernelApp" in getattr(shell, "config", ())
+
+
 @dataclass(slots=True)
 class Reporter:
-    """Counts what has ended and shows a bar on a terminal, else a line every minute; `show` False
+    """Counts what has ended and shows a bar on a terminal or in a notebook, else a line every minute; `show` False
     shows nothing.
     """
 
@@ -146,9 +154,11 @@ class Reporter:
         if counts is not None:
             self.counts = self.counts + counts
             self.done = self.kept = int(counts.sum())
-        terminal = bool(getattr(sys.stderr, "isatty", bool)())
-        if self.show or (self.show is None and terminal):
-            self._bar = tqdm(total=self.total, initial=self.kept, unit=self.unit, file=sys.stderr)
+        if self.show or (self.show is None and _has_bars()):
+            from tqdm.auto import tqdm  # which is one of widgets in a notebook that has them
+
+            said = f"compiled in {duration(compiling)}" if compiling >= 1.0 else None
+            self._bar = tqdm(total=self.total, initial=self.kept, desc=said, unit=self.unit, file=sys.stderr)
         self._tell()
 
     def add(self, counts: np.ndarray) -> None:

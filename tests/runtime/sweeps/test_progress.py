@@ -1,11 +1,13 @@
-"""What a sweep says while it runs: to a hook, on a terminal, in a pipe."""
+"""What a sweep says while it runs: to a hook, on a terminal, in a notebook, in a pipe."""
 
 from __future__ import annotations
 
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import tqdm.auto  # noqa: F401  (chooses its bars once; this process is no notebook)
 
 from synchain.runtime.cells.layout import Layout, block_size
 from synchain.runtime.support.progress import Progress, Reporter, duration
@@ -73,6 +75,19 @@ def test_a_terminal_has_a_bar_with_the_failures(monkeypatch):
     assert "15/20" in shown.text
     assert "cell/s" in shown.text
     assert "1 diverged" in shown.text
+
+
+@pytest.mark.parametrize(("config", "has_bar"), [({"IPKernelApp": {}}, True), ({}, False)])
+def test_a_notebook_has_a_bar_that_says_the_time_of_compilation(monkeypatch, config, has_bar):
+    """A kernel of Jupyter's, whose stderr is no terminal; IPython in a pipe is none."""
+    shell = SimpleNamespace(config=config)
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
+    shown = Terminal(False)
+    monkeypatch.setattr(sys, "stderr", shown)
+    reporter = Reporter(20)
+    reporter.start(counts(FINISHED=5), compiling=3.4)
+    reporter.close()
+    assert ("compiled in 3 s" in shown.text, "5/20" in shown.text) == (has_bar, has_bar)
 
 
 def test_periods_and_values_are_counted_without_a_status(monkeypatch):
