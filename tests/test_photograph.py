@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import math
 import os
+import subprocess
+import sys
 import warnings
 from collections import Counter
 from collections.abc import Iterator
@@ -12,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding as llvm
 import pytest
 from photograph import COUPLING, FRICTION_LAW, OSCILLATOR, SCENES, TOPOLOGY, Picture, camera, compare, names, take
 
@@ -96,6 +99,19 @@ def test_every_part_runs_in_a_scene_and_every_integrator_in_two(request: pytest.
     assert {name for name in integrators() if run[f"integrator {name}"] < 2} == set()
     exact = {quantity.split()[0] for quantity in json.loads(GOLDEN.read_text())["scenes"]["spectra of all families"]}
     assert set(names(TOPOLOGY)) - exact == set()
+
+
+@pytest.mark.long
+@pytest.mark.skipif("fma" not in llvm.get_host_cpu_features(), reason="the test compiles for Haswell")
+def test_machine_code_for_another_processor_gives_the_same_bits() -> None:
+    chosen = ("friction pair, zipped axes", "pendulum pair, taylor", "set-valued pair, taylor", "exponents of Lorenz")
+    command = [sys.executable, str(GOLDEN.parents[1] / "photograph.py"), *chosen]
+    own, other = (
+        subprocess.run(command, env=os.environ | more, capture_output=True, text=True, check=True).stdout
+        for more in ({}, {"NUMBA_CPU_NAME": "haswell"})
+    )
+    assert "0x1." in own
+    assert own == other
 
 
 def _numbers(*values: float) -> dict[str, dict[str, str]]:
