@@ -249,7 +249,7 @@ def thresholds(
     stable = exponent_windows(scene, alpha, execution, precision, periods, criterion.seed)
     pair = probe(scene, alpha, criterion, resolution, execution)
     direct = simulate(scene, grid, criterion, resolution, execution)
-    predicted = project(pair.intervals, spectrum, float(grid[-1]))
+    predicted = project(pair.intervals, spectrum, float(grid[-1]), float(grid[0]))
     return Thresholds(scene, pair, tuple(predicted), direct, criterion, stable, scene.warnings)
 
 
@@ -266,8 +266,8 @@ def _probe_grid(sigma: np.ndarray, spectrum: Spectrum) -> np.ndarray:
     one every 0.01.
     """
     sizes = [abs(value) for value in spectrum.values if abs(value) > 0.0]
-    low = 0.0 if 0.0 in sigma or spectrum.multiplicities[0] > 1 else sigma[0] * min(sizes)
-    high = sigma[-1] * max(sizes)
+    ends = np.outer(sigma[[0, -1]], [min(sizes), max(sizes), *([0.0] if spectrum.multiplicities[0] > 1 else [])])
+    low, high = ends.min(), ends.max()
     return np.linspace(low, high, max(len(sigma), math.ceil((high - low) / 0.01) + 1, 2))
 
 
@@ -395,15 +395,17 @@ def cells_of(scene: Scene, sigma: np.ndarray, criterion: Criterion) -> Scene:
     )
 
 
-def project(ranges: Sequence[Interval], spectrum: Spectrum, highest: float = math.inf) -> list[Interval]:
-    """The sigma for which every transversal |sigma gamma_k| lies in one of the ranges of alpha, up
-    to `highest`.
+def project(
+    ranges: Sequence[Interval], spectrum: Spectrum, highest: float = math.inf, lowest: float = 0.0
+) -> list[Interval]:
+    """The sigma from `lowest` to `highest` for which every transversal sigma |gamma_k| lies in one of
+    the ranges of alpha.
 
     One zero eigenvalue belongs to the synchronous motion itself.  Every further one is a part of
     the network that nothing couples to the rest: it asks that alpha = 0 be in a range (identical
     oscillators that the drive alone locks).
     """
-    allowed: list[Interval] = [(0.0, highest)]
+    allowed: list[Interval] = [(lowest, highest)]
     for value, multiplicity in zip(spectrum.values, spectrum.multiplicities, strict=True):
         if abs(value) > 0.0:
             allowed = intersect(allowed, scale(ranges, 1.0 / abs(value)))
