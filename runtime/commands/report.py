@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from ..console.arguments import add_scene, add_workers, folder
-from ..console.outcome import FINE, warn, wrong_use
+from ..console.outcome import FINE, WrongUse, warn, wrong_use
 
 SUMMARY = "write one page on a scene: equations, graph, spectrum, stability, a sweep (HTML)"
 EXAMPLES = (
@@ -35,6 +35,8 @@ def execute(arguments: Namespace) -> int:
         scene = load_scene(arguments.scene)
         target = Path(arguments.out)
         check_replaceable(target)
+        if target.suffix.lower() not in (".html", ".htm"):
+            raise WrongUse(f"--out {target}: found the ending {target.suffix!r} of a page of HTML; expected .html")
         output_folder(target.parent)
     warn(scene.warnings)
     write_text(target, report(scene, QUICK if arguments.quick else Effort(), workers=arguments.workers))

@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..console.arguments import above_zero, add_allow_code, add_workers, grid, positive
+from ..console.arguments import above_zero, add_scene, add_workers, positive, spaced
 from ..console.drive import drive_words
 from ..console.network import add_network, named_network, scene_on
 from ..console.outcome import FINE, WrongUse, print_json, warn, wrong_use
@@ -35,15 +35,13 @@ RESOLUTION, COARSE = 5e-4, 2e-3
 
 def configure(parser: ArgumentParser) -> None:
     """Add network, drive, grid and criterion."""
+    add_scene(parser, default="oscillators of table 1")
     add_network(parser)
-    parser.add_argument(
-        "--scene", metavar="SCENE", help="take oscillators and parameters from a scene (default: table 1)"
-    )
     parser.add_argument(
         "--sigma",
         metavar="LO:HI:N",
-        type=grid,
-        help="coupling to look at (default: 0 to 1.2/max|gamma|); ranges narrower than its step are not seen",
+        type=spaced,
+        help="coupling to look at, e.g. --sigma=-0.1:0.3:81 (default: 0 to 1.2/max|gamma|); narrower ranges are not seen",
     )
     parser.add_argument("--starts", metavar="K", type=positive, help="initial states for each value (default: 8)")
     parser.add_argument(
@@ -55,7 +53,6 @@ def configure(parser: ArgumentParser) -> None:
         help=f"defaults of {QUICK['starts']} starts, {QUICK['transient']:g} periods, half the grid; ends to {COARSE:g}",
     )
     parser.add_argument("--json", action="store_true", help="print JSON: intervals, probe, predicted, exponents ...")
-    add_allow_code(parser)
     add_workers(parser)
 
 
@@ -68,13 +65,15 @@ def execute(arguments: Namespace) -> int:
         scene = _scene(arguments)
         check_probe(scene.topology, scene.spectrum)
         if not scene.model.linked:
-            raise WrongUse("the scene has no coupling; expected a coupled network; choose another --scene")
+            raise WrongUse("the scene has no coupling; expected a coupled network; choose another SCENE")
         kernel_source(scene)
         criterion = Criterion(**_effort(arguments))
+        sigma = arguments.sigma or default_grid(scene.topology.spectrum, 0.005 if arguments.quick else 0.0025)
+        scene.replace(axes={scene.strength: sigma})
     warn(scene.warnings)
     result = thresholds(
         scene,
-        sigma=arguments.sigma or default_grid(scene.topology.spectrum, 0.005 if arguments.quick else 0.0025),
+        sigma=sigma,
         resolution=COARSE if arguments.quick else RESOLUTION,
         criterion=criterion,
         workers=arguments.workers,
@@ -103,7 +102,7 @@ def _scene(arguments: Namespace) -> Scene:
         scene.equations.expect_alike("thresholds")
     if network is None:
         if scene is None:
-            raise WrongUse("expected a network, e.g. --n 4, --matrix FILE or --scene SCENE")
+            raise WrongUse("expected a network, e.g. --n 4, --matrix FILE or a SCENE")
         network = scene.topology
     return scene_on(network, scene, arguments)
 

@@ -15,7 +15,6 @@ __all__ = [
     "add_scene",
     "add_workers",
     "folder",
-    "grid",
     "number",
     "positive",
     "setting",
@@ -87,14 +86,6 @@ def spaced(text: str) -> tuple[float, ...]:
     return Axis.from_table("grid", span(text)).values
 
 
-def grid(text: str) -> tuple[float, ...]:
-    """LO:HI:N with nothing below 0: a grid of the coupling."""
-    values = spaced(text)
-    if values[0] < 0:
-        raise ArgumentTypeError(f"found {short_repr(text)}; expected LO of at least 0: negative coupling drives apart")
-    return values
-
-
 def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, object]]:
     """name=value, name=a,b,c or name=LO:HI:N."""
     name, equals, value = text.partition("=")
@@ -109,11 +100,13 @@ def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, objec
     return name, number(value)
 
 
-def add_scene(parser: ArgumentParser) -> None:
-    """Add the argument SCENE."""
-    parser.add_argument(
-        "scene", metavar="SCENE", help="a shipped name (see: synchain scenes) or a path to a .toml file"
-    )
+def add_scene(parser: ArgumentParser, default: str = "") -> None:
+    """Add the argument SCENE; it may be left out if there is a default."""
+    known = "a shipped name (see: synchain scenes) or a path to a .toml file"
+    if default:
+        parser.add_argument("scene", metavar="SCENE", nargs="?", help=f"{known} (default: {default})")
+    else:
+        parser.add_argument("scene", metavar="SCENE", help=known)
     add_allow_code(parser)
 
 
