@@ -41,7 +41,7 @@ def configure(parser: ArgumentParser) -> None:
         "--sigma",
         metavar="LO:HI:N",
         type=spaced,
-        help="coupling to look at, e.g. --sigma=-0.1:0.3:81 (default: 0 to 1.2/max|gamma|); narrower ranges are not seen",
+        help="coupling to look at, e.g. --sigma=-0.1:0.3:81 (default: 0:1.2/max|gamma|); narrower ranges are not seen",
     )
     parser.add_argument("--starts", metavar="K", type=positive, help="initial states for each value (default: 8)")
     parser.add_argument(

@@ -79,8 +79,8 @@ def report(
     Parameters
     ----------
     scene : Scene
-        Its axes are the sweep of the report.  The master stability function covers sigma abs(gamma) of
-        all modes for every sigma of the sweep; without an axis of sigma, up to twice its value.
+        Its axes are the sweep of the report.  The master stability function covers sigma abs(gamma)
+        of all modes for every sigma of the sweep; without an axis of sigma, up to twice its value.
     effort : Effort, optional
         By default a full one.
     workers : int, optional
@@ -134,7 +134,7 @@ def _stability(scene: Scene, effort: Effort, workers: int | None, show_progress:
 
 
 def _strengths(scene: Scene, count: int) -> np.ndarray:
-    """Strengths alpha of all modes over the sweep of sigma, from 0; 0 … 1.2 if sigma is 0 throughout."""
+    """Strengths of all modes over the sweep of sigma, and 0; 0 … 1.2 if sigma is 0 throughout."""
     fixed = scene.parameters[scene.strength]
     swept = next((axis.values for axis in scene.axes if axis.name == scene.strength), (2.0 * fixed,))
     largest = max(abs(value) for value in scene.topology.spectrum.values)

@@ -164,7 +164,9 @@ def _bend(x: np.ndarray, y: np.ndarray, i: int, zero: float) -> float:
         return most
     slopes = np.diff(y[[before, i, i + 1, after]]) / np.diff(x[[before, i, i + 1, after]])
     least = min(slopes * np.sign(slopes[1]))
-    return min(most, float(share * (1.0 - share) * gap * np.abs(np.diff(slopes)).sum() / least)) if least > 0.0 else most
+    return (
+        min(most, float(share * (1.0 - share) * gap * np.abs(np.diff(slopes)).sum() / least)) if least > 0.0 else most
+    )
 
 
 def exponents(
