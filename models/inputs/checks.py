@@ -72,13 +72,14 @@ def suggestion(found: object, known: Iterable[str], other: Mapping[str, str] | N
     Returns
     -------
     str
-        ``"; did you mean 'x'?"``, or "" if no name is close.
+        ``"; did you mean 'x'?"``, of a name that begins as the unknown one if there is one; "" if none is close.
     """
     if not isinstance(found, str):
         return ""
     meant = {name: name for name in known}
     meant = {name: here for name, here in (other or {}).items() if here in meant} | meant
-    close = difflib.get_close_matches(found, sorted(meant), 1)
+    longer = sorted(name for name in meant if found and name.startswith(found))
+    close = longer[:1] or difflib.get_close_matches(found, sorted(meant), 1)
     return f"; did you mean {meant[close[0]]!r}?" if close else ""
 
 
