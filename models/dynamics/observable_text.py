@@ -165,6 +165,9 @@ class _Values(Arithmetic[sp.Expr]):
             raise NoMeaning(f"found the exponent {made.exp}; expected at most {EXPONENT}")
         return made
 
+    def compare(self, sign: str, a: sp.Expr, b: sp.Expr) -> sp.Expr:
+        raise NoMeaning(f"found the condition {a} {sign} {b}; expected a value, such as the difference {a} - ({b})")
+
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Expr]]:
         name = SPELLINGS.get(function, function)
         if name not in KNOWN and not ONE_NODE.fullmatch(name):

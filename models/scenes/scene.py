@@ -97,7 +97,8 @@ class Scene(Drawn, Written):
         Sections on functions of the states, by the names of the results' variables:
         ``Section("x_1 - x_2", "rising", keep=("v_1", "v_2"))``.
     stop : str or Expr, optional
-        A function of the states, parameters and t that ends a cell when it passes zero, in the transient too.
+        A function of the states, parameters and t that ends a cell when it passes zero, in the transient too.  As with
+        terminal events of SciPy, a function that begins on one side of zero, or at zero, ends nothing before it passes.
     transient, window : float
         Time before the records, and time of the records, in units of `time_unit`.
     time_unit : str, optional

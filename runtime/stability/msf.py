@@ -92,17 +92,24 @@ class MSF(Labelled):
             ("scene", repr(self.scene)),
             ("class", f"{self.kind}, for alpha {ends_of(self.fine.alpha)}"),
             ("negative for alpha", words_of(self.intervals, self.errors)),
-            ("sigma", words_of([(w.low, w.high) for w in self._known_windows])),
+            ("sigma", self._without_windows or words_of([(w.low, w.high) for w in self._known_windows])),
             ("motion", ", ".join(dict.fromkeys(self.attractors))),
             ("average", f"{self.fine.time:.6g} units of time for each of {self.fine.starts} starts"),
         )
 
     @property
     def _known_windows(self) -> tuple[Window, ...]:
-        """The windows; none if the network is a single node or has complex eigenvalues."""
+        """The windows, none where nothing is known of them."""
+        return () if self._without_windows else self.windows
+
+    @property
+    def _without_windows(self) -> str:
+        """Why nothing is known of windows; empty if they are known."""
         graph = self.scene.topology
+        if not graph.link_count:
+            return "not known: no links"
         real = graph.undirected or not any(isinstance(value, complex) for value in graph.spectrum.values)
-        return self.windows if graph.link_count and real else ()
+        return "" if real else f"not known: {graph.name}({graph.n}) has complex eigenvalues, which need `plane`"
 
     @property
     def exponent(self) -> np.ndarray:

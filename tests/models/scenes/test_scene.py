@@ -203,6 +203,11 @@ REFUSED = [
     ({"coupling": None}, "which has links"),
     ({"topology": "chain"}, "expected a graph"),
     ({"parameters": {"omga": 1}}, "did you mean 'omega'?"),
+    ({"oscilator": "duffing"}, "unknown keyword 'oscilator' of Scene; known: title, "),
+    ({"oscilator": "duffing"}, "did you mean 'oscillator'?"),
+    ({"sigma": 0.1}, "a parameter is given as parameters={'sigma': …}"),
+    ({"stop": "nodes.max(v)"}, "did you mean 'nodes.maximum'?"),
+    ({"stop": "nodes.maximum(v) < 1"}, "found the condition nodes.maximum(v) < 1; expected a value"),
     ({"parameters": {"omega": math.nan}}, "finite"),
     ({"parameters": {"omega": math.inf}}, "finite"),
     ({"parameters": {"omega": 10**400}}, "finite"),
@@ -291,6 +296,7 @@ REFUSED = [
 def test_refused(keywords: dict, part: str) -> None:
     with pytest.raises((ValueError, TypeError)) as caught:
         two(**keywords)
+    assert type(caught.value) in (ValueError, TypeError), "a name of our own says nothing"
     assert part in str(caught.value)
     assert "\n" not in str(caught.value)
 

@@ -267,3 +267,11 @@ def test_functions_of_strength_take_the_keywords_of_exponents(function: Callable
         return [p for p in inspect.signature(of).parameters.values() if p.kind in (p.KEYWORD_ONLY, p.VAR_KEYWORD)]
 
     assert keywords(function) == keywords(exponents)
+
+
+def test_windows_of_complex_eigenvalues_are_said_to_be_unknown() -> None:
+    """Not "none": a line of real strengths says nothing about them."""
+    found = msf(scene("harmonic", "damper").replace(topology=topology("one_way_ring", 3)), [0.0, 1.0])
+    assert dict(found.summary)["sigma"] == "not known: one_way_ring(3) has complex eigenvalues, which need `plane`"
+    assert found.data.sizes["window_number"] == 0
+    assert dict(msf(scene("harmonic", "damper"), [0.0, 1.0]).summary)["sigma"] == "0.0000 … 0.5000"
