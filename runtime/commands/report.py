@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ..console.arguments import add_scene, add_workers, folder
+from ..console.arguments import add_scene, add_workers
 from ..console.outcome import FINE, WrongUse, warn, wrong_use
 
 SUMMARY = "write one page on a scene: equations, graph, spectrum, stability, a sweep (HTML)"
@@ -17,7 +17,7 @@ EXAMPLES = (
 def configure(parser: ArgumentParser) -> None:
     """Add the scene, the file and the effort."""
     add_scene(parser)
-    parser.add_argument("--out", metavar="FILE", type=folder, required=True, help="the page, which ends in .html")
+    parser.add_argument("--out", metavar="FILE", required=True, help="the page, which ends in .html")
     parser.add_argument("--quick", action="store_true", help="coarse grids: at most 25 values of each axis")
     add_workers(parser)
 

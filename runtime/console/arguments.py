@@ -26,6 +26,10 @@ NODES = 100_000
 """Largest number of oscillators that can be asked for."""
 
 
+FILES = (".csv", ".html", ".json", ".nc", ".nc4", ".pdf", ".png", ".svg", ".toml", ".txt", ".zarr")
+"""Endings of files, which no folder has."""
+
+
 def whole(text: str, least: int = -NODES, most: int = NODES) -> int:
     """A whole number from `least` to `most`."""
     try:
@@ -43,6 +47,8 @@ def folder(text: str) -> str:
     """The name of a folder, which may not exist yet."""
     if not text.strip():
         raise ArgumentTypeError("found an empty name; expected a folder, e.g. results")
+    if text.endswith(FILES):
+        raise ArgumentTypeError(f"found {short_repr(text)}, the name of a file; expected a folder, e.g. results")
     return text
 
 

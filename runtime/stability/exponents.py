@@ -23,7 +23,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene, a_scene
 
-from ..cells.keywords import ORBITS, Given
+from ..cells.keywords import ONE_CELL, ORBITS, Given
 from ..prediction.intervals import Interval
 from ..results.labelled import Labelled, dataset, ends_of, words_of
 from ..support.arrays import row as row_of
@@ -156,6 +156,8 @@ def _bend(x: np.ndarray, y: np.ndarray, i: int, zero: float) -> float:
     J z (1 - z) times the gap, even if it has a kink.  The slopes beside the gap tell J and the least
     slope at the zero.  Without them, or if they differ in sign, the zero lies anywhere in the gap.
     """
+    if y[i] == 0.0 or y[i + 1] == 0.0:
+        return 0.0
     gap = x[i + 1] - x[i]
     share = (zero - x[i]) / gap
     before, after = np.searchsorted(x, x[i] - 1e-6 * gap) - 1, np.searchsorted(x, x[i + 1] + 1e-6 * gap)
@@ -295,9 +297,9 @@ def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
         Relative tolerance.
     """
     if a_scene(scene).model.linked:
-        coupled = scene.replace(axes=(), zipped=False, continuation="none")
+        coupled = scene.replace(**ONE_CELL)
     else:
-        coupled = scene.replace(topology=topology("chain", 2), axes=(), zipped=False, continuation="none")
+        coupled = scene.replace(topology=topology("chain", 2), **ONE_CELL)
         expect_vanishing("a lone oscillator gets a partner", coupled.equations)
     return single_cell(given, coupled, rtol)
 
@@ -321,7 +323,7 @@ def single_cell(given: Given, scene: Scene, rtol: float) -> Scene:
     ValueError
         If a parameter is unknown.
     """
-    return given.scene(scene, axes=(), zipped=False, continuation="none", record=(), rtol=rtol, atol=None)
+    return given.scene(scene, **ONE_CELL, rtol=rtol, atol=None)
 
 
 def initial_states(scene: Scene, starts: int, seed: int) -> np.ndarray:

@@ -116,6 +116,8 @@ def test_a_zero_without_neighbours_lies_anywhere_between_two_strengths() -> None
     alpha, exponent = np.array([0.0, 1.0]), np.array([-1.0, 3.0])
     (((_, none), (end, error)),) = Exponents(alpha, exponent, np.zeros(2), 1.0, 1, exponent[None]).ranges
     assert (none, end, error) == (0.0, 0.25, 0.75)
+    exponent = np.array([0.0, -1.0])
+    assert Exponents(alpha, exponent, np.zeros(2), 1.0, 1, exponent[None]).ranges == (((0.0, 0.0), (1.0, 0.0)),)
 
 
 @pytest.mark.long
@@ -267,6 +269,12 @@ def test_functions_of_strength_take_the_keywords_of_exponents(function: Callable
         return [p for p in inspect.signature(of).parameters.values() if p.kind in (p.KEYWORD_ONLY, p.VAR_KEYWORD)]
 
     assert keywords(function) == keywords(exponents)
+
+
+def test_draws_of_a_scene_are_refused() -> None:
+    drawn = scene("harmonic", "damper").replace(realisations=3, draws={"sigma": "uniform(0, 1)"})
+    with pytest.raises(ValueError, match="msf: found draws of sigma; expected a scene without them"):
+        msf(drawn, [0.0, 1.0])
 
 
 def test_windows_of_complex_eigenvalues_are_said_to_be_unknown() -> None:
