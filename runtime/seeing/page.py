@@ -132,9 +132,9 @@ def rows_table(rows: Iterable[tuple[str, str]]) -> str:
     return f"<table>{listed}</table>"
 
 
-def figure(value: Labelled, about: str) -> str:
+def figure(value: Labelled, about: str, **options: str) -> str:
     """Return the plot of a value as an image that is part of the page."""
-    axes = value.plot()
+    axes = value.plot(**options)
     buffer = io.BytesIO()
     axes.figure.figure.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
     text = base64.b64encode(buffer.getvalue()).decode()
@@ -151,11 +151,15 @@ def provenance_rows(scene: Scene) -> list[tuple[str, str]]:
     unit = "drive periods" if scene.time_unit == "period" else "units of time"
     numbers = [f"{name} = {value:g}" for name, value in scene.parameters.items()]
     start = [f"{name} = {_numbers(values)}" for name, values in scene.initial.items()]
+    axes = [f"{axis.name} from {min(axis.values):g} to {max(axis.values):g}, {len(axis)} values" for axis in scene.axes]
+    observed = [f"{name} = {value}" for name, value in scene.observe.items()]
+    more = [("sweep", "; ".join(axes)), ("observed", "; ".join(observed))]
     return [
         ("parameters", _few(numbers)),
         ("start", "; ".join(start)),
         ("time", f"transient {scene.transient:g}, window {scene.window:g} {unit}"),
         ("integrator", f"{scene.integrator}, rtol {scene.rtol:g}, atol {scene.atol:g}"),
+        *(row for row in more if row[1]),
     ]
 
 

@@ -154,8 +154,11 @@ def _sweep(scene: Scene, effort: Effort, workers: int | None, show_progress: boo
     """The scene's own sweep, with fewer values if the effort says so."""
     thinned = scene.replace(axes=tuple(_thinned(axis, effort.values) for axis in scene.axes))
     found = run(thinned, workers=workers, show_progress=show_progress)
+    plain = [{}] if not scene.observe or {"sync_error", "section"} & set(scene.record) else []
+    options: list[dict[str, str]] = [*plain, *({"kind": name} for name in scene.observe)]
+    pictures = "".join(figure(found, own.get("kind", "sweep"), **own) for own in options)
     words = "" if thinned.cells == scene.cells else f"<p>{thinned.cells} of the scene's {scene.cells} cells.</p>"
-    return f"{words}{rows_table(found.summary[1:3])}{figure(found, 'sweep')}"
+    return f"{words}{rows_table(found.summary[1:3])}{pictures}"
 
 
 def _thinned(axis: Axis, most: int | None) -> Axis:

@@ -123,21 +123,21 @@ class Lyapunov(Labelled):
     def dimension(self) -> float:
         """Kaplan-Yorke dimension; nan if too few exponents are known.
 
-        An exponent within two standard errors of 0 counts as 0: that of a periodic orbit gives 1, not 0 or
-        what its rounding errors say.  `dimension_range` holds what the errors leave open.
+        A negative exponent within its standard error counts as 0, as that along a periodic orbit is,
+        whose dimension is 1. `dimension_range` says what the errors leave open.
 
         References
         ----------
         Kaplan & Yorke, Springer Lecture Notes in Mathematics 730, 204 (1979).
         """
-        error = 2.0 * self.stderr
-        return self._dimension(np.where((np.abs(self.exponent) <= error) & np.isfinite(error), 0.0, self.exponent))
+        zero = (self.exponent < 0.0) & (-self.exponent <= self.stderr) & np.isfinite(self.stderr)
+        return self._dimension(np.where(zero, 0.0, self.exponent))
 
     @property
     def dimension_range(self) -> tuple[float, float]:
         """Kaplan-Yorke dimension of the exponents less, and plus, two standard errors.
 
-        It rises with each exponent, so that other exponents within their errors give dimensions between.
+        It rises with each exponent, so that all exponents within their errors give dimensions between.
         """
         return self._dimension(self.exponent - 2.0 * self.stderr), self._dimension(self.exponent + 2.0 * self.stderr)
 
