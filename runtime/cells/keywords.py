@@ -137,8 +137,8 @@ class Given:
             return f"{of}: {name!r} is a field of the scene; expected parameters; write scene.replace({name}=…)"
         initial = scene.equations.state if states else ()
         words = suggestion(name, (*scene.parameters, *initial, *own)) or suggestion(name, KEYWORDS)
-        states = initial if len(initial) <= SHOWN else (f"{initial[0]} … {initial[-1]}",)
-        known = dict.fromkeys((*scene.parameters, *states, *own))
+        shown = initial if len(initial) <= SHOWN else (f"{initial[0]} … {initial[-1]}",)
+        known = dict.fromkeys((*scene.parameters, *shown, *own))
         return f"unknown parameter or keyword {name!r} of {of}; known: {', '.join(known)}{words}"
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from functools import singledispatch
 from html import escape
 from itertools import islice
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
@@ -26,6 +27,9 @@ from synchain.models.spectra.spectrum import Spectrum
 
 from ..results.labelled import Labelled
 from .graph import svg
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 __all__ = ["STYLE", "body", "figure", "fragment", "latex", "provenance_rows", "rows_table", "spectrum_of"]
 
@@ -123,7 +127,7 @@ def _(value: Scene) -> str:
 @body.register
 def _(value: Labelled) -> str:
     name = f"<p><b>{escape(type(value).__name__)}</b></p>"
-    return f"{name}{rows_table(value.summary)}{figure(value, type(value).__name__)}"
+    return f"{name}{rows_table(value.summary)}{figure(value.plot(), type(value).__name__)}"
 
 
 def rows_table(rows: Iterable[tuple[str, str]]) -> str:
@@ -132,9 +136,8 @@ def rows_table(rows: Iterable[tuple[str, str]]) -> str:
     return f"<table>{listed}</table>"
 
 
-def figure(value: Labelled, about: str, **options: str) -> str:
-    """Return the plot of a value as an image that is part of the page."""
-    axes = value.plot(**options)
+def figure(axes: Axes, about: str) -> str:
+    """Return a plot as an image that is part of the page."""
     buffer = io.BytesIO()
     axes.figure.figure.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
     text = base64.b64encode(buffer.getvalue()).decode()

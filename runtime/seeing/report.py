@@ -128,7 +128,7 @@ def _stability(scene: Scene, effort: Effort, workers: int | None, show_progress:
             workers=workers,
             show_progress=show_progress,
         )
-        return f"{rows_table(found.summary[1:])}{figure(found, 'exponent over strength')}{_ends(found)}"
+        return f"{rows_table(found.summary[1:])}{figure(found.plot(), 'exponent over strength')}{_ends(found)}"
     except (ValueError, FloatingPointError) as problem:
         return f"<p>This scene has none: {escape(str(problem))}</p>"
 
@@ -154,9 +154,8 @@ def _sweep(scene: Scene, effort: Effort, workers: int | None, show_progress: boo
     """The scene's own sweep, with fewer values if the effort says so."""
     thinned = scene.replace(axes=tuple(_thinned(axis, effort.values) for axis in scene.axes))
     found = run(thinned, workers=workers, show_progress=show_progress)
-    plain = [{}] if not scene.observe or {"sync_error", "section"} & set(scene.record) else []
-    options: list[dict[str, str]] = [*plain, *({"kind": name} for name in scene.observe)]
-    pictures = "".join(figure(found, own.get("kind", "sweep"), **own) for own in options)
+    plain = [None] if not scene.observe or {"sync_error", "section"} & set(scene.record) else []
+    pictures = "".join(figure(found.plot(kind=kind), kind or "sweep") for kind in (*plain, *scene.observe))
     words = "" if thinned.cells == scene.cells else f"<p>{thinned.cells} of the scene's {scene.cells} cells.</p>"
     return f"{words}{rows_table(found.summary[1:3])}{pictures}"
 

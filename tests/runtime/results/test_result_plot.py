@@ -122,7 +122,7 @@ def test_observables_are_drawn_by_name_and_where_nothing_else_is_recorded() -> N
     assert list(x) == [0.1, 0.2, 0.3]
     assert list(y) == list(found.data["error"].values[[1, 2, 0]])
     assert len(result_plot.draw_result(found, kind="own").lines) == 2
-    with pytest.raises(ValueError, match="unknown kind of plot 'owm'; known: .*did you mean 'own'"):
+    with pytest.raises(ValueError, match=r"unknown kind of plot 'owm'; known: .*did you mean 'own'"):
         result_plot.draw_result(found, kind="owm")
     several = run(scene, realisations=4, draws={"x": "uniform(-1, 1)"}, show_progress=False)
     lines = result_plot.draw_result(several).lines

@@ -129,6 +129,19 @@ def test_strengths_are_those_of_the_sweep(changes: dict[str, object], ends: tupl
     assert (line[0], line[-1], len(line)) == (*map(pytest.approx, ends), 5)
 
 
+@pytest.mark.parametrize(("record", "pictures"), [(("sync_error",), 3), ((), 2)])
+def test_observables_and_the_sweep_are_shown(record: tuple[str, ...], pictures: int) -> None:
+    scene = Scene(
+        "harmonic", "spring", topology("chain", 2), record=record, transient=1, window=1, axes={"sigma": [0.1, 0.2]},
+        observe={"place": "mean(nodes.mean(x))"},
+    )  # fmt: skip
+    page = report(scene, FAST, show_progress=False)
+    assert page.count("<img ") == pictures
+    assert page.count('alt="place"') == 1
+    assert "sigma from 0.1 to 0.2, 2 values" in page
+    assert "place = mean(nodes.mean(x))" in page
+
+
 @needs_browser
 def test_the_browser_has_no_complaint_and_asks_for_nothing(folder: Path) -> None:
     log = folder / "net.json"
