@@ -56,8 +56,8 @@ class Labelled(Shown):
         Returns
         -------
         Axes
-            Nothing is shown on a screen.  ``ax.figure.savefig("figure.png")`` writes the figure; it is
-            not one of pyplot's, whose `plt.savefig` writes another one.
+            Nothing is shown on a screen.  ``ax.figure.savefig("figure.png")`` writes the figure, which
+            belongs to no window.
         """
         return self._drawn(ax)
 

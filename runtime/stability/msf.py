@@ -74,7 +74,7 @@ class MSF(Labelled):
                 "exponent": (("alpha",), self.exponent, "largest transversal exponent per unit of time"),
                 "stderr": (("alpha",), self.stderr, "standard error of the exponent"),
                 "interval": (("range", "end"), np.reshape(self.intervals, (-1, 2)), "alpha with a negative exponent"),
-                "interval_error": (("range", "end"), np.reshape(self.uncertainties, (-1, 2)), "standard errors"),
+                "interval_error": (("range", "end"), np.reshape(self.uncertainties, (-1, 2)), "errors of the ends"),
                 "window": (
                     ("window_number", "end"),
                     np.reshape([(w.low, w.high) for w in self._known_windows], (-1, 2)),
@@ -132,7 +132,7 @@ class MSF(Labelled):
 
     @property
     def uncertainties(self) -> tuple[Interval, ...]:
-        """Standard errors of the ends of the intervals; 0 at an end of the grid."""
+        """Errors of the ends of the intervals, of averages and of interpolation; 0 at an end of the grid."""
         return tuple((low, high) for (_, low), (_, high) in self.fine.ranges)
 
     @property

@@ -150,7 +150,7 @@ class Thresholds(Labelled):
                     name: ((f"{name}_number", "end"), np.reshape(ends, (-1, 2)), meaning)
                     for name, (ends, meaning) in ranges.items()
                 },
-                "window_error": (("window_number", "end"), np.reshape(found.errors, (-1, 2)), "standard errors"),
+                "window_error": (("window_number", "end"), np.reshape(found.errors, (-1, 2)), "errors of the ends"),
             },
             {"sigma": self.direct.x, "alpha": self.probe.x, "end": ["low", "high"]},
             self.scene,

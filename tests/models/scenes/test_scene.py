@@ -206,6 +206,8 @@ REFUSED = [
     ({"oscilator": "duffing"}, "unknown keyword 'oscilator' of Scene; known: title, "),
     ({"oscilator": "duffing"}, "did you mean 'oscillator'?"),
     ({"sigma": 0.1}, "a parameter is given as parameters={'sigma': …}"),
+    ({"coupling": chain(3)}, "coupling: found the graph chain(3); expected a coupling; write topology=…"),
+    ({"stop": "nodes.mean(v^2)"}, "found the sign ^; expected powers as x**2"),
     ({"stop": "nodes.max(v)"}, "did you mean 'nodes.maximum'?"),
     ({"stop": "nodes.maximum(v) < 1"}, "found the condition nodes.maximum(v) < 1; expected a value"),
     ({"parameters": {"omega": math.nan}}, "finite"),

@@ -553,7 +553,7 @@ WRONG = [
     ("thresholds figure_3", "--omega"),
     ("thresholds harmonic_chain --omega 1", "not driven"),
     ("figures nope", "unknown figure 'nope'"),
-    ("figures 4b --out {scene}", "cannot make the folder"),
+    ("figures 4b --out {scene}", "the name of a file; expected a folder"),
     ("cache empty", "invalid choice"),
     ("bench nope", "unknown benchmark 'nope'; known: agreement, "),
 ]
