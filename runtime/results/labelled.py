@@ -125,7 +125,7 @@ def ends_of(values: np.ndarray) -> str:
 def words_of(
     intervals: Sequence[tuple[float, float]], errors: Sequence[tuple[float, float]] | None = None, most: int = 8
 ) -> str:
-    """Return intervals in words, with the standard errors of their ends if they are known."""
+    """Return intervals in words, with the errors of their ends if they are known."""
     found = []
     for k, ends in enumerate(intervals[:most]):
         spread = errors[k] if errors else (0.0, 0.0)
