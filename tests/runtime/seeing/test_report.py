@@ -15,6 +15,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cli import main
+from synchain.runtime.seeing.page import provenance_rows
 from synchain.runtime.seeing.report import Effort, _strengths, report
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -140,6 +141,12 @@ def test_observables_and_the_sweep_are_shown(record: tuple[str, ...], pictures: 
     assert page.count('alt="place"') == 1
     assert "sigma from 0.1 to 0.2, 2 values" in page
     assert "place = mean(nodes.mean(x))" in page
+
+
+def test_what_is_drawn_is_said() -> None:
+    scene = Scene(topology=topology("chain", 2), realisations=3, draws={"x": "uniform(0, 1)", "omega": [1, 1.1, 1.2]})
+    assert dict(provenance_rows(scene))["drawn"] == "x = uniform(0.0, 1.0); omega = a list, 3 realisations"
+    assert "drawn" not in dict(provenance_rows(scene.replace(realisations=0, draws=None)))
 
 
 @needs_browser
