@@ -104,7 +104,7 @@ class Simulation:
     def msf(self, scene: Scene, alpha: np.ndarray, **options: Any) -> MSF:
         omega = scene.parameters["omega"]
         self.functions.append(("msf", omega, len(alpha)))
-        return MSF(scene, alpha, parabola(omega, np.union1d(alpha, np.linspace(alpha[0], alpha[-1], 101))))
+        return MSF(scene, alpha, parabola(omega, np.union1d(alpha, np.linspace(alpha[0], alpha[-1], 1001))))
 
     def plane(self, scene: Scene, alpha: np.ndarray, beta: np.ndarray, **options: Any) -> Plane:
         omega = scene.parameters["omega"]

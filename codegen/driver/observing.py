@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from ..simd.addresses import address
-from ..simd.lanes import broadcast, store
+from ..simd.lanes import broadcast, load, store
 from .names import WIDTH
 from .recording import ATOL, RTOL
 
@@ -16,6 +16,8 @@ LENGTH, TALLIES, TALLY = 4, 5, 6
 FIRST, SUM, SQUARES, LARGEST, LEAST, LATEST = 0, 1, 2, 3, 4, 5
 # Each point of the rule has four numbers; no panel of a step is shorter than 2^-DEEPEST.
 POINT, WEIGHT, TOP, NEXT, ROW, DEEPEST = 0, 1, 2, 3, 4, 12
+# Most parabolas for an extreme between the points of a panel.
+CLIMBS = 8
 
 
 @njit(error_model="numpy")
@@ -59,6 +61,87 @@ def add(which, i, length, seen, sums, rule, dims):
     sums[i, LENGTH] += length
 
 
+@njit(error_model="numpy", forceinline=True)
+def vertex(a, m, b, at_a, at_m, at_b):
+    """Where the parabola through three points is highest, and its value there; m itself if it opens upwards."""
+    left, right = (at_m - at_a) / (m - a), (at_b - at_m) / (b - m)
+    bend = (right - left) / (b - a)
+    if not bend < 0.0:
+        return m, at_m
+    place = 0.5 * (a + m - left / bend)
+    return place, at_a + (place - a) * (left + bend * (place - m))
+
+
+@njit(error_model="numpy")
+def bracket(which, k, sign, best, seen, rule, ends, dims):
+    """Write into `ends` the neighbours of the point of a panel beside which sign * value k may be highest, and values.
+
+    Returns where it may be, as a share of the panel, and whether it is higher than `best` there.
+    """
+    last, found, guess = len(rule) // ROW - 1, False, 0.0
+    for point in range(last + 1):
+        low, high, centre = max(point - 1, 0), min(point + 1, last), min(max(point, 1), last - 1)
+        at_low, at_point, at_high = (
+            sign * seen[(low * dims.observed + k) * WIDTH + which],
+            sign * seen[(point * dims.observed + k) * WIDTH + which],
+            sign * seen[(high * dims.observed + k) * WIDTH + which],
+        )
+        if at_low > at_point or at_high > at_point:
+            continue
+        place, height = vertex(
+            rule[ROW * (centre - 1)],
+            rule[ROW * centre],
+            rule[ROW * (centre + 1)],
+            sign * seen[((centre - 1) * dims.observed + k) * WIDTH + which],
+            sign * seen[(centre * dims.observed + k) * WIDTH + which],
+            sign * seen[((centre + 1) * dims.observed + k) * WIDTH + which],
+        )
+        if height > best and rule[ROW * low] < place < rule[ROW * high]:
+            found, best, guess = True, height, place
+            ends[0], ends[1], ends[2] = rule[ROW * low], rule[ROW * point], rule[ROW * high]
+            ends[3], ends[4], ends[5] = at_low, at_point, at_high
+    return guess, found
+
+
+@njit(error_model="numpy")
+def climb(added, begin, width, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims, values):
+    """Raise the extremes of the cells in `added` to those between the points of a panel, by successive parabolas.
+
+    Only an extreme beyond those that are known is looked for, and no closer than the tolerances.
+    """
+    ends, there, at = np.empty((WIDTH, 6)), np.empty(WIDTH), np.empty(dims.observed * WIDTH)
+    for k in range(dims.observed):
+        for column in (LARGEST, LEAST):
+            sign, place, open_lanes = 1.0 if column == LARGEST else -1.0, TALLIES + TALLY * k + column, 0
+            for which in range(WIDTH):
+                there[which] = 0.0
+                if (added >> which) & 1:
+                    best = sign * sums[cell[which], place]
+                    best += control[RTOL] * abs(best) + control[ATOL]
+                    there[which], higher = bracket(which, k, sign, best, seen, rule, ends[which], dims)
+                    open_lanes |= higher << which
+            for _ in range(CLIMBS):
+                if open_lanes == 0:
+                    break
+                values((load(there, 0, WIDTH) + begin) * width, t, h, y, y_new, dense, address(at, 0), dims)
+                for which in range(WIDTH):
+                    if (open_lanes >> which) & 1:
+                        a, m, b, at_a, at_m, at_b = ends[which]
+                        u, at_u = there[which], sign * at[k * WIDTH + which]
+                        if at_u > at_m:
+                            (a, at_a), (b, at_b) = ((m, at_m), (b, at_b)) if u > m else ((a, at_a), (m, at_m))
+                            m, at_m = u, at_u
+                        else:
+                            (a, at_a), (b, at_b) = ((a, at_a), (u, at_u)) if u > m else ((u, at_u), (b, at_b))
+                        sums[cell[which], place] = sign * max(sign * sums[cell[which], place], at_m)
+                        ends[which] = a, m, b, at_a, at_m, at_b
+                        there[which], height = vertex(a, m, b, at_a, at_m, at_b) if a < m < b else (m, at_m)
+                        if not (
+                            a < there[which] < b and height - at_m > 0.1 * (control[RTOL] * abs(at_m) + control[ATOL])
+                        ):
+                            open_lanes &= ~(1 << which)
+
+
 @njit(error_model="numpy")
 def tally(counted, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims, values):
     """Add the step of the lanes in `counted` to what is observed; its panels are halved where a value needs it.
@@ -70,7 +153,7 @@ def tally(counted, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims,
     open_lanes = np.zeros(DEEPEST + 1, np.int64)
     open_lanes[0], level, k = counted, 0, 0
     while True:
-        width, halved = 1.0 / (1 << level), 0
+        width, halved, added = 1.0 / (1 << level), 0, 0
         for point in range(points):
             theta = broadcast((k + rule[ROW * point + POINT]) * width, WIDTH)
             values(theta, t, h, y, y_new, dense, address(seen, point * dims.observed * WIDTH), dims)
@@ -80,6 +163,8 @@ def tally(counted, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims,
                     halved |= 1 << which
                 else:
                     add(which, cell[which], width * lengths[which], seen, sums, rule, dims)
+                    added |= 1 << which
+        climb(added, float(k), width, t, h, y, y_new, dense, seen, cell, sums, control, rule, dims, values)
         if halved != 0:
             level, k = level + 1, 2 * k
             open_lanes[level] = halved

@@ -102,8 +102,8 @@ def _evaluated(what: str, text: str, expression: Expression, algebra: Algebra[T]
     """The value of a text; errors of one line."""
     try:
         return expression.evaluate(algebra)
-    except _Refusal:
-        raise
+    except _Refusal as refusal:
+        raise ValueError(str(refusal)) from None
     except ValueError as error:
         raise ValueError(f"{what}: {str(error).removeprefix('observable: ')}") from None
     except (TypeError, AttributeError, OverflowError, ArithmeticError) as error:  # of SymPy, which compares in vain
@@ -111,7 +111,7 @@ def _evaluated(what: str, text: str, expression: Expression, algebra: Algebra[T]
         raise ValueError(f"{what}: {short_repr(text)} has no value: {reason or type(error).__name__}") from None
 
 
-class _Refusal(ValueError):
+class _Refusal(Exception):
     """An error in the words of this module."""
 
 
@@ -164,6 +164,9 @@ class _Values(Arithmetic[sp.Expr]):
         if made.is_Pow and made.exp.is_Rational and abs(made.exp) > EXPONENT:
             raise NoMeaning(f"found the exponent {made.exp}; expected at most {EXPONENT}")
         return made
+
+    def compare(self, sign: str, a: sp.Expr, b: sp.Expr) -> sp.Expr:
+        raise NoMeaning(f"found the condition {a} {sign} {b}; expected a value, such as the difference {a} - ({b})")
 
     def arguments(self, function: str, count: int, options: Sequence[str]) -> Sequence[Algebra[sp.Expr]]:
         name = SPELLINGS.get(function, function)

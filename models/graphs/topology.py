@@ -338,9 +338,11 @@ def from_matrix(rows: Iterable[Iterable[object]] | sp.MatrixBase, name: str = "m
             continue
         rounded = isinstance(given, list | tuple) and any(map(_rounded, given[i]))
         if not rounded or abs(excess) > total(map(abs, row)) / 10**12:
+            adjacency = not any(row[k] for k, row in enumerate(table))
+            remedy = "; of an adjacency matrix take from_sparse(scipy.sparse.coo_array(A), adjacency=True)"
             raise ValueError(
                 f"{name}: row {i + 1} sums to {excess}; expected 0, or the synchronous state is no solution: "
-                f"set its diagonal entry {row[i]} to {row[i] - excess}"
+                f"set its diagonal entry {row[i]} to {row[i] - excess}{remedy if adjacency else ''}"
             )
         row[i] -= excess
     links = tuple((i, j, weight) for i, row in enumerate(table) for j, weight in enumerate(row) if weight and i != j)

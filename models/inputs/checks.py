@@ -13,7 +13,8 @@ import operator
 import os
 import re
 import reprlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sized
+from itertools import islice
 from pathlib import Path
 from typing import TypeVar
 
@@ -32,6 +33,7 @@ __all__ = [
     "check_printable",
     "check_table",
     "check_text",
+    "first_of",
     "short_repr",
     "suggestion",
     "typed_repr",
@@ -57,6 +59,9 @@ def short_repr(value: object) -> str:
     return words if len(words) <= 120 else words[:117] + "..."
 
 
+T = TypeVar("T")
+
+
 def suggestion(found: object, known: Iterable[str], other: Mapping[str, str] | None = None) -> str:
     """Return the question whether a known name was meant.
 
@@ -72,14 +77,22 @@ def suggestion(found: object, known: Iterable[str], other: Mapping[str, str] | N
     Returns
     -------
     str
-        ``"; did you mean 'x'?"``, or "" if no name is close.
+        ``"; did you mean 'x'?"``, of a name that begins as the unknown one if there is one; "" if none is close.
     """
     if not isinstance(found, str):
         return ""
     meant = {name: name for name in known}
     meant = {name: here for name, here in (other or {}).items() if here in meant} | meant
-    close = difflib.get_close_matches(found, sorted(meant), 1)
+    longer = sorted(name for name in meant if found and name.startswith(found))
+    close = longer[:1] or difflib.get_close_matches(found, sorted(meant), 1)
     return f"; did you mean {meant[close[0]]!r}?" if close else ""
+
+
+def first_of(values: Iterable[T], n: int) -> tuple[tuple[T, ...], str]:
+    """Return up to n + 1 of some values, and in words how many there are; endless ones are not counted."""
+    first = tuple(islice(values, n + 1))
+    endless = len(first) > n and not isinstance(values, Sized)
+    return first, f"more than {n}" if endless else str(len(values) if isinstance(values, Sized) else len(first))
 
 
 def check_keys(what: str, given: Mapping[object, object], known: Iterable[str]) -> None:
@@ -232,9 +245,6 @@ def typed_repr(value: object) -> str:
     name = type(value).__name__
     words = short_repr(value)
     return words if name in words or value is None else f"{words} ({name})"
-
-
-T = TypeVar("T")
 
 
 def check_instance(what: str, value: object, kind: type[T] | tuple[type[T], ...], expected: str) -> T:

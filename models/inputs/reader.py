@@ -201,6 +201,8 @@ class Expression:
             algebra.refuse(node, error.reason)
 
     def _operation(self, node: ast.BinOp, algebra: Algebra[V], depth: int) -> V:
+        if isinstance(node.op, ast.BitXor):
+            raise NoMeaning("found the sign ^; expected powers as x**2")
         if not isinstance(node.op, (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow)):
             raise NoMeaning
         a = self._value(node.left, algebra, depth)

@@ -40,7 +40,7 @@ class Drawn(Shown):
     __slots__ = ()
 
     def draw(self, ax: Axes | None = None) -> Axes:
-        """Draw the graph; nothing is shown on a screen.
+        """Draw the graph; nothing is shown on a screen, ``ax.figure.savefig("graph.png")`` writes it.
 
         Widths show weights, arrows one-way links, colours kinds of nodes.
 

@@ -46,9 +46,9 @@ class Rates:
 
     Parameters
     ----------
-    rates : mapping of Symbol to Expr
+    rates : mapping of Symbol or str to Expr or str
         What a link adds to the rate of each state of its target, such as {i.theta: K*W*sin(j.theta - i.theta)}, in the
-        symbols of `ends`.  Decimals are exact: 0.1 is 1/10.
+        symbols of `ends`, or as text, {"theta": "K*W*sin(theta_j - theta_i)"}.  Decimals are exact: 0.1 is 1/10.
     parameters : mapping of Symbol or str to number or Parameter
         Parameters of the link with their defaults.
 
@@ -65,21 +65,26 @@ class Rates:
     >>> from synchain.models.definitions.loader import load_oscillator
     >>> i, j, W = ends(load_oscillator("rossler"))
     >>> K = sp.Symbol("K")
-    >>> str(Rates({i.x: K * W * (j.x - i.x)}, {K: 0.1}))
-    'rates of x'
+    >>> link = Rates({i.x: K * W * (j.x - i.x)}, {K: 0.1})
+    >>> link == Rates({"x": "K*W*(x_j - x_i)"}, {"K": 0.1})
+    True
     """
 
     rates: Frozen[sp.Expr]
     parameters: Frozen[Parameter]
 
     def __init__(
-        self, rates: Mapping[sp.Symbol, object], parameters: Mapping[sp.Symbol | str, object] | None = None
+        self, rates: Mapping[sp.Symbol | str, object], parameters: Mapping[sp.Symbol | str, object] | None = None
     ) -> None:
         table = check_table("rates of a link", rates)
         if not table:
             raise ValueError("rates of a link: found none; expected one at least, e.g. {i.x: W*(j.x - i.x)}")
         targets = [_target(key) for key in table]
-        found = _Content.of("rates of a link", table.values(), parameters)
+        twice = next((name for name in targets if targets.count(name) > 1), None)
+        if twice is not None:
+            raise ValueError(f"rates of a link: the rate of {twice!r} is given twice; expected it once")
+        given = [_told(f"rates of a link: rate of {name}", e) for name, e in zip(targets, table.values(), strict=True)]
+        found = _Content.of("rates of a link", given, parameters)
         for name, rate in zip(targets, found.expressions, strict=True):
             if rate == 0:
                 raise ValueError(f"rates of a link: the rate of {name!r} is 0; expected a function; leave it out")
@@ -136,8 +141,9 @@ class Potential:
 
     Parameters
     ----------
-    energy : Expr
-        The energy of a link, in the symbols of `ends`: -G*W*i.m*j.m/sqrt((i.x - j.x)**2 + (i.y - j.y)**2).
+    energy : Expr or str
+        The energy of a link, in the symbols of `ends`: -G*W*i.m*j.m/sqrt((i.x - j.x)**2 + (i.y - j.y)**2), or as text,
+        "k*W*(x_i - x_j)**2/2".
     parameters : mapping of Symbol or str to number or Parameter
         Parameters of the link with their defaults.
 
@@ -152,7 +158,7 @@ class Potential:
     parameters: Frozen[Parameter]
 
     def __init__(self, energy: object, parameters: Mapping[sp.Symbol | str, object] | None = None) -> None:
-        found = _Content.of("potential of a link", [energy], parameters)
+        found = _Content.of("potential of a link", [_told("potential of a link", energy)], parameters)
         letters = {s.name[-2:] for s in found.expressions[0].free_symbols - found.own}
         if not {"_i", "_j"} <= letters:
             raise ValueError(
@@ -251,6 +257,11 @@ class _Content:
         return cls(found, table, own)
 
 
+def _told(what: str, value: object) -> object:
+    """The expression that a text tells; any other value as it is."""
+    return read(what, check_text(what, value, LENGTH), _AnyName()) if isinstance(value, str) else value
+
+
 def _exact(what: str, value: object) -> sp.Expr:
     """The expression with real symbols and rational numbers."""
     symbols = value.free_symbols if isinstance(value, sp.Expr) else ()
@@ -262,6 +273,8 @@ def _exact(what: str, value: object) -> sp.Expr:
 
 def _target(key: object) -> str:
     """The state of the target that a key of the rates means."""
+    if isinstance(key, str):
+        return check_text("rates of a link", key)
     if not isinstance(key, sp.Symbol):
         raise TypeError(f"rates of a link: found the key {typed_repr(key)}; expected a state of the target, e.g. i.x")
     if not key.name.endswith("_i") or len(key.name) < 3:
@@ -357,12 +370,8 @@ def from_table(what: str, given: Mapping[object, object]) -> Rates | Potential:
     parameters = check_table(f"{what}: parameters", given.get("parameters", {}))
     named = {str(name): value for name, value in parameters.items()}
     if kinds == ["potential"]:
-        return Potential(_read(f"{what}: potential", given["potential"]), named)
-    table = check_table(f"{what}: rates", given["rates"])
-    return Rates(
-        {sp.Symbol(f"{name}_i", real=True): _read(f"{what}: rate of {name}", text) for name, text in table.items()},
-        named,
-    )
+        return Potential(given["potential"], named)
+    return Rates(check_table(f"{what}: rates", given["rates"]), named)
 
 
 class _AnyName(Mapping[str, sp.Symbol]):
@@ -379,7 +388,3 @@ class _AnyName(Mapping[str, sp.Symbol]):
 
     def __len__(self) -> int:
         return 0
-
-
-def _read(what: str, text: object) -> sp.Expr:
-    return read(what, check_text(what, text, LENGTH), _AnyName())

@@ -283,8 +283,8 @@ def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     algebra = _Expressions(what, names)
     try:
         found = algebra.value(expression.evaluate(algebra))
-    except _Refusal:
-        raise
+    except _Refusal as refusal:
+        raise ValueError(str(refusal)) from None
     except NoMeaning as error:
         raise ValueError(f"{what}: {error.reason}; expected a value") from None
     except Exception as error:  # of SymPy, which compares in vain
@@ -298,7 +298,7 @@ def read(what: str, text: str, names: Mapping[str, sp.Symbol]) -> sp.Expr:
     return found
 
 
-class _Refusal(ValueError):
+class _Refusal(Exception):
     """An error in the words of this module."""
 
 

@@ -119,7 +119,8 @@ def _drawn(what: str, value: object, count: int) -> Draws:
         return _read(what, value)
     listed = value.tolist() if hasattr(value, "tolist") else value
     if not isinstance(listed, Sequence) or len(listed) != count:
-        raise ValueError(f"{what}: found {short_repr(listed)}; expected {KNOWN} or {count} entries")
+        entries = f"{len(listed)} entries" if isinstance(listed, Sequence) else short_repr(listed)
+        raise ValueError(f"{what}: found {entries}; expected {KNOWN} or {count} entries")
     rows = [row if isinstance(row, Sequence) and not isinstance(row, str) else (row,) for row in listed]
     if len({len(row) for row in rows}) != 1:
         raise ValueError(f"{what}: found rows of different lengths; expected one number, or one for each node, in each")

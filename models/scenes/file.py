@@ -54,6 +54,11 @@ def load_scene(name_or_path: str | os.PathLike[str]) -> Scene:
         path = Path(name)
         return _scene(path.name, _read(path), path.parent)
     known = scene_names()
+    if name not in known and Path(name).exists():
+        raise ValueError(
+            f"scene {short_repr(name)}: found a file of another kind; expected a scene, whose name ends in .toml; "
+            "the scene of a result is open_result(...).scene, which save('scene.toml') writes"
+        )
     if name not in known:
         raise ValueError(
             f"unknown scene {short_repr(name)}; known: {', '.join(known)}, or a path to a .toml file"

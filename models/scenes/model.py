@@ -338,6 +338,8 @@ def as_coupling(value: object) -> Coupling | None:
         return value
     if isinstance(value, Mapping):
         return from_table("coupling", value)
+    if isinstance(value, Topology):
+        raise TypeError(f"coupling: found the graph {value.name}({value.n}); expected a coupling; write topology=…")
     words = part("coupling", value)
     return None if words == "none" else read_coupling(words)
 

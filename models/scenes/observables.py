@@ -87,7 +87,7 @@ def stop(model: Model, numbers: Mapping[str, float], given: object) -> str | Non
     _check_names("stop", function, model, numbers)
     if _own(function, model, numbers):
         raise ValueError(
-            f"stop: found {function}, which each node has; expected one function, e.g. of nodes.maximum(x)"
+            f"stop: found {function}, which each node has; expected one function, e.g. of x_1 or of nodes.maximum(x)"
         )
     if model.unlinked.sticks:
         raise ValueError("stop: found set-valued contacts; expected smooth equations; take contact 'atan'")

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import islice
 from typing import Any, TypeVar
 
 from ..dynamics.periodicity import Drive, drive_of
-from ..inputs.checks import check_table, short_repr
+from ..inputs.checks import check_table, first_of, short_repr
 from ..inputs.frozen import Frozen
 from ..inputs.node_name import NodeName
 from .axis import Axis
@@ -80,9 +79,8 @@ def _for_each_node(model: Model, name: str, value: Any) -> list[float]:
         )
     if isinstance(value, set | frozenset):
         raise TypeError(f"parameter {name!r}: found a set, which has no order; expected a number or {n} numbers")
-    listed = list(islice(value.tolist() if hasattr(value, "tolist") else value, n + 1))
+    listed, count = first_of(value.tolist() if hasattr(value, "tolist") else value, n)
     if len(listed) != n:
-        count = f"more than {n}" if len(listed) > n else str(len(listed))
         raise ValueError(
             f"parameter {name!r}: found {count} values for {n} oscillators; expected {n} values or one number for all"
         )

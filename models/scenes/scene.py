@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
-from functools import lru_cache
+from functools import lru_cache, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ParamSpec
 
 from ..dynamics.equations import Equations
 from ..dynamics.observable import Observable
@@ -38,6 +38,23 @@ if TYPE_CHECKING:
     from ..spectra.spectrum import Spectrum
 
 __all__ = ["KEYWORDS", "Axis", "Scene", "Section", "a_scene"]
+
+
+P = ParamSpec("P")
+
+
+def _known_keywords(init: Callable[P, None]) -> Callable[P, None]:
+    """Refuse keywords that `Scene` does not know, with a suggestion."""
+
+    @wraps(init)
+    def checked(*args: P.args, **keywords: P.kwargs) -> None:
+        strange = next((name for name in keywords if name not in KEYWORDS), None)
+        if strange is not None:
+            hint = suggestion(strange, KEYWORDS) or f"; a parameter is given as parameters={{{strange!r}: …}}"
+            raise TypeError(f"unknown keyword {strange!r} of Scene; known: {', '.join(KEYWORDS)}{hint}")
+        init(*args, **keywords)
+
+    return checked
 
 
 @dataclass(frozen=True, slots=True, init=False, repr=False)
@@ -80,7 +97,8 @@ class Scene(Drawn, Written):
         Sections on functions of the states, by the names of the results' variables:
         ``Section("x_1 - x_2", "rising", keep=("v_1", "v_2"))``.
     stop : str or Expr, optional
-        A function of the states, parameters and t that ends a cell when it passes zero, in the transient too.
+        A function of the states, parameters and t that ends a cell when it passes zero, in the transient too.  As with
+        terminal events of SciPy, a function that begins on one side of zero, or at zero, ends nothing before it passes.
     transient, window : float
         Time before the records, and time of the records, in units of `time_unit`.
     time_unit : str, optional
@@ -98,7 +116,8 @@ class Scene(Drawn, Written):
     zipped : bool
         True if the axes run together.
     continuation : str
-        "up" or "down" if cells start from the end of their neighbours, else "none".
+        "up" or "down" if cells start from the end of their neighbours along the last axis, of the scene or of a run,
+        else "none".
     seed : int
         Seed of random initial states.
     realisations : int
@@ -155,6 +174,7 @@ class Scene(Drawn, Written):
     model: Model = field(compare=False)
     given: Frozen[Any] = field(compare=False)
 
+    @_known_keywords
     def __init__(
         self,
         oscillator: Oscillator | str = "friction",
@@ -272,6 +292,11 @@ class Scene(Drawn, Written):
         lengths = tuple(len(axis) for axis in self.axes)
         more = (self.realisations,) if self.realisations else ()
         return (*(lengths[:1] if self.zipped else lengths), *more)
+
+    @property
+    def continued(self) -> bool:
+        """True if cells start from the end of their neighbours along the last axis."""
+        return bool(self.axes) and self.continuation != Continuation.NONE
 
     @property
     def drawn(self) -> tuple[Axis, ...]:

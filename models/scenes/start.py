@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterable, Mapping
-from itertools import islice
 from typing import Any
 
-from ..inputs.checks import check_integer, check_keys, check_number, check_table, short_repr
+from ..inputs.checks import check_integer, check_keys, check_number, check_table, first_of, short_repr
 from ..inputs.frozen import Frozen
 
 __all__ = ["chosen_start", "default_start"]
@@ -65,9 +64,8 @@ def _component(what: str, value: object, name: str, n: int, seed: int) -> tuple[
         return (check_number(what, listed),) * n
     if isinstance(listed, (bytes, set, frozenset)):
         raise TypeError(f"{what}: found {short_repr(listed)}; expected a number, {n} numbers or {{low, high, seed}}")
-    listed = tuple(islice(listed, n + 1))
+    listed, count = first_of(listed, n)
     if len(listed) != n:
-        count = f"more than {n}" if len(listed) > n else str(len(listed))
         raise ValueError(f"{what}: found {count} values for {n} oscillators; expected {n} values or one number for all")
     return tuple(check_number(f"{what}_{i + 1}", entry) for i, entry in enumerate(listed))
 

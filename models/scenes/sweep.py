@@ -160,10 +160,8 @@ def _axis(model: Model, parameters: Mapping[str, float], axis: Axis) -> None:
 def _continuation(model: Model, axes: Sequence[Axis], zipped: bool, given: object) -> Continuation:
     """The continuation; ValueError if the axes do not allow it."""
     continuation = Continuation.parse("continuation", given)
-    if continuation == Continuation.NONE:
+    if continuation == Continuation.NONE or not axes:  # a run may sweep what the scene does not
         return continuation
-    if not axes:
-        raise ValueError(f"continuation: found {continuation!r} without axes; expected a sweep; add an axis")
     for axis in axes if zipped else axes[-1:]:
         if model.parameter(axis.name) is None:
             raise ValueError(

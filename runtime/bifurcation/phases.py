@@ -25,6 +25,7 @@ from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.friction import Contact
 from synchain.models.scenes.scene import Scene
 
+from ..cells.keywords import ONE_CELL
 from ..sweeps.run import run
 
 __all__ = ["Phases", "phases_of"]
@@ -84,11 +85,10 @@ def phases_of(scene: Scene, state: np.ndarray, periods: int) -> Phases | None:
     if contact is None:
         return None
     single = scene.replace(
+        **{**ONE_CELL, "record": ("trajectory",)},
         topology=topology("chain", 1),
-        record=("trajectory",),
         samples=SAMPLES * periods + 1,
         transient=0.0,
-        axes=(),
         window=float(periods),
         time_unit="period",
         initial={"x": [float(state[0])], "v": [float(state[1])]},

@@ -197,8 +197,12 @@ def _stiffest(rates: Iterable[tuple[float, float]]) -> float:
     return max((fastest / max(1.0, turning) for fastest, turning in rates), default=0.0)
 
 
+BLOWN = 1e6
+"""Growth of a state from which on its fast rates are those of a solution without bound."""
+
+
 def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[[np.ndarray], Plan]) -> None:
-    """Warn if Taylor steps of some cells were short because the equations are stiff, not because the motion is fast.
+    """Warn if Taylor steps of some cells were short because the equations are stiff or the motion has no bound.
 
     The three cells with the shortest steps are looked at, where they ended, unless they ended at a singularity.
 
@@ -215,11 +219,21 @@ def warn_of_stiffness(source: KernelSource, buffers: Buffers, rows_of: Callable[
     broken = np.isin(buffers.counts[:, Count.STATUS], (Status.STEP_UNDERFLOW, Status.DIVERGED))
     lengths = np.where((steps > 0) & (times > 0.0) & ~broken, times / np.maximum(steps, 1), math.inf)
     cells = np.argsort(lengths)[:3]
-    for cell, numbers in zip(cells, rows_of(cells).numbers, strict=True):
+    rows = rows_of(cells)
+    for cell, start, numbers in zip(cells, rows.start, rows.numbers, strict=True):
         if not math.isfinite(lengths[cell]) or not np.isfinite(buffers.end[cell]).all():
             continue
         fastest, turning = _rates(source.equations, buffers.end[cell], numbers)
         if fastest * lengths[cell] > 1.0 and fastest > STIFF * max(1.0, turning):
+            size = np.abs(buffers.end[cell]).max()
+            if size > BLOWN * max(1.0, np.abs(start).max()):
+                warnings.warn(
+                    f"a state grew to {size:.3g} in {steps[cell]} Taylor steps of a cell; expected a bounded motion; "
+                    "check the signs and the size of the parameters",
+                    RuntimeWarning,
+                    stacklevel=4,
+                )
+                return
             warnings.warn(
                 f"stiff equations: found a rate of {fastest:.3g} beside slow motion, and {steps[cell]} Taylor steps in a cell; "
                 "expected few; integrator = 'rodas5p' takes longer steps",

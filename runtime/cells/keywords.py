@@ -7,19 +7,35 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from synchain.models.inputs.checks import check_number, check_table, check_text, suggestion
 from synchain.models.inputs.node_name import NodeName
 from synchain.models.scenes.parameters import without
 from synchain.models.scenes.scene import KEYWORDS, Scene, a_scene
 
-__all__ = ["ONE_ORBIT", "ORBITS", "Given", "with_numbers"]
+__all__ = ["ONE_CELL", "ONE_ORBIT", "ORBITS", "Given", "with_numbers"]
 
 ORBITS = {"executor": "its orbits advance on threads of this process, as many as `workers` says"}
 """What functions that advance several orbits at once do not take, and why."""
 
 ONE_ORBIT = {name: "it advances one orbit, step after step, on one thread" for name in ("workers", "executor")}
 """What functions that advance a single orbit do not take, and why."""
+
+
+SHOWN = 12
+"""Most initial states that an error lists."""
+
+ONE_CELL: Mapping[str, Any] = {
+    "axes": (),
+    "zipped": False,
+    "continuation": "none",
+    "record": (),
+    "observe": None,
+    "sections": None,
+    "stop": None,
+}
+"""Settings of a scene that sweeps and records nothing, for functions that say themselves what they run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +78,14 @@ class Given:
         TypeError
             If `scene` is no Scene.
         ValueError
-            If a name is no parameter of the scene, or is given twice.
+            If a name is no parameter of the scene, or is given twice, and for a scene with draws, of
+            which these functions would take none.
         """
+        if a_scene(scene).draws:
+            raise ValueError(
+                f"{self.function.__name__}: found draws of {', '.join(scene.draws)}; expected a scene without them; "
+                "write scene.replace(realisations=0, draws=None)"
+            )
         return with_numbers(scene, self._checked(a_scene(scene)), **settings)
 
     def sweep(self, scene: Scene, **settings: object) -> Scene:
@@ -114,8 +136,9 @@ class Given:
         if name in KEYWORDS:
             return f"{of}: {name!r} is a field of the scene; expected parameters; write scene.replace({name}=…)"
         initial = scene.equations.state if states else ()
-        known = dict.fromkeys((*scene.parameters, *initial, *own))
-        words = suggestion(name, known) or suggestion(name, KEYWORDS)
+        words = suggestion(name, (*scene.parameters, *initial, *own)) or suggestion(name, KEYWORDS)
+        shown = initial if len(initial) <= SHOWN else (f"{initial[0]} … {initial[-1]}",)
+        known = dict.fromkeys((*scene.parameters, *shown, *own))
         return f"unknown parameter or keyword {name!r} of {of}; known: {', '.join(known)}{words}"
 
 

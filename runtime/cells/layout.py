@@ -39,7 +39,7 @@ class Layout:
     @classmethod
     def of(cls, scene: Scene, size: int) -> Layout:
         """Return the layout of a scene's sweep in blocks of this size."""
-        if scene.continuation == "none":
+        if not scene.continued:
             return cls(scene.cells, size)
         return cls(scene.cells, size, scene.shape[-1], scene.continuation == "down")
 
@@ -84,7 +84,7 @@ def block_size(scene: Scene, width: int, workers: int, cells: int | None = None)
         is continued).
     """
     if cells is None:
-        cells = scene.cells // (scene.shape[-1] if scene.continuation != "none" else 1)
+        cells = scene.cells // (scene.shape[-1] if scene.continued else 1)
     lengths = scene.transient + scene.window
     work = scene.n * max(lengths if scene.time_unit == "period" else lengths / (2.0 * math.pi), 1.0)
     most = min(REFILLS * width, int(LONGEST / work) // width * width)

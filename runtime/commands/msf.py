@@ -8,7 +8,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..console.arguments import above_zero, add_allow_code, add_workers, folder, positive, spaced
+from ..console.arguments import above_zero, add_scene, add_workers, folder, positive, spaced
 from ..console.network import add_network, named_network, scene_on
 from ..console.outcome import FINE, Failed, WrongUse, print_json, sentence, warn, wrong_use
 
@@ -31,12 +31,7 @@ POINTS = 1_000_000
 
 def configure(parser: ArgumentParser) -> None:
     """Add oscillator, network, strengths and effort."""
-    parser.add_argument(
-        "scene",
-        metavar="SCENE",
-        nargs="?",
-        help="a shipped name (see: synchain scenes) or a path to a .toml file (default: the oscillator of table 1)",
-    )
+    add_scene(parser, default="the oscillator of table 1")
     parser.add_argument(
         "--alpha", metavar="LO:HI:N", type=spaced, help="strengths, -sigma times an eigenvalue (default: 0:1.2:241)"
     )
@@ -51,7 +46,6 @@ def configure(parser: ArgumentParser) -> None:
     add_network(parser)
     parser.add_argument("--json", action="store_true", help="print JSON: alpha, exponent, stderr, intervals, class ...")
     parser.add_argument("--out", metavar="DIR", type=folder, help="write a figure (PNG) and the numbers (CSV) there")
-    add_allow_code(parser)
     add_workers(parser)
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ..console.arguments import add_scene, add_workers, folder
-from ..console.outcome import FINE, warn, wrong_use
+from ..console.arguments import add_scene, add_workers
+from ..console.outcome import FINE, WrongUse, warn, wrong_use
 
 SUMMARY = "write one page on a scene: equations, graph, spectrum, stability, a sweep (HTML)"
 EXAMPLES = (
@@ -17,7 +17,7 @@ EXAMPLES = (
 def configure(parser: ArgumentParser) -> None:
     """Add the scene, the file and the effort."""
     add_scene(parser)
-    parser.add_argument("--out", metavar="FILE", type=folder, required=True, help="the page, which ends in .html")
+    parser.add_argument("--out", metavar="FILE", required=True, help="the page, which ends in .html")
     parser.add_argument("--quick", action="store_true", help="coarse grids: at most 25 values of each axis")
     add_workers(parser)
 
@@ -35,6 +35,8 @@ def execute(arguments: Namespace) -> int:
         scene = load_scene(arguments.scene)
         target = Path(arguments.out)
         check_replaceable(target)
+        if target.suffix.lower() not in (".html", ".htm"):
+            raise WrongUse(f"--out {target}: found the ending {target.suffix!r} of a page of HTML; expected .html")
         output_folder(target.parent)
     warn(scene.warnings)
     write_text(target, report(scene, QUICK if arguments.quick else Effort(), workers=arguments.workers))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ..console.arguments import above_zero, add_allow_code, add_workers, grid, positive
+from ..console.arguments import above_zero, add_scene, add_workers, positive, spaced
 from ..console.drive import drive_words
 from ..console.network import add_network, named_network, scene_on
 from ..console.outcome import FINE, WrongUse, print_json, warn, wrong_use
@@ -34,15 +35,13 @@ RESOLUTION, COARSE = 5e-4, 2e-3
 
 def configure(parser: ArgumentParser) -> None:
     """Add network, drive, grid and criterion."""
+    add_scene(parser, default="oscillators of table 1")
     add_network(parser)
-    parser.add_argument(
-        "--scene", metavar="SCENE", help="take oscillators and parameters from a scene (default: table 1)"
-    )
     parser.add_argument(
         "--sigma",
         metavar="LO:HI:N",
-        type=grid,
-        help="coupling to look at (default: 0 to 1.2/max|gamma|); ranges narrower than its step are not seen",
+        type=spaced,
+        help="coupling to look at, e.g. --sigma=-0.1:0.3:81 (default: 0:1.2/max|gamma|); narrower ranges are not seen",
     )
     parser.add_argument("--starts", metavar="K", type=positive, help="initial states for each value (default: 8)")
     parser.add_argument(
@@ -54,7 +53,6 @@ def configure(parser: ArgumentParser) -> None:
         help=f"defaults of {QUICK['starts']} starts, {QUICK['transient']:g} periods, half the grid; ends to {COARSE:g}",
     )
     parser.add_argument("--json", action="store_true", help="print JSON: intervals, probe, predicted, exponents ...")
-    add_allow_code(parser)
     add_workers(parser)
 
 
@@ -67,13 +65,15 @@ def execute(arguments: Namespace) -> int:
         scene = _scene(arguments)
         check_probe(scene.topology, scene.spectrum)
         if not scene.model.linked:
-            raise WrongUse("the scene has no coupling; expected a coupled network; choose another --scene")
+            raise WrongUse("the scene has no coupling; expected a coupled network; choose another SCENE")
         kernel_source(scene)
         criterion = Criterion(**_effort(arguments))
+        sigma = arguments.sigma or default_grid(scene.topology.spectrum, 0.005 if arguments.quick else 0.0025)
+        scene.replace(axes={scene.strength: sigma})
     warn(scene.warnings)
     result = thresholds(
         scene,
-        sigma=arguments.sigma or default_grid(scene.topology.spectrum, 0.005 if arguments.quick else 0.0025),
+        sigma=sigma,
         resolution=COARSE if arguments.quick else RESOLUTION,
         criterion=criterion,
         workers=arguments.workers,
@@ -102,22 +102,23 @@ def _scene(arguments: Namespace) -> Scene:
         scene.equations.expect_alike("thresholds")
     if network is None:
         if scene is None:
-            raise WrongUse("expected a network, e.g. --n 4, --matrix FILE or --scene SCENE")
+            raise WrongUse("expected a network, e.g. --n 4, --matrix FILE or a SCENE")
         network = scene.topology
     return scene_on(network, scene, arguments)
 
 
 def report(result: Thresholds, criterion: Criterion) -> str:
     """The ranges as a table."""
-    scene, end, reach = result.scene, float(result.direct.x[-1]), float(result.probe.x[-1])
+    scene, grid, alpha = result.scene, result.direct.x[[0, -1]], result.probe.x[[0, -1]]
     steepest = max(abs(value) for value in scene.topology.spectrum.values)
+    reach = (*grid, *(alpha / steepest))
     unit = "drive periods" if scene.time_unit == "period" else "units of time"
     rows = [
-        (f"{scene.strength}, simulated", _written(result.direct.intervals, end)),
-        (f"{scene.strength}, predicted by the probe", _written(result.predicted, min(end, reach / steepest))),
+        (f"{scene.strength}, simulated", _written(result.direct.intervals, grid)),
+        (f"{scene.strength}, predicted by the probe", _written(result.predicted, reach)),
         *_wu_chua(result),
-        (f"{scene.strength}, negative exponents", _with_errors(result, min(end, reach / steepest))),
-        (f"alpha = {scene.strength} |gamma|, probe", _written(result.probe.intervals, reach)),
+        (f"{scene.strength}, negative exponents", _with_errors(result, reach)),
+        (f"alpha = {scene.strength} |gamma|, probe", _written(result.probe.intervals, alpha)),
     ]
     wide = max(len(name) for name, _ in rows)
     return "\n".join(
@@ -132,29 +133,25 @@ def report(result: Thresholds, criterion: Criterion) -> str:
 
 
 def _wu_chua(result: Thresholds) -> list[tuple[str, str]]:
-    """The conjecture's row, where the probe's first range starts at no coupling and ends on the
-    grid.
-    """
+    """The conjecture's row, if a range of the probe holds no coupling and ends inside the grid."""
     from synchain.models.graphs.families import topology
 
     from ..synchronisation.threshold import wu_chua
 
-    if not result.probe.intervals:
-        return []
-    low, high = result.probe.intervals[0]
-    if low > 0.0 or high >= result.probe.x[-1]:
+    high = next((high for low, high in result.probe.intervals if low <= 0.0 < high), math.inf)
+    if high >= result.probe.x[-1]:
         return []
     end = wu_chua(high / 2.0, topology("chain", 2).spectrum, result.scene.topology.spectrum)
-    return [(f"{result.scene.strength}, Wu-Chua conjecture", _written([(0.0, end)], float("inf")))]
+    return [(f"{result.scene.strength}, Wu-Chua conjecture", _written([(0.0, end)], (0.0, math.inf)))]
 
 
-def _with_errors(result: Thresholds, end: float) -> str:
+def _with_errors(result: Thresholds, grid: Iterable[float]) -> str:
     """The windows of the exponents with the errors of their ends, or why there are none."""
     found = result.exponents
     if found.absent:
         return found.words
     words = [
-        f"[{low:.4f}{_error(errors[0])}, {high:.4f}{_error(errors[1])}{_onwards(high, end)}]"
+        f"[{low:.4f}{_error(errors[0])}{_onwards(low, grid)}, {high:.4f}{_error(errors[1])}{_onwards(high, grid)}]"
         for (low, high), errors in zip(found.intervals, found.errors, strict=True)
     ]
     return ", ".join(words) or "none"
@@ -164,10 +161,10 @@ def _error(error: float) -> str:
     return f" ± {error:.1g}" if error else ""
 
 
-def _onwards(high: float, end: float) -> str:
-    return "..." if high >= end * (1 - 1e-12) else ""
+def _onwards(end: float, grid: Iterable[float]) -> str:
+    return "..." if end and any(math.isclose(end, last, rel_tol=1e-12) for last in grid) else ""
 
 
-def _written(ranges: Sequence[Interval], end: float) -> str:
-    words = [f"[{low:.4f}, {high:.4f}{_onwards(high, end)}]" for low, high in ranges]
+def _written(ranges: Sequence[Interval], grid: Iterable[float]) -> str:
+    words = [f"[{low:.4f}{_onwards(low, grid)}, {high:.4f}{_onwards(high, grid)}]" for low, high in ranges]
     return ", ".join(words) or "none"

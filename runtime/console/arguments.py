@@ -15,7 +15,6 @@ __all__ = [
     "add_scene",
     "add_workers",
     "folder",
-    "grid",
     "number",
     "positive",
     "setting",
@@ -25,6 +24,10 @@ __all__ = [
 
 NODES = 100_000
 """Largest number of oscillators that can be asked for."""
+
+
+FILES = (".csv", ".html", ".json", ".nc", ".nc4", ".pdf", ".png", ".svg", ".toml", ".txt", ".zarr")
+"""Endings of files, which no folder has."""
 
 
 def whole(text: str, least: int = -NODES, most: int = NODES) -> int:
@@ -44,6 +47,8 @@ def folder(text: str) -> str:
     """The name of a folder, which may not exist yet."""
     if not text.strip():
         raise ArgumentTypeError("found an empty name; expected a folder, e.g. results")
+    if text.endswith(FILES):
+        raise ArgumentTypeError(f"found {short_repr(text)}, the name of a file; expected a folder, e.g. results")
     return text
 
 
@@ -87,14 +92,6 @@ def spaced(text: str) -> tuple[float, ...]:
     return Axis.from_table("grid", span(text)).values
 
 
-def grid(text: str) -> tuple[float, ...]:
-    """LO:HI:N with nothing below 0: a grid of the coupling."""
-    values = spaced(text)
-    if values[0] < 0:
-        raise ArgumentTypeError(f"found {short_repr(text)}; expected LO of at least 0: negative coupling drives apart")
-    return values
-
-
 def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, object]]:
     """name=value, name=a,b,c or name=LO:HI:N."""
     name, equals, value = text.partition("=")
@@ -109,11 +106,13 @@ def setting(text: str) -> tuple[str, float | tuple[float, ...] | dict[str, objec
     return name, number(value)
 
 
-def add_scene(parser: ArgumentParser) -> None:
-    """Add the argument SCENE."""
-    parser.add_argument(
-        "scene", metavar="SCENE", help="a shipped name (see: synchain scenes) or a path to a .toml file"
-    )
+def add_scene(parser: ArgumentParser, default: str = "") -> None:
+    """Add the argument SCENE; it may be left out if there is a default."""
+    known = "a shipped name (see: synchain scenes) or a path to a .toml file"
+    if default:
+        parser.add_argument("scene", metavar="SCENE", nargs="?", help=f"{known} (default: {default})")
+    else:
+        parser.add_argument("scene", metavar="SCENE", help=known)
     add_allow_code(parser)
 
 

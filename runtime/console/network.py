@@ -102,6 +102,8 @@ def scene_on(network: Topology, scene: Scene | None, arguments: Namespace) -> Sc
 
     if scene is None:
         scene = Scene(topology=network)
+    if scene.draws:
+        raise WrongUse(f"found draws of {', '.join(scene.draws)} in the scene; expected none; only run takes them")
     frequency = at_frequency(scene, arguments.omega, arguments.scene)
     return scene.replace(topology=network, axes=(), zipped=False, continuation="none", record=None, **frequency)
 

@@ -94,7 +94,7 @@ def window_text(window: Window, error: bool = True) -> str:
     for side in ("low", "high"):
         sigma, mode = getattr(window, side), getattr(window, f"{side}_mode")
         if mode is None:
-            ends.append("0" if sigma == 0 else "any" if sigma == math.inf else f"{sigma:.4f}...")
+            ends.append("0" if sigma == 0 else "any" if math.isinf(sigma) else f"{sigma:.4f}...")
         else:
             ends.append(measured(sigma, getattr(window, f"{side}_error") if error else 0.0))
             lost.append(f"lost {'below' if side == 'low' else 'above'}: gamma = {mode.eigenvalue}")

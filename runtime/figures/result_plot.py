@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from synchain.models.inputs.checks import suggestion
 from synchain.models.inputs.node_name import NodeName
 
 from ..results.result import Result
@@ -20,6 +21,7 @@ __all__ = ["KINDS", "draw_result"]
 KINDS = ("error", "section", "map", "phase", "end")
 CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
 SIZE = (4.8, 3.4)
+REALISATION = "realisation"
 FINEST = 1000
 """Most values of each axis of a map that are drawn; a figure has fewer points than that."""
 ROUNDING = 1e-9
@@ -41,10 +43,11 @@ def draw_result(result: Result, ax: Axes | None = None, kind: str | None = None)
         Result to draw.
     ax : Axes, optional
         Axes to draw into; by default those of a new figure.
-    kind : {"error", "section", "map", "phase", "end"}, optional
+    kind : {"error", "section", "map", "phase", "end"} or str, optional
         Synchronisation error over one axis, section points over one axis or each over the one
-        before, colours over two axes, trajectories, or final states. By default the most specific
-        kind that the axes and records of the result allow.
+        before, colours over two axes, trajectories, final states, or the observable of that name
+        over one axis. By default the most specific kind that the axes and records of the result
+        allow.
 
     Returns
     -------
@@ -55,25 +58,31 @@ def draw_result(result: Result, ax: Axes | None = None, kind: str | None = None)
     ValueError
         If the kind is unknown, or if the result has no numbers for it.
     """
-    if kind is not None and kind not in KINDS:
-        raise ValueError(f"unknown kind of plot {kind!r}; known: {', '.join(KINDS)}")
-    possible = _possible(result)
+    if kind is not None and kind not in (known := (*KINDS, *result.scene.observe)):
+        raise ValueError(f"unknown kind of plot {kind!r}; known: {', '.join(known)}{suggestion(kind, known)}")
+    possible, kinds = _possible(result)
     chosen = kind or possible[0]
     if chosen not in possible:
         raise ValueError(f"this result has no numbers for the plot {chosen!r}; it has them for: {', '.join(possible)}")
     with context():
         axes = new_figure(SIZE).add_subplot() if ax is None else ax
-        cut, words = _cut(result, 2 if chosen == "map" else 1)
-        drawn = {"error": _error, "section": _section, "map": _map, "phase": _phase, "end": _end}[chosen](
-            axes, cut, result
-        )
+        observed = chosen not in kinds
+        cut, words = _cut(result, 2 if chosen == "map" or (observed and REALISATION in result.data.status.dims) else 1)
+        if observed:
+            drawn = _observed(axes, cut, result, chosen)
+        else:
+            drawn = {"error": _error, "section": _section, "map": _map, "phase": _phase, "end": _end}[chosen](
+                axes, cut, result
+            )
         failed = int((result.data.status != Status.FINISHED).sum())
         note(axes, "; ".join(filter(None, [words, failures(failed, result.data.status.size)])))
     return drawn
 
 
-def _possible(result: Result) -> tuple[str, ...]:
-    """Kinds of plot that a result has numbers for, the most specific first."""
+def _possible(result: Result) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What a result has numbers for, the most specific first, and which of that are kinds of plot, no
+    observables.
+    """
     count, data = result.data.status.ndim, result.data
     kinds = []
     if count >= 2:
@@ -86,7 +95,11 @@ def _possible(result: Result) -> tuple[str, ...]:
         kinds.append("section")
     if "trajectory" in data and count > 0:
         kinds.append("phase")
-    return (*kinds, "end")
+    kinds.append("end")
+    observed = [name for name in result.scene.observe if count and name in data and name not in kinds]
+    if "sync_error" in data or "section" in data:
+        return (*kinds[:-1], *observed, "end"), tuple(kinds)
+    return (*observed, *kinds), tuple(kinds)
 
 
 def _cut(result: Result, keep: int) -> tuple[xr.Dataset, str]:
@@ -119,6 +132,23 @@ def _error(axes: Axes, data: xr.Dataset, result: Result) -> Axes:
     axes.set(xlabel=symbol(name), ylabel="average synchronisation error")
     if np.nanmax(data.sync_error.values, initial=0.0) < ROUNDING:  # nothing but rounding: no landscape of it
         axes.set_ylim(-0.05 * ROUNDING, ROUNDING)
+    return axes
+
+
+def _observed(axes: Axes, data: xr.Dataset, result: Result, name: str) -> Axes:
+    """An observable over the axis: a line for each node, or for each realisation and their mean."""
+    x, along = _along(data, result)
+    order = np.argsort(x, kind="stable")
+    values = data[name].values[order].reshape(len(x), -1)
+    marker = "." if len(x) <= MARKED else None
+    if REALISATION in data.status.dims[1:]:
+        axes.plot(x[order], values, color=SKY, linewidth=0.5)
+        axes.plot(x[order], values.mean(axis=1), color=BLUE, marker=marker, label="mean of the realisations")
+        axes.legend()
+    else:
+        for i, line in enumerate(values.T):
+            axes.plot(x[order], line, color=CYCLE[i % len(CYCLE)], marker=marker)
+    axes.set(xlabel=symbol(along), ylabel=name.replace("_", " "))
     return axes
 
 

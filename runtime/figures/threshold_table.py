@@ -258,7 +258,8 @@ def _how(quality: Quality) -> str:
         f"Ends are refined to {quality.resolution:g} in sigma.\n\n"
         "Measured: direct simulation of the chain. Predicted: the two-oscillator probe's ranges of alpha, projected "
         "through every non-zero eigenvalue of the chain. Exponents: the ranges of alpha with a negative transversal "
-        "exponent, projected in the same way, with the standard errors of their ends (0 at sigma = 0); they know neither "
+        "exponent, projected in the same way, with the errors of their ends, those of averages and of the interpolation "
+        "between strengths (0 at sigma = 0); they know neither "
         f"transient nor tolerance. Gaps of up to {GAP:g} within a measured or predicted range are bridged; where there are "
         "several ranges, the one nearest to the published is shown. `thresholds.csv` lists all ranges as found."
     )

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from fractions import Fraction
 
@@ -148,7 +148,9 @@ class _End:
 def windows(
     ranges: Sequence[tuple[float, float]], graph: Topology, errors: Sequence[tuple[float, float]] | None = None
 ) -> tuple[Window, ...]:
-    """Find the intervals of sigma >= 0 on which every transversal mode lies in a stable range.
+    """Find the intervals of sigma on which every transversal mode lies in a stable range.
+
+    Ranges below alpha = 0 give intervals of negative sigma.
 
     Parameters
     ----------
@@ -170,7 +172,30 @@ def windows(
     ValueError
         If the ranges or errors are invalid, or if an eigenvalue is complex or positive.
     """
-    return tuple(_window(low, high) for low, high in _intersection(exact_ranges(ranges, errors), graph))
+    above = [_window(low, high) for low, high in _intersection(exact_ranges(ranges, errors), graph)]
+    pairs = zip(ranges, [(0.0, 0.0)] * len(ranges) if errors is None else errors, strict=True)
+    mirrored = [((max(-high, 0.0), -low), error[::-1]) for (low, high), error in reversed(list(pairs)) if low < 0.0]
+    if not mirrored:
+        return tuple(above)
+    exact = exact_ranges([r for r, _ in mirrored], [error for _, error in mirrored])
+    below = [_mirrored(_window(low, high)) for low, high in reversed(_intersection(exact, graph))]
+    if below and above and below[-1].high == above[0].low:
+        right = above.pop(0)
+        if right.high > 0.0:
+            below[-1] = replace(below[-1], high=right.high, high_error=right.high_error, high_mode=right.high_mode)
+    return (*below, *above)
+
+
+def _mirrored(window: Window) -> Window:
+    """The window of -sigma."""
+    return Window(
+        0.0 - window.high,
+        0.0 - window.low,
+        window.high_error,
+        window.low_error,
+        window.high_mode,
+        window.low_mode,
+    )
 
 
 def windows_complex(

@@ -56,7 +56,8 @@ class Labelled(Shown):
         Returns
         -------
         Axes
-            Nothing is shown on a screen.
+            Nothing is shown on a screen.  ``ax.figure.savefig("figure.png")`` writes the figure, which
+            belongs to no window.
         """
         return self._drawn(ax)
 
@@ -124,7 +125,7 @@ def ends_of(values: np.ndarray) -> str:
 def words_of(
     intervals: Sequence[tuple[float, float]], errors: Sequence[tuple[float, float]] | None = None, most: int = 8
 ) -> str:
-    """Return intervals in words, with the standard errors of their ends if they are known."""
+    """Return intervals in words, with the errors of their ends if they are known."""
     found = []
     for k, ends in enumerate(intervals[:most]):
         spread = errors[k] if errors else (0.0, 0.0)

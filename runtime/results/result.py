@@ -101,15 +101,16 @@ class Result(Labelled):
         ----------
         ax : Axes, optional
             Matplotlib axes; by default those of a new figure.
-        kind : {"error", "section", "map", "phase", "end"}, optional
+        kind : {"error", "section", "map", "phase", "end"} or str, optional
             Synchronisation error over one axis, section points over one axis or each over the one
-            before, colours over two axes, trajectories, or final states. By default the most
-            specific kind that the axes and records allow.
+            before, colours over two axes, trajectories, final states, or the observable of that
+            name over one axis. By default the most specific kind that the axes and records allow.
 
         Returns
         -------
         Axes
-            Nothing is shown on a screen.
+            Nothing is shown on a screen.  ``ax.figure.savefig("figure.png")`` writes the figure, which
+            belongs to no window.
 
         Raises
         ------

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from functools import singledispatch
 from html import escape
 from itertools import islice
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
@@ -20,12 +21,16 @@ from synchain.models.presentation.equations import latex as latex_of
 from synchain.models.presentation.equations import lines
 from synchain.models.presentation.mathml import formula
 from synchain.models.presentation.writer import Latex, Text, Writer
+from synchain.models.scenes.draw import Draw
 from synchain.models.scenes.scene import Scene
 from synchain.models.spectra.eigenvalue import Eigenvalue, decimal
 from synchain.models.spectra.spectrum import Spectrum
 
 from ..results.labelled import Labelled
 from .graph import svg
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 __all__ = ["STYLE", "body", "figure", "fragment", "latex", "provenance_rows", "rows_table", "spectrum_of"]
 
@@ -123,7 +128,7 @@ def _(value: Scene) -> str:
 @body.register
 def _(value: Labelled) -> str:
     name = f"<p><b>{escape(type(value).__name__)}</b></p>"
-    return f"{name}{rows_table(value.summary)}{figure(value, type(value).__name__)}"
+    return f"{name}{rows_table(value.summary)}{figure(value.plot(), type(value).__name__)}"
 
 
 def rows_table(rows: Iterable[tuple[str, str]]) -> str:
@@ -132,9 +137,8 @@ def rows_table(rows: Iterable[tuple[str, str]]) -> str:
     return f"<table>{listed}</table>"
 
 
-def figure(value: Labelled, about: str) -> str:
-    """Return the plot of a value as an image that is part of the page."""
-    axes = value.plot()
+def figure(axes: Axes, about: str) -> str:
+    """Return a plot as an image that is part of the page."""
     buffer = io.BytesIO()
     axes.figure.figure.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
     text = base64.b64encode(buffer.getvalue()).decode()
@@ -151,11 +155,17 @@ def provenance_rows(scene: Scene) -> list[tuple[str, str]]:
     unit = "drive periods" if scene.time_unit == "period" else "units of time"
     numbers = [f"{name} = {value:g}" for name, value in scene.parameters.items()]
     start = [f"{name} = {_numbers(values)}" for name, values in scene.initial.items()]
+    axes = [f"{axis.name} from {min(axis.values):g} to {max(axis.values):g}, {len(axis)} values" for axis in scene.axes]
+    observed = [f"{name} = {value}" for name, value in scene.observe.items()]
+    drawn = [f"{name} = {value if isinstance(value, Draw) else 'a list'}" for name, value in scene.draws.items()]
+    count = f", {scene.realisations} realisations" if drawn else ""
+    more = [("sweep", "; ".join(axes)), ("drawn", "; ".join(drawn) + count), ("observed", "; ".join(observed))]
     return [
         ("parameters", _few(numbers)),
         ("start", "; ".join(start)),
         ("time", f"transient {scene.transient:g}, window {scene.window:g} {unit}"),
         ("integrator", f"{scene.integrator}, rtol {scene.rtol:g}, atol {scene.atol:g}"),
+        *(row for row in more if row[1]),
     ]
 
 

@@ -6,7 +6,6 @@ The page is whole in itself: no script, no font, no image comes from elsewhere.
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass
 from html import escape
 
@@ -38,6 +37,9 @@ img,svg,table,math{break-inside:avoid}details{display:none}}
 """
 
 
+DEFAULT = 1.2
+"""Largest strength of the master stability function of a scene without coupling."""
+
 POLICY = (
     '<meta http-equiv="Content-Security-Policy" '
     "content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">"
@@ -51,17 +53,14 @@ class Effort:
 
     Parameters
     ----------
-    alpha : float
-        Largest strength of the master stability function.
     strengths : int
-        Number of strengths.
+        Number of strengths of the master stability function.
     precision, periods : float
         As for `synchain.runtime.exponents`.
     values : int, optional
         Most values of each axis of the sweep; None runs it as it is.
     """
 
-    alpha: float = 1.2
     strengths: int = 241
     precision: float = 1e-3
     periods: float = 5000.0
@@ -80,7 +79,8 @@ def report(
     Parameters
     ----------
     scene : Scene
-        Its axes are the sweep of the report.
+        Its axes are the sweep of the report.  The master stability function covers sigma abs(gamma)
+        of all modes for every sigma of the sweep; without an axis of sigma, up to twice its value.
     effort : Effort, optional
         By default a full one.
     workers : int, optional
@@ -122,30 +122,42 @@ def _stability(scene: Scene, effort: Effort, workers: int | None, show_progress:
     try:
         found = msf(
             scene,
-            np.linspace(0.0, effort.alpha, effort.strengths),
+            _strengths(scene, effort.strengths),
             precision=effort.precision,
             periods=effort.periods,
             workers=workers,
             show_progress=show_progress,
         )
-        return f"{rows_table(found.summary[1:])}{figure(found, 'exponent over strength')}{_ends(found)}"
+        return f"{rows_table(found.summary[1:])}{figure(found.plot(), 'exponent over strength')}{_ends(found)}"
     except (ValueError, FloatingPointError) as problem:
         return f"<p>This scene has none: {escape(str(problem))}</p>"
 
 
+def _strengths(scene: Scene, count: int) -> np.ndarray:
+    """Strengths of all modes over the sweep of sigma, and 0; 0 … 1.2 if sigma is 0 throughout."""
+    fixed = scene.parameters[scene.strength]
+    swept = next((axis.values for axis in scene.axes if axis.name == scene.strength), (2.0 * fixed,))
+    largest = max(abs(value) for value in scene.topology.spectrum.values)
+    low, high = (largest * end(0.0, *swept) for end in (min, max))
+    return np.linspace(low, high if high > low else DEFAULT, count)
+
+
 def _ends(found: MSF) -> str:
     """A sentence if a range goes on beyond the grid."""
-    last = float(found.fine.alpha[-1])
-    beyond = any(math.isclose(high, last) for _, high in found.intervals)
-    return f'<p class="quiet">The range that ends at alpha = {last:g} ends there with the grid.</p>' if beyond else ""
+    ends = {end for interval in found.intervals for end in interval}
+    last = [f"{end:g}" for end in found.fine.alpha[[0, -1]] if end and end in ends]
+    words = " and at ".join(last)
+    return f'<p class="quiet">The range that ends at alpha = {words} ends there with the grid.</p>' if last else ""
 
 
 def _sweep(scene: Scene, effort: Effort, workers: int | None, show_progress: bool | None) -> str:
     """The scene's own sweep, with fewer values if the effort says so."""
     thinned = scene.replace(axes=tuple(_thinned(axis, effort.values) for axis in scene.axes))
     found = run(thinned, workers=workers, show_progress=show_progress)
+    plain = [None] if not scene.observe or {"sync_error", "section"} & set(scene.record) else []
+    pictures = "".join(figure(found.plot(kind=kind), kind or "sweep") for kind in (*plain, *scene.observe))
     words = "" if thinned.cells == scene.cells else f"<p>{thinned.cells} of the scene's {scene.cells} cells.</p>"
-    return f"{words}{rows_table(found.summary[1:3])}{figure(found, 'sweep')}"
+    return f"{words}{rows_table(found.summary[1:3])}{pictures}"
 
 
 def _thinned(axis: Axis, most: int | None) -> Axis:

@@ -23,7 +23,7 @@ from synchain.models.graphs.families import topology
 from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene, a_scene
 
-from ..cells.keywords import ORBITS, Given
+from ..cells.keywords import ONE_CELL, ORBITS, Given
 from ..prediction.intervals import Interval
 from ..results.labelled import Labelled, dataset, ends_of, words_of
 from ..support.arrays import row as row_of
@@ -124,7 +124,8 @@ class Exponents(Labelled):
     def ranges(self) -> tuple[tuple[Interval, Interval], ...]:
         """The intervals as ((low, its uncertainty), (high, its uncertainty)).
 
-        The uncertainty is the standard error over the slope, and 0 at the ends of the grid.
+        The uncertainty is the standard error over the slope, and what the function may bend between
+        two strengths; 0 at the ends of the grid.
 
         Raises
         ------
@@ -141,10 +142,33 @@ class Exponents(Labelled):
             smooth = b - a >= 3 and bool(np.all(np.isfinite(y[a:b])))
             slope = abs(np.polyfit(x[a:b], y[a:b], 1)[0] if smooth else step / (x[i + 1] - x[i]))
             zero = x[i] - y[i] / step * (x[i + 1] - x[i]) if np.isfinite(step) else (x[i] if y[i] >= 0 else x[i + 1])
-            ends.append((float(zero), float(max(error[i], error[i + 1]) / max(slope, 1e-300))))
+            spread = float(max(error[i], error[i + 1]) / max(slope, 1e-300))
+            ends.append((float(zero), spread + _bend(x, y, i, float(zero))))
         if y[-1] < 0:
             ends.append((float(x[-1]), 0.0))
         return tuple(zip(ends[::2], ends[1::2], strict=True))
+
+
+def _bend(x: np.ndarray, y: np.ndarray, i: int, zero: float) -> float:
+    """How far the zero of a bent function may lie from that of the line through points i and i + 1.
+
+    At the share z of the way, a function whose slope changes by J leaves the line by at most
+    J z (1 - z) times the gap, even if it has a kink.  The slopes beside the gap tell J and the least
+    slope at the zero.  Without them, or if they differ in sign, the zero lies anywhere in the gap.
+    """
+    if y[i] == 0.0 or y[i + 1] == 0.0:
+        return 0.0
+    gap = x[i + 1] - x[i]
+    share = (zero - x[i]) / gap
+    before, after = np.searchsorted(x, x[i] - 1e-6 * gap) - 1, np.searchsorted(x, x[i + 1] + 1e-6 * gap)
+    most = float(max(share, 1.0 - share) * gap)
+    if before < 0 or after == len(x) or not np.all(np.isfinite(y[[before, i, i + 1, after]])):
+        return most
+    slopes = np.diff(y[[before, i, i + 1, after]]) / np.diff(x[[before, i, i + 1, after]])
+    least = min(slopes * np.sign(slopes[1]))
+    return (
+        min(most, float(share * (1.0 - share) * gap * np.abs(np.diff(slopes)).sum() / least)) if least > 0.0 else most
+    )
 
 
 def exponents(
@@ -273,9 +297,9 @@ def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
         Relative tolerance.
     """
     if a_scene(scene).model.linked:
-        coupled = scene.replace(axes=(), zipped=False, continuation="none")
+        coupled = scene.replace(**ONE_CELL)
     else:
-        coupled = scene.replace(topology=topology("chain", 2), axes=(), zipped=False, continuation="none")
+        coupled = scene.replace(topology=topology("chain", 2), **ONE_CELL)
         expect_vanishing("a lone oscillator gets a partner", coupled.equations)
     return single_cell(given, coupled, rtol)
 
@@ -299,7 +323,7 @@ def single_cell(given: Given, scene: Scene, rtol: float) -> Scene:
     ValueError
         If a parameter is unknown.
     """
-    return given.scene(scene, axes=(), zipped=False, continuation="none", record=(), rtol=rtol, atol=None)
+    return given.scene(scene, **ONE_CELL, rtol=rtol, atol=None)
 
 
 def initial_states(scene: Scene, starts: int, seed: int) -> np.ndarray:

@@ -106,10 +106,11 @@ class Lyapunov(Labelled):
     def summary(self) -> tuple[tuple[str, str], ...]:
         """The exponents with errors, their sum, the dimension and the length of the average."""
         shown = [f"{x:.5g} ± {e:.1g}" for x, e in zip(self.exponent[:8], self.stderr[:8], strict=True)]
+        low, high = self.dimension_range
         return (
             ("exponents", ", ".join([*shown, *(["…"] if len(self.exponent) > len(shown) else [])])),
             ("divergence", f"{self.divergence:.5g} ± {self.divergence_error:.1g}"),
-            ("Kaplan-Yorke dimension", f"{self.dimension:.4g}"),
+            ("Kaplan-Yorke dimension", f"{self.dimension:.4g}, from {low:.4g} to {high:.4g} within two errors"),
             ("average", f"{self.time:.6g} units of time"),
         )
 
@@ -122,16 +123,33 @@ class Lyapunov(Labelled):
     def dimension(self) -> float:
         """Kaplan-Yorke dimension; nan if too few exponents are known.
 
+        A negative exponent within its standard error counts as 0, as that along a periodic orbit is,
+        whose dimension is 1. `dimension_range` says what the errors leave open.
+
         References
         ----------
         Kaplan & Yorke, Springer Lecture Notes in Mathematics 730, 204 (1979).
         """
-        sums = np.cumsum(self.exponent)
+        zero = (self.exponent < 0.0) & (-self.exponent <= self.stderr) & np.isfinite(self.stderr)
+        return self._dimension(np.where(zero, 0.0, self.exponent))
+
+    @property
+    def dimension_range(self) -> tuple[float, float]:
+        """Kaplan-Yorke dimension of the exponents less, and plus, two standard errors.
+
+        It rises with each exponent, so that all exponents within their errors give dimensions between.
+        """
+        return self._dimension(self.exponent - 2.0 * self.stderr), self._dimension(self.exponent + 2.0 * self.stderr)
+
+    def _dimension(self, exponent: np.ndarray) -> float:
+        """The dimension that some exponents give."""
+        exponent = -np.sort(-exponent)
+        sums = np.cumsum(exponent)
         below = np.flatnonzero(sums < 0.0)
         if len(below) == 0:
             return float(self.components) if len(sums) == self.components else math.nan
         k = int(below[0])
-        return k + (float(sums[k - 1] / -self.exponent[k]) if k else 0.0)
+        return k + (float(sums[k - 1] / -exponent[k]) if k else 0.0)
 
 
 def lyapunov_spectrum(

@@ -74,7 +74,7 @@ class MSF(Labelled):
                 "exponent": (("alpha",), self.exponent, "largest transversal exponent per unit of time"),
                 "stderr": (("alpha",), self.stderr, "standard error of the exponent"),
                 "interval": (("range", "end"), np.reshape(self.intervals, (-1, 2)), "alpha with a negative exponent"),
-                "interval_error": (("range", "end"), np.reshape(self.uncertainties, (-1, 2)), "standard errors"),
+                "interval_error": (("range", "end"), np.reshape(self.uncertainties, (-1, 2)), "errors of the ends"),
                 "window": (
                     ("window_number", "end"),
                     np.reshape([(w.low, w.high) for w in self._known_windows], (-1, 2)),
@@ -92,17 +92,24 @@ class MSF(Labelled):
             ("scene", repr(self.scene)),
             ("class", f"{self.kind}, for alpha {ends_of(self.fine.alpha)}"),
             ("negative for alpha", words_of(self.intervals, self.errors)),
-            ("sigma", words_of([(w.low, w.high) for w in self._known_windows])),
+            ("sigma", self._without_windows or words_of([(w.low, w.high) for w in self._known_windows])),
             ("motion", ", ".join(dict.fromkeys(self.attractors))),
             ("average", f"{self.fine.time:.6g} units of time for each of {self.fine.starts} starts"),
         )
 
     @property
     def _known_windows(self) -> tuple[Window, ...]:
-        """The windows; none if the network is a single node or has complex eigenvalues."""
+        """The windows, none where nothing is known of them."""
+        return () if self._without_windows else self.windows
+
+    @property
+    def _without_windows(self) -> str:
+        """Why nothing is known of windows; empty if they are known."""
         graph = self.scene.topology
+        if not graph.link_count:
+            return "not known: no links"
         real = graph.undirected or not any(isinstance(value, complex) for value in graph.spectrum.values)
-        return self.windows if graph.link_count and real else ()
+        return "" if real else f"not known: {graph.name}({graph.n}) has complex eigenvalues, which need `plane`"
 
     @property
     def exponent(self) -> np.ndarray:
@@ -125,7 +132,7 @@ class MSF(Labelled):
 
     @property
     def uncertainties(self) -> tuple[Interval, ...]:
-        """Standard errors of the ends of the intervals; 0 at an end of the grid."""
+        """Errors of the ends of the intervals, of averages and of interpolation; 0 at an end of the grid."""
         return tuple((low, high) for (_, low), (_, high) in self.fine.ranges)
 
     @property

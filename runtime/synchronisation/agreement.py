@@ -23,7 +23,7 @@ from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 
-from ..cells.keywords import Given
+from ..cells.keywords import ONE_CELL, Given
 from ..stability.exponents import Exponents, exponents
 from ..support.execution import Execution
 from ..support.progress import Hook
@@ -146,8 +146,7 @@ def agreement(
         If the line lacks a strength, or if sigma is negative, not finite or does not increase; as
         `strengths` does.
     """
-    fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ()}
-    scene = Given(agreement, parameters, more, IN_CRITERION).scene(scene, **fixed)
+    scene = Given(agreement, parameters, more, IN_CRITERION).scene(scene, **ONE_CELL)
     expect_vanishing("agreement", scene.equations)
     check_probe(scene.topology, scene.spectrum)
     scene = scene.replace(record=("sync_error",))

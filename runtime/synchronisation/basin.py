@@ -20,7 +20,7 @@ from synchain.models.inputs.checks import check_integer, check_number, check_tab
 from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene, a_scene
 
-from ..cells.keywords import Given
+from ..cells.keywords import ONE_CELL, Given
 from ..cells.plan import Planner
 from ..cells.reduce import reduce_scene
 from ..results.labelled import Labelled, dataset
@@ -173,7 +173,7 @@ def basin(
     """
     _check(scene, samples, tolerance, confidence, seed)
     execution = Execution(workers, executor, show_progress, progress)
-    fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ("sync_error",)}
+    fixed = {**ONE_CELL, "record": ("sync_error",)}
     scene = Given(basin, parameters, more).scene(scene, **fixed, transient=transient, window=window)
     planner = Planner(random_starts(scene, samples, ranges, seed))
     whole = replace(reduce_scene(planner.scene, reduce=False), jumps=True)

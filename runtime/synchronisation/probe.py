@@ -28,7 +28,7 @@ from synchain.models.mechanics.components import Edge
 from synchain.models.scenes.scene import Scene
 
 from ..cells.choice import chosen_for_rows
-from ..cells.keywords import Given
+from ..cells.keywords import ONE_CELL, Given
 from ..cells.plan import Plan, Planner, control_of
 from ..results.labelled import Labelled, dataset, ends_of
 from ..support.arrays import numbers
@@ -137,12 +137,9 @@ def universal_probe(
     real, imaginary = _broadcast(alpha, beta)
     scene = Given(universal_probe, parameters, more, IN_CRITERION).scene(scene)
     ring = scene.replace(
+        **{**ONE_CELL, "record": ("sync_error",)},
         topology=topology("ring", 3),
         initial=None,
-        axes=(),
-        zipped=False,
-        continuation="none",
-        record=("sync_error",),
         transient=criterion.transient,
         window=criterion.window,
         rtol=criterion.rtol,

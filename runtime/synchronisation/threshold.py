@@ -25,7 +25,7 @@ from synchain.models.inputs.checks import check_instance, check_integer, check_n
 from synchain.models.scenes.scene import Scene, a_scene
 from synchain.models.spectra.spectrum import Spectrum
 
-from ..cells.keywords import Given
+from ..cells.keywords import ONE_CELL, Given
 from ..cells.plan import Planner
 from ..cells.reduce import reduce_scene
 from ..prediction.intervals import Interval, intersect, refine, scale
@@ -150,7 +150,7 @@ class Thresholds(Labelled):
                     name: ((f"{name}_number", "end"), np.reshape(ends, (-1, 2)), meaning)
                     for name, (ends, meaning) in ranges.items()
                 },
-                "window_error": (("window_number", "end"), np.reshape(found.errors, (-1, 2)), "standard errors"),
+                "window_error": (("window_number", "end"), np.reshape(found.errors, (-1, 2)), "errors of the ends"),
             },
             {"sigma": self.direct.x, "alpha": self.probe.x, "end": ["low", "high"]},
             self.scene,
@@ -207,7 +207,7 @@ def thresholds(
     Parameters
     ----------
     scene : Scene
-        The network; its axes and records are not used.
+        The network; its axes, records, observables, sections and stop are not used.
     sigma : sequence of float, optional
         An increasing grid on which ranges are looked for (default: `default_grid`); narrower ranges
         are not seen.  The probe's grid in alpha covers every sigma abs(gamma).
@@ -236,8 +236,7 @@ def thresholds(
     """
     a_scene(scene).equations.expect_alike("thresholds")
     expect_vanishing("thresholds", scene.equations)
-    fixed = {"axes": (), "zipped": False, "continuation": "none", "record": ()}
-    scene = Given(thresholds, parameters, more, IN_CRITERION).scene(scene, **fixed)
+    scene = Given(thresholds, parameters, more, IN_CRITERION).scene(scene, **ONE_CELL)
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     spectrum = scene.topology.spectrum
     check_probe(scene.topology, spectrum)
@@ -249,7 +248,7 @@ def thresholds(
     stable = exponent_windows(scene, alpha, execution, precision, periods, criterion.seed)
     pair = probe(scene, alpha, criterion, resolution, execution)
     direct = simulate(scene, grid, criterion, resolution, execution)
-    predicted = project(pair.intervals, spectrum, float(grid[-1]))
+    predicted = project(pair.intervals, spectrum, float(grid[-1]), float(grid[0]))
     return Thresholds(scene, pair, tuple(predicted), direct, criterion, stable, scene.warnings)
 
 
@@ -266,8 +265,8 @@ def _probe_grid(sigma: np.ndarray, spectrum: Spectrum) -> np.ndarray:
     one every 0.01.
     """
     sizes = [abs(value) for value in spectrum.values if abs(value) > 0.0]
-    low = 0.0 if 0.0 in sigma or spectrum.multiplicities[0] > 1 else sigma[0] * min(sizes)
-    high = sigma[-1] * max(sizes)
+    ends = np.outer(sigma[[0, -1]], [min(sizes), max(sizes), *([0.0] if spectrum.multiplicities[0] > 1 else [])])
+    low, high = ends.min(), ends.max()
     return np.linspace(low, high, max(len(sigma), math.ceil((high - low) / 0.01) + 1, 2))
 
 
@@ -395,15 +394,17 @@ def cells_of(scene: Scene, sigma: np.ndarray, criterion: Criterion) -> Scene:
     )
 
 
-def project(ranges: Sequence[Interval], spectrum: Spectrum, highest: float = math.inf) -> list[Interval]:
-    """The sigma for which every transversal |sigma gamma_k| lies in one of the ranges of alpha, up
-    to `highest`.
+def project(
+    ranges: Sequence[Interval], spectrum: Spectrum, highest: float = math.inf, lowest: float = 0.0
+) -> list[Interval]:
+    """The sigma from `lowest` to `highest` for which every transversal sigma |gamma_k| lies in one of
+    the ranges of alpha.
 
     One zero eigenvalue belongs to the synchronous motion itself.  Every further one is a part of
     the network that nothing couples to the rest: it asks that alpha = 0 be in a range (identical
     oscillators that the drive alone locks).
     """
-    allowed: list[Interval] = [(0.0, highest)]
+    allowed: list[Interval] = [(lowest, highest)]
     for value, multiplicity in zip(spectrum.values, spectrum.multiplicities, strict=True):
         if abs(value) > 0.0:
             allowed = intersect(allowed, scale(ranges, 1.0 / abs(value)))

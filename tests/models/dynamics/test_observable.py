@@ -59,7 +59,7 @@ def test_observables_and_their_texts(observable: object, text: str) -> None:
         ("mean(log(-1)*x)", "expected a real value"),
         ("mean(x.y)", "expected numbers, names"),
         ("mean(__import__('os'))", "unknown function '__import__'"),
-        ("mean(x if x > 0 else v)", "expected numbers, names"),
+        ("mean(x if x > 0 else v)", "found the condition x > 0; expected a value"),
         ("mean((lambda: x)())", "expected numbers, names"),
         ("mean(nodes.sum(x, v))", "has 2 arguments"),
         ("mean(" * 70 + "x" + ")" * 70, ""),

@@ -231,6 +231,11 @@ def test_floats_mean_their_shortest_decimal() -> None:
         (sp.zeros(2, 3), ValueError, "row 1 has 3 entries; expected 2"),
         ([[-1, 1], [1, 0]], ValueError, "row 2 sums to 1; expected 0, or the synchronous state"),
         ([[-1, 1], [1, 0]], ValueError, "set its diagonal entry 0 to -1"),
+        (
+            [[0, 1], [1, 0]],
+            ValueError,
+            "of an adjacency matrix take from_sparse(scipy.sparse.coo_array(A), adjacency=True)",
+        ),
         ([[-1, "1/3"], [1, -1]], ValueError, "row 1 sums to -2/3"),
         ([[0, float("nan")], [0, 0]], ValueError, "entry (1, 2) is nan, not finite"),
         ([[0, 0], [float("-inf"), 0]], ValueError, "entry (2, 1) is -inf, not finite"),

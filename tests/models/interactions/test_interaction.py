@@ -66,6 +66,11 @@ def test_equal_contents_make_equal_couplings() -> None:
     assert Rates({TARGET.theta: K * W * sp.sin(SOURCE.theta - TARGET.theta)}, {K: 0}) != KURAMOTO
 
 
+def test_links_are_said_by_expressions_or_by_text() -> None:
+    assert Rates({"theta": "K*W*sin(theta_j - theta_i - lag)"}, {"K": 0, "lag": 0.1}) == KURAMOTO
+    assert Potential("-G*W*m_i*m_j/sqrt((x_i - x_j)**2 + (y_i - y_j)**2)", {"G": 1}) == GRAVITY
+
+
 def test_decimals_are_exact() -> None:
     (rate,) = Rates({TARGET.theta: 0.1 * W * (SOURCE.theta - 0.3 * TARGET.theta)}).rates.values()
     assert not rate.atoms(sp.Float)
@@ -76,11 +81,13 @@ def test_decimals_are_exact() -> None:
     ("made", "message"),
     [
         (lambda: Rates({}), "found none; expected one at least"),
-        (lambda: Rates({"theta": W}), r"found the key 'theta' \(str\); expected a state of the target, e.g. i.x"),
+        (lambda: Rates({1: W}), r"found the key 1 \(int\); expected a state of the target, e.g. i.x"),
+        (lambda: Rates({"theta": W, TARGET.theta: W}), "the rate of 'theta' is given twice; expected it once"),
+        (lambda: Rates({"theta": "W*(theta_j -"}), "unreadable expression"),
+        (lambda: Rates({"theta": "W*(theta_j - theta)"}), "undeclared symbol 'theta'"),
         (lambda: Rates({SOURCE.theta: W}), "found the rate of 'theta_j'; expected a state of the target"),
         (lambda: Rates({TARGET.theta: sp.S.Zero * W}), "nothing uses the weight"),
         (lambda: Rates({TARGET.theta: W, TARGET.p: sp.S.Zero}), "the rate of 'p' is 0"),
-        (lambda: Rates({TARGET.theta: "W"}), "undeclared symbol 'W'"),
         (lambda: Rates({TARGET.theta: K * W}), "undeclared symbol 'K'; expected .* give it a default"),
         (lambda: Rates({TARGET.theta: W}, {K: 1}), "nothing uses the parameter 'K'"),
         (
@@ -153,7 +160,7 @@ def test_text_and_expression_are_one(e: str) -> None:
      "sin()", "sin(x, y)", "lambda: 1", "1/0", "sqrt(-1)", "x" * 25000, "-" * 150 + "x", "sin", "x**1001"],
 )  # fmt: skip
 def test_hostile_texts_are_refused(text: str) -> None:
-    with pytest.raises(ValueError, match=r"\Acoupling: rate of x: "):
+    with pytest.raises(ValueError, match=r"\Arates of a link: rate of x: "):
         from_table("coupling", {"rates": {"x": text}})
 
 
@@ -185,7 +192,7 @@ def test_a_scene_with_a_table_goes_to_a_dictionary_and_back() -> None:
         ({"rates": {"x": "W*x_j"}, "potential": "W"}, "expected either 'rates' or 'potential'"),
         ({"parameters": {}}, "expected either 'rates' or 'potential'"),
         ({"rates": {"x": "W*x_j"}, "strength": 1}, "found 'rates', 'strength'; expected either"),
-        ({"rates": {"x": 1}}, "coupling: rate of x: found 1"),
+        ({"rates": {"x": 1}}, "nothing uses the weight of a link"),
         (
             {"rates": {"x": "K*W"}, "parameters": {"K": {"value": 1}}},
             "parameter K: unknown key 'value'; known: default",

@@ -88,7 +88,7 @@ def test_equal_numbers_are_equal_nodes() -> None:
     ("given", "message"),
     [
         ({"delta": [0.1, 0.2]}, "parameter 'delta': found 2 values for 3 oscillators; expected 3 values or one number"),
-        ({"delta": range(5)}, "found more than 3 values"),
+        ({"delta": range(5)}, "found 5 values for 3 oscillators"),
         ({"delta": {0.1, 0.2, 0.3}}, "a set, which has no order"),
         ({"sigma": [0.1, 0.2, 0.3]}, "'sigma' belongs to the links, which share it; expected one number"),
         ({"delta_4": 0.1}, "unknown parameter 'delta_4'"),

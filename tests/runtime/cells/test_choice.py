@@ -152,6 +152,8 @@ def test_a_singularity_is_not_called_stiff():
         warnings.simplefilter("error")
         found = run(blowing, c=[0.0, 2.0], show_progress=False)
     assert found.status.values.tolist() == [Status.DIVERGED, Status.FINISHED]
+    with pytest.warns(RuntimeWarning, match=r"^a state grew to .* in 60 Taylor steps of a cell; expected a bounded"):
+        run(blowing.replace(max_steps=60), show_progress=False)
 
 
 def test_modes_that_become_stiff_are_said():

@@ -413,12 +413,12 @@ def test_thresholds_of_a_scene_of_a_matrix_and_of_other_graphs(
     own = matrix(tmp_path, "-2 2\n2 -2")
     (tmp_path / "ring.toml").write_text('topology = {name = "ring", n = 3}')
     for words in (
-        "--scene figure_6 --transient 50 --starts 3",
-        "--scene figure_6 --n 4 --topology ring --omega 1.2",
+        "figure_6 --transient 50 --starts 3",
+        "figure_6 --n 4 --topology ring --omega 1.2",
         f"--matrix {own} --omega 1.15",
-        "--scene harmonic_chain",
-        f"--scene {tmp_path}/ring.toml --n 5",
-        "--scene figure_6 --topology ring",
+        "harmonic_chain",
+        f"{tmp_path}/ring.toml --n 5",
+        "figure_6 --topology ring",
     ):
         assert main(["thresholds", *words.split(), "--json"]) == 0
     graphs = [(a["scene"].topology.name, a["scene"].n, a["scene"].angular_frequency) for a in asked]
@@ -550,10 +550,10 @@ WRONG = [
     ("thresholds --n 4 --omega 1.15 --sigma 0:0.5", "expected LO:HI:N"),
     ("thresholds --n 4 --omega 1.15 --sigma=-1:0.5:4", "at least 0"),
     ("thresholds --n 2 --matrix {own} --omega 1.15", "the matrix alone"),
-    ("thresholds --scene figure_3", "--omega"),
-    ("thresholds --scene harmonic_chain --omega 1", "not driven"),
+    ("thresholds figure_3", "--omega"),
+    ("thresholds harmonic_chain --omega 1", "not driven"),
     ("figures nope", "unknown figure 'nope'"),
-    ("figures 4b --out {scene}", "cannot make the folder"),
+    ("figures 4b --out {scene}", "the name of a file; expected a folder"),
     ("cache empty", "invalid choice"),
     ("bench nope", "unknown benchmark 'nope'; known: agreement, "),
 ]

@@ -67,7 +67,7 @@ CASES = [
     ("synchain run mi", {"mine.toml"}, {"mine.txt"}),
     ("synchain spectrum s", {"star", "small_world"}, {"chain"}),
     ("synchain msf --topology r", {"ring"}, {"star"}),
-    ("synchain thresholds --scene two", {"two_oscillators"}, set()),
+    ("synchain thresholds two", {"two_oscillators"}, set()),
     ("synchain run --c", {"--certify"}, {"--rtol"}),
     ("synchain cache ", {"info", "clear", "warm"}, {"figure_4a"}),
     ("synchain new ", {"friction", "topology", "oscillator", "coupling"}, set()),

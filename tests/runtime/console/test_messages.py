@@ -21,7 +21,7 @@ from synchain.runtime.cells.kernels import warn_of_chords, write_kernel
 from synchain.runtime.cells.reduce import reduce_scene
 from synchain.runtime.cli import main
 from synchain.runtime.commands.run import _nothing_to_do
-from synchain.runtime.console.arguments import grid, spaced
+from synchain.runtime.console.arguments import spaced
 from synchain.runtime.sweeps import job
 from synchain.runtime.sweeps.certify import check_certifiable
 from synchain.runtime.sweeps.run import run
@@ -94,7 +94,7 @@ def test_a_hint_shows_the_option_that_was_used(words, expected, tmp_path, capsys
 def test_grids_of_the_command_line_have_the_limit_of_an_axis():
     assert len(spaced("0:1:200001")) == 200001
     with pytest.raises(ArgumentTypeError, match="expected at most 10000000"):
-        grid("0:1:10000001")
+        spaced("0:1:10000001")
 
 
 def test_a_sweep_that_does_not_fit_is_refused_before_memory_is_taken():

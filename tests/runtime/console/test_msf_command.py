@@ -381,7 +381,7 @@ WRONG = [
     ("--omega 1.4 --n 3 --matrix {own}", "the matrix alone"),
     ("--omega 1.4 --matrix {laplacian}", "negate it"),
     ("--omega 1.4 --matrix {own}.missing", "missing"),
-    ("figure_8 --out {own}", "cannot make the folder"),
+    ("figure_8 --out {own}", "the name of a file; expected a folder"),
     ("{alone}", "the scene has no coupling, by which modes differ"),
 ]
 

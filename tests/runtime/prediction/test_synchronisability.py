@@ -97,9 +97,30 @@ def test_one_range_is_lost_by_the_slowest_mode_below_and_the_fastest_above() -> 
 
 
 def test_ends_at_zero_and_infinity_have_no_mode_and_no_error() -> None:
-    (found,) = windows([(-1.0, math.inf)], topology("ring", 5), [(0.1, 0.1)])
+    (found,) = windows([(0.0, math.inf)], topology("ring", 5), [(0.1, 0.1)])
     assert (found.low, found.high, found.low_mode, found.high_mode) == (0.0, math.inf, None, None)
     assert (found.low_error, found.high_error) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("ranges", [[(-3.5, -1.0), (-0.4, 0.9)], [(-2.0, 0.0)], [(-9.0, -0.5), (1.0, 4.0)]])
+def test_negative_sigma_is_served_by_negative_alpha(ranges: list[tuple[float, float]]) -> None:
+    graph = topology("chain", 3)  # sigma and 3 sigma
+    errors = [(0.01 * k, 0.02 * k) for k in range(1, 1 + len(ranges))]
+    found = windows(ranges, graph, errors)
+    back = windows([(0.0 - b, 0.0 - a) for a, b in ranges[::-1]], graph, [e[::-1] for e in errors[::-1]])
+    ends = [(w.high, w.low, w.high_error, w.low_error, w.high_mode, w.low_mode) for w in back[::-1]]
+    assert [(-w.low, -w.high, w.low_error, w.high_error, w.low_mode, w.high_mode) for w in found] == ends
+    expected = project(ranges, graph.spectrum, math.inf, -math.inf)
+    assert [list(p) for p in pieces(found)] == [pytest.approx(list(p), rel=1e-14) for p in expected]
+
+
+def test_a_window_across_zero_is_one() -> None:
+    (found,) = windows([(-0.6, 1.2)], topology("chain", 3), [(0.3, 0.6)])
+    assert (found.low, found.high) == pytest.approx((-0.2, 0.4))
+    assert (found.low_error, found.high_error) == pytest.approx((0.1, 0.2))
+    assert found.low_mode is not None
+    assert found.low_mode == found.high_mode
+    assert found.low_mode.size == 3.0
 
 
 def test_parts_that_nothing_couples_ask_for_stability_at_zero() -> None:

@@ -15,6 +15,7 @@ from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.figures import result_plot, style
 from synchain.runtime.results.result import Result
+from synchain.runtime.sweeps.run import run
 
 SWEPT = {"error": {"sigma": (0.3, 0.1, 0.2)}, "map": {"omega": (1.0, 1.1), "sigma": (0.1, 0.2, 0.3)}}
 
@@ -109,3 +110,23 @@ def test_rounding_is_drawn_as_zero(pair: Callable[..., Result]) -> None:
     assert result_plot.draw_result(result).get_ylim()[1] > 0.01
     result.data["sync_error"] = result.data.sync_error * 0.0 + 1e-14
     assert result_plot.draw_result(result).get_ylim() == pytest.approx((-5e-11, 1e-9))
+
+
+def test_observables_are_drawn_by_name_and_where_nothing_else_is_recorded() -> None:
+    scene = Scene("harmonic", "spring", chain(2), record=(), transient=0, window=1, observe={
+        "error": "end(nodes.mean(x))", "own": "end(x)"}, axes={"sigma": (0.3, 0.1, 0.2)})  # fmt: skip
+    found = run(scene, show_progress=False)
+    axes = result_plot.draw_result(found)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (r"$\sigma$", "error")
+    x, y = axes.lines[0].get_data()
+    assert list(x) == [0.1, 0.2, 0.3]
+    assert list(y) == list(found.data["error"].values[[1, 2, 0]])
+    assert len(result_plot.draw_result(found, kind="own").lines) == 2
+    with pytest.raises(ValueError, match=r"unknown kind of plot 'owm'; known: .*did you mean 'own'"):
+        result_plot.draw_result(found, kind="owm")
+    several = run(scene, realisations=4, draws={"x": "uniform(-1, 1)"}, show_progress=False)
+    lines = result_plot.draw_result(several).lines
+    assert len(lines) == 5
+    np.testing.assert_allclose(lines[-1].get_ydata(), several.data["error"].values[[1, 2, 0]].mean(axis=1))
+    with_error = run(scene.replace(record=("sync_error",), observe={"own": "end(x)"}), show_progress=False)
+    assert result_plot.draw_result(with_error).get_ylabel() == "average synchronisation error"

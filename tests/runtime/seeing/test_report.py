@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from synchain.models.graphs.families import topology
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cli import main
-from synchain.runtime.seeing.report import Effort, report
+from synchain.runtime.seeing.page import provenance_rows
+from synchain.runtime.seeing.report import Effort, _strengths, report
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")
@@ -98,6 +100,53 @@ def test_the_command_writes_the_page(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert target.read_text("utf-8").startswith("<!DOCTYPE html>")
     assert main(["report", "figure_1b", "--out", str(tmp_path)]) == 2
     assert "is a folder" in capsys.readouterr().err
+    for name in ("page.pdf", "page"):
+        assert main(["report", "figure_1b", "--out", str(tmp_path / name)]) == 2
+        assert "expected .html" in capsys.readouterr().err
+        assert not (tmp_path / name).exists()
+
+
+def test_a_file_that_is_no_scene_is_said_to_be_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("result.nc").write_bytes(b"CDF")
+    assert main(["report", "result.nc", "--out", "page.html"]) == 2
+    assert "found a file of another kind; expected a scene, whose name ends in .toml" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("changes", "ends"),
+    [
+        ({"sigma": 0.1}, (0.0, 0.6)),
+        ({"sigma": -0.1}, (-0.6, 0.0)),
+        ({"sigma": 0.0}, (0.0, 1.2)),
+        ({"axes": {"sigma": [0.2, 0.5]}}, (0.0, 1.5)),
+        ({"axes": {"omega": [1.0, 2.0], "sigma": [-0.2, 0.1]}}, (-0.6, 0.3)),
+    ],
+)
+def test_strengths_are_those_of_the_sweep(changes: dict[str, object], ends: tuple[float, float]) -> None:
+    line = _strengths(Scene("duffing", "x->v", topology("chain", 3)).replace(**changes), 5)
+    assert (line[0], line[-1], len(line)) == (*map(pytest.approx, ends), 5)
+
+
+@pytest.mark.parametrize(("record", "pictures"), [(("sync_error",), 3), ((), 2)])
+def test_observables_and_the_sweep_are_shown(record: tuple[str, ...], pictures: int) -> None:
+    scene = Scene(
+        "harmonic", "spring", topology("chain", 2), record=record, transient=1, window=1, axes={"sigma": [0.1, 0.2]},
+        observe={"place": "mean(nodes.mean(x))"},
+    )  # fmt: skip
+    page = report(scene, FAST, show_progress=False)
+    assert page.count("<img ") == pictures
+    assert page.count('alt="place"') == 1
+    assert "sigma from 0.1 to 0.2, 2 values" in page
+    assert "place = mean(nodes.mean(x))" in page
+
+
+def test_what_is_drawn_is_said() -> None:
+    scene = Scene(topology=topology("chain", 2), realisations=3, draws={"x": "uniform(0, 1)", "omega": [1, 1.1, 1.2]})
+    assert dict(provenance_rows(scene))["drawn"] == "x = uniform(0.0, 1.0); omega = a list, 3 realisations"
+    assert "drawn" not in dict(provenance_rows(scene.replace(realisations=0, draws=None)))
 
 
 @needs_browser

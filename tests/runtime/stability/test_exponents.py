@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.averages import Batches
-from synchain.runtime.stability.exponents import exponents
+from synchain.runtime.stability.exponents import Exponents, exponents
 from synchain.runtime.stability.interpolation import combine, strength_interpolation
 from synchain.runtime.stability.msf import classify, msf, plane
 
@@ -87,6 +88,36 @@ def test_an_interpolation_is_as_good_as_its_check_says() -> None:
             assert errors[-1] < 30 * made.error(own) + 1e-12
         assert errors[0] > 1e-3
         assert errors[-1] < 1e-6
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.0003, 0.0007])
+@pytest.mark.parametrize(
+    ("function", "zero", "power"),
+    [
+        (lambda x: np.sqrt(2.0 - x) - 1.0, 1.0, 2),
+        (lambda x: np.exp(x) - 3.0, math.log(3.0), 2),
+        (lambda x: np.where(x < 0.9995, 0.1 * (x - 0.9996), 3.0 * (x - 0.9995) - 1e-5), 0.9995 + 1e-5 / 3, 1),
+    ],
+    ids=["root", "exp", "kink"],
+)
+def test_the_error_of_a_zero_covers_what_lies_between_two_strengths(function, zero, power, shift) -> None:
+    for gap, uneven in ((0.002, False), (0.01, False), (0.01, True)):
+        alpha = np.arange(0.5 + shift, 1.5, gap)
+        if uneven:  # as msf joins the strengths that were asked for and those of its fine grid
+            alpha = np.union1d(alpha, np.nextafter(alpha[::3], 9.0))
+        still = np.zeros(len(alpha))
+        found = Exponents(alpha, function(alpha), still, 1.0, 1, function(alpha)[None])
+        ((end, error),) = [end for pair in found.ranges for end in pair if end[0] not in (alpha[0], alpha[-1])]
+        assert abs(end - zero) <= error + 1e-15
+        assert error <= gap**power
+
+
+def test_a_zero_without_neighbours_lies_anywhere_between_two_strengths() -> None:
+    alpha, exponent = np.array([0.0, 1.0]), np.array([-1.0, 3.0])
+    (((_, none), (end, error)),) = Exponents(alpha, exponent, np.zeros(2), 1.0, 1, exponent[None]).ranges
+    assert (none, end, error) == (0.0, 0.25, 0.75)
+    exponent = np.array([0.0, -1.0])
+    assert Exponents(alpha, exponent, np.zeros(2), 1.0, 1, exponent[None]).ranges == (((0.0, 0.0), (1.0, 0.0)),)
 
 
 @pytest.mark.long
@@ -238,3 +269,17 @@ def test_functions_of_strength_take_the_keywords_of_exponents(function: Callable
         return [p for p in inspect.signature(of).parameters.values() if p.kind in (p.KEYWORD_ONLY, p.VAR_KEYWORD)]
 
     assert keywords(function) == keywords(exponents)
+
+
+def test_draws_of_a_scene_are_refused() -> None:
+    drawn = scene("harmonic", "damper").replace(realisations=3, draws={"sigma": "uniform(0, 1)"})
+    with pytest.raises(ValueError, match="msf: found draws of sigma; expected a scene without them"):
+        msf(drawn, [0.0, 1.0])
+
+
+def test_windows_of_complex_eigenvalues_are_said_to_be_unknown() -> None:
+    """Not "none": a line of real strengths says nothing about them."""
+    found = msf(scene("harmonic", "damper").replace(topology=topology("one_way_ring", 3)), [0.0, 1.0])
+    assert dict(found.summary)["sigma"] == "not known: one_way_ring(3) has complex eigenvalues, which need `plane`"
+    assert found.data.sizes["window_number"] == 0
+    assert dict(msf(scene("harmonic", "damper"), [0.0, 1.0]).summary)["sigma"] == "0.0000 … 0.5000"

@@ -151,6 +151,26 @@ def test_dimension_by_hand() -> None:
     assert np.isnan(of(1.0, 0.0))
 
 
+@pytest.mark.parametrize(
+    ("exponents", "errors", "dimension", "span"),
+    [
+        ((-6e-6, -0.5), (4e-4, 1e-3), 1.0, (0.0, 1.0 + 7.94e-4 / 0.498)),
+        ((1e-6, -2e-6, -0.5), (1e-4, 1e-4, 1e-3), 2.0 + 1e-6 / 0.5, (0.0, 2.0 + 3.99e-4 / 0.498)),
+        ((-2e-3, -0.5), (4e-4, 1e-3), 0.0, (0.0, 0.0)),
+        ((0.09, 2e-5, -9.0), (2e-3, 1e-4, 0.1), 2.0 + 0.09002 / 9.0, (2.0 + 0.08582 / 9.2, 2.0 + 0.09422 / 8.8)),
+        ((0.2, -0.5), (np.inf, np.inf), 1.4, (0.0, 2.0)),
+    ],
+)
+def test_the_errors_of_exponents_are_those_of_the_dimension(
+    exponents: tuple[float, ...], errors: tuple[float, ...], dimension: float, span: tuple[float, float]
+) -> None:
+    values = np.array(exponents), np.array(errors), np.ones(len(errors), dtype=bool)
+    found = Lyapunov(*values, 0.0, 0.0, 1.0, 1.0, len(errors))
+    assert found.dimension == pytest.approx(dimension, rel=1e-12)
+    assert found.dimension_range == pytest.approx(span, rel=1e-12)
+    assert dict(found.summary)["Kaplan-Yorke dimension"].startswith(f"{dimension:.4g}, from {span[0]:.4g} to ")
+
+
 def test_what_is_refused() -> None:
     with pytest.raises(ValueError, match="count = 3; expected 1 … 2"):
         lyapunov_spectrum(lone("duffing"), count=3)

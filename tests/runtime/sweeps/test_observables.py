@@ -22,6 +22,7 @@ from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import stream
 
 x, v, x_1, v_1, theta, t = sp.symbols("x v x_1 v_1 theta t")
+T = np.linspace(0.0, 20.0, 2_000_001)
 ERROR = sp.sqrt((x - x_1) ** 2 + (v - v_1) ** 2)
 
 
@@ -110,7 +111,27 @@ def test_kinks_are_found(integrator: str) -> None:
     assert float(found.data["size"][0]) == pytest.approx(2 / math.pi, abs=1e-8)
     assert float(found.square[0]) == pytest.approx(0.5, abs=1e-10)
     assert float(found.swing[0]) == pytest.approx(0.5, abs=1e-10)
-    assert 0.97 < float(found.top[0]) <= 1.0 + 1e-12
+    assert float(found.top[0]) == pytest.approx(1.0, abs=1e-11)
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "rodas5p", pytest.param("dop853", marks=pytest.mark.long)])
+def test_extremes_between_the_points_of_the_rule_are_found(integrator: str) -> None:
+    """Of x = cos t and v = -sin t, smooth ones within the tolerance and one with a kink nearly so."""
+    closed = {
+        "low": ("minimum(x)", -1.0),
+        "product": ("maximum(abs(x*v))", 0.5),
+        "ripple": ("minimum(x + sin(5*t)/20)", float(np.min(np.cos(T) + np.sin(5 * T) / 20))),
+        "kink": ("minimum(max(x, v))", -math.sqrt(0.5)),
+    }
+    scene = Scene(
+        oscillator="harmonic", integrator=integrator, rtol=1e-10, record=(), transient=0.0, window=20.0,
+        time_unit="time", initial={"x": [1.0, 1.0, 1.0], "v": [0.0, 0.0, 0.0]}, topology=ring(3),
+        observe={name: words for name, (words, _) in closed.items()} | {"all": "maximum(nodes.sum(v))"},
+    )  # fmt: skip
+    found = run(scene, show_progress=False)
+    for name, (_, value) in closed.items():
+        np.testing.assert_allclose(found.data[name], value, rtol=0, atol=1e-6 if name == "kink" else 2e-9)
+    assert float(found.data["all"]) == pytest.approx(3.0, abs=2e-9)
 
 
 ROTORS = Scene(

@@ -66,6 +66,16 @@ def test_cells_stop_each_for_itself_in_any_lanes() -> None:
         np.testing.assert_array_equal(other.speed, found.speed)
 
 
+@pytest.mark.parametrize(
+    ("stop", "end_time"),
+    [("x_1 - 3/2", 20.0), ("1/2 - x_1", np.pi / 3), ("v_1", np.pi), ("v_1 - 1/2", 7 * np.pi / 6)],
+)
+def test_a_function_must_pass_zero_even_if_it_begins_there(stop: str, end_time: float) -> None:
+    """x = cos t: as terminal events of SciPy do, one that touches zero or lies past it at the start ends nothing."""
+    scene = Scene(oscillator="harmonic", rtol=1e-10, initial=START, record=(), stop=stop, **TIMES)
+    assert float(run(scene, show_progress=False).end_time) == pytest.approx(end_time, abs=1e-8)
+
+
 def test_the_synchronisation_error_is_that_of_the_time_before_the_stop(tmp_path: Path) -> None:
     """Networks in loops too: their mean falls through a level at the time that it alone decides."""
     n = 12

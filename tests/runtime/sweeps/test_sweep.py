@@ -116,6 +116,17 @@ def test_continuation_starts_from_the_neighbour(direction):
         state = alone.states("end")
 
 
+def test_a_run_may_sweep_what_a_continued_scene_does_not():
+    scene = SECTIONS.replace(axes={"sigma": [0.02, 0.05]}, continuation="up")
+    bare = scene.replace(axes=())
+    assert not bare.continued
+    alone = run(bare, sigma=0.02, show_progress=False)
+    along = run(bare, sigma=[0.02, 0.05], show_progress=False)
+    np.testing.assert_array_equal(along.end[0], alone.end)
+    np.testing.assert_array_equal(along.end, run(scene, show_progress=False).end)
+    assert not np.array_equal(along.end[1], run(bare, sigma=0.05, show_progress=False).end)
+
+
 def test_continuation_keeps_its_states_where_room_grows():
     scene = SECTIONS.replace(axes={"sigma": [0.02, 0.05, 0.08]}, continuation="up")
     whole = run(scene)

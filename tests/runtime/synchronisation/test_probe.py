@@ -208,3 +208,11 @@ def test_strengths_must_be_numbers(alpha, beta, words):
 def test_a_scene_without_coupling_is_refused():
     with pytest.raises(ValueError, match="coupling"):
         universal_probe(Scene(oscillator="harmonic", coupling=None), 0.5, 0.0)
+
+
+def test_what_the_scene_observes_changes_nothing():
+    """The ring of three is another network, whose kernel has no room for observed values."""
+    criterion = Criterion(starts=2, transient=5, window=2)
+    watched = SPRINGS.replace(observe={"e": "mean(nodes.mean(v**2))"}, stop="x_2 - 100")
+    found, plain = (universal_probe(s, [0.1, 0.2], 0.1, criterion=criterion) for s in (watched, SPRINGS))
+    np.testing.assert_array_equal(found.error, plain.error)

@@ -117,7 +117,14 @@ def test_the_probe_covers_every_mode_and_the_network_is_swept_as_asked(swept):
 
 @pytest.mark.parametrize(
     ("graph", "sigma", "low", "count"),
-    [(chain(3), [0.0, 0.01], 0.0, 4), (PARTS, [0.1, 0.11], 0.0, 23), (chain(2), [0.1, 0.1 + 1e-9], 0.2, 2)],
+    [
+        (chain(3), [0.0, 0.01], 0.0, 4),
+        (PARTS, [0.1, 0.11], 0.0, 23),
+        (chain(2), [0.1, 0.1 + 1e-9], 0.2, 2),
+        (chain(3), [-0.02, 0.01], -0.06, 10),
+        (chain(3), [-0.02, -0.01], -0.06, 6),
+        (PARTS, [-0.02, -0.01], -0.04, 5),
+    ],
 )
 def test_the_grid_of_the_probe_begins_at_zero_where_zero_is_asked_for(swept, graph, sigma, low, count):
     thresholds(Scene(topology=graph), sigma=sigma)
@@ -131,6 +138,20 @@ def test_the_grid_of_the_probe_begins_at_zero_where_zero_is_asked_for(swept, gra
 def test_the_prediction_ends_with_the_grid_of_sigma(swept):
     assert thresholds(Scene(topology=chain(2)), sigma=[0.05, 0.15]).predicted == ((0.1, 0.15),)
     assert thresholds(Scene(topology=chain(2)), sigma=[0.05, 0.5]).predicted == ((0.1, 0.2),)
+
+
+def test_what_a_scene_observes_and_where_it_stops_is_not_used(swept):
+    thresholds(Scene(topology=chain(3), observe={"e": "mean(nodes.mean(v))"}, stop="x_1 - 9"), sigma=[0.1, 0.2])
+    assert [(dict(scene.observe), scene.stop) for scene, *_ in swept] == [({}, None)] * 2
+
+
+def test_negative_sigma_is_predicted_as_it_is_simulated(swept, monkeypatch):
+    found = Sweep(np.array([-0.3, 0.3]), np.zeros(2), np.ones(2), ((-0.15, 0.3),))
+    monkeypatch.setattr(threshold, "simulate", lambda *_: found)
+    assert thresholds(Scene(topology=chain(2)), sigma=[-0.3, 0.3]).predicted == ((-0.15, 0.3),)
+    assert thresholds(Scene(topology=chain(3)), sigma=[-0.3, 0.3]).predicted == (
+        (pytest.approx(-0.1), pytest.approx(0.2)),
+    )
 
 
 def test_the_criterion_is_that_of_the_published_table():
