@@ -17,6 +17,8 @@ __all__ = ["Averaging", "Batches"]
 
 BATCHES = 64
 """Most batches that are kept."""
+CHECKED = 8
+"""Batches between two checks of the error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +57,8 @@ class Averaging:
 
     def rounds(
         self, batches: Batches, step: float, error: Callable[[], np.ndarray], reporter: Reporter
-    ) -> Iterator[None]:
-        """Yield until the average is long or precise enough; each time one block must be added.
+    ) -> Iterator[int]:
+        """Yield how many blocks are left until the average is long or precise enough; one of them at least must be added.
 
         Parameters
         ----------
@@ -70,8 +72,9 @@ class Averaging:
             Counts the periods.
         """
         while batches.blocks * step < self.periods:
-            yield
-            reporter.advance(step)
+            before = batches.blocks
+            yield max(1, math.ceil(self.periods / step) - before)
+            reporter.advance(step * (batches.blocks - before))
             if batches.due and np.all(error() <= self.precision):
                 return
 
@@ -106,13 +109,34 @@ class Batches:
     sums: list[np.ndarray] = field(default_factory=list)
     due: bool = False
 
-    def add(self, growth: np.ndarray) -> None:
-        """Add the growth over one more block.
+    def ahead(self, most: int) -> np.ndarray:
+        """Return the blocks of the batches until the error is due.
+
+        Parameters
+        ----------
+        most : int
+            Most blocks of all of them.
+
+        Returns
+        -------
+        ndarray of int64, shape (batches,)
+            The last batch may stay incomplete.
+        """
+        full = len(self.sums) == BATCHES
+        length, known = (2 * self.per_batch, BATCHES // 2) if full else (self.per_batch, len(self.sums))
+        count = BATCHES - known if self.blocks < BATCHES else CHECKED - known % CHECKED
+        whole, rest = divmod(min(most, count * length), length)
+        return np.array([length] * whole + [rest] * (rest > 0), dtype=np.int64)
+
+    def add(self, growth: np.ndarray, blocks: int = 1) -> None:
+        """Add the growth over further blocks of the same batch.
 
         Parameters
         ----------
         growth : ndarray, shape (starts, m)
-            Logarithm of the growth of each deviation over the block.
+            Logarithm of the growth of each deviation over the blocks.
+        blocks : int
+            Their number.
         """
         if self.blocks % self.per_batch == 0:
             if len(self.sums) == BATCHES:
@@ -120,8 +144,8 @@ class Batches:
                 self.per_batch *= 2
             self.sums.append(np.zeros_like(growth))
         self.sums[-1] += growth
-        self.blocks += 1
-        self.due = self.blocks % self.per_batch == 0 and self.blocks >= BATCHES and len(self.sums) % 8 == 0
+        self.blocks += blocks
+        self.due = self.blocks % self.per_batch == 0 and self.blocks >= BATCHES and len(self.sums) % CHECKED == 0
 
     def mean(self) -> np.ndarray:
         """Return the growth per unit of time, an ndarray of shape (starts, m)."""

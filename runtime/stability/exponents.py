@@ -360,7 +360,9 @@ def _average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[
     """Mean growth rates (starts, m), their standard errors and the time averaged over."""
     orbits.prepare()
     batches = Batches(orbits.unit * orbits.block)
-    for _ in averaging.rounds(batches, orbits.block, batches.error, reporter):
-        batches.add(orbits.advance())
+    for left in averaging.rounds(batches, orbits.block, batches.error, reporter):
+        parts = batches.ahead(left)
+        for growth, blocks in zip(orbits.growths(parts), parts, strict=True):
+            batches.add(growth, int(blocks))
     mean, error = batches.mean(), batches.error_by_start()
     return mean, error, batches.blocks * batches.length

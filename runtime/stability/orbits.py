@@ -19,7 +19,7 @@ from synchain.models.scenes.scene import Scene
 from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
 from .interpolation import Interpolation, exact_interpolation, strength_interpolation
-from .variational_integrator import VariationalIntegrator
+from .variational_integrator import Travellers, VariationalIntegrator
 
 __all__ = ["Orbits", "unit_of_time"]
 
@@ -55,15 +55,13 @@ class Orbits:
     method : Integrator
         Method of all steps, the one that suits all strengths.
     block : float
-        Number of units of one call of `advance`.
+        Number of units of a block.
     interpolation : Interpolation, optional
         Interpolation in the strength, set by `prepare`.
     integrator : VariationalIntegrator, optional
         Integrator of the nodes of the interpolation, set by `prepare`.
-    deviations : ndarray, shape (starts, m, components), optional
-        Deviations at unit length.
-    interpolation_error : float
-        Largest error of the interpolation so far.
+    travellers : Travellers, optional
+        Deviations of all strengths, and the largest error of the interpolation so far.
     """
 
     scene: Scene
@@ -76,8 +74,7 @@ class Orbits:
     block: float = 1.0
     interpolation: Interpolation | None = None
     integrator: VariationalIntegrator | None = None
-    deviations: np.ndarray | None = None
-    interpolation_error: float = 0.0
+    travellers: Travellers | None = None
 
     @classmethod
     def make(cls, scene: Scene, strengths: np.ndarray, state: np.ndarray, workers: int | None) -> Orbits:
@@ -158,15 +155,42 @@ class Orbits:
         """Choose block and interpolation by trial on the next blocks, and start the deviations."""
         limit = max(0.1 * self.scene.rtol, 1e-12)
         for block, nodes, parts in _choices(self.scene.forced):
-            self.block, self.interpolation = block, strength_interpolation(self.strengths, nodes, parts)
-            self.integrator = self.integrator_of(self.interpolation.nodes, LOOSENESS)
-            if self.interpolation.is_exact or self.interpolation.error(self.propagators()) < limit:
+            self.start(strength_interpolation(self.strengths, nodes, parts), block)
+            if self.interpolation.is_exact or self._misfit() < limit:
                 break
         else:
-            self.interpolation = exact_interpolation(self.strengths)
-        self.integrator = self.integrator_of(self.interpolation.nodes, LOOSENESS)
-        start = np.ones((len(self.state), len(self.strengths), self.components), dtype=self.strengths.dtype)
-        self.deviations = start / math.sqrt(self.components)
+            self.start(exact_interpolation(self.strengths), block)
+        self.start(self.interpolation, block)
+
+    def _misfit(self) -> float:
+        """Error of the interpolation over one block, in which the orbits advance."""
+        self.growths(np.ones(1, dtype=np.int64))
+        return self.travellers.error
+
+    def start(self, interpolation: Interpolation, block: float, looseness: float = LOOSENESS) -> None:
+        """Start deviations of all strengths along the orbits from their settled states.
+
+        Parameters
+        ----------
+        interpolation : Interpolation
+            Which propagators are integrated, and how the others follow from them.
+        block : float
+            Units of time between two products.
+        looseness : float
+            Ratio of the tolerance of the propagators to that of the orbit.
+        """
+        self.interpolation, self.block = interpolation, block
+        self.integrator = self.integrator_of(interpolation.nodes, looseness)
+        self.integrator.set_deviations(self._basis(self.integrator))
+        registers = interpolation.registers(self.integrator.kernel.origin.width)
+        self.travellers = Travellers.make(registers, len(self.state), self.components, self.variation.size)
+
+    def _basis(self, integrator: VariationalIntegrator) -> np.ndarray:
+        """The columns of the identity (cells, size, modes), for each node."""
+        basis = np.zeros((len(self.state), self.variation.size, len(integrator.order)))
+        for k in range(self.components):
+            basis[:, k, k :: self.components] = 1.0
+        return basis
 
     def propagators(self) -> np.ndarray:
         """Advance by one block.
@@ -181,43 +205,37 @@ class Orbits:
         RuntimeError
             If the orbits are not prepared.
         """
-        integrator, p = self.integrator, self.components
-        if integrator is None:
+        if self.integrator is None:
             raise RuntimeError("orbits are not prepared")
-        size = self.variation.size
-        basis = np.zeros((len(self.state), size, len(integrator.order)))
-        for k in range(p):
-            basis[:, k, k::p] = 1.0
-        integrator.set_deviations(basis)
+        integrator, p, size = self.integrator, self.components, self.variation.size
+        integrator.set_deviations(self._basis(integrator))
         growth = integrator.advance(self.block * self.unit)
         columns = integrator.deviations * np.exp(growth)[:, None, :]
         if size != p:
             columns = columns[:, :p] + 1j * columns[:, p:]
         return np.asarray(columns.reshape(len(self.state), p, -1, p).transpose(0, 2, 1, 3))
 
-    def advance(self) -> np.ndarray:
-        """Advance orbits and deviations by one block.
+    def growths(self, batches: np.ndarray) -> np.ndarray:
+        """Advance orbits and deviations by batches of blocks.
+
+        Parameters
+        ----------
+        batches : ndarray of int64, shape (b,)
+            Blocks of each batch.
 
         Returns
         -------
-        ndarray, shape (starts, m)
-            Logarithm of the growth of each deviation.
+        ndarray, shape (b, starts, m)
+            Logarithm of the growth of each deviation over each batch.
 
         Raises
         ------
         RuntimeError
             If the orbits are not prepared.
         """
-        if self.interpolation is None or self.deviations is None:
+        if self.integrator is None or self.travellers is None:
             raise RuntimeError("orbits are not prepared")
-        nodes = self.propagators()
-        self.interpolation_error = max(self.interpolation_error, self.interpolation.error(nodes))
-        propagators = self.interpolation.apply(nodes)
-        moved = sum(propagators[..., k] * self.deviations[..., k, None] for k in range(self.components))
-        length = np.linalg.norm(moved, axis=2)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            self.deviations = np.where(length[..., None] > 0.0, moved / length[..., None], 0.0)
-            return np.asarray(np.log(length))
+        return self.integrator.follow(self.block * self.unit, batches, self.travellers)
 
 
 def _rows(strengths: np.ndarray) -> np.ndarray:
