@@ -19,6 +19,7 @@ BATCHES = 64
 """Most batches that are kept."""
 CHECKED = 8
 """Batches between two checks of the error."""
+ALL = slice(None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +98,8 @@ class Batches:
         Growth over each batch.
     due : bool
         True if enough new batches are complete for another check of the error.
+    worst : int
+        The strength with the largest error when all were looked at.
 
     References
     ----------
@@ -108,6 +111,7 @@ class Batches:
     per_batch: int = 1
     sums: list[np.ndarray] = field(default_factory=list)
     due: bool = False
+    worst: int = 0
 
     def ahead(self, most: int) -> np.ndarray:
         """Return the blocks of the batches until the error is due.
@@ -142,8 +146,9 @@ class Batches:
             if len(self.sums) == BATCHES:
                 self.sums = [a + b for a, b in zip(self.sums[::2], self.sums[1::2], strict=True)]
                 self.per_batch *= 2
-            self.sums.append(np.zeros_like(growth))
-        self.sums[-1] += growth
+            self.sums.append(np.array(growth))
+        else:
+            self.sums[-1] += growth
         self.blocks += blocks
         self.due = self.blocks % self.per_batch == 0 and self.blocks >= BATCHES and len(self.sums) % CHECKED == 0
 
@@ -151,16 +156,22 @@ class Batches:
         """Return the growth per unit of time, an ndarray of shape (starts, m)."""
         return np.asarray(np.sum(self.sums, axis=0) / (self.blocks * self.length))
 
-    def error_by_start(self) -> np.ndarray:
+    def error_by_start(self, strengths: slice = ALL) -> np.ndarray:
         """Estimate the standard error of each start.
+
+        Parameters
+        ----------
+        strengths : slice
+            Which strengths to look at.
 
         Returns
         -------
-        ndarray, shape (starts, m)
+        ndarray, shape (starts, strengths)
             The largest estimate from the batches alone, joined in twos and joined in fours; inf if
             there is a single batch.
         """
-        rates = np.array(self.sums[: self.blocks // self.per_batch]) / (self.per_batch * self.length)
+        whole = self.sums[: self.blocks // self.per_batch]
+        rates = np.array([growth[:, strengths] for growth in whole]) / (self.per_batch * self.length)
         estimates = []
         for join in (1, 2, 4):
             count = len(rates) // join
@@ -171,7 +182,20 @@ class Batches:
                 )
         return np.asarray(np.max(estimates, axis=0))
 
-    def error(self) -> np.ndarray:
-        """Return the standard error of the mean over the starts, an ndarray of shape (m,)."""
-        each = self.error_by_start()
+    def error(self, strengths: slice = ALL) -> np.ndarray:
+        """Return the standard errors (strengths,) of the mean over the starts, as `error_by_start`."""
+        each = self.error_by_start(strengths)
         return np.asarray(np.sqrt((each**2).sum(axis=0)) / len(each))
+
+    def largest_error(self, enough: float) -> float:
+        """Return the largest standard error, or another one that exceeds `enough`.
+
+        The strength with the largest error the last time is looked at first: a thousand of them take longer than the
+        orbit itself.
+        """
+        first = float(self.error(slice(self.worst, self.worst + 1))[0])
+        if not first <= enough:
+            return first
+        error = self.error()
+        self.worst = int(np.argmax(error))
+        return float(error[self.worst])

@@ -360,7 +360,7 @@ def _average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[
     """Mean growth rates (starts, m), their standard errors and the time averaged over."""
     orbits.prepare()
     batches = Batches(orbits.unit * orbits.block)
-    for left in averaging.rounds(batches, orbits.block, batches.error, reporter):
+    for left in averaging.rounds(batches, orbits.block, lambda: batches.largest_error(averaging.precision), reporter):
         parts = batches.ahead(left)
         for growth, blocks in zip(orbits.growths(parts), parts, strict=True):
             batches.add(growth, int(blocks))

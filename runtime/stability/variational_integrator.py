@@ -261,7 +261,7 @@ class VariationalIntegrator:
         panels = (batches, places, registers.panels, registers.weights, travellers.vectors, gains, misfits)
         self._run(length, panels, self.vectors, np.empty((len(self.state), self.strengths.shape[1])))
         travellers.error = max(travellers.error, float(misfits.max()))
-        return gains.transpose(1, 0, 2)[:, :, registers.where]
+        return gains.transpose(1, 0, 2).take(registers.where, axis=2)
 
     def _run(
         self, length: float | np.ndarray, panels: tuple[np.ndarray, ...], vectors: np.ndarray, growth: np.ndarray
