@@ -51,8 +51,10 @@ from .names import WIDTH
 from .propagators import NODE
 from .propagators import POINTS
 from .propagators import EXTRAS
+from .propagators import join
 from .propagators import level
 from .propagators import misfit
+from .propagators import part
 from .propagators import settle
 from .propagators import tabulate
 from .propagators import transport
@@ -236,7 +238,8 @@ def march(
     out = address(dense, dims.dense_rows * size)
     shared = address(out, 9 * dims.nodes)
     columns, stride, groups = places.shape[1], registers * LANES, gains.shape[2] // LANES
-    deviations = aligned((registers * (2 * parts + 2 + max(1, kinds) + columns * parts) + groups + parts) * LANES)
+    room = registers * (2 * parts + 2 + max(1, kinds) + columns * parts) + groups + parts
+    deviations = aligned((room + registers * (4 + max(1, kinds))) * LANES)
     old, new = address(deviations, 0), address(deviations, registers * parts * LANES)
     powers = address(new, registers * parts * LANES)
     strong = address(powers, registers * LANES)
@@ -244,6 +247,14 @@ def march(
     table = address(exponents, registers * LANES)
     lifts = address(table, columns * parts * stride)
     moved = address(lifts, groups * LANES)
+    heads = address(moved, parts * LANES)
+    head_powers = address(heads, stride)
+    alone = address(head_powers, stride)  # strengths, of one deviation for each node
+    few = (places.shape[0] + LANES - 1) // LANES
+    narrow = panels.shape[0] > 0 and columns == 2 and parts == 2
+    for node in range(places.shape[0]):
+        for k in range(kinds):
+            alone[(kinds * (node // LANES) + k) * LANES + node % LANES] = strengths[k, places[node, 0]]
     for which in range(registers):
         for k in range(kinds):
             for lane in range(LANES):
@@ -260,17 +271,22 @@ def march(
                     renew(cell, spans, clock)
                 begun = True
                 take_in(vectors[cell], old, registers, parts)
+                for k in range(registers * LANES):
+                    powers[k] = 0.0
+                active, carried, landed, parted = registers, strong, False, False
                 if CONTACTS:
                     for i in range(dims.nodes):
                         if y[2 * dims.nodes + i] == 0.0:
                             brake(i, 0.0, old, registers, owners)  # a velocity beside that of the ground is lost at once
-                for k in range(registers * LANES):
-                    powers[k] = 0.0
+                            landed = True
                 status, taken = outcome(0, clock, y, control, dims), 0
                 while status == 0:
+                    if CONTACTS and narrow and landed and not parted:
+                        part(old, powers, places, owners, heads, head_powers, new, few)
+                        old, new, active, carried, parted = new, old, few, alone, True
                     t = load(clock, TIME, WIDTH)
                     h, accept = attempt(
-                        t, clock, y, y_new, dense, middle, out, steering, shared, strong, old, new, registers, tolerance,
+                        t, clock, y, y_new, dense, middle, out, steering, shared, carried, old, new, active, tolerance,
                         dims, step, carry, pushes,
                     )  # fmt: skip
                     t_new = arrive(clock, t, h)
@@ -278,7 +294,7 @@ def march(
                         old, new = new, old
                         taken += 1
                         if taken % BETWEEN_SCALINGS == 0:
-                            scale(old, powers, registers, parts)
+                            scale(old, powers, active, parts)
                     largest = advance(clock, y, t, t_new, accept, y_new, dims)
                     if CONTACTS:
                         for i in range(dims.nodes):
@@ -286,9 +302,8 @@ def march(
                         change_modes(accept, t_new, y, out, (), dims, pushes)
                         for i in range(dims.nodes):
                             if y[2 * dims.nodes + i] != slips[i]:
-                                saltate(
-                                    i, slips[i], clock[TIME], y, out, strong, old, registers, owners, dims, release
-                                )  # fmt: skip
+                                saltate(i, slips[i], clock[TIME], y, out, carried, old, active, owners, dims, release)
+                                landed = landed or y[2 * dims.nodes + i] == 0.0
                     if lane_bits(pause(clock, largest, steering)) != 0:
                         status = outcome(0, clock, y, control, dims)
                         if status == 0 and clock[TIME] >= clock[PERIOD]:
@@ -297,6 +312,9 @@ def march(
                 counts[cell, N_ACCEPTED] += int(clock[ACCEPTED])
                 counts[cell, N_REJECTED] += int(clock[REJECTED])
                 if panels.shape[0]:
+                    if parted:
+                        join(old, powers, places, heads, head_powers, new)
+                        old, new = new, old
                     scale(old, powers, registers, parts)
                     tabulate(old, powers, places, table, exponents, parts, stride)
                     for k in range(panels.shape[0]):

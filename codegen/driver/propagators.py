@@ -52,6 +52,41 @@ def tabulate(modes, powers, places, table, exponents, parts, stride):
 
 
 @njit(error_model="numpy")
+def part(modes, powers, places, owners, heads, head_powers, single, registers):
+    """Part propagators of two components, of which a landing has left one, into this row and one deviation for each node.
+
+    What becomes of this deviation, which begins with 1 in the component that is left, is what becomes of both columns.
+    heads, head_powers: the row, by mode.  single: the deviation of each node, in so many registers.
+    """
+    left = 1 if owners[0] >= 0 else 0
+    for node in range(places.shape[0]):
+        for c in range(2):
+            k = places[node, c]
+            heads[k], head_powers[k] = modes[(2 * (k // LANES) + left) * LANES + k % LANES], powers[k]
+    for k in range(registers * LANES):
+        first = 2 * (k // LANES) * LANES + k % LANES
+        single[first + left * LANES] = 1.0 if k < places.shape[0] else 0.0
+        single[first + (1 - left) * LANES] = 0.0
+    for k in range(registers * LANES):
+        powers[k] = 0.0
+
+
+@njit(error_model="numpy")
+def join(single, powers, places, heads, head_powers, modes):
+    """Write the columns of the propagators that `part` has parted."""
+    for node in range(places.shape[0]):
+        first = 2 * (node // LANES) * LANES + node % LANES
+        for c in range(2):
+            k = places[node, c]
+            head_powers[k] += powers[node]
+            for r in range(2):
+                modes[(2 * (k // LANES) + r) * LANES + k % LANES] = heads[k] * single[first + r * LANES]
+    for node in range(places.shape[0]):
+        for c in range(2):
+            powers[places[node, c]] = head_powers[places[node, c]]
+
+
+@njit(error_model="numpy")
 def level(node, count, table, exponents, entries, stride):
     """Scale the propagators of some nodes by the same power of two, the largest of theirs."""
     largest = exponents[node]
