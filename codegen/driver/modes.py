@@ -186,7 +186,7 @@ def attempt(
         return h, accept_series(clock, h, limit)
     h = aim(clock, steering)
     error = step(t, h, y, y, y_new, dense, steering[RTOL], steering[ATOL], shared)
-    if any_lane(error <= 1.0):
+    if any_lane(error <= 1.0) and registers > 0:
         worst = watched(shared, strengths, old, new, registers - 1, tolerance, carry)
         if worst <= 1.0 and registers > 1:
             worst = max(worst, watched(shared, strengths, old, new, 0, tolerance, carry))
@@ -284,13 +284,14 @@ def march(
                     if CONTACTS and narrow and landed and not parted:
                         part(old, powers, places, owners, heads, head_powers, new, few)
                         old, new, active, carried, parted = new, old, few, alone, True
-                    t = load(clock, TIME, WIDTH)
+                    still = parted and y[2 * dims.nodes] == 0.0  # a place that sticks stays
+                    moving, t = 0 if still else active, load(clock, TIME, WIDTH)
                     h, accept = attempt(
-                        t, clock, y, y_new, dense, middle, out, steering, shared, carried, old, new, active, tolerance,
+                        t, clock, y, y_new, dense, middle, out, steering, shared, carried, old, new, moving, tolerance,
                         dims, step, carry, pushes,
                     )  # fmt: skip
                     t_new = arrive(clock, t, h)
-                    if any_lane(accept):
+                    if any_lane(accept) and not still:
                         old, new = new, old
                         taken += 1
                         if taken % BETWEEN_SCALINGS == 0:

@@ -124,14 +124,16 @@ def misfit(panel, weights, table, columns, parts, stride):
 
 
 @njit(error_model="numpy", forceinline=True)
-def entry(slot, which, panel, weights, table, stride):
-    """An entry of the propagators in a register of strengths; of their real parts, if they are complex."""
+def two_entries(slot, other, which, panel, weights, table, stride):
+    """Two entries of real propagators in a register of strengths."""
+    one, two = broadcast(0.0, LANES), broadcast(0.0, LANES)
+    at, a, b = panel[WEIGHTS] + which * panel[POINTS], slot * stride + panel[NODE], other * stride + panel[NODE]
     if panel[POINTS] == 0:
-        return load(table, (slot * stride + panel[NODE]) // LANES + which, LANES)
-    total, at = broadcast(0.0, LANES), panel[WEIGHTS] + which * panel[POINTS]
+        return load(table, a // LANES + which, LANES), load(table, b // LANES + which, LANES)
     for j in range(panel[POINTS]):
-        total = fma(load(weights, at + j, LANES), table[slot * stride + panel[NODE] + j], total)
-    return total
+        weight = load(weights, at + j, LANES)
+        one, two = fma(weight, table[a + j], one), fma(weight, table[b + j], two)
+    return one, two
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -155,20 +157,24 @@ def transport(panel, weights, table, exponents, travellers, lifts, moved, column
     """Apply the propagators of one panel to the deviations of its strengths; powers of two are counted in `lifts`."""
     for s in range(panel[FROM], panel[TO]):
         which, first = s - panel[FROM], parts * s
-        for r in range(columns):
-            real, imaginary = broadcast(0.0, LANES), broadcast(0.0, LANES)
-            for c in range(columns):
-                if parts == columns:
-                    here = load(travellers, first + c, LANES)
-                    real = fma(entry(parts * c + r, which, panel, weights, table, stride), here, real)
-                else:
+        for r in range(parts):
+            store(moved, r, broadcast(0.0, LANES))
+        for c in range(columns):
+            if parts == columns:
+                x = load(travellers, first + c, LANES)
+                for r in range(0, columns, 2):
+                    below = min(r + 1, columns - 1)
+                    u, v = two_entries(parts * c + r, parts * c + below, which, panel, weights, table, stride)
+                    real, other = load(moved, r, LANES), load(moved, below, LANES)
+                    store(moved, below, fma(v, x, other))
+                    store(moved, r, fma(u, x, real))
+            else:
+                x, y = load(travellers, first + c, LANES), load(travellers, first + columns + c, LANES)
+                for r in range(columns):
                     u, v = complex_entry(parts * c + r, columns, which, panel, weights, table, stride)
-                    x, y = load(travellers, first + c, LANES), load(travellers, first + columns + c, LANES)
-                    real = fma(u, x, fma(v, -y, real))
-                    imaginary = fma(u, y, fma(v, x, imaginary))
-            store(moved, r, real)
-            if parts != columns:
-                store(moved, columns + r, imaginary)
+                    real, imaginary = load(moved, r, LANES), load(moved, columns + r, LANES)
+                    store(moved, r, fma(u, x, fma(v, -y, real)))
+                    store(moved, columns + r, fma(u, y, fma(v, x, imaginary)))
         for r in range(parts):
             store(travellers, first + r, load(moved, r, LANES))
         lift = broadcast(exponents[panel[NODE]], LANES)
