@@ -50,6 +50,7 @@ from .names import SERIES
 from .names import WIDTH
 from .propagators import NODE
 from .propagators import POINTS
+from .propagators import TILE
 from .propagators import EXTRAS
 from .propagators import join
 from .propagators import level
@@ -238,7 +239,7 @@ def march(
     out = address(dense, dims.dense_rows * size)
     shared = address(out, 9 * dims.nodes)
     columns, stride, groups = places.shape[1], registers * LANES, gains.shape[2] // LANES
-    room = registers * (2 * parts + 2 + max(1, kinds) + columns * parts) + groups + parts
+    room = registers * (2 * parts + 2 + max(1, kinds) + columns * parts) + groups + parts * (1 + TILE * columns)
     deviations = aligned((room + registers * (4 + max(1, kinds))) * LANES)
     old, new = address(deviations, 0), address(deviations, registers * parts * LANES)
     powers = address(new, registers * parts * LANES)
@@ -246,8 +247,8 @@ def march(
     exponents = address(strong, registers * max(1, kinds) * LANES)
     table = address(exponents, registers * LANES)
     lifts = address(table, columns * parts * stride)
-    moved = address(lifts, groups * LANES)
-    heads = address(moved, parts * LANES)
+    found = address(lifts, groups * LANES)
+    heads = address(found, parts * (1 + TILE * columns) * LANES)
     head_powers = address(heads, stride)
     alone = address(head_powers, stride)  # strengths, of one deviation for each node
     few = (places.shape[0] + LANES - 1) // LANES
@@ -325,7 +326,7 @@ def march(
                             worst = misfit(panel, weights, table, columns, parts, stride)
                             misfits[cell] = misfits[cell] if worst <= misfits[cell] else worst  # NaN too
                         transport(
-                            panel, weights, table, exponents, travellers[cell], lifts, moved, columns, parts, stride
+                            panel, weights, table, exponents, travellers[cell], lifts, found, columns, parts, stride
                         )  # fmt: skip
                     scale(address(travellers[cell], 0), lifts, groups, parts)
             if panels.shape[0]:

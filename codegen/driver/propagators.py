@@ -12,6 +12,7 @@ import math
 
 from numba import njit
 
+from ..simd.addresses import address
 from ..simd.elementary import log
 from ..simd.lanes import broadcast
 from ..simd.lanes import fma
@@ -25,6 +26,8 @@ from .names import LANES
 # Columns of `panels`: registers of strengths, first node, nodes with weights, nodes for comparison, where the weights of
 # the first register begin (in registers), and where those of the nodes for comparison begin (in numbers).
 FROM, TO, NODE, POINTS, EXTRAS, WEIGHTS, CHECKS = 0, 1, 2, 3, 4, 5, 6
+# Registers of strengths whose propagators are interpolated together: a number of a node is loaded once for all of them.
+TILE = 4
 
 
 @njit(error_model="numpy")
@@ -123,64 +126,100 @@ def misfit(panel, weights, table, columns, parts, stride):
     return worst
 
 
-@njit(error_model="numpy", forceinline=True)
-def two_entries(slot, other, which, panel, weights, table, stride):
-    """Two entries of real propagators in a register of strengths."""
-    one, two = broadcast(0.0, LANES), broadcast(0.0, LANES)
-    at, a, b = panel[WEIGHTS] + which * panel[POINTS], slot * stride + panel[NODE], other * stride + panel[NODE]
-    if panel[POINTS] == 0:
-        return load(table, a // LANES + which, LANES), load(table, b // LANES + which, LANES)
-    for j in range(panel[POINTS]):
-        weight = load(weights, at + j, LANES)
-        one, two = fma(weight, table[a + j], one), fma(weight, table[b + j], two)
-    return one, two
+@njit(error_model="numpy")
+def real_entries(which, count, panel, weights, table, entries, stride, found):
+    """The real propagators in the registers which … which+3 of a panel of `count`: register TILE*slot + k of `found`.
 
-
-@njit(error_model="numpy", forceinline=True)
-def complex_entry(slot, above, which, panel, weights, table, stride):
-    """The real and the imaginary part of an entry; the latter of nodes is `above` slots further on."""
-    if panel[POINTS] == 0:
-        at = (slot * stride + panel[NODE]) // LANES + which
-        return load(table, at, LANES), load(table, at + above * stride // LANES, LANES)
-    real, imaginary = broadcast(0.0, LANES), broadcast(0.0, LANES)
-    at = panel[WEIGHTS] + 2 * which * panel[POINTS]
-    for j in range(panel[POINTS]):
-        u, v = load(weights, at + 2 * j, LANES), load(weights, at + 2 * j + 1, LANES)
-        x, y = table[slot * stride + panel[NODE] + j], table[(slot + above) * stride + panel[NODE] + j]
-        real = fma(u, x, fma(v, -y, real))
-        imaginary = fma(u, y, fma(v, x, imaginary))
-    return real, imaginary
+    Behind the last register of the panel it stands again.
+    """
+    points, node, first = panel[POINTS], panel[NODE], panel[WEIGHTS]
+    a, b = first + points * which, first + points * min(which + 1, count - 1)
+    c, d = first + points * min(which + 2, count - 1), first + points * min(which + 3, count - 1)
+    for slot in range(entries):
+        place = slot * stride + node
+        one, two = broadcast(0.0, LANES), broadcast(0.0, LANES)
+        three, four = one, two
+        for j in range(points):
+            value = broadcast(table[place + j], LANES)
+            one = fma(load(weights, a + j, LANES), value, one)
+            two = fma(load(weights, b + j, LANES), value, two)
+            three = fma(load(weights, c + j, LANES), value, three)
+            four = fma(load(weights, d + j, LANES), value, four)
+        store(found, TILE * slot, one)
+        store(found, TILE * slot + 1, two)
+        store(found, TILE * slot + 2, three)
+        store(found, TILE * slot + 3, four)
 
 
 @njit(error_model="numpy")
-def transport(panel, weights, table, exponents, travellers, lifts, moved, columns, parts, stride):
-    """Apply the propagators of one panel to the deviations of its strengths; powers of two are counted in `lifts`."""
-    for s in range(panel[FROM], panel[TO]):
-        which, first = s - panel[FROM], parts * s
-        for r in range(parts):
-            store(moved, r, broadcast(0.0, LANES))
+def complex_entries(which, count, panel, weights, table, columns, stride, found):
+    """As `real_entries`, of complex propagators: the imaginary part of an entry is `columns` slots further on."""
+    points, node = panel[POINTS], panel[NODE]
+    for k in range(min(TILE, count - which)):
+        at = panel[WEIGHTS] + 2 * points * (which + k)
         for c in range(columns):
-            if parts == columns:
-                x = load(travellers, first + c, LANES)
-                for r in range(0, columns, 2):
-                    below = min(r + 1, columns - 1)
-                    u, v = two_entries(parts * c + r, parts * c + below, which, panel, weights, table, stride)
-                    real, other = load(moved, r, LANES), load(moved, below, LANES)
-                    store(moved, below, fma(v, x, other))
-                    store(moved, r, fma(u, x, real))
-            else:
-                x, y = load(travellers, first + c, LANES), load(travellers, first + columns + c, LANES)
-                for r in range(columns):
-                    u, v = complex_entry(parts * c + r, columns, which, panel, weights, table, stride)
-                    real, imaginary = load(moved, r, LANES), load(moved, columns + r, LANES)
-                    store(moved, r, fma(u, x, fma(v, -y, real)))
-                    store(moved, columns + r, fma(u, y, fma(v, x, imaginary)))
+            for r in range(columns):
+                slot = 2 * columns * c + r
+                real, imaginary = broadcast(0.0, LANES), broadcast(0.0, LANES)
+                for j in range(points):
+                    u, v = load(weights, at + 2 * j, LANES), load(weights, at + 2 * j + 1, LANES)
+                    x, y = table[slot * stride + node + j], table[(slot + columns) * stride + node + j]
+                    real = fma(u, x, fma(v, -y, real))
+                    imaginary = fma(u, y, fma(v, x, imaginary))
+                store(found, TILE * slot + k, real)
+                store(found, TILE * (slot + columns) + k, imaginary)
+
+
+@njit(error_model="numpy")
+def own_entries(which, count, panel, table, entries, stride, found):
+    """As `real_entries`, of a panel whose strengths are nodes themselves."""
+    for k in range(min(TILE, count - which)):
+        for slot in range(entries):
+            store(found, TILE * slot + k, load(table, (slot * stride + panel[NODE]) // LANES + which + k, LANES))
+
+
+@njit(error_model="numpy")
+def product(first, k, travellers, found, columns, parts):
+    """Apply the propagators of register k of `found` to the deviations of one register."""
+    moved = address(found, TILE * columns * parts * LANES)
+    for r in range(parts):
+        store(moved, r, broadcast(0.0, LANES))
+    for c in range(columns):
+        x = load(travellers, first + c, LANES)
         for r in range(parts):
-            store(travellers, first + r, load(moved, r, LANES))
-        lift = broadcast(exponents[panel[NODE]], LANES)
+            store(moved, r, fma(load(found, TILE * (parts * c + r) + k, LANES), x, load(moved, r, LANES)))
+        if parts > columns:
+            y = load(travellers, first + columns + c, LANES)
+            for r in range(columns):
+                real = load(found, TILE * (parts * c + r) + k, LANES)
+                imaginary = load(found, TILE * (parts * c + columns + r) + k, LANES)
+                store(moved, r, fma(-imaginary, y, load(moved, r, LANES)))
+                store(moved, columns + r, fma(real, y, load(moved, columns + r, LANES)))
+    for r in range(parts):
+        store(travellers, first + r, load(moved, r, LANES))
+
+
+@njit(error_model="numpy")
+def transport(panel, weights, table, exponents, travellers, lifts, found, columns, parts, stride):
+    """Apply the propagators of one panel to the deviations of its strengths; powers of two are counted in `lifts`.
+
+    `found` has room for the propagators of TILE registers, and for one deviation behind them.
+    """
+    count = panel[TO] - panel[FROM]
+    for which in range(0, count, TILE):
         if panel[POINTS] == 0:
-            lift = load(exponents, panel[NODE] // LANES + which, LANES)
-        store(lifts, s, load(lifts, s, LANES) + lift)
+            own_entries(which, count, panel, table, columns * parts, stride, found)
+        elif parts == columns:
+            real_entries(which, count, panel, weights, table, columns * parts, stride, found)
+        else:
+            complex_entries(which, count, panel, weights, table, columns, stride, found)
+        for k in range(min(TILE, count - which)):
+            s = panel[FROM] + which + k
+            product(parts * s, k, travellers, found, columns, parts)
+            lift = broadcast(exponents[panel[NODE]], LANES)
+            if panel[POINTS] == 0:
+                lift = load(exponents, panel[NODE] // LANES + which + k, LANES)
+            store(lifts, s, load(lifts, s, LANES) + lift)
 
 
 @njit(error_model="numpy")
