@@ -94,8 +94,10 @@ class Batches:
         Number of blocks so far.
     per_batch : int
         Number of blocks in a batch.
-    sums : list of ndarray, shape (starts, m)
-        Growth over each batch.
+    sums : ndarray, shape (BATCHES, starts, m)
+        Growth over each batch; behind the first `count` nothing that counts.
+    count : int
+        Number of batches, the last of which may be incomplete.
     due : bool
         True if enough new batches are complete for another check of the error.
     worst : int
@@ -109,7 +111,8 @@ class Batches:
     length: float
     blocks: int = 0
     per_batch: int = 1
-    sums: list[np.ndarray] = field(default_factory=list)
+    sums: np.ndarray = field(default_factory=lambda: np.zeros((BATCHES, 0, 0)))
+    count: int = 0
     due: bool = False
     worst: int = 0
 
@@ -126,8 +129,8 @@ class Batches:
         ndarray of int64, shape (batches,)
             The last batch may stay incomplete.
         """
-        full = len(self.sums) == BATCHES
-        length, known = (2 * self.per_batch, BATCHES // 2) if full else (self.per_batch, len(self.sums))
+        full = self.count == BATCHES
+        length, known = (2 * self.per_batch, BATCHES // 2) if full else (self.per_batch, self.count)
         count = BATCHES - known if self.blocks < BATCHES else CHECKED - known % CHECKED
         whole, rest = divmod(min(most, count * length), length)
         return np.array([length] * whole + [rest] * (rest > 0), dtype=np.int64)
@@ -142,19 +145,22 @@ class Batches:
         blocks : int
             Their number.
         """
+        if self.blocks == 0:
+            self.sums = np.empty((BATCHES, *growth.shape))
         if self.blocks % self.per_batch == 0:
-            if len(self.sums) == BATCHES:
-                self.sums = [a + b for a, b in zip(self.sums[::2], self.sums[1::2], strict=True)]
-                self.per_batch *= 2
-            self.sums.append(np.array(growth))
+            if self.count == BATCHES:
+                self.count, self.per_batch = BATCHES // 2, 2 * self.per_batch
+                self.sums[: self.count] = self.sums[::2] + self.sums[1::2]
+            self.sums[self.count] = growth
+            self.count += 1
         else:
-            self.sums[-1] += growth
+            self.sums[self.count - 1] += growth
         self.blocks += blocks
-        self.due = self.blocks % self.per_batch == 0 and self.blocks >= BATCHES and len(self.sums) % CHECKED == 0
+        self.due = self.blocks % self.per_batch == 0 and self.blocks >= BATCHES and self.count % CHECKED == 0
 
     def mean(self) -> np.ndarray:
         """Return the growth per unit of time, an ndarray of shape (starts, m)."""
-        return np.asarray(np.sum(self.sums, axis=0) / (self.blocks * self.length))
+        return np.asarray(np.sum(self.sums[: self.count], axis=0) / (self.blocks * self.length))
 
     def error_by_start(self, strengths: slice = ALL) -> np.ndarray:
         """Estimate the standard error of each start.
@@ -170,8 +176,7 @@ class Batches:
             The largest estimate from the batches alone, joined in twos and joined in fours; inf if
             there is a single batch.
         """
-        whole = self.sums[: self.blocks // self.per_batch]
-        rates = np.array([growth[:, strengths] for growth in whole]) / (self.per_batch * self.length)
+        rates = self.sums[: self.blocks // self.per_batch, :, strengths] / (self.per_batch * self.length)
         estimates = []
         for join in (1, 2, 4):
             count = len(rates) // join
