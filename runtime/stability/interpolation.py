@@ -186,14 +186,14 @@ def _numbers(table: np.ndarray) -> np.ndarray:
 def _pieces(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
     """Yield equal pieces of the real line with Chebyshev points of the second kind.
 
-    The strengths for comparison lie between the two points at either end.
+    The strengths for comparison lie between the outer points, and in the middle.
     """
     edges = np.linspace(strengths.min(), strengths.max(), count + 1)
     which = np.clip(np.searchsorted(edges, strengths, side="right") - 1, 0, count - 1)
     unit = np.cos(np.arange(nodes) * math.pi / (nodes - 1))
     signs = (-1.0) ** np.arange(nodes)
     signs[[0, -1]] *= 0.5
-    between = (unit[:-1] + unit[1:])[[0, -1]] / 2
+    between = (unit[:-1] + unit[1:])[[0, nodes // 2 - 1, -1]] / 2
     for k in np.unique(which):
         centre, half = (edges[k] + edges[k + 1]) / 2, (edges[k + 1] - edges[k]) / 2
         rows = np.flatnonzero(which == k)

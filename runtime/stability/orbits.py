@@ -23,10 +23,17 @@ from .variational_integrator import Travellers, VariationalIntegrator
 
 __all__ = ["Orbits", "unit_of_time"]
 
-NODES, PARTS = (14, 22, 30, 38, 62), (1, 2, 4, 8, 16)
-"""Nodes of a panel of strengths, and panels on each side, that are tried; with two nodes for comparison they fill registers."""
-SHARE = 1 / 800
-"""Time that a node costs each strength in the product of a block, beside its integration over a unit of time."""
+NODES, PARTS = (13, 21, 29, 37, 61), (1, 2, 4, 8, 16)
+"""Nodes of a panel of strengths, and panels on each side, that are tried; with three for comparison they fill registers."""
+
+STEP = 200
+"""Multiplications of a register that take as long as a step of a deviation."""
+
+BESIDE = 6
+"""Nodes that cost a strength as much as what else is done for it in a block."""
+
+TRIAL = 8
+"""Blocks on which an interpolation is tried."""
 
 LOOSENESS = 10.0
 """Ratio of the tolerance of the modes to that of the orbit if their growth is averaged.
@@ -155,8 +162,11 @@ class Orbits:
 
     def prepare(self) -> None:
         """Choose block and interpolation by trial on the next blocks, and start the deviations."""
-        limit = max(0.1 * self.scene.rtol, 1e-12)
-        for block, nodes, parts in _choices(self.scene.forced, len(self.strengths)):
+        limit = max(0.01 * self.scene.rtol, 1e-12)  # later blocks of a chaotic orbit are up to ten times worse
+        one = self.integrator_of(self.strengths[:1], LOOSENESS)
+        one.advance(self.unit)
+        taken = STEP * self.components * one.steps / len(self.state)
+        for block, nodes, parts in _choices(self.scene.forced, len(self.strengths) * self.components**2 / taken):
             self.start(strength_interpolation(self.strengths, nodes, parts), block)
             if self.interpolation.is_exact or self._misfit() < limit:
                 break
@@ -165,8 +175,8 @@ class Orbits:
         self.start(self.interpolation, block)
 
     def _misfit(self) -> float:
-        """Error of the interpolation over one block, in which the orbits advance."""
-        self.growths(np.ones(1, dtype=np.int64))
+        """Error of the interpolation over some blocks, in which the orbits advance."""
+        self.growths(np.full(1, TRIAL))
         return self.travellers.error
 
     def start(self, interpolation: Interpolation, block: float, looseness: float = LOOSENESS) -> None:
@@ -284,11 +294,19 @@ def unit_of_time(scene: Scene) -> float:
     return scene.period or 2.0 * math.pi
 
 
-def _choices(forced: bool, strengths: int) -> list[tuple[float, int, int]]:
-    """Blocks, nodes of a panel and panels on each side, the cheapest first."""
-    blocks = (4.0, 2.0, 1.0) if forced else (1.0, 0.5, 0.25, 0.125)
+def _choices(forced: bool, share: float) -> list[tuple[float, int, int]]:
+    """Blocks, nodes of a panel and panels on each side, the cheapest first.
+
+    `share`: the time that a node costs all strengths in the product of a block, over that of its own integration over a
+    unit of time.
+    """
+
+    def cost(block: float, nodes: int, parts: int) -> float:
+        return nodes * parts + share * (nodes + BESIDE) / block
+
+    blocks = (8.0, 4.0, 2.0, 1.0) if forced else (1.0, 0.5, 0.25, 0.125)
     choices = [(block, nodes, parts) for block in blocks for nodes in NODES for parts in PARTS]
-    return sorted(choices, key=lambda choice: choice[1] * (choice[2] + SHARE * strengths / choice[0]))
+    return sorted(choices, key=lambda choice: cost(*choice))
 
 
 def _stretches(periods: int) -> list[int]:
