@@ -278,7 +278,9 @@ def march(
                 if CONTACTS:
                     for i in range(dims.nodes):
                         if y[2 * dims.nodes + i] == 0.0:
-                            brake(i, 0.0, old, registers, owners)  # a velocity beside that of the ground is lost at once
+                            brake(
+                                i, 0.0, old, registers, owners
+                            )  # a velocity beside that of the ground is lost at once
                             landed = True
                 status, taken = outcome(0, clock, y, control, dims), 0
                 while status == 0:

@@ -57,7 +57,7 @@ class Averaging:
         return self.execution.reporter(round(self.transient) + math.ceil(self.periods), "period")
 
     def rounds(
-        self, batches: Batches, step: float, error: Callable[[], np.ndarray], reporter: Reporter
+        self, batches: Batches, step: float, error: Callable[[], np.ndarray | float], reporter: Reporter
     ) -> Iterator[int]:
         """Yield how many blocks are left until the average is long or precise enough; one of them at least must be added.
 
@@ -68,7 +68,7 @@ class Averaging:
         step : float
             Length of a block in periods.
         error : callable
-            Returns the standard errors (m,) that must become small.
+            Returns the standard errors that must become small, or the largest.
         reporter : Reporter
             Counts the periods.
         """

@@ -358,7 +358,7 @@ def group_by_attractor(attractors: Sequence[Attractor], by_start: np.ndarray) ->
 
 def _average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[np.ndarray, np.ndarray, float]:
     """Mean growth rates (starts, m), their standard errors and the time averaged over."""
-    orbits.prepare()
+    orbits.prepare(averaging.periods)
     batches = Batches(orbits.unit * orbits.block)
     for left in averaging.rounds(batches, orbits.block, lambda: batches.largest_error(averaging.precision), reporter):
         parts = batches.ahead(left)

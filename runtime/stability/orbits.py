@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -18,6 +18,7 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
+from .averages import BATCHES
 from .interpolation import Interpolation, exact_interpolation, strength_interpolation
 from .variational_integrator import Travellers, VariationalIntegrator
 
@@ -25,6 +26,9 @@ __all__ = ["Orbits", "unit_of_time"]
 
 NODES, PARTS = (13, 21, 29, 37, 61), (1, 2, 4, 8, 16)
 """Nodes of a panel of strengths, and panels on each side, that are tried; with three for comparison they fill registers."""
+
+BLOCKS, FREE_BLOCKS = (8.0, 4.0, 2.0, 1.0), (1.0, 0.5, 0.25, 0.125)
+"""Lengths of a block that are tried, in periods of the drive and in units of 2 pi."""
 
 STEP = 200
 """Multiplications of a register that take as long as a step of a deviation."""
@@ -160,26 +164,36 @@ class Orbits:
                 advanced(length)
         self.state = integrator.state
 
-    def prepare(self) -> None:
-        """Choose block and interpolation by trial on the next blocks, and start the deviations."""
+    def prepare(self, periods: float) -> None:
+        """Choose block and interpolation by trial on the next blocks, and start the deviations.
+
+        Parameters
+        ----------
+        periods : float
+            Length of the longest average in units. A short one keeps short blocks, whose scatter says its error.
+        """
         limit = max(0.01 * self.scene.rtol, 1e-12)  # later blocks of a chaotic orbit are up to ten times worse
         one = self.integrator_of(self.strengths[:1], LOOSENESS)
         one.advance(self.unit)
         taken = STEP * self.components * one.steps / len(self.state)
-        for block, nodes, parts in _choices(self.scene.forced, len(self.strengths) * self.components**2 / taken):
-            self.start(strength_interpolation(self.strengths, nodes, parts), block)
-            if self.interpolation.is_exact or self._misfit() < limit:
+        blocks = [b for b in BLOCKS if b <= max(4.0, periods / BATCHES)] if self.scene.forced else FREE_BLOCKS
+        for block, nodes, parts in _choices(blocks, len(self.strengths) * self.components**2 / taken):
+            chosen = strength_interpolation(self.strengths, nodes, parts)
+            if chosen.is_exact or self._misfit(chosen, block) < limit:
                 break
         else:
-            self.start(exact_interpolation(self.strengths), block)
-        self.start(self.interpolation, block)
+            chosen = exact_interpolation(self.strengths)
+        self.start(chosen, block)
 
-    def _misfit(self) -> float:
-        """Error of the interpolation over some blocks, in which the orbits advance."""
-        self.growths(np.full(1, TRIAL))
-        return self.travellers.error
+    def _misfit(self, interpolation: Interpolation, block: float) -> float:
+        """Error of an interpolation over the next blocks."""
+        integrator, travellers = self.start(interpolation, block)
+        integrator.follow(block * self.unit, np.full(1, TRIAL), travellers)
+        return travellers.error
 
-    def start(self, interpolation: Interpolation, block: float, looseness: float = LOOSENESS) -> None:
+    def start(
+        self, interpolation: Interpolation, block: float, looseness: float = LOOSENESS
+    ) -> tuple[VariationalIntegrator, Travellers]:
         """Start deviations of all strengths along the orbits from their settled states.
 
         Parameters
@@ -190,12 +204,20 @@ class Orbits:
             Units of time between two products.
         looseness : float
             Ratio of the tolerance of the propagators to that of the orbit.
+
+        Returns
+        -------
+        integrator : VariationalIntegrator
+            Integrator of the nodes, beside each other from the settled states.
+        travellers : Travellers
+            The deviations.
         """
-        self.interpolation, self.block = interpolation, block
-        self.integrator = self.integrator_of(interpolation.nodes, looseness)
-        self.integrator.set_deviations(self._basis(self.integrator))
-        registers = interpolation.registers(self.integrator.kernel.origin.width)
-        self.travellers = Travellers.make(registers, len(self.state), self.components, self.variation.size)
+        integrator = self.integrator_of(interpolation.nodes, looseness)
+        integrator.set_deviations(self._basis(integrator))
+        registers = interpolation.registers(integrator.kernel.origin.width)
+        travellers = Travellers.make(registers, len(self.state), self.components, self.variation.size)
+        self.interpolation, self.block, self.integrator, self.travellers = interpolation, block, integrator, travellers
+        return integrator, travellers
 
     def _basis(self, integrator: VariationalIntegrator) -> np.ndarray:
         """The columns of the identity (cells, size, modes), for each node."""
@@ -294,7 +316,7 @@ def unit_of_time(scene: Scene) -> float:
     return scene.period or 2.0 * math.pi
 
 
-def _choices(forced: bool, share: float) -> list[tuple[float, int, int]]:
+def _choices(blocks: Sequence[float], share: float) -> list[tuple[float, int, int]]:
     """Blocks, nodes of a panel and panels on each side, the cheapest first.
 
     `share`: the time that a node costs all strengths in the product of a block, over that of its own integration over a
@@ -304,7 +326,6 @@ def _choices(forced: bool, share: float) -> list[tuple[float, int, int]]:
     def cost(block: float, nodes: int, parts: int) -> float:
         return nodes * parts + share * (nodes + BESIDE) / block
 
-    blocks = (8.0, 4.0, 2.0, 1.0) if forced else (1.0, 0.5, 0.25, 0.125)
     choices = [(block, nodes, parts) for block in blocks for nodes in NODES for parts in PARTS]
     return sorted(choices, key=lambda choice: cost(*choice))
 
