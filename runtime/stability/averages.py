@@ -133,7 +133,7 @@ class Batches:
         length, known = (2 * self.per_batch, BATCHES // 2) if full else (self.per_batch, self.count)
         count = BATCHES - known if self.blocks < BATCHES else CHECKED - known % CHECKED
         whole, rest = divmod(min(most, count * length), length)
-        return np.array([length] * whole + [rest] * (rest > 0), dtype=np.int64)
+        return np.array([length] * whole + ([rest] if rest else []), dtype=np.int64)
 
     def add(self, growth: np.ndarray, blocks: int = 1) -> None:
         """Add the growth over further blocks of the same batch.
