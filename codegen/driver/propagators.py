@@ -49,7 +49,7 @@ def tabulate(modes, powers, places, table, exponents, parts, stride):
         for c in range(places.shape[1]):
             k = places[node, c]
             first = (k // LANES * parts) * LANES + k % LANES
-            factor = math.ldexp(1.0, int(powers[k] - exponents[node]))
+            factor = 1.0 if powers[k] == exponents[node] else math.ldexp(1.0, int(powers[k] - exponents[node]))
             for r in range(parts):
                 table[(parts * c + r) * stride + node] = factor * modes[first + r * LANES]
 
@@ -114,14 +114,14 @@ def misfit(panel, weights, table, columns, parts, stride):
                 at = (parts * c + r) * stride + node
                 beside = at + columns * stride if kinds == 2 else at
                 real, imaginary = table[at + points + extra], table[beside + points + extra] if kinds == 2 else 0.0
-                size = max(size, math.hypot(real, imaginary))
+                size = max(size, math.hypot(real, imaginary) if kinds == 2 else abs(real))
                 for j in range(points):
                     k = panel[CHECKS] + kinds * (extra * points + j)
                     real -= weights[k] * table[at + j]
                     if kinds == 2:
                         real += weights[k + 1] * table[beside + j]
                         imaginary -= weights[k] * table[beside + j] + weights[k + 1] * table[at + j]
-                gap = max(gap, math.hypot(real, imaginary))
+                gap = max(gap, math.hypot(real, imaginary) if kinds == 2 else abs(real))
         worst = gap / size if not gap / size <= worst else worst  # NaN too
     return worst
 
