@@ -49,6 +49,7 @@ from .names import LANES
 from .names import SERIES
 from .names import WIDTH
 from .propagators import NODE
+from .propagators import PANEL
 from .propagators import POINTS
 from .propagators import TILE
 from .propagators import EXTRAS
@@ -251,11 +252,12 @@ def march(
     heads = address(found, parts * (1 + TILE * columns) * LANES)
     head_powers = address(heads, stride)
     alone = address(head_powers, stride)  # strengths, of one deviation for each node
-    few = (places.shape[0] + LANES - 1) // LANES
+    nodes, spots, given = places.shape[0], address(places, 0), address(weights, 0)
+    few, left = (nodes + LANES - 1) // LANES, 1 if owners[0] >= 0 else 0
     narrow = panels.shape[0] > 0 and columns == 2 and parts == 2
-    for node in range(places.shape[0]):
+    for node in range(nodes):
         for k in range(kinds):
-            alone[(kinds * (node // LANES) + k) * LANES + node % LANES] = strengths[k, places[node, 0]]
+            alone[(kinds * (node // LANES) + k) * LANES + node % LANES] = strengths[k, int(places[node, 0])]
     for which in range(registers):
         for k in range(kinds):
             for lane in range(LANES):
@@ -263,7 +265,7 @@ def march(
     tolerance = control[RTOL] * control[LOOSENESS]
     for cell in range(first, last):
         fill(0, cell, start, numbers, spans, control, clock, y, growth, old, dims)
-        status, begun = FINISHED, False
+        status, begun, moved = FINISHED, False, address(travellers, cell * groups * parts * LANES)
         for batch in range(batches.size):
             for _ in range(batches[batch]):
                 if status != FINISHED:
@@ -284,9 +286,10 @@ def march(
                             landed = True
                 status, taken = outcome(0, clock, y, control, dims), 0
                 while status == 0:
-                    if CONTACTS and narrow and landed and not parted:
-                        part(old, powers, places, owners, heads, head_powers, new, few)
-                        old, new, active, carried, parted = new, old, few, alone, True
+                    if CONTACTS:  # noqa: SIM102  (Numba leaves out what a constant excludes)
+                        if narrow and landed and not parted:
+                            part(old, powers, spots, nodes, left, heads, head_powers, new, few)
+                            old, new, active, carried, parted = new, old, few, alone, True
                     still = parted and y[2 * dims.nodes] == 0.0  # a place that sticks stays
                     moving, t = 0 if still else active, load(clock, TIME, WIDTH)
                     h, accept = attempt(
@@ -316,23 +319,25 @@ def march(
                 counts[cell, N_ACCEPTED] += int(clock[ACCEPTED])
                 counts[cell, N_REJECTED] += int(clock[REJECTED])
                 if panels.shape[0]:
-                    if parted:
-                        join(old, powers, places, heads, head_powers, new)
-                        old, new = new, old
+                    if CONTACTS:  # noqa: SIM102
+                        if parted:
+                            join(old, powers, spots, nodes, heads, head_powers, new)
+                            old, new = new, old
                     scale(old, powers, registers, parts)
-                    tabulate(old, powers, places, table, exponents, parts, stride)
+                    tabulate(old, powers, spots, nodes, columns, table, exponents, parts, stride)
                     for k in range(panels.shape[0]):
-                        panel = panels[k]
-                        if panel[POINTS]:
-                            level(panel[NODE], panel[POINTS] + panel[EXTRAS], table, exponents, columns * parts, stride)
-                            worst = misfit(panel, weights, table, columns, parts, stride)
+                        panel = address(panels, len(PANEL) * k)
+                        points = int(panel[POINTS])
+                        if points:
+                            level(
+                                int(panel[NODE]), points + int(panel[EXTRAS]), table, exponents, columns * parts, stride
+                            )  # fmt: skip
+                            worst = misfit(panel, given, table, columns, parts, stride)
                             misfits[cell] = misfits[cell] if worst <= misfits[cell] else worst  # NaN too
-                        transport(
-                            panel, weights, table, exponents, travellers[cell], lifts, found, columns, parts, stride
-                        )  # fmt: skip
-                    scale(address(travellers[cell], 0), lifts, groups, parts)
+                        transport(panel, given, table, exponents, moved, lifts, found, columns, parts, stride)
+                    scale(moved, lifts, groups, parts)
             if panels.shape[0]:
-                settle(travellers[cell], lifts, groups, gains[cell, batch], parts)
+                settle(moved, lifts, groups, address(gains, (cell * batches.size + batch) * groups * LANES), parts)
         if not panels.shape[0]:
             hand_back(old, powers, registers, vectors[cell], growth[cell], parts)
         for c in range(dims.dimension):

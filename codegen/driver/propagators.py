@@ -25,29 +25,29 @@ from .names import LANES
 # --- kernel text below ---
 # Columns of `panels`: registers of strengths, first node, nodes with weights, nodes for comparison, where the weights of
 # the first register begin (in registers), and where those of the nodes for comparison begin (in numbers).
-FROM, TO, NODE, POINTS, EXTRAS, WEIGHTS, CHECKS = 0, 1, 2, 3, 4, 5, 6
+FROM, TO, NODE, POINTS, EXTRAS, WEIGHTS, CHECKS = PANEL = 0, 1, 2, 3, 4, 5, 6
 # Registers of strengths whose propagators are interpolated together: a number of a node is loaded once for all of them.
 TILE = 4
 
 
 @njit(error_model="numpy")
-def tabulate(modes, powers, places, table, exponents, parts, stride):
+def tabulate(modes, powers, places, nodes, columns, table, exponents, parts, stride):
     """Write the propagators of all nodes, each scaled by a power of two, which is written beside them.
 
-    places (nodes, columns): the deviations that are the columns of a propagator. Number `parts*c + r` of `table` holds
+    places (nodes * columns): the deviations that are the columns of a propagator. Number `parts*c + r` of `table` holds
     entry (r, c) of all nodes.
     """
-    for node in range(places.shape[0]):
+    for node in range(nodes):
         largest = -math.inf
-        for c in range(places.shape[1]):
-            k = places[node, c]
+        for c in range(columns):
+            k = int(places[columns * node + c])
             first = (k // LANES * parts) * LANES + k % LANES
             for r in range(parts):
                 if modes[first + r * LANES] != 0.0:
                     largest = max(largest, powers[k])
         exponents[node] = largest if largest > -math.inf else 0.0
-        for c in range(places.shape[1]):
-            k = places[node, c]
+        for c in range(columns):
+            k = int(places[columns * node + c])
             first = (k // LANES * parts) * LANES + k % LANES
             factor = 1.0 if powers[k] == exponents[node] else math.ldexp(1.0, int(powers[k] - exponents[node]))
             for r in range(parts):
@@ -55,38 +55,34 @@ def tabulate(modes, powers, places, table, exponents, parts, stride):
 
 
 @njit(error_model="numpy")
-def part(modes, powers, places, owners, heads, head_powers, single, registers):
+def part(modes, powers, places, nodes, left, heads, head_powers, single, registers):
     """Part propagators of two components, of which a landing has left one, into this row and one deviation for each node.
 
     What becomes of this deviation, which begins with 1 in the component that is left, is what becomes of both columns.
     heads, head_powers: the row, by mode.  single: the deviation of each node, in so many registers.
     """
-    left = 1 if owners[0] >= 0 else 0
-    for node in range(places.shape[0]):
-        for c in range(2):
-            k = places[node, c]
-            heads[k], head_powers[k] = modes[(2 * (k // LANES) + left) * LANES + k % LANES], powers[k]
+    for j in range(2 * nodes):
+        k = int(places[j])
+        heads[k], head_powers[k] = modes[(2 * (k // LANES) + left) * LANES + k % LANES], powers[k]
     for k in range(registers * LANES):
         first = 2 * (k // LANES) * LANES + k % LANES
-        single[first + left * LANES] = 1.0 if k < places.shape[0] else 0.0
+        single[first + left * LANES] = 1.0 if k < nodes else 0.0
         single[first + (1 - left) * LANES] = 0.0
     for k in range(registers * LANES):
         powers[k] = 0.0
 
 
 @njit(error_model="numpy")
-def join(single, powers, places, heads, head_powers, modes):
+def join(single, powers, places, nodes, heads, head_powers, modes):
     """Write the columns of the propagators that `part` has parted."""
-    for node in range(places.shape[0]):
+    for j in range(2 * nodes):
+        k, node = int(places[j]), j // 2
         first = 2 * (node // LANES) * LANES + node % LANES
-        for c in range(2):
-            k = places[node, c]
-            head_powers[k] += powers[node]
-            for r in range(2):
-                modes[(2 * (k // LANES) + r) * LANES + k % LANES] = heads[k] * single[first + r * LANES]
-    for node in range(places.shape[0]):
-        for c in range(2):
-            powers[places[node, c]] = head_powers[places[node, c]]
+        head_powers[k] += powers[node]
+        for r in range(2):
+            modes[(2 * (k // LANES) + r) * LANES + k % LANES] = heads[k] * single[first + r * LANES]
+    for j in range(2 * nodes):
+        powers[int(places[j])] = head_powers[int(places[j])]
 
 
 @njit(error_model="numpy")
@@ -106,8 +102,8 @@ def level(node, count, table, exponents, entries, stride):
 @njit(error_model="numpy")
 def misfit(panel, weights, table, columns, parts, stride):
     """The largest difference of interpolated from integrated propagators, relative to the size of the propagator."""
-    node, points, kinds, worst = panel[NODE], panel[POINTS], parts // columns, 0.0
-    for extra in range(panel[EXTRAS]):
+    node, points, kinds, worst = int(panel[NODE]), int(panel[POINTS]), parts // columns, 0.0
+    for extra in range(int(panel[EXTRAS])):
         size, gap = 1e-300, 0.0
         for c in range(columns):
             for r in range(columns):
@@ -116,7 +112,7 @@ def misfit(panel, weights, table, columns, parts, stride):
                 real, imaginary = table[at + points + extra], table[beside + points + extra] if kinds == 2 else 0.0
                 size = max(size, math.hypot(real, imaginary) if kinds == 2 else abs(real))
                 for j in range(points):
-                    k = panel[CHECKS] + kinds * (extra * points + j)
+                    k = int(panel[CHECKS]) + kinds * (extra * points + j)
                     real -= weights[k] * table[at + j]
                     if kinds == 2:
                         real += weights[k + 1] * table[beside + j]
@@ -132,7 +128,7 @@ def real_entries(which, count, panel, weights, table, entries, stride, found):
 
     Behind the last register of the panel it stands again.
     """
-    points, node, first = panel[POINTS], panel[NODE], panel[WEIGHTS]
+    points, node, first = int(panel[POINTS]), int(panel[NODE]), int(panel[WEIGHTS])
     a, b = first + points * which, first + points * min(which + 1, count - 1)
     c, d = first + points * min(which + 2, count - 1), first + points * min(which + 3, count - 1)
     for slot in range(entries):
@@ -154,9 +150,9 @@ def real_entries(which, count, panel, weights, table, entries, stride, found):
 @njit(error_model="numpy")
 def complex_entries(which, count, panel, weights, table, columns, stride, found):
     """As `real_entries`, of complex propagators: the imaginary part of an entry is `columns` slots further on."""
-    points, node = panel[POINTS], panel[NODE]
+    points, node = int(panel[POINTS]), int(panel[NODE])
     for k in range(min(TILE, count - which)):
-        at = panel[WEIGHTS] + 2 * points * (which + k)
+        at = int(panel[WEIGHTS]) + 2 * points * (which + k)
         for c in range(columns):
             for r in range(columns):
                 slot = 2 * columns * c + r
@@ -175,7 +171,7 @@ def own_entries(which, count, panel, table, entries, stride, found):
     """As `real_entries`, of a panel whose strengths are nodes themselves."""
     for k in range(min(TILE, count - which)):
         for slot in range(entries):
-            store(found, TILE * slot + k, load(table, (slot * stride + panel[NODE]) // LANES + which + k, LANES))
+            store(found, TILE * slot + k, load(table, (slot * stride + int(panel[NODE])) // LANES + which + k, LANES))
 
 
 @njit(error_model="numpy")
@@ -205,20 +201,20 @@ def transport(panel, weights, table, exponents, travellers, lifts, found, column
 
     `found` has room for the propagators of TILE registers, and for one deviation behind them.
     """
-    count = panel[TO] - panel[FROM]
+    count = int(panel[TO]) - int(panel[FROM])
     for which in range(0, count, TILE):
-        if panel[POINTS] == 0:
+        if int(panel[POINTS]) == 0:
             own_entries(which, count, panel, table, columns * parts, stride, found)
         elif parts == columns:
             real_entries(which, count, panel, weights, table, columns * parts, stride, found)
         else:
             complex_entries(which, count, panel, weights, table, columns, stride, found)
         for k in range(min(TILE, count - which)):
-            s = panel[FROM] + which + k
+            s = int(panel[FROM]) + which + k
             product(parts * s, k, travellers, found, columns, parts)
-            lift = broadcast(exponents[panel[NODE]], LANES)
-            if panel[POINTS] == 0:
-                lift = load(exponents, panel[NODE] // LANES + which + k, LANES)
+            lift = broadcast(exponents[int(panel[NODE])], LANES)
+            if int(panel[POINTS]) == 0:
+                lift = load(exponents, int(panel[NODE]) // LANES + which + k, LANES)
             store(lifts, s, load(lifts, s, LANES) + lift)
 
 

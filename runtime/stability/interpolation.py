@@ -91,9 +91,9 @@ class Interpolation:
         """
         if self.is_exact:
             count = len(self.strengths)
-            table = np.array([[0, -(-count // lanes), 0, 0, 0, 0, 0]], dtype=np.int64)
+            table = np.array([[0.0, -(-count // lanes), 0.0, 0.0, 0.0, 0.0, 0.0]])
             return Registers(table, np.zeros(1), np.arange(count), lanes * int(table[0, 1]), lanes)
-        where, table = np.empty(len(self.strengths), dtype=np.int64), np.zeros((len(self.panels), 7), dtype=np.int64)
+        where, table = np.empty(len(self.strengths), dtype=np.int64), np.zeros((len(self.panels), 7))
         kinds = 2 if np.iscomplexobj(self.strengths) else 1
         spread, register, node, room = [], 0, 0, 0
         for k, panel in enumerate(self.panels):
@@ -116,8 +116,8 @@ class Registers:
 
     Parameters
     ----------
-    panels : ndarray of int64, shape (panels, 7)
-        What belongs to each panel.
+    panels : ndarray, shape (panels, 7)
+        What belongs to each panel: whole numbers.
     weights : ndarray, shape (any,)
         The weights of the strengths, then those of the strengths for comparison.
     where : ndarray of int64, shape (m,)

@@ -32,7 +32,8 @@ __all__ = ["Travellers", "VariationalIntegrator"]
 
 NO_PANELS = (
     np.ones(1, dtype=np.int64),
-    *(np.zeros((0, k), dtype=np.int64) for k in (1, 7)),
+    np.zeros((0, 1)),
+    np.zeros((0, 7)),
     np.zeros(0),
     np.zeros((0, 0)),
     np.zeros((0, 0, 0)),
@@ -255,7 +256,7 @@ class VariationalIntegrator:
         KeyboardInterrupt
             On Ctrl-C.
         """
-        places, room = self.order.reshape(-1, travellers.columns), travellers.registers.room
+        places, room = self.order.reshape(-1, travellers.columns).astype(float), travellers.registers.room
         gains, misfits = np.empty((len(self.state), len(batches), room)), np.zeros(len(self.state))
         registers = travellers.registers
         panels = (batches, places, registers.panels, registers.weights, travellers.vectors, gains, misfits)
