@@ -54,6 +54,7 @@ from .propagators import POINTS
 from .propagators import TILE
 from .propagators import EXTRAS
 from .propagators import join
+from .propagators import larger
 from .propagators import level
 from .propagators import misfit
 from .propagators import part
@@ -332,8 +333,7 @@ def march(
                             level(
                                 int(panel[NODE]), points + int(panel[EXTRAS]), table, exponents, columns * parts, stride
                             )  # fmt: skip
-                            worst = misfit(panel, given, table, columns, parts, stride)
-                            misfits[cell] = misfits[cell] if worst <= misfits[cell] else worst  # NaN too
+                            misfits[cell] = larger(misfits[cell], misfit(panel, given, table, columns, parts, stride))
                         transport(panel, given, table, exponents, moved, lifts, found, columns, parts, stride)
                     scale(moved, lifts, groups, parts)
             if panels.shape[0]:

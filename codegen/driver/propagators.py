@@ -99,6 +99,12 @@ def level(node, count, table, exponents, entries, stride):
             exponents[j] = largest
 
 
+@njit(error_model="numpy", forceinline=True)
+def larger(known, other):
+    """The larger of two sizes; NaN if either is."""
+    return other if other > known or other != other else known
+
+
 @njit(error_model="numpy")
 def misfit(panel, weights, table, columns, parts, stride):
     """The largest difference of interpolated from integrated propagators, relative to the size of the propagator."""
@@ -117,8 +123,8 @@ def misfit(panel, weights, table, columns, parts, stride):
                     if kinds == 2:
                         real += weights[k + 1] * table[beside + j]
                         imaginary -= weights[k] * table[beside + j] + weights[k + 1] * table[at + j]
-                gap = max(gap, math.hypot(real, imaginary) if kinds == 2 else abs(real))
-        worst = gap / size if not gap / size <= worst else worst  # NaN too
+                gap = larger(gap, math.hypot(real, imaginary) if kinds == 2 else abs(real))
+        worst = larger(worst, gap / size)
     return worst
 
 

@@ -261,7 +261,7 @@ class VariationalIntegrator:
         registers = travellers.registers
         panels = (batches, places, registers.panels, registers.weights, travellers.vectors, gains, misfits)
         self._run(length, panels, self.vectors, np.empty((len(self.state), self.strengths.shape[1])))
-        travellers.error = max(travellers.error, float(misfits.max()))
+        travellers.error = float(np.maximum(travellers.error, misfits.max()))  # NaN too
         return gains.transpose(1, 0, 2).take(registers.where, axis=2)
 
     def _run(

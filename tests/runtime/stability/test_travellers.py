@@ -88,6 +88,17 @@ def test_coarse_nodes_are_seen_by_the_strengths_for_comparison() -> None:
     assert 1e-9 < found[13] < 1e-5
 
 
+@pytest.mark.parametrize("place", [-1, -13, -26, -39])
+def test_a_number_that_is_none_is_seen_in_the_error(place: int) -> None:
+    """The last of the weights are those of the strengths for comparison, 13 for each."""
+    orbits = settled(LINE, oscillator="duffing")
+    orbits.start(strength_interpolation(LINE, 13), 1.0)
+    assert orbits.travellers is not None
+    orbits.travellers.registers.weights[place] = np.nan
+    orbits.growths(np.array([1, 1]))
+    assert np.isnan(orbits.travellers.error)
+
+
 def test_growth_does_not_depend_on_the_number_of_workers_or_on_batches() -> None:
     alone, shared = (settled(LINE, 3, 1e-6, w, contact="set-valued", parameters={"omega": 1.4}) for w in (1, 2))
     found = []
