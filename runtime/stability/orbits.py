@@ -30,8 +30,8 @@ NODES, PARTS = (13, 21, 29, 37, 61), (1, 2, 4, 8, 16)
 BLOCKS, FREE_BLOCKS = (8.0, 4.0, 2.0, 1.0), (1.0, 0.5, 0.25, 0.125)
 """Lengths of a block that are tried, in periods of the drive and in units of 2 pi."""
 
-STEP = 200
-"""Multiplications of a register that take as long as a step of a deviation."""
+STEP, BLOCK = 200, 40_000
+"""Multiplications that take as long as a step of a deviation, and as a block without any."""
 
 BESIDE = 6
 """Nodes that cost a strength as much as what else is done for it in a block."""
@@ -177,7 +177,7 @@ class Orbits:
         one.advance(self.unit)
         taken = STEP * self.components * one.steps / len(self.state)
         blocks = [b for b in BLOCKS if b <= max(4.0, periods / BATCHES)] if self.scene.forced else FREE_BLOCKS
-        for block, nodes, parts in _choices(blocks, len(self.strengths) * self.components**2 / taken):
+        for block, nodes, parts in _choices(blocks, taken, len(self.strengths) * self.components**2):
             chosen = strength_interpolation(self.strengths, nodes, parts)
             if chosen.is_exact or self._misfit(chosen, block) < limit:
                 break
@@ -316,15 +316,14 @@ def unit_of_time(scene: Scene) -> float:
     return scene.period or 2.0 * math.pi
 
 
-def _choices(blocks: Sequence[float], share: float) -> list[tuple[float, int, int]]:
+def _choices(blocks: Sequence[float], taken: float, numbers: int) -> list[tuple[float, int, int]]:
     """Blocks, nodes of a panel and panels on each side, the cheapest first.
 
-    `share`: the time that a node costs all strengths in the product of a block, over that of its own integration over a
-    unit of time.
+    `taken`: multiplications that integrate a node over a unit of time; `numbers`: those of all propagators.
     """
 
     def cost(block: float, nodes: int, parts: int) -> float:
-        return nodes * parts + share * (nodes + BESIDE) / block
+        return nodes * parts * taken + (numbers * (nodes + BESIDE) + BLOCK) / block
 
     choices = [(block, nodes, parts) for block in blocks for nodes in NODES for parts in PARTS]
     return sorted(choices, key=lambda choice: cost(*choice))
