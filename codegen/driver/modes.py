@@ -28,8 +28,11 @@ from ..simd.lanes import split_binary
 from ..simd.lanes import store
 from .cells import REPEATING
 from .cells import aligned
+from .cells import begin
 from .cells import fill
 from .cells import outcome
+from .cells import put
+from .cells import restart
 from .cells import turn_over
 from .contacts import change_modes
 from .contacts import stop_at_event
@@ -45,14 +48,29 @@ from .names import CONTACTS
 from .names import LANES
 from .names import SERIES
 from .names import WIDTH
+from .propagators import NODE
+from .propagators import PANEL
+from .propagators import POINTS
+from .propagators import TILE
+from .propagators import EXTRAS
+from .propagators import join
+from .propagators import larger
+from .propagators import level
+from .propagators import misfit
+from .propagators import part
+from .propagators import settle
+from .propagators import tabulate
+from .propagators import transport
 from .recording import ACCEPTED
 from .recording import ATOL
 from .recording import BASE
 from .recording import CLOCK
+from .recording import FINISHED
 from .recording import MAX_STEP
 from .recording import N_ACCEPTED
 from .recording import N_REJECTED
 from .recording import PERIOD
+from .recording import PERIODS
 from .recording import REJECTED
 from .recording import RTOL
 from .recording import STATUS
@@ -171,7 +189,7 @@ def attempt(
         return h, accept_series(clock, h, limit)
     h = aim(clock, steering)
     error = step(t, h, y, y, y_new, dense, steering[RTOL], steering[ATOL], shared)
-    if any_lane(error <= 1.0):
+    if any_lane(error <= 1.0) and registers > 0:
         worst = watched(shared, strengths, old, new, registers - 1, tolerance, carry)
         if worst <= 1.0 and registers > 1:
             worst = max(worst, watched(shared, strengths, old, new, 0, tolerance, carry))
@@ -184,19 +202,35 @@ def attempt(
     return h, accept
 
 
+@njit(error_model="numpy")
+def renew(cell, spans, clock):
+    """Let the next block begin at time 0 of the clock, with nothing in mind but a power of two as the step."""
+    restart(0, clock)
+    for group in (ACCEPTED, REJECTED, PERIODS):
+        put(clock, group, 0, 0.0)
+    begin(0, cell, spans, clock)
+
+
 @njit(error_model="numpy", nogil=True, cache=True)
 def march(
     step, carry, pushes, release, dims, owners, first, last, start, numbers, spans, control, strengths, vectors, growth,
-    end, sums, counts, samples,
+    end, sums, counts, batches, places, panels, weights, travellers, gains, misfits,
 ):  # fmt: skip
     """Run the cells first … last-1, each an orbit with all modes.
 
     step, carry, pushes, release: functions of a scene; those that this driver does not call may be any.  dims: the sizes
     of its arrays.  owners (mode): the contact that each component of a deviation is a velocity of, -1 for the others.
     start, numbers, spans, control, end, sums, counts as in a sweep.  strengths (dims.strengths, modes): the same for all
-    cells, sorted by size; vectors (cells, mode, modes): deviations at the start, overwritten by those at the end at
-    unit length; growth (cells, modes): filled with the logarithm of the length at the end, -inf for a deviation that has
-    become zero. The number of modes is a multiple of LANES.  samples is not used.
+    cells, sorted by size; vectors (cells, mode, modes): deviations at the start.  The number of modes is a multiple of
+    LANES.
+
+    batches (any): how many blocks follow each other, each as long as spans say and each with the same deviations at its
+    start; the orbit goes on.  Without panels there is one block, and vectors are overwritten by the deviations at its end
+    at unit length, growth (cells, modes) by the logarithm of the length at the end, -inf for a deviation that has become
+    zero.  With panels, places (nodes, columns) are the modes whose deviations are the columns of a propagator; weights
+    and panels as in `propagators`.  travellers (cells, registers of strengths * mode * LANES) are deviations of unit
+    length that the propagators move from block to block; gains (cells, batches, strengths) are filled with the logarithm
+    of their growth over each batch, misfits (cells) with the largest error of the interpolation.
     """
     registers, parts, kinds = growth.shape[1] // LANES, owners.size, dims.strengths
     size, steering, slips = dims.dimension, address(control, 0), np.zeros(dims.nodes)
@@ -206,55 +240,108 @@ def march(
     middle, dense = address(y_new, size), address(y_new, 2 * size)
     out = address(dense, dims.dense_rows * size)
     shared = address(out, 9 * dims.nodes)
-    deviations = aligned(registers * (2 * parts + 1 + max(1, kinds)) * LANES)
+    columns, stride, groups = places.shape[1], registers * LANES, gains.shape[2] // LANES
+    room = registers * (2 * parts + 2 + max(1, kinds) + columns * parts) + groups + parts * (1 + TILE * columns)
+    deviations = aligned((room + registers * (4 + max(1, kinds))) * LANES)
     old, new = address(deviations, 0), address(deviations, registers * parts * LANES)
     powers = address(new, registers * parts * LANES)
     strong = address(powers, registers * LANES)
+    exponents = address(strong, registers * max(1, kinds) * LANES)
+    table = address(exponents, registers * LANES)
+    lifts = address(table, columns * parts * stride)
+    found = address(lifts, groups * LANES)
+    heads = address(found, parts * (1 + TILE * columns) * LANES)
+    head_powers = address(heads, stride)
+    alone = address(head_powers, stride)  # strengths, of one deviation for each node
+    nodes, spots, given = places.shape[0], address(places, 0), address(weights, 0)
+    few, left = (nodes + LANES - 1) // LANES, 1 if owners[0] >= 0 else 0
+    narrow = panels.shape[0] > 0 and columns == 2 and parts == 2
+    for node in range(nodes):
+        for k in range(kinds):
+            alone[(kinds * (node // LANES) + k) * LANES + node % LANES] = strengths[k, int(places[node, 0])]
     for which in range(registers):
         for k in range(kinds):
             for lane in range(LANES):
                 strong[(kinds * which + k) * LANES + lane] = strengths[k, which * LANES + lane]
     tolerance = control[RTOL] * control[LOOSENESS]
     for cell in range(first, last):
-        fill(0, cell, start, numbers, spans, control, clock, y, samples, old, dims)
-        take_in(vectors[cell], old, registers, parts)
-        if CONTACTS:
-            for i in range(dims.nodes):
-                if y[2 * dims.nodes + i] == 0.0:
-                    brake(i, 0.0, old, registers, owners)  # a velocity beside that of the ground is lost at once
-        for k in range(registers * LANES):
-            powers[k] = 0.0
-        status, taken = outcome(0, clock, y, control, dims), 0
-        while status == 0:
-            t = load(clock, TIME, WIDTH)
-            h, accept = attempt(
-                t, clock, y, y_new, dense, middle, out, steering, shared, strong, old, new, registers, tolerance, dims, step,
-                carry, pushes,
-            )  # fmt: skip
-            t_new = arrive(clock, t, h)
-            if any_lane(accept):
-                old, new = new, old
-                taken += 1
-                if taken % BETWEEN_SCALINGS == 0:
+        fill(0, cell, start, numbers, spans, control, clock, y, growth, old, dims)
+        status, begun, moved = FINISHED, False, address(travellers, cell * groups * parts * LANES)
+        for batch in range(batches.size):
+            for _ in range(batches[batch]):
+                if status != FINISHED:
+                    break
+                if begun:
+                    renew(cell, spans, clock)
+                begun = True
+                take_in(vectors[cell], old, registers, parts)
+                for k in range(registers * LANES):
+                    powers[k] = 0.0
+                active, carried, landed, parted = registers, strong, False, False
+                if CONTACTS:
+                    for i in range(dims.nodes):
+                        if y[2 * dims.nodes + i] == 0.0:
+                            brake(
+                                i, 0.0, old, registers, owners
+                            )  # a velocity beside that of the ground is lost at once
+                            landed = True
+                status, taken = outcome(0, clock, y, control, dims), 0
+                while status == 0:
+                    if CONTACTS:  # noqa: SIM102  (Numba leaves out what a constant excludes)
+                        if narrow and landed and not parted:
+                            part(old, powers, spots, nodes, left, heads, head_powers, new, few)
+                            old, new, active, carried, parted = new, old, few, alone, True
+                    still = parted and y[2 * dims.nodes] == 0.0  # a place that sticks stays
+                    moving, t = 0 if still else active, load(clock, TIME, WIDTH)
+                    h, accept = attempt(
+                        t, clock, y, y_new, dense, middle, out, steering, shared, carried, old, new, moving, tolerance,
+                        dims, step, carry, pushes,
+                    )  # fmt: skip
+                    t_new = arrive(clock, t, h)
+                    if any_lane(accept) and not still:
+                        old, new = new, old
+                        taken += 1
+                        if taken % BETWEEN_SCALINGS == 0:
+                            scale(old, powers, active, parts)
+                    largest = advance(clock, y, t, t_new, accept, y_new, dims)
+                    if CONTACTS:
+                        for i in range(dims.nodes):
+                            slips[i] = y[2 * dims.nodes + i]
+                        change_modes(accept, t_new, y, out, (), dims, pushes)
+                        for i in range(dims.nodes):
+                            if y[2 * dims.nodes + i] != slips[i]:
+                                saltate(i, slips[i], clock[TIME], y, out, carried, old, active, owners, dims, release)
+                                landed = landed or y[2 * dims.nodes + i] == 0.0
+                    if lane_bits(pause(clock, largest, steering)) != 0:
+                        status = outcome(0, clock, y, control, dims)
+                        if status == 0 and clock[TIME] >= clock[PERIOD]:
+                            turn_over(0, cell, spans, control, clock, y, dims)
+                            status = outcome(0, clock, y, control, dims)
+                counts[cell, N_ACCEPTED] += int(clock[ACCEPTED])
+                counts[cell, N_REJECTED] += int(clock[REJECTED])
+                if panels.shape[0]:
+                    if CONTACTS:  # noqa: SIM102
+                        if parted:
+                            join(old, powers, spots, nodes, heads, head_powers, new)
+                            old, new = new, old
                     scale(old, powers, registers, parts)
-            largest = advance(clock, y, t, t_new, accept, y_new, dims)
-            if CONTACTS:
-                for i in range(dims.nodes):
-                    slips[i] = y[2 * dims.nodes + i]
-                change_modes(accept, t_new, y, out, (), dims, pushes)
-                for i in range(dims.nodes):
-                    if y[2 * dims.nodes + i] != slips[i]:
-                        saltate(i, slips[i], clock[TIME], y, out, strong, old, registers, owners, dims, release)
-            if lane_bits(pause(clock, largest, steering)) != 0:
-                status = outcome(0, clock, y, control, dims)
-                if status == 0 and clock[TIME] >= clock[PERIOD]:
-                    turn_over(0, cell, spans, control, clock, y, dims)
-                    status = outcome(0, clock, y, control, dims)
-        hand_back(old, powers, registers, vectors[cell], growth[cell], parts)
+                    tabulate(old, powers, spots, nodes, columns, table, exponents, parts, stride)
+                    for k in range(panels.shape[0]):
+                        panel = address(panels, len(PANEL) * k)
+                        points = int(panel[POINTS])
+                        if points:
+                            level(
+                                int(panel[NODE]), points + int(panel[EXTRAS]), table, exponents, columns * parts, stride
+                            )  # fmt: skip
+                            misfits[cell] = larger(misfits[cell], misfit(panel, given, table, columns, parts, stride))
+                        transport(panel, given, table, exponents, moved, lifts, found, columns, parts, stride)
+                    scale(moved, lifts, groups, parts)
+            if panels.shape[0]:
+                settle(moved, lifts, groups, address(gains, (cell * batches.size + batch) * groups * LANES), parts)
+        if not panels.shape[0]:
+            hand_back(old, powers, registers, vectors[cell], growth[cell], parts)
         for c in range(dims.dimension):
             end[cell, c] = y[c]
         sums[cell, STOPPED_AT] = clock[BASE] + clock[TIME]
         counts[cell, STATUS] = status
-        counts[cell, N_ACCEPTED] = int(clock[ACCEPTED])
-        counts[cell, N_REJECTED] = int(clock[REJECTED])
     block[0] = deviations[0] = 0.0  # the memory behind the addresses is held until here

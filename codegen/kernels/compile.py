@@ -75,7 +75,8 @@ def signatures(driver: Driver) -> dict[str, Any]:
             "pushes": types.void(one, *[ADDRESS] * 3),
             "release": types.void(types.int64, *[types.float64] * 2, *[ADDRESS] * 3, types.int64),
         }
-        arrays = (*[_input] * 3, _vector, _input, _cube, _matrix, _matrix, _matrix, _counts, _cube)
+        arrays = (*[_input] * 3, _vector, _input, _cube, _matrix, _matrix, _matrix, _counts)
+        arrays += (types.int64[::1], _matrix, _matrix, _vector, _matrix, _cube, _vector)
         own: tuple[Any, ...] = (_sizes(ModeDimensions), types.int64[::1])
     else:
         lane, sizes = Lane(driver.width), _sizes(Dimensions)

@@ -112,6 +112,7 @@ class Driver:
             "cells",
             "control",
             *chosen,
+            *(["propagators"] if last == "modes" else []),
             last,
         )
         lines = [

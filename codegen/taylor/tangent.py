@@ -208,17 +208,22 @@ class ModeWriter:
         self.lines += ["# step length", f"size = {show(largest(_sizes(self.at.at(s, 0) for s in self.deviations)))}"]
         self.lines.append("weight = 1.0/(tolerance*size + 2.2250738585072014e-308)")
         reaches: list[Expr] = []
+        fits = []
         for k in (self.order, self.order - 1, self.order - 2):
             last = [e for s in self.deviations if (e := self.at.at(s, k)) != ZERO]
             if last:
                 self.lines.append(f"size_{k} = {show(times(largest(_sizes(last)), Name('weight')))}")
+                fits.append(f"({show(times(Name(f'size_{k}'), Name(f'ratio**{k}')))} <= 1.0)")
                 reaches.append(times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))))
+        self.lines += ["ratio = longest/scale", "length = longest"]
         if reaches:
-            self.lines.append(f"lengths = truncated(scale*exp({show(extreme('minimum', reaches))}))")
-            self.lines.append(f"length = common_length(lengths, longest, new, {_place(self.variation.size, 0)})")
-        else:
-            self.lines.append("length = longest")
-        self.lines.append("ratio = length/scale")
+            place = _place(self.variation.size, 0)
+            self.lines += [
+                f"if any_lane(~({' & '.join(fits)})):  # not all of them go so far",
+                f"    lengths = truncated(scale*exp({show(extreme('minimum', reaches))}))",
+                f"    length = common_length(lengths, longest, new, {place})",
+                "    ratio = length/scale",
+            ]
 
 
 def write_tangent(variation: Variation, order: int) -> TangentStep:

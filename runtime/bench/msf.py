@@ -1,13 +1,14 @@
 """What a master stability function costs: many strengths along one orbit, and the same exponents by
 JiTCODE.
 
-"one orbit" is the friction oscillator's: CPU time of one drive period with all strengths along it,
-one start, one thread, beside the same stretch of the orbit by itself (the kernel of one oscillator,
-the same method and tolerance). `integrated` strengths are carried along, the others interpolated;
-differences are those of the mean growth with interpolation from that with every strength
-integrated, along a periodic orbit and by the same steps. The largest one lies where a multiplier
-passes through zero and the exponent dips towards -inf: there any relative accuracy of the
-propagators is lost in the logarithm.
+"one orbit" is the friction oscillator's, with set-valued and with smoothed friction: CPU time of
+one drive period of an average over PERIODS of them, with all strengths along it and their standard
+errors, one start, one thread, beside the same stretch of the orbit by itself (the kernel of one
+oscillator, the same method and tolerance). `integrated` strengths are carried along, the others
+interpolated; differences are those of the mean growth with interpolation from that with every
+strength integrated, along a periodic orbit and by the same steps. The largest one lies where a
+multiplier passes through zero and the exponent dips towards -inf: there any relative accuracy of
+the propagators is lost in the logarithm.
 
 "to an error bar" is the CPU time from the start of the transient until the standard error of every
 exponent is below PRECISION, by the same estimate from batches; medians over several starts (of the
@@ -35,15 +36,27 @@ from ..cells.buffers import Buffers
 from ..cells.kernels import kernel
 from ..cells.keywords import Given
 from ..cells.plan import control_array, plan, tolerances
-from ..stability.averages import Batches
-from ..stability.exponents import coupled_cell, exponents
+from ..stability.averages import Averaging, Batches
+from ..stability.exponents import average, coupled_cell, exponents
 from ..stability.interpolation import exact_interpolation
 from ..stability.orbits import Orbits, unit_of_time
+from ..support.execution import Execution
 from . import peers
 from .kit.tables import markdown
 from .peers import _jitcode_transversal as jitcode
 
-__all__ = ["CASES", "COLUMNS", "Case", "difference", "measure", "notes", "orbit_rows", "strengths", "summary"]
+__all__ = [
+    "CASES",
+    "COLUMNS",
+    "LAWS",
+    "Case",
+    "difference",
+    "measure",
+    "notes",
+    "orbit_rows",
+    "strengths",
+    "summary",
+]
 
 COLUMNS = (
     "what",
@@ -62,7 +75,11 @@ COLUMNS = (
     "exponent",
     "standard error",
 )
+LAWS = {"set-valued": "set-valued friction, omega = 1.4", "atan": "friction, omega = 1.4"}
+"""Contacts of the orbits, and what the table calls them."""
 COUNTS = (1, 8, 100, 1_000, 10_000)
+PERIODS, REVIEWED = 1_000, 128
+"""Periods that are timed, and those over which differences are taken."""
 SIDE = 60
 """Strengths a side of the plane, alpha from 0 to 1.2 and beta from 0 to 0.6; negative beta would
 say the same again.
@@ -119,7 +136,7 @@ def measure(quick: bool = False) -> list[Row]:
     """Return the rows of the table, in the order of COLUMNS; `quick` takes few strengths and a
     loose error bar.
     """
-    rows = _one_thread(orbit_rows, quick)
+    rows = [row for contact in LAWS for row in _one_thread(orbit_rows, contact, quick)]
     for case in CASES[:1] if quick else CASES:
         rows += _one_thread(_own_rows, case, quick)
         if not peers.absent(jitcode):
@@ -142,13 +159,13 @@ def strengths(count: int) -> np.ndarray:
     return (np.linspace(0.0, 1.2, SIDE)[:, None] + 1j * np.linspace(0.0, 0.6, SIDE)).reshape(-1)
 
 
-def orbit_rows(quick: bool) -> list[Row]:
+def orbit_rows(contact: str, quick: bool) -> list[Row]:
     """The orbit by itself, then with more and more strengths; timed in turn, the best of several
     rounds.
     """
-    periods, rounds = (16, 2) if quick else (128, 12)
+    periods, reviewed, rounds = (64, 16, 2) if quick else (PERIODS, REVIEWED, 12)
     chosen = [strengths(count) for count in ((1, 100) if quick else (*COUNTS, 0))]
-    ready = [_settled(1.4, values) for values in chosen]
+    ready = [_settled(contact, 1.4, values, periods) for values in chosen]
     alone = _alone(ready[0], periods)
     best, steps = [math.inf] * (1 + len(ready)), [0.0] * (1 + len(ready))
     for _ in range(rounds):
@@ -156,15 +173,15 @@ def orbit_rows(quick: bool) -> list[Row]:
             begin = time.process_time()
             steps[k] = run() / periods
             best[k] = min(best[k], (time.process_time() - begin) / periods)
-    rows: list[Row] = [
-        (ORBIT, CASES[0].name, "synchain", "", 0, 0, steps[0], 1e6 * best[0], 1.0, nan, nan, periods, nan, nan, nan)
-    ]
+    what = (ORBIT, LAWS[contact], "synchain")
+    rows: list[Row] = [(*what, "", 0, 0, steps[0], 1e6 * best[0], 1.0, nan, nan, periods, nan, nan, nan)]
     for k, (orbits, values) in enumerate(zip(ready, chosen, strict=True), 1):
         plane = np.iscomplexobj(values)
         given = ("0 … 1.2, beta 0 … 0.6", f"{SIDE} x {SIDE}") if plane else (_span(values), len(values))
-        integrated, off = len(orbits.interpolation.nodes) if orbits.interpolation else 0, difference(values, periods)
+        integrated = len(orbits.interpolation.nodes) if orbits.interpolation else 0
+        off = difference(contact, values, reviewed)
         cost = (steps[k], 1e6 * best[k], best[k] / best[0], *off, periods, nan, nan, nan)
-        rows.append((ORBIT, CASES[0].name, "synchain", *given, integrated, *cost))
+        rows.append((*what, *given, integrated, *cost))
     return rows
 
 
@@ -173,24 +190,26 @@ def _span(values: Sequence[float] | np.ndarray) -> str:
     return f"{values[0]:g}" if len(values) == 1 else f"{values[0]:g} … {values[-1]:g}"
 
 
-def _settled(omega: float, values: np.ndarray) -> Orbits:
-    """One orbit with its modes, behind the transient."""
-    scene = coupled_cell(Given(exponents, {"omega": omega}), Scene(topology=topology("chain", 2), record=()), RTOL)
+def _settled(contact: str, omega: float, values: np.ndarray, periods: int) -> Orbits:
+    """One orbit with its modes, behind the transient, ready for an average over so many periods."""
+    pair = Scene(topology=topology("chain", 2), record=(), contact=contact)
+    scene = coupled_cell(Given(exponents, {"omega": omega}), pair, RTOL)
     start = np.array([[numbers[0] for numbers in scene.initial.values()]])
     orbits = Orbits.make(scene, values, start, workers=1)
     orbits.settle(SETTLED)
-    orbits.prepare()
+    orbits.prepare(periods)
     return orbits
 
 
 def _along(orbits: Orbits, periods: int) -> int:
-    """Advance from the settled state with all strengths; returns the steps of the orbit."""
+    """Average from the settled state with all strengths; returns the steps of the orbit."""
     carrier = orbits.integrator
     if carrier is None:
         raise RuntimeError("orbits are not prepared")
     carrier.state, before = orbits.state.copy(), carrier.steps
-    for _ in range(round(periods / orbits.block)):
-        orbits.advance()
+    averaging = Averaging(0.0, periods, 0.0, 0, Execution(1, show_progress=False))
+    with averaging.reporter() as reporter:
+        average(orbits, averaging, reporter)
     return carrier.steps - before
 
 
@@ -199,7 +218,8 @@ def _alone(orbits: Orbits, periods: int) -> Callable[[], int]:
     scene = Scene(
         topology=topology("chain", 1),
         record=(),
-        integrator="rodas5p",
+        contact=orbits.scene.contact,
+        integrator=orbits.method.name,
         rtol=RTOL,
         transient=0.0,
         window=periods,
@@ -218,22 +238,20 @@ def _alone(orbits: Orbits, periods: int) -> Callable[[], int]:
     return run
 
 
-def difference(values: np.ndarray, periods: int) -> tuple[float, float]:
+def difference(contact: str, values: np.ndarray, periods: int) -> tuple[float, float]:
     """The largest and the median difference of mean growth, with strengths interpolated and with
     all of them integrated.
 
     Along the periodic orbit at omega = 1.15, over so many periods.  The orbit alone chooses the
     steps of both, so that nothing but the interpolation tells them apart.
     """
-    few, all_of_them = _settled(1.15, values), _settled(1.15, values)
-    nodes = values if few.interpolation is None else few.interpolation.nodes
-    all_of_them.block, all_of_them.interpolation = few.block, exact_interpolation(values)
-    few.integrator, all_of_them.integrator = (few.integrator_of(taken, BY_ORBIT) for taken in (nodes, values))
-    sums = np.zeros((2, len(values)))
-    for _ in range(round(periods / few.block)):
-        for k, orbits in enumerate((few, all_of_them)):
-            sums[k] += orbits.advance()[0]
-    gaps = np.abs(sums[0] - sums[1]) / (periods * few.unit)
+    orbits = _settled(contact, 1.15, values, periods)
+    block, interpolation = orbits.block, orbits.interpolation or exact_interpolation(values)
+    sums = []
+    for way in (interpolation, exact_interpolation(values)):
+        orbits.start(way, block, BY_ORBIT)
+        sums.append(orbits.growths(np.full(1, round(periods / block)))[0, 0])
+    gaps = np.abs(sums[0] - sums[1]) / (periods * orbits.unit)
     return float(gaps.max()), float(np.median(gaps))
 
 

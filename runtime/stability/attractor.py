@@ -13,7 +13,6 @@ import sympy as sp
 
 from synchain.models.dynamics.variational import MODE, Variation
 
-from .interpolation import exact_interpolation
 from .orbits import Orbits
 
 __all__ = ["Attractor", "Motion", "cycle_propagators", "find_attractor"]
@@ -148,8 +147,7 @@ def cycle_propagators(orbit: Orbits, cycle: int) -> np.ndarray:
     ndarray, shape (1, m, p, p)
         Propagators of the m modes with p components each.
     """
-    orbit.interpolation, orbit.block = exact_interpolation(orbit.strengths), 1.0
-    orbit.integrator = orbit.integrator_of(orbit.strengths)
+    orbit.block, orbit.integrator = 1.0, orbit.integrator_of(orbit.strengths)
     total = orbit.propagators()
     for _ in range(cycle - 1):
         total = orbit.propagators() @ total

@@ -17,6 +17,9 @@ __all__ = ["Averaging", "Batches"]
 
 BATCHES = 64
 """Most batches that are kept."""
+CHECKED = 8
+"""Batches between two checks of the error."""
+ALL = slice(None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +57,9 @@ class Averaging:
         return self.execution.reporter(round(self.transient) + math.ceil(self.periods), "period")
 
     def rounds(
-        self, batches: Batches, step: float, error: Callable[[], np.ndarray], reporter: Reporter
-    ) -> Iterator[None]:
-        """Yield until the average is long or precise enough; each time one block must be added.
+        self, batches: Batches, step: float, error: Callable[[], np.ndarray | float], reporter: Reporter
+    ) -> Iterator[int]:
+        """Yield how many blocks are left until the average is long or precise enough; one of them at least must be added.
 
         Parameters
         ----------
@@ -65,13 +68,14 @@ class Averaging:
         step : float
             Length of a block in periods.
         error : callable
-            Returns the standard errors (m,) that must become small.
+            Returns the standard errors that must become small, or the largest.
         reporter : Reporter
             Counts the periods.
         """
         while batches.blocks * step < self.periods:
-            yield
-            reporter.advance(step)
+            before = batches.blocks
+            yield max(1, math.ceil(self.periods / step) - before)
+            reporter.advance(step * (batches.blocks - before))
             if batches.due and np.all(error() <= self.precision):
                 return
 
@@ -90,10 +94,14 @@ class Batches:
         Number of blocks so far.
     per_batch : int
         Number of blocks in a batch.
-    sums : list of ndarray, shape (starts, m)
-        Growth over each batch.
+    sums : ndarray, shape (BATCHES, starts, m)
+        Growth over each batch; behind the first `count` nothing that counts.
+    count : int
+        Number of batches, the last of which may be incomplete.
     due : bool
         True if enough new batches are complete for another check of the error.
+    worst : int
+        The strength with the largest error when all were looked at.
 
     References
     ----------
@@ -103,40 +111,72 @@ class Batches:
     length: float
     blocks: int = 0
     per_batch: int = 1
-    sums: list[np.ndarray] = field(default_factory=list)
+    sums: np.ndarray = field(default_factory=lambda: np.zeros((BATCHES, 0, 0)))
+    count: int = 0
     due: bool = False
+    worst: int = 0
 
-    def add(self, growth: np.ndarray) -> None:
-        """Add the growth over one more block.
+    def ahead(self, most: int) -> np.ndarray:
+        """Return the blocks of the batches until the error is due.
+
+        Parameters
+        ----------
+        most : int
+            Most blocks of all of them.
+
+        Returns
+        -------
+        ndarray of int64, shape (batches,)
+            The last batch may stay incomplete.
+        """
+        full = self.count == BATCHES
+        length, known = (2 * self.per_batch, BATCHES // 2) if full else (self.per_batch, self.count)
+        count = BATCHES - known if self.blocks < BATCHES else CHECKED - known % CHECKED
+        whole, rest = divmod(min(most, count * length), length)
+        return np.array([length] * whole + ([rest] if rest else []), dtype=np.int64)
+
+    def add(self, growth: np.ndarray, blocks: int = 1) -> None:
+        """Add the growth over further blocks of the same batch.
 
         Parameters
         ----------
         growth : ndarray, shape (starts, m)
-            Logarithm of the growth of each deviation over the block.
+            Logarithm of the growth of each deviation over the blocks.
+        blocks : int
+            Their number.
         """
+        if self.blocks == 0:
+            self.sums = np.empty((BATCHES, *growth.shape))
         if self.blocks % self.per_batch == 0:
-            if len(self.sums) == BATCHES:
-                self.sums = [a + b for a, b in zip(self.sums[::2], self.sums[1::2], strict=True)]
-                self.per_batch *= 2
-            self.sums.append(np.zeros_like(growth))
-        self.sums[-1] += growth
-        self.blocks += 1
-        self.due = self.blocks % self.per_batch == 0 and self.blocks >= BATCHES and len(self.sums) % 8 == 0
+            if self.count == BATCHES:
+                self.count, self.per_batch = BATCHES // 2, 2 * self.per_batch
+                self.sums[: self.count] = self.sums[::2] + self.sums[1::2]
+            self.sums[self.count] = growth
+            self.count += 1
+        else:
+            self.sums[self.count - 1] += growth
+        self.blocks += blocks
+        self.due = self.blocks % self.per_batch == 0 and self.blocks >= BATCHES and self.count % CHECKED == 0
 
     def mean(self) -> np.ndarray:
         """Return the growth per unit of time, an ndarray of shape (starts, m)."""
-        return np.asarray(np.sum(self.sums, axis=0) / (self.blocks * self.length))
+        return np.asarray(np.sum(self.sums[: self.count], axis=0) / (self.blocks * self.length))
 
-    def error_by_start(self) -> np.ndarray:
+    def error_by_start(self, strengths: slice = ALL) -> np.ndarray:
         """Estimate the standard error of each start.
+
+        Parameters
+        ----------
+        strengths : slice
+            Which strengths to look at.
 
         Returns
         -------
-        ndarray, shape (starts, m)
+        ndarray, shape (starts, strengths)
             The largest estimate from the batches alone, joined in twos and joined in fours; inf if
             there is a single batch.
         """
-        rates = np.array(self.sums[: self.blocks // self.per_batch]) / (self.per_batch * self.length)
+        rates = self.sums[: self.blocks // self.per_batch, :, strengths] / (self.per_batch * self.length)
         estimates = []
         for join in (1, 2, 4):
             count = len(rates) // join
@@ -147,7 +187,20 @@ class Batches:
                 )
         return np.asarray(np.max(estimates, axis=0))
 
-    def error(self) -> np.ndarray:
-        """Return the standard error of the mean over the starts, an ndarray of shape (m,)."""
-        each = self.error_by_start()
+    def error(self, strengths: slice = ALL) -> np.ndarray:
+        """Return the standard errors (strengths,) of the mean over the starts, as `error_by_start`."""
+        each = self.error_by_start(strengths)
         return np.asarray(np.sqrt((each**2).sum(axis=0)) / len(each))
+
+    def largest_error(self, enough: float) -> float:
+        """Return the largest standard error, or another one that exceeds `enough`.
+
+        The strength with the largest error the last time is looked at first: a thousand of them take longer than the
+        orbit itself.
+        """
+        first = float(self.error(slice(self.worst, self.worst + 1))[0])
+        if not first <= enough:
+            return first
+        error = self.error()
+        self.worst = int(np.argmax(error))
+        return float(error[self.worst])

@@ -35,6 +35,7 @@ from .orbits import Orbits
 
 __all__ = [
     "Exponents",
+    "average",
     "coupled_cell",
     "exponents",
     "group_by_attractor",
@@ -280,7 +281,9 @@ def _by_start(
             exponent[row], error[row] = attractor.exponents()
     length = max(attractor.cycle for attractor in attractors)
     if rest:
-        exponent[rest], error[rest], length = _average(orbits.part(rest), averaging, reporter)
+        aperiodic = orbits.part(rest)
+        aperiodic.prepare(averaging.periods)
+        exponent[rest], error[rest], length = average(aperiodic, averaging, reporter)
     return exponent, error, length
 
 
@@ -380,11 +383,29 @@ def group_by_attractor(attractors: Sequence[Attractor], by_start: np.ndarray) ->
     return groups
 
 
-def _average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[np.ndarray, np.ndarray, float]:
-    """Mean growth rates (starts, m), their standard errors and the time averaged over."""
-    orbits.prepare()
+def average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[np.ndarray, np.ndarray, float]:
+    """Average growth rates along orbits with their modes, from the settled states on.
+
+    Parameters
+    ----------
+    orbits : Orbits
+        Orbits whose `prepare` was called.
+    averaging : Averaging
+        How long to average.
+    reporter : Reporter
+        Counts the periods.
+
+    Returns
+    -------
+    mean, error : ndarray, shape (starts, m)
+        Growth rates and their standard errors, per unit of non-dimensional time.
+    length : float
+        Time averaged over.
+    """
     batches = Batches(orbits.unit * orbits.block)
-    for _ in averaging.rounds(batches, orbits.block, batches.error, reporter):
-        batches.add(orbits.advance())
+    for left in averaging.rounds(batches, orbits.block, lambda: batches.largest_error(averaging.precision), reporter):
+        parts = batches.ahead(left)
+        for growth, blocks in zip(orbits.growths(parts), parts, strict=True):
+            batches.add(growth, int(blocks))
     mean, error = batches.mean(), batches.error_by_start()
     return mean, error, batches.blocks * batches.length

@@ -18,16 +18,40 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Interpolation", "combine", "exact_interpolation", "strength_interpolation"]
+__all__ = ["Interpolation", "Panel", "Registers", "exact_interpolation", "on_a_cache_line", "strength_interpolation"]
 
-SINGLE = 2**18
-"""Most multiplications of one matrix product.
 
-Above this OpenBLAS uses several threads, whatever the number of workers.
-"""
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """Strengths that are interpolated from the same nodes.
 
-Panel = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Indices of the strengths on the panel, nodes, barycentric weights, strengths for comparison."""
+    Parameters
+    ----------
+    rows : ndarray, shape (m,)
+        Indices of the strengths.
+    points : ndarray, shape (k,)
+        Strengths of the nodes.
+    extras : ndarray, shape (c,)
+        Strengths that are integrated for comparison only.
+    weights : ndarray, shape (m, k)
+        Propagators of the strengths = weights @ propagators of the nodes.
+    checks : ndarray, shape (c, k)
+        Weights that give the propagators of the strengths for comparison from the nodes.
+    """
+
+    rows: np.ndarray
+    points: np.ndarray
+    extras: np.ndarray
+    weights: np.ndarray
+    checks: np.ndarray
+
+    @classmethod
+    def of(
+        cls, strengths: np.ndarray, rows: np.ndarray, points: np.ndarray, signs: np.ndarray, extras: np.ndarray
+    ) -> Panel:
+        """Return the panel of nodes with barycentric weights `signs`."""
+        weights, checks = (_barycentric(x, points, signs) for x in (strengths[rows], extras))
+        return cls(rows, points, extras, weights, checks)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,65 +62,82 @@ class Interpolation:
     ----------
     strengths : ndarray, shape (m,)
         All strengths, real or complex.
-    nodes : ndarray, shape (k,)
-        Strengths that are integrated.
-    weights : ndarray, shape (m, k)
-        Propagators of the strengths = weights @ propagators of the nodes.
-    checked : ndarray, shape (c,)
-        Indices of the nodes that serve for comparison only.
-    checks : ndarray, shape (c, k)
-        Weights that give the propagators of the checked nodes from the other nodes.
+    panels : tuple of Panel
+        Parts of the strengths with their nodes; none if every strength is integrated.
     """
 
     strengths: np.ndarray
-    nodes: np.ndarray
-    weights: np.ndarray
-    checked: np.ndarray
-    checks: np.ndarray
-
-    def apply(self, propagators: np.ndarray) -> np.ndarray:
-        """Compute the propagators of all strengths.
-
-        Parameters
-        ----------
-        propagators : ndarray, shape (cells, k, p, p)
-            Propagators of the nodes.
-
-        Returns
-        -------
-        ndarray, shape (cells, m, p, p)
-        """
-        return propagators if self.is_exact else combine(self.weights, propagators)
-
-    def error(self, propagators: np.ndarray) -> float:
-        """Compare interpolated with integrated propagators.
-
-        Parameters
-        ----------
-        propagators : ndarray, shape (cells, k, p, p)
-            Propagators of the nodes.
-
-        Returns
-        -------
-        float
-            Largest difference at the checked nodes, relative to the size of the propagator.
-        """
-        if len(self.checked) == 0:
-            return 0.0
-        integrated = propagators[:, self.checked]
-        sizes = np.maximum(np.abs(integrated).max(axis=(2, 3)), 1e-300)
-        return float((np.abs(combine(self.checks, propagators) - integrated).max(axis=(2, 3)) / sizes).max())
+    panels: tuple[Panel, ...] = ()
 
     @property
     def is_exact(self) -> bool:
         """True if every strength is integrated."""
-        return self.nodes is self.strengths
+        return not self.panels
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Strengths (k,) that are integrated."""
+        if self.is_exact:
+            return self.strengths
+        return np.concatenate([part for panel in self.panels for part in (panel.points, panel.extras)])
+
+    def registers(self, lanes: int) -> Registers:
+        """Return the strengths and the weights in groups of `lanes`, as kernels take them.
+
+        Parameters
+        ----------
+        lanes : int
+            Numbers in a register.
+        """
+        if self.is_exact:
+            count = len(self.strengths)
+            table = np.array([[0.0, -(-count // lanes), 0.0, 0.0, 0.0, 0.0, 0.0]])
+            return Registers(table, np.zeros(1), np.arange(count), lanes * int(table[0, 1]), lanes)
+        where, table = np.empty(len(self.strengths), dtype=np.int64), np.zeros((len(self.panels), 7))
+        kinds = 2 if np.iscomplexobj(self.strengths) else 1
+        spread, register, node, room = [], 0, 0, 0
+        for k, panel in enumerate(self.panels):
+            count, points = -(-len(panel.rows) // lanes), len(panel.points)
+            where[panel.rows] = register * lanes + np.arange(len(panel.rows))
+            table[k] = register, register + count, node, points, len(panel.extras), room, 0
+            padded = np.zeros((count * lanes, points), dtype=panel.weights.dtype)
+            padded[: len(panel.rows)] = panel.weights
+            numbers = _numbers(padded).reshape(count, lanes, points * kinds)
+            spread.append(numbers.transpose(0, 2, 1).reshape(-1))
+            register, node, room = register + count, node + points + len(panel.extras), room + count * points * kinds
+        checks = [_numbers(panel.checks).reshape(-1) for panel in self.panels]
+        table[:, 6] = room * lanes + np.cumsum([0, *map(len, checks[:-1])])
+        return Registers(table, on_a_cache_line(np.concatenate([*spread, *checks])), where, register * lanes, lanes)
+
+
+@dataclass(frozen=True, slots=True)
+class Registers:
+    """The weights of an interpolation as `synchain.codegen.driver.propagators` takes them.
+
+    Parameters
+    ----------
+    panels : ndarray, shape (panels, 7)
+        What belongs to each panel: whole numbers.
+    weights : ndarray, shape (any,)
+        The weights of the strengths, then those of the strengths for comparison.
+    where : ndarray of int64, shape (m,)
+        Position of each strength in the registers.
+    room : int
+        Numbers in all registers.
+    lanes : int
+        Numbers in one.
+    """
+
+    panels: np.ndarray
+    weights: np.ndarray
+    where: np.ndarray
+    room: int
+    lanes: int
 
 
 def exact_interpolation(strengths: np.ndarray) -> Interpolation:
     """Return the trivial map: every strength is integrated."""
-    nothing = np.zeros((0, len(strengths)))
-    return Interpolation(strengths, strengths, nothing, np.zeros(0, dtype=int), nothing)
+    return Interpolation(strengths)
 
 
 def strength_interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) -> Interpolation:
@@ -123,29 +164,29 @@ def strength_interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) ->
     """
     if len(strengths) == 0:
         raise ValueError("found no strength of a mode; expected at least one")
-    panels = list((_squares if np.iscomplexobj(strengths) else _pieces)(strengths, parts, nodes))
-    total = sum(len(points) + len(extra) for _, points, _, extra in panels)
-    if total >= len(strengths):
+    panels = tuple((_squares if np.iscomplexobj(strengths) else _pieces)(strengths, parts, nodes))
+    if sum(len(panel.points) + len(panel.extras) for panel in panels) >= len(strengths):
         return exact_interpolation(strengths)
-    weights = np.zeros((len(strengths), total), dtype=strengths.dtype)
-    integrated, checked, checks = [], [], []
-    first = 0
-    for rows, points, signs, extra in panels:
-        last = first + len(points)
-        weights[rows, first:last] = _barycentric(strengths[rows], points, signs)
-        for k, row in enumerate(_barycentric(extra, points, signs)):
-            checks.append(np.zeros(total, dtype=strengths.dtype))
-            checks[-1][first:last] = row
-            checked.append(last + k)
-        integrated += [points, extra]
-        first = last + len(extra)
-    return Interpolation(strengths, np.concatenate(integrated), weights, np.array(checked), np.array(checks))
+    return Interpolation(strengths, panels)
+
+
+def on_a_cache_line(values: np.ndarray) -> np.ndarray:
+    """Return a copy of a row of numbers that begins on a cache line, so that no register lies across two."""
+    block = np.empty(len(values) + 8)
+    first = -block.ctypes.data // 8 % 8
+    block[first : first + len(values)] = values
+    return block[first : first + len(values)]
+
+
+def _numbers(table: np.ndarray) -> np.ndarray:
+    """A matrix of complex numbers as pairs of columns, one of real numbers as it is."""
+    return np.ascontiguousarray(table).view(float)
 
 
 def _pieces(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
     """Yield equal pieces of the real line with Chebyshev points of the second kind.
 
-    The strengths for comparison lie between the outer points.
+    The strengths for comparison lie between the outer points, and in the middle.
     """
     edges = np.linspace(strengths.min(), strengths.max(), count + 1)
     which = np.clip(np.searchsorted(edges, strengths, side="right") - 1, 0, count - 1)
@@ -155,7 +196,8 @@ def _pieces(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
     between = (unit[:-1] + unit[1:])[[0, nodes // 2 - 1, -1]] / 2
     for k in np.unique(which):
         centre, half = (edges[k] + edges[k + 1]) / 2, (edges[k + 1] - edges[k]) / 2
-        yield np.flatnonzero(which == k), centre + half * unit, signs, centre + half * between
+        rows = np.flatnonzero(which == k)
+        yield Panel.of(strengths, rows, centre + half * unit, signs, centre + half * between)
 
 
 def _squares(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
@@ -172,7 +214,8 @@ def _squares(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
     for x, y in np.unique(cells, axis=1).T:
         centre, half = low + side * complex(x + 0.5, y + 0.5), side / 2
         rows = np.flatnonzero((cells[0] == x) & (cells[1] == y))
-        yield rows, centre + 1.5 * half * unit, unit, centre + half * np.array([0.0, 1.0 + 1.0j, -1.0 + 1.0j])
+        extras = centre + half * np.array([0.0, 1.0 + 1.0j, -1.0 + 1.0j])
+        yield Panel.of(strengths, rows, centre + 1.5 * half * unit, unit, extras)
 
 
 def _barycentric(x: np.ndarray, nodes: np.ndarray, signs: np.ndarray) -> np.ndarray:
@@ -183,26 +226,3 @@ def _barycentric(x: np.ndarray, nodes: np.ndarray, signs: np.ndarray) -> np.ndar
     terms[at.any(axis=1)] = 0.0
     terms[at] = 1.0
     return np.asarray(terms / terms.sum(axis=1, keepdims=True))
-
-
-def combine(weights: np.ndarray, propagators: np.ndarray, largest: int = SINGLE) -> np.ndarray:
-    """Multiply a matrix of weights with propagators, in pieces that stay on one thread.
-
-    Parameters
-    ----------
-    weights : ndarray, shape (m, k)
-        Weights.
-    propagators : ndarray, shape (cells, k, p, p)
-        Propagators of the nodes.
-    largest : int
-        Most multiplications of one matrix product.
-
-    Returns
-    -------
-    ndarray, shape (cells, m, p, p)
-    """
-    cells, count, p, _ = propagators.shape
-    table = propagators.transpose(1, 0, 2, 3).reshape(count, -1)
-    rows = max(1, largest // table.size)
-    products = np.concatenate([weights[i : i + rows] @ table for i in range(0, max(len(weights), 1), rows)])
-    return np.asarray(products.reshape(len(weights), cells, p, p).transpose(1, 0, 2, 3))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -18,13 +18,26 @@ from synchain.models.scenes.scene import Scene
 
 from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
+from .averages import BATCHES
 from .interpolation import Interpolation, exact_interpolation, strength_interpolation
-from .variational_integrator import VariationalIntegrator
+from .variational_integrator import Travellers, VariationalIntegrator
 
 __all__ = ["Orbits", "unit_of_time"]
 
-NODES, PARTS = (14, 20, 28, 40, 60), (1, 2, 4, 8, 16)
-"""Nodes of a panel of strengths, and panels on each side, that are tried."""
+NODES, PARTS = (13, 21, 29, 37, 61), (1, 2, 4, 8, 16)
+"""Nodes of a panel of strengths, and panels on each side, that are tried; with three for comparison they fill registers."""
+
+BLOCKS, FREE_BLOCKS = (8.0, 4.0, 2.0, 1.0), (1.0, 0.5, 0.25, 0.125)
+"""Lengths of a block that are tried, in periods of the drive and in units of 2 pi."""
+
+STEP, BLOCK = 200, 40_000
+"""Multiplications that take as long as a step of a deviation, and as a block without any."""
+
+BESIDE = 6
+"""Nodes that cost a strength as much as what else is done for it in a block."""
+
+TRIAL = 8
+"""Blocks on which an interpolation is tried."""
 
 LOOSENESS = 10.0
 """Ratio of the tolerance of the modes to that of the orbit if their growth is averaged.
@@ -55,15 +68,13 @@ class Orbits:
     method : Integrator
         Method of all steps, the one that suits all strengths.
     block : float
-        Number of units of one call of `advance`.
+        Number of units of a block.
     interpolation : Interpolation, optional
         Interpolation in the strength, set by `prepare`.
     integrator : VariationalIntegrator, optional
         Integrator of the nodes of the interpolation, set by `prepare`.
-    deviations : ndarray, shape (starts, m, components), optional
-        Deviations at unit length.
-    interpolation_error : float
-        Largest error of the interpolation so far.
+    travellers : Travellers, optional
+        Deviations of all strengths, and the largest error of the interpolation so far.
     """
 
     scene: Scene
@@ -76,8 +87,7 @@ class Orbits:
     block: float = 1.0
     interpolation: Interpolation | None = None
     integrator: VariationalIntegrator | None = None
-    deviations: np.ndarray | None = None
-    interpolation_error: float = 0.0
+    travellers: Travellers | None = None
 
     @classmethod
     def make(cls, scene: Scene, strengths: np.ndarray, state: np.ndarray, workers: int | None) -> Orbits:
@@ -154,19 +164,67 @@ class Orbits:
                 advanced(length)
         self.state = integrator.state
 
-    def prepare(self) -> None:
-        """Choose block and interpolation by trial on the next blocks, and start the deviations."""
-        limit = max(0.1 * self.scene.rtol, 1e-12)
-        for block, nodes, parts in _choices(self.scene.forced):
-            self.block, self.interpolation = block, strength_interpolation(self.strengths, nodes, parts)
-            self.integrator = self.integrator_of(self.interpolation.nodes, LOOSENESS)
-            if self.interpolation.is_exact or self.interpolation.error(self.propagators()) < limit:
+    def prepare(self, periods: float) -> None:
+        """Choose block and interpolation by trial on the next blocks, and start the deviations.
+
+        Parameters
+        ----------
+        periods : float
+            Length of the longest average in units. A short one keeps short blocks, whose scatter says its error.
+        """
+        limit = max(0.01 * self.scene.rtol, 1e-12)  # later blocks of a chaotic orbit are up to ten times worse
+        one = self.integrator_of(self.strengths[:1], LOOSENESS)
+        one.advance(self.unit)
+        taken = STEP * self.components * one.steps / len(self.state)
+        blocks = [b for b in BLOCKS if b <= max(4.0, periods / BATCHES)] if self.scene.forced else FREE_BLOCKS
+        for block, nodes, parts in _choices(blocks, taken, len(self.strengths) * self.components**2):
+            chosen = strength_interpolation(self.strengths, nodes, parts)
+            if chosen.is_exact or self._misfit(chosen, block) < limit:
                 break
         else:
-            self.interpolation = exact_interpolation(self.strengths)
-        self.integrator = self.integrator_of(self.interpolation.nodes, LOOSENESS)
-        start = np.ones((len(self.state), len(self.strengths), self.components), dtype=self.strengths.dtype)
-        self.deviations = start / math.sqrt(self.components)
+            chosen = exact_interpolation(self.strengths)
+        self.start(chosen, block)
+
+    def _misfit(self, interpolation: Interpolation, block: float) -> float:
+        """Error of an interpolation over the next blocks."""
+        integrator, travellers = self.start(interpolation, block)
+        integrator.follow(block * self.unit, np.full(1, TRIAL), travellers)
+        return travellers.error
+
+    def start(
+        self, interpolation: Interpolation, block: float, looseness: float = LOOSENESS
+    ) -> tuple[VariationalIntegrator, Travellers]:
+        """Start deviations of all strengths along the orbits from their settled states.
+
+        Parameters
+        ----------
+        interpolation : Interpolation
+            Which propagators are integrated, and how the others follow from them.
+        block : float
+            Units of time between two products.
+        looseness : float
+            Ratio of the tolerance of the propagators to that of the orbit.
+
+        Returns
+        -------
+        integrator : VariationalIntegrator
+            Integrator of the nodes, beside each other from the settled states.
+        travellers : Travellers
+            The deviations.
+        """
+        integrator = self.integrator_of(interpolation.nodes, looseness)
+        integrator.set_deviations(self._basis(integrator))
+        registers = interpolation.registers(integrator.kernel.origin.width)
+        travellers = Travellers.make(registers, len(self.state), self.components, self.variation.size)
+        self.interpolation, self.block, self.integrator, self.travellers = interpolation, block, integrator, travellers
+        return integrator, travellers
+
+    def _basis(self, integrator: VariationalIntegrator) -> np.ndarray:
+        """The columns of the identity (cells, size, modes), for each node."""
+        basis = np.zeros((len(self.state), self.variation.size, len(integrator.order)))
+        for k in range(self.components):
+            basis[:, k, k :: self.components] = 1.0
+        return basis
 
     def propagators(self) -> np.ndarray:
         """Advance by one block.
@@ -181,43 +239,37 @@ class Orbits:
         RuntimeError
             If the orbits are not prepared.
         """
-        integrator, p = self.integrator, self.components
-        if integrator is None:
+        if self.integrator is None:
             raise RuntimeError("orbits are not prepared")
-        size = self.variation.size
-        basis = np.zeros((len(self.state), size, len(integrator.order)))
-        for k in range(p):
-            basis[:, k, k::p] = 1.0
-        integrator.set_deviations(basis)
+        integrator, p, size = self.integrator, self.components, self.variation.size
+        integrator.set_deviations(self._basis(integrator))
         growth = integrator.advance(self.block * self.unit)
         columns = integrator.deviations * np.exp(growth)[:, None, :]
         if size != p:
             columns = columns[:, :p] + 1j * columns[:, p:]
         return np.asarray(columns.reshape(len(self.state), p, -1, p).transpose(0, 2, 1, 3))
 
-    def advance(self) -> np.ndarray:
-        """Advance orbits and deviations by one block.
+    def growths(self, batches: np.ndarray) -> np.ndarray:
+        """Advance orbits and deviations by batches of blocks.
+
+        Parameters
+        ----------
+        batches : ndarray of int64, shape (b,)
+            Blocks of each batch.
 
         Returns
         -------
-        ndarray, shape (starts, m)
-            Logarithm of the growth of each deviation.
+        ndarray, shape (b, starts, m)
+            Logarithm of the growth of each deviation over each batch.
 
         Raises
         ------
         RuntimeError
             If the orbits are not prepared.
         """
-        if self.interpolation is None or self.deviations is None:
+        if self.integrator is None or self.travellers is None:
             raise RuntimeError("orbits are not prepared")
-        nodes = self.propagators()
-        self.interpolation_error = max(self.interpolation_error, self.interpolation.error(nodes))
-        propagators = self.interpolation.apply(nodes)
-        moved = sum(propagators[..., k] * self.deviations[..., k, None] for k in range(self.components))
-        length = np.linalg.norm(moved, axis=2)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            self.deviations = np.where(length[..., None] > 0.0, moved / length[..., None], 0.0)
-            return np.asarray(np.log(length))
+        return self.integrator.follow(self.block * self.unit, batches, self.travellers)
 
 
 def _rows(strengths: np.ndarray) -> np.ndarray:
@@ -264,14 +316,17 @@ def unit_of_time(scene: Scene) -> float:
     return scene.period or 2.0 * math.pi
 
 
-def _choices(forced: bool) -> list[tuple[float, int, int]]:
+def _choices(blocks: Sequence[float], taken: float, numbers: int) -> list[tuple[float, int, int]]:
     """Blocks, nodes of a panel and panels on each side, the cheapest first.
 
-    Each block costs as much as twenty nodes by itself.
+    `taken`: multiplications that integrate a node over a unit of time; `numbers`: those of all propagators.
     """
-    blocks = (4.0, 2.0, 1.0) if forced else (1.0, 0.5, 0.25, 0.125)
+
+    def cost(block: float, nodes: int, parts: int) -> float:
+        return nodes * parts * taken + (numbers * (nodes + BESIDE) + BLOCK) / block
+
     choices = [(block, nodes, parts) for block in blocks for nodes in NODES for parts in PARTS]
-    return sorted(choices, key=lambda choice: (20.0 + choice[1] * choice[2]) / choice[0])
+    return sorted(choices, key=lambda choice: cost(*choice))
 
 
 def _stretches(periods: int) -> list[int]:

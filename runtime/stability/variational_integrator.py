@@ -25,8 +25,61 @@ from ..cells.initial_modes import local_clock
 from ..cells.plan import control_array, half_swing, periods, tolerances
 from ..support.status import Status
 from ..support.threads import worker_count
+from .interpolation import Registers, on_a_cache_line
 
-__all__ = ["VariationalIntegrator"]
+__all__ = ["Travellers", "VariationalIntegrator"]
+
+
+NO_PANELS = (
+    np.ones(1, dtype=np.int64),
+    np.zeros((0, 1)),
+    np.zeros((0, 7)),
+    np.zeros(0),
+    np.zeros((0, 0)),
+    np.zeros((0, 0, 0)),
+    np.zeros(0),
+)
+"""The last arguments of a kernel that carries deviations over one block, and moves no others."""
+
+
+@dataclass(slots=True)
+class Travellers:
+    """Deviations of all strengths, which propagators move.
+
+    Parameters
+    ----------
+    registers : Registers
+        How they follow from the propagators of the nodes.
+    columns : int
+        Components of a deviation, real or complex.
+    vectors : ndarray, shape (cells, any)
+        The deviations at unit length, in registers.
+    error : float
+        Largest error of the interpolation so far, relative to the size of a propagator.
+    """
+
+    registers: Registers
+    columns: int
+    vectors: np.ndarray
+    error: float = 0.0
+
+    @classmethod
+    def make(cls, registers: Registers, cells: int, columns: int, parts: int) -> Travellers:
+        """Return deviations along (1, 1, …).
+
+        Parameters
+        ----------
+        registers : Registers
+            How they follow from the propagators of the nodes.
+        cells, columns : int
+            Numbers of orbits and of components.
+        parts : int
+            Real numbers of a deviation.
+        """
+        lanes = registers.lanes
+        start = np.zeros((cells, registers.room // lanes, parts, lanes))
+        start[:, :, :columns] = 1.0 / math.sqrt(columns)
+        return cls(registers, columns, on_a_cache_line(start.reshape(-1)).reshape(cells, -1))
 
 
 @dataclass(slots=True)
@@ -173,24 +226,54 @@ class VariationalIntegrator:
         KeyboardInterrupt
             On Ctrl-C.
         """
+        growth = np.empty((len(self.state), self.strengths.shape[1]))
+        self._run(length, NO_PANELS, self.vectors, growth)
+        return growth[:, self.order]
+
+    def follow(self, length: float, batches: np.ndarray, travellers: Travellers) -> np.ndarray:
+        """Integrate over blocks of time that follow each other, and move deviations by their propagators.
+
+        Every block begins with the deviations that were set, p for each node, which stay as they are.
+
+        Parameters
+        ----------
+        length : float
+            Length of a block, as for `advance`.
+        batches : ndarray of int64, shape (b,)
+            Numbers of blocks.
+        travellers : Travellers
+            The deviations of all strengths, which are moved.
+
+        Returns
+        -------
+        ndarray, shape (b, cells, strengths)
+            Logarithm of the growth of each deviation over each batch.
+
+        Raises
+        ------
+        FloatingPointError
+            If an orbit cannot be integrated.
+        KeyboardInterrupt
+            On Ctrl-C.
+        """
+        places, room = self.order.reshape(-1, travellers.columns).astype(float), travellers.registers.room
+        gains, misfits = np.empty((len(self.state), len(batches), room)), np.zeros(len(self.state))
+        registers = travellers.registers
+        panels = (batches, places, registers.panels, registers.weights, travellers.vectors, gains, misfits)
+        self._run(length, panels, self.vectors, np.empty((len(self.state), self.strengths.shape[1])))
+        travellers.error = float(np.maximum(travellers.error, misfits.max()))  # NaN too
+        return gains.transpose(1, 0, 2).take(registers.where, axis=2)
+
+    def _run(
+        self, length: float | np.ndarray, panels: tuple[np.ndarray, ...], vectors: np.ndarray, growth: np.ndarray
+    ) -> None:
+        """Call the kernel for all cells, and go on from where it ends."""
         cells, dimension = self.state.shape
         spans = np.zeros((cells, 4))
         spans[:, 1], spans[:, 2] = length, self.period
-        growth = np.empty((cells, self.strengths.shape[1]))
         end, sums, counts = np.empty((cells, dimension)), np.empty((cells, 4)), np.zeros((cells, 6), dtype=np.int64)
-        rest = (
-            self.state,
-            self.numbers,
-            spans,
-            self.control,
-            self.strengths,
-            self.vectors,
-            growth,
-            end,
-            sums,
-            counts,
-            np.empty((cells, 0, dimension)),
-        )
+        given = (self.state, self.numbers, spans, self.control, self.strengths, vectors, growth, end, sums, counts)
+        rest = (*given, *panels)
         cuts = np.linspace(0, cells, min(cells, self.workers) + 1).astype(int)
         if len(cuts) == 2:
             self.kernel.drive(0, cells, *rest)
@@ -200,16 +283,15 @@ class VariationalIntegrator:
         if len(bad):
             status = Status(int(counts[bad[0], 0]))
             raise FloatingPointError(f"the orbit with its deviations cannot be integrated: {status.message}")
-        taken = int(counts[:, 1:3].sum())
+        taken, blocks = int(counts[:, 1:3].sum()), int(panels[0].sum())
         if self.kernel.origin.method.series and taken:
-            step = float(np.broadcast_to(length, cells).sum()) / taken
+            step = blocks * float(np.broadcast_to(length, cells).sum()) / taken
             self.control[Control.FIRST_STEP] = (
                 step  # a Taylor step of any scale finds its length, only the first few gain
             )
             warn_of_stiff_modes(self.variation, end, self.numbers, self.strengths, step)
         self.state = end
         self.steps += taken
-        return growth[:, self.order]
 
     def _share(self, cuts: np.ndarray, rest: tuple[np.ndarray, ...]) -> None:
         """Run parts of the cells on threads; Ctrl-C stops them at once."""

@@ -1,0 +1,240 @@
+"""The deviations of many strengths, moved by propagators that are interpolated from those of few nodes.
+
+The strengths are divided into panels. A row of `panels` says which registers of strengths belong to a panel, which of its
+nodes are interpolated from and which are there for comparison, and where its weights begin. In a panel without weights
+every strength is a node itself.
+"""
+
+# ruff: noqa: I001  (the long lists of names stay short)
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from ..simd.addresses import address
+from ..simd.elementary import log
+from ..simd.lanes import broadcast
+from ..simd.lanes import fma
+from ..simd.lanes import load
+from ..simd.lanes import select
+from ..simd.lanes import sqrt
+from ..simd.lanes import store
+from .names import LANES
+
+# --- kernel text below ---
+# Columns of `panels`: registers of strengths, first node, nodes with weights, nodes for comparison, where the weights of
+# the first register begin (in registers), and where those of the nodes for comparison begin (in numbers).
+FROM, TO, NODE, POINTS, EXTRAS, WEIGHTS, CHECKS = PANEL = 0, 1, 2, 3, 4, 5, 6
+# Registers of strengths whose propagators are interpolated together: a number of a node is loaded once for all of them.
+TILE = 4
+
+
+@njit(error_model="numpy")
+def tabulate(modes, powers, places, nodes, columns, table, exponents, parts, stride):
+    """Write the propagators of all nodes, each scaled by a power of two, which is written beside them.
+
+    places (nodes * columns): the deviations that are the columns of a propagator. Number `parts*c + r` of `table` holds
+    entry (r, c) of all nodes.
+    """
+    for node in range(nodes):
+        largest = -math.inf
+        for c in range(columns):
+            k = int(places[columns * node + c])
+            first = (k // LANES * parts) * LANES + k % LANES
+            for r in range(parts):
+                if modes[first + r * LANES] != 0.0:
+                    largest = max(largest, powers[k])
+        exponents[node] = largest if largest > -math.inf else 0.0
+        for c in range(columns):
+            k = int(places[columns * node + c])
+            first = (k // LANES * parts) * LANES + k % LANES
+            factor = 1.0 if powers[k] == exponents[node] else math.ldexp(1.0, int(powers[k] - exponents[node]))
+            for r in range(parts):
+                table[(parts * c + r) * stride + node] = factor * modes[first + r * LANES]
+
+
+@njit(error_model="numpy")
+def part(modes, powers, places, nodes, left, heads, head_powers, single, registers):
+    """Part propagators of two components, of which a landing has left one, into this row and one deviation for each node.
+
+    What becomes of this deviation, which begins with 1 in the component that is left, is what becomes of both columns.
+    heads, head_powers: the row, by mode.  single: the deviation of each node, in so many registers.
+    """
+    for j in range(2 * nodes):
+        k = int(places[j])
+        heads[k], head_powers[k] = modes[(2 * (k // LANES) + left) * LANES + k % LANES], powers[k]
+    for k in range(registers * LANES):
+        first = 2 * (k // LANES) * LANES + k % LANES
+        single[first + left * LANES] = 1.0 if k < nodes else 0.0
+        single[first + (1 - left) * LANES] = 0.0
+    for k in range(registers * LANES):
+        powers[k] = 0.0
+
+
+@njit(error_model="numpy")
+def join(single, powers, places, nodes, heads, head_powers, modes):
+    """Write the columns of the propagators that `part` has parted."""
+    for j in range(2 * nodes):
+        k, node = int(places[j]), j // 2
+        first = 2 * (node // LANES) * LANES + node % LANES
+        head_powers[k] += powers[node]
+        for r in range(2):
+            modes[(2 * (k // LANES) + r) * LANES + k % LANES] = heads[k] * single[first + r * LANES]
+    for j in range(2 * nodes):
+        powers[int(places[j])] = head_powers[int(places[j])]
+
+
+@njit(error_model="numpy")
+def level(node, count, table, exponents, entries, stride):
+    """Scale the propagators of some nodes by the same power of two, the largest of theirs."""
+    largest = exponents[node]
+    for j in range(node, node + count):
+        largest = max(largest, exponents[j])
+    for j in range(node, node + count):
+        if exponents[j] != largest:
+            factor = math.ldexp(1.0, int(exponents[j] - largest))
+            for slot in range(entries):
+                table[slot * stride + j] *= factor
+            exponents[j] = largest
+
+
+@njit(error_model="numpy", forceinline=True)
+def larger(known, other):
+    """The larger of two sizes; NaN if either is."""
+    return other if other > known or other != other else known
+
+
+@njit(error_model="numpy")
+def misfit(panel, weights, table, columns, parts, stride):
+    """The largest difference of interpolated from integrated propagators, relative to the size of the propagator."""
+    node, points, kinds, worst = int(panel[NODE]), int(panel[POINTS]), parts // columns, 0.0
+    for extra in range(int(panel[EXTRAS])):
+        size, gap = 1e-300, 0.0
+        for c in range(columns):
+            for r in range(columns):
+                at = (parts * c + r) * stride + node
+                beside = at + columns * stride if kinds == 2 else at
+                real, imaginary = table[at + points + extra], table[beside + points + extra] if kinds == 2 else 0.0
+                size = max(size, math.hypot(real, imaginary) if kinds == 2 else abs(real))
+                for j in range(points):
+                    k = int(panel[CHECKS]) + kinds * (extra * points + j)
+                    real -= weights[k] * table[at + j]
+                    if kinds == 2:
+                        real += weights[k + 1] * table[beside + j]
+                        imaginary -= weights[k] * table[beside + j] + weights[k + 1] * table[at + j]
+                gap = larger(gap, math.hypot(real, imaginary) if kinds == 2 else abs(real))
+        worst = larger(worst, gap / size)
+    return worst
+
+
+@njit(error_model="numpy")
+def real_entries(which, count, panel, weights, table, entries, stride, found):
+    """The real propagators in the registers which … which+3 of a panel of `count`: register TILE*slot + k of `found`.
+
+    Behind the last register of the panel it stands again.
+    """
+    points, node, first = int(panel[POINTS]), int(panel[NODE]), int(panel[WEIGHTS])
+    a, b = first + points * which, first + points * min(which + 1, count - 1)
+    c, d = first + points * min(which + 2, count - 1), first + points * min(which + 3, count - 1)
+    for slot in range(entries):
+        place = slot * stride + node
+        one, two = broadcast(0.0, LANES), broadcast(0.0, LANES)
+        three, four = one, two
+        for j in range(points):
+            value = broadcast(table[place + j], LANES)
+            one = fma(load(weights, a + j, LANES), value, one)
+            two = fma(load(weights, b + j, LANES), value, two)
+            three = fma(load(weights, c + j, LANES), value, three)
+            four = fma(load(weights, d + j, LANES), value, four)
+        store(found, TILE * slot, one)
+        store(found, TILE * slot + 1, two)
+        store(found, TILE * slot + 2, three)
+        store(found, TILE * slot + 3, four)
+
+
+@njit(error_model="numpy")
+def complex_entries(which, count, panel, weights, table, columns, stride, found):
+    """As `real_entries`, of complex propagators: the imaginary part of an entry is `columns` slots further on."""
+    points, node = int(panel[POINTS]), int(panel[NODE])
+    for k in range(min(TILE, count - which)):
+        at = int(panel[WEIGHTS]) + 2 * points * (which + k)
+        for c in range(columns):
+            for r in range(columns):
+                slot = 2 * columns * c + r
+                real, imaginary = broadcast(0.0, LANES), broadcast(0.0, LANES)
+                for j in range(points):
+                    u, v = load(weights, at + 2 * j, LANES), load(weights, at + 2 * j + 1, LANES)
+                    x, y = table[slot * stride + node + j], table[(slot + columns) * stride + node + j]
+                    real = fma(u, x, fma(v, -y, real))
+                    imaginary = fma(u, y, fma(v, x, imaginary))
+                store(found, TILE * slot + k, real)
+                store(found, TILE * (slot + columns) + k, imaginary)
+
+
+@njit(error_model="numpy")
+def own_entries(which, count, panel, table, entries, stride, found):
+    """As `real_entries`, of a panel whose strengths are nodes themselves."""
+    for k in range(min(TILE, count - which)):
+        for slot in range(entries):
+            store(found, TILE * slot + k, load(table, (slot * stride + int(panel[NODE])) // LANES + which + k, LANES))
+
+
+@njit(error_model="numpy")
+def product(first, k, travellers, found, columns, parts):
+    """Apply the propagators of register k of `found` to the deviations of one register."""
+    moved = address(found, TILE * columns * parts * LANES)
+    for r in range(parts):
+        store(moved, r, broadcast(0.0, LANES))
+    for c in range(columns):
+        x = load(travellers, first + c, LANES)
+        for r in range(parts):
+            store(moved, r, fma(load(found, TILE * (parts * c + r) + k, LANES), x, load(moved, r, LANES)))
+        if parts > columns:
+            y = load(travellers, first + columns + c, LANES)
+            for r in range(columns):
+                real = load(found, TILE * (parts * c + r) + k, LANES)
+                imaginary = load(found, TILE * (parts * c + columns + r) + k, LANES)
+                store(moved, r, fma(-imaginary, y, load(moved, r, LANES)))
+                store(moved, columns + r, fma(real, y, load(moved, columns + r, LANES)))
+    for r in range(parts):
+        store(travellers, first + r, load(moved, r, LANES))
+
+
+@njit(error_model="numpy")
+def transport(panel, weights, table, exponents, travellers, lifts, found, columns, parts, stride):
+    """Apply the propagators of one panel to the deviations of its strengths; powers of two are counted in `lifts`.
+
+    `found` has room for the propagators of TILE registers, and for one deviation behind them.
+    """
+    count = int(panel[TO]) - int(panel[FROM])
+    for which in range(0, count, TILE):
+        if int(panel[POINTS]) == 0:
+            own_entries(which, count, panel, table, columns * parts, stride, found)
+        elif parts == columns:
+            real_entries(which, count, panel, weights, table, columns * parts, stride, found)
+        else:
+            complex_entries(which, count, panel, weights, table, columns, stride, found)
+        for k in range(min(TILE, count - which)):
+            s = int(panel[FROM]) + which + k
+            product(parts * s, k, travellers, found, columns, parts)
+            lift = broadcast(exponents[int(panel[NODE])], LANES)
+            if int(panel[POINTS]) == 0:
+                lift = load(exponents, int(panel[NODE]) // LANES + which + k, LANES)
+            store(lifts, s, load(lifts, s, LANES) + lift)
+
+
+@njit(error_model="numpy")
+def settle(travellers, lifts, registers, gains, parts):
+    """Give all deviations unit length, and write the logarithms of how much they have grown; zeros stay zeros."""
+    for s in range(registers):
+        square = broadcast(0.0, LANES)
+        for r in range(parts):
+            value = load(travellers, parts * s + r, LANES)
+            square = fma(value, value, square)
+        length = sqrt(square)
+        store(gains, s, load(lifts, s, LANES) * 0.6931471805599453 + log(length))
+        store(lifts, s, broadcast(0.0, LANES))
+        scaled = 1.0 / select(length > 0.0, length, 1.0)
+        for r in range(parts):
+            store(travellers, parts * s + r, scaled * load(travellers, parts * s + r, LANES))

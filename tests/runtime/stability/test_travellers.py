@@ -1,0 +1,164 @@
+"""Deviations of many strengths, moved by a kernel, against products of propagators that are all integrated."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from synchain.models.graphs.families import topology
+from synchain.models.scenes.scene import Scene
+from synchain.runtime.stability.averages import BATCHES, Batches
+from synchain.runtime.stability.interpolation import exact_interpolation, strength_interpolation
+from synchain.runtime.stability.orbits import Orbits
+
+LINE = np.linspace(0.0, 1.2, 149)
+SQUARE = (np.linspace(0.0, 1.2, 12)[:, None] + 1j * np.linspace(0.0, 0.6, 11)).reshape(-1)
+
+
+def settled(strengths: np.ndarray, starts: int = 1, rtol: float = 1e-11, workers: int = 1, **given: object) -> Orbits:
+    scene = Scene(topology=topology("chain", 2), rtol=rtol, record=(), **given)  # type: ignore[arg-type]
+    first = np.array([values[0] for values in scene.initial.values()])
+    state = np.tile(first, (starts, 1))
+    state[:, 0] += 0.1 * np.arange(starts)
+    orbits = Orbits.make(scene, strengths, state, workers)
+    orbits.settle(10)
+    return orbits
+
+
+def expected(orbits: Orbits, block: float, blocks: int) -> np.ndarray:
+    """Growth (starts, m) of deviations that begin along (1, 1, …), by products of NumPy."""
+    whole = orbits.part(list(range(len(orbits.state))))
+    whole.block, whole.integrator = block, whole.integrator_of(orbits.strengths)
+    p, growth = orbits.components, 0.0
+    vectors = np.full((len(orbits.state), len(orbits.strengths), p, 1), 1.0 / np.sqrt(p))
+    for _ in range(blocks):
+        vectors = whole.propagators() @ vectors
+        length = np.linalg.norm(vectors, axis=2, keepdims=True)
+        growth, vectors = growth + np.log(length[:, :, 0, 0]), vectors / length
+    return np.asarray(growth)
+
+
+CASES = {
+    "that sticks": (LINE, 4.0, {"contact": "set-valued", "parameters": {"omega": 1.4}}),
+    "that begins at rest": (LINE, 0.5, {"contact": "set-valued", "parameters": {"omega": 1.15}}),
+    "that sticks, in the plane": (SQUARE, 2.0, {"contact": "set-valued", "parameters": {"omega": 1.4}}),
+    "with a kink": (LINE, 1.0, {"rtol": 1e-9, "parameters": {"omega": 1.4}}),
+    "smooth": (LINE, 2.0, {"oscillator": "duffing"}),
+    "of three states": (5.0 * LINE, 0.5, {"oscillator": "lorenz", "coupling": "x->x"}),
+    "of three states, in the plane": (5.0 * SQUARE, 0.5, {"oscillator": "rossler", "coupling": "x->x"}),
+    "whose modes shrink at different rates": (0.4 + LINE, 3.0, {"oscillator": "harmonic", "coupling": "damper"}),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_growth_is_that_of_products_of_propagators(case: str) -> None:
+    strengths, block, given = CASES[case]
+    orbits = settled(strengths, starts=2, **given)  # type: ignore[arg-type]
+    wanted = expected(orbits, block, 3)
+    few = strength_interpolation(strengths, *((26, 1) if np.iscomplexobj(strengths) else (29, 2)))
+    assert not few.is_exact
+    for interpolation in (few, exact_interpolation(strengths)):
+        orbits.start(interpolation, block, 1.0)
+        found = orbits.growths(np.array([2, 1])).sum(axis=0)
+        close = np.abs(found - wanted)
+        assert np.median(close) < 1e-7, interpolation.is_exact
+        assert close.max() < 1e-4  # where a multiplier passes zero
+        assert orbits.travellers is not None
+        assert orbits.travellers.error < 1e-6
+
+
+def test_growth_beyond_the_range_of_numbers_is_counted() -> None:
+    """x'' = -x - alpha v over 3000 turns: a deviation shrinks like exp(-alpha t/2), to 1e-4000 and below."""
+    alpha = np.linspace(0.5, 1.5, 9)
+    orbits = settled(alpha, rtol=1e-6, oscillator="harmonic", coupling="damper")
+    orbits.start(exact_interpolation(alpha), 3000.0)
+    found = orbits.growths(np.array([1]))[0, 0]
+    np.testing.assert_allclose(found, -0.5 * alpha * 3000.0 * orbits.unit, rtol=0, atol=2.0)
+
+
+def test_coarse_nodes_are_seen_by_the_strengths_for_comparison() -> None:
+    orbits = settled(LINE, contact="set-valued", parameters={"omega": 1.4})
+    found = {}
+    for nodes in (8, 13):
+        orbits.start(strength_interpolation(LINE, nodes), 4.0)
+        orbits.growths(np.array([8]))
+        assert orbits.travellers is not None
+        found[nodes] = orbits.travellers.error
+    assert found[8] > 1e-3
+    assert 1e-9 < found[13] < 1e-5
+
+
+@pytest.mark.parametrize("place", [-1, -13, -26, -39])
+def test_a_number_that_is_none_is_seen_in_the_error(place: int) -> None:
+    """The last of the weights are those of the strengths for comparison, 13 for each."""
+    orbits = settled(LINE, oscillator="duffing")
+    orbits.start(strength_interpolation(LINE, 13), 1.0)
+    assert orbits.travellers is not None
+    orbits.travellers.registers.weights[place] = np.nan
+    orbits.growths(np.array([1, 1]))
+    assert np.isnan(orbits.travellers.error)
+
+
+def test_growth_does_not_depend_on_the_number_of_workers_or_on_batches() -> None:
+    alone, shared = (settled(LINE, 3, 1e-6, w, contact="set-valued", parameters={"omega": 1.4}) for w in (1, 2))
+    found = []
+    for orbits in (alone, shared):
+        orbits.prepare(1000)
+        found.append(orbits.growths(np.array([1, 3, 2])))
+    np.testing.assert_array_equal(*found)
+    assert found[0].shape == (3, 3, len(LINE))
+    alone.prepare(1000)
+    np.testing.assert_allclose(alone.growths(np.array([6]))[0], found[0].sum(axis=0), rtol=0, atol=1e-11)
+
+
+def test_strengths_in_other_company_grow_as_much() -> None:
+    """Their places in registers and their number change nothing but rounding, as long as the nodes are the same."""
+    orbits = settled(LINE, contact="set-valued", parameters={"omega": 1.4})
+    orbits.start(strength_interpolation(LINE, 21), 4.0)
+    many = orbits.growths(np.array([4]))[0, 0]
+    for chosen in (np.r_[0:37, 148], np.r_[0, 60:149]):
+        orbits.strengths = LINE[chosen]
+        orbits.start(strength_interpolation(LINE[chosen], 21), 4.0)
+        np.testing.assert_array_equal(orbits.growths(np.array([4]))[0, 0], many[chosen])
+
+
+def test_a_deviation_that_has_vanished_stays_so() -> None:
+    orbits = settled(LINE, oscillator="duffing")
+    orbits.start(strength_interpolation(LINE, 13), 1.0)
+    assert orbits.travellers is not None
+    orbits.travellers.vectors[:] = 0.0
+    for _ in range(2):
+        assert np.all(orbits.growths(np.array([1])) == -np.inf)
+    assert np.all(orbits.travellers.vectors == 0.0)
+
+
+def test_batches_ahead_are_those_of_single_blocks() -> None:
+    growth = np.random.default_rng(0).normal(size=(5 * BATCHES, 2, 3))
+    one, many, place = Batches(1.0), Batches(1.0), 0
+    while place < len(growth):
+        parts = many.ahead(len(growth) - place)
+        for k, blocks in enumerate(parts):
+            assert not (many.due and k)
+            many.add(growth[place : place + blocks].sum(axis=0), int(blocks))
+            for row in growth[place : place + blocks]:
+                assert not (one.due and one.blocks % BATCHES and k)
+                one.add(row)
+            place += blocks
+        assert (one.blocks, one.count, one.per_batch, one.due) == (many.blocks, many.count, many.per_batch, many.due)
+        np.testing.assert_allclose(one.error(), many.error(), rtol=1e-12)
+        assert many.due or place == len(growth)
+    assert many.ahead(3).tolist() == [3]
+
+
+def test_the_largest_error_is_the_largest_or_too_large() -> None:
+    random = np.random.default_rng(0)
+    batches = Batches(1.0)
+    for _ in range(BATCHES):
+        batches.add(random.normal(size=(2, 5)) * [1.0, 2.0, 9.0, 1.0, 3.0])
+    error = batches.error()
+    assert batches.largest_error(error.max()) == error.max()
+    assert batches.worst == 2
+    assert batches.largest_error(0.5 * error.max()) == error.max()
+    batches.worst = 0
+    assert batches.largest_error(0.5 * error[0]) == error[0]
+    assert batches.largest_error(error.max()) == error.max()
