@@ -37,12 +37,13 @@ def synchronous_node(equations: Equations) -> Node:
     Raises
     ------
     NoSynchrony
-        If a link acts between equal states and the sums of weights differ from node to node, and if a link has no value
-        between equal states.
+        If a link acts between equal states and the sums of weights, or parameters of links, differ from place to place,
+        and if a link has no value between equal states.
     ValueError
         For nodes that differ.
     """
-    equations.expect_alike("complete synchronisation", inertia_too=True, layers_too=True)
+    apart = replace(equations, layers=())
+    apart.expect_alike("complete synchronisation")
     node = equations.node
     for layer in equations.layers:
         ((_, edge),) = layer.edge_of
@@ -81,6 +82,12 @@ def _with_links(node: Node, layer: Layer, edge: Edge, n: int) -> Node:
         raise NoSynchrony(
             f"a link {', '.join(map(str, edge.rhs))} has no value between equal states, so complete synchronisation is no "
             "solution of this network"
+        )
+    own = [name for name in layer.varied if any(e.has(sp.Symbol(name, real=True)) for e in felt)]
+    if own:
+        raise NoSynchrony(
+            f"a link acts between equal states and {', '.join(own)} differs from link to link, so complete synchronisation is "
+            "no solution of this network"
         )
     unit = {edge.weight: sp.S.One}
     if all(sp.expand(e - edge.weight * e.xreplace(unit)) == 0 for e in felt):

@@ -236,6 +236,7 @@ def _generic(equations: Equations, named: _Named, style: Style) -> Iterator[str]
     here = dict(zip(node.state, own, strict=True))
     letters = _letters(equations, named, style, own, "i")
     letters |= {s: style.letter(s.name, "i") for s in _varied(equations)}
+    letters |= {sp.Symbol(name, real=True): style.letter(name, "ij") for name in equations.numbered}
     for edge, name in joints:
         letters |= _letters(equations, named, style, edge.here, "i")
         letters |= _letters(equations, named, style, edge.there, "j")

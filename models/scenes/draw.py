@@ -14,11 +14,12 @@ from typing import NoReturn
 from ..inputs.arithmetic import constant
 from ..inputs.checks import check_integer, check_number, check_positive, check_table, check_text, short_repr
 from ..inputs.frozen import Frozen
-from ..inputs.node_name import NodeName
+from ..inputs.node_name import LinkName, NodeName
 from ..inputs.reader import Algebra, NoMeaning, parse
 from ..inputs.words import Word
 from .axis import LIMIT, Axis
-from .model import Model
+from .model import WEIGHTS, Model
+from .parameters import in_order
 
 __all__ = ["Distribution", "Draw", "Draws", "drawn_axes", "draws", "lorentzian", "normal", "uniform"]
 
@@ -86,7 +87,7 @@ def lorentzian(centre: float, half_width: float) -> Draw:
 
 
 Draws = Draw | tuple[tuple[float, ...], ...]
-"""A distribution, or numbers by realisation: one, or one for each node."""
+"""A distribution, or numbers by realisation: one, or one for each node or link."""
 
 
 def draws(given: object, realisations: object) -> Frozen[Draws]:
@@ -122,7 +123,7 @@ def _drawn(what: str, value: object, count: int) -> Draws:
         raise ValueError(f"{what}: found {short_repr(listed)}; expected {KNOWN} or {count} entries")
     rows = [row if isinstance(row, Sequence) and not isinstance(row, str) else (row,) for row in listed]
     if len({len(row) for row in rows}) != 1:
-        raise ValueError(f"{what}: found rows of different lengths; expected one number, or one for each node, in each")
+        raise ValueError(f"{what}: found rows of different lengths; expected one number, or one for each node or link, in each")
     return tuple(tuple(check_number(what, number) for number in row) for row in rows)
 
 
@@ -161,13 +162,14 @@ def _read(what: str, text: str) -> Draw:
 def drawn_axes(model: Model, drawn: Frozen[Draws], count: int, rng: int) -> tuple[Axis, ...]:
     """Return the drawn values of each parameter and initial state, one for each realisation.
 
-    A distribution of a parameter or state of the nodes is drawn for each node by itself.  Each name has a stream of
-    its own, which depends on `rng` and the name alone: neither workers nor other draws change it.
+    A distribution of a parameter or state of the nodes is drawn for each node by itself, that of a parameter of links, or
+    of their weights "W", for each edge by itself: links there and back have one number.  Each name has a stream of its own,
+    which depends on `rng` and the name alone: neither workers nor other draws change it.
 
     Raises
     ------
     ValueError
-        For unknown names, and for lists that have neither one number nor one for each node.
+        For unknown names, and for lists that have neither one number nor one for each node or link.
     """
     axes: dict[str, Axis] = {}
     for name, how in drawn.items():
@@ -181,7 +183,12 @@ def drawn_axes(model: Model, drawn: Frozen[Draws], count: int, rng: int) -> tupl
 def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Iterable[tuple[str, Sequence[float]]]:
     """The names and the values of one draw."""
     holders = model.unlinked.holders(name)
+    links = {} if holders else model.link_names(name)
+    if links:
+        return _link_columns(name, links, how, count, rng)
     known = name in model.parameters or name in model.components or NodeName.parse(name) is not None
+    if name == WEIGHTS:
+        raise ValueError(f"draw {name}: found {len(model.linked)} layers of links; expected one whose weights are drawn")
     if not known:
         raise ValueError(model.unknown(name, "draw", (*model.parameters, *model.components)))
     alone = not holders or (model.n == 1 and name in model.parameters)
@@ -194,6 +201,20 @@ def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Itera
     if width not in (1, len(names)):
         raise ValueError(f"draw {name}: found rows of {width} numbers; expected 1 or {len(names)}, one for each node")
     return [(own, [row[min(k, width - 1)] for row in how]) for k, own in enumerate(names)]
+
+
+def _link_columns(
+    name: str, links: Mapping[tuple[int, int], LinkName], how: Draws, count: int, rng: int
+) -> Iterable[tuple[str, Sequence[float]]]:
+    """The names and the values of one draw of a parameter of links, or of their weights."""
+    if isinstance(how, Draw):
+        edges = {at: links[at[::-1]] if at[0] > at[1] and at[::-1] in links else own for at, own in links.items()}
+        drawn = {edge: _numbers(how, f"{rng} {edge}", count) for edge in dict.fromkeys(edges.values())}
+        return [(str(own), drawn[edges[own.target, own.source]]) for own in dict.fromkeys(links.values())]
+    if len(how[0]) == 1 and name != WEIGHTS:
+        return [(name, [row[0] for row in how])]
+    rows = [in_order(f"draw {name}", links, row if len(row) > 1 else row * len(links)) for row in how]
+    return [(str(own), [row[own.target, own.source] for row in rows]) for own in dict.fromkeys(links.values())]
 
 
 def _numbers(how: Draw, stream: str, count: int) -> list[float]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
 from itertools import islice
+from types import MappingProxyType
 
 from ..definitions.loader import load_friction_law, load_oscillator, read_coupling
 from ..definitions.table import as_name_or_table, law_of_table, oscillator_of_table
@@ -18,9 +19,10 @@ from ..graphs.links import LINK_LIMIT
 from ..graphs.topology import Topology
 from ..inputs.checks import check_integer, check_keys, check_number, check_table, short_repr, suggestion
 from ..inputs.frozen import Frozen
-from ..inputs.node_name import NodeName
+from ..inputs.node_name import LinkName, NodeName
 from ..inputs.plugins import part
-from ..interactions.coupling import COUPLINGS, Coupling, from_table
+from ..interactions.coupling import COUPLINGS, Coupling, LagrangianCoupling, Potential, from_table
+from ..mechanics.components import WEIGHT_NUMBER
 from ..mechanics.friction import ContactModel, FrictionLaw
 from ..mechanics.oscillator import Oscillator
 from ..mechanics.parameter import Parameter
@@ -41,6 +43,11 @@ __all__ = [
 
 MOST = 100_000
 """Most nodes that groups may name."""
+
+WEIGHTS = WEIGHT_NUMBER.name
+"""What the weights of links are called where a run draws or sweeps them."""
+
+_WEIGHT = Parameter(1.0, "1", "weight of a link")
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,9 +217,25 @@ class Model:
         return parts if parts is not None and parts.index in self.holders(parts.base) else None
 
     def parameter(self, name: str) -> Parameter | None:
-        """Return the parameter that a name such as "a" or "a_2" means, None if it means none."""
-        parts = self.node_parameter(name)
+        """Return the parameter that a name such as "a", "a_2" or "k_1_2" means, None if it means none."""
+        parts = self.node_parameter(name) or self.link_parameter(name)
+        if parts is not None and parts.base == WEIGHTS and WEIGHTS not in self.parameters:
+            return _WEIGHT
         return self.parameters.get(name if parts is None else parts.base)
+
+    def link_parameter(self, name: str) -> LinkName | None:
+        """Return the parts of the name of a parameter of one link, "k_1_2"; None for any other name."""
+        parts = None if name in self.parameters else LinkName.parse(name)
+        if parts is None or self.link_names(parts.base).get((parts.target, parts.source)) != parts:
+            return None
+        return parts
+
+    def link_names(self, name: str) -> Mapping[tuple[int, int], LinkName]:
+        """Return what a parameter of links, or "W", their weights, is called at each (target, source); none of a node's.
+
+        A link that acts on both ends has one name with the link that runs back, that of their edge.
+        """
+        return _link_names(self, name)
 
     def unknown(self, name: str, what: str, known: Iterable[str]) -> str:
         """Return the sentence that refuses a name; a parameter of the coupling without links has its own."""
@@ -256,6 +279,20 @@ def _equations(model: Model, varied: tuple[str, ...]) -> Equations:
     """The equations of a whole network."""
     oscillators = [kind.oscillator for kind in model.kinds]
     return network.layered_network(oscillators, model.unlinked.nodes, model.kind_of, model.linked, varied)
+
+
+@lru_cache(maxsize=64)
+def _link_names(model: Model, name: str) -> Mapping[tuple[int, int], LinkName]:
+    """The names of a parameter of links, or of their weights, by target and source."""
+    found: dict[tuple[int, int], LinkName] = {}
+    weights = name == WEIGHTS and name not in model.parameters and len(model.linked) == 1
+    for coupling, graph in () if model.holders(name) else model.linked:
+        if weights or name in coupling.parameters:
+            mutual = isinstance(coupling, LagrangianCoupling | Potential) and graph.symmetric
+            for target, source, _ in graph.links:
+                ends = (source, target) if mutual and source < target else (target, source)
+                found[target, source] = found[ends] if ends in found else LinkName(name, *ends)
+    return MappingProxyType(found)
 
 
 @lru_cache(maxsize=64)

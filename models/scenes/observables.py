@@ -107,8 +107,13 @@ def _kept(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, float])
 
 def _own(value: sp.Expr, model: Model, numbers: Mapping[str, float]) -> bool:
     """True if an expression has a value for each node."""
-    names = {*model.unlinked.components, *varied(numbers, model.parameters)}
+    names = {*model.unlinked.components, *_of_nodes(model, numbers)}
     return any(s.name in names for s in node_symbols(value))
+
+
+def _of_nodes(model: Model, numbers: Mapping[str, float]) -> tuple[str, ...]:
+    """The parameters that have a value for each node."""
+    return tuple(name for name in varied(numbers, model.parameters) if model.holders(name))
 
 
 def _named(keyword: str, model: Model, numbers: Mapping[str, float], given: object) -> Iterator[tuple[str, object]]:
@@ -126,7 +131,7 @@ def _named(keyword: str, model: Model, numbers: Mapping[str, float], given: obje
 def _check_names(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, float]) -> None:
     """Refuse symbols that are no state, parameter or t, and states that some nodes lack."""
     apart, everywhere = model.unlinked, range(model.n)
-    own = (*apart.components, *varied(numbers, model.parameters))
+    own = (*apart.components, *_of_nodes(model, numbers))
     partly = {name for name in own if apart.holders(name) != tuple(everywhere)}
     states = {*apart.components, *apart.state}
     known = (*own, *apart.state, *(name for name in numbers), TIME.name)

@@ -1,4 +1,4 @@
-"""The parameters of a scene: one number each, or a list with one number for each node (a_1 … a_n)."""
+"""The parameters of a scene: one number each, one for each node (a_1 … a_n), or one for each link (k_1_2 …)."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from itertools import islice
 from typing import Any, TypeVar
 
 from ..dynamics.periodicity import Drive, drive_of
+from ..graphs.topology import Topology
 from ..inputs.checks import check_table, short_repr
 from ..inputs.frozen import Frozen
-from ..inputs.node_name import NodeName
+from ..inputs.node_name import LinkName, NodeName
 from .axis import Axis
-from .model import Model, NodeKind, in_range
+from .model import WEIGHTS, Model, NodeKind, in_range
 
-__all__ = ["at_nodes", "collected", "drive", "parameters", "varied", "without"]
+__all__ = ["at_nodes", "collected", "drive", "in_order", "parameters", "varied", "without"]
 
 T = TypeVar("T")
 
@@ -21,12 +22,15 @@ T = TypeVar("T")
 def parameters(model: Model, given: object, axes: Sequence[Axis]) -> Frozen[float]:
     """Return every parameter with its value; those that differ from node to node, or are swept at one, as a_1 … a_n.
 
+    Those that differ from link to link, or are swept at one, are k_1_2 where node 1 feels node 2.
+
     Parameters
     ----------
     model : Model
         The model that has the parameters.
     given : object
-        A table of names and values: a number, one for each node, or the parameter of one node ("a_2"); None for none.
+        A table of names and values: a number, one for each node or link, or the parameter of one node ("a_2") or one link
+        ("k_1_2"); None for none.
     axes : sequence of Axis
         The axes of the sweep.
 
@@ -39,29 +43,54 @@ def parameters(model: Model, given: object, axes: Sequence[Axis]) -> Frozen[floa
     shared = {name: float(known[name].default) for name in known}
     lists = {name: model.defaults(name) for name in known} if len(model.kinds) > 1 else {}
     single: dict[str, dict[int, float]] = {}
+    linked: dict[str, dict[LinkName, float]] = {}
     for name, value in check_table("parameters", {} if given is None else given).items():
         if not isinstance(name, str):
             raise TypeError(f"parameters: key {short_repr(name)} is a {type(name).__name__}; expected text")
-        parts = model.node_parameter(name)
+        parts, link = model.node_parameter(name), model.link_parameter(name)
+        if name == WEIGHTS or (link is not None and link.base == WEIGHTS):
+            raise ValueError(f"parameter {name!r}: the graph has the weights of links; expected {WEIGHTS} on an axis or drawn")
         if parts is not None:
             single.setdefault(parts.base, {})[parts.index] = in_range(name, value, known[parts.base])
+        elif link is not None:
+            linked.setdefault(link.base, {})[link] = in_range(name, value, known[link.base])
         elif name not in known:
             raise ValueError(model.unknown(name, "parameter", known))
+        elif not model.holders(name) and (isinstance(value, Topology) or _listed(value)):
+            linked[name] = _for_each_link(model, name, value) | linked.get(name, {})
         elif _listed(value):
             lists[name] = _for_each_node(model, name, value)
         else:
             shared[name] = in_range(name, value, known[name])
             lists.pop(name, None)
-    swept = {parts.base for axis in axes if (parts := model.node_parameter(axis.name)) is not None}
+    single_names = (model.node_parameter(axis.name) or model.link_parameter(axis.name) for axis in axes)
+    swept = {parts.base for parts in single_names if parts is not None}
     values: dict[str, float] = {}
     for name, value in shared.items():
+        links = dict.fromkeys(model.link_names(name).values() if name in linked or name in swept else ())
+        if links:
+            values |= _at_links(links, value, linked.get(name, {}), name in swept)
+            continue
         holders = model.holders(name)
         own = dict(zip(holders, lists.get(name) or [value] * len(holders), strict=True)) | single.get(name, {})
         if name in swept or len(set(own.values())) > 1:
             values |= {str(NodeName(name, i)): number for i, number in own.items()}
         else:
             values[name] = next(iter(own.values()), value)
+    if WEIGHTS in swept - set(known):
+        names, ((_, graph),) = model.link_names(WEIGHTS), model.linked
+        values |= {str(names[i, j]): float(weight) for i, j, weight in graph.links}
     return Frozen(values)
+
+
+def _at_links(
+    links: Iterable[LinkName], shared: float, own: Mapping[LinkName, float], swept: bool
+) -> dict[str, float]:
+    """The values of a parameter of links: one if it does not differ from link to link."""
+    found = {name: own.get(name, shared) for name in links}
+    if swept or len(set(found.values())) > 1:
+        return {str(name): value for name, value in found.items()}
+    return {name.base: value for name, value in found.items()}
 
 
 def _listed(value: object) -> bool:
@@ -70,14 +99,81 @@ def _listed(value: object) -> bool:
     )
 
 
+def _for_each_link(model: Model, name: str, value: Any) -> dict[LinkName, float]:
+    """The values of a parameter of links.
+
+    They are a list in the order of the graph's links, or of its edges (i < j) where links run both ways, a matrix, or a
+    graph whose weights they are.  ValueError or TypeError for anything else.
+    """
+    parameter, links = model.parameters[name], model.link_names(name)
+    if isinstance(value, Topology):
+        table = {(i, j): float(weight) for i, j, weight in value.links}
+    else:
+        if isinstance(value, set | frozenset):
+            raise TypeError(f"parameter {name!r}: found a set, which has no order; expected a number or a list")
+        most = max(len(links), model.n)
+        listed = list(islice(value.tolist() if hasattr(value, "tolist") else value, most + 1))
+        table = _matrix(model, name, listed) if any(map(_listed, listed)) else in_order(f"parameter {name!r}", links, listed)
+    for i, j in table.keys() ^ links.keys():
+        if (i, j) in links or table[i, j] != 0:
+            found = "no number" if (i, j) in links else "a number without a link"
+            raise ValueError(
+                f"parameter {name!r}: found {found} where node {i + 1} feels node {j + 1}; expected one for each link, no others"
+            )
+    numbers: dict[LinkName, float] = {}
+    for at, own in links.items():
+        number = in_range(str(own), table[at], parameter)
+        if numbers.setdefault(own, number) != number:
+            raise ValueError(
+                f"parameter {name!r}: found {numbers[own]!r} and {number!r} at nodes {own.target + 1} and {own.source + 1}; "
+                "expected one number for both directions of a link that acts on both of its ends"
+            )
+    return numbers
+
+
+def in_order(what: str, links: Mapping[tuple[int, int], LinkName], listed: Sequence[T]) -> dict[tuple[int, int], T]:
+    """Return numbers by target and source.
+
+    Parameters
+    ----------
+    what : str
+        What the numbers are, for errors.
+    links : mapping
+        The name of the parameter at each link.
+    listed : sequence
+        A number for each link in the order of the graph's links, or, if every link runs back too, one for each edge i < j.
+
+    Raises
+    ------
+    ValueError
+        For another number of entries.
+    """
+    edges = [at for at in links if at[0] < at[1]] if all(at[::-1] in links for at in links) else []
+    if len(listed) == len(edges) != 0:
+        table = dict(zip(edges, listed, strict=True))
+        return table | {at[::-1]: number for at, number in table.items()}
+    if len(listed) != len(links):
+        count = f"more than {len(listed) - 1}" if len(listed) > len(links) else str(len(listed))
+        expected = f"{len(edges)} values, one for each edge, or " if edges else ""
+        raise ValueError(
+            f"{what}: found {count} values for {len(links)} links; expected {expected}one for each link, or one number for all"
+        )
+    return dict(zip(links, listed, strict=True))
+
+
+def _matrix(model: Model, name: str, listed: Sequence[Any]) -> dict[tuple[int, int], Any]:
+    """The entries of a matrix, row i what node i feels."""
+    n = model.n
+    rows = [list(islice(row, n + 1)) if _listed(row) else [] for row in listed]
+    if len(rows) != n or any(len(row) != n for row in rows):
+        raise ValueError(f"parameter {name!r}: found rows of numbers; expected a matrix of {n} rows of {n} numbers")
+    return {(i, j): number for i, row in enumerate(rows) for j, number in enumerate(row)}
+
+
 def _for_each_node(model: Model, name: str, value: Any) -> list[float]:
-    """The values of a list, one for each node that has the parameter; ValueError for another number or for links."""
+    """The values of a list, one for each node that has the parameter; ValueError for another number."""
     parameter, holders = model.parameters[name], model.holders(name)
     n = len(holders)
-    if not holders:
-        raise ValueError(
-            f"parameter {name!r} belongs to the links, which share it; expected one number: give links weights instead"
-        )
     if isinstance(value, set | frozenset):
         raise TypeError(f"parameter {name!r}: found a set, which has no order; expected a number or {n} numbers")
     listed = list(islice(value.tolist() if hasattr(value, "tolist") else value, n + 1))
@@ -90,8 +186,10 @@ def _for_each_node(model: Model, name: str, value: Any) -> list[float]:
 
 
 def varied(values: Mapping[str, float], known: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of the parameters that have a value for each node."""
-    return tuple(name for name in known if name not in values)
+    """Return the names of the parameters that have a value for each node or each link; "W" for weights that are swept."""
+    names = dict.fromkeys(known)
+    weights = WEIGHTS not in names and any((link := LinkName.parse(name)) and link.base == WEIGHTS for name in values)
+    return (*(name for name in names if name not in values), *((WEIGHTS,) if weights else ()))
 
 
 def at_nodes(model: Model, values: Mapping[str, T]) -> Iterator[tuple[NodeKind, dict[str, T]]]:
@@ -127,20 +225,23 @@ def drive(model: Model, values: Mapping[str, float]) -> Drive:
 def without(model: Model, values: Mapping[object, object], names: Iterable[str]) -> dict[object, object]:
     """Return the values of parameters without those that single nodes have of some `names`."""
     gone = set(names)
-    return {
-        name: value
-        for name, value in values.items()
-        if not isinstance(name, str) or (parts := model.node_parameter(name)) is None or parts.base not in gone
-    }
+
+    def kept(name: object) -> bool:
+        parts = (model.node_parameter(name) or model.link_parameter(name)) if isinstance(name, str) else None
+        return parts is None or parts.base not in gone
+
+    return {name: value for name, value in values.items() if kept(name)}
 
 
 def collected(values: Mapping[str, float], varied: Iterable[str]) -> dict[str, float | list[float]]:
-    """Return the parameters as a scene file has them: those of `varied` as lists."""
+    """Return the parameters as a scene file has them: those of `varied` as lists, weights not at all."""
     lists: dict[str, list[float]] = {name: [] for name in varied}
     table: dict[str, float | list[float]] = {}
     for name, value in values.items():
-        parts = NodeName.parse(name)
-        if parts is not None and parts.base in lists:
+        parts = next((p for p in (LinkName.parse(name), NodeName.parse(name)) if p and p.base in lists), None)
+        if parts is not None and parts.base == WEIGHTS and isinstance(parts, LinkName):
+            continue
+        if parts is not None:
             lists[parts.base].append(value)
             table.setdefault(parts.base, lists[parts.base])
         else:

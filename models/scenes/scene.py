@@ -66,7 +66,7 @@ class Scene(Drawn, Written):
     links : iterable of (Coupling or str, Topology), optional
         Several layers of links, each with its own graph, in place of `coupling` and `topology`.
     parameters : mapping, optional
-        Values of parameters: a number, or a list with one number for each node.
+        Values of parameters: a number, or a list with one number for each node, of the coupling one for each edge or link.
     initial : mapping, optional
         Initial states: a number, one number for each node, or {low, high, seed} for random ones.
     record : iterable of str, optional
@@ -104,8 +104,8 @@ class Scene(Drawn, Written):
     realisations : int
         Realisations of what is drawn, a further dimension of the sweep; 0 for none.
     draws : mapping, optional
-        What is drawn, by the names of parameters and initial states: `normal`, `uniform`, `lorentzian` (of each node by itself), or a
-        list with one entry for each realisation.
+        What is drawn, by the names of parameters and initial states, or "W", the weights of links: `normal`, `uniform`,
+        `lorentzian` (of each node or edge by itself), or a list with one entry for each realisation.
     rng : int
         Seed of what is drawn.
 
@@ -212,7 +212,7 @@ class Scene(Drawn, Written):
 
     @property
     def varied(self) -> tuple[str, ...]:
-        """Names of the parameters that have a value for each node: `parameters` has them as a_1 … a_n."""
+        """Names of the parameters that have a value for each node or link: `parameters` has a_1 … a_n, or k_1_2 …"""
         return varied(self.parameters, self.model.parameters)
 
     @property
@@ -233,7 +233,8 @@ class Scene(Drawn, Written):
         if len(self.model.linked) != 1:
             raise ValueError(f"strength of the links: found {len(self.model.linked)} layers of links; expected one")
         equations = self.equations
-        names = {strength(edge, equations.nodes[a].parameters).name for (a, _), edge in equations.edge_of}
+        numbered = tuple(s for edge in equations.edges for s in edge.parameters if s.name in equations.numbered)
+        names = {strength(edge, (*equations.nodes[a].parameters, *numbered)).name for (a, _), edge in equations.edge_of}
         if len(names) > 1:
             raise ValueError(f"strength of the links: found {', '.join(sorted(names))}; expected one for all links")
         return names.pop()
@@ -435,9 +436,10 @@ def _kept_parameters(given: Mapping[str, object], model: Model, numbers: Mapping
         if name in numbers:
             kept[name] = numbers[name]
         elif name in model.parameters:
-            kept[name] = tuple(numbers[str(NodeName(name, i))] for i in model.holders(name))
+            links = dict.fromkeys(map(str, model.link_names(name).values()))
+            kept[name] = tuple(numbers[own] for own in links or (str(NodeName(name, i)) for i in model.holders(name)))
         else:
-            parts = model.node_parameter(name)
+            parts = model.node_parameter(name) or model.link_parameter(name)
             kept[name] = numbers[parts.base] if parts else given[name]
     return kept
 
