@@ -18,9 +18,26 @@ from ..program.lowering import Library, number
 from ..program.statements import Statement, let
 
 __all__ = [
-    "LARGEST_UNROLLED", "Body", "Linked", "Place", "Storing", "check_inertia", "is_unrolled", "link_body", "link_places",
-    "link_numbers", "mass_body", "node_body", "node_mass_body", "node_places", "node_rate_symbols", "own_parameters",
-    "parameters", "rate_symbols", "weights", "wrapped",
+    "LARGEST_UNROLLED",
+    "Body",
+    "Linked",
+    "Place",
+    "Storing",
+    "check_inertia",
+    "is_unrolled",
+    "link_body",
+    "link_numbers",
+    "link_places",
+    "mass_body",
+    "node_body",
+    "node_mass_body",
+    "node_places",
+    "node_rate_symbols",
+    "own_parameters",
+    "parameters",
+    "rate_symbols",
+    "weights",
+    "wrapped",
 ]  # fmt: skip
 
 LARGEST_UNROLLED = 8

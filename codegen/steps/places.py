@@ -135,9 +135,7 @@ class Places:
     def of_link(self, used: Container[sp.Symbol]) -> list[tuple[str, Expression]]:
         """The parameters that a link has for itself, those `used`, and where its numbers are."""
         places = ((name, Number(self.behind + k * self.links) + "e") for k, name in enumerate(self.numbered))
-        return [
-            (name, Load("p", Load("where", at, None))) for name, at in places if sp.Symbol(name, real=True) in used
-        ]
+        return [(name, Load("p", Load("where", at, None))) for name, at in places if sp.Symbol(name, real=True) in used]
 
     def of_source(self, edge: Edge, used: Container[sp.Symbol], index: str = "j") -> list[tuple[str, Expression]]:
         """What the parameters are called that a link takes of its source, those `used`, and where they are."""

@@ -75,7 +75,9 @@ def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Dr
         return Drive(found, problem="depends on time other than by sines and cosines of a t + b, a constant")
     own = sorted({s.name for wave in found for s in wave.free_symbols} & set(varied))
     if own:
-        return Drive(found, problem=f"is driven at a frequency that differs from node to node or link to link ({', '.join(own)})")
+        return Drive(
+            found, problem=f"is driven at a frequency that differs from node to node or link to link ({', '.join(own)})"
+        )
     ratios = [sp.cancel(wave / found[0]) for wave in found]
     strange = next((wave for wave, ratio in zip(found, ratios, strict=True) if not ratio.is_Rational), None)
     if strange is not None:

@@ -18,7 +18,7 @@ from .axis import Axis
 from .draw import LIMIT, drawn_axes, draws
 from .model import Model, NodeKind, as_contact, as_coupling, as_groups, as_law, as_layers, as_oscillator
 from .observables import observables, sections, stop
-from .parameters import at_nodes, drive, parameters
+from .parameters import at_nodes, drive, parameters, varied
 from .section import Section
 from .start import SEED_LIMIT, chosen_start, default_start
 from .sweep import check_draws, check_sweep, read_axes
@@ -83,6 +83,9 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     values["draws"] = draws(given["draws"], given["realisations"])
     drawn = drawn_axes(model, values["draws"], given["realisations"], values["rng"])
     values["parameters"] = numbers = parameters(model, given["parameters"], (*axes, *drawn))
+    own = varied(numbers, model.parameters)
+    if any(model.link_names(name) for name in own):
+        model.equations(own)  # refuses links that can have no numbers of their own
     values["initial"] = _start(model, given["initial"], values["seed"])
     values["record"] = _records(model, given["record"])
     values["section"] = _section(model, given["section"])

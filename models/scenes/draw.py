@@ -123,7 +123,9 @@ def _drawn(what: str, value: object, count: int) -> Draws:
         raise ValueError(f"{what}: found {short_repr(listed)}; expected {KNOWN} or {count} entries")
     rows = [row if isinstance(row, Sequence) and not isinstance(row, str) else (row,) for row in listed]
     if len({len(row) for row in rows}) != 1:
-        raise ValueError(f"{what}: found rows of different lengths; expected one number, or one for each node or link, in each")
+        raise ValueError(
+            f"{what}: found rows of different lengths; expected one number, or one for each node or link, in each"
+        )
     return tuple(tuple(check_number(what, number) for number in row) for row in rows)
 
 
@@ -188,7 +190,9 @@ def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Itera
         return _link_columns(name, links, how, count, rng)
     known = name in model.parameters or name in model.components or NodeName.parse(name) is not None
     if name == WEIGHTS:
-        raise ValueError(f"draw {name}: found {len(model.linked)} layers of links; expected one whose weights are drawn")
+        raise ValueError(
+            f"draw {name}: found {len(model.linked)} layers of links; expected one whose weights are drawn"
+        )
     if not known:
         raise ValueError(model.unknown(name, "draw", (*model.parameters, *model.components)))
     alone = not holders or (model.n == 1 and name in model.parameters)

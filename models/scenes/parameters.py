@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from ..dynamics.periodicity import Drive, drive_of
 from ..graphs.topology import Topology
-from ..inputs.checks import check_table, short_repr
+from ..inputs.checks import check_number, check_table, short_repr
 from ..inputs.frozen import Frozen
 from ..inputs.node_name import LinkName, NodeName
 from .axis import Axis
@@ -17,6 +17,9 @@ from .model import WEIGHTS, Model, NodeKind, in_range
 __all__ = ["at_nodes", "collected", "drive", "in_order", "parameters", "varied", "without"]
 
 T = TypeVar("T")
+
+Place: TypeAlias = NodeName | LinkName
+"""The name of a parameter at one node or one link."""
 
 
 def parameters(model: Model, given: object, axes: Sequence[Axis]) -> Frozen[float]:
@@ -39,58 +42,66 @@ def parameters(model: Model, given: object, axes: Sequence[Axis]) -> Frozen[floa
     ValueError, TypeError
         For unknown names, values out of range, and lists of another length.
     """
-    known = model.parameters
-    shared = {name: float(known[name].default) for name in known}
-    lists = {name: model.defaults(name) for name in known} if len(model.kinds) > 1 else {}
-    single: dict[str, dict[int, float]] = {}
-    linked: dict[str, dict[LinkName, float]] = {}
+    read = _Given(model)
     for name, value in check_table("parameters", {} if given is None else given).items():
         if not isinstance(name, str):
             raise TypeError(f"parameters: key {short_repr(name)} is a {type(name).__name__}; expected text")
-        parts, link = model.node_parameter(name), model.link_parameter(name)
-        if name == WEIGHTS or (link is not None and link.base == WEIGHTS):
-            raise ValueError(f"parameter {name!r}: the graph has the weights of links; expected {WEIGHTS} on an axis or drawn")
-        if parts is not None:
-            single.setdefault(parts.base, {})[parts.index] = in_range(name, value, known[parts.base])
-        elif link is not None:
-            linked.setdefault(link.base, {})[link] = in_range(name, value, known[link.base])
-        elif name not in known:
-            raise ValueError(model.unknown(name, "parameter", known))
-        elif not model.holders(name) and (isinstance(value, Topology) or _listed(value)):
-            linked[name] = _for_each_link(model, name, value) | linked.get(name, {})
-        elif _listed(value):
-            lists[name] = _for_each_node(model, name, value)
-        else:
-            shared[name] = in_range(name, value, known[name])
-            lists.pop(name, None)
-    single_names = (model.node_parameter(axis.name) or model.link_parameter(axis.name) for axis in axes)
-    swept = {parts.base for parts in single_names if parts is not None}
+        read.add(name, value)
+    single = (model.node_parameter(axis.name) or model.link_parameter(axis.name) for axis in axes)
+    swept = {parts.base for parts in single if parts is not None}
     values: dict[str, float] = {}
-    for name, value in shared.items():
-        links = dict.fromkeys(model.link_names(name).values() if name in linked or name in swept else ())
-        if links:
-            values |= _at_links(links, value, linked.get(name, {}), name in swept)
-            continue
-        holders = model.holders(name)
-        own = dict(zip(holders, lists.get(name) or [value] * len(holders), strict=True)) | single.get(name, {})
-        if name in swept or len(set(own.values())) > 1:
-            values |= {str(NodeName(name, i)): number for i, number in own.items()}
+    for name, value in read.shared.items():
+        own = read.own(name, value, name in swept)
+        if own and (name in swept or len(set(own.values())) > 1):
+            values |= {str(place): number for place, number in own.items()}
         else:
             values[name] = next(iter(own.values()), value)
-    if WEIGHTS in swept - set(known):
+    if WEIGHTS in swept - set(values):
         names, ((_, graph),) = model.link_names(WEIGHTS), model.linked
         values |= {str(names[i, j]): float(weight) for i, j, weight in graph.links}
     return Frozen(values)
 
 
-def _at_links(
-    links: Iterable[LinkName], shared: float, own: Mapping[LinkName, float], swept: bool
-) -> dict[str, float]:
-    """The values of a parameter of links: one if it does not differ from link to link."""
-    found = {name: own.get(name, shared) for name in links}
-    if swept or len(set(found.values())) > 1:
-        return {str(name): value for name, value in found.items()}
-    return {name.base: value for name, value in found.items()}
+class _Given:
+    """What was given of the parameters of a model, in their ranges: numbers for all, lists, and those of one place."""
+
+    def __init__(self, model: Model) -> None:
+        known = model.parameters
+        self.model, self.shared = model, {name: float(known[name].default) for name in known}
+        self.lists = {name: _at_nodes(model, name, model.defaults(name)) for name in known if len(model.kinds) > 1}
+        self.single: dict[str, dict[Place, float]] = {}
+
+    def add(self, name: str, value: Any) -> None:
+        """Take one of the parameters; ValueError or TypeError as `parameters`."""
+        model, known = self.model, self.model.parameters
+        place = model.node_parameter(name) or model.link_parameter(name)
+        if WEIGHTS not in known and (name if place is None else place.base) == WEIGHTS:
+            raise ValueError(
+                f"parameter {name!r}: the graph has the weights of links; expected {WEIGHTS} on an axis or drawn"
+            )
+        if place is not None:
+            self.single.setdefault(place.base, {})[place] = in_range(name, value, known[place.base])
+        elif name not in known:
+            raise ValueError(model.unknown(name, "parameter", known))
+        elif not model.holders(name) and (isinstance(value, Topology) or _listed(value)):
+            self.lists[name] = _for_each_link(model, name, value)
+        elif _listed(value):
+            self.lists[name] = _at_nodes(model, name, _for_each_node(model, name, value))
+        else:
+            self.shared[name] = in_range(name, value, known[name])
+            self.lists.pop(name, None)
+
+    def own(self, name: str, shared: float, swept: bool) -> dict[Place, float]:
+        """The values of a parameter at each node, or at each link if links have numbers or are swept; else none."""
+        nodes: Iterable[Place] = [NodeName(name, i) for i in self.model.holders(name)]
+        links = swept or name in self.lists or name in self.single
+        places = nodes or (self.model.link_names(name).values() if links else ())
+        return dict.fromkeys(places, shared) | self.lists.get(name, {}) | self.single.get(name, {})
+
+
+def _at_nodes(model: Model, name: str, values: Iterable[float]) -> dict[Place, float]:
+    """The values of a parameter by the nodes that have it."""
+    return {NodeName(name, i): value for i, value in zip(model.holders(name), values, strict=True)}
 
 
 def _listed(value: object) -> bool:
@@ -99,7 +110,7 @@ def _listed(value: object) -> bool:
     )
 
 
-def _for_each_link(model: Model, name: str, value: Any) -> dict[LinkName, float]:
+def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:
     """The values of a parameter of links.
 
     They are a list in the order of the graph's links, or of its edges (i < j) where links run both ways, a matrix, or a
@@ -113,14 +124,15 @@ def _for_each_link(model: Model, name: str, value: Any) -> dict[LinkName, float]
             raise TypeError(f"parameter {name!r}: found a set, which has no order; expected a number or a list")
         most = max(len(links), model.n)
         listed = list(islice(value.tolist() if hasattr(value, "tolist") else value, most + 1))
-        table = _matrix(model, name, listed) if any(map(_listed, listed)) else in_order(f"parameter {name!r}", links, listed)
-    for i, j in table.keys() ^ links.keys():
-        if (i, j) in links or table[i, j] != 0:
+        what = f"parameter {name!r}"
+        table = _matrix(model, name, listed) if any(map(_listed, listed)) else in_order(what, links, listed)
+    for i, j in sorted(table.keys() ^ links.keys()):
+        if (i, j) in links or check_number(f"parameter {name!r}", table[i, j]) != 0:
             found = "no number" if (i, j) in links else "a number without a link"
             raise ValueError(
                 f"parameter {name!r}: found {found} where node {i + 1} feels node {j + 1}; expected one for each link, no others"
             )
-    numbers: dict[LinkName, float] = {}
+    numbers: dict[Place, float] = {}
     for at, own in links.items():
         number = in_range(str(own), table[at], parameter)
         if numbers.setdefault(own, number) != number:

@@ -325,7 +325,9 @@ class Scene(Drawn, Written):
             numbers = {} if given["parameters"] is None else check_table("parameters", given["parameters"])
             given["parameters"] = {**without(self.model, numbers, single), **single}
         if self.varied and "parameters" not in changes and _nodes(given) != self.n:
-            raise ValueError(f"{self.varied[0]} has values for {self.n} nodes; give `parameters` for another number")
+            raise ValueError(
+                f"{self.varied[0]} has values for {self.n} nodes, or for their links; give `parameters` for another number"
+            )
         return Scene(**given)
 
     def _kept_start(self, changes: Mapping[str, object]) -> Mapping[str, object] | None:

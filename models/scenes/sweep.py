@@ -152,7 +152,9 @@ def _axis(model: Model, parameters: Mapping[str, float], axis: Axis) -> None:
         return
     if axis.name == WEIGHTS and model.link_names(WEIGHTS):
         one = next(map(str, model.link_names(WEIGHTS).values()))
-        raise ValueError(f"axis {axis.name!r}: each link has a weight; expected that of one link, e.g. {one}, or it in draws")
+        raise ValueError(
+            f"axis {axis.name!r}: each link has a weight; expected that of one link, e.g. {one}, or it in draws"
+        )
     parts = NodeName.parse(axis.name)
     if parts is None or parts.base not in model.components:
         states = tuple(str(NodeName(c, 0)) for c in model.components)
