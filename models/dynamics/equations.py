@@ -256,22 +256,27 @@ class Equations(_Cached, Written):
         layers_too : bool
             Allow several layers of links.
         """
+        if not varied_too:
+            self.expect_exact_links(what)
         problems = {
             "nodes of several kinds": self.mixed,
             f"nodes that differ in {', '.join(self.varied)}": bool(self.varied) and not varied_too,
-            f"links that differ in {', '.join(self.numbered)}": bool(self.numbered) and not varied_too,
             "links with inertia": self.inertial_links and not inertia_too,
             "nodes with a mass matrix (more than three coupled coordinates)": any(node.inertia for node in self.nodes),
             f"{len(self.layers)} layers of links": len(self.layers) > 1 and not layers_too,
         }
         found = next((words for words, holds in problems.items() if holds), None)
         if found is not None:
-            expected = "links that have no inertia"
-            if found.startswith("links that differ"):
-                expected = "links that differ in the weights of their graph alone"
-            elif found.endswith("layers of links"):
-                expected = "links of one layer"
+            expected = "links of one layer" if found.endswith("layers of links") else "links that have no inertia"
             raise ValueError(f"{what}: found {found}; expected equal nodes with {expected}")
+
+    def expect_exact_links(self, what: str) -> None:
+        """Raise ValueError if links differ in more than the weights of their graph; the message begins with `what`."""
+        if self.numbered:
+            raise ValueError(
+                f"{what}: found links that differ in {', '.join(self.numbered)}; expected links that differ in the weights of "
+                "their graph alone"
+            )
 
     @cached_property
     def inertial(self) -> bool:

@@ -53,10 +53,11 @@ def synchronous_node(equations: Equations) -> Node:
 
 
 def expect_vanishing(what: str, equations: Equations) -> None:
-    """Raise ValueError if a link acts between equal states or is not proportional to its weight.
+    """Raise ValueError if a link acts between equal states, is not proportional to its weight, or has own numbers.
 
     `what` needs one synchronous motion for all strengths, and modes that are those of the graph.
     """
+    equations.expect_exact_links(what)
     if not all(edge.diffusive for edge in equations.edges):
         raise ValueError(
             f"{what}: a link acts between equal states, so that the synchronous motion changes with its strength; expected "

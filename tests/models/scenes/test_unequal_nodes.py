@@ -90,7 +90,10 @@ def test_equal_numbers_are_equal_nodes() -> None:
         ({"delta": [0.1, 0.2]}, "parameter 'delta': found 2 values for 3 oscillators; expected 3 values or one number"),
         ({"delta": range(5)}, "found more than 3 values"),
         ({"delta": {0.1, 0.2, 0.3}}, "a set, which has no order"),
-        ({"sigma": [0.1, 0.2, 0.3]}, "'sigma': found 3 values for 4 links; expected 2 values, one for each edge, or one for each link"),
+        (
+            {"sigma": [0.1, 0.2, 0.3]},
+            "'sigma': found 3 values for 4 links; expected 2 values, one for each edge, or one for each link",
+        ),
         ({"delta_4": 0.1}, "unknown parameter 'delta_4'"),
         ({"sigma_1": 0.1}, "unknown parameter 'sigma_1'"),
         ({"omega": [1, -1, 2]}, "omega_2"),
