@@ -7,16 +7,17 @@ from dataclasses import replace
 
 import sympy as sp
 
-from ..dynamics.observable import AtNode, Observable, Rate, node_symbols
+from ..dynamics.observable import AtNode, Observable, Rate, Reduction, energy, node_symbols
 from ..dynamics.observable_text import as_observable, as_value
 from ..inputs.checks import check_table, check_text, short_repr, suggestion
 from ..inputs.frozen import Frozen
 from ..mechanics.components import TIME
+from .energy import energy_of
 from .model import Model
 from .parameters import varied
 from .section import Section
 
-__all__ = ["TAKEN", "observables", "sections", "stop"]
+__all__ = ["TAKEN", "has_own_energy", "observables", "sections", "stop"]
 
 TAKEN = frozenset(
     {"cell", "component", "data", "drive_phase", "end", "end_time", "ended_early", "kind", "link", "message", "name", "names", "node",
@@ -134,12 +135,14 @@ def _check_names(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, 
     own = (*apart.components, *_of_nodes(model, numbers))
     partly = {name for name in own if apart.holders(name) != tuple(everywhere)}
     states = {*apart.components, *apart.state}
-    known = (*own, *apart.state, *(name for name in numbers), TIME.name)
+    known = (*own, *apart.state, *(name for name in numbers), TIME.name, energy.name)
     for name in sorted(s.name for s in value.free_symbols):
         if name in partly:
             raise ValueError(f"{what}: some nodes have no {name!r}; expected what all nodes have, or {name}_1 of one")
         if name not in known:
             raise ValueError(f"{what}: unknown name {short_repr(name)}; known: {_few(known)}{suggestion(name, known)}")
+    if value.has(energy) and not has_own_energy(model):
+        _check_energy(what, value, model, varied(numbers, model.parameters))
     for e in value.atoms(Rate):
         if e.args[0].name not in states:
             raise ValueError(f"{what}: found {e}; expected the rate of a state: {', '.join(apart.components)}")
@@ -148,6 +151,22 @@ def _check_names(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, 
             raise ValueError(f"{what}: found node {e.args[1]}; expected 1 to {model.n}")
     if not value.free_symbols:
         raise ValueError(f"{what}: found the constant {short_repr(value)}; expected an expression of states")
+
+
+def has_own_energy(model: Model) -> bool:
+    """True if a state or parameter is called energy, which observables mean then."""
+    return energy.name in {*model.parameters, *model.components}
+
+
+def _check_energy(what: str, value: sp.Expr, model: Model, own: tuple[str, ...]) -> None:
+    """Refuse the energy of a network that has none, and that of single nodes."""
+    inside = next((e for e in sorted(value.atoms(Reduction), key=str) if e.has(energy)), None)
+    if inside is not None:
+        raise ValueError(f"{what}: found {inside}; expected the energy of the whole network outside of nodes")
+    try:
+        energy_of(model, own)
+    except ValueError as problem:
+        raise ValueError(f"{what}: {problem}") from None
 
 
 def _few(names: tuple[str, ...]) -> str:

@@ -24,7 +24,7 @@ from synchain.models.scenes.scene import Scene, a_scene
 
 from ..support.status import Status
 from .buffers import IN_MEMORY, Buffers, numbers_of_a_cell
-from .observed import Observed, Sections
+from .observed import Observed, Sections, watched
 from .plan import Plan
 
 __all__ = ["NodeMerge", "Reduction", "as_reduction", "explain", "reduce_scene"]
@@ -288,10 +288,9 @@ def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> 
 
 def _observed_parameters(scene: Scene) -> set[str]:
     """The parameters that occur in observables and in sections on functions."""
-    sections = Sections(scene)
-    values = [*Observed(scene).values, *(e for parts in sections.values for e in parts)]
-    values += [] if sections.stop is None else [sections.stop]
-    names = {s.name for value in values for s in value.free_symbols}
+    found = watched(scene)
+    names = {s.name for value in (*found.observed, *found.events) for s in value.free_symbols}
+    names = names.union(*(rows.names for rows in found.sums))
     of_nodes = {str(NodeName(name, i)) for name in scene.equations.varied if name in names for i in range(scene.n)}
     return (names | of_nodes) & set(scene.parameters)
 
