@@ -23,6 +23,7 @@ import sympy as sp
 
 from ..graphs.links import LINK_LIMIT
 from ..graphs.partitions import class_links, coarsest_balanced
+from ..inputs.node_name import LinkName
 from ..mechanics.components import Edge
 from .equations import Equations
 
@@ -86,7 +87,9 @@ def _check_constants(equations: Equations, values: Mapping[str, int | Fraction])
         if name not in equations.parameters:
             raise ValueError(f"fold: unknown parameter {name!r}; known: {', '.join(equations.parameters) or 'none'}")
         if name in equations.single:
-            raise ValueError(f"fold {name}: the nodes or links have different values of it; it stays a parameter")
+            link = LinkName.parse(name)
+            places = "links" if link is not None and link.base in equations.numbered else "nodes"
+            raise ValueError(f"fold {name}: the {places} have different values of it; it stays a parameter")
     if values and equations.mixed:
         raise ValueError(f"fold {', '.join(values)}: found nodes of several kinds; they stay parameters")
 

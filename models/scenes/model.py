@@ -39,6 +39,7 @@ __all__ = [
     "as_oscillator",
     "as_topology",
     "in_range",
+    "union_of",
 ]
 
 MOST = 100_000
@@ -173,7 +174,8 @@ class Model:
     @property
     def topology(self) -> Topology:
         """The graph of a single layer; of several layers the union of their graphs, which nodes feel which at all."""
-        return self.layers[0][1] if len(self.layers) == 1 else _union(tuple(graph for _, graph in self.layers))
+        graphs = tuple(graph for _, graph in self.layers)
+        return graphs[0] if len(graphs) == 1 else union_of(graphs, " and ".join(graph.name for graph in graphs))
 
     @property
     def forced(self) -> bool:
@@ -265,9 +267,9 @@ def _unlinked(kinds: tuple[NodeKind, ...], kind_of: tuple[int, ...], contact: Co
 
 
 @lru_cache(maxsize=64)
-def _union(graphs: tuple[Topology, ...]) -> Topology:
-    """The union of graphs: a link of weight 1 wherever one of them has a link."""
-    name, n = " and ".join(graph.name for graph in graphs), graphs[0].n
+def union_of(graphs: tuple[Topology, ...], name: str) -> Topology:
+    """Return the union of graphs: a link of weight 1 wherever one of them has a link."""
+    n = graphs[0].n
     if any(graph.all_to_all is not None for graph in graphs):
         return Topology(name, n, rule=topology("complete", n).rule)
     pairs = sorted({link[:2] for graph in graphs for link in graph.links})

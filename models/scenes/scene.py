@@ -26,7 +26,7 @@ from ..mechanics.oscillator import Oscillator
 from .axis import Axis
 from .complete import TimeUnit, complete
 from .dictionary import arguments, as_dict
-from .draw import Draws, drawn_axes
+from .draw import GRAPH, Draws, drawn_axes
 from .model import Group, Model, as_oscillator, as_topology
 from .parameters import drive, varied, without
 from .section import Section
@@ -105,7 +105,8 @@ class Scene(Drawn, Written):
         Realisations of what is drawn, a further dimension of the sweep; 0 for none.
     draws : mapping, optional
         What is drawn, by the names of parameters and initial states, or "W", the weights of links: `normal`, `uniform`,
-        `lorentzian` (of each node or edge by itself), or a list with one entry for each realisation.
+        `lorentzian` (of each node or edge by itself), or a list with one entry for each realisation; by the name
+        "topology" a list of graphs.
     rng : int
         Seed of what is drawn.
 
@@ -424,6 +425,8 @@ def _kept(given: Mapping[str, Any], values: Mapping[str, Any]) -> Frozen[Any]:
     for name in ("parameters", "initial"):
         if given[name] is None:
             kept[name] = None
+    if GRAPH in values["draws"] and given["topology"] is not None:
+        kept["topology"] = as_topology(given["topology"])
     if given["initial"] is not None:
         kept["initial"] = Frozen({name: values["initial"][name] for name in given["initial"]})
     if given["parameters"] is not None:

@@ -185,6 +185,58 @@ def test_an_edge_draws_one_number_a_link_its_own() -> None:
     assert [axis.name for axis in shared.drawn] == ["lag"]
 
 
+GRAPHS = [erdos_renyi(10, p=0.3, seed=k) for k in range(4)]
+
+
+@pytest.mark.parametrize(("oscillator", "coupling"), [("duffing", "spring"), ("rossler", "x->x")])
+def test_graphs_are_realisations(oscillator: str, coupling: str, tmp_path: Path) -> None:
+    """Each realisation is the run on its graph to the last bit, links that it has not add nothing; files keep the graphs."""
+    given = {**EXACT, "window": 3, "rtol": 1e-9, "record": ["sync_error"], "integrator": "dop853"}
+    scene = Scene(oscillator, coupling, ring(10), parameters={"sigma": 0.4}, **given)
+    found = run(scene, realisations=4, draws={"topology": GRAPHS}, sigma=[0.2, 0.4], show_progress=False)
+    assert found.end.dims == ("sigma", "realisation", "component", "node")
+    for k, graph in enumerate(GRAPHS):
+        one = run(scene.replace(topology=graph), show_progress=False)
+        np.testing.assert_array_equal(one.end.values, found.end.values[1, k])
+        assert float(one.sync_error) == float(found.sync_error[1, k])
+    assert len({float(error) for error in found.sync_error[1]}) == 4
+    assert Scene.from_dict(found.scene.as_dict()) == found.scene
+    assert found.scene.replace(draws=None, realisations=0, axes={}) == scene
+    found.scene.save(tmp_path / "graphs.toml")
+    assert load_scene(tmp_path / "graphs.toml") == found.scene
+    found.save(tmp_path / "graphs.nc")
+    assert open_result(tmp_path / "graphs.nc").scene == found.scene
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (
+            {"realisations": 2, "draws": {"topology": [chain(3), chain(4)]}},
+            "found graphs of 3, 4 nodes; expected one number",
+        ),
+        (
+            {"realisations": 3, "draws": {"topology": GRAPHS}},
+            "found more than 3 graphs; expected 3, one for each realisation",
+        ),
+        (
+            {"realisations": 4, "draws": {"topology": [chain(4)] * 4}},
+            "found graphs of 4 nodes; expected graphs of 10 nodes",
+        ),
+        ({"realisations": 4, "draws": {"topology": GRAPHS, "W": uniform(0, 1)}}, "is drawn twice"),
+        ({"realisations": 4, "draws": {"topology": "ring"}}, "found 'ring'; expected a list of 4 graphs"),
+        (
+            {"realisations": 4, "draws": {"topology": GRAPHS}, "coupling": Rates({i.v: sp.cos(W + j.x - i.x)})},
+            "found a link that adds",
+        ),
+    ],
+)
+def test_wrong_graphs_are_refused(given: dict[str, Any], words: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=re.escape(words)) as error:
+        Scene(**{"oscillator": "harmonic", "coupling": "spring", "topology": ring(10), **given})
+    assert "\n" not in str(error.value)
+
+
 CHAIN = Scene("rossler", "x->x", chain(3))
 
 
