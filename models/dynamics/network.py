@@ -189,10 +189,6 @@ def _listed_layer(
     edges: tuple[tuple[tuple[int, int], Edge], ...], graph: Topology, own: tuple[str, ...], mutual: bool
 ) -> Layer:
     """The links of a graph, of which each has numbers of its own."""
-    if graph.link_count > LINK_LIMIT:
-        raise ValueError(
-            f"{', '.join(own)}: found a number for each of {graph.link_count} links; expected at most {LINK_LIMIT} links"
-        )
     oriented = any(link.oriented for _, link in edges)
     if WEIGHT_NUMBER.name in own:
         if oriented:

@@ -45,6 +45,9 @@ __all__ = [
 MOST = 100_000
 """Most nodes that groups may name."""
 
+MOST_NUMBERED = 1_000_000
+"""Most links that have numbers of their own, a name and a parameter each: more take gigabytes."""
+
 WEIGHTS = WEIGHT_NUMBER.name
 """What the weights of links are called where a run draws or sweeps them."""
 
@@ -235,7 +238,8 @@ class Model:
     def link_names(self, name: str) -> Mapping[tuple[int, int], LinkName]:
         """Return what a parameter of links, or "W", their weights, is called at each (target, source); none of a node's.
 
-        A link that acts on both ends has one name with the link that runs back, that of their edge.
+        A link that acts on both ends has one name with the link that runs back, that of their edge.  Raises ValueError for
+        more than MOST_NUMBERED links.
         """
         return _link_names(self, name)
 
@@ -290,6 +294,11 @@ def _link_names(model: Model, name: str) -> Mapping[tuple[int, int], LinkName]:
     weights = name == WEIGHTS and name not in model.parameters and len(model.linked) == 1
     for coupling, graph in () if model.holders(name) else model.linked:
         if weights or name in coupling.parameters:
+            if graph.link_count > MOST_NUMBERED:
+                raise ValueError(
+                    f"{name}: found numbers of {graph.link_count} links; expected at most {MOST_NUMBERED} links with numbers of "
+                    "their own"
+                )
             mutual = isinstance(coupling, LagrangianCoupling | Potential) and graph.symmetric
             for target, source, _ in graph.links:
                 ends = (source, target) if mutual and source < target else (target, source)

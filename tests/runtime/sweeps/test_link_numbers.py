@@ -13,7 +13,20 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from synchain import erdos_renyi, one_way_ring
-from synchain.models import Field, Potential, Rates, Scene, Topology, chain, ends, from_edges, normal, ring, uniform
+from synchain.models import (
+    Field,
+    Potential,
+    Rates,
+    Scene,
+    Topology,
+    chain,
+    complete,
+    ends,
+    from_edges,
+    normal,
+    ring,
+    uniform,
+)
 from synchain.models.definitions.loader import load_oscillator
 from synchain.models.scenes.file import load_scene
 from synchain.runtime import cluster_exponents, exponents, lyapunov_spectrum, msf, plane, thresholds, universal_probe
@@ -254,6 +267,7 @@ CHAIN = Scene("rossler", "x->x", chain(3))
         ({"axes": {"W": [1.0, 2.0]}}, "axis 'W': each link has a weight; expected that of one link, e.g. W_1_2"),
         ({"axes": {"sigma": [1.0]}, "parameters": {"sigma": [1, 2]}}, "expected the parameter of one, e.g. sigma_1_2"),
         ({"axes": {"W_1_2": [1.0]}, "realisations": 2, "draws": {"W": normal(0, 1)}}, "it is an axis as well"),
+        ({"topology": complete(2000), "parameters": {"sigma_1_2": 1}}, "found numbers of 3998000 links; expected at most 1000000"),
         ({"realisations": 2, "draws": {"W": [[1.0] * 3] * 2}}, "draw W: found 3 values for 4 links"),
         ({"oscillator": "harmonic", "coupling": "spring", "parameters": {"sigma": [1, 2, 3, 3]}}, "expected one number for both"),
         ({"oscillator": "mass", "coupling": "fput", "realisations": 2, "draws": {"W": normal(0, 1)}}, "tells the two ends"),
