@@ -13,7 +13,7 @@ from ..inputs.checks import check_table, check_text, short_repr, suggestion
 from ..inputs.frozen import Frozen
 from ..mechanics.components import TIME
 from .energy import energy_of
-from .model import Model
+from .model import WEIGHTS, Model
 from .parameters import varied
 from .section import Section
 
@@ -119,7 +119,8 @@ def _of_nodes(model: Model, numbers: Mapping[str, float]) -> tuple[str, ...]:
 
 def _named(keyword: str, model: Model, numbers: Mapping[str, float], given: object) -> Iterator[tuple[str, object]]:
     """Yield names and values of a table, whose names results must not have for something else."""
-    taken = TAKEN | set(model.parameters) | set(numbers) | set(model.unlinked.state)
+    links = {f"{parameter}_link" for parameter in (*model.parameters, WEIGHTS)} | {WEIGHTS}
+    taken = TAKEN | set(model.parameters) | set(numbers) | set(model.unlinked.state) | links
     for key, value in check_table(keyword, given).items():
         name = check_text(keyword, key)
         if not name.isidentifier() or name.startswith("_"):

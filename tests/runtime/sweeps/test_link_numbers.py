@@ -32,6 +32,7 @@ from synchain.models.scenes.file import load_scene
 from synchain.runtime import cluster_exponents, exponents, lyapunov_spectrum, msf, plane, thresholds, universal_probe
 from synchain.runtime.opening.open import open_result
 from synchain.runtime.sweeps.run import run
+from synchain.runtime.sweeps.stream import stream
 
 DICE = np.random.default_rng(5)
 THETA, OMEGA, K, LAG, REST, C = sp.symbols("theta omega K lag rest c")
@@ -158,26 +159,32 @@ def test_lags_there_and_back_differ() -> None:
 DRAWN: dict[str, Any] = {"realisations": 20, "rng": 3, "show_progress": False}
 
 
-def test_weights_are_drawn() -> None:
+def test_weights_are_drawn(tmp_path: Path) -> None:
     """Each realisation is the run on the graph of its weights; workers, lanes and other draws do not change it."""
     graph = erdos_renyi(9, p=0.5, seed=2)
     scene = Scene("duffing", "spring", graph, parameters={"sigma": 0.3}, **{**EXACT, "window": 3, "rtol": 1e-10})
     draws = {"W": uniform(0.5, 1.5)}
     found = run(scene, draws=draws, **DRAWN)
-    names = [f"W_{a + 1}_{b + 1}" for a, b in edges_of(graph)]
-    assert [name for name in found.data.coords if str(name).startswith("W_")] == names
+    names = [f"{a + 1}_{b + 1}" for a, b in edges_of(graph)]
+    assert found.data.W.dims == ("realisation", "W_link")
+    assert found.data.W_link.values.tolist() == names
     for k in (0, 7):
-        listed = [(*pair, float(found.data[name][k])) for pair, name in zip(edges_of(graph), names, strict=True)]
+        listed = [
+            (*pair, float(found.data.W.sel(W_link=name)[k])) for pair, name in zip(edges_of(graph), names, strict=True)
+        ]
         one = run(scene.replace(topology=from_edges(listed, n=9)), show_progress=False)
         np.testing.assert_allclose(found.end.values[k], one.end.values, rtol=0, atol=1e-9)
-    assert len({*found.data[names[0]].values.tolist(), *found.data[names[1]].values.tolist()}) == 40
+    assert len(set(found.data.W.values.ravel().tolist())) == 20 * len(names)
     other = run(scene, draws={"x_1": normal(0.0, 1.0), **draws}, width=1, workers=1, **DRAWN)
-    for name in names:
-        np.testing.assert_array_equal(other.data[name], found.data[name])
+    np.testing.assert_array_equal(other.data.W, found.data.W)
     alone = run(scene, draws=draws, width=1, workers=1, **DRAWN)
     np.testing.assert_array_equal(alone.end, found.end)
     assert Scene.from_dict(found.scene.as_dict()) == found.scene
     assert run(found.scene, show_progress=False).end.identical(found.end)
+    found.save(tmp_path / "whole.nc")
+    assert open_result(tmp_path / "whole.nc").data.identical(found.data)
+    assert stream(scene, tmp_path / "streamed.nc", draws=draws, **DRAWN).success
+    assert (tmp_path / "streamed.nc").read_bytes() == (tmp_path / "whole.nc").read_bytes()
 
 
 def test_an_edge_draws_one_number_a_link_its_own() -> None:
