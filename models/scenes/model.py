@@ -245,7 +245,10 @@ class Model:
 
     def unknown(self, name: str, what: str, known: Iterable[str]) -> str:
         """Return the sentence that refuses a name; a parameter of the coupling without links has its own."""
-        known = tuple(known)
+        known, link = tuple(known), LinkName.parse(name)
+        back = None if link is None else self.link_names(link.base).get((link.target, link.source))
+        if back is not None:
+            return f"unknown {what} {name!r}; expected {str(back)!r}, the one number of a link that acts on both of its ends"
         for coupling, graph in self.layers:
             if not graph.link_count and coupling is not None and name in coupling.parameters:
                 return (

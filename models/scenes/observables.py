@@ -13,7 +13,7 @@ from ..inputs.checks import check_table, check_text, short_repr, suggestion
 from ..inputs.frozen import Frozen
 from ..mechanics.components import TIME
 from .energy import energy_of
-from .model import WEIGHTS, Model
+from .model import Model
 from .parameters import varied
 from .section import Section
 
@@ -119,8 +119,9 @@ def _of_nodes(model: Model, numbers: Mapping[str, float]) -> tuple[str, ...]:
 
 def _named(keyword: str, model: Model, numbers: Mapping[str, float], given: object) -> Iterator[tuple[str, object]]:
     """Yield names and values of a table, whose names results must not have for something else."""
-    links = {f"{parameter}_link" for parameter in (*model.parameters, WEIGHTS)} | {WEIGHTS}
-    taken = TAKEN | set(model.parameters) | set(numbers) | set(model.unlinked.state) | links
+    links = {name for name in varied(numbers, model.parameters) if not model.holders(name)}
+    taken = TAKEN | set(model.parameters) | set(numbers) | set(model.unlinked.state)
+    taken |= links.union(f"{name}_link" for name in links)
     for key, value in check_table(keyword, given).items():
         name = check_text(keyword, key)
         if not name.isidentifier() or name.startswith("_"):

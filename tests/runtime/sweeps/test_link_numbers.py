@@ -269,6 +269,7 @@ CHAIN = Scene("rossler", "x->x", chain(3))
         ({"parameters": {"sigma": one_way_ring(3)}}, "no number where node 2 feels node 1"),
         ({"parameters": {"sigma": {0.1, 0.2}}}, "found a set, which has no order"),
         ({"parameters": {"sigma_1_3": 1.0}}, "unknown parameter 'sigma_1_3'"),
+        ({"oscillator": "harmonic", "coupling": "spring", "parameters": {"sigma_2_1": 1}}, "expected 'sigma_1_2', the one number"),
         ({"parameters": {"W": [1, 2]}}, "the graph has the weights of links; expected W on an axis or drawn"),
         ({"parameters": {"W_1_2": 1.0}}, "the graph has the weights of links"),
         ({"axes": {"W": [1.0, 2.0]}}, "axis 'W': each link has a weight; expected that of one link, e.g. W_1_2"),
