@@ -18,7 +18,9 @@ from ..inputs.checks import short_repr
 from ..inputs.words import Word
 
 __all__ = [
+    "ENERGY",
     "AtNode",
+    "Energy",
     "NodeMaximum",
     "NodeMean",
     "NodeMinimum",
@@ -144,8 +146,15 @@ class Rows:
         return frozenset({s.name for s in self.value.free_symbols}.union(entries))
 
 
-energy = sp.Symbol("energy", real=True)
-"""The energy of the whole network, of nodes and links, in observables, sections and stops."""
+class Energy(sp.Symbol):
+    """The energy of the whole network, of its nodes and its links, in observables, sections and stops."""
+
+
+energy = Energy("energy", real=True)
+"""The energy of the whole network, of its nodes and its links."""
+
+ENERGY = sp.Symbol(energy.name, real=True)
+"""What stands for it in values, which are made of plain symbols."""
 
 
 class Nodes:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import sympy as sp
 
-from ..dynamics.observable import AtNode, Observable, Rate, Reduction, energy, node_symbols
+from ..dynamics.observable import ENERGY, AtNode, Observable, Rate, Reduction, node_symbols
 from ..dynamics.observable_text import as_observable, as_value
 from ..inputs.checks import check_table, check_text, short_repr, suggestion
 from ..inputs.frozen import Frozen
@@ -137,13 +137,13 @@ def _check_names(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, 
     own = (*apart.components, *_of_nodes(model, numbers))
     partly = {name for name in own if apart.holders(name) != tuple(everywhere)}
     states = {*apart.components, *apart.state}
-    known = (*own, *apart.state, *(name for name in numbers), TIME.name, energy.name)
+    known = (*own, *apart.state, *(name for name in numbers), TIME.name, ENERGY.name)
     for name in sorted(s.name for s in value.free_symbols):
         if name in partly:
             raise ValueError(f"{what}: some nodes have no {name!r}; expected what all nodes have, or {name}_1 of one")
         if name not in known:
             raise ValueError(f"{what}: unknown name {short_repr(name)}; known: {_few(known)}{suggestion(name, known)}")
-    if value.has(energy) and not has_own_energy(model):
+    if value.has(ENERGY) and not has_own_energy(model):
         _check_energy(what, value, model, varied(numbers, model.parameters))
     for e in value.atoms(Rate):
         if e.args[0].name not in states:
@@ -157,12 +157,12 @@ def _check_names(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, 
 
 def has_own_energy(model: Model) -> bool:
     """True if a state or parameter is called energy, which observables mean then."""
-    return energy.name in {*model.parameters, *model.components}
+    return ENERGY.name in {*model.parameters, *model.components}
 
 
 def _check_energy(what: str, value: sp.Expr, model: Model, own: tuple[str, ...]) -> None:
     """Refuse the energy of a network that has none, and that of single nodes."""
-    inside = next((e for e in sorted(value.atoms(Reduction), key=str) if e.has(energy)), None)
+    inside = next((e for e in sorted(value.atoms(Reduction), key=str) if e.has(ENERGY)), None)
     if inside is not None:
         raise ValueError(f"{what}: found {inside}; expected the energy of the whole network outside of nodes")
     try:

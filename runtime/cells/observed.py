@@ -11,7 +11,7 @@ import sympy as sp
 
 from synchain.codegen.driver.columns import Sum, Tally
 from synchain.codegen.kernels.observed import Watched, with_rows
-from synchain.models.dynamics.observable import Window, energy
+from synchain.models.dynamics.observable import ENERGY, Window
 from synchain.models.dynamics.observable_text import as_value
 from synchain.models.scenes.energy import energy as exact_energy
 from synchain.models.scenes.observables import has_own_energy
@@ -24,10 +24,10 @@ def watched(scene: Scene) -> Watched:
     """Return what the kernel of a scene watches: observables, sections and a stop, the energy in them as sums."""
     sections = Sections(scene)
     found = Watched(Observed(scene).values, sections.values, sections.stop)
-    if has_own_energy(scene.model) or not any(e.has(energy) for e in (*found.observed, *found.events)):
+    if has_own_energy(scene.model) or not any(e.has(ENERGY) for e in (*found.observed, *found.events)):
         return found
     value, sums = exact_energy(scene).rows()
-    swap = {energy: value}
+    swap = {ENERGY: value}
     return Watched(
         tuple(e.xreplace(swap) for e in found.observed),
         tuple(tuple(e.xreplace(swap) for e in parts) for parts in found.sections),
