@@ -112,7 +112,10 @@ def _solved(model: Equations, small: bool, value: Expression) -> list[Statement]
 
 
 def _arguments(model: Equations, known: Mapping[str, float]) -> dict[str, str]:
-    """The parameters that a function takes with their values; of many nodes those that differ, and of links, come as one sequence."""
+    """The parameters that a function takes with their values.
+
+    Of many nodes, and of their links, those that differ come as one sequence.
+    """
     if is_unrolled(model):
         return {name: repr(known[name]) if known else "" for name in model.parameters}
     single = {name: [f"{name}_{i + 1}" for i in range(model.n)] for name in model.varied}

@@ -43,8 +43,8 @@ class Program:
     target, source (links,): ends of each link.  node_slot (components**2 * n,), here_slot, there_slot
     (components**2 * links,): where the entries of the node's block and of a link's two blocks stand in the matrix, -1 where
     there is none; where nodes are of several kinds, components are those of the node that has most, nodes and links are
-    numbered as codegen/steps/places.py says, and `where` is its table, also of links that differ in a parameter.  order (dimension,): pivots; place (dimension,): its
-    inverse.  The off-diagonal entries of pivot order[q] are row_start[q] … row_start[q + 1] - 1, those from after_start[q]
+    numbered as codegen/steps/places.py says, and `where` is its table, also of links that differ in a parameter.
+    order (dimension,): pivots; place (dimension,): its inverse.  The off-diagonal entries of pivot order[q] are row_start[q] … row_start[q + 1] - 1, those from after_start[q]
     on belong to later pivots; column: of each entry.
     """
 
