@@ -7,6 +7,7 @@ from .definitions.inline import Lagrangian as Lagrangian
 from .definitions.inline import friction_law as friction_law
 from .dynamics.observable import Observable as Observable
 from .dynamics.observable import end as end
+from .dynamics.observable import energy as energy
 from .dynamics.observable import maximum as maximum
 from .dynamics.observable import mean as mean
 from .dynamics.observable import minimum as minimum

@@ -14,10 +14,12 @@ import numpy as np
 import sympy as sp
 from pendula import pendulum, telescope
 
+from synchain import one_way_ring
 from synchain.codegen import driver
 from synchain.codegen.kernels.compile import Kernel, load
 from synchain.codegen.kernels.sweep import KernelSource, emit
-from synchain.models import chain, ring, star
+from synchain.models import Potential, Rates, chain, ends, ring, star
+from synchain.models.definitions.loader import load_oscillator
 from synchain.models.dynamics.equations import Equations
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.mechanics.components import TIME, Edge, Node
@@ -171,8 +173,24 @@ def two_kinds() -> Equations:
     return scene.equations
 
 
+def numbered(n: int = 3, mutual: bool = True) -> Equations:
+    """Springs with strengths and rest lengths of their own, or one-way links of squared strengths and own weights."""
+    i, j, w = ends(load_oscillator("duffing"))
+    k, rest = sp.symbols("k rest")
+    if mutual:
+        coupling: Potential | Rates = Potential(
+            k * w * ((i.x - j.x) ** 2 / 2 + sp.cos(i.x - j.x) / rest), {k: 1, rest: 1}
+        )
+    else:
+        coupling = Rates({i.v: k**2 * w * sp.sin(j.x - i.x) / (2 + sp.cos(rest * i.v))}, {k: 1, rest: 1})
+    graph = ring(n) if mutual else one_way_ring(n)
+    own = {name: [0.3 + 0.1 * a * b for a in range(n)] for b, name in enumerate(("k", "rest"), start=1)}
+    draws = {"draws": {"W": [[1.0] * n]}, "realisations": 1} if not mutual else {}
+    return Scene("duffing", coupling, graph, parameters=own, **draws).equations
+
+
 UNEQUAL: dict[str, Equations] = {
-    "varied": varied(), "inertial": inertial(), "clocks": clocks(), "two kinds": two_kinds(), "pendula": pendula(),
+    "numbered": numbered(), "numbered one way": numbered(mutual=False), "varied": varied(), "inertial": inertial(), "clocks": clocks(), "two kinds": two_kinds(), "pendula": pendula(),
     "telescopes": telescopes(),
 }  # fmt: skip
 """Networks whose nodes differ or whose links have inertia."""

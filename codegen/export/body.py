@@ -18,9 +18,26 @@ from ..program.lowering import Library, number
 from ..program.statements import Statement, let
 
 __all__ = [
-    "LARGEST_UNROLLED", "Body", "Linked", "Place", "Storing", "check_inertia", "is_unrolled", "link_body", "link_places",
-    "mass_body", "node_body", "node_mass_body", "node_places", "node_rate_symbols", "own_parameters", "parameters",
-    "rate_symbols", "weights", "wrapped",
+    "LARGEST_UNROLLED",
+    "Body",
+    "Linked",
+    "Place",
+    "Storing",
+    "check_inertia",
+    "is_unrolled",
+    "link_body",
+    "link_numbers",
+    "link_places",
+    "mass_body",
+    "node_body",
+    "node_mass_body",
+    "node_places",
+    "node_rate_symbols",
+    "own_parameters",
+    "parameters",
+    "rate_symbols",
+    "weights",
+    "wrapped",
 ]  # fmt: skip
 
 LARGEST_UNROLLED = 8
@@ -219,6 +236,15 @@ def wrapped(numbers: Iterable[str], indent: str = "    ", width: int = 110) -> l
             line = indent
         line += f"{text}, "
     return [*lines, line.rstrip()]
+
+
+def link_numbers(equations: Equations) -> list[str]:
+    """For each link, if links differ in a parameter, which of its numbers is that of the link."""
+    if not equations.numbered:
+        return []
+    ((name, layer), *_) = equations.numbered.items()
+    places = {own: k for k, own in enumerate(layer.names(name))}
+    return [str(places[layer.name(name, link)]) for link in layer.links]
 
 
 def weights(equations: Equations) -> list[str]:

@@ -10,7 +10,7 @@ from synchain.models.dynamics.equations import Equations
 from ..program.expressions import Expression, Name, Number, call
 from ..program.printers import C99
 from ..program.statements import Array, Do, Statement, called, used
-from .body import check_inertia, is_unrolled, link_places, node_places, weights, wrapped
+from .body import check_inertia, is_unrolled, link_numbers, link_places, node_places, weights, wrapped
 from .header import given_values, header
 from .loops import jacobian_statements, mass_statements, rhs_statements
 from .names import portable
@@ -114,6 +114,7 @@ def _sizes(model: Equations, small: bool) -> list[str]:
     if small or not model.links:
         return lines
     tables = {"TARGET": [str(i) for i, _, _ in model.links], "SOURCE": [str(j) for _, j, _ in model.links]}
+    tables |= {"NUMBER": link_numbers(model)} if model.numbered else {}
     for name, table in tables.items():
         lines += [f"static const int {name}[LINKS] = {{", *wrapped(table), "};"]
     if any(e.has(edge.weight) for edge in model.edges for e in edge.rhs):

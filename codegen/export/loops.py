@@ -180,8 +180,14 @@ def _pair(
         (target, source, _), names = link[0], equations.parameters
         own = own_parameters(equations, target)
         own |= {s: names.index(f"{of.name}_{source + 1}") for s, of in edge.theirs}
+        numbered = (s for s in edge.parameters if s.name in equations.numbered)
+        own |= {s: names.index(equations.numbered[s.name].name(s.name, link[0])) for s in numbered}
         for s, k in own.items():
             found[s] = _at("numbers", Number(k)) if reads else Name(names[k])
+    else:
+        for name, layer in equations.numbered.items():
+            first = Number(equations.parameters.index(layer.names(name)[0]))
+            found[sp.Symbol(name, real=True)] = _at("numbers", first + _at("NUMBER", Name("link_")))
     return found | {s: _at("rates", place) for s, place in zip(rate_symbols(edge), places, strict=True)}
 
 

@@ -26,7 +26,7 @@ nearbyint nextafter nexttoward pow pow10 remainder remquo rint round scalb scalb
 tgamma trunc drem finite isinf isnan isfinite isnormal signbit fpclassify signgam j0 j1 jn y0 y1 yn float_t double_t"""
 _OWN = """np math types cfunc carray csc_matrix lsoda_sig address rhs jac jacobian jacobian_places sparsity state rates
 numbers matrix mass_ solve right_ values sign i_ j_ k_ link_ weight_ NODES DIMENSION PARAMETERS LINKS ENTRIES TARGET SOURCE
-WEIGHT ROWS COLUMNS STATE NODE HEAVY defaults memset"""
+WEIGHT NUMBER ROWS COLUMNS STATE NODE HEAVY defaults memset"""
 RESERVED = {*f"{_C} {_MATH} {_OWN}".split(), *keyword.kwlist, *keyword.softkwlist, *dir(builtins)}
 """Words of the languages, of their mathematics and of the exported text; a symbol of that name gets an underscore."""
 
@@ -49,7 +49,7 @@ def portable(equations: Equations) -> tuple[Equations, dict[str, str]]:
         swap |= dict(zip(edge.parameters, edges[edge].parameters, strict=True))  # other links share them
         changed |= more
     renamed = equations.map_templates(
-        lambda node: node.map(lambda e: e.xreplace(of_nodes)), lambda edge: edges.get(edge, edge), of_nodes
+        lambda node: node.map(lambda e: e.xreplace(of_nodes)), lambda edge: edges.get(edge, edge), swap
     )
     return renamed, changed
 

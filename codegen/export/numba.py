@@ -9,7 +9,7 @@ from synchain.models.dynamics.equations import Equations
 from ..program.expressions import Load, Name, Number, call
 from ..program.printers import MATH
 from ..program.statements import Array, Loop, let, store
-from .body import check_inertia, is_unrolled, weights, wrapped
+from .body import check_inertia, is_unrolled, link_numbers, weights, wrapped
 from .header import given_values, header
 from .loops import mass_statements, rhs_statements
 from .names import portable
@@ -34,6 +34,7 @@ def to_numba(equations: Equations, values: Mapping[str, float] | None = None) ->
         lines += ["PARAMETERS = np.array([", *wrapped(map(repr, known.values())), "])"]
     if not is_unrolled(model) and model.links:
         ends = {"TARGET": [str(i) for i, _, _ in model.links], "SOURCE": [str(j) for _, j, _ in model.links]}
+        ends |= {"NUMBER": link_numbers(model)} if model.numbered else {}
         lines += [f"LINKS = {len(model.links)}"]
         for name, table in {**ends, "WEIGHT": weights(model)}.items():
             lines += [f"{name} = np.array([", *wrapped(table), "])"]

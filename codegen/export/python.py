@@ -16,6 +16,7 @@ from .body import (
     check_inertia,
     is_unrolled,
     link_body,
+    link_numbers,
     link_places,
     mass_body,
     node_body,
@@ -111,12 +112,17 @@ def _solved(model: Equations, small: bool, value: Expression) -> list[Statement]
 
 
 def _arguments(model: Equations, known: Mapping[str, float]) -> dict[str, str]:
-    """The parameters that a function takes with their values; of many nodes those that differ come as one sequence."""
+    """The parameters that a function takes with their values.
+
+    Of many nodes, and of their links, those that differ come as one sequence.
+    """
     if is_unrolled(model):
         return {name: repr(known[name]) if known else "" for name in model.parameters}
-    own = {f"{name}_{i + 1}": name for name in model.varied for i in range(model.n)}
+    single = {name: [f"{name}_{i + 1}" for i in range(model.n)] for name in model.varied}
+    single |= {name: list(layer.names(name)) for name, layer in model.numbered.items()}
+    own = {one: name for name, ones in single.items() for one in ones}
     names = dict.fromkeys(own.get(name, name) for name in model.parameters)
-    lists = {name: repr(tuple(known[f"{name}_{i + 1}"] for i in range(model.n))) for name in model.varied if known}
+    lists = {name: repr(tuple(known[one] for one in ones)) for name, ones in single.items() if known}
     return {name: lists.get(name) or (repr(known[name]) if known else "") for name in names}
 
 
@@ -171,6 +177,7 @@ def _tables(model: Equations, small: bool) -> list[str]:
     lines = ["NODE = np.arange(NODES)"]
     if model.links:
         ends = {"TARGET": [str(i) for i, _, _ in model.links], "SOURCE": [str(j) for _, j, _ in model.links]}
+        ends |= {"NUMBER": link_numbers(model)} if model.numbered else {}
         for name, table in {**ends, "WEIGHT": weights(model)}.items():
             lines += [f"{name} = np.array([", *wrapped(table), "])"]
     here, there = link_places(model)
@@ -220,6 +227,8 @@ def _loads(model: Equations) -> tuple[dict[sp.Symbol, Expression], dict[sp.Symbo
     if model.edge is None or not model.links:
         return own, {}
     ends: dict[sp.Symbol, Expression] = {s: Load(text, Name("TARGET"), None) for s, text in varied.items()}
+    for name in model.numbered:
+        ends[sp.Symbol(name, real=True)] = Load(f"np.asarray({name}, dtype=float)", Name("NUMBER"), None)
     for index, states in (("TARGET", model.edge.here), ("SOURCE", model.edge.there)):
         ends |= {s: state(_at(c, index)) for c, s in enumerate(states)}
     return own, ends | {model.edge.weight: Name("WEIGHT")}

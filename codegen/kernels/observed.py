@@ -17,6 +17,8 @@ from synchain.models.dynamics.observable import (
     NodeSum,
     Rate,
     Reduction,
+    Rows,
+    RowSum,
     node_symbols,
 )
 from synchain.models.mechanics.components import TIME
@@ -69,11 +71,14 @@ class Watched:
         Functions of which points are taken when they pass zero, each followed by the values that its points keep.
     stop
         A function that ends a cell when it passes zero.
+    sums
+        The rows that are summed in them (`RowSum`).
     """
 
     observed: tuple[sp.Expr, ...] = ()
     sections: tuple[tuple[sp.Expr, ...], ...] = ()
     stop: sp.Expr | None = None
+    sums: tuple[Rows, ...] = ()
 
     @property
     def kept(self) -> int:
@@ -112,16 +117,33 @@ class Watched:
             ("values", self.observed, "The observed values at the fraction theta of the step."),
             ("section", self.events, what),
         )
-        return [_function(equations, plain, values, name, about) for name, values, about in parts if values]
+        return [_function(self, equations, plain, values, name, about) for name, values, about in parts if values]
+
+    def tables(self, equations: Equations) -> dict[str, str]:
+        """Return the text of the tables that the sums read, by their names: slots of a bank, or numbers."""
+        slots = {name: k for k, name in enumerate((*equations.state, *equations.parameters))}
+        found = {}
+        for k, rows in enumerate(self.sums):
+            for number, (_, entries) in enumerate(rows.at):
+                values = [slots[entry] if isinstance(entry, str) else entry for entry in entries]
+                found[table_name(k, number)] = f"np.array({values!r})"
+        return found
+
+
+def table_name(rows: int, number: int) -> str:
+    """What the table of one symbol of some rows is called."""
+    return f"ROWS_{rows}_{number}"
 
 
 UNWATCHED = Watched()
 """Nothing beside the records."""
 
 
-def _function(equations: Equations, plain: Equations, observed: Sequence[sp.Expr], name: str, about: str) -> Function:
+def _function(
+    watched: Watched, equations: Equations, plain: Equations, observed: Sequence[sp.Expr], name: str, about: str
+) -> Function:
     """A function that writes values at the fraction theta of a step."""
-    writer = _Writer(equations, plain)
+    writer = _Writer(equations, plain, watched.sums)
     return Function(
         name,
         ("theta", "t", "h", "y", "y_new", "dense", "out", "dims"),
@@ -134,8 +156,8 @@ def _function(equations: Equations, plain: Equations, observed: Sequence[sp.Expr
 class _Writer:
     """Writes the loops over nodes, those of inner reductions first."""
 
-    def __init__(self, equations: Equations, plain: Equations) -> None:
-        self.n = plain.n
+    def __init__(self, equations: Equations, plain: Equations, sums: Sequence[Rows] = ()) -> None:
+        self.n, self.sums, self.state = plain.n, sums, frozenset(equations.state)
         self.own = self._places(equations.components, plain.components, equations.state, plain)
         self.own |= self._parameters(equations.varied, plain.varied, equations)
         self.whole: dict[str, tuple[str, Expression]] = {}
@@ -166,9 +188,10 @@ class _Writer:
         """All statements of the function."""
         values = [self._placed(e) for e in observed]
         body: list[Statement] = []
-        if any(e.has(TIME) for e in values):
+        if any(e.has(TIME) for e in (*values, *(rows.value for rows in self.sums))):
             body.append(let("now", Name("t") + Name("theta") * "h"))
-        body += self._loads(values, {**self.whole, **self.numbers})
+        summed = [self.sums[int(r.args[0])].value for e in values for r in e.atoms(RowSum)]
+        body += self._loads([*values, *summed], {**self.whole, **self.numbers})
         while left := self._innermost(values):
             body += self._reductions(left)
             values = [e.xreplace(self.reduced) for e in values]
@@ -202,8 +225,11 @@ class _Writer:
         return sorted(found, key=sp.default_sort_key)
 
     def _reductions(self, found: Sequence[sp.Expr]) -> list[Statement]:
-        """The loop that computes reductions."""
-        begins: list[Statement] = []
+        """The loops that compute reductions."""
+        begins: list[Statement] = [line for r in found if isinstance(r, RowSum) for line in self._row_sum(r)]
+        found = [r for r in found if not isinstance(r, RowSum)]
+        if not found:
+            return begins
         inside, computed = self._node_values([r.args[0] for r in found])
         for r, value in zip(found, computed, strict=True):
             symbol = _real(f"_total{len(self.reduced)}")
@@ -213,6 +239,23 @@ class _Writer:
             inside.append(let(symbol.name, Name(symbol.name) + value if linear else call(function, symbol.name, value)))
             self.reduced[r] = symbol / self.n if type(r) is NodeMean else symbol
         return [*begins, Loop("i", Number(0), Number(self.n), tuple(inside))]
+
+    def _row_sum(self, r: sp.Expr) -> list[Statement]:
+        """The loop that adds up a value of some nodes or links."""
+        k = int(r.args[0])
+        rows, total = self.sums[k], _real(f"_total{len(self.reduced)}")
+        inside: list[Statement] = []
+        swap = {}
+        for number, (s, entries) in enumerate(rows.at):
+            entry: Expression = Load(table_name(k, number), Name("e"), None)
+            if isinstance(entries[0], str):
+                entry = _inside(entry) if entries[0] in self.state else Load("y", entry)
+            swap[s] = _real(f"_row{number}")
+            inside.append(let(swap[s].name, entry))
+        value = lower(self._shown(rows.value.xreplace(swap)))
+        inside.append(let(total.name, Name(total.name) + value))
+        self.reduced[r] = total
+        return [let(total.name, 0.0 * Name("theta")), Loop("e", Number(0), Number(rows.count), tuple(inside))]
 
     def _node_values(self, values: Sequence[sp.Expr]) -> tuple[list[Statement], list[Expression]]:
         """The statements that a loop over nodes needs for some values, and the values."""

@@ -198,8 +198,9 @@ def emit(
         constants |= {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": method.dense_rows}
         constants |= {"ENTRIES": elimination.entries if solves else 0}
     head = describe(equations, plain, method, (*ordered, *watched.words(equations)), count)
-    named = "\n".join(f"{name} = {value!r}" for name, value in constants.items())
-    text = "\n\n\n".join([head, imports(text), named, text])
+    tables = [f"{name} = {value}" for name, value in watched.tables(equations).items()]
+    named = "\n".join([*(f"{name} = {value!r}" for name, value in constants.items()), *tables])
+    text = "\n\n\n".join([head, imports(f"{named}\n{text}"), named, text])
     sizes = _dimensions(plain, method, scratch)._replace(
         observed=watched.count(equations),
         sections=len(watched.sections) or int("section" in ordered),

@@ -9,7 +9,7 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.saltation import Entry, Events
 from synchain.models.dynamics.variational import Variation
-from synchain.models.mechanics.components import TIME, Edge
+from synchain.models.mechanics.components import TIME
 from synchain.models.mechanics.friction import Contact
 
 from ..program.expressions import ZERO, Compare, Expression, Load, Name, Number, Product, call, plus
@@ -17,7 +17,7 @@ from ..program.lowering import lower
 from ..program.passes import Body, Hoist, Names, share
 from ..program.statements import Assign, Function, If, Statement, accumulate, let, store
 from .names import NAMES
-from .places import link_ends, span
+from .places import link_ends, places, span
 from .step import lane
 
 __all__ = ["event_functions", "push_functions", "register"]
@@ -60,7 +60,7 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
         return []
     fixed = Hoist(frozenset(node.state), names.fresh("fixed"), frozenset({TIME}))
     body = share([fixed.apply(e) for e in _columns(node.contact)], names.fresh("z"))
-    force, link = _force(equations.edges, node.contact)
+    force, link = _force(equations, node.contact)
     used = body.symbols.union(*(e.free_symbols for e in (*fixed.table, *link)))
     before = [*_parameters(equations, used), *(let(s.name, lane(lower(e))) for e, s in fixed.table.items())]
     own: list[Statement] = [let(s.name, Load("y", _place(k, "i"))) for k, s in enumerate(node.state) if s in used]
@@ -72,14 +72,15 @@ def _looped(equations: Equations, names: Names) -> list[Statement]:
     return [*before, nodes.over(own), unpacked, span("e", "target.size").over(force)]
 
 
-def _force(edges: tuple[Edge, ...], contact: Contact) -> tuple[list[Statement], tuple[sp.Expr, ...]]:
+def _force(equations: Equations, contact: Contact) -> tuple[list[Statement], tuple[sp.Expr, ...]]:
     """Statements that add the force of one link on a body that sticks, and the expressions they hold."""
-    if not edges:
+    if not equations.edges:
         return [], ()
-    (edge,) = edges
+    (edge,) = equations.edges
     velocity, mode = edge.here[1], edge.here[2]
     force = edge.rhs[1].xreplace({mode: sp.S.One, velocity: contact.speed})
     found = link_ends(edge)
+    found += [let(name, load) for name, load in places(equations).of_link(force.free_symbols)]
     swap = {}
     for place, suffix, states in (("i", "here", edge.here), ("j", "there", edge.there)):
         for k, s in enumerate(states):

@@ -56,7 +56,7 @@ class Looped(Step):
             base["FIELD"] = base["MATRIX"] + matrix
         self.put(*(whole(name, place) for name, place in base.items()))
         self.put(Assign(NAMES, Name("graph"), whole=True))
-        self.parameters(but={f"{name}_{i + 1}" for name in self.equations.varied for i in range(self.equations.n)})
+        self.parameters(but=self.equations.single)
         if not self.method.implicit:
             self.mass.opening()
 
@@ -111,6 +111,7 @@ class Looped(Step):
         read, body = self.places.read, Body((), used)
         found = link_ends(joint.edge) + self.places.own(body)
         found += [let(name, load) for name, load in self.places.of_source(joint.edge, body.symbols)]
+        found += [let(name, load) for name, load in self.places.of_link(body.symbols)]
         if states:
             found += read(joint.target, base, "_here", "i") + read(joint.source, base, "_there", "j")
         return found

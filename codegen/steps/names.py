@@ -58,7 +58,7 @@ def tidy(equations: Equations) -> Equations:
     taken = {s.name for s in shown} | {s.name for edge in edges for s in (*edge.here, *edge.there)}
     swap: dict[sp.Symbol, sp.Symbol] = {}
     for s in sorted(shown, key=str):
-        numbered = s in states or s.name in equations.varied
+        numbered = s in states or s.name in equations.differing
         if _clashes(s.name) or (numbered and NUMBERED.search(s.name)):
             name = _free(s.name, taken)
             taken.add(name)

@@ -2,7 +2,8 @@
 
 Nodes of one kind are numbered as they are, and state c of node i stands at c*NODES + i.  Nodes of several kinds are numbered
 kind after kind and links joint after joint, so that one loop has nodes, or links, of one template; the array `where` says at
-c*NODES + i where state c of node i stands, and in further rows which parameters the node has for itself.
+c*NODES + i where state c of node i stands, and in further rows which parameters the node has for itself.  Behind them
+it says at k*LINKS + e where link e has its own number of the k-th parameter that differs from link to link.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from itertools import accumulate, pairwise
 import numpy as np
 import sympy as sp
 
-from synchain.models.dynamics.equations import Equations
+from synchain.models.dynamics.equations import Equations, Layer
 from synchain.models.graphs.links import Link
 from synchain.models.mechanics.components import Edge, Node
 
@@ -31,6 +32,7 @@ __all__ = [
     "by_kind",
     "joint_numbers",
     "link_ends",
+    "link_table",
     "named",
     "places",
     "span",
@@ -85,7 +87,9 @@ class Places:
 
     def __init__(self, equations: Equations) -> None:
         self.size = max(len(node.state) for node in equations.nodes)
-        self.varied = equations.varied
+        self.varied, self.numbered = equations.varied, tuple(equations.numbered)
+        self.links = sum(len(layer.links) for layer in equations.listed)
+        self.behind = (self.size + len(self.varied)) * equations.n if equations.mixed else 0
         self.slots = {name: slot for slot, name in enumerate(equations.parameters, start=equations.dimension)}
         counts = [equations.kind_of.count(k) for k in range(len(equations.nodes))]
         parts = zip(equations.nodes, self.spans("i", "NODES", counts), strict=True)
@@ -127,6 +131,11 @@ class Places:
         """Load the parameters that a node has for itself, those that a body uses."""
         used = {s.name for s in body.symbols}
         return [let(name, Load("p", self.parameter(k))) for k, name in enumerate(self.varied) if name in used]
+
+    def of_link(self, used: Container[sp.Symbol]) -> list[tuple[str, Expression]]:
+        """The parameters that a link has for itself, those `used`, and where its numbers are."""
+        places = ((name, Number(self.behind + k * self.links) + "e") for k, name in enumerate(self.numbered))
+        return [(name, Load("p", Load("where", at, None))) for name, at in places if sp.Symbol(name, real=True) in used]
 
     def of_source(self, edge: Edge, used: Container[sp.Symbol], index: str = "j") -> list[tuple[str, Expression]]:
         """What the parameters are called that a link takes of its source, those `used`, and where they are."""
@@ -207,13 +216,29 @@ def by_kind(equations: Equations) -> list[int]:
 
 def by_joint(equations: Equations) -> tuple[Link, ...]:
     """Return the listed links in the order in which a kernel numbers them: joint after joint."""
-    links = (link for layer in equations.listed for link in layer.links)
+    return tuple(link for link, _ in _by_joint(equations))
+
+
+def _by_joint(equations: Equations) -> list[tuple[Link, Layer]]:
+    links = ((link, layer) for layer in equations.listed for link in layer.links)
     pairs = zip(joint_numbers(equations), links, strict=True)
-    return tuple(link for _, link in sorted(pairs, key=lambda pair: pair[0]))
+    return [pair for _, pair in sorted(pairs, key=lambda pair: pair[0])]
+
+
+def link_table(equations: Equations) -> np.ndarray:
+    """Return (parameters with a number for each link) * links slots of a bank, -1 for links of other layers."""
+    slots = {name: k for k, name in enumerate(equations.parameters, start=equations.dimension)}
+    links = _by_joint(equations) if equations.numbered else []
+    found = [
+        slots[layer.name(name, link)] if name in layer.varied else -1
+        for name in equations.numbered
+        for link, layer in links
+    ]
+    return np.array(found, np.int64)
 
 
 def table(equations: Equations) -> np.ndarray:
-    """Return `where`, (most states of a node + parameters with a value for each node) * n slots of a bank, -1 where none."""
+    """Return (most states of a node + parameters with a value for each node) * n slots of a bank, -1 where none."""
     size = max(len(node.state) for node in equations.nodes)
     slots = {name: k for k, name in enumerate(equations.parameters, start=equations.dimension)}
     found = np.full((size + len(equations.varied), equations.n), -1, np.int64)

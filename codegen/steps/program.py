@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import accumulate, pairwise
 
@@ -25,7 +25,7 @@ from synchain.models.mechanics.components import Edge, Node
 from .elimination import Entry, Plan
 from .fields import mean_fields
 from .mass import added_masses, momentum_slopes, turned_masses
-from .places import by_joint, by_kind, joint_numbers, table
+from .places import by_joint, by_kind, joint_numbers, link_table, table
 from .step import Step
 
 __all__ = ["FILL_LIMIT", "Program", "block_pattern", "program", "workspace"]
@@ -43,8 +43,8 @@ class Program:
     target, source (links,): ends of each link.  node_slot (components**2 * n,), here_slot, there_slot
     (components**2 * links,): where the entries of the node's block and of a link's two blocks stand in the matrix, -1 where
     there is none; where nodes are of several kinds, components are those of the node that has most, nodes and links are
-    numbered as codegen/steps/places.py says, and `where` is its table.  order (dimension,): pivots; place (dimension,): its
-    inverse.  The off-diagonal entries of pivot order[q] are row_start[q] … row_start[q + 1] - 1, those from after_start[q]
+    numbered as codegen/steps/places.py says, and `where` is its table, also of links that differ in a parameter.
+    order (dimension,): pivots; place (dimension,): its inverse.  The off-diagonal entries of pivot order[q] are row_start[q] … row_start[q + 1] - 1, those from after_start[q]
     on belong to later pivots; column: of each entry.
     """
 
@@ -77,7 +77,11 @@ def program(equations: Equations, fill: float = FILL_LIMIT, solves: bool = True)
     links = tuple((numbers[target], numbers[source], weight) for target, source, weight in by_joint(equations))
     counts = tuple(map(equations.kind_of.count, range(len(own))))
     shares = tuple(map(joint_numbers(equations).count, range(len(joined))))
-    return _program(equations.n, size, own, joined, links, fill, counts, shares, where)
+    found = _program(equations.n, size, own, joined, links, fill, counts, shares, where)
+    if not equations.numbered:
+        return found
+    *arrays, places = found.arrays
+    return replace(found, arrays=(*arrays, np.concatenate([places, link_table(equations)])))
 
 
 def _node_pattern(node: Node) -> Pattern:

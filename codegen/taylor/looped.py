@@ -289,8 +289,8 @@ class LoopWriter:
     # -- sections ---------------------------------------------------------------------------------------------
 
     def varied(self) -> list[sp.Symbol]:
-        """Parameters that have a value for each node."""
-        return [sp.Symbol(name, real=True) for name in self.equations.varied]
+        """Parameters that have a value for each node or link."""
+        return [sp.Symbol(name, real=True) for name in self.equations.differing]
 
     def node(
         self,
@@ -348,6 +348,8 @@ class LoopWriter:
         section.setting += self.own(edge.rhs, [], joint.target, "i", "_here")
         for name, load in self.places.of_source(edge, used, "j_there"):
             section.setting.append(f"{name} = {LANES.text(load)}")
+        for name, load in self.places.of_link(used):
+            section.setting.append(f"{self.called[name]} = {LANES.text(load)}")
         swap |= {s: sp.Symbol(f"{own.name}_there", real=True) for s, own in edge.theirs}
         seen = self.seen(section, self.waves, waves)
         found = self.read(section, rates, {**moving, **seen}, swap)
@@ -507,9 +509,8 @@ class LoopWriter:
         later = [self.waves.text("k"), *(section.text("k") for section in self.sections)]
         bases, size = self.bases()
         lines = [*bases, f"{', '.join(NAMES)} = graph", f"LINKS = {self.links}"]
-        own = {f"{name}_{i + 1}" for name in eq.varied for i in range(eq.n)}
         for slot, name in enumerate(eq.parameters, start=eq.dimension):
-            if name not in own:
+            if name not in eq.single:
                 lines.append(f"{self.called[name]} = load(p, {slot}, WIDTH)")
         lines += [f"{name} = {text}" for name, text in self.waves.graph.constants.items()]
         lines += ["# order 0", *self.states("store(dense, at_states + {0}, load(y, {0}, WIDTH))")]

@@ -14,6 +14,7 @@ from functools import cached_property
 import sympy as sp
 
 from ..graphs.links import AllPairs, Link, Links
+from ..inputs.node_name import LinkName
 from ..inputs.shown import Written
 from ..interactions.separation import separated
 from ..mechanics.components import Block, Edge, Node
@@ -45,14 +46,33 @@ class Layer:
     links : tuple of (int, int, Fraction), or AllPairs
         Target and source (0-based) and weight of each link.  Links of all pairs make a mean field
         of an edge that separates (`synchain.models.interactions.separation`).
+    varied : tuple of str
+        Parameters of the templates that have one number for each link, k_1_2 where node 1 feels node 2.
+    mutual : bool
+        True if a link and the one that runs back have one number, that of their edge.
     """
 
     edge_of: tuple[tuple[Ends, Edge], ...]
     links: Links
+    varied: tuple[str, ...] = ()
+    mutual: bool = False
 
-    def map(self, change: Callable[[Edge], Edge]) -> Layer:
-        """The same links with changed templates."""
-        return replace(self, edge_of=tuple((ends, change(edge)) for ends, edge in self.edge_of))
+    def map(self, change: Callable[[Edge], Edge], renamed: Mapping[sp.Symbol, sp.Symbol] | None = None) -> Layer:
+        """The same links with changed templates; parameters in `varied` that no template has any more leave it."""
+        edge_of = tuple((ends, change(edge)) for ends, edge in self.edge_of)
+        names = {s.name for _, edge in edge_of for s in edge.parameters}
+        varied = tuple(name for name in _renamed(self.varied, renamed) if name in names)
+        return replace(self, edge_of=edge_of, varied=varied)
+
+    def name(self, parameter: str, link: Link) -> str:
+        """What a parameter of `varied` is called at one link."""
+        target, source, _ = link
+        ends = (source, target) if self.mutual and source < target else (target, source)
+        return str(LinkName(parameter, *ends))
+
+    def names(self, parameter: str) -> tuple[str, ...]:
+        """What a parameter of `varied` is called at all links, each name once."""
+        return tuple(dict.fromkeys(self.name(parameter, link) for link in self.links))
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -204,7 +224,7 @@ class Equations(_Cached, Written):
         of_node, of_edge : callable
             What becomes of each node and edge template.
         renamed : mapping of Symbol to Symbol, optional
-            The new symbols of parameters in `varied`.
+            The new symbols of parameters of which nodes or links have numbers of their own.
 
         Returns
         -------
@@ -213,13 +233,11 @@ class Equations(_Cached, Written):
         """
         nodes = tuple(map(of_node, self.nodes))
         names = {s.name for node in nodes for s in node.parameters}
-        symbols = (sp.Symbol(name, real=True) for name in self.varied)
-        varied = (s.name for s in (symbols if renamed is None else (renamed.get(s, s) for s in symbols)))
         return replace(
             self,
             nodes=nodes,
-            layers=tuple(layer.map(of_edge) for layer in self.layers),
-            varied=tuple(name for name in varied if name in names),
+            layers=tuple(layer.map(of_edge, renamed) for layer in self.layers),
+            varied=tuple(name for name in _renamed(self.varied, renamed) if name in names),
         )
 
     def expect_alike(
@@ -232,12 +250,14 @@ class Equations(_Cached, Written):
         what : str
             What is for such networks alone; the message begins with it.
         varied_too : bool
-            Allow parameters that differ from node to node.
+            Allow parameters that differ from node to node, or from link to link.
         inertia_too : bool
             Allow links with inertia.
         layers_too : bool
             Allow several layers of links.
         """
+        if not varied_too:
+            self.expect_exact_links(what)
         problems = {
             "nodes of several kinds": self.mixed,
             f"nodes that differ in {', '.join(self.varied)}": bool(self.varied) and not varied_too,
@@ -249,6 +269,14 @@ class Equations(_Cached, Written):
         if found is not None:
             expected = "links of one layer" if found.endswith("layers of links") else "links that have no inertia"
             raise ValueError(f"{what}: found {found}; expected equal nodes with {expected}")
+
+    def expect_exact_links(self, what: str) -> None:
+        """Raise ValueError if links differ in more than the weights of their graph; the message begins with `what`."""
+        if self.numbered:
+            raise ValueError(
+                f"{what}: found links that differ in {', '.join(self.numbered)}; expected links that differ in the weights of "
+                "their graph alone"
+            )
 
     @cached_property
     def inertial(self) -> bool:
@@ -282,13 +310,31 @@ class Equations(_Cached, Written):
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
-        """Names of all parameters, nodes first; a parameter in `varied` is a_1 … a_n."""
+        """Names of all parameters, nodes first; one that differs is a_1 … a_n, or k_1_2 … of links."""
         names: list[str] = []
         for name in dict.fromkeys(s.name for node in self.nodes for s in node.parameters):
             names += [f"{name}_{i + 1}" for i in self.holders(name)] if name in self.varied else [name]
-        for edge in self.edges:
-            names += [s.name for s in edge.parameters if s.name not in (*names, *self.varied)]
+        known = {*names, *self.varied}
+        for name in dict.fromkeys(s.name for edge in self.edges for s in edge.parameters):
+            if name not in known:
+                names += self.numbered[name].names(name) if name in self.numbered else [name]
         return tuple(names)
+
+    @cached_property
+    def numbered(self) -> Mapping[str, Layer]:
+        """The parameters that have one number for each link, and their layers."""
+        return {name: layer for layer in self.layers for name in layer.varied}
+
+    @property
+    def differing(self) -> tuple[str, ...]:
+        """The parameters that have one number for each node or for each link."""
+        return (*self.varied, *self.numbered)
+
+    @cached_property
+    def single(self) -> frozenset[str]:
+        """The parameters of single nodes and links, a_1 … a_n and k_1_2 …"""
+        own = {f"{name}_{i + 1}" for name in self.varied for i in range(self.n)}
+        return frozenset(own.union(*(layer.names(name) for name, layer in self.numbered.items())))
 
     def holders(self, name: str) -> tuple[int, ...]:
         """The nodes (0-based) that have a parameter or a state of that name."""
@@ -342,6 +388,11 @@ class Equations(_Cached, Written):
         here = dict(zip(edge.here, self.symbols(target), strict=True))
         there = dict(zip(edge.there, self.symbols(source), strict=True))
         own = {s: _numbered(s, target) for s in edge.parameters if s.name in self.varied}
+        own |= {
+            s: sp.Symbol(self.numbered[s.name].name(s.name, link), real=True)
+            for s in edge.parameters
+            if s.name in self.numbered
+        }
         theirs = {s: _numbered(of, source) for s, of in edge.theirs}
         return {**here, **there, **own, **theirs, edge.weight: sp.Rational(weight.numerator, weight.denominator)}
 
@@ -438,11 +489,19 @@ class Equations(_Cached, Written):
             parts += [repr(self.kind_of), *(_text(node.state, node.rhs, node.parameters) for node in others)]
             parts += [repr(ends) for layer in self.layers for ends, _ in layer.edge_of]
         parts += [f"layers {[len(layer.links) for layer in self.layers]}"] if len(self.layers) > 1 else []
+        parts += [f"links {name} {layer.mutual}" for name, layer in self.numbered.items()]
         for edge in self.edges:
             parts.append(_text((*edge.here, *edge.there, edge.weight), edge.rhs, edge.parameters))
             parts += [sp.srepr(sp.Matrix(block)) for block in edge.inertia]
             parts += [f"theirs {edge.theirs}"] if edge.theirs else []
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def _renamed(names: Iterable[str], renamed: Mapping[sp.Symbol, sp.Symbol] | None) -> Iterator[str]:
+    """Names of parameters, of which some symbols are new."""
+    for name in names:
+        s = sp.Symbol(name, real=True)
+        yield name if renamed is None else renamed.get(s, s).name
 
 
 def _numbered(s: sp.Symbol, i: int) -> sp.Symbol:
@@ -469,6 +528,7 @@ def check(eq: Equations) -> None:
         raise ValueError(f"a network needs at least one node, found n = {eq.n}")
     _check_kinds(eq)
     _check_links(eq)
+    _check_numbered(eq)
     _check_names(eq)
 
 
@@ -513,6 +573,19 @@ def _check_links(eq: Equations) -> None:
             seen.add((target, source))
         if {eq.ends(link) for link in layer.links} - {ends for ends, _ in layer.edge_of}:
             raise ValueError(f"{len(layer.links)} links but no edge equations; give a coupling")
+
+
+def _check_numbered(eq: Equations) -> None:
+    for name, layer in eq.numbered.items():
+        if sum(name in own.varied for own in eq.layers) > 1 or isinstance(layer.links, AllPairs):
+            raise ValueError(f"{name!r} has a number for each link of two layers, or of all pairs; expected one list")
+        if not any(s.name == name for _, edge in layer.edge_of for s in edge.parameters):
+            raise ValueError(f"{name!r} has a number for each link, but no link of its layer has it as a parameter")
+    for layer in (layer for layer in eq.layers if layer.mutual):
+        pairs = {link[:2] for link in layer.links}
+        back = next(((i, j) for i, j in pairs if (j, i) not in pairs), None)
+        if back is not None:
+            raise ValueError(f"numbers of edges: link {back[0]} <- {back[1]} has none that runs back")
 
 
 def _check_names(eq: Equations) -> None:

@@ -18,11 +18,11 @@ from ..definitions.definition import FRICTION_LAW
 from ..graphs.links import LINK_LIMIT, AllPairs, Link
 from ..graphs.topology import Topology
 from ..inputs.plugins import names
-from ..interactions.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling
+from ..interactions.coupling import WEIGHT, Coupling, LagrangianCoupling, MatrixCoupling, Potential
 from ..interactions.link import edge
 from ..interactions.separation import separated
 from ..mechanics.calculus import cancelled, expanded
-from ..mechanics.components import SLIDING, Block, Edge, Node
+from ..mechanics.components import SLIDING, WEIGHT_NUMBER, Block, Edge, Node
 from ..mechanics.friction import KAPPA, SLIP, ContactModel, FrictionLaw, set_valued
 from ..mechanics.lagrangian import LARGEST_BY_MINORS, Mechanics, check_masses_exist, coupled, solve_masses
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional, scale, static_coefficient
@@ -166,9 +166,14 @@ FEW = 8
 """Most nodes of a complete graph whose links are always listed."""
 
 
-def _layer(apart: Equations, link: Edge, graph: Topology) -> Layer:
-    """The links of a graph between equal nodes: all pairs, if these make a mean field, or a list."""
+def _layer(apart: Equations, link: Edge, graph: Topology, own: tuple[str, ...] = (), mutual: bool = False) -> Layer:
+    """The links of a graph between equal nodes: all pairs, if these make a mean field, or a list.
+
+    Of the parameters `own` each link has a number; links that act on both ends are `mutual`.
+    """
     shared = link.with_shared(apart.varied)
+    if own:
+        return _listed_layer(((((0, 0), shared)),), graph, own, mutual)
     weight = None if graph.n <= FEW or apart.sticks else graph.all_to_all
     if weight is not None and separated(shared, apart.varied) is not None:
         return Layer((((0, 0), shared),), AllPairs(graph.n, weight))
@@ -178,6 +183,21 @@ def _layer(apart: Equations, link: Edge, graph: Topology) -> Layer:
             f"functions of the target times functions of the source, or at most {LINK_LIMIT} links, which can be listed"
         )
     return Layer((((0, 0), shared),), oriented_links(graph) if graph.link_count and link.oriented else graph.links)
+
+
+def _listed_layer(
+    edges: tuple[tuple[tuple[int, int], Edge], ...], graph: Topology, own: tuple[str, ...], mutual: bool
+) -> Layer:
+    """The links of a graph, of which each has numbers of its own."""
+    oriented = any(link.oriented for _, link in edges)
+    if WEIGHT_NUMBER.name in own:
+        if oriented:
+            raise ValueError(
+                "W: found weights as numbers of a coupling that tells the two ends of a link apart; strength and direction "
+                "share one number there; expected a parameter of the link"
+            )
+        edges = tuple((ends, link.with_weight_number()) for ends, link in edges)
+    return Layer(edges, oriented_links(graph) if oriented else graph.links, own, mutual and graph.symmetric)
 
 
 def layered_network(
@@ -200,27 +220,42 @@ def layered_network(
     layers : sequence of (Coupling, Topology)
         Couplings and their graphs.  Of a coupling every pair of kinds that a link joins gets its own edge.
     varied : tuple of str
-        Parameters of nodes that have one value for each node.
+        Parameters that have one value for each node, or for each link; "W" is the weight of a single layer.
 
     Raises
     ------
     ValueError
         If a coupling does not fit a pair of kinds.
     """
-    apart = Equations(tuple(singles), tuple(kinds), (), varied)
-    if not apart.mixed:
-        edges = ((edge(coupling, singles[0], oscillators[0]), graph) for coupling, graph in layers)
-        return replace(apart, layers=tuple(_layer(apart, link, graph) for link, graph in edges))
-    return replace(apart, layers=tuple(_mixed_layer(apart, oscillators, *layer) for layer in layers))
+    names = {s.name for single in singles for s in single.parameters}
+    apart = Equations(tuple(singles), tuple(kinds), (), tuple(name for name in varied if name in names))
+    of_links = [name for name in varied if name not in names]
+    made = []
+    for coupling, graph in layers:
+        own = tuple(name for name in of_links if name in coupling.parameters or name == WEIGHT_NUMBER.name)
+        mutual = isinstance(coupling, LagrangianCoupling | Potential)
+        if apart.mixed:
+            made.append(_mixed_layer(apart, oscillators, coupling, graph, own, mutual))
+        else:
+            made.append(_layer(apart, edge(coupling, singles[0], oscillators[0]), graph, own, mutual))
+    return replace(apart, layers=tuple(made))
 
 
-def _mixed_layer(apart: Equations, oscillators: Sequence[Oscillator], coupling: Coupling, graph: Topology) -> Layer:
+def _mixed_layer(
+    apart: Equations,
+    oscillators: Sequence[Oscillator],
+    coupling: Coupling,
+    graph: Topology,
+    own: tuple[str, ...],
+    mutual: bool,
+) -> Layer:
     """The links of a graph between nodes of several kinds."""
     singles, pairs = apart.nodes, sorted({apart.ends(link) for link in graph.links})
     edges = tuple(((a, b), edge(coupling, singles[a], oscillators[a], singles[b], oscillators[b])) for a, b in pairs)
     if any(a == b and link.oriented for (a, b), link in edges):
         raise ValueError(f"coupling {str(coupling)!r} tells the ends of a link apart; expected nodes of one kind")
-    return Layer(tuple((ends, link.with_shared(apart.varied)) for ends, link in edges), graph.links)
+    shared = tuple((ends, link.with_shared(apart.varied)) for ends, link in edges)
+    return _listed_layer(shared, graph, own, mutual) if own else Layer(shared, graph.links)
 
 
 def connectivity(coupling: Coupling, graph: Topology) -> tuple[tuple[Fraction, ...], ...]:

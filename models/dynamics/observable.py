@@ -6,7 +6,7 @@ node: ``x``.  The names of the network's states, ``x_1`` … ``x_n``, are known 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
@@ -18,7 +18,9 @@ from ..inputs.checks import short_repr
 from ..inputs.words import Word
 
 __all__ = [
+    "ENERGY",
     "AtNode",
+    "Energy",
     "NodeMaximum",
     "NodeMean",
     "NodeMinimum",
@@ -27,8 +29,11 @@ __all__ = [
     "Observable",
     "Rate",
     "Reduction",
+    "RowSum",
+    "Rows",
     "Window",
     "end",
+    "energy",
     "maximum",
     "mean",
     "minimum",
@@ -99,6 +104,57 @@ class AtNode(Reduction):
 
     def _sympystr(self, printer: Any) -> str:
         return f"nodes[{self.args[1]}]({printer._print(self.args[0])})"
+
+
+class RowSum(Reduction):
+    """The sum of a value over some `Rows`, those of the number that is its argument."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """A value at each of some nodes or links.
+
+    Parameters
+    ----------
+    value : Expr
+        An expression of the symbols in `at`, of parameters that all share, and of t.
+    at : tuple of (Symbol, tuple)
+        What a symbol is in each row: names of states, or of parameters, or numbers.
+    count : int
+        The number of rows.
+    """
+
+    value: sp.Expr
+    at: tuple[tuple[sp.Symbol, tuple[str, ...] | tuple[float, ...]], ...]
+    count: int
+
+    @classmethod
+    def of(cls, value: sp.Expr, places: Sequence[Mapping[sp.Symbol, sp.Expr]]) -> Rows:
+        """Return the rows of a value whose symbols are a symbol of the network or a number in each of some places."""
+        used = sorted(value.free_symbols & set(places[0]), key=lambda s: s.name)
+        found = {s: tuple(place[s] for place in places) for s in used}
+        fixed = {s: row[0] for s, row in found.items() if len(set(row)) == 1}
+        rows = (
+            (s, tuple(e.name if e.is_Symbol else float(e) for e in row)) for s, row in found.items() if s not in fixed
+        )
+        return cls(value.xreplace(fixed), tuple(rows), len(places))
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The names of states and parameters that occur."""
+        entries = (entry for _, row in self.at for entry in row if isinstance(entry, str))
+        return frozenset({s.name for s in self.value.free_symbols}.union(entries))
+
+
+class Energy(sp.Symbol):
+    """The energy of the whole network, of its nodes and its links, in observables, sections and stops."""
+
+
+energy = Energy("energy", real=True)
+"""The energy of the whole network, of its nodes and its links."""
+
+ENERGY = sp.Symbol(energy.name, real=True)
+"""What stands for it in values, which are made of plain symbols."""
 
 
 class Nodes:

@@ -47,7 +47,7 @@ class Drive:
 
 def angular_frequency(equations: Equations) -> sp.Expr | None:
     """Return the angular frequency of the drive, None if no period is known (see `Drive`)."""
-    return drive_of((*equations.nodes, *equations.edges), equations.varied).frequency
+    return drive_of((*equations.nodes, *equations.edges), equations.differing).frequency
 
 
 @lru_cache(maxsize=64)
@@ -59,7 +59,7 @@ def drive_of(templates: tuple[Node | Edge, ...], varied: tuple[str, ...] = ()) -
     templates : tuple of Node or Edge
         The templates of the nodes and links.
     varied : tuple of str
-        Names of parameters that differ from node to node.
+        Names of parameters that differ from node to node or from link to link.
     """
     if not any(template.forced for template in templates):
         return Drive(problem="is not driven")
@@ -75,7 +75,9 @@ def _periodic(templates: tuple[Node | Edge, ...], varied: tuple[str, ...]) -> Dr
         return Drive(found, problem="depends on time other than by sines and cosines of a t + b, a constant")
     own = sorted({s.name for wave in found for s in wave.free_symbols} & set(varied))
     if own:
-        return Drive(found, problem=f"is driven at a frequency that differs from node to node ({', '.join(own)})")
+        return Drive(
+            found, problem=f"is driven at a frequency that differs from node to node or link to link ({', '.join(own)})"
+        )
     ratios = [sp.cancel(wave / found[0]) for wave in found]
     strange = next((wave for wave, ratio in zip(found, ratios, strict=True) if not ratio.is_Rational), None)
     if strange is not None:

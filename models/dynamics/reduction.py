@@ -23,6 +23,7 @@ import sympy as sp
 
 from ..graphs.links import LINK_LIMIT
 from ..graphs.partitions import class_links, coarsest_balanced
+from ..inputs.node_name import LinkName
 from ..mechanics.components import Edge
 from .equations import Equations
 
@@ -85,8 +86,10 @@ def _check_constants(equations: Equations, values: Mapping[str, int | Fraction])
             raise TypeError(f"fold {name}: found {value!r} ({type(value).__name__}); expected an int or a Fraction")
         if name not in equations.parameters:
             raise ValueError(f"fold: unknown parameter {name!r}; known: {', '.join(equations.parameters) or 'none'}")
-        if any(name in (f"{own}_{i + 1}" for i in range(equations.n)) for own in equations.varied):
-            raise ValueError(f"fold {name}: the nodes have different values of it; it stays a parameter")
+        if name in equations.single:
+            link = LinkName.parse(name)
+            places = "links" if link is not None and link.base in equations.numbered else "nodes"
+            raise ValueError(f"fold {name}: the {places} have different values of it; it stays a parameter")
     if values and equations.mixed:
         raise ValueError(f"fold {', '.join(values)}: found nodes of several kinds; they stay parameters")
 
@@ -163,6 +166,8 @@ def collapse(equations: Equations, classes: Sequence[int]) -> Equations:
         raise ValueError(f"partition: found the classes {sorted(set(classes))}; expected 0 … {count - 1}")
     if count == equations.n and list(classes) == list(range(count)):
         return equations
+    if equations.numbered:
+        raise NoQuotient(f"quotient: the links differ in {', '.join(equations.numbered)}; nodes are stepped one by one")
     if equations.mixed or equations.inertial_links:
         raise NoQuotient("quotient: nodes of several kinds or links with inertia are stepped one by one")
     for edge in equations.edges:

@@ -37,12 +37,13 @@ def synchronous_node(equations: Equations) -> Node:
     Raises
     ------
     NoSynchrony
-        If a link acts between equal states and the sums of weights differ from node to node, and if a link has no value
-        between equal states.
+        If a link acts between equal states and the sums of weights, or parameters of links, differ from place to place,
+        and if a link has no value between equal states.
     ValueError
         For nodes that differ.
     """
-    equations.expect_alike("complete synchronisation", inertia_too=True, layers_too=True)
+    apart = replace(equations, layers=())
+    apart.expect_alike("complete synchronisation")
     node = equations.node
     for layer in equations.layers:
         ((_, edge),) = layer.edge_of
@@ -52,10 +53,11 @@ def synchronous_node(equations: Equations) -> Node:
 
 
 def expect_vanishing(what: str, equations: Equations) -> None:
-    """Raise ValueError if a link acts between equal states or is not proportional to its weight.
+    """Raise ValueError if a link acts between equal states, is not proportional to its weight, or has own numbers.
 
     `what` needs one synchronous motion for all strengths, and modes that are those of the graph.
     """
+    equations.expect_exact_links(what)
     if not all(edge.diffusive for edge in equations.edges):
         raise ValueError(
             f"{what}: a link acts between equal states, so that the synchronous motion changes with its strength; expected "
@@ -81,6 +83,12 @@ def _with_links(node: Node, layer: Layer, edge: Edge, n: int) -> Node:
         raise NoSynchrony(
             f"a link {', '.join(map(str, edge.rhs))} has no value between equal states, so complete synchronisation is no "
             "solution of this network"
+        )
+    own = [name for name in layer.varied if any(e.has(sp.Symbol(name, real=True)) for e in felt)]
+    if own:
+        raise NoSynchrony(
+            f"a link acts between equal states and {', '.join(own)} differs from link to link, so complete synchronisation is "
+            "no solution of this network"
         )
     unit = {edge.weight: sp.S.One}
     if all(sp.expand(e - edge.weight * e.xreplace(unit)) == 0 for e in felt):

@@ -1,10 +1,10 @@
-"""Names of states and parameters of single nodes: "x_2" is the state x of the second node."""
+"""Names of states and parameters of single nodes, "x_2", and of parameters of single links, "k_1_2"."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["NodeName"]
+__all__ = ["LinkName", "NodeName"]
 
 _DIGITS = 9
 """Most digits of the number of a node."""
@@ -34,3 +34,30 @@ class NodeName:
 
     def __str__(self) -> str:
         return f"{self.base}_{self.index + 1}"
+
+
+@dataclass(frozen=True, slots=True)
+class LinkName:
+    """The name of a parameter of one link: "k_1_2" is k where node 1 feels node 2.
+
+    Parameters
+    ----------
+    base : str
+        The parameter: "k" of "k_1_2".
+    target, source : int
+        The two ends, counted from 0: 0 and 1 of "k_1_2".
+    """
+
+    base: str
+    target: int
+    source: int
+
+    @classmethod
+    def parse(cls, name: str) -> LinkName | None:
+        """Return the parts of a name such as "k_1_2"; None if the text is no such name."""
+        outer = NodeName.parse(name)
+        inner = None if outer is None else NodeName.parse(outer.base)
+        return None if outer is None or inner is None else cls(inner.base, inner.index, outer.index)
+
+    def __str__(self) -> str:
+        return f"{self.base}_{self.target + 1}_{self.source + 1}"

@@ -11,13 +11,16 @@ import sympy as sp
 from .calculus import derivative
 from .friction import SLIP, Contact
 
-__all__ = ["SLIDING", "TIME", "Block", "Edge", "Node"]
+__all__ = ["SLIDING", "TIME", "WEIGHT_NUMBER", "Block", "Edge", "Node"]
 
 TIME = sp.Symbol("t", real=True)
 """Non-dimensional time, the one time symbol of all equations."""
 
 Block: TypeAlias = tuple[tuple[sp.Expr, ...], ...]
 """The entries of a matrix that belong to one node or to one end of a link, row by row."""
+
+WEIGHT_NUMBER = sp.Symbol("W", real=True)
+"""The weight of a link as a parameter, a number of the run in place of an exact one of the graph."""
 
 SLIDING = sp.Symbol("w", real=True)
 """The sliding velocity, the argument of a friction law."""
@@ -244,6 +247,13 @@ class Edge:
         theirs = tuple(pair for pair in self.theirs if pair[0] not in shared)
         rhs = tuple(e.xreplace(shared) for e in self.rhs)
         return replace(self, rhs=rhs, parameters=(*self.parameters, *more), theirs=theirs)
+
+    def with_weight_number(self) -> Edge:
+        """The same with the parameter `WEIGHT_NUMBER` in place of the weight."""
+        swap = {self.weight: WEIGHT_NUMBER}
+        inertia = tuple(tuple(tuple(e.xreplace(swap) for e in row) for row in block) for block in self.inertia)
+        rhs = tuple(e.xreplace(swap) for e in self.rhs)
+        return replace(self, rhs=rhs, parameters=(*self.parameters, WEIGHT_NUMBER), inertia=inertia)
 
     @property
     def diffusive(self) -> bool:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ..dynamics.equations import Equations
-from ..mechanics.components import SLIDING, TIME, Edge, Node
+from ..mechanics.components import SLIDING, TIME, WEIGHT_NUMBER, Edge, Node
 from ..mechanics.nondimensional import FRICTION
 from .writer import Latex, Style, Text, Writer
 
@@ -133,7 +133,8 @@ def lines(equations: Equations, style: Style) -> Iterator[str]:
         count, meaning = equations.link_count, ""
         layers = (layer for layer in equations.layers if layer.links)
         for layer, (_, name) in zip(layers, _weights(equations), strict=True):
-            meaning += f", {style.letter(name, 'ij')}" + style.words(f" the weights of the {len(layer.links)} links")
+            shown = WEIGHT_NUMBER.name if WEIGHT_NUMBER.name in layer.varied else name
+            meaning += f", {style.letter(shown, 'ij')}" + style.words(f" the weights of the {len(layer.links)} links")
         if any(edge.oriented for edge in equations.edges):
             meaning += style.words(", -1 where a link runs from j to i")
         yield ("i, j" if count else "i") + f" = 1, {style.dots}, {equations.n}{meaning}"
@@ -236,6 +237,8 @@ def _generic(equations: Equations, named: _Named, style: Style) -> Iterator[str]
     here = dict(zip(node.state, own, strict=True))
     letters = _letters(equations, named, style, own, "i")
     letters |= {s: style.letter(s.name, "i") for s in _varied(equations)}
+    numbered = tuple(sp.Symbol(name, real=True) for name in equations.numbered)
+    letters |= {s: style.letter(s.name, "ij") for s in numbered}
     for edge, name in joints:
         letters |= _letters(equations, named, style, edge.here, "i")
         letters |= _letters(equations, named, style, edge.there, "j")
@@ -246,7 +249,7 @@ def _generic(equations: Equations, named: _Named, style: Style) -> Iterator[str]
         line = writer.total([term.xreplace(here) for term in _ordered(named.rhs[c], node)])
         for edge, name in joints:
             if edge.rhs[c] != 0:
-                summed = _sum_over_links(edge, _weight(name), c, writer)
+                summed = _sum_over_links(edge, _weight(name), c, writer, numbered)
                 line = line + summed if line != "0" else summed.removeprefix(" + ").lstrip()
         row = [e.xreplace(here) for e in _masses(node, c)]
         left = _massive(row, own, writer) if row else writer.write(here[node.state[c]]) + "'"
@@ -273,10 +276,10 @@ def _summed_inertia(edge: Edge, weight: sp.Symbol, c: int, writer: Writer) -> st
     return _summed(term.xreplace({edge.weight: weight}), (weight, *ends, *rates), full)
 
 
-def _sum_over_links(edge: Edge, weight: sp.Symbol, c: int, writer: Writer) -> str:
-    """The links of node i: what all of them share stands before the sum sign."""
-    sources = (s for s, _ in edge.theirs)
-    return _summed(edge.rhs[c].xreplace({edge.weight: weight}), (weight, *edge.here, *edge.there, *sources), writer)
+def _sum_over_links(edge: Edge, weight: sp.Symbol, c: int, writer: Writer, numbered: tuple[sp.Symbol, ...]) -> str:
+    """The links of node i: what all of them share, not what is `numbered` by link, stands before the sum sign."""
+    inside = (weight, *edge.here, *edge.there, *(s for s, _ in edge.theirs), *numbered)
+    return _summed(edge.rhs[c].xreplace({edge.weight: weight}), inside, writer)
 
 
 def _summed(term: sp.Expr, inside: tuple[sp.Symbol, ...], writer: Writer) -> str:

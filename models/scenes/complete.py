@@ -7,18 +7,22 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import sympy as sp
+
 from ..dynamics.record import Record
+from ..graphs.topology import Topology
 from ..inputs.checks import check_choice, check_integer, check_number, check_text, short_repr
 from ..inputs.frozen import Frozen
 from ..inputs.words import Word
+from ..mechanics.components import WEIGHT_NUMBER
 from ..mechanics.friction import ContactModel, FrictionLaw
 from ..mechanics.oscillator import FieldModel
 from ..mechanics.physics import check_masses, check_power
 from .axis import Axis
-from .draw import LIMIT, drawn_axes, draws
+from .draw import GRAPH, LIMIT, drawn_axes, drawn_graph, draws
 from .model import Model, NodeKind, as_contact, as_coupling, as_groups, as_law, as_layers, as_oscillator
 from .observables import observables, sections, stop
-from .parameters import at_nodes, drive, parameters
+from .parameters import at_nodes, drive, parameters, varied
 from .section import Section
 from .start import SEED_LIMIT, chosen_start, default_start
 from .sweep import check_draws, check_sweep, read_axes
@@ -76,13 +80,18 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     values = dict(given)
     values["title"] = check_text("title", given["title"])
     values["seed"] = check_integer("seed", given["seed"], *LIMITS["seed"])
-    values |= _model(given)
+    values["draws"] = draws(given["draws"], given["realisations"])
+    values |= _model(given, drawn_graph(values["draws"]))
     model: Model = values["model"]
     values["axes"] = axes = read_axes(given["axes"], given["zipped"])
     values["rng"] = check_integer("rng", given["rng"], *LIMITS["rng"])
-    values["draws"] = draws(given["draws"], given["realisations"])
     drawn = drawn_axes(model, values["draws"], given["realisations"], values["rng"])
     values["parameters"] = numbers = parameters(model, given["parameters"], (*axes, *drawn))
+    own = varied(numbers, model.parameters)
+    if any(model.link_names(name) for name in own):
+        model.equations(own)  # refuses links that can have no numbers of their own
+    if GRAPH in values["draws"]:
+        _check_graphs(model, own)
     values["initial"] = _start(model, given["initial"], values["seed"])
     values["record"] = _records(model, given["record"])
     values["section"] = _section(model, given["section"])
@@ -104,13 +113,30 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     return values
 
 
-def _model(given: Mapping[str, Any]) -> dict[str, Any]:
-    """The parts of the model, and the model."""
+def _check_graphs(model: Model, own: tuple[str, ...]) -> None:
+    """Refuse graphs by realisation if a link of weight 0, which stands for none, acts."""
+    for edge in model.equations(own).edges:
+        acting = next((e for e in edge.expressions if e.xreplace({WEIGHT_NUMBER: sp.S.Zero}) != 0), None)
+        if acting is not None:
+            raise ValueError(
+                f"draw topology: found a link that adds {acting}; expected nothing at the weight W = 0, which stands for no link"
+            )
+
+
+def _model(given: Mapping[str, Any], drawn: Topology | None) -> dict[str, Any]:
+    """The parts of the model, and the model, on the graph that is `drawn` if there is one."""
     oscillator = as_oscillator(given["oscillator"])
     if given["links"] is not None and given["coupling"] not in (None, "spring"):
         raise ValueError("links: found a coupling beside it; expected each layer with its own coupling; leave one out")
     coupling = as_coupling(given["coupling"]) if given["links"] is None else None
     layers = as_layers(given["links"], coupling, given["topology"])
+    if drawn is not None:
+        if len(layers) > 1 or (given["topology"] is not None and layers[0][1].n != drawn.n):
+            found = f"{len(layers)} layers of links" if len(layers) > 1 else f"graphs of {drawn.n} nodes"
+            raise ValueError(
+                f"draw topology: found {found}; expected graphs of {layers[0][1].n} nodes for a single layer"
+            )
+        layers = ((coupling, drawn),)
     friction = as_law(given["friction"], oscillator)
     groups = as_groups(given["nodes"], layers[0][1].n)
     contact = as_contact(given["contact"], (oscillator, *(group.oscillator for group in groups)))

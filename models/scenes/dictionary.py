@@ -13,7 +13,7 @@ from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import check_integer, check_keys, check_table, check_text, short_repr
 from ..inputs.plugins import part
 from ..interactions.coupling import Coupling, Potential, Rates, split
-from .draw import Draw
+from .draw import GRAPH, Draw, Draws, Graphs
 from .parameters import collected
 
 __all__ = ["arguments", "as_dict", "graph_of", "graph_table"]
@@ -53,6 +53,10 @@ def arguments(values: object, keywords: Iterable[str], folder: Path | None = Non
     for name in ("parameters", "initial", "observe", "sections", "draws"):
         if name in given:
             check_table(name, given[name])
+    graphs = given.get("draws", {}).get(GRAPH)
+    if isinstance(graphs, list):
+        tables = (check_table(f"draw {GRAPH} {k}", graph) for k, graph in enumerate(graphs, start=1))
+        given["draws"] = {**given["draws"], GRAPH: [graph_of(table, folder) for table in tables]}
     for name in ("oscillator", "friction", "coupling"):
         if name in given:
             given[name] = _placed(given[name], folder)
@@ -161,10 +165,7 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
     written["record"] = [str(record) for record in values["record"]]
     written["observe"] = {name: str(observable) for name, observable in values["observe"].items()}
     written["sections"] = {name: section.as_table() for name, section in values["sections"].items()}
-    written["draws"] = {
-        name: str(drawn) if isinstance(drawn, Draw) else [list(row) for row in drawn]
-        for name, drawn in values["draws"].items()
-    }
+    written["draws"] = {name: _draw(drawn) for name, drawn in values["draws"].items()}
     if not written["draws"]:
         del written["rng"], written["realisations"]
     for name in ("observe", "sections", "stop", "draws"):
@@ -172,6 +173,13 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
             del written[name]
     written["sweep"] = {axis.name: list(axis.values) for axis in written.pop("axes")}
     return written
+
+
+def _draw(drawn: Draws) -> object:
+    """A distribution as text, or numbers or graphs by realisation."""
+    if isinstance(drawn, Draw):
+        return str(drawn)
+    return [*map(graph_table, drawn.graphs)] if isinstance(drawn, Graphs) else [*map(list, drawn)]
 
 
 def _coupling(coupling: Coupling | None) -> object:

@@ -8,19 +8,34 @@ import random
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import islice
 from statistics import NormalDist
 from typing import NoReturn
 
+from ..graphs.readers import as_topology
+from ..graphs.topology import Topology
 from ..inputs.arithmetic import constant
 from ..inputs.checks import check_integer, check_number, check_positive, check_table, check_text, short_repr
 from ..inputs.frozen import Frozen
-from ..inputs.node_name import NodeName
+from ..inputs.node_name import LinkName, NodeName
 from ..inputs.reader import Algebra, NoMeaning, parse
 from ..inputs.words import Word
 from .axis import LIMIT, Axis
-from .model import Model
+from .model import WEIGHTS, Model, union_of
+from .parameters import in_order
 
-__all__ = ["Distribution", "Draw", "Draws", "drawn_axes", "draws", "lorentzian", "normal", "uniform"]
+__all__ = [
+    "GRAPH",
+    "Distribution",
+    "Draw",
+    "Draws",
+    "drawn_axes",
+    "drawn_graph",
+    "draws",
+    "lorentzian",
+    "normal",
+    "uniform",
+]
 
 
 KNOWN = "normal(mean, deviation), uniform(low, high), lorentzian(centre, half width)"
@@ -85,8 +100,29 @@ def lorentzian(centre: float, half_width: float) -> Draw:
     return Draw(Distribution.LORENTZIAN, centre, half_width)
 
 
-Draws = Draw | tuple[tuple[float, ...], ...]
-"""A distribution, or numbers by realisation: one, or one for each node."""
+@dataclass(frozen=True, slots=True)
+class Graphs:
+    """Graphs by realisation; ValueError unless all have as many nodes."""
+
+    graphs: tuple[Topology, ...]
+
+    def __post_init__(self) -> None:
+        sizes = sorted({graph.n for graph in self.graphs})
+        if len(sizes) != 1:
+            found = ", ".join(map(str, sizes)) or "no"
+            raise ValueError(f"draw {GRAPH}: found graphs of {found} nodes; expected one number of nodes")
+
+    @property
+    def union(self) -> Topology:
+        """The union of the graphs, whose links a run steps: their weights are numbers of its cells, 0 for no link."""
+        return union_of(self.graphs, f"union of {len(self.graphs)} graphs")
+
+
+Draws = Draw | tuple[tuple[float, ...], ...] | Graphs
+"""A distribution, or numbers by realisation, one, or one for each node or link; or graphs by realisation."""
+
+GRAPH = "topology"
+"""The name of the graph among what is drawn."""
 
 
 def draws(given: object, realisations: object) -> Frozen[Draws]:
@@ -109,7 +145,29 @@ def draws(given: object, realisations: object) -> Frozen[Draws]:
     if bool(table) != bool(count):
         found = f"{count} realisations and {len(table)} names to draw"
         raise ValueError(f"draws: found {found}; expected both, e.g. realisations=50, draws={{'x': normal(0, 1)}}")
-    return Frozen({check_text("draw", name): _drawn(f"draw {name}", value, count) for name, value in table.items()})
+    return Frozen(
+        {
+            check_text("draw", name): (_graphs if name == GRAPH else _drawn)(f"draw {name}", value, count)
+            for name, value in table.items()
+        }
+    )
+
+
+def drawn_graph(drawn: Mapping[str, Draws]) -> Topology | None:
+    """Return the union of the graphs of all realisations, None if no graphs are listed."""
+    graphs = drawn.get(GRAPH)
+    return graphs.union if isinstance(graphs, Graphs) else None
+
+
+def _graphs(what: str, value: object, count: int) -> Graphs:
+    """Graphs by realisation."""
+    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
+        raise TypeError(f"{what}: found {short_repr(value)}; expected a list of {count} graphs")
+    found = tuple(as_topology(what, graph) for graph in islice(value, count + 1))
+    if len(found) != count:
+        few = f"more than {count}" if len(found) > count else str(len(found))
+        raise ValueError(f"{what}: found {few} graphs; expected {count}, one for each realisation")
+    return Graphs(found)
 
 
 def _drawn(what: str, value: object, count: int) -> Draws:
@@ -123,7 +181,9 @@ def _drawn(what: str, value: object, count: int) -> Draws:
         raise ValueError(f"{what}: found {entries}; expected {KNOWN} or {count} entries")
     rows = [row if isinstance(row, Sequence) and not isinstance(row, str) else (row,) for row in listed]
     if len({len(row) for row in rows}) != 1:
-        raise ValueError(f"{what}: found rows of different lengths; expected one number, or one for each node, in each")
+        raise ValueError(
+            f"{what}: found rows of different lengths; expected one number, or one for each node or link, in each"
+        )
     return tuple(tuple(check_number(what, number) for number in row) for row in rows)
 
 
@@ -162,13 +222,14 @@ def _read(what: str, text: str) -> Draw:
 def drawn_axes(model: Model, drawn: Frozen[Draws], count: int, rng: int) -> tuple[Axis, ...]:
     """Return the drawn values of each parameter and initial state, one for each realisation.
 
-    A distribution of a parameter or state of the nodes is drawn for each node by itself.  Each name has a stream of
-    its own, which depends on `rng` and the name alone: neither workers nor other draws change it.
+    A distribution of a parameter or state of the nodes is drawn for each node by itself, that of a parameter of links, or
+    of their weights "W", for each edge by itself: links there and back have one number.  Each name has a stream of its own,
+    which depends on `rng` and the name alone: neither workers nor other draws change it.
 
     Raises
     ------
     ValueError
-        For unknown names, and for lists that have neither one number nor one for each node.
+        For unknown names, and for lists that have neither one number nor one for each node or link.
     """
     axes: dict[str, Axis] = {}
     for name, how in drawn.items():
@@ -181,8 +242,17 @@ def drawn_axes(model: Model, drawn: Frozen[Draws], count: int, rng: int) -> tupl
 
 def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Iterable[tuple[str, Sequence[float]]]:
     """The names and the values of one draw."""
+    if isinstance(how, Graphs):
+        return _weights(model, how.graphs)
     holders = model.unlinked.holders(name)
+    links = {} if holders else model.link_names(name)
+    if links:
+        return _link_columns(name, links, how, count, rng)
     known = name in model.parameters or name in model.components or NodeName.parse(name) is not None
+    if name == WEIGHTS:
+        raise ValueError(
+            f"draw {name}: found {len(model.linked)} layers of links; expected one whose weights are drawn"
+        )
     if not known:
         raise ValueError(model.unknown(name, "draw", (*model.parameters, *model.components)))
     alone = not holders or (model.n == 1 and name in model.parameters)
@@ -195,6 +265,33 @@ def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Itera
     if width not in (1, len(names)):
         raise ValueError(f"draw {name}: found rows of {width} numbers; expected 1 or {len(names)}, one for each node")
     return [(own, [row[min(k, width - 1)] for row in how]) for k, own in enumerate(names)]
+
+
+def _weights(model: Model, graphs: tuple[Topology, ...]) -> Iterable[tuple[str, Sequence[float]]]:
+    """The names and the values of the weights of graphs; 0 where a graph has no link."""
+    links = model.link_names(WEIGHTS)
+    rows = [{at[:2]: float(at[2]) for at in graph.links} for graph in graphs]
+    return [
+        (str(own), [row.get((own.target, own.source), 0.0) for row in rows]) for own in dict.fromkeys(links.values())
+    ]
+
+
+def _link_columns(
+    name: str,
+    links: Mapping[tuple[int, int], LinkName],
+    how: Draw | tuple[tuple[float, ...], ...],
+    count: int,
+    rng: int,
+) -> Iterable[tuple[str, Sequence[float]]]:
+    """The names and the values of one draw of a parameter of links, or of their weights."""
+    if isinstance(how, Draw):
+        edges = {at: links[at[::-1]] if at[0] > at[1] and at[::-1] in links else own for at, own in links.items()}
+        drawn = {edge: _numbers(how, f"{rng} {edge}", count) for edge in dict.fromkeys(edges.values())}
+        return [(str(own), drawn[edges[own.target, own.source]]) for own in dict.fromkeys(links.values())]
+    if len(how[0]) == 1 and name != WEIGHTS:
+        return [(name, [row[0] for row in how])]
+    rows = [in_order(f"draw {name}", links, row if len(row) > 1 else row * len(links)) for row in how]
+    return [(str(own), [row[own.target, own.source] for row in rows]) for own in dict.fromkeys(links.values())]
 
 
 def _numbers(how: Draw, stream: str, count: int) -> list[float]:

@@ -9,27 +9,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import sympy as sp
 
 from ..dynamics.equations import Equations
+from ..dynamics.observable import Rows, RowSum
 from ..graphs.links import Link
 from ..graphs.topology import Topology
 from ..interactions.coupling import Coupling, LagrangianCoupling, Potential
 from ..interactions.ends import Pair, Terms
 from ..mechanics.calculus import derivative
-from ..mechanics.components import TIME, Edge
+from ..mechanics.components import TIME, WEIGHT_NUMBER, Edge
 from ..mechanics.friction import ContactModel
 from ..mechanics.nondimensional import FRICTION, friction_coefficient, nondimensional
 from ..mechanics.oscillator import FieldModel
-from .model import NodeKind
-from .scene import a_scene
+from .model import Model, NodeKind
 
 if TYPE_CHECKING:
     from .scene import Scene
 
-__all__ = ["Energy", "Share", "energy"]
+__all__ = ["Energy", "Share", "energy", "energy_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +82,17 @@ class Energy:
         found = sp.Add(*(share.energy.xreplace(values) for share, values in shares))
         return found, sp.Add(*(share.power.xreplace(values) for share, values in shares))
 
+    def rows(self) -> tuple[sp.Expr, tuple[Rows, ...]]:
+        """Return the energy of the whole network as sums over nodes of each kind and links of each edge, for observables."""
+        eq, places = self.equations, [list[dict[sp.Symbol, sp.Expr]]() for _ in (*self.nodes, *self.links)]
+        for i, kind in enumerate(eq.kind_of):
+            places[kind].append(dict(eq.at_node(i)))
+        for link, k in self.pairs:
+            places[len(self.nodes) + k].append(eq.at_link(link, eq.edges[k]))
+        shares = [(share.energy, own) for share, own in zip((*self.nodes, *self.links), places, strict=True) if own]
+        found = tuple(Rows.of(value, own) for value, own in shares if value != 0)
+        return sp.Add(*(RowSum(sp.Integer(k)) for k in range(len(found)))), found
+
 
 def energy(scene: Scene) -> Energy:
     """Return the energy of a scene's network.
@@ -88,22 +100,44 @@ def energy(scene: Scene) -> Energy:
     Raises ValueError for a vector field or a coupling by components, which have no energy, for one-way links, which have no
     potential, and for set-valued friction, whose force in stick is no function of the state.
     """
-    kinds = a_scene(scene).model.kinds
+    from .scene import a_scene
+
+    return energy_of(a_scene(scene).model, scene.varied)
+
+
+@lru_cache(maxsize=16)
+def energy_of(model: Model, varied: tuple[str, ...] = ()) -> Energy:
+    """Return the energy of a model's network.
+
+    Parameters
+    ----------
+    model : Model
+    varied : tuple of str
+        Parameters that have a value for each node or link.
+
+    Raises
+    ------
+    ValueError
+        As `energy`.
+    """
+    kinds = model.kinds
     for kind in kinds:
         if isinstance(kind.oscillator.model, FieldModel):
             name = kind.oscillator.name
             raise ValueError(f"energy: oscillator {name!r} is a vector field; expected one with a Lagrangian")
-    equations = scene.equations
+    equations = model.equations(varied)
     if equations.sticks:
         raise ValueError("energy: set-valued friction does work that is no function of the state; use contact 'atan'")
-    nodes = tuple(_of_node(kind, scene.contact) for kind in kinds)
+    nodes = tuple(_of_node(kind, model.contact) for kind in kinds)
     links, layers = [], []
-    for (coupling, graph), layer in zip(scene.model.linked, equations.layers, strict=True):
+    for (coupling, graph), layer in zip(model.linked, equations.layers, strict=True):
         _check(coupling, graph)
         edges = []
         for (a, b), edge in layer.edge_of:
             pair = Pair((equations.nodes[a], equations.nodes[b]), (kinds[a].oscillator, kinds[b].oscillator))
             share, joint = _of_link(edge, pair, coupling.terms(pair), equations.varied)
+            if WEIGHT_NUMBER.name in layer.varied:
+                share = Share(*(e.xreplace({edge.weight: WEIGHT_NUMBER}) for e in (share.energy, share.power)))
             links.append(share)
             edges.append(((a, b), joint))
         layers.append(replace(layer, edge_of=tuple(edges)))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
 from itertools import islice
+from types import MappingProxyType
 
 from ..definitions.loader import load_friction_law, load_oscillator, read_coupling
 from ..definitions.table import as_name_or_table, law_of_table, oscillator_of_table
@@ -18,9 +19,10 @@ from ..graphs.links import LINK_LIMIT
 from ..graphs.topology import Topology
 from ..inputs.checks import check_integer, check_keys, check_number, check_table, short_repr, suggestion
 from ..inputs.frozen import Frozen
-from ..inputs.node_name import NodeName
+from ..inputs.node_name import LinkName, NodeName
 from ..inputs.plugins import part
-from ..interactions.coupling import COUPLINGS, Coupling, from_table
+from ..interactions.coupling import COUPLINGS, Coupling, LagrangianCoupling, Potential, from_table
+from ..mechanics.components import WEIGHT_NUMBER
 from ..mechanics.friction import ContactModel, FrictionLaw
 from ..mechanics.oscillator import Oscillator
 from ..mechanics.parameter import Parameter
@@ -37,10 +39,19 @@ __all__ = [
     "as_oscillator",
     "as_topology",
     "in_range",
+    "union_of",
 ]
 
 MOST = 100_000
 """Most nodes that groups may name."""
+
+MOST_NUMBERED = 1_000_000
+"""Most links that have numbers of their own, a name and a parameter each: more take gigabytes."""
+
+WEIGHTS = WEIGHT_NUMBER.name
+"""What the weights of links are called where a run draws or sweeps them."""
+
+_WEIGHT = Parameter(1.0, "1", "weight of a link")
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +177,8 @@ class Model:
     @property
     def topology(self) -> Topology:
         """The graph of a single layer; of several layers the union of their graphs, which nodes feel which at all."""
-        return self.layers[0][1] if len(self.layers) == 1 else _union(tuple(graph for _, graph in self.layers))
+        graphs = tuple(graph for _, graph in self.layers)
+        return graphs[0] if len(graphs) == 1 else union_of(graphs, " and ".join(graph.name for graph in graphs))
 
     @property
     def forced(self) -> bool:
@@ -210,13 +222,33 @@ class Model:
         return parts if parts is not None and parts.index in self.holders(parts.base) else None
 
     def parameter(self, name: str) -> Parameter | None:
-        """Return the parameter that a name such as "a" or "a_2" means, None if it means none."""
-        parts = self.node_parameter(name)
+        """Return the parameter that a name such as "a", "a_2" or "k_1_2" means, None if it means none."""
+        parts = self.node_parameter(name) or self.link_parameter(name)
+        if parts is not None and parts.base == WEIGHTS and WEIGHTS not in self.parameters:
+            return _WEIGHT
         return self.parameters.get(name if parts is None else parts.base)
+
+    def link_parameter(self, name: str) -> LinkName | None:
+        """Return the parts of the name of a parameter of one link, "k_1_2"; None for any other name."""
+        parts = None if name in self.parameters else LinkName.parse(name)
+        if parts is None or self.link_names(parts.base).get((parts.target, parts.source)) != parts:
+            return None
+        return parts
+
+    def link_names(self, name: str) -> Mapping[tuple[int, int], LinkName]:
+        """Return what a parameter of links, or "W", their weights, is called at each (target, source); none of a node's.
+
+        A link that acts on both ends has one name with the link that runs back, that of their edge.  Raises ValueError for
+        more than MOST_NUMBERED links.
+        """
+        return _link_names(self, name)
 
     def unknown(self, name: str, what: str, known: Iterable[str]) -> str:
         """Return the sentence that refuses a name; a parameter of the coupling without links has its own."""
-        known = tuple(known)
+        known, link = tuple(known), LinkName.parse(name)
+        back = None if link is None else self.link_names(link.base).get((link.target, link.source))
+        if back is not None:
+            return f"unknown {what} {name!r}; expected {str(back)!r}, the one number of a link that acts on both of its ends"
         for coupling, graph in self.layers:
             if not graph.link_count and coupling is not None and name in coupling.parameters:
                 return (
@@ -242,9 +274,9 @@ def _unlinked(kinds: tuple[NodeKind, ...], kind_of: tuple[int, ...], contact: Co
 
 
 @lru_cache(maxsize=64)
-def _union(graphs: tuple[Topology, ...]) -> Topology:
-    """The union of graphs: a link of weight 1 wherever one of them has a link."""
-    name, n = " and ".join(graph.name for graph in graphs), graphs[0].n
+def union_of(graphs: tuple[Topology, ...], name: str) -> Topology:
+    """Return the union of graphs: a link of weight 1 wherever one of them has a link."""
+    n = graphs[0].n
     if any(graph.all_to_all is not None for graph in graphs):
         return Topology(name, n, rule=topology("complete", n).rule)
     pairs = sorted({link[:2] for graph in graphs for link in graph.links})
@@ -256,6 +288,25 @@ def _equations(model: Model, varied: tuple[str, ...]) -> Equations:
     """The equations of a whole network."""
     oscillators = [kind.oscillator for kind in model.kinds]
     return network.layered_network(oscillators, model.unlinked.nodes, model.kind_of, model.linked, varied)
+
+
+@lru_cache(maxsize=64)
+def _link_names(model: Model, name: str) -> Mapping[tuple[int, int], LinkName]:
+    """The names of a parameter of links, or of their weights, by target and source."""
+    found: dict[tuple[int, int], LinkName] = {}
+    weights = name == WEIGHTS and name not in model.parameters and len(model.linked) == 1
+    for coupling, graph in () if model.holders(name) else model.linked:
+        if weights or name in coupling.parameters:
+            if graph.link_count > MOST_NUMBERED:
+                raise ValueError(
+                    f"{name}: found numbers of {graph.link_count} links; expected at most {MOST_NUMBERED} links with numbers of "
+                    "their own"
+                )
+            mutual = isinstance(coupling, LagrangianCoupling | Potential) and graph.symmetric
+            for target, source, _ in graph.links:
+                ends = (source, target) if mutual and source < target else (target, source)
+                found[target, source] = found[ends] if ends in found else LinkName(name, *ends)
+    return MappingProxyType(found)
 
 
 @lru_cache(maxsize=64)

@@ -7,16 +7,17 @@ from dataclasses import replace
 
 import sympy as sp
 
-from ..dynamics.observable import AtNode, Observable, Rate, node_symbols
+from ..dynamics.observable import ENERGY, AtNode, Observable, Rate, Reduction, node_symbols
 from ..dynamics.observable_text import as_observable, as_value
 from ..inputs.checks import check_table, check_text, short_repr, suggestion
 from ..inputs.frozen import Frozen
 from ..mechanics.components import TIME
+from .energy import energy_of
 from .model import Model
 from .parameters import varied
 from .section import Section
 
-__all__ = ["TAKEN", "observables", "sections", "stop"]
+__all__ = ["TAKEN", "has_own_energy", "observables", "sections", "stop"]
 
 TAKEN = frozenset(
     {"cell", "component", "data", "drive_phase", "end", "end_time", "ended_early", "kind", "link", "message", "name", "names", "node",
@@ -107,13 +108,20 @@ def _kept(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, float])
 
 def _own(value: sp.Expr, model: Model, numbers: Mapping[str, float]) -> bool:
     """True if an expression has a value for each node."""
-    names = {*model.unlinked.components, *varied(numbers, model.parameters)}
+    names = {*model.unlinked.components, *_of_nodes(model, numbers)}
     return any(s.name in names for s in node_symbols(value))
+
+
+def _of_nodes(model: Model, numbers: Mapping[str, float]) -> tuple[str, ...]:
+    """The parameters that have a value for each node."""
+    return tuple(name for name in varied(numbers, model.parameters) if model.holders(name))
 
 
 def _named(keyword: str, model: Model, numbers: Mapping[str, float], given: object) -> Iterator[tuple[str, object]]:
     """Yield names and values of a table, whose names results must not have for something else."""
+    links = {name for name in varied(numbers, model.parameters) if not model.holders(name)}
     taken = TAKEN | set(model.parameters) | set(numbers) | set(model.unlinked.state)
+    taken |= links.union(f"{name}_link" for name in links)
     for key, value in check_table(keyword, given).items():
         name = check_text(keyword, key)
         if not name.isidentifier() or name.startswith("_"):
@@ -126,15 +134,17 @@ def _named(keyword: str, model: Model, numbers: Mapping[str, float], given: obje
 def _check_names(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, float]) -> None:
     """Refuse symbols that are no state, parameter or t, and states that some nodes lack."""
     apart, everywhere = model.unlinked, range(model.n)
-    own = (*apart.components, *varied(numbers, model.parameters))
+    own = (*apart.components, *_of_nodes(model, numbers))
     partly = {name for name in own if apart.holders(name) != tuple(everywhere)}
     states = {*apart.components, *apart.state}
-    known = (*own, *apart.state, *(name for name in numbers), TIME.name)
+    known = (*own, *apart.state, *(name for name in numbers), TIME.name, ENERGY.name)
     for name in sorted(s.name for s in value.free_symbols):
         if name in partly:
             raise ValueError(f"{what}: some nodes have no {name!r}; expected what all nodes have, or {name}_1 of one")
         if name not in known:
             raise ValueError(f"{what}: unknown name {short_repr(name)}; known: {_few(known)}{suggestion(name, known)}")
+    if value.has(ENERGY) and not has_own_energy(model):
+        _check_energy(what, value, model, varied(numbers, model.parameters))
     for e in value.atoms(Rate):
         if e.args[0].name not in states:
             raise ValueError(f"{what}: found {e}; expected the rate of a state: {', '.join(apart.components)}")
@@ -143,6 +153,22 @@ def _check_names(what: str, value: sp.Expr, model: Model, numbers: Mapping[str, 
             raise ValueError(f"{what}: found node {e.args[1]}; expected 1 to {model.n}")
     if not value.free_symbols:
         raise ValueError(f"{what}: found the constant {short_repr(value)}; expected an expression of states")
+
+
+def has_own_energy(model: Model) -> bool:
+    """True if a state or parameter is called energy, which observables mean then."""
+    return ENERGY.name in {*model.parameters, *model.components}
+
+
+def _check_energy(what: str, value: sp.Expr, model: Model, own: tuple[str, ...]) -> None:
+    """Refuse the energy of a network that has none, and that of single nodes."""
+    inside = next((e for e in sorted(value.atoms(Reduction), key=str) if e.has(ENERGY)), None)
+    if inside is not None:
+        raise ValueError(f"{what}: found {inside}; expected the energy of the whole network outside of nodes")
+    try:
+        energy_of(model, own)
+    except ValueError as problem:
+        raise ValueError(f"{what}: {problem}") from None
 
 
 def _few(names: tuple[str, ...]) -> str:

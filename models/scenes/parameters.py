@@ -1,31 +1,39 @@
-"""The parameters of a scene: one number each, or a list with one number for each node (a_1 … a_n)."""
+"""The parameters of a scene: one number each, one for each node (a_1 … a_n), or one for each link (k_1_2 …)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, TypeVar
+from itertools import islice
+from typing import Any, TypeAlias, TypeVar
 
 from ..dynamics.periodicity import Drive, drive_of
-from ..inputs.checks import check_table, first_of, short_repr
+from ..graphs.topology import Topology
+from ..inputs.checks import check_number, check_table, first_of, short_repr
 from ..inputs.frozen import Frozen
-from ..inputs.node_name import NodeName
+from ..inputs.node_name import LinkName, NodeName
 from .axis import Axis
-from .model import Model, NodeKind, in_range
+from .model import WEIGHTS, Model, NodeKind, in_range
 
-__all__ = ["at_nodes", "collected", "drive", "parameters", "varied", "without"]
+__all__ = ["at_nodes", "collected", "drive", "in_order", "parameters", "varied", "without"]
 
 T = TypeVar("T")
+
+Place: TypeAlias = NodeName | LinkName
+"""The name of a parameter at one node or one link."""
 
 
 def parameters(model: Model, given: object, axes: Sequence[Axis]) -> Frozen[float]:
     """Return every parameter with its value; those that differ from node to node, or are swept at one, as a_1 … a_n.
+
+    Those that differ from link to link, or are swept at one, are k_1_2 where node 1 feels node 2.
 
     Parameters
     ----------
     model : Model
         The model that has the parameters.
     given : object
-        A table of names and values: a number, one for each node, or the parameter of one node ("a_2"); None for none.
+        A table of names and values: a number, one for each node or link, or the parameter of one node ("a_2") or one link
+        ("k_1_2"); None for none.
     axes : sequence of Axis
         The axes of the sweep.
 
@@ -34,33 +42,66 @@ def parameters(model: Model, given: object, axes: Sequence[Axis]) -> Frozen[floa
     ValueError, TypeError
         For unknown names, values out of range, and lists of another length.
     """
-    known = model.parameters
-    shared = {name: float(known[name].default) for name in known}
-    lists = {name: model.defaults(name) for name in known} if len(model.kinds) > 1 else {}
-    single: dict[str, dict[int, float]] = {}
+    read = _Given(model)
     for name, value in check_table("parameters", {} if given is None else given).items():
         if not isinstance(name, str):
             raise TypeError(f"parameters: key {short_repr(name)} is a {type(name).__name__}; expected text")
-        parts = model.node_parameter(name)
-        if parts is not None:
-            single.setdefault(parts.base, {})[parts.index] = in_range(name, value, known[parts.base])
-        elif name not in known:
-            raise ValueError(model.unknown(name, "parameter", known))
-        elif _listed(value):
-            lists[name] = _for_each_node(model, name, value)
-        else:
-            shared[name] = in_range(name, value, known[name])
-            lists.pop(name, None)
-    swept = {parts.base for axis in axes if (parts := model.node_parameter(axis.name)) is not None}
+        read.add(name, value)
+    single = (model.node_parameter(axis.name) or model.link_parameter(axis.name) for axis in axes)
+    swept = {parts.base for parts in single if parts is not None}
     values: dict[str, float] = {}
-    for name, value in shared.items():
-        holders = model.holders(name)
-        own = dict(zip(holders, lists.get(name) or [value] * len(holders), strict=True)) | single.get(name, {})
-        if name in swept or len(set(own.values())) > 1:
-            values |= {str(NodeName(name, i)): number for i, number in own.items()}
+    for name, value in read.shared.items():
+        own = read.own(name, value, name in swept)
+        if own and (name in swept or len(set(own.values())) > 1):
+            values |= {str(place): number for place, number in own.items()}
         else:
             values[name] = next(iter(own.values()), value)
+    if WEIGHTS in swept - set(values):
+        names, ((_, graph),) = model.link_names(WEIGHTS), model.linked
+        values |= {str(names[i, j]): float(weight) for i, j, weight in graph.links}
     return Frozen(values)
+
+
+class _Given:
+    """What was given of the parameters of a model, in their ranges: numbers for all, lists, and those of one place."""
+
+    def __init__(self, model: Model) -> None:
+        known = model.parameters
+        self.model, self.shared = model, {name: float(known[name].default) for name in known}
+        self.lists = {name: _at_nodes(model, name, model.defaults(name)) for name in known if len(model.kinds) > 1}
+        self.single: dict[str, dict[Place, float]] = {}
+
+    def add(self, name: str, value: Any) -> None:
+        """Take one of the parameters; ValueError or TypeError as `parameters`."""
+        model, known = self.model, self.model.parameters
+        place = model.node_parameter(name) or model.link_parameter(name)
+        if WEIGHTS not in known and (name if place is None else place.base) == WEIGHTS:
+            raise ValueError(
+                f"parameter {name!r}: the graph has the weights of links; expected {WEIGHTS} on an axis or drawn"
+            )
+        if place is not None:
+            self.single.setdefault(place.base, {})[place] = in_range(name, value, known[place.base])
+        elif name not in known:
+            raise ValueError(model.unknown(name, "parameter", known))
+        elif not model.holders(name) and (isinstance(value, Topology) or _listed(value)):
+            self.lists[name] = _for_each_link(model, name, value)
+        elif _listed(value):
+            self.lists[name] = _at_nodes(model, name, _for_each_node(model, name, value))
+        else:
+            self.shared[name] = in_range(name, value, known[name])
+            self.lists.pop(name, None)
+
+    def own(self, name: str, shared: float, swept: bool) -> dict[Place, float]:
+        """The values of a parameter at each node, or at each link if links have numbers or are swept; else none."""
+        nodes: Iterable[Place] = [NodeName(name, i) for i in self.model.holders(name)]
+        links = swept or name in self.lists or name in self.single
+        places = nodes or (self.model.link_names(name).values() if links else ())
+        return dict.fromkeys(places, shared) | self.lists.get(name, {}) | self.single.get(name, {})
+
+
+def _at_nodes(model: Model, name: str, values: Iterable[float]) -> dict[Place, float]:
+    """The values of a parameter by the nodes that have it."""
+    return {NodeName(name, i): value for i, value in zip(model.holders(name), values, strict=True)}
 
 
 def _listed(value: object) -> bool:
@@ -69,14 +110,82 @@ def _listed(value: object) -> bool:
     )
 
 
+def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:
+    """The values of a parameter of links.
+
+    They are a list in the order of the graph's links, or of its edges (i < j) where links run both ways, a matrix, or a
+    graph whose weights they are.  ValueError or TypeError for anything else.
+    """
+    parameter, links = model.parameters[name], model.link_names(name)
+    if isinstance(value, Topology):
+        table = {(i, j): float(weight) for i, j, weight in value.links}
+    else:
+        if isinstance(value, set | frozenset):
+            raise TypeError(f"parameter {name!r}: found a set, which has no order; expected a number or a list")
+        most = max(len(links), model.n)
+        listed = list(islice(value.tolist() if hasattr(value, "tolist") else value, most + 1))
+        what = f"parameter {name!r}"
+        table = _matrix(model, name, listed) if any(map(_listed, listed)) else in_order(what, links, listed)
+    for i, j in sorted(table.keys() ^ links.keys()):
+        if (i, j) in links or check_number(f"parameter {name!r}", table[i, j]) != 0:
+            found = "no number" if (i, j) in links else "a number without a link"
+            raise ValueError(
+                f"parameter {name!r}: found {found} where node {i + 1} feels node {j + 1}; expected one for each link, no others"
+            )
+    numbers: dict[Place, float] = {}
+    for at, own in links.items():
+        number = in_range(str(own), table[at], parameter)
+        if numbers.setdefault(own, number) != number:
+            raise ValueError(
+                f"parameter {name!r}: found {numbers[own]!r} and {number!r} at nodes {own.target + 1} and {own.source + 1}; "
+                "expected one number for both directions of a link that acts on both of its ends"
+            )
+    return numbers
+
+
+def in_order(what: str, links: Mapping[tuple[int, int], LinkName], listed: Sequence[T]) -> dict[tuple[int, int], T]:
+    """Return numbers by target and source.
+
+    Parameters
+    ----------
+    what : str
+        What the numbers are, for errors.
+    links : mapping
+        The name of the parameter at each link.
+    listed : sequence
+        A number for each link in the order of the graph's links, or, if every link runs back too, one for each edge i < j.
+
+    Raises
+    ------
+    ValueError
+        For another number of entries.
+    """
+    edges = [at for at in links if at[0] < at[1]] if all(at[::-1] in links for at in links) else []
+    if len(listed) == len(edges) != 0:
+        table = dict(zip(edges, listed, strict=True))
+        return table | {at[::-1]: number for at, number in table.items()}
+    if len(listed) != len(links):
+        count = f"more than {len(listed) - 1}" if len(listed) > len(links) else str(len(listed))
+        expected = f"{len(edges)} values, one for each edge, or " if edges else ""
+        raise ValueError(
+            f"{what}: found {count} values for {len(links)} links; expected {expected}one for each link, or one number for all"
+        )
+    return dict(zip(links, listed, strict=True))
+
+
+def _matrix(model: Model, name: str, listed: Sequence[Any]) -> dict[tuple[int, int], Any]:
+    """The entries of a matrix, row i what node i feels."""
+    n = model.n
+    rows = [list(islice(row, n + 1)) if _listed(row) else [] for row in listed]
+    if len(rows) != n or any(len(row) != n for row in rows):
+        raise ValueError(f"parameter {name!r}: found rows of numbers; expected a matrix of {n} rows of {n} numbers")
+    return {(i, j): number for i, row in enumerate(rows) for j, number in enumerate(row)}
+
+
 def _for_each_node(model: Model, name: str, value: Any) -> list[float]:
-    """The values of a list, one for each node that has the parameter; ValueError for another number or for links."""
+    """The values of a list, one for each node that has the parameter; ValueError for another number."""
     parameter, holders = model.parameters[name], model.holders(name)
     n = len(holders)
-    if not holders:
-        raise ValueError(
-            f"parameter {name!r} belongs to the links, which share it; expected one number: give links weights instead"
-        )
     if isinstance(value, set | frozenset):
         raise TypeError(f"parameter {name!r}: found a set, which has no order; expected a number or {n} numbers")
     listed, count = first_of(value.tolist() if hasattr(value, "tolist") else value, n)
@@ -88,8 +197,10 @@ def _for_each_node(model: Model, name: str, value: Any) -> list[float]:
 
 
 def varied(values: Mapping[str, float], known: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of the parameters that have a value for each node."""
-    return tuple(name for name in known if name not in values)
+    """Return the names of the parameters that have a value for each node or each link; "W" for weights that are swept."""
+    names = dict.fromkeys(known)
+    weights = WEIGHTS not in names and any((link := LinkName.parse(name)) and link.base == WEIGHTS for name in values)
+    return (*(name for name in names if name not in values), *((WEIGHTS,) if weights else ()))
 
 
 def at_nodes(model: Model, values: Mapping[str, T]) -> Iterator[tuple[NodeKind, dict[str, T]]]:
@@ -125,20 +236,23 @@ def drive(model: Model, values: Mapping[str, float]) -> Drive:
 def without(model: Model, values: Mapping[object, object], names: Iterable[str]) -> dict[object, object]:
     """Return the values of parameters without those that single nodes have of some `names`."""
     gone = set(names)
-    return {
-        name: value
-        for name, value in values.items()
-        if not isinstance(name, str) or (parts := model.node_parameter(name)) is None or parts.base not in gone
-    }
+
+    def kept(name: object) -> bool:
+        parts = (model.node_parameter(name) or model.link_parameter(name)) if isinstance(name, str) else None
+        return parts is None or parts.base not in gone
+
+    return {name: value for name, value in values.items() if kept(name)}
 
 
 def collected(values: Mapping[str, float], varied: Iterable[str]) -> dict[str, float | list[float]]:
-    """Return the parameters as a scene file has them: those of `varied` as lists."""
+    """Return the parameters as a scene file has them: those of `varied` as lists, weights not at all."""
     lists: dict[str, list[float]] = {name: [] for name in varied}
     table: dict[str, float | list[float]] = {}
     for name, value in values.items():
-        parts = NodeName.parse(name)
-        if parts is not None and parts.base in lists:
+        parts = next((p for p in (LinkName.parse(name), NodeName.parse(name)) if p and p.base in lists), None)
+        if parts is not None and parts.base == WEIGHTS and isinstance(parts, LinkName):
+            continue
+        if parts is not None:
             lists[parts.base].append(value)
             table.setdefault(parts.base, lists[parts.base])
         else:

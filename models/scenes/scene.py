@@ -26,7 +26,7 @@ from ..mechanics.oscillator import Oscillator
 from .axis import Axis
 from .complete import TimeUnit, complete
 from .dictionary import arguments, as_dict
-from .draw import Draws, drawn_axes
+from .draw import GRAPH, Draws, drawn_axes
 from .model import Group, Model, as_oscillator, as_topology
 from .parameters import drive, varied, without
 from .section import Section
@@ -83,7 +83,7 @@ class Scene(Drawn, Written):
     links : iterable of (Coupling or str, Topology), optional
         Several layers of links, each with its own graph, in place of `coupling` and `topology`.
     parameters : mapping, optional
-        Values of parameters: a number, or a list with one number for each node.
+        Values of parameters: a number, or a list with one number for each node, of the coupling one for each edge or link.
     initial : mapping, optional
         Initial states: a number, one number for each node, or {low, high, seed} for random ones.
     record : iterable of str, optional
@@ -123,8 +123,9 @@ class Scene(Drawn, Written):
     realisations : int
         Realisations of what is drawn, a further dimension of the sweep; 0 for none.
     draws : mapping, optional
-        What is drawn, by the names of parameters and initial states: `normal`, `uniform`, `lorentzian` (of each node by itself), or a
-        list with one entry for each realisation.
+        What is drawn, by the names of parameters and initial states, or "W", the weights of links: `normal`, `uniform`,
+        `lorentzian` (of each node or edge by itself), or a list with one entry for each realisation; by the name
+        "topology" a list of graphs.
     rng : int
         Seed of what is drawn.
 
@@ -232,7 +233,7 @@ class Scene(Drawn, Written):
 
     @property
     def varied(self) -> tuple[str, ...]:
-        """Names of the parameters that have a value for each node: `parameters` has them as a_1 … a_n."""
+        """Names of the parameters that have a value for each node or link: `parameters` has a_1 … a_n, or k_1_2 …"""
         return varied(self.parameters, self.model.parameters)
 
     @property
@@ -253,7 +254,8 @@ class Scene(Drawn, Written):
         if len(self.model.linked) != 1:
             raise ValueError(f"strength of the links: found {len(self.model.linked)} layers of links; expected one")
         equations = self.equations
-        names = {strength(edge, equations.nodes[a].parameters).name for (a, _), edge in equations.edge_of}
+        numbered = tuple(s for edge in equations.edges for s in edge.parameters if s.name in equations.numbered)
+        names = {strength(edge, (*equations.nodes[a].parameters, *numbered)).name for (a, _), edge in equations.edge_of}
         if len(names) > 1:
             raise ValueError(f"strength of the links: found {', '.join(sorted(names))}; expected one for all links")
         return names.pop()
@@ -349,7 +351,9 @@ class Scene(Drawn, Written):
             numbers = {} if given["parameters"] is None else check_table("parameters", given["parameters"])
             given["parameters"] = {**without(self.model, numbers, single), **single}
         if self.varied and "parameters" not in changes and _nodes(given) != self.n:
-            raise ValueError(f"{self.varied[0]} has values for {self.n} nodes; give `parameters` for another number")
+            raise ValueError(
+                f"{self.varied[0]} has values for {self.n} nodes, or for their links; give `parameters` for another number"
+            )
         return Scene(**given)
 
     def _kept_start(self, changes: Mapping[str, object]) -> Mapping[str, object] | None:
@@ -446,6 +450,8 @@ def _kept(given: Mapping[str, Any], values: Mapping[str, Any]) -> Frozen[Any]:
     for name in ("parameters", "initial"):
         if given[name] is None:
             kept[name] = None
+    if GRAPH in values["draws"] and given["topology"] is not None:
+        kept["topology"] = as_topology(given["topology"])
     if given["initial"] is not None:
         kept["initial"] = Frozen({name: values["initial"][name] for name in given["initial"]})
     if given["parameters"] is not None:
@@ -460,9 +466,10 @@ def _kept_parameters(given: Mapping[str, object], model: Model, numbers: Mapping
         if name in numbers:
             kept[name] = numbers[name]
         elif name in model.parameters:
-            kept[name] = tuple(numbers[str(NodeName(name, i))] for i in model.holders(name))
+            links = dict.fromkeys(map(str, model.link_names(name).values()))
+            kept[name] = tuple(numbers[own] for own in links or (str(NodeName(name, i)) for i in model.holders(name)))
         else:
-            parts = model.node_parameter(name)
+            parts = model.node_parameter(name) or model.link_parameter(name)
             kept[name] = numbers[parts.base] if parts else given[name]
     return kept
 

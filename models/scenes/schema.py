@@ -81,6 +81,7 @@ def _rows() -> dict[str, Table]:
     uniform = {"low": NUMBER, "high": NUMBER, "seed": _of_type("seed", int)}
     span = {"from": NUMBER, "to": NUMBER, "count": {"type": "integer", "minimum": 1, "maximum": AXIS_LIMIT}}
     numbers = {"type": "array", "items": NUMBER, "minItems": 1}
+    values = _either(numbers, {"type": "array", "items": numbers, "minItems": 1})
     expressions: Table = {"type": "object", "additionalProperties": NUMBER}
     tables = [
         _table({"rates": expressions, "parameters": {"type": "object"}}, "rates"),
@@ -104,8 +105,8 @@ def _rows() -> dict[str, Table]:
         "topology": graph,
         "parameters": {
             "type": "object",
-            "properties": {name: {"description": words, **_either(numbers)} for name, words in _parameters().items()},
-            "additionalProperties": _either(numbers),
+            "properties": {name: {"description": words, **values} for name, words in _parameters().items()},
+            "additionalProperties": values,
         },
         "initial": {"type": "object", "additionalProperties": _either(numbers, _table(uniform, "low", "high"))},
         "observe": {"type": "object", "additionalProperties": TEXT},

@@ -15,7 +15,7 @@ from ..inputs.checks import short_repr
 from ..inputs.node_name import NodeName
 from ..inputs.words import Word
 from .axis import LIMIT, Axis, known_length
-from .model import Model, in_range
+from .model import WEIGHTS, Model, in_range
 from .parameters import drive
 
 __all__ = ["Continuation", "check_draws", "check_sweep", "read_axes", "rest_in_sweep"]
@@ -145,11 +145,16 @@ def _axis(model: Model, parameters: Mapping[str, float], axis: Axis) -> None:
         for value in (min(axis.values), max(axis.values)):
             in_range(f"axis {axis.name}", value, parameter)
         if axis.name not in parameters:
+            one = next(map(str, model.link_names(axis.name).values()), str(NodeName(axis.name, 0)))
             raise ValueError(
-                f"axis {axis.name!r}: the nodes have different values of it; expected the parameter of one node, e.g. "
-                f"{NodeName(axis.name, 0)}"
+                f"axis {axis.name!r}: nodes or links have different values of it; expected the parameter of one, e.g. {one}"
             )
         return
+    if axis.name == WEIGHTS and model.link_names(WEIGHTS):
+        one = next(map(str, model.link_names(WEIGHTS).values()))
+        raise ValueError(
+            f"axis {axis.name!r}: each link has a weight; expected that of one link, e.g. {one}, or it in draws"
+        )
     parts = NodeName.parse(axis.name)
     if parts is None or parts.base not in model.components:
         states = tuple(str(NodeName(c, 0)) for c in model.components)

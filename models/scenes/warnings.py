@@ -8,7 +8,7 @@ from typing import Any
 
 from ..dynamics.synchrony import NoSynchrony, synchronous_node
 from ..graphs.topology import Topology
-from ..inputs.node_name import NodeName
+from ..inputs.node_name import LinkName, NodeName
 from ..interactions.coupling import MatrixCoupling
 from .model import Model
 
@@ -44,19 +44,20 @@ def warnings(model: Model, varied: tuple[str, ...], values: Mapping[str, Any], d
     model : Model
         The model of the scene.
     varied : tuple of str
-        The parameters that have a value for each node.
+        The parameters that have a value for each node or link.
     values : mapping
         The scene's `parameters`, `axes`, `initial` and `record`.
     duration : float
         Non-dimensional time from the start to the end of the window.
     """
     graph = model.topology
+    of_nodes = tuple(name for name in varied if model.holders(name))
     alike = not varied and len(model.kinds) == 1
-    asynchronous = _without_synchrony(model) if len(model.kinds) == 1 else ""
+    asynchronous = _without_synchrony(model, varied) if len(model.kinds) == 1 else ""
     sentences = (
         _in_parts(graph),
         *(_negative_weights(own) for _, own in model.linked),
-        _different_nodes(graph, varied),
+        _different_nodes(graph, of_nodes),
         asynchronous,
         _stiff_springs(model, values, duration),
         _equal_starts(values) if alike and not asynchronous else "",
@@ -104,14 +105,15 @@ def _different_nodes(graph: Topology, varied: tuple[str, ...]) -> str:
     )
 
 
-def _without_synchrony(model: Model) -> str:
+def _without_synchrony(model: Model, varied: tuple[str, ...]) -> str:
     """A sentence if equal motion of all nodes is no solution, because couplings act between equal states."""
     if all(isinstance(coupling, MatrixCoupling) for coupling, _ in model.linked):
         return ""
+    equations = model.equations(tuple(name for name in varied if not model.holders(name)))
     try:
-        synchronous_node(model.equations())
+        synchronous_node(equations)
     except NoSynchrony as problem:
-        pairs = zip(model.linked, model.equations().edges, strict=True)
+        pairs = zip(model.linked, equations.edges, strict=True)
         names = dict.fromkeys(f"'{coupling}'" for (coupling, _), edge in pairs if not edge.diffusive)
         return (
             f"coupling {' and '.join(names)} does not vanish between oscillators in equal states: {problem}; expected a "
@@ -128,8 +130,8 @@ def _stiff_springs(model: Model, values: Mapping[str, Any], duration: float) -> 
     if [str(coupling) for coupling, _ in model.linked] != ["spring"]:
         return ""
     swept = (value for axis in values["axes"] if axis.name == "sigma" for value in axis.values)
-    sigma = max([values["parameters"]["sigma"], *swept])
-    fastest = math.sqrt(1.0 + 2.0 * sigma * _largest_degree(model.topology))
+    own = [value for name, value in values["parameters"].items() if name == "sigma" or _of_sigma(name)]
+    fastest = math.sqrt(1.0 + 2.0 * max([*own, *swept]) * _largest_degree(model.topology))
     swings = fastest * duration / (2.0 * math.pi)
     if fastest < STIFF or swings < STIFF:
         return ""
@@ -137,6 +139,12 @@ def _stiff_springs(model: Model, values: Mapping[str, Any], duration: float) -> 
         f"stiff springs: a mode of frequency {fastest:.3g} swings {swings:.3g} times, and the errors of its phase add up "
         "to more than rtol; tighten rtol until the result no longer changes"
     )
+
+
+def _of_sigma(name: str) -> bool:
+    """True for the strength of one link."""
+    link = LinkName.parse(name)
+    return link is not None and link.base == "sigma"
 
 
 def _largest_degree(graph: Topology) -> float:

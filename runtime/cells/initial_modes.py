@@ -55,6 +55,9 @@ def _link_forces(
     (edge,) = equations.edges
     target, source = (np.array([link[side] for link in equations.links]) for side in (0, 1))
     given = {**given, edge.weight: np.array([float(link[2]) for link in equations.links])}
+    for name, layer in equations.numbered.items():
+        columns = [given[sp.Symbol(layer.name(name, link), real=True)] for link in equations.links]
+        given[sp.Symbol(name, real=True)] = np.concatenate(columns, axis=1)
     for symbols, nodes in ((edge.here, target), (edge.there, source)):
         given |= {s: state[:, k * n + nodes] for k, s in enumerate(symbols)}
     force = edge.rhs[1].xreplace({edge.here[2]: sp.S.One, edge.here[1]: speed})

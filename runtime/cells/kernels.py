@@ -17,7 +17,7 @@ from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
 from .choice import chosen_integrator
-from .observed import Observed, Sections
+from .observed import watched
 from .reduce import Reduction, as_reduction
 
 __all__ = ["kernel", "kernel_source", "warn_of_chords", "write_kernel"]
@@ -64,10 +64,8 @@ def write_kernel(reduction: Reduction, width: int | None = None) -> KernelSource
         section = sp.Symbol(reduction.section_variable(), real=True) - sp.Rational(repr(scene.section.level))
     method = chosen_integrator(reduction)
     width = default_width(reduction.equations, method) if width is None else width
-    sections = Sections(scene)
     recorded = (reduction.records, section, width, reduction.multiplicity)
-    watched = Watched(Observed(scene).values, sections.values, sections.stop)
-    return _emitted(reduction.equations, method, recorded, watched)
+    return _emitted(reduction.equations, method, recorded, watched(scene))
 
 
 @lru_cache(maxsize=32)

@@ -10,12 +10,30 @@ import numpy as np
 import sympy as sp
 
 from synchain.codegen.driver.columns import Sum, Tally
-from synchain.codegen.kernels.observed import with_rows
-from synchain.models.dynamics.observable import Window
+from synchain.codegen.kernels.observed import Watched, with_rows
+from synchain.models.dynamics.observable import ENERGY, Window
 from synchain.models.dynamics.observable_text import as_value
+from synchain.models.scenes.energy import energy as exact_energy
+from synchain.models.scenes.observables import has_own_energy
 from synchain.models.scenes.scene import Scene, Section
 
-__all__ = ["Observed", "Sections"]
+__all__ = ["Observed", "Sections", "watched"]
+
+
+def watched(scene: Scene) -> Watched:
+    """Return what the kernel of a scene watches: observables, sections and a stop, the energy in them as sums."""
+    sections = Sections(scene)
+    found = Watched(Observed(scene).values, sections.values, sections.stop)
+    if has_own_energy(scene.model) or not any(e.has(ENERGY) for e in (*found.observed, *found.events)):
+        return found
+    value, sums = exact_energy(scene).rows()
+    swap = {ENERGY: value}
+    return Watched(
+        tuple(e.xreplace(swap) for e in found.observed),
+        tuple(tuple(e.xreplace(swap) for e in parts) for parts in found.sections),
+        None if found.stop is None else found.stop.xreplace(swap),
+        sums,
+    )
 
 
 @dataclass(frozen=True)

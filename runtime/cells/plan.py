@@ -168,7 +168,7 @@ def periods(equations: Equations, numbers: np.ndarray) -> np.ndarray:
     """
     if len(numbers) == 0:
         return np.zeros(0)
-    frequency = drive_of((*equations.nodes, *equations.edges), equations.varied).frequency
+    frequency = drive_of((*equations.nodes, *equations.edges), equations.differing).frequency
     if frequency is None:
         return np.zeros(len(numbers))
     with np.errstate(divide="ignore"):
@@ -194,7 +194,7 @@ def half_swing(equations: Equations, values: Mapping[str, np.ndarray]) -> float:
     No step may be longer, so that none can miss a whole swing of the drive, or a pulse.
     """
     rows = max((len(column) for column in values.values()), default=1)
-    paces = drive_of((*equations.nodes, *equations.edges), equations.varied).paces
+    paces = drive_of((*equations.nodes, *equations.edges), equations.differing).paces
     fastest = max((float(np.max(_sizes(pace, values, rows), initial=0.0)) for pace in paces), default=0.0)
     return math.pi / fastest if fastest > 0.0 else math.inf
 
@@ -214,11 +214,14 @@ def longest_step(scene: Scene) -> float:
 
 
 def parameter_names(scene: Scene, name: str) -> tuple[str, ...]:
-    """Return the names under which a scene has a parameter: one, a_1 … a_n if nodes differ, none if
-    it has no such.
+    """Return the names under which a scene has a parameter: one, a_1 … a_n if nodes differ, k_1_2 …
+    if links do, none if it has no such.
     """
     if name not in scene.varied:
         return (name,) if name in scene.parameters else ()
+    links = scene.model.link_names(name)
+    if links:
+        return tuple(dict.fromkeys(map(str, links.values())))
     return tuple(own for own in scene.parameters if (parts := NodeName.parse(own)) and parts.base == name)
 
 

@@ -24,7 +24,7 @@ from synchain.models.scenes.scene import Scene, a_scene
 
 from ..support.status import Status
 from .buffers import IN_MEMORY, Buffers, numbers_of_a_cell
-from .observed import Observed, Sections
+from .observed import Observed, Sections, watched
 from .plan import Plan
 
 __all__ = ["NodeMerge", "Reduction", "as_reduction", "explain", "reduce_scene"]
@@ -288,11 +288,10 @@ def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> 
 
 def _observed_parameters(scene: Scene) -> set[str]:
     """The parameters that occur in observables and in sections on functions."""
-    sections = Sections(scene)
-    values = [*Observed(scene).values, *(e for parts in sections.values for e in parts)]
-    values += [] if sections.stop is None else [sections.stop]
-    names = {s.name for value in values for s in value.free_symbols}
-    of_nodes = {str(NodeName(name, i)) for name in scene.varied if name in names for i in range(scene.n)}
+    found = watched(scene)
+    names = {s.name for value in (*found.observed, *found.events) for s in value.free_symbols}
+    names = names.union(*(rows.names for rows in found.sums))
+    of_nodes = {str(NodeName(name, i)) for name in scene.equations.varied if name in names for i in range(scene.n)}
     return (names | of_nodes) & set(scene.parameters)
 
 
@@ -302,7 +301,10 @@ def _present(scene: Scene, equations: Equations) -> list[str]:
     if equations.link_count:
         fixed = _fixed(scene)
         names = [*dict.fromkeys(symbol.name for edge in equations.edges for symbol in edge.parameters)]
-        strengths = [f"{name} = {fixed[name]:g}" if name in fixed else f"{name} is swept" for name in names]
+        differ = dict.fromkeys(equations.numbered, "differs")
+        strengths = [
+            f"{name} = {fixed[name]:g}" if name in fixed else f"{name} {differ.get(name, 'is swept')}" for name in names
+        ]
         found.append(f"coupling: {', '.join([f'{equations.link_count} links', *strengths])}")
     return found
 
@@ -368,7 +370,7 @@ def _colours(scene: Scene) -> list[Hashable]:
     for i in range(scene.n):
         own: list[Hashable] = []
         starts = {f"{component}_{i + 1}": values[i] for component, values in scene.initial.items()}
-        numbers = {f"{name}_{i + 1}": scene.parameters[f"{name}_{i + 1}"] for name in scene.varied}
+        numbers = {f"{name}_{i + 1}": scene.parameters[f"{name}_{i + 1}"] for name in scene.equations.varied}
         for name, value in (starts | numbers).items():
             found = swept.get(name, (value,))
             if min(found) == max(found):

@@ -112,6 +112,9 @@ def energy_function(scene: Scene) -> EnergyFunction:
             states = [s for end in (here, there) for s in np.array([places[i] for i in end]).T]
             sources, own = [s for s, _ in edge.theirs], [s for _, s in edge.theirs]
             names = _names(equations, edge.parameters, here) + _names(equations, own, there)
+            for k, s in enumerate(edge.parameters):
+                if s.name in equations.numbered:
+                    names[k] = [equations.numbered[s.name].name(s.name, pair) for pair in pairs]
             formulas = _compiled(share, (edge.weight, *edge.here, *edge.there, *edge.parameters, *sources))
             groups.append(_Group(formulas, np.array([float(pair[2]) for pair in pairs]), states, names))
     return EnergyFunction(scene, exact, tuple(groups))

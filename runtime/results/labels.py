@@ -221,11 +221,34 @@ def coordinates(scene: Scene) -> dict[str, Any]:
     """Return the coordinates of a result: the axes, the components, the numbers of the nodes, and what sections keep."""
     coords: dict[str, Any] = {"component": list(scene.equations.components), "node": np.arange(1, scene.n + 1)}
     coords |= {f"{name}_kept": list(section.keep) for name, section in scene.sections.items() if section.keep}
+    coords |= {f"{base}_link": list(columns) for base, columns in _of_links(scene).items()}
+    return coords | {name: (dims, values) for name, dims, values in swept(scene)}
+
+
+def swept(scene: Scene) -> Iterator[Variable]:
+    """Yield the coordinates that tell cells apart, the values of axes and draws, a row for each value.
+
+    A draw of all links has a column for each name that is drawn, along the dimension `…_link`.
+    """
     for axis in scene.axes:
-        coords[axis.name] = ("cell" if scene.zipped else axis.name, np.array(axis.values))
+        yield axis.name, ("cell" if scene.zipped else axis.name,), np.array(axis.values)
+    groups = _of_links(scene)
+    grouped = {f"{base}_{ends}" for base, columns in groups.items() for ends in columns}
     for axis in scene.drawn:
-        coords[axis.name] = ("realisation", np.array(axis.values))
-    return coords
+        if axis.name not in grouped:
+            yield axis.name, ("realisation",), np.array(axis.values)
+    for base, columns in groups.items():
+        yield base, ("realisation", f"{base}_link"), np.array(list(columns.values())).T
+
+
+def _of_links(scene: Scene) -> dict[str, dict[str, tuple[float, ...]]]:
+    """What is drawn of all links, by parameter and by the ends of each, "1_2"."""
+    found: dict[str, dict[str, tuple[float, ...]]] = {}
+    for axis in scene.drawn:
+        link = None if axis.name in scene.draws else scene.model.link_parameter(axis.name)
+        if link is not None:
+            found.setdefault(link.base, {})[axis.name.removeprefix(f"{link.base}_")] = axis.values
+    return found
 
 
 def labelled(
@@ -243,9 +266,8 @@ def labelled(
     attributes : mapping
     """
     dims, coords = dimensions(scene), coordinates(scene)
-    for axis in (*scene.axes, *scene.drawn):
-        dim, values = coords[axis.name]
-        coords[axis.name] = (dim, values[: shape[dims.index(dim)]])
+    for name, (dim, *more), values in swept(scene):
+        coords[name] = ((dim, *more), values[: shape[dims.index(dim)]])
     made = {
         name: ((*dims, *more), values.reshape((*shape, *values.shape[1:])), {"long_name": meaning(scene, name)})
         for name, more, values in found

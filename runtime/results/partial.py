@@ -24,7 +24,7 @@ from ..support.files import understood, whole_file
 from ..support.netcdf import Sheet, seal, unsealed
 from .block_log import BlockLog, Description
 from .certificate import VERDICTS, Certificate
-from .labels import Variable, dimensions, labelled, scene_of, variables
+from .labels import Variable, dimensions, labelled, scene_of, swept, variables
 from .result import Result, gather
 
 __all__ = ["certificate_of", "describe_sweep", "layout_of", "partial_path", "read_partial", "write_result"]
@@ -143,8 +143,8 @@ def write_result(log: BlockLog, path: str | os.PathLike[str], scene: Scene) -> d
     lengths = dict(zip(dimensions(scene), scene.shape, strict=True))
     with whole_file(path) as temporary, open(temporary, "w+b") as file:
         sheet = Sheet(file, _template(reader), lengths)
-        for axis in (*scene.axes, *scene.drawn):
-            sheet.put(axis.name, np.arange(len(axis)), np.array(axis.values))
+        for name, _, values in swept(scene):
+            sheet.put(name, np.arange(len(values)), values)
         for block in range(reader.layout.blocks):
             rows = reader.layout.rows(block)
             for name, _, values in reader.variables(rows, reader.buffers(block)):

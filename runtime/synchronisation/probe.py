@@ -136,6 +136,8 @@ def universal_probe(
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     real, imaginary = _broadcast(alpha, beta)
     scene = Given(universal_probe, parameters, more, IN_CRITERION).scene(scene)
+    if scene.varied:
+        scene.equations.expect_alike("the three-oscillator probe")
     ring = scene.replace(
         **{**ONE_CELL, "record": ("sync_error",)},
         topology=topology("ring", 3),

@@ -16,7 +16,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
-from samples import CASES, pendula, real, telescopes
+from samples import CASES, numbered, pendula, real, telescopes
 
 from synchain.codegen.export.c import to_c
 from synchain.codegen.export.names import RESERVED, portable
@@ -149,6 +149,7 @@ NETWORKS: dict[str, Equations] = {
     **{f"inertial {n}": inertial(n) for n in (3, 9)},
     "pendula": pendula(),
     "telescopes": telescopes(),
+    **{f"numbered {n} {mutual}": numbered(n, mutual) for n in (3, 9) for mutual in (True, False)},
     "alone 9": Equations.of_equal_nodes(Node((sp.Symbol("x", real=True),), (sp.S.One,), ()), None, 9),
 }
 
@@ -198,8 +199,9 @@ def together(equations: Equations, numbers: list[float]) -> list[Any]:
     """The arguments of a text of many nodes: parameters that differ come as one list."""
     found: dict[str, Any] = {}
     for name, value in zip(equations.parameters, numbers, strict=True):
-        base = name.rpartition("_")[0]
-        if base in equations.varied:
+        node = name.rpartition("_")[0]
+        base = node if node in equations.varied else node.rpartition("_")[0]
+        if base in equations.differing:
             found.setdefault(base, []).append(value)
         else:
             found[name] = value

@@ -90,7 +90,10 @@ def test_equal_numbers_are_equal_nodes() -> None:
         ({"delta": [0.1, 0.2]}, "parameter 'delta': found 2 values for 3 oscillators; expected 3 values or one number"),
         ({"delta": range(5)}, "found 5 values for 3 oscillators"),
         ({"delta": {0.1, 0.2, 0.3}}, "a set, which has no order"),
-        ({"sigma": [0.1, 0.2, 0.3]}, "'sigma' belongs to the links, which share it; expected one number"),
+        (
+            {"sigma": [0.1, 0.2, 0.3]},
+            "'sigma': found 3 values for 4 links; expected 2 values, one for each edge, or one for each link",
+        ),
         ({"delta_4": 0.1}, "unknown parameter 'delta_4'"),
         ({"sigma_1": 0.1}, "unknown parameter 'sigma_1'"),
         ({"omega": [1, -1, 2]}, "omega_2"),
@@ -113,7 +116,7 @@ def test_a_swept_parameter_of_one_node() -> None:
     made = scene(parameters={"sigma": 0.1}, axes={"delta_2": [0.1, 0.2]}, time_unit="time")
     assert made.varied == ("delta",)
     assert made.replace(axes={}).varied == ()
-    with pytest.raises(ValueError, match="axis 'delta': the nodes have different values"):
+    with pytest.raises(ValueError, match="axis 'delta': nodes or links have different values"):
         scene(axes={"delta": [0.1, 0.2]})
     with pytest.raises(ValueError, match="delta has values for 3 nodes"):
         scene().replace(topology=chain(4))

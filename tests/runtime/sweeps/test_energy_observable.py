@@ -1,0 +1,129 @@
+"""The energy of nodes and links as an observable, as a section and as a stop."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from synchain import erdos_renyi, one_way_ring
+from synchain.models import (
+    Lagrangian,
+    Potential,
+    Rates,
+    Scene,
+    chain,
+    complete,
+    end,
+    ends,
+    energy,
+    maximum,
+    minimum,
+    nodes,
+    ring,
+    uniform,
+)
+from synchain.models.definitions.loader import load_oscillator
+from synchain.runtime.results.energy import energy_function
+from synchain.runtime.sweeps.run import run
+
+X, V, P, K = sp.symbols("x v P K")
+EXACT: dict[str, Any] = {"transient": 0, "window": 20, "time_unit": "time", "rtol": 1e-11, "record": []}
+EXTREMES = {"high": maximum(energy), "low": minimum(energy), "last": end(energy)}
+
+LOSSLESS = Lagrangian(V**2 / 2, -P * X, coordinates={X: V}, parameters={P: 0})
+i, j, W = ends(LOSSLESS)
+LINE = Potential(K * W * (1 - sp.cos(i.x - j.x)), {K: 1})
+GRID = erdos_renyi(12, p=0.3, seed=3)
+DICE = np.random.default_rng(2)
+CONSERVATIVE = {
+    "fput": Scene("mass", "fput", chain(12), observe=EXTREMES, initial={"x": list(DICE.normal(0, 0.2, 12))}, **EXACT),
+    "swing": Scene(
+        LOSSLESS,
+        LINE,
+        GRID,
+        parameters={"P": list(np.linspace(-0.55, 0.55, 12)), "K": list(DICE.uniform(1, 3, len(GRID.links) // 2))},
+        observe=EXTREMES,
+        initial={"x": list(DICE.normal(size=12)), "v": [0.0] * 12},
+        **EXACT,
+    ),
+    "few": Scene("harmonic", "cubic_spring", complete(3), parameters={"sigma": 0.7}, observe=EXTREMES, **EXACT),
+    "inerter": Scene("harmonic", "inerter", ring(4), parameters={"sigma": 0.5}, observe=EXTREMES, initial={"v": [1, 0, 0, 0]}, **EXACT),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CONSERVATIVE)
+def test_a_conservative_network_keeps_the_energy_of_its_nodes_and_links(name: str) -> None:
+    """To the tolerance of the steps, where the nodes' own energy moves by more than a tenth of what the links hold."""
+    scene = CONSERVATIVE[name]
+    found = run(scene, show_progress=False)
+    start = float(energy_function(scene)(np.array(scene.y0)))
+    assert float(found.high - found.low) < 1e-8 * abs(start)
+    assert float(found.last) == pytest.approx(start, rel=1e-8)
+    own = sp.Symbol("v") ** 2 / 2
+    moving = run(
+        scene.replace(observe={"e": maximum(nodes.sum(own)), "f": minimum(nodes.sum(own))}), show_progress=False
+    )
+    assert float(moving.e - moving.f) > 1e-2 * abs(start)
+
+
+def test_it_is_the_energy_of_the_state() -> None:
+    """Nodes of several kinds and with parameters of their own, drives and drawn weights against the energy of end states."""
+    kinds = [{"oscillator": "pendulum", "at": [2]}, {"oscillator": "duffing", "at": [3, 4]}]
+    own = {"delta": [0.1, 0.2, 0.3, 0.4], "sigma": [0.1, 0.2, 0.3, 0.4]}
+    mixed = Scene("duffing", "spring", ring(4), nodes=kinds, parameters=own, observe=EXTREMES, **EXACT)
+    drawn = Scene(
+        "duffing", "damper", ring(10), observe=EXTREMES, realisations=2, draws={"W": uniform(0.5, 1)}, **EXACT
+    )
+    drawn = drawn.replace(coupling="spring", parameters={"sigma": 0.5})
+    for scene in (mixed, drawn):
+        found = run(scene, show_progress=False)
+        states = np.atleast_2d(found.states("end"))
+        for k, state in enumerate(states):
+            numbers = {axis.name: axis.values[k] for axis in scene.drawn}
+            exact = energy_function(scene)(state, 20.0, numbers)
+            assert np.atleast_1d(found.last)[k] == pytest.approx(float(exact), rel=1e-9)
+
+
+def test_a_stop_and_a_section_at_an_energy() -> None:
+    """A damped network stops where its energy falls through a level, and passes it there."""
+    scene = Scene(
+        "duffing", "spring", chain(2), parameters={"u": 0, "delta": 0.1, "sigma": 0.3}, **{**EXACT, "window": 200}
+    )
+    scene = scene.replace(initial={"x": [1, 2], "v": [0, 0]})
+    level = float(energy_function(scene)(np.array(scene.y0))) / 2
+    found = run(scene.replace(stop=f"energy - {level!r}"), show_progress=False)
+    assert int(found.status) == 7
+    assert float(energy_function(scene)(np.array(found.states("end")))) == pytest.approx(level, rel=1e-9)
+    passed = run(scene.replace(sections={"half": {"function": f"energy - {level!r}"}}), show_progress=False)
+    assert float(passed.half_time[0]) == pytest.approx(float(found.end_time), rel=1e-9)
+
+
+i, j, W = ends(load_oscillator("harmonic"))
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"oscillator": "rossler", "coupling": "x->x"}, "observe e: energy: oscillator 'rossler' is a vector field"),
+        ({"coupling": Rates({i.v: W * (j.x - i.x)})}, "observe e: energy: the coupling 'rates of v' has none"),
+        ({"topology": one_way_ring(3)}, "has one-way links; expected links both ways"),
+        ({"oscillator": "friction", "contact": "set-valued"}, "set-valued friction does work"),
+        ({"observe": {"e": "mean(nodes.sum(energy))"}}, "expected the energy of the whole network outside of nodes"),
+        ({"observe": {"e": "mean(rate(energy))"}}, "expected the rate of a state"),
+    ],
+)
+def test_networks_without_an_energy(given: dict[str, Any], words: str) -> None:
+    common = {"oscillator": "harmonic", "coupling": "spring", "topology": ring(3), "observe": {"e": "mean(energy)"}}
+    with pytest.raises(ValueError, match="energy") as error:
+        Scene(**{**common, **given})
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_parameter_of_that_name_is_meant() -> None:
+    node = Lagrangian(V**2 / 2, sp.Symbol("energy") * X**2 / 2, coordinates={X: V}, parameters={"energy": 3})
+    found = run(Scene(node, observe={"e": "mean(energy + 0*x_1)"}, **EXACT), show_progress=False)
+    assert float(found.e) == 3.0

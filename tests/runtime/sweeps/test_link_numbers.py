@@ -1,0 +1,331 @@
+"""Links with numbers of their own: parameters, weights that are drawn, and what they are refused for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.integrate import solve_ivp
+
+from synchain import erdos_renyi, one_way_ring
+from synchain.models import (
+    Field,
+    Potential,
+    Rates,
+    Scene,
+    Topology,
+    chain,
+    complete,
+    ends,
+    from_edges,
+    normal,
+    ring,
+    uniform,
+)
+from synchain.models.definitions.loader import load_oscillator
+from synchain.models.scenes.file import load_scene
+from synchain.runtime import cluster_exponents, exponents, lyapunov_spectrum, msf, plane, thresholds, universal_probe
+from synchain.runtime.opening.open import open_result
+from synchain.runtime.sweeps.run import run
+from synchain.runtime.sweeps.stream import stream
+
+DICE = np.random.default_rng(5)
+THETA, OMEGA, K, LAG, REST, C = sp.symbols("theta omega K lag rest c")
+PHASE = Field({THETA: OMEGA}, parameters={OMEGA: 0})
+EXACT: dict[str, Any] = {"transient": 0, "window": 10, "time_unit": "time", "rtol": 1e-11, "record": []}
+
+i, j, W = ends(PHASE)
+LAGGING = Rates({i.theta: K * W * sp.sin(j.theta - i.theta - LAG)}, {K: 1, LAG: 0})
+i, j, W = ends(load_oscillator("harmonic"))
+RESTING = Potential(K * W * ((i.x - j.x) ** 2 / 2 + REST * sp.cos(i.x - j.x)), {K: 0.1, REST: 0})
+DAMPED = Rates({i.v: C * W * (j.v - i.v)}, {C: 0.1})
+
+
+def edges_of(graph: Topology) -> list[tuple[int, int]]:
+    return [(i, j) for i, j, _ in graph.links if i < j]
+
+
+def lagging(n: int) -> tuple[Scene, Callable[[float, np.ndarray], np.ndarray]]:
+    """Phases with a lag of each link, there and back another one."""
+    graph = erdos_renyi(n, p=0.6, seed=4)
+    lags, own, start = DICE.uniform(-1, 1, len(graph.links)), DICE.normal(size=n), DICE.uniform(-3, 3, n)
+
+    def rhs(t: float, y: np.ndarray) -> np.ndarray:
+        rates = own.copy()
+        for (a, b, _), lag in zip(graph.links, lags, strict=True):
+            rates[a] += np.sin(y[b] - y[a] - lag)
+        return rates
+
+    numbers = {"omega": own, "lag": lags}
+    return Scene(PHASE, LAGGING, graph, parameters=numbers, initial={"theta": start}, **EXACT), rhs
+
+
+def springs(n: int) -> tuple[Scene, Callable[[float, np.ndarray], np.ndarray]]:
+    """Springs with a strength and a rest length of each edge, and dampers with a number of each link of another graph."""
+    first, second = erdos_renyi(n, p=0.6, seed=4), ring(n)
+    pairs = edges_of(first)
+    k, rest, c = DICE.uniform(0.1, 1, len(pairs)), DICE.uniform(-1, 1, len(pairs)), DICE.uniform(0, 0.3, 2 * n)
+
+    def rhs(t: float, y: np.ndarray) -> np.ndarray:
+        x, v = y[:n], y[n:]
+        rates = -x
+        for (a, b), strength, length in zip(pairs, k, rest, strict=True):
+            gap = x[a] - x[b]
+            pull = strength * (gap - length * np.sin(gap))
+            rates[a] -= pull
+            rates[b] += pull
+        for (a, b, _), damping in zip(second.links, c, strict=True):
+            rates[a] += damping * (v[b] - v[a])
+        return np.concatenate([v, rates])
+
+    start = {"x": DICE.normal(size=n), "v": DICE.normal(size=n)}
+    numbers = {"K": k, "rest": rest, "c": c}
+    layers = [(RESTING, first), (DAMPED, second)]
+    return Scene("harmonic", links=layers, parameters=numbers, initial=start, **EXACT), rhs
+
+
+@pytest.mark.parametrize("n", [5, 11])
+@pytest.mark.parametrize("make", [lagging, springs])
+def test_each_link_has_its_number(make: Callable[[int], tuple[Scene, Any]], n: int) -> None:
+    """Written-out and looped steps of every family against SciPy's DOP853 on right-hand sides that were written by hand."""
+    scene, rhs = make(n)
+    exact = solve_ivp(rhs, (0, 10), scene.y0, method="DOP853", rtol=2.3e-14, atol=1e-14).y[:, -1]
+    for method in ("dop853", "taylor", "rodas5p"):
+        found = run(scene.replace(integrator=method), show_progress=False)
+        np.testing.assert_allclose(found.end.values.ravel(), exact, rtol=0, atol=2e-10)
+
+
+CASES: dict[str, dict[str, Any]] = {
+    "set-valued": {"oscillator": "friction", "contact": "set-valued"},
+    "inerter": {"oscillator": "duffing", "coupling": "inerter", "integrator": "dop853"},
+    "mixed": {"oscillator": "van_der_pol", "coupling": "x->x", "nodes": [{"oscillator": "lorenz", "at": [2, 3]}]},
+    "driven": {"oscillator": "duffing", "coupling": "damper", "integrator": "taylor"},
+}
+
+
+@pytest.mark.parametrize("n", [4, 10])
+@pytest.mark.parametrize("name", CASES)
+def test_numbers_of_links_are_weights_of_the_graph(name: str, n: int) -> None:
+    """Strengths of edges at run time move a network as exact weights do: contacts, inertia, several kinds, drives."""
+    pairs = edges_of(ring(n))
+    sizes = [0.5 + 0.125 * k for k in range(n)]
+    weighted = from_edges([(*pair, size) for pair, size in zip(pairs, sizes, strict=True)])
+    given = {**EXACT, "window": 5, "rtol": 1e-10, **CASES[name]}
+    first = run(Scene(topology=weighted, parameters={"sigma": 0.5}, **given), show_progress=False)
+    second = run(Scene(topology=ring(n), parameters={"sigma": [0.5 * s for s in sizes]}, **given), show_progress=False)
+    np.testing.assert_allclose(second.end.values, first.end.values, rtol=0, atol=1e-9)
+    other = run(Scene(topology=ring(n), parameters={"sigma": 0.5}, **given), show_progress=False)
+    assert np.nanmax(np.abs(other.end.values - first.end.values)) > 1e-5
+
+
+def test_numbers_are_given_in_several_forms(tmp_path: Path) -> None:
+    """A list by edges or by links, a matrix, a graph and single names are one scene, which files keep."""
+    graph, numbers = chain(4), [0.1, 0.2, 0.3]
+    scene = Scene("harmonic", "spring", graph, parameters={"sigma": numbers}, **EXACT)
+    assert [scene.parameters[f"sigma_{k}_{k + 1}"] for k in (1, 2, 3)] == numbers
+    matrix = np.diag(numbers, 1) + np.diag(numbers, -1)
+    weighted = from_edges([(k, k + 1, number) for k, number in enumerate(numbers)])
+    single = {"sigma": 0.1, "sigma_2_3": 0.2, "sigma_3_4": 0.3}
+    for given in ([0.1, 0.1, 0.2, 0.2, 0.3, 0.3], matrix, matrix.tolist(), weighted):
+        assert scene.replace(parameters={"sigma": given}) == scene
+    assert scene.replace(parameters=single).parameters == scene.parameters
+    assert scene.replace(sigma=0.5) == scene.replace(parameters={"sigma": 0.5})
+    assert scene.replace(sigma_2_3=0.7).parameters["sigma_2_3"] == 0.7
+    scene.save(tmp_path / "links.toml")
+    assert load_scene(tmp_path / "links.toml") == scene
+    found = run(scene, show_progress=False, sigma_1_2=[0.1, 0.5])
+    found.save(tmp_path / "found.nc")
+    assert open_result(tmp_path / "found.nc").scene == found.scene
+    one = run(scene.replace(sigma_1_2=0.5), show_progress=False)
+    np.testing.assert_array_equal(found.end.values[1], one.end.values)
+
+
+def test_lags_there_and_back_differ() -> None:
+    """Rates have a number for each link, of an undirected graph too; a list of half as many serves both directions."""
+    scene = Scene(PHASE, LAGGING, chain(3), parameters={"lag": [0.1, 0.2, 0.3, 0.4]}, **EXACT)
+    assert [scene.parameters[f"lag_{name}"] for name in ("1_2", "2_1", "2_3", "3_2")] == [0.1, 0.2, 0.3, 0.4]
+    both = scene.replace(parameters={"lag": [0.1, 0.4]})
+    assert [both.parameters[f"lag_{name}"] for name in ("1_2", "2_1", "2_3", "3_2")] == [0.1, 0.1, 0.4, 0.4]
+    (warning,) = scene.warnings
+    assert "lag differs from link to link, so complete synchronisation is no solution" in warning
+    assert not scene.replace(parameters={"lag": 0.3}, topology=ring(3)).warnings
+
+
+DRAWN: dict[str, Any] = {"realisations": 20, "rng": 3, "show_progress": False}
+
+
+def test_weights_are_drawn(tmp_path: Path) -> None:
+    """Each realisation is the run on the graph of its weights; workers, lanes and other draws do not change it."""
+    graph = erdos_renyi(9, p=0.5, seed=2)
+    scene = Scene("duffing", "spring", graph, parameters={"sigma": 0.3}, **{**EXACT, "window": 3, "rtol": 1e-10})
+    draws = {"W": uniform(0.5, 1.5)}
+    found = run(scene, draws=draws, **DRAWN)
+    names = [f"{a + 1}_{b + 1}" for a, b in edges_of(graph)]
+    assert found.data.W.dims == ("realisation", "W_link")
+    assert found.data.W_link.values.tolist() == names
+    for k in (0, 7):
+        listed = [
+            (*pair, float(found.data.W.sel(W_link=name)[k])) for pair, name in zip(edges_of(graph), names, strict=True)
+        ]
+        one = run(scene.replace(topology=from_edges(listed, n=9)), show_progress=False)
+        np.testing.assert_allclose(found.end.values[k], one.end.values, rtol=0, atol=1e-9)
+    assert len(set(found.data.W.values.ravel().tolist())) == 20 * len(names)
+    other = run(scene, draws={"x_1": normal(0.0, 1.0), **draws}, width=1, workers=1, **DRAWN)
+    np.testing.assert_array_equal(other.data.W, found.data.W)
+    alone = run(scene, draws=draws, width=1, workers=1, **DRAWN)
+    np.testing.assert_array_equal(alone.end, found.end)
+    assert Scene.from_dict(found.scene.as_dict()) == found.scene
+    assert run(found.scene, show_progress=False).end.identical(found.end)
+    found.save(tmp_path / "whole.nc")
+    assert open_result(tmp_path / "whole.nc").data.identical(found.data)
+    assert stream(scene, tmp_path / "streamed.nc", draws=draws, **DRAWN).success
+    assert (tmp_path / "streamed.nc").read_bytes() == (tmp_path / "whole.nc").read_bytes()
+
+
+def test_an_edge_draws_one_number_a_link_its_own() -> None:
+    """Of an undirected graph links there and back draw the same number; single names and lists may part them."""
+    phases = {"oscillator": PHASE, "coupling": LAGGING, "realisations": 4}
+    both = {axis.name: axis.values for axis in Scene(topology=chain(3), draws={"lag": normal(0, 1)}, **phases).drawn}
+    assert list(both) == ["lag_1_2", "lag_2_1", "lag_2_3", "lag_3_2"]
+    assert both["lag_1_2"] == both["lag_2_1"] != both["lag_2_3"] == both["lag_3_2"]
+    single = Scene(topology=chain(3), draws={"lag_2_1": normal(0, 1)}, **phases)
+    assert [axis.name for axis in single.drawn] == ["lag_2_1"]
+    assert single.parameters["lag_1_2"] == 0.0
+    one_way = {axis.name for axis in Scene(topology=one_way_ring(3), draws={"W": normal(0, 1)}, **phases).drawn}
+    assert one_way == {f"W_{a + 1}_{b + 1}" for a, b, _ in one_way_ring(3).links}
+    rows = [[0.1 * k, 0.2 * k, 0.3 * k, 0.4 * k] for k in range(4)]
+    listed = Scene(topology=chain(3), draws={"lag": rows}, **phases)
+    assert {axis.name: axis.values[1] for axis in listed.drawn} == dict(zip(both, rows[1], strict=True))
+    shared = Scene(topology=chain(3), draws={"lag": [0.1, 0.2, 0.3, 0.4]}, **phases)
+    assert [axis.name for axis in shared.drawn] == ["lag"]
+
+
+GRAPHS = [erdos_renyi(10, p=0.3, seed=k) for k in range(4)]
+
+
+@pytest.mark.parametrize(("oscillator", "coupling"), [("duffing", "spring"), ("rossler", "x->x")])
+def test_graphs_are_realisations(oscillator: str, coupling: str, tmp_path: Path) -> None:
+    """Each realisation is the run on its graph to the last bit, links that it has not add nothing; files keep the graphs."""
+    given = {**EXACT, "window": 3, "rtol": 1e-9, "record": ["sync_error"], "integrator": "dop853"}
+    scene = Scene(oscillator, coupling, ring(10), parameters={"sigma": 0.4}, **given)
+    found = run(scene, realisations=4, draws={"topology": GRAPHS}, sigma=[0.2, 0.4], show_progress=False)
+    assert found.end.dims == ("sigma", "realisation", "component", "node")
+    for k, graph in enumerate(GRAPHS):
+        one = run(scene.replace(topology=graph), show_progress=False)
+        np.testing.assert_array_equal(one.end.values, found.end.values[1, k])
+        assert float(one.sync_error) == float(found.sync_error[1, k])
+    assert len({float(error) for error in found.sync_error[1]}) == 4
+    assert Scene.from_dict(found.scene.as_dict()) == found.scene
+    assert found.scene.replace(draws=None, realisations=0, axes={}) == scene
+    found.scene.save(tmp_path / "graphs.toml")
+    assert load_scene(tmp_path / "graphs.toml") == found.scene
+    found.save(tmp_path / "graphs.nc")
+    assert open_result(tmp_path / "graphs.nc").scene == found.scene
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (
+            {"realisations": 2, "draws": {"topology": [chain(3), chain(4)]}},
+            "found graphs of 3, 4 nodes; expected one number",
+        ),
+        (
+            {"realisations": 3, "draws": {"topology": GRAPHS}},
+            "found more than 3 graphs; expected 3, one for each realisation",
+        ),
+        (
+            {"realisations": 4, "draws": {"topology": [chain(4)] * 4}},
+            "found graphs of 4 nodes; expected graphs of 10 nodes",
+        ),
+        ({"realisations": 4, "draws": {"topology": GRAPHS, "W": uniform(0, 1)}}, "is drawn twice"),
+        ({"realisations": 4, "draws": {"topology": "ring"}}, "found 'ring'; expected a list of 4 graphs"),
+        (
+            {"realisations": 4, "draws": {"topology": GRAPHS}, "coupling": Rates({i.v: sp.cos(W + j.x - i.x)})},
+            "found a link that adds",
+        ),
+    ],
+)
+def test_wrong_graphs_are_refused(given: dict[str, Any], words: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=re.escape(words)) as error:
+        Scene(**{"oscillator": "harmonic", "coupling": "spring", "topology": ring(10), **given})
+    assert "\n" not in str(error.value)
+
+
+CHAIN = Scene("rossler", "x->x", chain(3))
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"parameters": {"sigma": [1, 2, 3]}}, "found 3 values for 4 links; expected 2 values, one for each edge, or one for"),
+        ({"parameters": {"sigma": [[0, 1, 1], [1, 0, 1], [1, 1, 0]]}}, "a number without a link where node 1 feels node 3"),
+        ({"parameters": {"sigma": [[0, 1], [1, 0]]}}, "expected a matrix of 3 rows of 3 numbers"),
+        ({"parameters": {"sigma": one_way_ring(3)}}, "no number where node 2 feels node 1"),
+        ({"parameters": {"sigma": {0.1, 0.2}}}, "found a set, which has no order"),
+        ({"parameters": {"sigma_1_3": 1.0}}, "unknown parameter 'sigma_1_3'"),
+        ({"oscillator": "harmonic", "coupling": "spring", "parameters": {"sigma_2_1": 1}}, "expected 'sigma_1_2', the one number"),
+        ({"parameters": {"W": [1, 2]}}, "the graph has the weights of links; expected W on an axis or drawn"),
+        ({"parameters": {"W_1_2": 1.0}}, "the graph has the weights of links"),
+        ({"axes": {"W": [1.0, 2.0]}}, "axis 'W': each link has a weight; expected that of one link, e.g. W_1_2"),
+        ({"axes": {"sigma": [1.0]}, "parameters": {"sigma": [1, 2]}}, "expected the parameter of one, e.g. sigma_1_2"),
+        ({"axes": {"W_1_2": [1.0]}, "realisations": 2, "draws": {"W": normal(0, 1)}}, "it is an axis as well"),
+        ({"topology": complete(2000), "parameters": {"sigma_1_2": 1}}, "found numbers of 3998000 links; expected at most 1000000"),
+        ({"realisations": 2, "draws": {"W": [[1.0] * 3] * 2}}, "draw W: found 3 values for 4 links"),
+        ({"oscillator": "harmonic", "coupling": "spring", "parameters": {"sigma": [1, 2, 3, 3]}}, "expected one number for both"),
+        ({"oscillator": "mass", "coupling": "fput", "realisations": 2, "draws": {"W": normal(0, 1)}}, "tells the two ends"),
+    ],
+)  # fmt: skip
+def test_wrong_numbers_are_refused(given: dict[str, Any], words: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=re.escape(words)) as error:
+        CHAIN.replace(**given)
+    assert "\n" not in str(error.value)
+
+
+def test_weights_of_layers_are_not_drawn() -> None:
+    layers = [("spring", chain(3)), (DAMPED, chain(3))]
+    with pytest.raises(ValueError, match="draw W: found 2 layers of links; expected one whose weights are drawn"):
+        Scene("harmonic", links=layers, realisations=2, draws={"W": normal(0, 1)})
+
+
+@pytest.mark.parametrize("given", [{"parameters": {"sigma": [0.1, 0.2]}}, {"axes": {"W_1_2": [1.0]}}])
+@pytest.mark.parametrize(
+    ("function", "more"),
+    [
+        (msf, {"alpha": [0.1, 0.2]}), (plane, {"alpha": [0.1, 0.2], "beta": [0.0, 0.1]}), (thresholds, {}),
+        (run, {"certified": True}),
+    ],
+)  # fmt: skip
+def test_stability_refuses_links_that_differ(
+    function: Callable[..., Any], more: dict[str, Any], given: dict[str, Any]
+) -> None:
+    """Modes of the graph are none of the network if its links differ in more than their exact weights."""
+    with pytest.raises(ValueError, match=r"links that differ in (sigma|W); expected") as error:
+        function(CHAIN.replace(**given), show_progress=False, **more)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("function", "more"),
+    [
+        (exponents, {"alpha": [0.1]}), (universal_probe, {"alpha": [0.1, 0.2], "beta": [0.0, 0.1]}),
+        (cluster_exponents, {"state": [0, 1, 0]}),
+    ],
+)  # fmt: skip
+def test_modes_of_one_strength_refuse_links_that_differ(function: Callable[..., Any], more: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="links that differ in sigma; expected"):
+        function(CHAIN.replace(parameters={"sigma": [0.1, 0.2]}), show_progress=False, **more)
+
+
+def test_lyapunov_exponents_take_them() -> None:
+    """Two phases with lags of their own: the exponents of an equilibrium that rotates are 0 and -K (cos a + cos b)."""
+    scene = Scene(PHASE, LAGGING, chain(2), parameters={"lag": [0.3, -0.2], "K": 0.4}, rtol=1e-9, window=50)
+    found = lyapunov_spectrum(scene, show_progress=False)
+    # the gap g between them obeys g' = K (sin(0.2 - g) - sin(g - 0.3)), which rests at g = 0.25
+    assert found.exponent[0] == pytest.approx(0.0, abs=1e-6)
+    assert found.exponent[1] == pytest.approx(-0.8 * np.cos(0.05), abs=1e-6)
