@@ -171,11 +171,12 @@ def two_kinds() -> Equations:
     return scene.equations
 
 
-UNEQUAL: dict[str, Equations] = {
-    "varied": varied(), "inertial": inertial(), "clocks": clocks(), "two kinds": two_kinds(), "pendula": pendula(),
-    "telescopes": telescopes(),
-}  # fmt: skip
-"""Networks whose nodes differ or whose links have inertia."""
+def unequal() -> dict[str, Equations]:
+    """Networks whose nodes differ or whose links have inertia; a child process that needs none does not derive them."""
+    return {
+        "varied": varied(), "inertial": inertial(), "clocks": clocks(), "two kinds": two_kinds(), "pendula": pendula(),
+        "telescopes": telescopes(),
+    }  # fmt: skip
 
 
 def numbers(equations: Equations, **changed: float) -> list[float]:

@@ -16,7 +16,6 @@ from samples import (
     CASES,
     DIGITS,
     TABLE,
-    UNEQUAL,
     Interpreted,
     friction_chain,
     harmonic_chain,
@@ -24,6 +23,7 @@ from samples import (
     real,
     take_step,
     third_order,
+    unequal,
     waving,
 )
 
@@ -37,7 +37,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
 SMALL = mpf(10) ** -38
-NETWORKS = {**CASES, **UNEQUAL}
+NETWORKS = {**CASES, **unequal()}
 
 
 @pytest.fixture(autouse=True)
