@@ -189,11 +189,12 @@ def numbered(n: int = 3, mutual: bool = True) -> Equations:
     return Scene("duffing", coupling, graph, parameters=own, **draws).equations
 
 
-UNEQUAL: dict[str, Equations] = {
-    "numbered": numbered(), "numbered one way": numbered(mutual=False), "varied": varied(), "inertial": inertial(), "clocks": clocks(), "two kinds": two_kinds(), "pendula": pendula(),
-    "telescopes": telescopes(),
-}  # fmt: skip
-"""Networks whose nodes differ or whose links have inertia."""
+def unequal() -> dict[str, Equations]:
+    """Networks whose nodes differ or whose links have inertia; a child process that needs none does not derive them."""
+    return {
+        "numbered": numbered(), "numbered one way": numbered(mutual=False), "varied": varied(), "inertial": inertial(),
+        "clocks": clocks(), "two kinds": two_kinds(), "pendula": pendula(), "telescopes": telescopes(),
+    }  # fmt: skip
 
 
 def numbers(equations: Equations, **changed: float) -> list[float]:

@@ -5,6 +5,7 @@ The files are Python that can be read and checked; their text becomes part of ev
 
 from __future__ import annotations
 
+import functools
 from importlib.resources import files
 
 __all__ = ["MARK", "text"]
@@ -12,6 +13,7 @@ __all__ = ["MARK", "text"]
 MARK = "# --- kernel text below ---\n"
 
 
+@functools.cache
 def text(name: str) -> str:
     """Return the part of a file of this folder that a generated module contains.
 

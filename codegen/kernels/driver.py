@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
+import re
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -143,9 +143,13 @@ def common_drivers() -> list[Driver]:
     ]
 
 
+WORDS = re.compile(r'"""(?:.|\n)*?"""|"[^"\n]*"|\'[^\'\n]*\'|#[^\n]*|(?<![\w.])([A-Za-z_]\w*)')
+"""A string, a comment, or a name that is no attribute, which is the group."""
+
+
 def imports(text: str) -> str:
-    """Return the import statements of a module: what its text names."""
-    named = {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
+    """Return the import statements of a module: what its text names outside of strings and comments."""
+    named = set(WORDS.findall(text))
     modules = [line for name, line in (("math", "import math"), ("np", "import numpy as np")) if name in named]
     used = ", ".join(sorted(named.intersection(simd.__all__)))
     return "\n\n".join([*modules, f"from synchain.codegen.simd import {used}"])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import sympy as sp
 
@@ -51,6 +52,7 @@ def expanded_terms(e: sp.Expr) -> int:
     return 1
 
 
+@lru_cache(maxsize=4096)
 def derivative(expression: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
     """Return d(expression)/d(symbol) with d|w| = sign(w) dw and d sign(w) = 0, exact wherever w != 0.
 

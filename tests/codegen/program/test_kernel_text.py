@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,8 +13,9 @@ import pytest
 import sympy as sp
 from samples import CASES, TABLE, friction_chain, real
 
+from synchain.codegen import simd
 from synchain.codegen.integrators import integrator
-from synchain.codegen.kernels.driver import Driver, KernelKind
+from synchain.codegen.kernels.driver import Driver, KernelKind, imports
 from synchain.codegen.kernels.modes import emit_modes
 from synchain.codegen.kernels.sweep import emit
 from synchain.codegen.program.lowering import UnprintableError
@@ -47,6 +50,18 @@ DRIVERS = {
 @pytest.mark.parametrize("name", DRIVERS)
 def test_golden_drivers(golden, name):
     golden(f"driver_{name}.txt", DRIVERS[name].text)
+
+
+@pytest.mark.parametrize("name", DRIVERS)
+def test_a_module_imports_what_its_code_names(name):
+    """Words of its docstrings and comments bring nothing; attributes neither."""
+    text = DRIVERS[name].text
+    found = {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
+    imported = re.search(r"^from synchain.codegen.simd import (.*)$", text, re.MULTILINE)[1].split(", ")
+    assert imported == sorted(found & set(simd.__all__))
+    assert imports("import math\n'sin'; \"cos\"  # exp\n\"\"\"tan\nlog\"\"\"\nmath.sqrt(atan(1.0))").splitlines() == [
+        "import math", "", "from synchain.codegen.simd import atan"
+    ]  # fmt: skip
 
 
 def test_scenes_of_the_same_kind_share_a_driver():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import random
 
@@ -15,7 +16,6 @@ from samples import (
     CASES,
     DIGITS,
     TABLE,
-    UNEQUAL,
     Interpreted,
     friction_chain,
     harmonic_chain,
@@ -23,6 +23,7 @@ from samples import (
     real,
     take_step,
     third_order,
+    unequal,
     waving,
 )
 
@@ -36,7 +37,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
 SMALL = mpf(10) ** -38
-NETWORKS = {**CASES, **UNEQUAL}
+NETWORKS = {**CASES, **unequal()}
 
 
 @pytest.fixture(autouse=True)
@@ -120,16 +121,14 @@ def explicit_reference(m, f: Right, t, h, y) -> tuple[list, list, list]:
     return new, error, [h * d for row in m.dense for d in weighted(row, k, size)]
 
 
-def rosenbrock_reference(m, f: Right, t, h, y, eq: Equations) -> tuple[list, list, list]:
-    size, k = len(y), []
+def rosenbrock_reference(m, f: Right, t, h, y, eq: Equations, jacobian, slope) -> tuple[list, list, list]:
+    size, k, jacobian = len(y), [], jacobian.copy()
     shift = 1 / (h * mpf(m.gamma))
-    jacobian = f.jacobian(t, y)
     node = [int(name.rpartition("_")[2]) for name in eq.state]
     for i, j in itertools.product(range(size), repeat=2):
         if m.inexact and node[i] != node[j]:
             jacobian[i, j] = 0
     matrix = shift * mpmath.eye(size) - jacobian
-    slope = f.time_derivative(t, y)
     for i, c in enumerate(m.c):
         at = [u + d for u, d in zip(y, weighted(m.a[i], k, size), strict=True)]
         right, old = f(t + mpf(c) * h, at), weighted(m.big_c[i], k, size)
@@ -150,6 +149,27 @@ def states(eq: Equations, seed: int) -> tuple[list, list]:
         for i in range(eq.n):
             y[eq.n + i] = p[0] - reach[(seed + i) % len(reach)]
     return y, p
+
+
+@functools.lru_cache(maxsize=64)
+def placed(case: str, seed: int) -> tuple:
+    """The time, the state and the parameters of a step, its rates, and their derivatives by the state and by the time."""
+    eq, t = NETWORKS[case], mpf(seed) / 3
+    y, p = states(eq, seed)
+    f = Right.of(eq, p)
+    return t, y, p, f, f.jacobian(t, y), f.time_derivative(t, y)
+
+
+@functools.lru_cache(maxsize=64)
+def expected(case: str, method: str, name: str, seed: int) -> tuple:
+    """The length of a step and its results by definition; `name` is that of one of the steps of the method."""
+    m = integrators.integrator(method)
+    m = m if name == "step" else m.smooth
+    t, y, _, f, jacobian, slope = placed(case, seed)
+    h = mpf(1) / (20 + 30 * seed)
+    if m.kind == "rosenbrock":
+        return h, rosenbrock_reference(m, f, t, h, y, NETWORKS[case], jacobian, slope)
+    return h, explicit_reference(m, f, t, h, y)
 
 
 def close(found: list, expected: list, allowed=SMALL) -> bool:
@@ -186,21 +206,16 @@ def test_a_step_is_what_its_definition_says(case, method, looped, exact_numbers)
     assert kernel.source.driver.looped is looped
     weights = [mpf(w.numerator) / w.denominator for _, _, w in by_joint(eq)]
     graph = (program(eq).arrays, np.array(weights, object)) if looped else ()
-    steps = {"step": m} if m.smooth is None or looped else {"step": m, "step_smooth": m.smooth}
+    steps = ("step",) if m.smooth is None or looped else ("step", "step_smooth")
     for seed, name in itertools.product(range(6 if "friction" in case else 3), steps):
-        y, p = states(eq, seed)
-        m = steps[name]
-        t, h = mpf(seed) / 3, mpf(1) / (20 + 30 * seed)
-        if m.kind == "rosenbrock":
-            new, error, dense = rosenbrock_reference(m, Right.of(eq, p), t, h, y, eq)
-        else:
-            new, error, dense = explicit_reference(m, Right.of(eq, p), t, h, y)
+        t, y, p, _, jacobian, _ = placed(case, seed)
+        h, (new, error, dense) = expected(case, method, name, seed)
         rtol, atol = mpf(1) / 7, mpf(1) / 1000
         step = take_step(kernel, t, h, y, p, rtol, atol, *graph, name=name)
         assert close(step.y_new, new)
         assert close(step.dense[: len(dense)], dense)
         if len(steps) > 1:
-            values = mpmath.eig(Right.of(eq, p).jacobian(t, y), left=False, right=False)
+            values = mpmath.eig(jacobian, left=False, right=False)
             largest = max(abs(z) for z in values)
             assert step.bound >= largest * (1 - SMALL)
             assert step.bound <= 6 * largest + 3

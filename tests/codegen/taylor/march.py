@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -77,8 +78,9 @@ class Lanes:
         return length, y_new.reshape(size, -1).T, dense[: self.order * size * self.width].reshape(self.order, size, -1)
 
 
+@functools.lru_cache(maxsize=64)
 def compiled(equations: Equations, order: int, width: int = 1, dense: bool = False, looped: bool = False) -> Lanes:
-    """The step of some order, compiled for a width."""
+    """The step of some order, compiled for a width; tests that ask for the same one share it."""
     plan = program(tidy(equations))
     written = write_looped(tidy(equations), order) if looped else step_of(equations, order)
     space = {**SPACE, "WIDTH": width, "DIMENSION": equations.dimension, "NODES": equations.n, "DENSE": dense}

@@ -39,27 +39,38 @@ WORDS: dict[str, Any] = {
 
 
 def march(
-    equations: Equations, order: int, start: Sequence[float], end: float, rtol: float, longest: float = math.inf
+    equations: Equations,
+    order: int,
+    start: Sequence[float],
+    end: float,
+    rtol: float,
+    longest: float = math.inf,
+    numbers: Sequence[float] = (),
 ) -> tuple[np.ndarray, int]:
-    """The state at the end, NaN where steps vanish or are too many, and the number of steps; atol is a tenth of rtol."""
+    """The state at the end, NaN where steps vanish or are too many, and the number of steps; atol is a tenth of rtol.
+
+    `numbers` are the values of the parameters.
+    """
     written = write_step(tidy(equations), order)
     space = {**WORDS, "DIMENSION": equations.dimension}
     exec(written.text, space)
     work = np.zeros(order * equations.dimension + written.workspace)
-    y, new = np.array(start, dtype=float), np.zeros(len(start))
+    size = equations.dimension
+    y, new = np.array([*start, *numbers], dtype=float), np.zeros(size)
     t, scale, power_of_two = np.float64(0.0), np.float64(1e-4), _kept(0x7FF << 52)
     with np.errstate(all="ignore"):
         for steps in range(BUDGET):
             if t >= end:
-                return y, steps
+                return y[:size], steps
             limit = np.float64(min(end - t, longest))
-            found = space["step"](t, limit, scale, y, (), new, work, rtol, rtol / 10)
+            found = space["step"](t, limit, scale, y, y, new, work, rtol, rtol / 10)
             h, reach = found if written.kinks else (found, found)
             if not reach > 0.0:
                 scale = 0.0625 * scale
             else:
-                y, t = new.copy(), np.float64(end) if h >= end - t else t + h
+                t = np.float64(end) if h >= end - t else t + h
+                y[:size] = new
                 scale = power_of_two(reach) if reach < limit else np.maximum(scale, power_of_two(reach))
-            if not (scale > 4e-16 * max(1.0, t) and np.abs(y).max() < 2.0**53):
+            if not (scale > 4e-16 * max(1.0, t) and np.abs(y[:size]).max() < 2.0**53):
                 break
-    return np.full(len(y), math.nan), steps
+    return np.full(size, math.nan), steps

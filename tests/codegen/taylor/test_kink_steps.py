@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 
 import mpmath
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from march import Lanes, alone, compiled, step_of
+from plain import march
 from samples import path, spring
 
 from synchain.codegen.steps.names import tidy
@@ -34,8 +34,8 @@ def bilinear(t: float, stiff: float, x: float = 0.0, v: float = 1.0) -> list[flo
         return [float(-v * mpmath.sin(t - above)), float(-v * mpmath.cos(t - above))]
 
 
-@functools.cache
-def springs(form: str = "max", order: int = 20, looped: bool = False, width: int = 1) -> Lanes:
+def bending(form: str = "max") -> Equations:
+    """A spring that is A**2 times as stiff on one side."""
     more = {
         "max": (A**2 - 1) * sp.Max(X, 0),
         "min": (1 - A**2) * sp.Min(-X, 0),
@@ -44,14 +44,24 @@ def springs(form: str = "max", order: int = 20, looped: bool = False, width: int
         "pieces": sp.Piecewise((0, X < 0), ((A**2 - 1) * X, True)),
         "turned": sp.Piecewise(((A**2 - 1) * X, X >= 0), (0, True)),
     }[form]
-    return compiled(alone([X, V], [V, -X - more], [A]), order, width, looped=looped)
+    return alone([X, V], [V, -X - more], [A])
+
+
+def springs(form: str = "max", order: int = 20, looped: bool = False, width: int = 1) -> Lanes:
+    return compiled(bending(form), order, width, looped=looped)
 
 
 # -- accuracy ----------------------------------------------------------------------------------------------------
 
 
-@BOTH
-@pytest.mark.parametrize("form", ["max", "min", "abs", "negative", "pieces", "turned"])
+FORMS = ("max", "min", "abs", "negative", "pieces", "turned")
+
+
+@pytest.mark.parametrize(
+    ("form", "looped"),
+    [*((form, False) for form in FORMS), ("abs", True), ("pieces", True),
+     *(pytest.param(form, True, marks=pytest.mark.long) for form in ("max", "min", "negative", "turned"))],
+)  # fmt: skip
 def test_a_bilinear_spring_switches_where_it_should(form, looped):
     """Two hundred passages; every form of the same force."""
     end = 100.3 * (math.pi + math.pi / 3.0)
@@ -78,30 +88,31 @@ def test_a_step_has_its_order_across_a_kink():
 
 def test_exact_times_of_a_piecewise_exponential():
     """x' = 1 - |x| from -1/2: x = -1 + exp(t)/2 up to t = ln 2, then 1 - exp(-(t - ln 2))."""
-    step = compiled(alone([X], [1 - sp.Abs(X)]), 20)
+    equations = alone([X], [1 - sp.Abs(X)])
     with mpmath.workdps(30):
         for t in (0.5, 0.7, 3.0):
             low, switch = mpmath.exp(mpmath.mpf(t)) / 2 - 1, mpmath.log(2)
             exact = low if t < switch else 1 - mpmath.exp(-(mpmath.mpf(t) - switch))
-            assert abs(step.run([-0.5], NONE, t, 1e-15)[0][0, 0] - exact) < 5e-16 * 4
+            assert abs(march(equations, 20, [-0.5], t, 1e-15)[0][0] - exact) < 5e-16 * 4
 
 
 def test_kinks_of_time_are_found():
     """x' = |sin t|: 2 for each half turn."""
-    for looped in (False, True):
-        step = compiled(alone([X], [sp.Abs(sp.sin(T))]), 20, looped=looped)
-        state, _ = step.run([0.0], NONE, 100 * math.pi, 1e-14)
-        assert state[0, 0] == pytest.approx(200.0, rel=1e-14)
+    equations = alone([X], [sp.Abs(sp.sin(T))])
+    state, _ = compiled(equations, 20, looped=True).run([0.0], NONE, 100 * math.pi, 1e-14)
+    assert state[0, 0] == pytest.approx(200.0, rel=1e-14)
+    state, _ = march(equations, 20, [0.0], 100 * math.pi, 1e-14)
+    assert state[0] == pytest.approx(200.0, rel=1e-14)
 
 
 def test_a_kink_that_bends_itself():
     """x' = |x**2 - 1| from 0: tanh t up to nothing; from -3 it comes down to -1 and rests there; from 2 it blows up."""
-    step = compiled(alone([X], [sp.Abs(X**2 - 1)]), 20)
-    assert step.run([0.0], NONE, 3.0, 1e-14)[0][0, 0] == pytest.approx(math.tanh(3.0), rel=1e-13)
-    slow = step.run([-3.0], NONE, 5.0, 1e-14)[0][0, 0]
+    equations = alone([X], [sp.Abs(X**2 - 1)])
+    assert march(equations, 20, [0.0], 3.0, 1e-14)[0][0] == pytest.approx(math.tanh(3.0), rel=1e-13)
+    slow = march(equations, 20, [-3.0], 5.0, 1e-14)[0][0]
     assert slow == pytest.approx(float(-mpmath.coth(mpmath.atanh(mpmath.mpf(1) / 3) + 5)), rel=1e-13)
-    crossing = compiled(alone([X, V], [sp.S.One, sp.Abs(X**2 - 1)]), 16).run([-2.0, 0.0], NONE, 4.0, 1e-12)[0]
-    assert crossing[0].tolist() == pytest.approx([2.0, 4.0 / 3.0 + 4.0 / 3.0 + 4.0 / 3.0], rel=1e-13)
+    crossing, _ = march(alone([X, V], [sp.S.One, sp.Abs(X**2 - 1)]), 16, [-2.0, 0.0], 4.0, 1e-12)
+    assert crossing.tolist() == pytest.approx([2.0, 4.0 / 3.0 + 4.0 / 3.0 + 4.0 / 3.0], rel=1e-13)
 
 
 # -- where a step begins and what it touches ------------------------------------------------------------------------
@@ -121,9 +132,9 @@ def test_a_start_on_or_by_the_kink_costs_a_step_at_most(start, speed):
 def test_a_start_at_rest_on_the_kink_goes_where_the_series_goes(power):
     """x leaves zero like t**power: what is on its side is chosen by the first coefficient that is not zero."""
     for sign in (1.0, -1.0):
-        step = compiled(alone([X, V], [A * T ** (power - 1), sp.Abs(X)], [A]), 16)
-        state, _ = step.run([0.0, 0.0], [sign], 2.0, 1e-13)
-        assert state[0].tolist() == pytest.approx([sign * 2.0**power / power, 2.0 ** (power + 1) / power / (power + 1)])
+        equations = alone([X, V], [A * T ** (power - 1), sp.Abs(X)], [A])
+        state, _ = march(equations, 16, [0.0, 0.0], 2.0, 1e-13, numbers=[sign])
+        assert state.tolist() == pytest.approx([sign * 2.0**power / power, 2.0 ** (power + 1) / power / (power + 1)])
 
 
 @pytest.mark.parametrize("depth", [-1e-3, -1e-7, -1e-9, -1e-13, 0.0, 1e-13, 1e-9, 1e-7, 1e-3])
@@ -142,15 +153,14 @@ def test_joint_kinks_end_one_step():
     """Two kinks that are passed at the same instant by equal and by opposite series."""
     y, w = sp.symbols("y w", real=True)
     rates = [V, -X - 8 * sp.Max(X, 0), w, -y - 8 * sp.Max(y, 0)]
-    pair = compiled(alone([X, V, y, w], rates), 20)
-    _, steps = springs().run([0.0, 1.0], [3.0], 30.0, 1e-12)
-    both, count = pair.run([0.0, 1.0, 0.0, 1.0], NONE, 30.0, 1e-12)
+    _, steps = march(bending(), 20, [0.0, 1.0], 30.0, 1e-12, numbers=[3.0])
+    both, count = march(alone([X, V, y, w], rates), 20, [0.0, 1.0, 0.0, 1.0], 30.0, 1e-12)
     assert count == steps
-    assert both[0, :2].tolist() == both[0, 2:].tolist()
-    mirrored = compiled(alone([X, V, y, w], [V, -X - 8 * sp.Max(X, 0), w, -y - 8 * sp.Min(y, 0)]), 20)
-    both, count = mirrored.run([0.0, 1.0, 0.0, -1.0], NONE, 30.0, 1e-12)
+    assert both[:2].tolist() == both[2:].tolist()
+    mirrored = alone([X, V, y, w], [V, -X - 8 * sp.Max(X, 0), w, -y - 8 * sp.Min(y, 0)])
+    both, count = march(mirrored, 20, [0.0, 1.0, 0.0, -1.0], 30.0, 1e-12)
     assert count <= steps + 1
-    assert both[0, :2].tolist() == (-both[0, 2:]).tolist()
+    assert both[:2].tolist() == (-both[2:]).tolist()
 
 
 def test_a_series_that_is_zero_for_ever_costs_nothing():
@@ -158,12 +168,12 @@ def test_a_series_that_is_zero_for_ever_costs_nothing():
     y, w = sp.symbols("y w", real=True)
     force = sp.Abs(X - y)
     for second, start in ((-y + force, 1.0), (-y + force, 1.0 + 2.0**-52), (-(y * A) / A + force, 1.0)):
-        pair = compiled(alone([X, V, y, w], [V, -X + force, w, second], [A]), 16)
-        plain = compiled(alone([X, V, y, w], [V, -X, w, -y], [A]), 16)
-        state, steps = pair.run([1.0, 0.0, start, 0.0], [0.3], 60.0, 1e-10)
-        usual = plain.run([1.0, 0.0, start, 0.0], [0.3], 60.0, 1e-10)[1]
+        pair = alone([X, V, y, w], [V, -X + force, w, second], [A])
+        free = alone([X, V, y, w], [V, -X, w, -y], [A])
+        state, steps = march(pair, 16, [1.0, 0.0, start, 0.0], 60.0, 1e-10, numbers=[0.3])
+        usual = march(free, 16, [1.0, 0.0, start, 0.0], 60.0, 1e-10, numbers=[0.3])[1]
         assert steps <= usual + 2
-        assert np.abs(state[0, [0, 2]] - math.cos(60.0)).max() < 1e-8
+        assert np.abs(state[[0, 2]] - math.cos(60.0)).max() < 1e-8
 
 
 @pytest.mark.parametrize("size", [1e-200, 1e-8, 1e8, 1e200])
@@ -267,11 +277,11 @@ def test_continuous_functions_are_taken(joined):
 
 def test_nested_kinks_follow_the_solution():
     """x' = 1, v' = ||x| - 1| from -2 to 2: four triangles of area 1/2; a clipped ramp."""
-    nested = compiled(alone([X, V], [sp.S.One, sp.Abs(sp.Abs(X) - 1)]), 12).run([-2.0, 0.0], NONE, 4.0, 1e-12)[0]
-    assert nested[0, 1] == pytest.approx(2.0, rel=1e-14)
+    nested, _ = march(alone([X, V], [sp.S.One, sp.Abs(sp.Abs(X) - 1)]), 12, [-2.0, 0.0], 4.0, 1e-12)
+    assert nested[1] == pytest.approx(2.0, rel=1e-14)
     clip = sp.Piecewise((-1, X < -1), (1, X > 1), (X, True))
-    ramp = compiled(alone([X, V], [sp.S.One, clip]), 12).run([-2.0, 0.0], NONE, 4.5, 1e-12)[0]
-    assert ramp[0, 1] == pytest.approx(0.5, rel=1e-13)
+    ramp, _ = march(alone([X, V], [sp.S.One, clip]), 12, [-2.0, 0.0], 4.5, 1e-12)
+    assert ramp[1] == pytest.approx(0.5, rel=1e-13)
 
 
 def test_the_pair_of_springs_is_that_of_runge_and_kutta():

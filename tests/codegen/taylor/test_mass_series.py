@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 from march import compiled, step_of
 from pendula import ByHand, of_energies, pendulum, real, telescope
+from plain import march
 from samples import clocks, inertial
 from scipy.integrate import solve_ivp
 
@@ -74,14 +75,18 @@ APART: dict[str, Equations] = {
 }
 
 
-@pytest.mark.parametrize("looped", [False, True], ids=["written out", "looped"])
+@pytest.mark.parametrize("way", ["text", "loops", pytest.param("lines", marks=pytest.mark.long)])
 @pytest.mark.parametrize("equations", APART.values(), ids=APART)
-def test_nodes_move_as_their_masses_and_forces_say(equations, looped):
+def test_nodes_move_as_their_masses_and_forces_say(equations, way):
+    """As loops, and as lines: Python runs their text."""
     start = np.linspace(-0.4, 0.6, equations.dimension)
     numbers = list(np.linspace(0.3, 0.9, len(equations.parameters)))
-    found, _ = compiled(equations, 12, looped=looped).run(start, numbers, 0.5, 1e-13)
+    if way == "text":
+        found = march(equations, 12, start, 0.5, 1e-13, numbers=numbers)[0]
+    else:
+        found = compiled(equations, 12, looped=way == "loops").run(start, numbers, 0.5, 1e-13)[0][0]
     expected = solve_ivp(rates_of(equations, numbers), (0, 0.5), start, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
-    assert np.abs(found[0] - expected).max() < 2e-13
+    assert np.abs(found - expected).max() < 2e-13
 
 
 def test_inertia_of_links_alone_moves_no_node():

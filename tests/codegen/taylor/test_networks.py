@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from march import compiled
+from plain import march
 from samples import TABLE, harmonic_chain, looped, parametric, tanh_pair, two_kinds, varied, waving
 from scipy.integrate import solve_ivp
 from test_step import friction_pair, pendula
@@ -19,7 +20,7 @@ from synchain.models.mechanics.components import TIME
 CASES = {
     "chain": harmonic_chain(5), "one-way": looped(), "parametric": parametric(), "functions": tanh_pair(),
     "driven pendulum": waving(), "own parameters": varied(), "two kinds": two_kinds(), "set-valued": friction_pair(),
-    "pendula": pendula(), "lorenz ring": Scene(oscillator="lorenz", topology=ring(4), coupling="x->x").equations,
+    "pendula": pendula(2), "lorenz ring": Scene(oscillator="lorenz", topology=ring(4), coupling="x->x").equations,
 }  # fmt: skip
 END = 0.75
 
@@ -43,13 +44,34 @@ def reference(eq: Equations) -> np.ndarray:
     return found.y[:, -1]
 
 
-@pytest.mark.parametrize("shape", ["written out", "looped"])
-@pytest.mark.parametrize("name", CASES)
-def test_networks_follow_their_equations(name, shape):
-    eq = CASES[name]
-    end, steps = compiled(eq, 14, looped=shape == "looped").run(*values(eq), END, 1e-12)
-    assert np.abs(end[0] - reference(eq)).max() < 3e-12 * (1 + np.abs(end).max())
+LENGTHY = ("one-way", "functions", "pendula", "lorenz ring", "own parameters")
+"""Networks whose written-out steps take seconds to compile: Python runs them, by default."""
+
+
+def follows(eq: Equations, end: np.ndarray, steps: int) -> None:
+    assert np.abs(end - reference(eq)).max() < 3e-12 * (1 + np.abs(end).max())
     assert steps < 60
+
+
+@pytest.mark.parametrize(
+    ("name", "looped"),
+    [
+        pytest.param(name, looped, id=f"{name}-{'looped' if looped else 'written out'}",
+                     marks=[pytest.mark.long] * (name in LENGTHY and not looped))
+        for name in CASES for looped in (False, True)
+    ],
+)  # fmt: skip
+def test_networks_follow_their_equations(name, looped):
+    eq = CASES[name]
+    end, steps = compiled(eq, 14, looped=looped).run(*values(eq), END, 1e-12)
+    follows(eq, end[0], steps)
+
+
+@pytest.mark.parametrize("name", LENGTHY)
+def test_text_of_networks_follows_their_equations(name):
+    eq = CASES[name]
+    start, numbers = values(eq)
+    follows(eq, *march(eq, 14, start, END, 1e-12, numbers=numbers))
 
 
 @pytest.mark.parametrize("name", [pytest.param("own parameters", marks=pytest.mark.long), "two kinds", "set-valued"])
@@ -65,7 +87,7 @@ def test_dense_output_of_loops_is_that_of_lines(name):
 def test_a_looped_step_without_numbers_has_no_length():
     eq = CASES["pendula"]
     start, numbers = values(eq)
-    assert np.isnan(compiled(eq, 8, looped=True).step([np.nan, *start[1:]], numbers)[0][0])
+    assert np.isnan(compiled(eq, 14, looped=True).step([np.nan, *start[1:]], numbers)[0][0])
 
 
 def test_the_text_of_loops_does_not_grow():
@@ -75,6 +97,6 @@ def test_the_text_of_loops_does_not_grow():
 
 
 def test_equal_oscillators_of_a_ring_have_equal_bits_in_loops():
-    eq = Scene(oscillator="lorenz", topology=ring(4), coupling="x->x").equations
-    end, _ = compiled(eq, 12, looped=True).run([1.0] * 4 + [2.0] * 4 + [20.0] * 4, values(eq)[1], 2.0, 1e-9)
+    eq = CASES["lorenz ring"]
+    end, _ = compiled(eq, 14, looped=True).run([1.0] * 4 + [2.0] * 4 + [20.0] * 4, values(eq)[1], 2.0, 1e-9)
     assert (np.ptp(end.reshape(3, 4), axis=1) == 0.0).all()

@@ -26,6 +26,15 @@ from synchain.runtime.cli import main
 REFUSAL = 15_000
 """A refusal takes up to 4700 calls."""
 
+
+@pytest.fixture(scope="module")
+def ready(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """The modules that a command imports and the families that it finds are no effort of what it refuses later."""
+    path = tmp_path_factory.mktemp("first") / "claims.txt"
+    path.write_text("chain 4: 0\nchian 4: 0")
+    main(["check", str(path)])
+
+
 RIGHT = [
     "chain 4: -2-sqrt(2), -2, -2+sqrt(2), 0",
     "chain 4: 0, -2, -2+sqrt(2), -(2+sqrt(2))  # a comment",
@@ -227,7 +236,7 @@ def test_letters() -> None:
     ],
 )
 def test_what_cannot_be_read_is_refused(
-    text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    text: str, words: str, ready: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "claims.txt"
     path.write_text(text)

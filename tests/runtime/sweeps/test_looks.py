@@ -14,15 +14,17 @@ import synchain as sc
 x_1 = sp.Symbol("x_1")
 CIRCLE = sc.Scene(
     sc.Field({"x": "y", "y": "-x"}), initial={"x": [0.0], "y": [1.0]}, transient=0, window=50, time_unit="time",
-    record=(), rtol=1e-10,
+    record=("trajectory",), samples=2, observe={"height": sc.end(sp.Symbol("x"))}, rtol=1e-10,
 )  # fmt: skip
+"""Its stops, sections and records are those of test_stop: the tests share a driver."""
 NEAR, FAR = 0.999, -0.95
+NEARBY = {"near": sc.Section(x_1 - NEAR, "both"), "far": sc.Section(x_1 - FAR, "rising")}
 
 
 @pytest.mark.parametrize("integrator", ["taylor", "dop853"])
 def test_sections_near_an_extremum_have_all_their_points(integrator: str) -> None:
-    sections = {"near": sc.Section(x_1 - NEAR, "both"), "far": sc.Section(x_1 - FAR, "rising")}
-    data = sc.run(CIRCLE.replace(integrator=integrator, sections=sections), show_progress=False).data
+    circle = CIRCLE.replace(integrator=integrator, sections=NEARBY, stop=x_1 - 2)
+    data = sc.run(circle, show_progress=False).data
     turns = 2 * math.pi * np.arange(8)
     near = np.sort(np.concatenate([math.asin(NEAR) + turns, math.pi - math.asin(NEAR) + turns]))
     far = 2 * math.pi + math.asin(FAR) + turns
@@ -33,7 +35,8 @@ def test_sections_near_an_extremum_have_all_their_points(integrator: str) -> Non
 
 @pytest.mark.parametrize("integrator", ["taylor", "dop853"])
 def test_a_stop_near_an_extremum_ends_its_cell_the_first_time(integrator: str) -> None:
-    found = sc.run(CIRCLE.replace(integrator=integrator, stop=x_1 - NEAR), show_progress=False)
+    circle = CIRCLE.replace(integrator=integrator, sections=NEARBY, stop=x_1 - NEAR)
+    found = sc.run(circle, show_progress=False)
     np.testing.assert_allclose(found.states(), [NEAR, math.sqrt(1 - NEAR**2)], rtol=0, atol=1e-9)
 
 

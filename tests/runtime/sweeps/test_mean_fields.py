@@ -69,7 +69,7 @@ def test_a_scene_of_many_phases_lists_no_link(tmp_path, monkeypatch: pytest.Monk
 
     monkeypatch.setattr(AllPairs, "__iter__", refuse)
     large = scene(
-        LARGE, window=0.1, integrator="dop853", record=("sync_error",), observe={"r": "end(nodes.mean(cos(theta)))"}
+        LARGE, window=0.1, integrator="taylor", record=("sync_error",), observe={"r": "end(nodes.mean(cos(theta)))"}
     )
     result = sc.run(large)
     assert float(result.r) == pytest.approx(np.cos(result.states("end")).mean(), abs=1e-12)
@@ -117,7 +117,7 @@ def test_layers_beside_a_mean_field_keep_their_links() -> None:
     n = 12
     ring = sc.Rates({HERE.theta: sp.Symbol("c") * W * sp.sin(THERE.theta - HERE.theta) ** 3}, {"c": 0.4})
     given = {"parameters": {"K": 1.5, "omega": np.linspace(-1, 1, n)}, "initial": {"theta": np.linspace(0, 5, n)}}
-    more = {"transient": 0, "window": 1, "time_unit": "time", "integrator": "dop853", "rtol": 1e-11, "record": ()}
+    more = {"transient": 0, "window": 1, "time_unit": "time", "integrator": "taylor", "rtol": 1e-11, "record": ()}
     both = sc.Scene(PHASE, links=[(SINE, mean_field(n)), (ring, sc.ring(n))], **given, **more)
     assert (len(both.equations.fields), len(both.equations.listed)) == (1, 1)
     listed = sc.Topology("listed", n, tuple(AllPairs(n, mean_field(n).all_to_all)))

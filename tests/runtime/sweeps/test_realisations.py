@@ -31,7 +31,7 @@ DRAWS = {
 
 def test_cells_are_those_of_the_drawn_numbers() -> None:
     """Each realisation on a grid is the cell that a scene with its numbers runs."""
-    found = run(SCENE, show_progress=False, sigma=[0.1, 0.4], realisations=6, draws=DRAWS, rng=7)
+    found = run(SCENE, show_progress=False, width=8, sigma=[0.1, 0.4], realisations=6, draws=DRAWS, rng=7)
     assert found.frequency.dims == ("sigma", "realisation", "node")
     assert found.scene.shape == (2, 6)
     numbers = {name: found.data[name].values for name in ("delta", *(f"power_{i}" for i in range(1, 5)))}
@@ -43,7 +43,7 @@ def test_cells_are_those_of_the_drawn_numbers() -> None:
             "delta": DRAWS["delta"][k],
             "sigma": 0.4,
         }
-        one = run(SCENE.replace(parameters=own, initial=start), show_progress=False)
+        one = run(SCENE.replace(parameters=own, initial=start), show_progress=False, width=8)
         np.testing.assert_array_equal(found.end.values[1, k], one.end.values)
         np.testing.assert_array_equal(found.frequency.values[1, k], one.frequency.values)
         assert float(found.sync_error[1, k]) == float(one.sync_error)
@@ -99,9 +99,9 @@ def test_files_keep_what_was_drawn(tmp_path: Path) -> None:
 def test_one_realisation_of_a_zipped_sweep() -> None:
     """Zipped axes are one dimension, realisations another."""
     scene = SCENE.replace(axes={"sigma": [0.1, 0.2], "x_1": [0.5, 0.6]}, zipped=True)
-    found = run(scene, show_progress=False, realisations=3, draws={"x_2": [0.1, 0.2, 0.3]})
+    found = run(scene, show_progress=False, width=8, realisations=3, draws={"x_2": [0.1, 0.2, 0.3]})
     assert found.middle.dims == ("cell", "realisation")
-    one = run(SCENE.replace(parameters={"sigma": 0.2}), show_progress=False, x_1=0.6, x_2=0.3)
+    one = run(SCENE.replace(parameters={"sigma": 0.2}), show_progress=False, width=8, x_1=0.6, x_2=0.3)
     assert float(found.middle[1, 2]) == float(one.middle)
 
 
