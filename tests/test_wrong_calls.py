@@ -15,7 +15,6 @@ from synchain import models, runtime
 from synchain.models import chain, star
 from synchain.models.graphs.clusters import clusters, orbital_partitions
 from synchain.models.graphs.topology import Topology
-from synchain.models.scenes.energy import energy
 from synchain.models.scenes.scene import Scene
 from synchain.models.scenes.section import Section
 from synchain.models.spectra.spectrum import Spectrum
@@ -73,7 +72,6 @@ CALLS = [
     (lambda: clusters(chain(2), 3), "partition: found 3"),
     (lambda: clusters("chain", [0]), f"clusters: found 'chain'.*{A_GRAPH}"),
     (lambda: orbital_partitions(4), A_GRAPH),
-    (lambda: energy(None), A_SCENE),
     # sweeps
     (lambda: runtime.run("figure_4a"), f"found 'figure_4a'.*{A_SCENE}"),
     (lambda: runtime.run(Scene), A_SCENE),

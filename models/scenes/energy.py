@@ -100,9 +100,7 @@ def energy(scene: Scene) -> Energy:
     Raises ValueError for a vector field or a coupling by components, which have no energy, for one-way links, which have no
     potential, and for set-valued friction, whose force in stick is no function of the state.
     """
-    from .scene import a_scene
-
-    return energy_of(a_scene(scene).model, scene.varied)
+    return energy_of(scene.model, scene.varied)
 
 
 @lru_cache(maxsize=16)

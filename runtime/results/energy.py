@@ -13,7 +13,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.inputs.checks import check_keys, check_number, check_table
 from synchain.models.mechanics.components import TIME
 from synchain.models.scenes.energy import Energy, Share, energy
-from synchain.models.scenes.scene import Scene
+from synchain.models.scenes.scene import Scene, a_scene
 
 from ..support.arrays import numbers
 
@@ -97,7 +97,7 @@ def energy_function(scene: Scene) -> EnergyFunction:
     """Return the compiled energy of a scene's network; ValueError as
     `synchain.models.scenes.energy.energy`.
     """
-    exact = energy(scene)
+    exact = energy(a_scene(scene))
     equations, places = exact.equations, exact.equations.places
     groups = []
     for kind, (share, node) in enumerate(zip(exact.nodes, equations.nodes, strict=True)):
