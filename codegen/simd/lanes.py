@@ -2,8 +2,8 @@
 
 Kernels are written once on lane values.  Width 1 is the scalar kernel, wider ones run several cells of a sweep in
 step with each other in one vector register.  Operators and the functions below are branch-free: both sides of a
-`select` are computed.  A sum or a difference of which one side is a product is one fused multiply-add; the first product
-is taken if both sides are.  The text alone decides it, so that every width has the same bits; LLVM, which may choose
+`select` are computed.  A sum or a difference of which one side is a product of lanes is one fused multiply-add; the first
+product is taken if both sides are.  The text alone decides it, so that every width has the same bits; LLVM, which may choose
 otherwise from one width to the next, is allowed nothing, and infinities and NaN mean what they mean in IEEE 754.
 """
 
@@ -57,9 +57,14 @@ def _define_operator(function: Callable, emit: Callable, result: type) -> None:
         lower_builtin(function, left, right)(lower)
 
 
+PRODUCT = "product"
+"""What products of lanes are called in LLVM's text, where a lane of one cell and a number are of one type."""
+
+
 def _factors(value: Any) -> tuple[Any, Any] | None:
-    """The factors of what this block has multiplied."""
-    return tuple(value.operands) if getattr(value, "opname", None) == "fmul" else None
+    """The factors of lanes that this block has multiplied."""
+    of_lanes = getattr(value, "opname", None) == "fmul" and value.name.startswith(PRODUCT)
+    return tuple(value.operands) if of_lanes else None
 
 
 def _call(builder: Any, name: str, *values: Any) -> Any:
@@ -91,7 +96,7 @@ def _difference(builder: Any, x: Any, y: Any) -> Any:
 for _function, _emit in (
     (operator.add, _sum),
     (operator.sub, _difference),
-    (operator.mul, lambda b, x, y: b.fmul(x, y)),
+    (operator.mul, lambda b, x, y: b.fmul(x, y, PRODUCT)),
     (operator.truediv, lambda b, x, y: b.fdiv(x, y)),
 ):
     _define_operator(_function, _emit, Lane)
@@ -145,14 +150,12 @@ def _lower_invert(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.not_(args[0])
 
 
-def _llvm_function(name: str, arity: int) -> Any:
-    """An intrinsic that calls llvm.<name> on lanes; numbers among the arguments are broadcast."""
+def _function(emit: Callable, arity: int) -> Any:
+    """An intrinsic on lanes that `emit` builds; numbers among the arguments are broadcast."""
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         width = sig.return_type.width
-        return _call(
-            builder, name, *(as_lane(context, builder, v, t, width) for v, t in zip(args, sig.args, strict=True))
-        )
+        return emit(builder, *(as_lane(context, builder, v, t, width) for v, t in zip(args, sig.args, strict=True)))
 
     def typed(*arguments: Any) -> Any:
         width = common_width(arguments)
@@ -165,14 +168,31 @@ def _llvm_function(name: str, arity: int) -> Any:
     return intrinsic(lambda typingctx, x, y, z: typed(x, y, z))
 
 
+def _llvm_function(name: str, arity: int) -> Any:
+    """An intrinsic that calls llvm.<name> on lanes."""
+    return _function(lambda builder, *values: _call(builder, name, *values), arity)
+
+
+def _extreme(relation: str) -> Any:
+    """The one of two numbers that stands in a relation to the other; of a number and a NaN, the number.
+
+    Not maxnum and minnum of LLVM, whose version 22 vectorises loops over nodes that take maxima by them, and loses some.
+    """
+
+    def emit(builder: Any, x: Any, y: Any) -> Any:
+        second = builder.fcmp_ordered(relation, y, x)
+        return builder.select(builder.fcmp_unordered("uno", x, x), y, builder.select(second, y, x))
+
+    return _function(emit, 2)
+
+
 absolute = _llvm_function("fabs", 1)
 floor = _llvm_function("floor", 1)
 round_even = _llvm_function("rint", 1)
 sqrt = _llvm_function("sqrt", 1)
 copysign = _llvm_function("copysign", 2)
-# of a number and a NaN these two return the number
-minimum = _llvm_function("minnum", 2)
-maximum = _llvm_function("maxnum", 2)
+minimum = _extreme("<")
+maximum = _extreme(">")
 fma = _llvm_function("fma", 3)
 
 

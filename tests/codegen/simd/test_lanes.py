@@ -207,6 +207,21 @@ def test_the_first_product_of_a_sum_is_rounded_with_it(width):
         same(applied(name, width), applied("fma", 1, factor, B, term))
 
 
+@pytest.mark.parametrize("width", WIDTHS)
+def test_products_of_numbers_are_rounded_by_themselves(width):
+    @njit(error_model="numpy")
+    def add(a, b, numbers):
+        for i in range(a.size // width):
+            store(b, 2 * i, load(a, i, width) + numbers[0] * numbers[1])
+            store(b, 2 * i + 1, broadcast(numbers[0] * numbers[1], width) - load(a, i, width))
+
+    found = np.empty(16)
+    add(np.full(8, -0.01), found, np.array([0.1, 0.1]))
+    wide = found.reshape(-1, 2, width)
+    assert set(wide[:, 0].ravel()) == {0.1 * 0.1 - 0.01}
+    assert set(wide[:, 1].ravel()) == {0.1 * 0.1 + 0.01}
+
+
 @pytest.mark.parametrize("width", WIDTHS[1:])
 def test_widths_agree_in_a_long_expression(width):
     same(applied("long expression", width), applied("long expression", 1))

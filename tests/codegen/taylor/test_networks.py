@@ -84,6 +84,18 @@ def test_dense_output_of_loops_is_that_of_lines(name):
     assert np.abs(rows[0][0]).max() > 0.0
 
 
+def test_the_length_of_a_looped_step_is_that_of_the_largest_node_at_every_width():
+    """Scalar loops that take a maximum over nodes are what LLVM vectorises; a lost node lets the step be too long."""
+    scene = Scene("duffing", "spring", ring(9), parameters={"sigma": 0.3})
+    numbers = [scene.parameters[name] for name in scene.equations.parameters]
+    single, many = (compiled(scene.equations, 12, width, looped=True) for width in (1, 8))
+    dice = np.random.default_rng(3)
+    for trial in range(25):
+        starts, more = dice.normal(size=(8, 18)), {"t": float(trial), "scale": 2.0 ** (trial % 5 - 4)}
+        together, _, _ = many.step(starts, numbers, **more)
+        assert [single.step([start], numbers, **more)[0][0] for start in starts] == together.tolist()
+
+
 def test_a_looped_step_without_numbers_has_no_length():
     eq = CASES["pendula"]
     start, numbers = values(eq)

@@ -267,8 +267,8 @@ def test_functions_of_strength_take_the_keywords_of_exponents(function: Callable
 
 
 def test_draws_of_a_scene_are_refused() -> None:
-    drawn = scene("harmonic", "damper").replace(realisations=3, draws={"sigma": "uniform(0, 1)"})
-    with pytest.raises(ValueError, match="msf: found draws of sigma; expected a scene without them"):
+    drawn = scene("harmonic", "damper").replace(realisations=3, draws={"x": "uniform(0, 1)"})
+    with pytest.raises(ValueError, match="msf: found draws of x; expected a scene without them"):
         msf(drawn, [0.0, 1.0])
 
 
