@@ -34,6 +34,7 @@ from synchain.runtime.opening.open import open_result
 from synchain.runtime.sweeps.run import run
 from synchain.runtime.sweeps.stream import stream
 
+LONG = pytest.mark.long
 DICE = np.random.default_rng(5)
 THETA, OMEGA, K, LAG, REST, C = sp.symbols("theta omega K lag rest c")
 PHASE = Field({THETA: OMEGA}, parameters={OMEGA: 0})
@@ -89,8 +90,10 @@ def springs(n: int) -> tuple[Scene, Callable[[float, np.ndarray], np.ndarray]]:
     return Scene("harmonic", links=layers, parameters=numbers, initial=start, **EXACT), rhs
 
 
-@pytest.mark.parametrize("n", [5, 11])
-@pytest.mark.parametrize("make", [lagging, springs])
+@pytest.mark.parametrize(
+    ("make", "n"),
+    [(lagging, 5), (springs, 11), pytest.param(lagging, 11, marks=LONG), pytest.param(springs, 5, marks=LONG)],
+)
 def test_each_link_has_its_number(make: Callable[[int], tuple[Scene, Any]], n: int) -> None:
     """Written-out and looped steps of every family against SciPy's DOP853 on right-hand sides that were written by hand."""
     scene, rhs = make(n)
@@ -108,8 +111,18 @@ CASES: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("n", [4, 10])
-@pytest.mark.parametrize("name", CASES)
+LINES, LOOPS = ("set-valued", "driven"), ("inerter", "mixed")
+"""Cases whose written-out steps, and whose looped ones, are tested by default; the others take as long again."""
+
+
+@pytest.mark.parametrize(
+    ("name", "n"),
+    [
+        pytest.param(name, n, marks=() if name in own else LONG)
+        for own, n in ((LINES, 4), (LOOPS, 10))
+        for name in CASES
+    ],
+)
 def test_numbers_of_links_are_weights_of_the_graph(name: str, n: int) -> None:
     """Strengths of edges at run time move a network as exact weights do: contacts, inertia, several kinds, drives."""
     pairs = edges_of(ring(n))
@@ -208,7 +221,9 @@ def test_an_edge_draws_one_number_a_link_its_own() -> None:
 GRAPHS = [erdos_renyi(10, p=0.3, seed=k) for k in range(4)]
 
 
-@pytest.mark.parametrize(("oscillator", "coupling"), [("duffing", "spring"), ("rossler", "x->x")])
+@pytest.mark.parametrize(
+    ("oscillator", "coupling"), [("duffing", "spring"), pytest.param("rossler", "x->x", marks=LONG)]
+)
 def test_graphs_are_realisations(oscillator: str, coupling: str, tmp_path: Path) -> None:
     """Each realisation is the run on its graph to the last bit, links that it has not add nothing; files keep the graphs."""
     given = {**EXACT, "window": 3, "rtol": 1e-9, "record": ["sync_error"], "integrator": "dop853"}
