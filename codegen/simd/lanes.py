@@ -150,7 +150,7 @@ def _lower_invert(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.not_(args[0])
 
 
-def _function(emit: Callable, arity: int) -> Any:
+def _on_lanes(emit: Callable, arity: int) -> Any:
     """An intrinsic on lanes that `emit` builds; numbers among the arguments are broadcast."""
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -170,7 +170,7 @@ def _function(emit: Callable, arity: int) -> Any:
 
 def _llvm_function(name: str, arity: int) -> Any:
     """An intrinsic that calls llvm.<name> on lanes."""
-    return _function(lambda builder, *values: _call(builder, name, *values), arity)
+    return _on_lanes(lambda builder, *values: _call(builder, name, *values), arity)
 
 
 def _extreme(relation: str) -> Any:
@@ -183,7 +183,7 @@ def _extreme(relation: str) -> Any:
         second = builder.fcmp_ordered(relation, y, x)
         return builder.select(builder.fcmp_unordered("uno", x, x), y, builder.select(second, y, x))
 
-    return _function(emit, 2)
+    return _on_lanes(emit, 2)
 
 
 absolute = _llvm_function("fabs", 1)

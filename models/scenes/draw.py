@@ -22,7 +22,7 @@ from ..inputs.reader import Algebra, NoMeaning, parse
 from ..inputs.words import Word
 from .axis import LIMIT, Axis
 from .model import WEIGHTS, Model, union_of
-from .parameters import in_order
+from .parameters import by_name, in_order
 
 __all__ = [
     "GRAPH",
@@ -271,9 +271,8 @@ def _weights(model: Model, graphs: tuple[Topology, ...]) -> Iterable[tuple[str, 
     """The names and the values of the weights of graphs; 0 where a graph has no link."""
     links = model.link_names(WEIGHTS)
     rows = [{at[:2]: float(at[2]) for at in graph.links} for graph in graphs]
-    return [
-        (str(own), [row.get((own.target, own.source), 0.0) for row in rows]) for own in dict.fromkeys(links.values())
-    ]
+    found = [by_name("draw topology", links, {at: row.get(at, 0.0) for at in links}) for row in rows]
+    return [(str(own), [row[own] for row in found]) for own in found[0]]
 
 
 def _link_columns(
@@ -290,8 +289,9 @@ def _link_columns(
         return [(str(own), drawn[edges[own.target, own.source]]) for own in dict.fromkeys(links.values())]
     if len(how[0]) == 1 and name != WEIGHTS:
         return [(name, [row[0] for row in how])]
-    rows = [in_order(f"draw {name}", links, row if len(row) > 1 else row * len(links)) for row in how]
-    return [(str(own), [row[own.target, own.source] for row in rows]) for own in dict.fromkeys(links.values())]
+    tables = [in_order(f"draw {name}", links, row if len(row) > 1 else row * len(links)) for row in how]
+    rows = [by_name(f"draw {name}", links, table) for table in tables]
+    return [(str(own), [row[own] for row in rows]) for own in rows[0]]
 
 
 def _numbers(how: Draw, stream: str, count: int) -> list[float]:

@@ -14,7 +14,7 @@ from ..inputs.node_name import LinkName, NodeName
 from .axis import Axis
 from .model import WEIGHTS, Model, NodeKind, in_range
 
-__all__ = ["at_nodes", "collected", "drive", "in_order", "parameters", "varied", "without"]
+__all__ = ["at_nodes", "by_name", "collected", "drive", "in_order", "parameters", "varied", "without"]
 
 T = TypeVar("T")
 
@@ -132,12 +132,25 @@ def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:
             raise ValueError(
                 f"parameter {name!r}: found {found} where node {i + 1} feels node {j + 1}; expected one for each link, no others"
             )
+    checked = {at: in_range(str(own), table[at], parameter) for at, own in links.items()}
+    return by_name(f"parameter {name!r}", links, checked)
+
+
+def by_name(
+    what: str, links: Mapping[tuple[int, int], LinkName], table: Mapping[tuple[int, int], float]
+) -> dict[Place, float]:
+    """Return the numbers of links by the names of the links.
+
+    Raises
+    ------
+    ValueError
+        If a link that acts on both of its ends, which has one name, has two numbers.
+    """
     numbers: dict[Place, float] = {}
     for at, own in links.items():
-        number = in_range(str(own), table[at], parameter)
-        if numbers.setdefault(own, number) != number:
+        if numbers.setdefault(own, table[at]) != table[at]:
             raise ValueError(
-                f"parameter {name!r}: found {numbers[own]!r} and {number!r} at nodes {own.target + 1} and {own.source + 1}; "
+                f"{what}: found {numbers[own]!r} and {table[at]!r} at nodes {own.target + 1} and {own.source + 1}; "
                 "expected one number for both directions of a link that acts on both of its ends"
             )
     return numbers

@@ -366,7 +366,12 @@ def _strobe(scene: Scene, state: np.ndarray, periods: int, alpha: float) -> tupl
     start = np.zeros(len(scene.initial))
     start[: len(state)] = state
     orbits = Orbits.make(scene, np.array([alpha]), start[None], 1)
-    matrix = cycle_propagators(orbits, periods)[0, 0]
+    propagators, logarithms = cycle_propagators(orbits, periods)
+    if (size := float(logarithms[0, 0])) > 700.0:
+        raise FloatingPointError(
+            f"multipliers: found a deviation that grows by exp({size:.3g}); expected exp(700) at most"
+        )
+    matrix = propagators[0, 0] * math.exp(size)
     return orbits.state[0], matrix
 
 

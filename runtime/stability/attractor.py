@@ -5,6 +5,7 @@ The motion is a fixed point, a periodic orbit locked to the drive, or neither.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -13,7 +14,7 @@ import sympy as sp
 
 from synchain.models.dynamics.variational import MODE, Variation
 
-from .orbits import Orbits
+from .orbits import FAR, Orbits
 
 __all__ = ["Attractor", "Motion", "cycle_propagators", "find_attractor"]
 
@@ -48,12 +49,15 @@ class Attractor:
         motion, the matrix of the variational equation, twice. None for aperiodic motion.
     periods : int
         Drive periods of one cycle.
+    logarithms : float or ndarray, shape (2, m)
+        Logarithms of the factors that the propagators of a cycle are without.
     """
 
     motion: Motion
     cycle: float
     propagators: np.ndarray | None = field(default=None, repr=False)
     periods: int = 1
+    logarithms: np.ndarray | float = field(default=0.0, repr=False)
 
     @property
     def kind(self) -> str:
@@ -82,7 +86,7 @@ class Attractor:
             exponents = values.real.max(axis=-1)
         else:
             with np.errstate(divide="ignore"):
-                exponents = np.log(np.abs(values).max(axis=-1)) / self.cycle
+                exponents = (np.log(np.abs(values).max(axis=-1)) + self.logarithms) / self.cycle
         return exponents[1], np.abs(exponents[1] - exponents[0])
 
 
@@ -119,8 +123,9 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
         cycle = next((k + 1 for k, gap in enumerate(gaps) if gap < closed), 0)
         orbits.state[row] = orbit.state[0] = states[-1]
         if cycle:
-            propagators = np.concatenate([cycle_propagators(orbit, cycle) for _ in range(2)])
-            return Attractor(Motion.PERIODIC, cycle * orbit.unit, propagators, cycle)
+            both = [cycle_propagators(orbit, cycle) for _ in range(2)]
+            propagators, logarithms = (np.concatenate(parts) for parts in zip(*both, strict=True))
+            return Attractor(Motion.PERIODIC, cycle * orbit.unit, propagators, cycle, logarithms)
         if min(gaps) > 1e-3:
             break
         integrator.advance(max(1, round(patience)) * orbit.unit)
@@ -132,7 +137,7 @@ def _distance(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.abs(a - b).max() / max(1e-3, np.abs(b).max()))
 
 
-def cycle_propagators(orbit: Orbits, cycle: int) -> np.ndarray:
+def cycle_propagators(orbit: Orbits, cycle: int) -> tuple[np.ndarray, np.ndarray]:
     """Integrate the propagators of all modes over one cycle, from the current state.
 
     Parameters
@@ -144,15 +149,21 @@ def cycle_propagators(orbit: Orbits, cycle: int) -> np.ndarray:
 
     Returns
     -------
-    ndarray, shape (1, m, p, p)
-        Propagators of the m modes with p components each.
+    propagators : ndarray, shape (1, m, p, p)
+        Propagators of the m modes with p components each, without a factor.
+    logarithms : ndarray, shape (1, m)
+        Logarithm of this factor.
     """
     orbit.block, orbit.integrator = 1.0, orbit.integrator_of(orbit.strengths)
-    total = orbit.propagators()
+    total, logarithms = orbit.propagators()
     for _ in range(cycle - 1):
-        total = orbit.propagators() @ total
+        propagators, more = orbit.propagators()
+        total = propagators @ total
+        size = np.abs(total).max(axis=(-2, -1))
+        factor = np.where((size > math.exp(FAR)) | ((size < math.exp(-FAR)) & (size > 0.0)), size, 1.0)
+        total, logarithms = total / factor[..., None, None], logarithms + more + np.log(factor)
     orbit.state = orbit.integrator.state
-    return total
+    return total, logarithms
 
 
 def _states(variation: Variation) -> list[sp.Symbol]:

@@ -36,6 +36,9 @@ STEP, BLOCK = 200, 40_000
 BESIDE = 6
 """Nodes that cost a strength as much as what else is done for it in a block."""
 
+FAR = 300.0
+"""Logarithm of the size beyond which a factor of a propagator is kept apart; numbers end at 745."""
+
 TRIAL = 8
 """Blocks on which an interpolation is tried."""
 
@@ -226,13 +229,15 @@ class Orbits:
             basis[:, k, k :: self.components] = 1.0
         return basis
 
-    def propagators(self) -> np.ndarray:
+    def propagators(self) -> tuple[np.ndarray, np.ndarray]:
         """Advance by one block.
 
         Returns
         -------
-        ndarray, shape (starts, nodes, components, components)
-            Propagators of the nodes over the block.
+        propagators : ndarray, shape (starts, nodes, components, components)
+            Propagators of the nodes over the block, without a factor.
+        logarithms : ndarray, shape (starts, nodes)
+            Logarithm of this factor: 0 unless a propagator is larger than exp(FAR) or smaller than exp(-FAR).
 
         Raises
         ------
@@ -244,10 +249,12 @@ class Orbits:
         integrator, p, size = self.integrator, self.components, self.variation.size
         integrator.set_deviations(self._basis(integrator))
         growth = integrator.advance(self.block * self.unit)
-        columns = integrator.deviations * np.exp(growth)[:, None, :]
+        largest = growth.reshape(len(self.state), -1, p).max(axis=-1)
+        logarithms = np.where((np.abs(largest) > FAR) & np.isfinite(largest), largest, 0.0)
+        columns = integrator.deviations * np.exp(growth - np.repeat(logarithms, p, axis=-1))[:, None, :]
         if size != p:
             columns = columns[:, :p] + 1j * columns[:, p:]
-        return np.asarray(columns.reshape(len(self.state), p, -1, p).transpose(0, 2, 1, 3))
+        return np.asarray(columns.reshape(len(self.state), p, -1, p).transpose(0, 2, 1, 3)), logarithms
 
     def growths(self, batches: np.ndarray) -> np.ndarray:
         """Advance orbits and deviations by batches of blocks.

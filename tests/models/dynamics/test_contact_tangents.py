@@ -89,7 +89,7 @@ def test_the_propagator_of_a_law_with_a_jump_against_fifty_digits() -> None:
     scene = jumping().replace(rtol=1e-12)
     orbits = Orbits.make(scene, np.array([0.0]), np.array([[0.1, 0.1, 0.0]]), 1)
     orbits.block, orbits.integrator = 2.0, orbits.integrator_of(orbits.strengths)
-    found = orbits.propagators()[0, 0]
+    found = orbits.propagators()[0][0, 0]
     length = 4.0 * np.pi / JUMP["omega"]
     with mp.workdps(50):
         step = mpf(10) ** -15
@@ -107,7 +107,7 @@ def test_a_pair_out_of_phase_follows_its_mode() -> None:
     scene = jumping(sigma=0.15).replace(transient=0.0, window=2.0, record=(), rtol=1e-12)
     orbits = Orbits.make(scene, np.array([0.3]), np.array([[0.1, 0.1, 0.0]]), 1)
     orbits.block, orbits.integrator = 2.0, orbits.integrator_of(orbits.strengths)
-    found = orbits.propagators()[0, 0][:, 0]
+    found = orbits.propagators()[0][0, 0][:, 0]
     d = 1e-6
     end = run(scene, reduce=False, show_progress=False, x_1=0.1 + d, x_2=0.1 - d).states("end")
     np.testing.assert_allclose(found, (end[[0, 2]] - end[[1, 3]]) / (2 * d), rtol=1e-4)

@@ -252,7 +252,7 @@ def test_propagator_against_differences_of_the_flow(
     pair = scene.replace(topology=topology("chain", 2), initial={"x": [x, x], "v": [v, v]})
     orbits = Orbits.make(pair, np.array([0.0]), np.array([[x, v, 0.0]]), 1)
     orbits.block, orbits.integrator = 1.0, orbits.integrator_of(orbits.strengths)
-    found = orbits.propagators()[0, 0]
+    found = orbits.propagators()[0][0, 0]
     d = 1e-6
     by_x, by_v = (flow(scene, x + p, v + q) - flow(scene, x - p, v - q) for p, q in ((d, 0.0), (0.0, d)))
     expected = np.stack([by_x, by_v], axis=1) / (2 * d)

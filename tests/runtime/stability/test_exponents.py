@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from synchain.models import Field
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.averages import Batches
@@ -264,6 +265,28 @@ def test_functions_of_strength_take_the_keywords_of_exponents(function: Callable
         return [p for p in inspect.signature(of).parameters.values() if p.kind in (p.KEYWORD_ONLY, p.VAR_KEYWORD)]
 
     assert keywords(function) == keywords(exponents)
+
+
+@pytest.mark.parametrize(
+    ("given", "strengths"),
+    [
+        (
+            {"oscillator": Field({"x": "x - x**3 + 0.2*cos(w*t)"}, parameters={"w": 0.01}), "coupling": "x->x"},
+            [0.0, 2.0, -4.0],
+        ),
+        ({"oscillator": "duffing", "coupling": "x->x, v->v"}, [0.0, 120.0, -120.0]),
+    ],
+    ids=["slow drive", "large strengths"],
+)
+def test_deviations_may_grow_and_decay_beyond_the_range_of_numbers(
+    given: dict[str, object], strengths: list[float]
+) -> None:
+    """All components are coupled alike, so that a mode's exponent is that of the orbit less the strength."""
+    found = exponents(
+        Scene(**given, topology=topology("chain", 2), initial={"x": 1.0}, transient=5), strengths, starts=1
+    )
+    assert [a.kind for a in found.attractors] == ["periodic"]
+    np.testing.assert_allclose(found.exponent - found.exponent[0], np.negative(strengths), rtol=0, atol=2e-5)
 
 
 def test_draws_of_a_scene_are_refused() -> None:

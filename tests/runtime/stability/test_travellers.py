@@ -32,7 +32,7 @@ def expected(orbits: Orbits, block: float, blocks: int) -> np.ndarray:
     p, growth = orbits.components, 0.0
     vectors = np.full((len(orbits.state), len(orbits.strengths), p, 1), 1.0 / np.sqrt(p))
     for _ in range(blocks):
-        vectors = whole.propagators() @ vectors
+        vectors = whole.propagators()[0] @ vectors
         length = np.linalg.norm(vectors, axis=2, keepdims=True)
         growth, vectors = growth + np.log(length[:, :, 0, 0]), vectors / length
     return np.asarray(growth)

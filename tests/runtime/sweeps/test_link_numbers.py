@@ -259,6 +259,11 @@ def test_graphs_are_realisations(oscillator: str, coupling: str, tmp_path: Path)
             "found graphs of 4 nodes; expected graphs of 10 nodes",
         ),
         ({"realisations": 4, "draws": {"topology": GRAPHS, "W": uniform(0, 1)}}, "is drawn twice"),
+        (
+            {"realisations": 2, "draws": {"topology": [ring(10), one_way_ring(10)]}},
+            "draw topology: found 1.0 and 0.0 at nodes",
+        ),
+        ({"realisations": 1, "draws": {"W": [[*range(1, 21)]]}}, "draw W: found 1.0 and 3.0 at nodes 1 and 2"),
         ({"realisations": 4, "draws": {"topology": "ring"}}, "found 'ring'; expected a list of 4 graphs"),
         (
             {"realisations": 4, "draws": {"topology": GRAPHS}, "coupling": Rates({i.v: sp.cos(W + j.x - i.x)})},
