@@ -223,10 +223,20 @@ class Model:
 
     def parameter(self, name: str) -> Parameter | None:
         """Return the parameter that a name such as "a", "a_2" or "k_1_2" means, None if it means none."""
-        parts = self.node_parameter(name) or self.link_parameter(name)
+        parts = self.single(name)
         if parts is not None and parts.base == WEIGHTS and WEIGHTS not in self.parameters:
             return _WEIGHT
         return self.parameters.get(name if parts is None else parts.base)
+
+    def single(self, name: str) -> NodeName | LinkName | None:
+        """Return the parts of the name of a parameter of one node or link; ValueError if it means one of each."""
+        node, link = self.node_parameter(name), self.link_parameter(name)
+        if node is not None and link is not None:
+            raise ValueError(
+                f"parameter {name!r}: found {node.base!r} of a node and {link.base!r} of a link by this name; "
+                "expected one of them; rename the other"
+            )
+        return node or link
 
     def link_parameter(self, name: str) -> LinkName | None:
         """Return the parts of the name of a parameter of one link, "k_1_2"; None for any other name."""

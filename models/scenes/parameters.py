@@ -47,7 +47,7 @@ def parameters(model: Model, given: object, axes: Sequence[Axis]) -> Frozen[floa
         if not isinstance(name, str):
             raise TypeError(f"parameters: key {short_repr(name)} is a {type(name).__name__}; expected text")
         read.add(name, value)
-    single = (model.node_parameter(axis.name) or model.link_parameter(axis.name) for axis in axes)
+    single = (model.single(axis.name) for axis in axes)
     swept = {parts.base for parts in single if parts is not None}
     values: dict[str, float] = {}
     for name, value in read.shared.items():
@@ -74,7 +74,7 @@ class _Given:
     def add(self, name: str, value: Any) -> None:
         """Take one of the parameters; ValueError or TypeError as `parameters`."""
         model, known = self.model, self.model.parameters
-        place = model.node_parameter(name) or model.link_parameter(name)
+        place = model.single(name)
         if WEIGHTS not in known and (name if place is None else place.base) == WEIGHTS:
             raise ValueError(
                 f"parameter {name!r}: the graph has the weights of links; expected {WEIGHTS} on an axis or drawn"
@@ -251,7 +251,7 @@ def without(model: Model, values: Mapping[object, object], names: Iterable[str])
     gone = set(names)
 
     def kept(name: object) -> bool:
-        parts = (model.node_parameter(name) or model.link_parameter(name)) if isinstance(name, str) else None
+        parts = model.single(name) if isinstance(name, str) else None
         return parts is None or parts.base not in gone
 
     return {name: value for name, value in values.items() if kept(name)}

@@ -469,7 +469,7 @@ def _kept_parameters(given: Mapping[str, object], model: Model, numbers: Mapping
             links = dict.fromkeys(map(str, model.link_names(name).values()))
             kept[name] = tuple(numbers[own] for own in links or (str(NodeName(name, i)) for i in model.holders(name)))
         else:
-            parts = model.node_parameter(name) or model.link_parameter(name)
+            parts = model.single(name)
             kept[name] = numbers[parts.base] if parts else given[name]
     return kept
 

@@ -307,6 +307,16 @@ def test_wrong_numbers_are_refused(given: dict[str, Any], words: str) -> None:
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    "given",
+    [{"parameters": {"K_1_2": 3}}, {"axes": {"K_1_2": [1.0]}}, {"draws": {"K_1_2": normal(0, 1)}, "realisations": 1}],
+)
+def test_a_name_of_a_node_and_of_a_link_is_refused(given: dict[str, Any]) -> None:
+    node, link = Field({"x": "-K_1*x"}, parameters={"K_1": 1}), Rates({"x": "K*W*(x_j - x_i)"}, {"K": 0.1})
+    with pytest.raises(ValueError, match="found 'K_1' of a node and 'K' of a link by this name"):
+        Scene(node, link, chain(3), **given)
+
+
 def test_weights_of_layers_are_not_drawn() -> None:
     layers = [("spring", chain(3)), (DAMPED, chain(3))]
     with pytest.raises(ValueError, match="draw W: found 2 layers of links; expected one whose weights are drawn"):
