@@ -77,7 +77,8 @@ class _Given:
         place = model.single(name)
         if WEIGHTS not in known and (name if place is None else place.base) == WEIGHTS:
             raise ValueError(
-                f"parameter {name!r}: the graph has the weights of links; expected {WEIGHTS} on an axis or drawn"
+                f"parameter {name!r}: the graph has the weights of links; expected an axis such as {WEIGHTS}_1_2 = [0.5, 1], "
+                f"or draws of {WEIGHTS}"
             )
         if place is not None:
             self.single.setdefault(place.base, {})[place] = in_range(name, value, known[place.base])

@@ -290,7 +290,7 @@ CHAIN = Scene("rossler", "x->x", chain(3))
         ({"parameters": {"sigma": {0.1, 0.2}}}, "found a set, which has no order"),
         ({"parameters": {"sigma_1_3": 1.0}}, "unknown parameter 'sigma_1_3'"),
         ({"oscillator": "harmonic", "coupling": "spring", "parameters": {"sigma_2_1": 1}}, "expected 'sigma_1_2', the one number"),
-        ({"parameters": {"W": [1, 2]}}, "the graph has the weights of links; expected W on an axis or drawn"),
+        ({"parameters": {"W": [1, 2]}}, "the graph has the weights of links; expected an axis such as W_1_2 = [0.5, 1], or draws of W"),
         ({"parameters": {"W_1_2": 1.0}}, "the graph has the weights of links"),
         ({"axes": {"W": [1.0, 2.0]}}, "axis 'W': each link has a weight; expected that of one link, e.g. W_1_2"),
         ({"axes": {"sigma": [1.0]}, "parameters": {"sigma": [1, 2]}}, "expected the parameter of one, e.g. sigma_1_2"),
