@@ -173,7 +173,7 @@ def _layer(apart: Equations, link: Edge, graph: Topology, own: tuple[str, ...] =
     """
     shared = link.with_shared(apart.varied)
     if own:
-        return _listed_layer(((((0, 0), shared)),), graph, own, mutual)
+        return _listed_layer((((0, 0), shared),), graph, own, mutual)
     weight = None if graph.n <= FEW or apart.sticks else graph.all_to_all
     if weight is not None and separated(shared, apart.varied) is not None:
         return Layer((((0, 0), shared),), AllPairs(graph.n, weight))

@@ -286,9 +286,7 @@ class VariationalIntegrator:
         taken, blocks = int(counts[:, 1:3].sum()), int(panels[0].sum())
         if self.kernel.origin.method.series and taken:
             step = blocks * float(np.broadcast_to(length, cells).sum()) / taken
-            self.control[Control.FIRST_STEP] = (
-                step  # a Taylor step of any scale finds its length, only the first few gain
-            )
+            self.control[Control.FIRST_STEP] = step  # any scale finds its length, only the first few steps gain
             warn_of_stiff_modes(self.variation, end, self.numbers, self.strengths, step)
         self.state = end
         self.steps += taken
