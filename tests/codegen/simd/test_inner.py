@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 from numba import types
-from numba.core import utils
+from numba.core import errors, utils
 from numba.core.registry import cpu_target
 from numba.core.target_extension import get_local_target
 
 from synchain.codegen.simd import lanes  # noqa: F401  (defines the operators)
-from synchain.codegen.simd.decorator import njit
+from synchain.codegen.simd.decorator import njit, resolved_once
 from synchain.codegen.simd.lane_types import Lane
 
 
@@ -81,3 +81,25 @@ def test_negation_of_a_lane_is_tried_first(function: Any) -> None:
     templates = context.resolve_value_type(function).templates
     first = utils.order_by_target_specificity(get_local_target(context), templates)[0]
     assert first(context).apply((Lane(4),), {}).return_type == Lane(4)
+
+
+def test_the_meaning_of_an_operator_is_found_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    context = cpu_target.typing_context
+    context.refresh()
+    add = context.resolve_value_type(operator.add)
+    found = types.Function.get_call_type
+    monkeypatch.setattr(
+        types.Function, "get_call_type", lambda *request: (asked.append(request[2]), found(*request))[1]
+    )
+    counted = types.Function.get_call_type
+    pairs = [(Lane(4), Lane(4)), (types.float64, Lane(4)), [Lane(4), Lane(4)], (Lane(4), Lane(4))]
+    with resolved_once():
+        meanings = [add.get_call_type(context, pair, {}) for pair in pairs]
+        for _ in range(2):
+            with pytest.raises(errors.TypingError):
+                add.get_call_type(context, (Lane(4), Lane(8)), {})
+    assert meanings == [add.get_call_type(context, pair, {}) for pair in pairs]
+    assert asked[:4] == [*pairs[:2], *[(Lane(4), Lane(8))] * 2]
+    assert len(asked) == 4 + len(pairs)
+    assert types.Function.get_call_type is counted
