@@ -18,6 +18,7 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
 from ..program import functions
+from ..program.expressions import ONE, ZERO, Expression, Name, Negation, Number
 from ..program.lowering import lower
 from ..program.passes import Names
 from ..program.printers import LANES
@@ -41,8 +42,7 @@ from .series import (
     Time,
     Unknown,
 )  # fmt: skip
-from .terms import ONE, ZERO, Expr, Name, Number, add, times
-from .terms import Product as Factors
+from .terms import add, times
 
 __all__ = ["STARTS", "Graph", "Template", "is_analytic", "is_linear", "jump", "split"]
 
@@ -222,7 +222,7 @@ class Graph:
             self.series.append(self.known[key])
         return self.known[key]
 
-    def sum(self, terms: Sequence[tuple[Expr, Series]], constant: Expr = ZERO) -> Series:
+    def sum(self, terms: Sequence[tuple[Expression, Series]], constant: Expression = ZERO) -> Series:
         """constant + sum of factor * series; a difference and its negative share a series."""
         pairs = []
         for factor, series in terms:
@@ -340,7 +340,7 @@ class Graph:
             return self.kinked(e)
         return self.function(e)
 
-    def constant(self, e: sp.Expr) -> Expr:
+    def constant(self, e: sp.Expr) -> Expression:
         """What does not change within a step: a number, a parameter or a name for what is computed once."""
         if e.is_number:
             return Number(float(e if e.is_Rational else e.evalf(30)))
@@ -369,7 +369,7 @@ class Graph:
             self.constants[name], self.fixed[e] = text, Name(name)
         return self.fixed[e]
 
-    def scaled(self, e: sp.Expr) -> tuple[Expr, Series]:
+    def scaled(self, e: sp.Expr) -> tuple[Expression, Series]:
         """Constant factor and series of a term."""
         factors = sp.Mul.make_args(e)
         constant = sp.Mul(*(f for f in factors if not self.moves(f)))
@@ -528,7 +528,7 @@ def _degree(series: Series) -> float:
     return 1.0
 
 
-def split(series: Series) -> tuple[Expr, Series]:
+def split(series: Series) -> tuple[Expression, Series]:
     """The constant factor of a series and the rest."""
     if isinstance(series, Linear) and len(series.terms) == 1 and series.constant == ZERO:
         return series.terms[0]
@@ -543,8 +543,8 @@ def _sorted(factors: Iterable[sp.Expr]) -> list[sp.Expr]:
     return sorted(factors, key=sp.default_sort_key)
 
 
-def _negative(e: Expr) -> bool:
-    return (isinstance(e, Number) and e.value < 0.0) or (isinstance(e, Factors) and e.number < 0.0)
+def _negative(e: Expression) -> bool:
+    return (isinstance(e, Number) and e.value < 0.0) or isinstance(e, Negation)
 
 
 def _words() -> tuple[str, ...]:

@@ -15,6 +15,7 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME, Block, Edge, Node
 
+from ..program.expressions import ONE, ZERO, Call, Expression, Name, Number
 from ..program.passes import Body, Hoist, Names
 from ..program.printers import LANES
 from ..steps.fields import MeanField, compensated, mean_fields
@@ -37,7 +38,7 @@ from .step import (
     returned,
     unseen,
 )
-from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement
+from .terms import add, show, statement
 
 __all__ = ["write_looped"]
 
@@ -77,36 +78,36 @@ class Section:
     waves: dict[Series, Section] = field(default_factory=dict)
     kept: list[str] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
-    values: dict[Series, Expr] = field(default_factory=dict)
+    values: dict[Series, Expression] = field(default_factory=dict)
     sums: int = 0
 
     # -- what a recurrence asks for -------------------------------------------------------------------------------
 
     @property
-    def inverse(self) -> Expr:
+    def inverse(self) -> Expression:
         """1/k."""
         return Name("inverse")
 
     @property
-    def number(self) -> Expr:
+    def number(self) -> Expression:
         """k."""
         return Name("number")
 
-    def of(self, series: Series) -> Expr:
+    def of(self, series: Series) -> Expression:
         """Coefficient k of a series."""
         if isinstance(series, Constant):
             return ZERO
         return self.values[series]
 
-    def start(self, series: Series) -> Expr:
+    def start(self, series: Series) -> Expression:
         """Coefficient 0 of a series."""
         return series.value if isinstance(series, Constant) else self.values[series]
 
-    def before(self, series: Series) -> Expr:
+    def before(self, series: Series) -> Expression:
         """Coefficient k - 1 of a series."""
         return Name(self.load(series, "(k - 1)"))
 
-    def sum(self, left: Series, right: Series, first: int, last: int) -> Expr:
+    def sum(self, left: Series, right: Series, first: int, last: int) -> Expression:
         """Sum of left_j * right_(k-j) for j = first … k + last."""
         total = f"s{self.sums}"
         self.sums += 1
@@ -115,15 +116,15 @@ class Section:
         self.lines.append(f"{total} = convolution(dense, {ends}, k, {first}, {end})")
         return Name(total)
 
-    def square(self, base: Series, first: int) -> Expr:
+    def square(self, base: Series, first: int) -> Expression:
         """Sum of base_j * base_(k-j) for j = first … k - first."""
         return self.sum(base, base, first, -first)
 
-    def keep(self, what: str, value: Expr) -> str:
+    def keep(self, what: str, value: Expression) -> str:
         """Compute something once; returns its name."""
         if what not in self.kept:
             self.kept.append(what)
-            self.lines += [*statement(Assign(what, value)), f"store(dense, {self.slot(what, '0')}, {what} + 0.0*scale)"]
+            self.lines += [*statement(what, value), f"store(dense, {self.slot(what, '0')}, {what} + 0.0*scale)"]
         return what
 
     # -- places ---------------------------------------------------------------------------------------------------
@@ -173,7 +174,7 @@ class Section:
             value = s.begin(self) if first else s.coefficient(self)
             inline = s in (self.graph.inline_start if first else self.graph.inline) and s not in remembered
             if not inline and not isinstance(value, Name | Number):
-                self.lines += statement(Assign(s.name, value))
+                self.lines += statement(s.name, value)
                 value = Name(s.name)
             self.values[s] = value
             if s in remembered:
@@ -189,7 +190,7 @@ class Section:
                 text = f"{show(value)} + 0.0*scale" if isinstance(rate, Constant) else show(value)
                 self.lines.append(f"store(dense, at_rates + {place}, {text})")
             elif value != ZERO:
-                self.lines += statement(Assign("rate", add(Name(f"load(dense, at_rates + {place}, WIDTH)"), value)))
+                self.lines += statement("rate", add(Name(f"load(dense, at_rates + {place}, WIDTH)"), value))
                 self.lines.append(f"store(dense, at_rates + {place}, rate)")
 
     def ends(self, order: int) -> list[str]:
@@ -214,7 +215,7 @@ class Section:
         found = []
         for s in self.graph.gaps:
             sizes = {k: Call("absolute", (Name(self.load(s, str(k))),)) for k in (0, 1, 2, *orders)}
-            found += statement(Assign("largest", largest(sizes[k] for k in range(3))))
+            found += statement("largest", largest(sizes[k] for k in range(3)))
             found.append("weight = 1.0/(atol + rtol*largest)")
             found += [f"size_{k} = maximum(size_{k}, {show(sizes[k])}*weight)" for k in orders]
         for s in self.graph.watched:
@@ -243,7 +244,7 @@ class Totals(Section):
             value = self.start(rate) if first else self.of(rate)
             if value != ZERO:
                 self.lines += [
-                    *statement(Assign(f"{name}_value", value)),
+                    *statement(f"{name}_value", value),
                     *LANES.lines(compensated(name, f"{name}_value")),
                 ]
 

@@ -6,15 +6,15 @@ from collections.abc import Mapping
 
 from synchain.models.mechanics.components import Edge, Node
 
+from ..program.expressions import ONE, ZERO, Expression
 from ..steps.elimination import Entry, plan
 from ..steps.mass import added_masses
 from .graph import Graph, split
 from .series import Constant, Row, Series, Unknown
-from .terms import ONE, ZERO, Expr
 
 __all__ = ["moved", "solved"]
 
-Factor = tuple[Expr, Series]
+Factor = tuple[Expression, Series]
 
 
 def moved(part: Node | Edge) -> list[bool]:

@@ -16,7 +16,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from .terms import ONE, ZERO, Call, Expr, Name, Number, add, over, show, times
+from ..program.expressions import ONE, ZERO, Call, Expression, Name, Number
+from .terms import add, over, show, times
 
 __all__ = ["Choice", "Constant", "Integral", "Kink", "Linear", "Order", "Power", "Product", "QuotientIntegral", "Ratio",
            "Row", "Series", "Slope", "Square", "SquareRoot", "State", "Time", "Unknown"]  # fmt: skip
@@ -26,36 +27,36 @@ class Order(Protocol):
     """What a recurrence can ask for while coefficient k > 0 is made."""
 
     @property
-    def inverse(self) -> Expr:
+    def inverse(self) -> Expression:
         """1/k."""
 
     @property
-    def number(self) -> Expr:
+    def number(self) -> Expression:
         """k."""
 
-    def of(self, series: Series) -> Expr:
+    def of(self, series: Series) -> Expression:
         """Coefficient k of a series."""
 
-    def start(self, series: Series) -> Expr:
+    def start(self, series: Series) -> Expression:
         """Coefficient 0 of a series."""
 
-    def before(self, series: Series) -> Expr:
+    def before(self, series: Series) -> Expression:
         """Coefficient k - 1 of a series."""
 
-    def sum(self, left: Series, right: Series, first: int, last: int) -> Expr:
+    def sum(self, left: Series, right: Series, first: int, last: int) -> Expression:
         """Sum of left_j * right_(k-j) for j = first … k + last."""
 
-    def square(self, base: Series, first: int) -> Expr:
+    def square(self, base: Series, first: int) -> Expression:
         """Sum of base_j * base_(k-j) for j = first … k - first."""
 
 
 class Start(Protocol):
     """What a series can ask for while coefficient 0 is made."""
 
-    def start(self, series: Series) -> Expr:
+    def start(self, series: Series) -> Expression:
         """Coefficient 0 of a series."""
 
-    def keep(self, what: str, value: Expr) -> str:
+    def keep(self, what: str, value: Expression) -> str:
         """Compute something once; returns its name."""
 
 
@@ -81,11 +82,11 @@ class Series:
     def started(self) -> tuple[Series, ...]:
         return ()
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         """Coefficient 0."""
         raise NotImplementedError
 
-    def coefficient(self, at: Order) -> Expr:
+    def coefficient(self, at: Order) -> Expression:
         """Coefficient k > 0."""
         raise NotImplementedError
 
@@ -94,12 +95,12 @@ class Series:
 class Constant(Series):
     """A number, or what depends on parameters alone."""
 
-    value: Expr
+    value: Expression
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         return self.value
 
-    def coefficient(self, at: Order) -> Expr:
+    def coefficient(self, at: Order) -> Expression:
         return ZERO
 
 
@@ -119,17 +120,17 @@ class Time(Series):
 class Linear(Series):
     """constant + sum of factor * series."""
 
-    terms: tuple[tuple[Expr, Series], ...]
-    constant: Expr = ZERO
+    terms: tuple[tuple[Expression, Series], ...]
+    constant: Expression = ZERO
 
     @property
     def linear(self) -> tuple[Series, ...]:
         return tuple(series for _, series in self.terms)
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         return add(*(times(factor, at.start(series)) for factor, series in self.terms), self.constant)
 
-    def coefficient(self, at: Order) -> Expr:
+    def coefficient(self, at: Order) -> Expression:
         return add(*(times(factor, at.of(series)) for factor, series in self.terms))
 
 
@@ -144,10 +145,10 @@ class Product(Series):
     def convolved(self) -> tuple[Series, ...]:
         return self.left, self.right
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         return times(at.start(self.left), at.start(self.right))
 
-    def coefficient(self, at: Order) -> Expr:
+    def coefficient(self, at: Order) -> Expression:
         return at.sum(self.left, self.right, 0, 0)
 
 
@@ -161,10 +162,10 @@ class Square(Series):
     def convolved(self) -> tuple[Series, ...]:
         return (self.base,)
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         return times(at.start(self.base), at.start(self.base))
 
-    def coefficient(self, at: Order) -> Expr:
+    def coefficient(self, at: Order) -> Expression:
         return at.square(self.base, 0)
 
 
@@ -183,12 +184,12 @@ class SquareRoot(Series):
     def convolved(self) -> tuple[Series, ...]:
         return (self,)
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         root = Call("sqrt", (at.start(self.base),))
         self.inverse = at.keep(f"half_{self.name}", over(Number(0.5), root))
         return root
 
-    def coefficient(self, at: Order) -> Expr:
+    def coefficient(self, at: Order) -> Expression:
         return times(add(at.of(self.base), times(Number(-1.0), at.square(self, 1))), Name(self.inverse))
 
 
@@ -208,11 +209,11 @@ class Ratio(Series):
     def convolved(self) -> tuple[Series, ...]:
         return self, self.below
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         self.inverse = at.keep(f"i_{self.below.name}", over(ONE, at.start(self.below)))
         return times(at.start(self.above), Name(self.inverse))
 
-    def coefficient(self, at: Order) -> Expr:
+    def coefficient(self, at: Order) -> Expression:
         known = at.sum(self.below, self, 1, 0)
         return times(add(at.of(self.above), times(Number(-1.0), known)), Name(self.inverse))
 
@@ -227,10 +228,10 @@ class Slope(Series):
     def linear(self) -> tuple[Series, ...]:
         return (self.of,)
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         return ZERO
 
-    def coefficient(self, at: Order) -> Expr:
+    def coefficient(self, at: Order) -> Expression:
         return times(at.number, at.of(self.of))
 
 
@@ -259,10 +260,10 @@ class Integral(Series):
     def started(self) -> tuple[Series, ...]:
         return (self.argument,)
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         return Call(self.function, (at.start(self.argument),))
 
-    def coefficient(self, at: Order) -> Expr:
+    def coefficient(self, at: Order) -> Expression:
         if self.factor is None:
             raise RuntimeError(f"{self.name} has no derivative yet; this is a mistake in the program")
         return times(Number(self.number), at.inverse, at.sum(self.slope, self.factor, 1, 0))
@@ -275,7 +276,7 @@ class SquaredSecant(Integral):
     Where tanh(a) is 1 to the last digit u is small and not zero, so that the series tell how far away the layer is.
     """
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         secant = Name(at.keep(f"i_{self.name}", over(ONE, Call("cosh", (at.start(self.argument),)))))
         return Call("maximum", (times(secant, secant), Number(FAINT)))
 
@@ -299,11 +300,11 @@ class QuotientIntegral(Series):
     def convolved(self) -> tuple[Series, ...]:
         return (self.divisor,) if self.slope is None else (self.slope, self.divisor)
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         self.inverse = at.keep(f"i_{self.divisor.name}", over(ONE, at.start(self.divisor)))
         return Call(self.function, (at.start(self.argument),))
 
-    def coefficient(self, at: Order) -> Expr:
+    def coefficient(self, at: Order) -> Expression:
         if self.slope is None:
             raise RuntimeError(f"{self.name} has no slope yet; this is a mistake in the program")
         known = times(Number(-1.0), at.inverse, at.sum(self.slope, self.divisor, 1, -1))
@@ -316,7 +317,7 @@ class Power(Series):
 
     base: Series
     slope: Slope
-    exponent: Expr
+    exponent: Expression
     inverse: str = ""
     beyond: str = ""
 
@@ -324,13 +325,13 @@ class Power(Series):
     def convolved(self) -> tuple[Series, ...]:
         return self, self.slope, self.base
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         base = at.start(self.base)
         self.inverse = at.keep(f"i_{self.base.name}", over(ONE, base))
         self.beyond = at.keep(f"e_{self.name}", add(self.exponent, ONE))
         return Call("power", (base, self.exponent))
 
-    def coefficient(self, at: Order) -> Expr:
+    def coefficient(self, at: Order) -> Expression:
         grown = times(at.inverse, Name(self.beyond), at.sum(self.slope, self, 1, 0))
         return times(add(grown, times(Number(-1.0), at.sum(self.base, self, 1, 0))), Name(self.inverse))
 
@@ -350,7 +351,7 @@ class Kink(Series):
     def convolved(self) -> tuple[Series, ...]:
         return self.base, self
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         parts = [at.start(self.base)]
         if isinstance(self.base, Linear):
             parts = [times(factor, at.start(series)) for factor, series in self.base.terms]
@@ -358,7 +359,7 @@ class Kink(Series):
         self.size = at.keep(f"size_{self.name}", add(*map(_absolute, parts)))
         return Call("side_of", (at.start(self.base), Name(f"ROUNDING*{self.size}")))
 
-    def coefficient(self, at: Order) -> Expr:
+    def coefficient(self, at: Order) -> Expression:
         side, value = at.before(self), at.of(self.base)
         if value == ZERO:
             return side
@@ -377,18 +378,18 @@ class Choice(Series):
     def linear(self) -> tuple[Series, ...]:
         return self.kink, self.above, self.below
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         return _chosen(at.start(self.kink), at.start(self.above), at.start(self.below))
 
-    def coefficient(self, at: Order) -> Expr:
+    def coefficient(self, at: Order) -> Expression:
         return _chosen(at.of(self.kink), at.of(self.above), at.of(self.below))
 
 
-def _absolute(e: Expr) -> Expr:
+def _absolute(e: Expression) -> Expression:
     return Number(abs(e.value)) if isinstance(e, Number) else Call("absolute", (e,))
 
 
-def _chosen(side: Expr, above: Expr, below: Expr) -> Expr:
+def _chosen(side: Expression, above: Expression, below: Expression) -> Expression:
     if above == below:
         return above
     if above == times(Number(-1.0), below):
@@ -406,20 +407,20 @@ class Row(Series):
     """
 
     right: Series
-    entries: dict[int, tuple[Expr, Series]]
+    entries: dict[int, tuple[Expression, Series]]
     before: tuple[Row, ...]
     symmetric: bool
     unknowns: tuple[Unknown, ...] = ()
-    lower: dict[int, Expr] = field(default_factory=dict)
-    upper: dict[int, Expr] = field(default_factory=dict)
-    inverse: Expr = ONE
+    lower: dict[int, Expression] = field(default_factory=dict)
+    upper: dict[int, Expression] = field(default_factory=dict)
+    inverse: Expression = ONE
 
     @property
     def linear(self) -> tuple[Series, ...]:
         return self.right, *self.before
 
     @property
-    def moving(self) -> list[tuple[Expr, Series, Unknown]]:
+    def moving(self) -> list[tuple[Expression, Series, Unknown]]:
         """The entries that change within a step, each with the unknown that it multiplies."""
         pairs = [(factor, series, self.unknowns[c]) for c, (factor, series) in self.entries.items()]
         return [found for found in pairs if not isinstance(found[1], Constant)]
@@ -428,15 +429,15 @@ class Row(Series):
     def convolved(self) -> tuple[Series, ...]:
         return tuple(s for _, series, unknown in self.moving for s in (series, unknown))
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         self.factorise(at)
         return add(at.start(self.right), *self.known(at.start))
 
-    def coefficient(self, at: Order) -> Expr:
+    def coefficient(self, at: Order) -> Expression:
         pushed = (times(Number(-1.0), factor, at.sum(series, a, 1, 0)) for factor, series, a in self.moving)
         return add(at.of(self.right), *pushed, *self.known(at.of))
 
-    def known(self, value: Callable[[Series], Expr]) -> list[Expr]:
+    def known(self, value: Callable[[Series], Expression]) -> list[Expression]:
         """What earlier rows take off."""
         return [times(Number(-1.0), e, value(self.before[k])) for k, e in self.lower.items()]
 
@@ -468,13 +469,13 @@ class Unknown(Series):
     def linear(self) -> tuple[Series, ...]:
         return self.row, *self.after.values()
 
-    def begin(self, at: Start) -> Expr:
+    def begin(self, at: Start) -> Expression:
         return self.value(at.start)
 
-    def coefficient(self, at: Order) -> Expr:
+    def coefficient(self, at: Order) -> Expression:
         return self.value(at.of)
 
-    def value(self, of: Callable[[Series], Expr]) -> Expr:
+    def value(self, of: Callable[[Series], Expression]) -> Expression:
         """One coefficient, from those of the others."""
         known = (times(Number(-1.0), e, of(self.after[c])) for c, e in self.row.upper.items())
         return times(add(of(self.row), *known), self.row.inverse)

@@ -15,12 +15,13 @@ import sympy as sp
 from synchain.models.dynamics.equations import Equations
 from synchain.models.mechanics.components import TIME
 
+from ..program.expressions import ONE, ZERO, Call, Expression, Name, Number
 from ..program.passes import Names
 from .graph import STARTS, Graph, Template
 from .masses import moved, solved
 from .passage import PASSAGE
 from .series import Constant, Series, State, Time
-from .terms import ONE, ZERO, Assign, Call, Expr, Name, Number, add, show, statement, times
+from .terms import add, show, statement, times
 
 __all__ = [
     "FARTHEST",
@@ -119,42 +120,42 @@ class TaylorStep:
 class Written:
     """Coefficients that were made so far, as names and numbers; it is the `Order` and the `Start` of straight lines."""
 
-    values: dict[tuple[Series, int], Expr]
-    kept: dict[str, Expr]
-    lines: list[Assign]
+    values: dict[tuple[Series, int], Expression]
+    kept: dict[str, Expression]
+    lines: list[tuple[str, Expression]]
     k: int = 0
 
     # -- what a recurrence asks for -------------------------------------------------------------------------------
 
     @property
-    def inverse(self) -> Expr:
+    def inverse(self) -> Expression:
         """1/k."""
         return Number(1.0 / self.k)
 
     @property
-    def number(self) -> Expr:
+    def number(self) -> Expression:
         """k."""
         return Number(float(self.k))
 
-    def at(self, series: Series, j: int) -> Expr:
+    def at(self, series: Series, j: int) -> Expression:
         """Coefficient j of a series."""
         if isinstance(series, Constant):
             return ZERO if j else series.value
         return self.values[series, j]
 
-    def of(self, series: Series) -> Expr:
+    def of(self, series: Series) -> Expression:
         """Coefficient k of a series."""
         return self.at(series, self.k)
 
-    def start(self, series: Series) -> Expr:
+    def start(self, series: Series) -> Expression:
         """Coefficient 0 of a series."""
         return self.at(series, 0)
 
-    def before(self, series: Series) -> Expr:
+    def before(self, series: Series) -> Expression:
         """Coefficient k - 1 of a series."""
         return self.at(series, self.k - 1)
 
-    def sum(self, left: Series, right: Series, first: int, last: int) -> Expr:
+    def sum(self, left: Series, right: Series, first: int, last: int) -> Expression:
         """Sum of left_j * right_(k-j) for j = first … k + last.
 
         The latest coefficients come last, so that the processor can add up all others before they are known.
@@ -163,27 +164,27 @@ class Written:
         order = sorted(range(first, k + last + 1), key=lambda j: max(j, k - j))
         return add(*(times(self.at(left, j), self.at(right, k - j)) for j in order))
 
-    def square(self, base: Series, first: int) -> Expr:
+    def square(self, base: Series, first: int) -> Expression:
         """Sum of base_j * base_(k-j) for j = first … k - first, pairs of equal products once."""
         k = self.k
         half = add(*(times(self.at(base, j), self.at(base, k - j)) for j in reversed(range(first, (k + 1) // 2))))
         middle = self.at(base, k // 2) if k % 2 == 0 and k // 2 >= first else ZERO
         return add(times(middle, middle), times(Number(2.0), half))
 
-    def keep(self, what: str, value: Expr) -> str:
+    def keep(self, what: str, value: Expression) -> str:
         """Compute something once; returns its name."""
         if what not in self.kept:
             self.kept[what] = value
-            self.lines.append(Assign(what, value))
+            self.lines.append((what, value))
         return what
 
     # -- statements -----------------------------------------------------------------------------------------------
 
-    def put(self, series: Series, value: Expr, inline: bool = False) -> None:
+    def put(self, series: Series, value: Expression, inline: bool = False) -> None:
         """Name a coefficient, unless it is a name or a number or is written where it is used."""
         if not inline and not isinstance(value, Name | Number):
             name = f"{series.name}_{self.k}"
-            self.lines.append(Assign(name, value))
+            self.lines.append((name, value))
             value = Name(name)
         self.values[series, self.k] = value
 
@@ -216,7 +217,7 @@ class StepWriter:
 
     def read(self) -> list[Series]:
         """The rates of the states that move: those of the node, and what each link adds."""
-        eq, terms = self.equations, dict[int, list[tuple[Expr, Series]]]()
+        eq, terms = self.equations, dict[int, list[tuple[Expression, Series]]]()
         shared = self.supply.fresh("shared_")
         nodes = [Template.of(node.rhs, (TIME, *node.state), shared) for node in eq.nodes]
         edges = {edge: Template.of(edge.rhs, (TIME, *edge.here, *edge.there), shared) for edge in eq.edges}
@@ -232,7 +233,7 @@ class StepWriter:
 
     def masses(self) -> dict[tuple[int, int], Series]:
         """The entries of M."""
-        eq, terms = self.equations, dict[tuple[int, int], list[tuple[Expr, Series]]]()
+        eq, terms = self.equations, dict[tuple[int, int], list[tuple[Expression, Series]]]()
         shared = self.supply.fresh("shared_")
         nodes = [Template.of([e for row in node.inertia for e in row], node.state, shared) for node in eq.nodes]
         ends = {edge: (*edge.here, *edge.there) for edge in eq.edges}
@@ -271,8 +272,8 @@ class StepWriter:
 
     def flush(self) -> None:
         """Turn statements into text."""
-        for assign in self.at.lines:
-            self.put(*statement(assign))
+        for target, value in self.at.lines:
+            self.put(*statement(target, value))
         self.at.lines.clear()
 
     def write(self) -> list[str]:
@@ -313,7 +314,7 @@ class StepWriter:
             at.put(s, s.coefficient(at), s in self.graph.inline)
         self.flush()
 
-    def state_at(self, slot: int, k: int) -> Expr:
+    def state_at(self, slot: int, k: int) -> Expression:
         """Coefficient k of a state."""
         if slot not in self.states:
             return ZERO if k else Name(self.called[self.equations.state[slot]])
@@ -323,7 +324,7 @@ class StepWriter:
         """The length of the step."""
         p = self.order
         self.put("# step length")
-        sizes: dict[int, list[Expr]] = {p: [], p - 1: [], p - 2: []}
+        sizes: dict[int, list[Expression]] = {p: [], p - 1: [], p - 2: []}
         for series in (*self.states.values(), *self.graph.gaps):
             last = {k: e for k in sizes if (e := self.at.at(series, k)) != ZERO}
             if not last:
@@ -332,14 +333,14 @@ class StepWriter:
             self.put(f"w_{series.name} = 1.0/(atol + rtol*{show(size)})")
             for k, e in last.items():
                 sizes[k].append(times(Call("absolute", (e,)), Name(f"w_{series.name}")))
-        reaches: list[Expr] = []
+        reaches: list[Expression] = []
         for k, found in sizes.items():
             if found:
-                self.put(*statement(Assign(f"size_{k}", largest(found))))
+                self.put(*statement(f"size_{k}", largest(found)))
                 reaches.append(times(Number(-1.0 / k), Call("log", (Name(f"size_{k}"),))))
         if not reaches:
             reaches = [Name("-log(0.0*scale)")]
-        self.put(*statement(Assign("reach", extreme("minimum", reaches))))
+        self.put(*statement("reach", extreme("minimum", reaches)))
         if self.graph.watched:
             self.put("unseen = 0.0*scale")
             for s in self.graph.watched:
@@ -388,7 +389,7 @@ def broken(end: str, start: str) -> str:
     return f"total = total + 0.0*log({end}/({start}))"
 
 
-def polynomial(name: str, coefficients: Sequence[Expr]) -> list[str]:
+def polynomial(name: str, coefficients: Sequence[Expression]) -> list[str]:
     """The lines for n_<name>, a polynomial in `ratio`: two in ratio**2 of half the degree are ready sooner than one."""
     start, *known = coefficients
     lines: list[str] = []
@@ -397,7 +398,7 @@ def polynomial(name: str, coefficients: Sequence[Expr]) -> list[str]:
     return [*lines, f"n_{name} = {show(add(times(slope, Name('ratio')), start))}"]
 
 
-def _horner(lines: list[str], name: str, coefficients: Sequence[Expr]) -> Expr:
+def _horner(lines: list[str], name: str, coefficients: Sequence[Expression]) -> Expression:
     """A polynomial in ratio**2, its lines appended."""
     known = list(coefficients)
     while known and known[-1] == ZERO:
@@ -442,7 +443,7 @@ def check_order(order: int) -> None:
         raise ValueError(f"taylor: found order {order}; expected at least 6")
 
 
-def unseen(coefficients: Sequence[Expr]) -> list[str]:
+def unseen(coefficients: Sequence[Expression]) -> list[str]:
     """How much larger the high coefficients of a series are than its low ones, the largest so far."""
     half = len(coefficients) // 2
     low, high = (
@@ -452,8 +453,8 @@ def unseen(coefficients: Sequence[Expr]) -> list[str]:
     if not (low and high):
         return []
     return [
-        *statement(Assign("high", largest(high))),
-        *statement(Assign("low", largest(low))),
+        *statement("high", largest(high)),
+        *statement("low", largest(low)),
         f"unseen = maximum(unseen, high/(low + ({HIDDEN!r}*high + {LOST!r}*atol)))",
     ]
 
@@ -486,19 +487,19 @@ def returned(kinks: bool) -> str:
     return f"return {'until, ' if kinks else ''}{length}  # NaN where any coefficient is infinite or NaN"
 
 
-def lane(value: Expr) -> str:
+def lane(value: Expression) -> str:
     """The text of a value that is stored: numbers become lanes."""
     if isinstance(value, Number):
         return f"broadcast({show(value)}, WIDTH)"
     return show(value)
 
 
-def largest(values: Iterable[Expr]) -> Expr:
+def largest(values: Iterable[Expression]) -> Expression:
     """The largest of some values."""
     return extreme("maximum", list(values))
 
 
-def extreme(function: str, values: Sequence[Expr]) -> Expr:
+def extreme(function: str, values: Sequence[Expression]) -> Expression:
     """Nested calls of a function of two values."""
     if len(values) == 1:
         return values[0]

@@ -17,11 +17,12 @@ from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.variational import Variation
 from synchain.models.mechanics.components import TIME
 
+from ..program.expressions import ONE, ZERO, Call, Expression, Name, Number
 from ..program.passes import Names
 from .graph import Graph, Template, is_analytic
 from .series import Series, State
 from .step import StepWriter, TaylorStep, Written, check_order, extreme, largest, polynomial
-from .terms import ONE, ZERO, Call, Expr, Name, Number, add, show, statement, times
+from .terms import add, show, statement, times
 
 __all__ = ["TangentStep", "write_tangent"]
 
@@ -76,7 +77,7 @@ class OrbitWriter(StepWriter):
 
     Attributes
     ----------
-    wanted : list of Expr
+    wanted : list of Expression
         The coefficients, in the symbols of the network.
     called_so : dict
         What each of them is called in the step of a mode; those that are one series have one name.
@@ -89,7 +90,7 @@ class OrbitWriter(StepWriter):
     def __init__(self, equations: Equations, order: int, wanted: Sequence[sp.Expr]) -> None:
         self.wanted = list(wanted)
         self.called_so: dict[sp.Expr, str] = {}
-        self.left: dict[tuple[str, int], Expr] = {}
+        self.left: dict[tuple[str, int], Expression] = {}
         self.places: dict[str, int] = {}
         super().__init__(equations, order)
 
@@ -141,11 +142,11 @@ class ModeWriter:
 
     def rate(self, row: int) -> Series:
         """The rate of a deviation: each entry is what does not move times it, and convolutions for what does."""
-        terms: list[tuple[Expr, Series]] = []
+        terms: list[tuple[Expression, Series]] = []
         for (r, c), e in self.variation.matrix:
             if r != row:
                 continue
-            fixed: Expr = ZERO
+            fixed: Expression = ZERO
             for coefficient, strength in _parted(self.variation, e):
                 series = self.outer[self.orbit.called_so[coefficient]]
                 if self.moves(series):
@@ -187,7 +188,7 @@ class ModeWriter:
 
     def flush(self) -> None:
         """Turn statements into text."""
-        self.lines += [line for assign in self.at.lines for line in statement(assign)]
+        self.lines += [line for assign in self.at.lines for line in statement(*assign)]
         self.at.lines.clear()
 
     def coefficients(self, k: int) -> None:
@@ -207,7 +208,7 @@ class ModeWriter:
         """The length of the step: the last three coefficients are small beside the deviation at its beginning."""
         self.lines += ["# step length", f"size = {show(largest(_sizes(self.at.at(s, 0) for s in self.deviations)))}"]
         self.lines.append("weight = 1.0/(tolerance*size + 2.2250738585072014e-308)")
-        reaches: list[Expr] = []
+        reaches: list[Expression] = []
         fits = []
         for k in (self.order, self.order - 1, self.order - 2):
             last = [e for s in self.deviations if (e := self.at.at(s, k)) != ZERO]
@@ -254,16 +255,16 @@ def write_tangent(variation: Variation, order: int) -> TangentStep:
     return TangentStep(step, (COMMON, ModeWriter(variation, orbit).write(), CARRY), HEAD + len(orbit.places))
 
 
-def _parted(variation: Variation, e: sp.Expr) -> Iterator[tuple[sp.Expr, Expr]]:
+def _parted(variation: Variation, e: sp.Expr) -> Iterator[tuple[sp.Expr, Expression]]:
     """An entry of A as coefficients times strengths of a mode."""
     rest = e.xreplace(dict.fromkeys(variation.parameters, sp.S.Zero))
-    strengths: list[tuple[sp.Expr, Expr]] = [(e.diff(s), Name(s.name)) for s in variation.parameters]
+    strengths: list[tuple[sp.Expr, Expression]] = [(e.diff(s), Name(s.name)) for s in variation.parameters]
     for coefficient, strength in ((rest, ONE), *strengths):
         if coefficient != 0:
             yield coefficient, strength
 
 
-def _sizes(values: Iterable[Expr]) -> list[Expr]:
+def _sizes(values: Iterable[Expression]) -> list[Expression]:
     return [Call("absolute", (e,)) for e in values]
 
 
