@@ -130,6 +130,13 @@ def test_strengths_are_those_of_the_sweep(changes: dict[str, object], ends: tupl
     assert (line[0], line[-1], len(line)) == (*map(pytest.approx, ends), 5)
 
 
+def test_the_function_of_a_swept_scene_is_that_of_its_own_values() -> None:
+    scene = Scene("harmonic", "spring", topology("chain", 2), record=(), transient=1, window=1)
+    words = "The sweep moves x_1, v_1; this function"
+    assert words in report(scene.replace(axes={"sigma": [0.2], "x_1": [0.1, 0.2], "v_1": [0.0, 0.1]}), FAST)
+    assert "The sweep moves" not in report(scene.replace(axes={"sigma": [0.2, 0.4]}), FAST)
+
+
 @pytest.mark.parametrize(("record", "pictures"), [(("sync_error",), 3), ((), 2)])
 def test_observables_and_the_sweep_are_shown(record: tuple[str, ...], pictures: int) -> None:
     scene = Scene(
