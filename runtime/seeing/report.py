@@ -144,11 +144,12 @@ def _strengths(scene: Scene, count: int) -> np.ndarray:
 
 
 def _ends(found: MSF) -> str:
-    """A sentence if a range goes on beyond the grid."""
-    ends = {end for interval in found.intervals for end in interval}
-    last = [f"{end:g}" for end in found.fine.alpha[[0, -1]] if end and end in ends]
-    words = " and at ".join(last)
-    return f'<p class="quiet">The range that ends at alpha = {words} ends there with the grid.</p>' if last else ""
+    """A sentence if a range goes on beyond the grid; strengths begin at 0."""
+    first, last = found.fine.alpha[[0, -1]]
+    cut = [low for low, _ in found.intervals if low == first != 0.0]
+    cut += [high for _, high in found.intervals if high == last]
+    words = " and at ".join(f"{end:g}" for end in cut)
+    return f'<p class="quiet">The range that ends at alpha = {words} ends there with the grid.</p>' if cut else ""
 
 
 def _fixed(scene: Scene) -> str:
