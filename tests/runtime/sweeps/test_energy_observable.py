@@ -109,7 +109,7 @@ i, j, W = ends(load_oscillator("harmonic"))
     [
         ({"oscillator": "rossler", "coupling": "x->x"}, "observe e: energy: oscillator 'rossler' is a vector field"),
         ({"coupling": Rates({i.v: W * (j.x - i.x)})}, "observe e: energy: the coupling 'rates of v' has none"),
-        ({"topology": one_way_ring(3)}, "has one-way links; expected links both ways"),
+        ({"topology": one_way_ring(3)}, "found one-way links, first from 2 to 1 in one_way_ring(3); expected links"),
         ({"oscillator": "friction", "contact": "set-valued"}, "set-valued friction does work"),
         ({"observe": {"e": "mean(nodes.sum(energy))"}}, "expected the energy of the whole network outside of nodes"),
         ({"observe": {"e": "mean(rate(energy))"}}, "expected the rate of a state"),
