@@ -262,7 +262,8 @@ def transversal(
     reporter = averaging.reporter()
     orbits = Orbits.make(scene, strengths, initial_states(scene, starts, averaging.seed), averaging.execution.size)
     with reporter:
-        orbits.settle(averaging.transient, reporter.advance)
+        if not orbits.linear:
+            orbits.settle(averaging.transient, reporter.advance)
         attractors = tuple(find_attractor(orbits, row, averaging.transient) for row in range(starts))
         by_start, error, length = _by_start(orbits, attractors, averaging, reporter)
     largest = max(group_by_attractor(attractors, by_start), key=len)
