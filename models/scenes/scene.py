@@ -338,9 +338,11 @@ class Scene(Drawn, Written):
         single = {name: changes.pop(name) for name in tuple(changes) if name not in self.given and self.takes(name)}
         strange = next((name for name in changes if name not in self.given), None)
         if strange is not None:
-            names = (*self.parameters, *self.given)
+            names, reason = (*self.parameters, *self.given), self.model.no_link(strange)
             raise TypeError(
-                f"unknown parameter or keyword {strange!r}; known: {', '.join(names)}{suggestion(strange, names)}"
+                f"unknown parameter {strange!r}; {reason}"
+                if reason
+                else f"unknown parameter or keyword {strange!r}; known: {', '.join(names)}{suggestion(strange, names)}"
             )
         if changes.get("topology") is not None:
             changes["topology"] = as_topology(changes["topology"])

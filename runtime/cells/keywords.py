@@ -140,6 +140,9 @@ class Given:
             return f"{of} takes no {name!r}: {self.refused[name]}"
         if name in KEYWORDS:
             return f"{of}: {name!r} is a field of the scene; expected parameters; write scene.replace({name}=…)"
+        reason = scene.model.no_link(name)
+        if reason:
+            return f"{of}: unknown parameter {name!r}; {reason}"
         initial = scene.equations.state if states else ()
         words = suggestion(name, (*scene.parameters, *initial, *own)) or suggestion(name, KEYWORDS)
         shown = initial if len(initial) <= SHOWN else (f"{initial[0]} … {initial[-1]}",)
