@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -67,6 +68,14 @@ def test_a_motion_without_bound_is_refused_with_a_remedy() -> None:
         lyapunov_spectrum(growing, show_progress=False)
     found = lyapunov_spectrum(growing.replace(initial={"x": 0.0}), periods=50, transient=0, show_progress=False)
     np.testing.assert_allclose(found.exponent, 0.5, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("strengths", "words"), [([0.0, 1e300], "1e+300"), ([-2e16 + 1e16j], "2.23607e+16")])
+def test_strengths_that_no_step_resolves_are_named(strengths: list[complex], words: str) -> None:
+    """Modes of Duffing's oscillator with frequencies of 1e8 and more: the mode, and not the orbit, is what fails."""
+    stiff = scene("duffing", "spring").replace(max_steps=1000)
+    with pytest.raises(FloatingPointError, match=re.escape(f"deviations of strengths up to {words} cannot be")):
+        exponents(stiff, strengths, starts=1, transient=1, show_progress=False)
 
 
 def test_a_fixed_point_has_the_eigenvalues_of_its_jacobian() -> None:
