@@ -136,7 +136,9 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name in _HOMES:
-        value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+        from .inputs.keywords import public
+
+        value = public(getattr(import_module(f".{_HOMES[name]}", __name__), name), __name__)
     elif name.startswith("_") or name not in _families():
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     else:

@@ -24,6 +24,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from synchain.models.inputs.keywords import public
+
 if TYPE_CHECKING:
     from .bifurcation.branches import Branch, follow
     from .bifurcation.periodic import PeriodicOrbit, periodic_orbit
@@ -124,7 +126,7 @@ def __getattr__(name: str) -> Any:
     """Import a public name when it is first used, so that the command line starts fast."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has: {', '.join(__all__)}")
-    return getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
+    return public(getattr(importlib.import_module(f".{_HOME[name]}", __name__), name), __name__)
 
 
 def __dir__() -> list[str]:

@@ -145,6 +145,38 @@ def test_what_a_function_cannot_use_is_refused_with_the_reason(name: str, word: 
         calls(DRIVEN, tmp_path / "a.nc")[name](**{word: 1})
 
 
+ONE_CELL = [(name, n) for name in sorted(set(TAKEN) - {"run", "stream"}) for n in (1, 2) if (name, n) != ("basin", 1)]
+
+
+@pytest.mark.parametrize(("name", "n"), ONE_CELL)
+@pytest.mark.parametrize(
+    ("changes", "remedy"),
+    [
+        (
+            {"axes": {"omega": [1.2, 1.3], "x_1": [0.0, 0.1]}, "zipped": True},
+            r"axes of omega, x_1; .*replace\(axes=\(\)\)",
+        ),
+        ({"draws": {"x": "normal(0, 1)"}, "realisations": 2}, "draws of x; .*realisations=0, draws=None"),
+    ],
+)
+def test_one_cell_stands_for_no_sweep(name: str, n: int, changes: dict[str, Any], remedy: str, tmp_path: Any) -> None:
+    swept = DRIVEN.replace(topology=chain(n), **changes)
+    with pytest.raises(ValueError, match=f"^{name}: found {remedy}") as caught:
+        calls(swept, tmp_path / "a.nc")[name]()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_parameter_fixes_an_axis() -> None:
+    words: dict[str, Any] = {"starts": 1, "transient": 5, "periods": 5, "show_progress": False}
+    swept = DRIVEN.replace(axes={"omega": [1.2, 1.4], "delta": [0.3, 0.7]})
+    with pytest.raises(ValueError, match="found axes of delta;"):
+        runtime.msf(swept, [0.1, 0.2], omega=1.4)
+    found = runtime.msf(swept, [0.1, 0.2], omega=1.4, delta=0.7, **words)
+    expected = runtime.msf(DRIVEN, [0.1, 0.2], omega=1.4, delta=0.7, **words)
+    assert found.scene == expected.scene
+    np.testing.assert_array_equal(found.exponent, expected.exponent)
+
+
 def made(name: str) -> Scene:
     """Two equal nodes x' = -s x with a link, whose parameter s is called otherwise."""
     node = Field({"x": f"-{name}*x"}, parameters={name: 2.0})

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+import pickle
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -207,3 +210,42 @@ def test_what_is_right_is_taken():
     assert clusters(star(5), "hpppp").quotient.n == 2
     assert Criterion(tolerance=1).tolerance == 1.0
     assert float(ENERGY([0, 1, 0, 0], parameters={"sigma": 0})) == 0.5
+
+
+OFFERED = [
+    value
+    for package in (models, runtime)
+    for value in (getattr(package, name) for name in package.__all__)
+    if inspect.isfunction(value) or (inspect.isclass(value) and value is not runtime.Status)
+]
+"""Public functions and classes; `Status` is an enumeration."""
+
+
+@pytest.mark.parametrize("value", OFFERED, ids=lambda value: value.__name__)
+def test_unknown_keywords_are_refused_with_those_that_are_known(value: Any) -> None:
+    given = inspect.signature(value).parameters.values()
+    if any(each.kind is each.VAR_KEYWORD for each in given):  # parameters of a scene; see tests/test_keywords.py
+        return
+    known = [each.name for each in given if each.kind is not each.VAR_POSITIONAL]
+    with pytest.raises(TypeError) as caught:
+        value(**{f"{known[-1]}_" if known else "wrong": 1})
+    words = f"known: {', '.join(known)}; did you mean '{known[-1]}'?" if known else "known: none"
+    assert f" of {value.__name__}; {words}" in str(caught.value)
+
+
+@pytest.mark.parametrize("value", OFFERED, ids=lambda value: value.__name__)
+def test_public_names_can_be_sent_to_other_processes(value: Any) -> None:
+    assert pickle.loads(pickle.dumps(value)) is value
+
+
+def test_a_class_is_changed_once() -> None:
+    for _ in range(3):
+        made = runtime.Criterion.__init__
+    assert not hasattr(made.__wrapped__, "__wrapped__")
+
+
+def test_a_parameter_among_the_keywords_is_said_to_be_one() -> None:
+    with pytest.raises(
+        TypeError, match=r"unknown keyword 'k' of Field; .*; a parameter is given as parameters=\{'k': …\}"
+    ):
+        models.Field({"x": "-k*x"}, k=2.0)

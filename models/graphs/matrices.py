@@ -68,8 +68,8 @@ class GraphMatrix:
     def __post_init__(self) -> None:
         if self.kind in (MatrixKind.ADJACENCY, MatrixKind.LAPLACIAN):
             return
-        if not self.graph.symmetric:
-            raise ValueError(f"{self.name}: found one-way links; expected an undirected graph")
+        if self.graph.asymmetry:
+            raise ValueError(f"{self.name}: found {self.graph.asymmetry}; expected an undirected graph")
         if self.kind is MatrixKind.RANDOM_WALK:
             wrong = next(((i, d) for i, d in self._degrees.items() if d <= 0), None)
             if wrong is not None:

@@ -84,8 +84,8 @@ def complement(graph: Topology) -> Topology:
     name, rule = f"complement({_named(graph)})", Complement(graph)
     _small(name, rule.link_count)
     odd = next((link for link in graph.links if link[2] != 1), None)
-    if odd is not None or not graph.symmetric:
-        found = f"a link of weight {odd[2]}" if odd is not None else "one-way links"
+    found = graph.asymmetry if odd is None else f"a link of weight {odd[2]}"
+    if found:
         raise ValueError(f"{name}: found {found}; expected undirected links of weight 1")
     return _made(name, graph.n, rule)
 

@@ -18,7 +18,7 @@ from ..inputs.rationals import file_text, rational
 from .links import LINK_LIMIT
 from .topology import Topology, from_matrix
 
-__all__ = ["as_topology", "from_edges", "from_graph", "from_sparse", "parsed", "read_edges", "read_graphml"]
+__all__ = ["as_topology", "from_edges", "from_graph", "from_sparse", "is_graph", "parsed", "read_edges", "read_graphml"]
 
 Weights = dict[tuple[int, int], Fraction]
 
@@ -42,7 +42,7 @@ def as_topology(what: str, value: object) -> Topology:
     """
     if isinstance(value, Topology):
         return value
-    if _is_graph(value):
+    if is_graph(value):
         return from_graph(value)
     if hasattr(value, "tocoo"):
         return from_sparse(value)
@@ -112,7 +112,7 @@ def from_graph(graph: Any, weight: str | None = "weight", name: str = "graph") -
     ValueError
         On loops, on weights that are not rational, and if no edge has an attribute that was named.
     """
-    if not _is_graph(graph):
+    if not is_graph(graph):
         raise TypeError(f"{name} is a {type(graph).__name__}; expected a networkx graph (nodes, edges, is_directed)")
     nodes = list(graph.nodes())
     place = {node: k for k, node in enumerate(nodes)}
@@ -128,9 +128,9 @@ def from_graph(graph: Any, weight: str | None = "weight", name: str = "graph") -
     return _graph(name, len(nodes), weights)
 
 
-def _is_graph(value: object) -> bool:
-    """True for a graph of networkx."""
-    return all(hasattr(value, need) for need in ("nodes", "edges", "is_directed"))
+def is_graph(value: object) -> bool:
+    """True for a Topology and for a graph of networkx."""
+    return isinstance(value, Topology) or all(hasattr(value, need) for need in ("nodes", "edges", "is_directed"))
 
 
 def from_sparse(matrix: object, adjacency: bool = False, name: str = "matrix") -> Topology:

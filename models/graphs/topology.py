@@ -148,10 +148,19 @@ class Topology(Drawn):
     @property
     def symmetric(self) -> bool:
         """True if every link has its mirror image of equal weight, so that G = transpose(G)."""
-        if self.all_to_all is not None:
-            return True
-        known = {(target, source): weight for target, source, weight in self.links}
-        return all(known.get((source, target)) == weight for (target, source), weight in known.items())
+        return not self.asymmetry
+
+    @property
+    def asymmetry(self) -> str:
+        """The first two nodes whose links there and back differ, in words for a message; "" on a symmetric graph."""
+        known = {} if self.all_to_all is not None else {link[:2]: link[2] for link in self.links}
+        for (target, source), weight in known.items():
+            back = known.get((source, target))
+            if back is None:
+                return f"one-way links, first from {source + 1} to {target + 1}"
+            if back != weight:
+                return f"the weights {back} from {target + 1} to {source + 1} and {weight} back"
+        return ""
 
     @property
     def components(self) -> int:

@@ -8,14 +8,13 @@ import random
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import islice
 from statistics import NormalDist
-from typing import NoReturn
+from typing import NoReturn, TypeGuard
 
-from ..graphs.readers import as_topology
+from ..graphs.readers import as_topology, is_graph
 from ..graphs.topology import Topology
 from ..inputs.arithmetic import constant
-from ..inputs.checks import check_integer, check_number, check_positive, check_table, check_text, short_repr
+from ..inputs.checks import check_integer, check_number, check_positive, check_table, check_text, first_of, short_repr
 from ..inputs.frozen import Frozen
 from ..inputs.node_name import LinkName, NodeName
 from ..inputs.reader import Algebra, NoMeaning, parse
@@ -161,13 +160,13 @@ def drawn_graph(drawn: Mapping[str, Draws]) -> Topology | None:
 
 def _graphs(what: str, value: object, count: int) -> Graphs:
     """Graphs by realisation."""
+    value = value.graphs if isinstance(value, Graphs) else value
     if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
         raise TypeError(f"{what}: found {short_repr(value)}; expected a list of {count} graphs")
-    found = tuple(as_topology(what, graph) for graph in islice(value, count + 1))
+    found, number = first_of(value, count)
     if len(found) != count:
-        few = f"more than {count}" if len(found) > count else str(len(found))
-        raise ValueError(f"{what}: found {few} graphs; expected {count}, one for each realisation")
-    return Graphs(found)
+        raise ValueError(f"{what}: found {number} graphs; expected {count}, one for each realisation")
+    return Graphs(tuple(as_topology(what, graph) for graph in found))
 
 
 def _drawn(what: str, value: object, count: int) -> Draws:
@@ -175,16 +174,30 @@ def _drawn(what: str, value: object, count: int) -> Draws:
         return value
     if isinstance(value, str):
         return _read(what, value)
-    listed = value.tolist() if hasattr(value, "tolist") else value
+    listed = _plain(value)
     if not isinstance(listed, Sequence) or len(listed) != count:
         entries = f"{len(listed)} entries" if isinstance(listed, Sequence) else short_repr(listed)
         raise ValueError(f"{what}: found {entries}; expected {KNOWN} or {count} entries")
-    rows = [row if isinstance(row, Sequence) and not isinstance(row, str) else (row,) for row in listed]
+    rows = [row if _is_row(row) else (row,) for row in map(_plain, listed)]
+    if any(is_graph(entry) or _is_row(entry) for row in rows for entry in row):
+        raise ValueError(
+            f"{what}: found graphs or matrices; expected one number, or one for each node or link, in each realisation; "
+            f"draws of {GRAPH!r} take a graph, or its matrix, for each"
+        )
     if len({len(row) for row in rows}) != 1:
         raise ValueError(
             f"{what}: found rows of different lengths; expected one number, or one for each node or link, in each"
         )
     return tuple(tuple(check_number(what, number) for number in row) for row in rows)
+
+
+def _plain(value: object) -> object:
+    """An array as lists."""
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def _is_row(value: object) -> TypeGuard[Sequence[object]]:
+    return isinstance(value, Sequence) and not isinstance(value, str)
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,7 +260,7 @@ def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Itera
     holders = model.unlinked.holders(name)
     links = {} if holders else model.link_names(name)
     if links:
-        return _link_columns(name, links, how, count, rng)
+        return _link_columns(f"draw {name}{model.on_graph(name)}", name, links, how, count, rng)
     known = name in model.parameters or name in model.components or NodeName.parse(name) is not None
     if name == WEIGHTS:
         raise ValueError(
@@ -276,6 +289,7 @@ def _weights(model: Model, graphs: tuple[Topology, ...]) -> Iterable[tuple[str, 
 
 
 def _link_columns(
+    what: str,
     name: str,
     links: Mapping[tuple[int, int], LinkName],
     how: Draw | tuple[tuple[float, ...], ...],
@@ -289,8 +303,8 @@ def _link_columns(
         return [(str(own), drawn[edges[own.target, own.source]]) for own in dict.fromkeys(links.values())]
     if len(how[0]) == 1 and name != WEIGHTS:
         return [(name, [row[0] for row in how])]
-    tables = [in_order(f"draw {name}", links, row if len(row) > 1 else row * len(links)) for row in how]
-    rows = [by_name(f"draw {name}", links, table) for table in tables]
+    full = [row if len(row) > 1 else row * len(links) for row in how]
+    rows = [by_name(what, links, in_order(what, links, row, str(len(row)))) for row in full]
     return [(str(own), [row[own] for row in rows]) for own in rows[0]]
 
 

@@ -97,8 +97,9 @@ class Energy:
 def energy(scene: Scene) -> Energy:
     """Return the energy of a scene's network.
 
-    Raises ValueError for a vector field or a coupling by components, which have no energy, for one-way links, which have no
-    potential, and for set-valued friction, whose force in stick is no function of the state.
+    Raises ValueError for a vector field or a coupling by components, which have no energy, for links that are one-way or have
+    another weight back, which have no potential, and for set-valued friction, whose force in stick is no function of the
+    state.
     """
     return energy_of(scene.model, scene.varied)
 
@@ -159,8 +160,10 @@ def _check(coupling: Coupling, graph: Topology) -> None:
         raise ValueError(f"energy: the coupling '{coupling}' has none; expected a spring or damper by its name")
     if coupling.forced:
         raise ValueError(f"energy: the coupling '{coupling}' depends on time; expected one that does not")
-    if not graph.symmetric:
-        raise ValueError(f"energy: {graph.name}({graph.n}) has one-way links; expected links both ways")
+    if graph.asymmetry:
+        raise ValueError(
+            f"energy: found {graph.asymmetry} in {graph.name}({graph.n}); expected links of equal weights both ways"
+        )
 
 
 def _of_link(edge: Edge, pair: Pair, terms: Terms, varied: tuple[str, ...]) -> tuple[Share, Edge]:

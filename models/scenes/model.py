@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
+from heapq import nsmallest
 from itertools import islice
 from types import MappingProxyType
 
@@ -253,12 +254,32 @@ class Model:
         """
         return _link_names(self, name)
 
+    def on_graph(self, name: str) -> str:
+        """Return, for messages, the graph whose links have a parameter, or whose weights "W" are meant: " on ring(4)"."""
+        graphs = (graph for coupling, graph in self.linked if name in (*coupling.parameters, WEIGHTS))
+        return "".join(f" on {graph.name}({graph.n})" for graph in islice(graphs, 1))
+
+    def no_link(self, name: str) -> str:
+        """Return why a name such as "k_1_9" is that of no link, and which are; "" for a name of another form."""
+        link = LinkName.parse(name)
+        names = {} if link is None else self.link_names(link.base)
+        if link is None or not names:
+            return ""
+        back = names.get((link.target, link.source))
+        if back is not None:
+            return f"expected {str(back)!r}, the one number of a link that acts on both of its ends"
+        own = dict.fromkeys(names.values())
+        near = nsmallest(3, own, key=lambda one: abs(one.target - link.target) + abs(one.source - link.source))
+        return (
+            f"found no link where node {link.target + 1} feels node {link.source + 1}; expected one of the {len(own)}, "
+            f"such as {', '.join(map(str, near))}"
+        )
+
     def unknown(self, name: str, what: str, known: Iterable[str]) -> str:
         """Return the sentence that refuses a name; a parameter of the coupling without links has its own."""
-        known, link = tuple(known), LinkName.parse(name)
-        back = None if link is None else self.link_names(link.base).get((link.target, link.source))
-        if back is not None:
-            return f"unknown {what} {name!r}; expected {str(back)!r}, the one number of a link that acts on both of its ends"
+        known, reason = tuple(known), self.no_link(name)
+        if reason:
+            return f"unknown {what} {name!r}; {reason}"
         for coupling, graph in self.layers:
             if not graph.link_count and coupling is not None and name in coupling.parameters:
                 return (

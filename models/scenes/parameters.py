@@ -7,7 +7,7 @@ from itertools import islice
 from typing import Any, TypeAlias, TypeVar
 
 from ..dynamics.periodicity import Drive, drive_of
-from ..graphs.topology import Topology
+from ..graphs.readers import as_topology, is_graph
 from ..inputs.checks import check_number, check_table, first_of, short_repr
 from ..inputs.frozen import Frozen
 from ..inputs.node_name import LinkName, NodeName
@@ -84,7 +84,7 @@ class _Given:
             self.single.setdefault(place.base, {})[place] = in_range(name, value, known[place.base])
         elif name not in known:
             raise ValueError(model.unknown(name, "parameter", known))
-        elif not model.holders(name) and (isinstance(value, Topology) or _listed(value)):
+        elif not model.holders(name) and (is_graph(value) or _listed(value)):
             self.lists[name] = _for_each_link(model, name, value)
         elif _listed(value):
             self.lists[name] = _at_nodes(model, name, _for_each_node(model, name, value))
@@ -106,9 +106,8 @@ def _at_nodes(model: Model, name: str, values: Iterable[float]) -> dict[Place, f
 
 
 def _listed(value: object) -> bool:
-    return (
-        not isinstance(value, str | bytes | Mapping) and isinstance(value, Iterable) and getattr(value, "ndim", 1) > 0
-    )
+    plain = isinstance(value, str | bytes | Mapping) or is_graph(value)
+    return not plain and isinstance(value, Iterable) and getattr(value, "ndim", 1) > 0
 
 
 def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:
@@ -118,23 +117,23 @@ def _for_each_link(model: Model, name: str, value: Any) -> dict[Place, float]:
     graph whose weights they are.  ValueError or TypeError for anything else.
     """
     parameter, links = model.parameters[name], model.link_names(name)
-    if isinstance(value, Topology):
-        table = {(i, j): float(weight) for i, j, weight in value.links}
+    what = f"parameter {name!r}{model.on_graph(name)}"
+    if is_graph(value):
+        table = {(i, j): float(weight) for i, j, weight in as_topology(what, value).links}
     else:
         if isinstance(value, set | frozenset):
-            raise TypeError(f"parameter {name!r}: found a set, which has no order; expected a number or a list")
-        most = max(len(links), model.n)
-        listed = list(islice(value.tolist() if hasattr(value, "tolist") else value, most + 1))
-        what = f"parameter {name!r}"
-        table = _matrix(model, name, listed) if any(map(_listed, listed)) else in_order(what, links, listed)
+            raise TypeError(f"{what}: found a set, which has no order; expected a number or a list")
+        listed, count = first_of(value.tolist() if hasattr(value, "tolist") else value, max(len(links), model.n))
+        table = _matrix(what, model.n, listed) if any(map(_listed, listed)) else in_order(what, links, listed, count)
     for i, j in sorted(table.keys() ^ links.keys()):
-        if (i, j) in links or check_number(f"parameter {name!r}", table[i, j]) != 0:
+        if (i, j) in links or check_number(what, table[i, j]) != 0:
             found = "no number" if (i, j) in links else "a number without a link"
+            more = "; a matrix may have the number 0" if (i, j) in links else ""
             raise ValueError(
-                f"parameter {name!r}: found {found} where node {i + 1} feels node {j + 1}; expected one for each link, no others"
+                f"{what}: found {found} where node {i + 1} feels node {j + 1}; expected one for each link, no others{more}"
             )
     checked = {at: in_range(str(own), table[at], parameter) for at, own in links.items()}
-    return by_name(f"parameter {name!r}", links, checked)
+    return by_name(what, links, checked)
 
 
 def by_name(
@@ -157,7 +156,9 @@ def by_name(
     return numbers
 
 
-def in_order(what: str, links: Mapping[tuple[int, int], LinkName], listed: Sequence[T]) -> dict[tuple[int, int], T]:
+def in_order(
+    what: str, links: Mapping[tuple[int, int], LinkName], listed: Sequence[T], count: str
+) -> dict[tuple[int, int], T]:
     """Return numbers by target and source.
 
     Parameters
@@ -168,6 +169,8 @@ def in_order(what: str, links: Mapping[tuple[int, int], LinkName], listed: Seque
         The name of the parameter at each link.
     listed : sequence
         A number for each link in the order of the graph's links, or, if every link runs back too, one for each edge i < j.
+    count : str
+        How many there are, in words.
 
     Raises
     ------
@@ -179,7 +182,6 @@ def in_order(what: str, links: Mapping[tuple[int, int], LinkName], listed: Seque
         table = dict(zip(edges, listed, strict=True))
         return table | {at[::-1]: number for at, number in table.items()}
     if len(listed) != len(links):
-        count = f"more than {len(listed) - 1}" if len(listed) > len(links) else str(len(listed))
         expected = f"{len(edges)} values, one for each edge, or " if edges else ""
         raise ValueError(
             f"{what}: found {count} values for {len(links)} links; expected {expected}one for each link, or one number for all"
@@ -187,12 +189,11 @@ def in_order(what: str, links: Mapping[tuple[int, int], LinkName], listed: Seque
     return dict(zip(links, listed, strict=True))
 
 
-def _matrix(model: Model, name: str, listed: Sequence[Any]) -> dict[tuple[int, int], Any]:
+def _matrix(what: str, n: int, listed: Sequence[Any]) -> dict[tuple[int, int], Any]:
     """The entries of a matrix, row i what node i feels."""
-    n = model.n
     rows = [list(islice(row, n + 1)) if _listed(row) else [] for row in listed]
     if len(rows) != n or any(len(row) != n for row in rows):
-        raise ValueError(f"parameter {name!r}: found rows of numbers; expected a matrix of {n} rows of {n} numbers")
+        raise ValueError(f"{what}: found rows of numbers; expected a matrix of {n} rows of {n} numbers")
     return {(i, j): number for i, row in enumerate(rows) for j, number in enumerate(row)}
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
-from functools import lru_cache, wraps
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec
+from typing import TYPE_CHECKING, Any
 
 from ..dynamics.equations import Equations
 from ..dynamics.observable import Observable
@@ -38,23 +38,6 @@ if TYPE_CHECKING:
     from ..spectra.spectrum import Spectrum
 
 __all__ = ["KEYWORDS", "Axis", "Scene", "Section", "a_scene"]
-
-
-P = ParamSpec("P")
-
-
-def _known_keywords(init: Callable[P, None]) -> Callable[P, None]:
-    """Refuse keywords that `Scene` does not know, with a suggestion."""
-
-    @wraps(init)
-    def checked(*args: P.args, **keywords: P.kwargs) -> None:
-        strange = next((name for name in keywords if name not in KEYWORDS), None)
-        if strange is not None:
-            hint = suggestion(strange, KEYWORDS) or f"; a parameter is given as parameters={{{strange!r}: …}}"
-            raise TypeError(f"unknown keyword {strange!r} of Scene; known: {', '.join(KEYWORDS)}{hint}")
-        init(*args, **keywords)
-
-    return checked
 
 
 @dataclass(frozen=True, slots=True, init=False, repr=False)
@@ -175,7 +158,6 @@ class Scene(Drawn, Written):
     model: Model = field(compare=False)
     given: Frozen[Any] = field(compare=False)
 
-    @_known_keywords
     def __init__(
         self,
         oscillator: Oscillator | str = "friction",
@@ -338,9 +320,11 @@ class Scene(Drawn, Written):
         single = {name: changes.pop(name) for name in tuple(changes) if name not in self.given and self.takes(name)}
         strange = next((name for name in changes if name not in self.given), None)
         if strange is not None:
-            names = (*self.parameters, *self.given)
+            names, reason = (*self.parameters, *self.given), self.model.no_link(strange)
             raise TypeError(
-                f"unknown parameter or keyword {strange!r}; known: {', '.join(names)}{suggestion(strange, names)}"
+                f"unknown parameter {strange!r}; {reason}"
+                if reason
+                else f"unknown parameter or keyword {strange!r}; known: {', '.join(names)}{suggestion(strange, names)}"
             )
         if changes.get("topology") is not None:
             changes["topology"] = as_topology(changes["topology"])

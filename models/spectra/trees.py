@@ -22,8 +22,8 @@ class Graph(Matrix, Protocol):
     """The matrix G of a graph: weights of links, with rows that sum to 0."""
 
     @property
-    def symmetric(self) -> bool:
-        """True if every link acts both ways with one weight."""
+    def asymmetry(self) -> str:
+        """In words, the first links that do not act both ways with one weight; "" if all do."""
 
 
 def spanning_trees(graph: Graph) -> Fraction:
@@ -35,7 +35,8 @@ def spanning_trees(graph: Graph) -> Fraction:
     Raises
     ------
     ValueError
-        If the graph has one-way links, or more than DENSE_LIMIT nodes.
+        If a link is one-way or has another weight back, or if the graph has more than DENSE_LIMIT
+        nodes.
     """
     first, _ = _lowest(graph, "spanning trees")
     return first / graph.n
@@ -50,7 +51,8 @@ def kirchhoff_index(graph: Graph) -> Fraction:
     Raises
     ------
     ValueError
-        If the graph has one-way links, falls into parts, or has more than DENSE_LIMIT nodes.
+        If a link is one-way or has another weight back, or if the graph falls into parts or has more
+        than DENSE_LIMIT nodes.
     """
     first, second = _lowest(graph, "Kirchhoff index")
     if not first:
@@ -63,8 +65,8 @@ def kirchhoff_index(graph: Graph) -> Fraction:
 
 def _lowest(graph: Graph, what: str) -> tuple[Fraction, Fraction]:
     """The coefficients of z and z² of det(z - G)."""
-    if not graph.symmetric:
-        raise ValueError(f"{what}: found one-way links in {graph.name}; expected an undirected graph")
+    if graph.asymmetry:
+        raise ValueError(f"{what}: found {graph.asymmetry} in {graph.name}; expected an undirected graph")
     if graph.n > DENSE_LIMIT:
         raise ValueError(f"{what}: found {graph.n} nodes; expected at most {DENSE_LIMIT}")
     polynomial = characteristic(graph)

@@ -17,7 +17,6 @@ from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene
 
 from .choice import chosen_integrator
-from .observed import watched
 from .reduce import Reduction, as_reduction
 
 __all__ = ["kernel", "kernel_source", "warn_of_chords", "write_kernel"]
@@ -65,7 +64,7 @@ def write_kernel(reduction: Reduction, width: int | None = None) -> KernelSource
     method = chosen_integrator(reduction)
     width = default_width(reduction.equations, method) if width is None else width
     recorded = (reduction.records, section, width, reduction.multiplicity)
-    return _emitted(reduction.equations, method, recorded, watched(scene))
+    return _emitted(reduction.equations, method, recorded, reduction.watched)
 
 
 @lru_cache(maxsize=32)

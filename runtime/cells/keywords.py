@@ -71,22 +71,27 @@ class Given:
         return {check_text("parameters", name): value for name, value in (*table.items(), *self.keywords.items())}
 
     def scene(self, scene: Scene, **settings: object) -> Scene:
-        """Return a scene with these parameters and with settings that the function needs.
+        """Return the single cell of a scene that has these parameters, with settings that the function needs.
 
         Raises
         ------
         TypeError
             If `scene` is no Scene.
         ValueError
-            If a name is no parameter of the scene, or is given twice, and for a scene with draws, of
-            which these functions would take none.
+            If a name is no parameter of the scene, or is given twice; as `expect_one_cell`.
         """
-        if a_scene(scene).draws:
-            raise ValueError(
-                f"{self.function.__name__}: found draws of {', '.join(scene.draws)}; expected a scene without them; "
-                "write scene.replace(realisations=0, draws=None)"
-            )
-        return with_numbers(scene, self._checked(a_scene(scene)), **settings)
+        self.expect_one_cell(scene)
+        return with_numbers(scene, self._checked(scene), **{**ONE_CELL, **settings})
+
+    def expect_one_cell(self, scene: Scene) -> None:
+        """Raise ValueError for a scene with draws, or with axes that no parameter fixes: one cell would stand for all."""
+        swept = [axis.name for axis in a_scene(scene).axes if axis.name not in self.values]
+        for what, names, remedy in (("axes", swept, "axes=()"), ("draws", scene.draws, "realisations=0, draws=None")):
+            if names:
+                raise ValueError(
+                    f"{self.function.__name__}: found {what} of {', '.join(names)}; expected a scene without them; "
+                    f"write scene.replace({remedy})"
+                )
 
     def sweep(self, scene: Scene, **settings: object) -> Scene:
         """Return a scene with parameters and initial states fixed, by a number, or swept, by a
@@ -135,6 +140,9 @@ class Given:
             return f"{of} takes no {name!r}: {self.refused[name]}"
         if name in KEYWORDS:
             return f"{of}: {name!r} is a field of the scene; expected parameters; write scene.replace({name}=…)"
+        reason = scene.model.no_link(name)
+        if reason:
+            return f"{of}: unknown parameter {name!r}; {reason}"
         initial = scene.equations.state if states else ()
         words = suggestion(name, (*scene.parameters, *initial, *own)) or suggestion(name, KEYWORDS)
         shown = initial if len(initial) <= SHOWN else (f"{initial[0]} … {initial[-1]}",)

@@ -16,6 +16,7 @@ from fractions import Fraction
 import numpy as np
 
 from synchain.codegen.driver.columns import Point, Sum
+from synchain.codegen.kernels.observed import Watched
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.reduction import NoQuotient, quotient, substitute_constants
 from synchain.models.inputs.checks import check_flag
@@ -108,6 +109,8 @@ class Reduction:
         Sentences: what was left out, and what was not and why.
     jumps : bool
         Whether a cell that repeats itself leaves out whole cycles.
+    watched : Watched
+        What the kernel watches: observables, sections and a stop.
     """
 
     scene: Scene
@@ -119,6 +122,7 @@ class Reduction:
     skipped: tuple[str, ...]
     kept: tuple[str, ...]
     jumps: bool
+    watched: Watched = field(repr=False)
 
     @property
     def dimension(self) -> int:
@@ -205,12 +209,12 @@ def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> R
         Substitute all parameters that have one value in every cell, by their shortest decimals.  By
         default only zeros are substituted, so that scenes that differ in numbers share a kernel.
     """
-    whole = scene.equations
+    whole, found = scene.equations, watched(scene)
     skipped: list[str] = []
     kept: list[str] = []
     equations, classes = whole, tuple(range(scene.n))
     if reduce:
-        equations = _fold(scene, fold_all, skipped, kept)
+        equations = _fold(scene, _observed_parameters(scene, found), fold_all, skipped, kept)
         equations, classes = _merge(scene, equations, skipped, kept)
         kept += _present(scene, equations)
     else:
@@ -230,6 +234,7 @@ def reduce_scene(scene: Scene, reduce: bool = True, fold_all: bool = False) -> R
         tuple(skipped),
         tuple(kept),
         reduce,
+        found,
     )
 
 
@@ -266,9 +271,9 @@ def _fixed(scene: Scene) -> dict[str, float]:
     return {name: found[0] for name, found in values.items() if min(found) == max(found)}
 
 
-def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> Equations:
-    """Fold parameters one after the other, and say what each of them took along."""
-    equations, fixed, observed = scene.equations, _fixed(scene), _observed_parameters(scene)
+def _fold(scene: Scene, observed: set[str], fold_all: bool, skipped: list[str], kept: list[str]) -> Equations:
+    """Fold parameters one after the other, and say what each of them took along; not those that are `observed`."""
+    equations, fixed = scene.equations, _fixed(scene)
     for name, value in fixed.items():
         if (value != 0.0 and not fold_all) or name not in equations.parameters:
             continue
@@ -286,9 +291,8 @@ def _fold(scene: Scene, fold_all: bool, skipped: list[str], kept: list[str]) -> 
     return equations
 
 
-def _observed_parameters(scene: Scene) -> set[str]:
+def _observed_parameters(scene: Scene, found: Watched) -> set[str]:
     """The parameters that occur in observables and in sections on functions."""
-    found = watched(scene)
     names = {s.name for value in (*found.observed, *found.events) for s in value.free_symbols}
     names = names.union(*(rows.names for rows in found.sums))
     of_nodes = {str(NodeName(name, i)) for name in scene.equations.varied if name in names for i in range(scene.n)}

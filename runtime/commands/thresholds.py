@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..console.arguments import above_zero, add_scene, add_workers, positive, spaced
@@ -109,9 +109,10 @@ def _scene(arguments: Namespace) -> Scene:
 
 def report(result: Thresholds, criterion: Criterion) -> str:
     """The ranges as a table."""
-    scene, grid, alpha = result.scene, result.direct.x[[0, -1]], result.probe.x[[0, -1]]
+    scene = result.scene
+    grid, alpha = ((float(x[0]), float(x[-1])) for x in (result.direct.x, result.probe.x))
     steepest = max(abs(value) for value in scene.topology.spectrum.values)
-    reach = (*grid, *(alpha / steepest))
+    reach = (*grid, *(end / steepest for end in alpha))
     unit = "drive periods" if scene.time_unit == "period" else "units of time"
     rows = [
         (f"{scene.strength}, simulated", _written(result.direct.intervals, grid)),
@@ -145,26 +146,26 @@ def _wu_chua(result: Thresholds) -> list[tuple[str, str]]:
     return [(f"{result.scene.strength}, Wu-Chua conjecture", _written([(0.0, end)], (0.0, math.inf)))]
 
 
-def _with_errors(result: Thresholds, grid: Iterable[float]) -> str:
+def _with_errors(result: Thresholds, grid: Sequence[float]) -> str:
     """The windows of the exponents with the errors of their ends, or why there are none."""
     found = result.exponents
     if found.absent:
         return found.words
-    words = [
-        f"[{low:.4f}{_error(errors[0])}{_onwards(low, grid)}, {high:.4f}{_error(errors[1])}{_onwards(high, grid)}]"
-        for (low, high), errors in zip(found.intervals, found.errors, strict=True)
-    ]
+    words = [_interval(ends, grid, errors) for ends, errors in zip(found.intervals, found.errors, strict=True)]
     return ", ".join(words) or "none"
 
 
-def _error(error: float) -> str:
-    return f" ± {error:.1g}" if error else ""
+def _written(ranges: Sequence[Interval], grid: Sequence[float]) -> str:
+    return ", ".join(_interval(ends, grid) for ends in ranges) or "none"
 
 
-def _onwards(end: float, grid: Iterable[float]) -> str:
-    return "..." if end and any(math.isclose(end, last, rel_tol=1e-12) for last in grid) else ""
+def _interval(ends: Interval, grid: Sequence[float], errors: Interval = (0.0, 0.0)) -> str:
+    """A range with the errors of its ends, and dots where it ends with the grid, pairs of ends.
 
-
-def _written(ranges: Sequence[Interval], grid: Iterable[float]) -> str:
-    words = [f"[{low:.4f}{_onwards(low, grid)}, {high:.4f}{_onwards(high, grid)}]" for low, high in ranges]
-    return ", ".join(words) or "none"
+    A range from 0 up begins where couplings do.
+    """
+    words = []
+    for end, error, lasts in zip(ends, errors, (grid[::2] if ends[0] else (), grid[1::2]), strict=True):
+        onwards = any(math.isclose(end, last, rel_tol=1e-12) for last in lasts)
+        words.append(f"{end:.4f}{f' ± {error:.1g}' if error else ''}{'...' if onwards else ''}")
+    return f"[{', '.join(words)}]"

@@ -96,7 +96,8 @@ def scene_on(network: Topology, scene: Scene | None, arguments: Namespace) -> Sc
     Raises
     ------
     WrongUse
-        If the scene has no single frequency of the drive that fits `omega`; see `at_frequency`.
+        If the scene has no single frequency of the drive that fits `omega`, see `at_frequency`,
+        or if it sweeps more than this frequency and the strength.
     """
     from synchain.models.scenes.scene import Scene
 
@@ -105,6 +106,10 @@ def scene_on(network: Topology, scene: Scene | None, arguments: Namespace) -> Sc
     if scene.draws:
         raise WrongUse(f"found draws of {', '.join(scene.draws)} in the scene; expected none; only run takes them")
     frequency = at_frequency(scene, arguments.omega, arguments.scene)
+    chosen = {*frequency, *([scene.strength] if len(scene.model.linked) == 1 else [])}
+    moved = [axis.name for axis in scene.axes if axis.name not in chosen]
+    if moved:
+        raise WrongUse(f"{arguments.scene} sweeps {', '.join(moved)}; expected a scene without these axes")
     return scene.replace(topology=network, axes=(), zipped=False, continuation="none", record=None, **frequency)
 
 

@@ -6,9 +6,8 @@ from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 
-from tqdm import tqdm
-
 from ..support.files import output_folder, write_text
+from ..support.progress import Reporter
 from . import Drawing, load
 from . import names as all_names
 from .figure_runs import FULL, QUICK, FigureRuns
@@ -41,7 +40,8 @@ def make(
     workers : int, optional
         Number of threads; all cores by default.
     show_progress : bool or None
-        Whether to show a progress bar; None shows it on terminals only.
+        Whether to show a bar; by default a bar on terminals and in notebooks, a line a minute
+        elsewhere.
 
     Returns
     -------
@@ -59,9 +59,8 @@ def make(
     folder = output_folder(out)
     runs = FigureRuns(QUICK if quick else FULL, workers=workers)
     written: list[Path] = []
-    with tqdm(wanted, unit="figure", disable=None if show_progress is None else not show_progress) as bar:
-        for drawing in bar:
-            bar.set_postfix_str(drawing.name)
+    with Reporter(len(wanted), show_progress, unit="figure") as reporter:
+        for drawing in reporter.each(wanted):
             written += produce(drawing, runs, folder)
     return written
 

@@ -121,14 +121,15 @@ def _stability(scene: Scene, effort: Effort, workers: int | None, show_progress:
     """The function with its windows, or why there is none."""
     try:
         found = msf(
-            scene,
+            scene.replace(axes=()),
             _strengths(scene, effort.strengths),
             precision=effort.precision,
             periods=effort.periods,
             workers=workers,
             show_progress=show_progress,
         )
-        return f"{rows_table(found.summary[1:])}{figure(found.plot(), 'exponent over strength')}{_ends(found)}"
+        picture = figure(found.plot(), "exponent over strength")
+        return f"{rows_table(found.summary[1:])}{picture}{_ends(found)}{_fixed(scene)}"
     except (ValueError, FloatingPointError) as problem:
         return f"<p>This scene has none: {escape(str(problem))}</p>"
 
@@ -143,11 +144,19 @@ def _strengths(scene: Scene, count: int) -> np.ndarray:
 
 
 def _ends(found: MSF) -> str:
-    """A sentence if a range goes on beyond the grid."""
-    ends = {end for interval in found.intervals for end in interval}
-    last = [f"{end:g}" for end in found.fine.alpha[[0, -1]] if end and end in ends]
-    words = " and at ".join(last)
-    return f'<p class="quiet">The range that ends at alpha = {words} ends there with the grid.</p>' if last else ""
+    """A sentence if a range goes on beyond the grid; strengths begin at 0."""
+    first, last = found.fine.alpha[[0, -1]]
+    cut = [low for low, _ in found.intervals if low == first != 0.0]
+    cut += [high for _, high in found.intervals if high == last]
+    words = " and at ".join(f"{end:g}" for end in cut)
+    return f'<p class="quiet">The range that ends at alpha = {words} ends there with the grid.</p>' if cut else ""
+
+
+def _fixed(scene: Scene) -> str:
+    """A sentence if the sweep moves more than the strength."""
+    moved = [axis.name for axis in scene.axes if axis.name != scene.strength]
+    words = f"The sweep moves {', '.join(moved)}; this function is that of the scene's own values."
+    return f'<p class="quiet">{escape(words)}</p>' if moved else ""
 
 
 def _sweep(scene: Scene, effort: Effort, workers: int | None, show_progress: bool | None) -> str:

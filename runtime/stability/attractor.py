@@ -26,7 +26,7 @@ RETURN = 1e-9
 
 
 class Motion(StrEnum):
-    """Kind of motion on an attractor."""
+    """Kind of motion on an attractor; of linear equations every motion, bounded or not, has the same exponents."""
 
     LINEAR = "linear"
     FIXED_POINT = "fixed point"
@@ -96,7 +96,7 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
     Parameters
     ----------
     orbits : Orbits
-        Orbits after their transient. The state of `row` is advanced.
+        Orbits after their transient, which linear ones need not have. The state of `row` is advanced.
     row : int
         Index of the start.
     patience : float
@@ -108,8 +108,9 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
     Attractor
     """
     orbit = orbits.part([row])
-    if not any(e.has(sp.Symbol("t", real=True), *_states(orbit.variation)) for _, e in orbit.variation.matrix):
-        return _steady(orbit, Motion.LINEAR)
+    if orbit.linear:
+        timed = any(e.has(sp.Symbol("t", real=True)) for _, e in orbit.variation.matrix)
+        return _periodic(orbit, Motion.LINEAR, 1) if timed else _steady(orbit, Motion.LINEAR)
     if not orbit.scene.forced:
         return _fixed_point(orbit)
     integrator = orbit.integrator_of(orbit.strengths[:1])
@@ -123,13 +124,18 @@ def find_attractor(orbits: Orbits, row: int, patience: float) -> Attractor:
         cycle = next((k + 1 for k, gap in enumerate(gaps) if gap < closed), 0)
         orbits.state[row] = orbit.state[0] = states[-1]
         if cycle:
-            both = [cycle_propagators(orbit, cycle) for _ in range(2)]
-            propagators, logarithms = (np.concatenate(parts) for parts in zip(*both, strict=True))
-            return Attractor(Motion.PERIODIC, cycle * orbit.unit, propagators, cycle, logarithms)
+            return _periodic(orbit, Motion.PERIODIC, cycle)
         if min(gaps) > 1e-3:
             break
         integrator.advance(max(1, round(patience)) * orbit.unit)
     return Attractor(Motion.APERIODIC, 0.0)
+
+
+def _periodic(orbit: Orbits, motion: Motion, cycle: int) -> Attractor:
+    """Return motion along which the variational equation repeats itself after some drive periods."""
+    both = [cycle_propagators(orbit, cycle) for _ in range(2)]
+    propagators, logarithms = (np.concatenate(parts) for parts in zip(*both, strict=True))
+    return Attractor(motion, cycle * orbit.unit, propagators, cycle, logarithms)
 
 
 def _distance(a: np.ndarray, b: np.ndarray) -> float:
@@ -164,11 +170,6 @@ def cycle_propagators(orbit: Orbits, cycle: int) -> tuple[np.ndarray, np.ndarray
         total, logarithms = total / factor[..., None, None], logarithms + more + np.log(factor)
     orbit.state = orbit.integrator.state
     return total, logarithms
-
-
-def _states(variation: Variation) -> list[sp.Symbol]:
-    """Symbols of the states of the orbit."""
-    return [sp.Symbol(name, real=True) for name in variation.orbit.state]
 
 
 def _fixed_point(orbit: Orbits) -> Attractor:

@@ -227,8 +227,9 @@ def exponents(
     Raises
     ------
     ValueError
-        If the network has no coupling, if the coupling has no synchronous state, or if time enters
-        without a known period.
+        If the network has no coupling, if the coupling has no synchronous state, if time enters
+        without a known period, and for a scene with axes or draws, for whose cells there is no one
+        answer.
     FloatingPointError
         If an integration fails.
     """
@@ -261,7 +262,8 @@ def transversal(
     reporter = averaging.reporter()
     orbits = Orbits.make(scene, strengths, initial_states(scene, starts, averaging.seed), averaging.execution.size)
     with reporter:
-        orbits.settle(averaging.transient, reporter.advance)
+        if not orbits.linear:
+            orbits.settle(averaging.transient, reporter.advance)
         attractors = tuple(find_attractor(orbits, row, averaging.transient) for row in range(starts))
         by_start, error, length = _by_start(orbits, attractors, averaging, reporter)
     largest = max(group_by_attractor(attractors, by_start), key=len)
@@ -299,16 +301,15 @@ def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
     rtol : float
         Relative tolerance.
     """
-    if a_scene(scene).model.linked:
-        coupled = scene.replace(**ONE_CELL)
-    else:
-        coupled = scene.replace(topology=topology("chain", 2), **ONE_CELL)
-        expect_vanishing("a lone oscillator gets a partner", coupled.equations)
-    return single_cell(given, coupled, rtol)
+    if not a_scene(scene).model.linked:
+        given.expect_one_cell(scene)
+        scene = scene.replace(topology=topology("chain", 2), **ONE_CELL)
+        expect_vanishing("a lone oscillator gets a partner", scene.equations)
+    return single_cell(given, scene, rtol)
 
 
 def single_cell(given: Given, scene: Scene, rtol: float) -> Scene:
-    """Return a scene without axes and records, with the parameters passed to a public function.
+    """Return the single cell of a scene, with the parameters passed to a public function.
 
     Parameters
     ----------
@@ -324,9 +325,9 @@ def single_cell(given: Given, scene: Scene, rtol: float) -> Scene:
     TypeError
         If `scene` is no Scene.
     ValueError
-        If a parameter is unknown.
+        If a parameter is unknown, and for axes and draws.
     """
-    return given.scene(scene, **ONE_CELL, rtol=rtol, atol=None)
+    return given.scene(scene, rtol=rtol, atol=None)
 
 
 def initial_states(scene: Scene, starts: int, seed: int) -> np.ndarray:

@@ -380,8 +380,8 @@ def plane(
 
 
 def _known(given: Given, scene: Scene) -> Scene:
-    """The scene with its parameters; a lone oscillator has none of the links."""
-    return with_numbers(scene, {name: value for name, value in given.values.items() if scene.takes(name)})
+    """The scene with its parameters, which fix its axes; a lone oscillator has none of the links."""
+    return with_numbers(scene, {name: value for name, value in given.values.items() if scene.takes(name)}, axes=())
 
 
 def classify(intervals: Sequence[Interval], end: float, begin: float = 0.0) -> StabilityClass:

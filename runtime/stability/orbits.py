@@ -126,6 +126,12 @@ class Orbits:
         """State variables of one deviation, real or complex."""
         return self.variation.size // len(self.variation.parameters)
 
+    @property
+    def linear(self) -> bool:
+        """True if no state occurs in the variational equation: it is the same along every orbit, bounded or not."""
+        states = {sp.Symbol(name, real=True) for name in self.variation.orbit.state}
+        return not any(e.free_symbols & states for _, e in self.variation.matrix)
+
     def part(self, rows: list[int]) -> Orbits:
         """Return the orbits of some starts."""
         return Orbits(

@@ -282,7 +282,9 @@ class VariationalIntegrator:
         bad = np.flatnonzero(counts[:, 0] != Status.FINISHED)
         if len(bad):
             status = Status(int(counts[bad[0], 0]))
-            raise FloatingPointError(f"the orbit with its deviations cannot be integrated: {status.message}")
+            largest = np.hypot.reduce(self.strengths).max()
+            modes = f" of strengths up to {largest:g}" if largest else ""
+            raise FloatingPointError(f"the orbit with its deviations{modes} cannot be integrated: {status.message}")
         taken, blocks = int(counts[:, 1:3].sum()), int(panels[0].sum())
         if self.kernel.origin.method.series and taken:
             step = blocks * float(np.broadcast_to(length, cells).sum()) / taken

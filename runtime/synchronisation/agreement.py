@@ -23,7 +23,7 @@ from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.graphs.topology import Topology
 from synchain.models.scenes.scene import Scene
 
-from ..cells.keywords import ONE_CELL, Given
+from ..cells.keywords import Given
 from ..stability.exponents import Exponents, exponents
 from ..support.execution import Execution
 from ..support.progress import Hook
@@ -127,7 +127,7 @@ def agreement(
     Parameters
     ----------
     scene : Scene
-        The network; its axes and records are not used.
+        The network; its records are not used.
     sigma : sequence of float
         Increasing numbers from 0 up.
     line : Exponents, optional
@@ -143,10 +143,10 @@ def agreement(
     Raises
     ------
     ValueError
-        If the line lacks a strength, or if sigma is negative, not finite or does not increase; as
-        `strengths` does.
+        If the line lacks a strength, or if sigma is negative, not finite or does not increase, and for
+        a scene with axes or draws; as `strengths` does.
     """
-    scene = Given(agreement, parameters, more, IN_CRITERION).scene(scene, **ONE_CELL)
+    scene = Given(agreement, parameters, more, IN_CRITERION).scene(scene)
     expect_vanishing("agreement", scene.equations)
     check_probe(scene.topology, scene.spectrum)
     scene = scene.replace(record=("sync_error",))

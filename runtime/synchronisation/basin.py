@@ -20,7 +20,7 @@ from synchain.models.inputs.checks import check_integer, check_number, check_tab
 from synchain.models.mechanics.friction import SLIP
 from synchain.models.scenes.scene import Scene, a_scene
 
-from ..cells.keywords import ONE_CELL, Given
+from ..cells.keywords import Given
 from ..cells.plan import Planner
 from ..cells.reduce import reduce_scene
 from ..results.labelled import Labelled, dataset
@@ -146,7 +146,7 @@ def basin(
     Parameters
     ----------
     scene : Scene
-        The network; its axes and records are not used.
+        The network; its records are not used.
     samples : int
         Number of starts.
     ranges : mapping of str to (float, float), optional
@@ -167,14 +167,15 @@ def basin(
     Raises
     ------
     ValueError
-        If a component is unknown, a range is empty, or a number makes no sense.
+        If a component is unknown, a range is empty, or a number makes no sense, and for a scene with
+        axes or draws.
     TypeError
         If the number of samples is not whole.
     """
     _check(scene, samples, tolerance, confidence, seed)
     execution = Execution(workers, executor, show_progress, progress)
-    fixed = {**ONE_CELL, "record": ("sync_error",)}
-    scene = Given(basin, parameters, more).scene(scene, **fixed, transient=transient, window=window)
+    timed = {"transient": transient, "window": window}
+    scene = Given(basin, parameters, more).scene(scene, record=("sync_error",), **timed)
     planner = Planner(random_starts(scene, samples, ranges, seed))
     whole = replace(reduce_scene(planner.scene, reduce=False), jumps=True)
     with Trials.of(whole, execution) as trials:

@@ -28,7 +28,7 @@ from synchain.models.mechanics.components import Edge
 from synchain.models.scenes.scene import Scene
 
 from ..cells.choice import chosen_for_rows
-from ..cells.keywords import ONE_CELL, Given
+from ..cells.keywords import Given
 from ..cells.plan import Plan, Planner, control_of
 from ..results.labelled import Labelled, dataset, ends_of
 from ..support.arrays import numbers
@@ -111,7 +111,7 @@ def universal_probe(
     Parameters
     ----------
     scene : Scene
-        Oscillator, coupling and parameters; its network, axes, start and sigma are not used.
+        Oscillator, coupling and parameters; its network, start and sigma are not used.
     alpha, beta : array_like
         Real and imaginary part of the strengths, broadcast against each other; negative numbers are
         allowed.
@@ -130,8 +130,8 @@ def universal_probe(
     Raises
     ------
     ValueError
-        If strengths are missing or not finite, if the scene has no coupling, or if its coupling is
-        not proportional to sigma and to the weight of a link.
+        If strengths are missing or not finite, if the scene has no coupling, axes or draws, or if its
+        coupling is not proportional to sigma and to the weight of a link.
     """
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     real, imaginary = _broadcast(alpha, beta)
@@ -139,7 +139,7 @@ def universal_probe(
     if scene.varied:
         scene.equations.expect_alike("the three-oscillator probe")
     ring = scene.replace(
-        **{**ONE_CELL, "record": ("sync_error",)},
+        record=("sync_error",),
         topology=topology("ring", 3),
         initial=None,
         transient=criterion.transient,

@@ -25,7 +25,7 @@ from synchain.models.inputs.checks import check_instance, check_integer, check_n
 from synchain.models.scenes.scene import Scene, a_scene
 from synchain.models.spectra.spectrum import Spectrum
 
-from ..cells.keywords import ONE_CELL, Given
+from ..cells.keywords import Given
 from ..cells.plan import Planner
 from ..cells.reduce import reduce_scene
 from ..prediction.intervals import Interval, intersect, refine, scale
@@ -207,7 +207,7 @@ def thresholds(
     Parameters
     ----------
     scene : Scene
-        The network; its axes, records, observables, sections and stop are not used.
+        The network; its records, observables, sections and stop are not used.
     sigma : sequence of float, optional
         An increasing grid on which ranges are looked for (default: `default_grid`); narrower ranges
         are not seen.  The probe's grid in alpha covers every sigma abs(gamma).
@@ -232,11 +232,11 @@ def thresholds(
     ------
     ValueError
         For a network without links, for one-way links whose eigenvalues are complex, for unequal
-        nodes and for links with inertia.
+        nodes, for links with inertia, and for a scene with axes or draws.
     """
     a_scene(scene).equations.expect_alike("thresholds")
     expect_vanishing("thresholds", scene.equations)
-    scene = Given(thresholds, parameters, more, IN_CRITERION).scene(scene, **ONE_CELL)
+    scene = Given(thresholds, parameters, more, IN_CRITERION).scene(scene)
     criterion, execution = checked(criterion), Execution(workers, executor, show_progress, progress)
     spectrum = scene.topology.spectrum
     check_probe(scene.topology, spectrum)

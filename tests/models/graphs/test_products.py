@@ -152,7 +152,11 @@ def test_names_tell_how_a_graph_was_made() -> None:
     [
         (lambda: weighted(topology("chain", 3), 0), ValueError, "weighted(chain(3)): factor = 0; expected another"),
         (lambda: weighted(topology("chain", 3), "x"), ValueError, "factor is 'x', not a number"),
-        (lambda: complement(topology("feed_forward", 3)), ValueError, "found one-way links; expected undirected"),
+        (
+            lambda: complement(topology("feed_forward", 3)),
+            ValueError,
+            "found one-way links, first from 1 to 2; expected undirected",
+        ),
         (lambda: complement(weighted(topology("chain", 3), 2)), ValueError, "found a link of weight 2"),
         (
             lambda: cartesian(topology("complete", 2000), topology("chain", 9)),

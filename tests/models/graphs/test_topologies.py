@@ -201,6 +201,9 @@ def test_components_and_symmetry() -> None:
     assert not one_way.symmetric
     uneven = Topology("x", 2, ((0, 1, ONE), (1, 0, Fraction(2))))
     assert not uneven.symmetric
+    assert one_way.asymmetry == "one-way links, first from 1 to 2"
+    assert uneven.asymmetry == "the weights 2 from 1 to 2 and 1 back"
+    assert topology("complete", 3).asymmetry == topology("ring", 3).asymmetry == ""
     assert Topology("x", 3, ()).components == 3
     assert Topology("x", 3, ()).symmetric
 

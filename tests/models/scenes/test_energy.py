@@ -109,10 +109,12 @@ def test_what_conserves_energy(coupling: str) -> None:
 
 def test_what_has_no_energy() -> None:
     one_way = from_matrix([[0, 0], [1, -1]])
+    uneven = from_matrix([[-1, 1, 0], [1, -3, 2], [0, 3, -3]])
     for given, message in (
         ({"oscillator": "lorenz", "coupling": "x->x", "topology": chain(2)}, "'lorenz' is a vector field"),
         ({"oscillator": "harmonic", "coupling": "x->v", "topology": chain(2)}, "the coupling 'x->v' has none"),
-        ({"oscillator": "harmonic", "topology": one_way}, "has one-way links"),
+        ({"oscillator": "harmonic", "topology": one_way}, "found one-way links, first from 1 to 2 in"),
+        ({"oscillator": "harmonic", "topology": uneven}, "found the weights 3 from 2 to 3 and 2 back in"),
         ({"contact": "set-valued"}, "set-valued friction does work that is no function of the state"),
     ):
         with pytest.raises(ValueError, match=message):

@@ -18,12 +18,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synchain.models import chain, ring, star
+from synchain.models import Scene, chain, ring, star
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.frozen import Frozen
 from synchain.models.scenes.axis import Axis
 from synchain.models.scenes.file import load_scene, scene_names
-from synchain.models.scenes.scene import KEYWORDS, Scene
+from synchain.models.scenes.scene import KEYWORDS
 from synchain.models.scenes.section import Section
 
 TABLE_1 = {
@@ -203,7 +203,7 @@ REFUSED = [
     ({"coupling": None}, "which has links"),
     ({"topology": "chain"}, "expected a graph"),
     ({"parameters": {"omga": 1}}, "did you mean 'omega'?"),
-    ({"oscilator": "duffing"}, "unknown keyword 'oscilator' of Scene; known: title, "),
+    ({"oscilator": "duffing"}, "unknown keyword 'oscilator' of Scene; known: oscillator, "),
     ({"oscilator": "duffing"}, "did you mean 'oscillator'?"),
     ({"sigma": 0.1}, "a parameter is given as parameters={'sigma': …}"),
     ({"coupling": chain(3)}, "coupling: found the graph chain(3); expected a coupling; write topology=…"),

@@ -92,7 +92,7 @@ def test_equal_numbers_are_equal_nodes() -> None:
         ({"delta": {0.1, 0.2, 0.3}}, "a set, which has no order"),
         (
             {"sigma": [0.1, 0.2, 0.3]},
-            "'sigma': found 3 values for 4 links; expected 2 values, one for each edge, or one for each link",
+            "'sigma' on chain(3): found 3 values for 4 links; expected 2 values, one for each edge, or one for each link",
         ),
         ({"delta_4": 0.1}, "unknown parameter 'delta_4'"),
         ({"sigma_1": 0.1}, "unknown parameter 'sigma_1'"),

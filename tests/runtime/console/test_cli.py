@@ -15,13 +15,14 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from synchain.models import chain
+from synchain.models import Scene, chain
 from synchain.models.graphs.families import names as families
 from synchain.models.scenes.file import load_scene, scene_names
 from synchain.models.scenes.schema import schema
 from synchain.runtime import commands
 from synchain.runtime.cells import kernels
 from synchain.runtime.cli import main
+from synchain.runtime.commands.thresholds import report
 from synchain.runtime.console.outcome import print_json
 from synchain.runtime.opening.open import open_result
 from synchain.runtime.sweeps import job, stream
@@ -372,6 +373,22 @@ def fake_thresholds(found: list[dict[str, Any]]) -> Any:
         return threshold.Thresholds(scene, pair, ranges, direct, criterion, windows, ("a warning",))
 
     return thresholds
+
+
+def test_thresholds_below_zero_end_with_the_grid_at_zero() -> None:
+    """A range from 0 up begins where couplings do; one from below up to 0 may go on."""
+    nothing = np.zeros(2)
+    below = [np.array([low, 0.0]) for low in (-0.4, -1.2)]
+    pair, direct = (threshold.Sweep(x, nothing, nothing, ((x[0], -0.1), (-0.05, 0.0))) for x in below)
+    windows = ExponentWindows(((-0.2, 0.0),), ((0.001, 0.0),))
+    found = threshold.Thresholds(
+        Scene(topology=chain(3)), pair, ((-0.02, 0.0),), direct, threshold.Criterion(), windows
+    )
+    ranges = [line.split("  ")[-1].strip() for line in report(found, threshold.Criterion()).splitlines()[1:5]]
+    assert ranges[0] == "[-1.2000..., -0.1000], [-0.0500, 0.0000...]"
+    assert ranges[1] == "[-0.0200, 0.0000...]"
+    assert ranges[2] == "[-0.2000 ± 0.001, 0.0000...]"
+    assert ranges[3] == "[-0.4000..., -0.1000], [-0.0500, 0.0000...]"
 
 
 def test_thresholds_as_json_and_as_a_table(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

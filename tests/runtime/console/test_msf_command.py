@@ -193,7 +193,8 @@ def test_the_option_omega_sets_the_frequency_of_the_drive_whatever_its_name(
     assert asked[0]["scene"].parameters == {"omega": 1.0, "Omega": 1.4, "sigma": asked[0]["scene"].parameters["sigma"]}
     assert "spring coupling, Omega = 1.4: exponents" in capsys.readouterr().out
     file.write_text(file.read_text() + "[sweep]\nomega = [1.0, 2.0]\n")
-    assert main(["msf", str(file)]) == 0
+    assert main(["msf", str(file)]) == 2
+    assert "sweeps omega; expected a scene without these axes" in capsys.readouterr().err
     file.write_text(file.read_text().replace("omega = [", "Omega = ["))
     assert main(["msf", str(file)]) == 2
     assert "sweeps Omega; expected one frequency" in capsys.readouterr().err
@@ -383,6 +384,7 @@ WRONG = [
     ("--omega 1.4 --matrix {own}.missing", "missing"),
     ("figure_8 --out {own}", "the name of a file; expected a folder"),
     ("{alone}", "the scene has no coupling, by which modes differ"),
+    ("{swept}", "sweeps kappa, x_1; expected a scene without these axes"),
 ]
 
 
@@ -395,7 +397,11 @@ def test_wrong_use_is_said_before_anything_is_computed(
     (tmp_path / "alone.toml").write_text(
         'coupling = "none"\ntopology = {name = "chain", n = 1}\nparameters = {omega = 1.4}\n'
     )
-    places = {"own": own, "laplacian": tmp_path / "laplacian.txt", "alone": tmp_path / "alone.toml"}
+    (tmp_path / "swept.toml").write_text(
+        "topology.name = 'chain'\ntopology.n = 2\nsweep = {kappa = [1e4, 1e5], x_1 = [0, 1]}\n"
+    )
+    places = {name: tmp_path / f"{name}.toml" for name in ("alone", "swept")}
+    places |= {"own": own, "laplacian": tmp_path / "laplacian.txt"}
     assert main(["msf", *words.format(**places).split()]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""

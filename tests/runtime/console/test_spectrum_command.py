@@ -65,7 +65,7 @@ WRONG = [
         "n = 11 with k = 2; expected a number of 2-subsets, such as 10 (of a set of 5) or 15 (of a set of 6)",
     ),
     ("paley 21 ", "n = 21; expected a prime power that leaves 1 on division by 4, such as 17 or 25"),
-    ("one_way_ring 4 --of signless_laplacian", "found one-way links; expected an undirected graph"),
+    ("one_way_ring 4 --of signless_laplacian", "found one-way links, first from 2 to 1; expected an undirected graph"),
     ("chain 4 --of incidence", "invalid choice: 'incidence'"),
     ("chain --of adjacency --symbolic", "found --of with --symbolic"),
     ("erdos_renyi 9 --option p=2", "p = 2; expected a probability from 0 to 1"),

@@ -19,6 +19,7 @@ from synchain.runtime.figures import make as maker
 from synchain.runtime.figures.figure_runs import FULL, QUICK, FigureRuns, Quality, thin
 from synchain.runtime.figures.make import make
 from synchain.runtime.figures.tables import Table, as_csv
+from synchain.runtime.support import progress
 from synchain.runtime.support.status import Status
 
 PAPER = (
@@ -67,6 +68,16 @@ def test_every_figure_keeps_the_contract(name: str) -> None:
     width, height = drawing.size
     assert width == style.COLUMN
     assert 1.5 < height < 5.0
+
+
+def test_bars_of_figures_are_those_of_all_functions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(maker, "produce", lambda *given: [])
+    for shown in (False, True):
+        monkeypatch.setattr(progress, "_has_bars", lambda shown=shown: shown)
+        make(["figure_1b", "figure_4b"], tmp_path)
+        assert ("2/2" in capsys.readouterr().err) == shown
 
 
 def test_an_unknown_name_is_refused_before_anything_is_done(tmp_path: Path, simulation: Simulation) -> None:

@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from synchain.models import Field
 from synchain.models.graphs.families import topology
 from synchain.models.scenes.file import load_scene
 from synchain.models.scenes.scene import Scene
 from synchain.runtime.cli import main
 from synchain.runtime.seeing.page import provenance_rows
-from synchain.runtime.seeing.report import Effort, _strengths, report
+from synchain.runtime.seeing.report import Effort, _ends, _strengths, report
+from synchain.runtime.stability.msf import msf
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")
@@ -128,6 +130,28 @@ def test_a_file_that_is_no_scene_is_said_to_be_one(
 def test_strengths_are_those_of_the_sweep(changes: dict[str, object], ends: tuple[float, float]) -> None:
     line = _strengths(Scene("duffing", "x->v", topology("chain", 3)).replace(**changes), 5)
     assert (line[0], line[-1], len(line)) == (*map(pytest.approx, ends), 5)
+
+
+def test_the_function_of_a_swept_scene_is_that_of_its_own_values() -> None:
+    scene = Scene("harmonic", "spring", topology("chain", 2), record=(), transient=1, window=1)
+    words = "The sweep moves x_1, v_1; this function"
+    assert words in report(scene.replace(axes={"sigma": [0.2], "x_1": [0.1, 0.2], "v_1": [0.0, 0.1]}), FAST)
+    assert "The sweep moves" not in report(scene.replace(axes={"sigma": [0.2, 0.4]}), FAST)
+
+
+@pytest.mark.parametrize(
+    ("strengths", "words"),
+    [
+        ([0, 1], "alpha = 1 ends"),
+        ([-0.5, 1], "= -0.5 and at 1 "),
+        ([-2, 0], "= 0 ends"),
+        ([-0.5, 0], "= -0.5 and at 0 "),
+    ],
+)
+def test_ranges_that_end_with_the_grid_are_said_to_do_so(strengths: list[float], words: str) -> None:
+    """x' = -x: the exponent -1 - alpha is negative above -1; a grid of strengths from 0 up begins by itself."""
+    found = msf(Scene(Field({"x": "-x"}), "x->x", topology("chain", 2)), strengths, starts=1, show_progress=False)
+    assert words in _ends(found)
 
 
 @pytest.mark.parametrize(("record", "pictures"), [(("sync_error",), 3), ((), 2)])

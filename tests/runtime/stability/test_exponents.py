@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import inspect
 import math
+import re
 from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from synchain.models import Field
 from synchain.models.graphs.families import topology
@@ -15,6 +17,7 @@ from synchain.models.scenes.scene import Scene
 from synchain.runtime.stability.averages import Batches
 from synchain.runtime.stability.exponents import Exponents, exponents
 from synchain.runtime.stability.interpolation import strength_interpolation
+from synchain.runtime.stability.lyapunov import lyapunov_spectrum
 from synchain.runtime.stability.msf import classify, msf, plane
 
 PAIR = topology("chain", 2)
@@ -31,6 +34,48 @@ def test_linear_nodes_in_closed_form() -> None:
     root = np.sqrt(np.maximum(alpha**2 / 4 - 1, 0.0))
     np.testing.assert_allclose(found.exponent, -alpha / 2 + root, atol=1e-8)
     assert {a.kind for a in found.attractors} == {"linear"}
+
+
+def test_linear_nodes_may_grow_without_bound() -> None:
+    """x'' = -x + v/2 + cos(6t/5), each state coupled to its rate: (1/4) - alpha, whatever the motion and its start."""
+    node = Field({"x": "v", "v": "-x + v/2 + cos(6*t/5)"})
+    alpha = np.array([0.0, 0.1, 1.0])
+    found = exponents(Scene(node, "x->x, v->v", PAIR, initial={"x": 1e12}), alpha, show_progress=False)
+    np.testing.assert_allclose(found.exponent, 0.25 - alpha, rtol=0, atol=1e-14)
+    assert {a.kind for a in found.attractors} == {"linear"}
+
+
+@pytest.mark.parametrize(("damping", "size"), [(0.05, 0.4), (0.4, 0.1)])
+def test_linear_nodes_with_periodic_coefficients_have_their_multipliers(damping: float, size: float) -> None:
+    """Mathieu's equation inside its first tongue and outside, against the monodromy matrix that SciPy integrates."""
+    node = Field({"x": "v", "v": "-(1 + size*cos(2*t))*x - c*v + 3*sin(2*t)"}, parameters={"size": size, "c": damping})
+    alpha = np.array([0.0, 0.02, 0.3])
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        return [y[1], -(1 + size * math.cos(2 * t)) * y[0] - damping * y[1]]
+
+    columns = [solve_ivp(rates, (0, math.pi), e, rtol=1e-12, atol=1e-14).y[:, -1] for e in np.eye(2)]
+    largest = np.log(np.abs(np.linalg.eigvals(np.array(columns).T)).max()) / math.pi
+    found = exponents(Scene(node, "x->x, v->v", PAIR), alpha, rtol=1e-10, show_progress=False)
+    np.testing.assert_allclose(found.exponent, largest - alpha, rtol=0, atol=1e-10)
+    assert (largest > 0) == (damping < 0.1)
+    assert {a.kind for a in found.attractors} == {"linear"}
+
+
+def test_a_motion_without_bound_is_refused_with_a_remedy() -> None:
+    growing = Scene(Field({"x": "x/2"}), "x->x", PAIR)
+    with pytest.raises(FloatingPointError, match=r"grew without bound, .*begin on a bounded motion, such as an equil"):
+        lyapunov_spectrum(growing, show_progress=False)
+    found = lyapunov_spectrum(growing.replace(initial={"x": 0.0}), periods=50, transient=0, show_progress=False)
+    np.testing.assert_allclose(found.exponent, 0.5, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("strengths", "words"), [([0.0, 1e300], "1e+300"), ([-2e16 + 1e16j], "2.23607e+16")])
+def test_strengths_that_no_step_resolves_are_named(strengths: list[complex], words: str) -> None:
+    """Modes of Duffing's oscillator with frequencies of 1e8 and more: the mode, and not the orbit, is what fails."""
+    stiff = scene("duffing", "spring").replace(max_steps=1000)
+    with pytest.raises(FloatingPointError, match=re.escape(f"deviations of strengths up to {words} cannot be")):
+        exponents(stiff, strengths, starts=1, transient=1, show_progress=False)
 
 
 def test_a_fixed_point_has_the_eigenvalues_of_its_jacobian() -> None:

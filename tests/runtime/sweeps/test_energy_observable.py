@@ -26,6 +26,8 @@ from synchain.models import (
     uniform,
 )
 from synchain.models.definitions.loader import load_oscillator
+from synchain.models.scenes.energy import Energy
+from synchain.runtime.cells.kernels import kernel_source
 from synchain.runtime.results.energy import energy_function
 from synchain.runtime.sweeps.run import run
 
@@ -104,12 +106,20 @@ def test_a_stop_and_a_section_at_an_energy() -> None:
 i, j, W = ends(load_oscillator("harmonic"))
 
 
+def test_the_sums_of_the_energy_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They take 0.1 s at 9000 links."""
+    made, rows = [], Energy.rows
+    monkeypatch.setattr(Energy, "rows", lambda own: made.append(own) or rows(own))
+    kernel_source(Scene("harmonic", "spring", ring(3), observe={"e": "mean(energy)"}))
+    assert len(made) == 1
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
         ({"oscillator": "rossler", "coupling": "x->x"}, "observe e: energy: oscillator 'rossler' is a vector field"),
         ({"coupling": Rates({i.v: W * (j.x - i.x)})}, "observe e: energy: the coupling 'rates of v' has none"),
-        ({"topology": one_way_ring(3)}, "has one-way links; expected links both ways"),
+        ({"topology": one_way_ring(3)}, "found one-way links, first from 2 to 1 in one_way_ring(3); expected links"),
         ({"oscillator": "friction", "contact": "set-valued"}, "set-valued friction does work"),
         ({"observe": {"e": "mean(nodes.sum(energy))"}}, "expected the energy of the whole network outside of nodes"),
         ({"observe": {"e": "mean(rate(energy))"}}, "expected the rate of a state"),

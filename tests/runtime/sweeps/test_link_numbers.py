@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -252,6 +253,10 @@ def test_graphs_are_realisations(oscillator: str, coupling: str, tmp_path: Path)
         ),
         (
             {"realisations": 3, "draws": {"topology": GRAPHS}},
+            f"found {len(GRAPHS)} graphs; expected 3, one for each realisation",
+        ),
+        (
+            {"realisations": 3, "draws": {"topology": itertools.repeat(ring(10))}},
             "found more than 3 graphs; expected 3, one for each realisation",
         ),
         (
@@ -263,7 +268,10 @@ def test_graphs_are_realisations(oscillator: str, coupling: str, tmp_path: Path)
             {"realisations": 2, "draws": {"topology": [ring(10), one_way_ring(10)]}},
             "draw topology: found 1.0 and 0.0 at nodes",
         ),
-        ({"realisations": 1, "draws": {"W": [[*range(1, 21)]]}}, "draw W: found 1.0 and 3.0 at nodes 1 and 2"),
+        (
+            {"realisations": 1, "draws": {"W": [[*range(1, 21)]]}},
+            "draw W on ring(10): found 1.0 and 3.0 at nodes 1 and 2",
+        ),
         ({"realisations": 4, "draws": {"topology": "ring"}}, "found 'ring'; expected a list of 4 graphs"),
         (
             {"realisations": 4, "draws": {"topology": GRAPHS}, "coupling": Rates({i.v: sp.cos(W + j.x - i.x)})},
@@ -283,12 +291,15 @@ CHAIN = Scene("rossler", "x->x", chain(3))
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"parameters": {"sigma": [1, 2, 3]}}, "found 3 values for 4 links; expected 2 values, one for each edge, or one for"),
+        ({"parameters": {"sigma": [1, 2, 3]}}, "parameter 'sigma' on chain(3): found 3 values for 4 links; expected 2 values, one for each edge, or one for"),
+        ({"parameters": {"sigma": iter(range(9))}}, "found more than 4 values for 4 links"),
         ({"parameters": {"sigma": [[0, 1, 1], [1, 0, 1], [1, 1, 0]]}}, "a number without a link where node 1 feels node 3"),
         ({"parameters": {"sigma": [[0, 1], [1, 0]]}}, "expected a matrix of 3 rows of 3 numbers"),
-        ({"parameters": {"sigma": one_way_ring(3)}}, "no number where node 2 feels node 1"),
+        ({"parameters": {"sigma": one_way_ring(3)}}, "no number where node 2 feels node 1; expected one for each link, no others; a matrix may have the number 0"),
         ({"parameters": {"sigma": {0.1, 0.2}}}, "found a set, which has no order"),
-        ({"parameters": {"sigma_1_3": 1.0}}, "unknown parameter 'sigma_1_3'"),
+        ({"parameters": {"sigma_1_3": 1.0}}, "unknown parameter 'sigma_1_3'; found no link where node 1 feels node 3; expected one of the 4, such as sigma_1_2, sigma_2_3, sigma_2_1"),
+        ({"sigma_1_9": 1.0}, "unknown parameter 'sigma_1_9'; found no link where node 1 feels node 9; expected one of the 4, such as sigma_1_2"),
+        ({"axes": {"W_3_1": [1.0]}}, "unknown axis 'W_3_1'; found no link where node 3 feels node 1"),
         ({"oscillator": "harmonic", "coupling": "spring", "parameters": {"sigma_2_1": 1}}, "expected 'sigma_1_2', the one number"),
         ({"parameters": {"W": [1, 2]}}, "the graph has the weights of links; expected an axis such as W_1_2 = [0.5, 1], or draws of W"),
         ({"parameters": {"W_1_2": 1.0}}, "the graph has the weights of links"),
@@ -296,7 +307,11 @@ CHAIN = Scene("rossler", "x->x", chain(3))
         ({"axes": {"sigma": [1.0]}, "parameters": {"sigma": [1, 2]}}, "expected the parameter of one, e.g. sigma_1_2"),
         ({"axes": {"W_1_2": [1.0]}, "realisations": 2, "draws": {"W": normal(0, 1)}}, "it is an axis as well"),
         ({"topology": complete(2000), "parameters": {"sigma_1_2": 1}}, "found numbers of 3998000 links; expected at most 1000000"),
-        ({"realisations": 2, "draws": {"W": [[1.0] * 3] * 2}}, "draw W: found 3 values for 4 links"),
+        ({"realisations": 2, "draws": {"W": [[1.0] * 3] * 2}}, "draw W on chain(3): found 3 values for 4 links"),
+        ({"realisations": 2, "draws": {"W": [np.ones((3, 3))] * 2}}, "draw W: found graphs or matrices; expected one number, or one for each"),
+        ({"realisations": 2, "draws": {"sigma": [chain(3)] * 2}}, "draws of 'topology' take a graph, or its matrix, for each"),
+        ({"realisations": 2, "draws": {"topology": [chain(3), ring(3)]}, "parameters": {"sigma": [1, 2, 3, 4]}},
+         "parameter 'sigma' on union of 2 graphs(3): found 4 values for 6 links"),
         ({"oscillator": "harmonic", "coupling": "spring", "parameters": {"sigma": [1, 2, 3, 3]}}, "expected one number for both"),
         ({"oscillator": "mass", "coupling": "fput", "realisations": 2, "draws": {"W": normal(0, 1)}}, "tells the two ends"),
     ],
@@ -305,6 +320,41 @@ def test_wrong_numbers_are_refused(given: dict[str, Any], words: str) -> None:
     with pytest.raises((ValueError, TypeError), match=re.escape(words)) as error:
         CHAIN.replace(**given)
     assert "\n" not in str(error.value)
+
+
+def test_a_run_says_which_links_there_are() -> None:
+    with pytest.raises(
+        ValueError, match=r"^run: unknown parameter 'sigma_1_3'; found no link where node 1 feels node 3;"
+    ):
+        run(CHAIN, sigma_1_3=[1.0, 2.0])
+    with pytest.raises(
+        ValueError, match=r"^run: unknown parameter 'sigma_2_1'; expected 'sigma_1_2', the one number of a"
+    ):
+        run(Scene("harmonic", "spring", chain(3)), sigma_2_1=1.0)
+
+
+def test_graphs_of_networkx_are_numbers_of_links() -> None:
+    """Not their nodes, which are numbers too and as many as the edges of a ring."""
+    networkx = pytest.importorskip("networkx")
+    graph = networkx.cycle_graph(4)
+    networkx.set_edge_attributes(graph, {(0, 1): 5, (1, 2): 6, (2, 3): 7, (0, 3): 8}, "weight")
+    found = Scene("harmonic", "spring", ring(4), parameters={"sigma": graph}).parameters
+    assert found == {"sigma_1_2": 5, "sigma_2_3": 6, "sigma_3_4": 7, "sigma_1_4": 8}
+    with pytest.raises(TypeError, match=r"mu_s: found .*Graph.*; expected a number"):
+        Scene(topology=ring(4), parameters={"mu_s": graph})
+
+
+def test_arrays_of_drawn_numbers_are_lists() -> None:
+    rows = np.arange(8.0).reshape(2, 4)
+    drawn = {how: CHAIN.replace(realisations=2, draws={"sigma": how_drawn}).drawn for how, how_drawn in
+             {"array": rows, "arrays": list(rows), "lists": rows.tolist()}.items()}  # fmt: skip
+    assert drawn["array"] == drawn["arrays"] == drawn["lists"]
+
+
+def test_a_scene_with_drawn_graphs_is_changed() -> None:
+    scene = Scene("harmonic", "spring", realisations=2, draws={"topology": [chain(3), ring(3)]})
+    assert scene.replace(rtol=1e-6).drawn == scene.drawn
+    assert scene.replace(parameters={"sigma": [1, 2, 3]}).parameters["sigma_1_3"] == 2
 
 
 @pytest.mark.parametrize(
