@@ -156,8 +156,7 @@ def emit(
     width = default_width(equations, method) if width is None else width
     ordered = tuple(r for r in Record if r in records)
     weights = tuple(multiplicity) if multiplicity is not None and "sync_error" in ordered else None
-    looped = equations.n > unroll or (not method.inexact and _of_links(equations) > MOST_OF_LINKS)
-    looped = looped or (method.series and equations.inertial and not equations.link_count)
+    looped = _is_looped(equations, method, unroll)
     if looped:
         method = _for_many(method, equations, unroll)
         equations = equations.without_fields() if method.implicit else equations
@@ -167,16 +166,8 @@ def emit(
     states = [s.name for node in plain.nodes for s in node.state]
     names = Names([*plain.state, *plain.parameters, *states, *plain.varied, *weight])
     functions, scratch, count, kinks = (_series if method.series else _stages)(plain, method, names, elimination)
-    traits = (
-        looped,
-        method.smooth is not None,
-        plain.sticks,
-        method.series,
-        kinks,
-        bool(watched.observed),
-        bool(watched.sections),
-        watched.stop is not None,
-    )
+    seen = bool(watched.observed), bool(watched.sections), watched.stop is not None
+    traits = looped, method.smooth is not None, plain.sticks, method.series, kinks, *seen
     chosen = Driver(KernelKind.SWEEP, width, ordered, *traits)
     events = [
         *push_functions(plain, names, looped),
@@ -188,18 +179,10 @@ def emit(
     if watched.has_rates:
         functions.append(driver.text("slope"))
     text = "\n\n\n".join([*functions, *map(LANES.function, events)]) + "\n"
-    constants = {
-        "WIDTH": width,
-        "DENSE": bool(ordered or watched) or plain.sticks,
-        "SERIES": method.series,
-    }
-    if elimination is not None:
-        solves = method.implicit or plain.inertial
-        constants |= {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": method.dense_rows}
-        constants |= {"ENTRIES": elimination.entries if solves else 0}
     head = describe(equations, plain, method, (*ordered, *watched.words(equations)), count)
-    tables = [f"{name} = {value}" for name, value in watched.tables(equations).items()]
-    named = "\n".join([*(f"{name} = {value!r}" for name, value in constants.items()), *tables])
+    constants = {"WIDTH": width, "DENSE": bool(ordered or watched) or plain.sticks, "SERIES": method.series}
+    constants |= {} if elimination is None else _of_loops(plain, method, elimination)
+    named = "\n".join(f"{name} = {value}" for name, value in (*constants.items(), *watched.tables(equations).items()))
     text = "\n\n\n".join([head, imports(f"{named}\n{text}"), named, text])
     sizes = _dimensions(plain, method, scratch)._replace(
         observed=watched.count(equations),
@@ -241,6 +224,18 @@ def default_width(equations: Equations, method: Integrator) -> int:
     most = 2 if method.implicit else 6
     moving = sum(len(equations.nodes[kind].continuous) for kind in equations.kind_of[: most + 1])
     return lanes.native_width(2 if moving <= most else 1)
+
+
+def _is_looped(equations: Equations, method: Integrator, unroll: int) -> bool:
+    """True if the steps run in loops."""
+    alone = method.series and equations.inertial and not equations.link_count
+    return equations.n > unroll or alone or (not method.inexact and _of_links(equations) > MOST_OF_LINKS)
+
+
+def _of_loops(plain: Equations, method: Integrator, elimination: Program) -> dict[str, int]:
+    """The constants of the text of a kernel of loops."""
+    entries = elimination.entries if method.implicit or plain.inertial else 0
+    return {"NODES": plain.n, "DIMENSION": plain.dimension, "DENSE_ROWS": method.dense_rows, "ENTRIES": entries}
 
 
 def _of_links(equations: Equations) -> int:
