@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from synchain.models.inputs.checks import check_number, check_table, check_text, suggestion
@@ -105,7 +105,7 @@ class Given:
         start = {name: list(values) for name, values in scene.initial.items()}
         given = self._checked(scene, states=True)
         for name, value in given.items():
-            if isinstance(value, Iterable) and not isinstance(value, str | bytes) and getattr(value, "ndim", 1) > 0:
+            if _is_row(value):
                 swept[name] = value
                 continue
             if state := _state(scene, name):
@@ -117,6 +117,12 @@ class Given:
         if given:
             settings |= {"axes": swept, "initial": start}
         return with_numbers(scene, fixed, **settings)
+
+    def parted(self) -> tuple[dict[str, Any], Given]:
+        """Return the rows of values by name, and the same call with the numbers alone."""
+        rows = {name: value for name, value in self.values.items() if _is_row(value)}
+        numbers = {name: value for name, value in self.values.items() if name not in rows}
+        return rows, replace(self, table=numbers, keywords={})
 
     def _checked(self, scene: Scene, states: bool = False) -> dict[str, object]:
         """The values; ValueError for an unknown name; with `states`, initial states are known too."""
@@ -150,6 +156,11 @@ def with_numbers(scene: Scene, values: Mapping[str, object], **settings: object)
         numbers.update(values.items())
         settings["parameters"] = numbers
     return scene.replace(**settings) if settings else scene
+
+
+def _is_row(value: object) -> bool:
+    """True for a sequence of values in place of one."""
+    return isinstance(value, Iterable) and not isinstance(value, str | bytes) and getattr(value, "ndim", 1) > 0
 
 
 def _state(scene: Scene, name: str) -> NodeName | None:

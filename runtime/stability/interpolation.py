@@ -2,7 +2,7 @@
 
 The propagator of a mode over a stretch of time is an entire function of its strength, so a short
 polynomial in the strength gives it for all modes. The strengths are divided into panels, pieces of
-the real line or squares of the plane. On each panel the propagators of some nodes are integrated,
+the real line, squares of the complex plane, or rectangles of two real strengths. On each panel the propagators of some nodes are integrated,
 and the others are interpolated from them. Every panel has further strengths that are integrated
 for comparison only.
 
@@ -13,7 +13,7 @@ on a circle, Austin, Kravanja & Trefethen, SIAM J. Numer. Anal. 52, 1795 (2014).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,9 +29,9 @@ class Panel:
     ----------
     rows : ndarray, shape (m,)
         Indices of the strengths.
-    points : ndarray, shape (k,)
+    points : ndarray, shape (k,) or (k, 2)
         Strengths of the nodes.
-    extras : ndarray, shape (c,)
+    extras : ndarray, shape (c,) or (c, 2)
         Strengths that are integrated for comparison only.
     weights : ndarray, shape (m, k)
         Propagators of the strengths = weights @ propagators of the nodes.
@@ -60,7 +60,7 @@ class Interpolation:
 
     Parameters
     ----------
-    strengths : ndarray, shape (m,)
+    strengths : ndarray, shape (m,) or (m, layers)
         All strengths, real or complex.
     panels : tuple of Panel
         Parts of the strengths with their nodes; none if every strength is integrated.
@@ -76,7 +76,7 @@ class Interpolation:
 
     @property
     def nodes(self) -> np.ndarray:
-        """Strengths (k,) that are integrated."""
+        """Strengths (k,) or (k, layers) that are integrated."""
         if self.is_exact:
             return self.strengths
         return np.concatenate([part for panel in self.panels for part in (panel.points, panel.extras)])
@@ -145,17 +145,19 @@ def strength_interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) ->
 
     Parameters
     ----------
-    strengths : ndarray, shape (m,)
-        Real or complex strengths.
+    strengths : ndarray, shape (m,) or (m, layers)
+        Real or complex strengths, one for each layer.
     nodes : int
-        Chebyshev points on each piece of the real line; a square has twice as many on a circle.
+        Chebyshev points on each piece of the real line and on each side of a rectangle; a square has twice as many on a
+        circle.
     parts : int
         Panels on each side of the range.
 
     Returns
     -------
     Interpolation
-        `exact_interpolation(strengths)` if the panels need as many nodes as there are strengths.
+        `exact_interpolation(strengths)` if the panels need as many nodes as there are strengths, for two complex strengths,
+        and for more than two.
 
     Raises
     ------
@@ -164,10 +166,20 @@ def strength_interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) ->
     """
     if len(strengths) == 0:
         raise ValueError("found no strength of a mode; expected at least one")
-    panels = tuple((_squares if np.iscomplexobj(strengths) else _pieces)(strengths, parts, nodes))
+    way = _way(strengths)
+    if way is None:
+        return exact_interpolation(strengths)
+    panels = tuple(way(strengths, parts, nodes))
     if sum(len(panel.points) + len(panel.extras) for panel in panels) >= len(strengths):
         return exact_interpolation(strengths)
     return Interpolation(strengths, panels)
+
+
+def _way(strengths: np.ndarray) -> Callable[[np.ndarray, int, int], Iterator[Panel]] | None:
+    """What divides strengths into panels; None if every one is integrated."""
+    if strengths.ndim == 1:
+        return _squares if np.iscomplexobj(strengths) else _pieces
+    return _rectangles if strengths.shape[1] == 2 and not np.iscomplexobj(strengths) else None
 
 
 def on_a_cache_line(values: np.ndarray) -> np.ndarray:
@@ -188,16 +200,53 @@ def _pieces(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
 
     The strengths for comparison lie between the outer points, and in the middle.
     """
-    edges = np.linspace(strengths.min(), strengths.max(), count + 1)
-    which = np.clip(np.searchsorted(edges, strengths, side="right") - 1, 0, count - 1)
-    unit = np.cos(np.arange(nodes) * math.pi / (nodes - 1))
-    signs = (-1.0) ** np.arange(nodes)
-    signs[[0, -1]] *= 0.5
-    between = (unit[:-1] + unit[1:])[[0, nodes // 2 - 1, -1]] / 2
+    edges, which = _parted(strengths, count)
+    unit, signs, between = _chebyshev(nodes)
     for k in np.unique(which):
         centre, half = (edges[k] + edges[k + 1]) / 2, (edges[k + 1] - edges[k]) / 2
         rows = np.flatnonzero(which == k)
         yield Panel.of(strengths, rows, centre + half * unit, signs, centre + half * between)
+
+
+def _parted(strengths: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The ends of equal pieces of the real line that cover the strengths, and the piece of each strength."""
+    edges = np.linspace(strengths.min(), strengths.max(), count + 1)
+    return edges, np.clip(np.searchsorted(edges, strengths, side="right") - 1, 0, count - 1)
+
+
+def _chebyshev(nodes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Chebyshev points of the second kind, their barycentric weights, and three points between them."""
+    unit = np.cos(np.arange(nodes) * math.pi / (nodes - 1))
+    signs = (-1.0) ** np.arange(nodes)
+    signs[[0, -1]] *= 0.5
+    return unit, signs, (unit[:-1] + unit[1:])[[0, nodes // 2 - 1, -1]] / 2
+
+
+def _rectangles(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
+    """Yield rectangles that cover pairs of real strengths; their nodes are those of the pieces of both sides.
+
+    A side without length has a single node.
+    """
+    edges, which = zip(*(_parted(side, count) for side in strengths.T), strict=True)
+    places = np.stack(which, axis=1)
+    for cell in np.unique(places, axis=0):
+        rows = np.flatnonzero((places == cell).all(axis=1))
+        sides, extras = [], []
+        for k, (ends, turn) in enumerate(zip(edges, (0, 1), strict=True)):
+            centre, half = (ends[cell[k]] + ends[cell[k] + 1]) / 2, (ends[cell[k] + 1] - ends[cell[k]]) / 2
+            unit, signs, between = _chebyshev(nodes) if half > 0.0 else (np.zeros(1), np.ones(1), np.zeros(3))
+            sides.append((centre + half * unit, signs))
+            extras.append(centre + half * np.roll(between, turn))
+        points = np.stack(np.meshgrid(*(side for side, _ in sides), indexing="ij"), axis=-1).reshape(-1, 2)
+        compared = np.stack(extras, axis=1)
+        weights, checks = (_of_sides(x, sides) for x in (strengths[rows], compared))
+        yield Panel(rows, points, compared, weights, checks)
+
+
+def _of_sides(x: np.ndarray, sides: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Interpolating polynomial of two variables (len(x), nodes of both sides)."""
+    first, second = (_barycentric(column, *side) for column, side in zip(x.T, sides, strict=True))
+    return (first[:, :, None] * second[:, None, :]).reshape(len(x), -1)
 
 
 def _squares(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:

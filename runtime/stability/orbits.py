@@ -60,8 +60,8 @@ class Orbits:
         Oscillator, coupling and numerical settings.
     variation : Variation
         Variational equation of a mode.
-    strengths : ndarray, shape (m,)
-        Strengths in the variational equation: alpha + i beta unless links have inertia.
+    strengths : ndarray, shape (m,) or (m, layers)
+        Strengths in the variational equation: alpha + i beta unless links have inertia; of several layers one each.
     state : ndarray, shape (starts, components)
         Current states.
     workers : int or None
@@ -100,7 +100,7 @@ class Orbits:
         ----------
         scene : Scene
             Scene with coupling.
-        strengths : ndarray, shape (m,)
+        strengths : ndarray, shape (m,) or (m, layers)
             Strengths alpha + i beta of the modes.
         state : ndarray, shape (starts, components)
             Initial states.
@@ -110,10 +110,16 @@ class Orbits:
         Raises
         ------
         ValueError
-            If time enters without a known period, or if a mode has no positive mass at its
-            strength.
+            If time enters without a known period, if a mode has no positive mass at its strength, or if modes have another
+            number of strengths than there are layers of links.
         """
         variation = _variation(scene.equations, bool(np.iscomplexobj(strengths)))
+        layers = len(scene.equations.layers)
+        if strengths.size != len(strengths) * layers:
+            raise ValueError(
+                f"transversal modes: found {layers} layer{'s' * (layers > 1)} of links, so that a mode has as many strengths; expected "
+                "one for each; `plane` takes the strengths of layers as axes, e.g. plane(scene, k=[0, 1], g=[0, 1])"
+            )
         unit = unit_of_time(scene)
         row = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])
         numbers = np.repeat(row, len(state), axis=0)
@@ -124,7 +130,7 @@ class Orbits:
     @property
     def components(self) -> int:
         """State variables of one deviation, real or complex."""
-        return self.variation.size // len(self.variation.parameters)
+        return len(self.variation.orbit.node.continuous)
 
     def part(self, rows: list[int]) -> Orbits:
         """Return the orbits of some starts."""
@@ -142,7 +148,7 @@ class Orbits:
         looseness : float
             Ratio of the tolerance of the deviations to that of the orbit.
         """
-        repeated = np.repeat(strengths, self.components)
+        repeated = np.repeat(strengths, self.components, axis=0)
         rows = _rows(repeated.astype(self.strengths.dtype))
         names = self.variation.orbit.parameters
         numbers = np.tile([self.scene.parameters[name] for name in names], (len(self.state), 1))
@@ -180,7 +186,8 @@ class Orbits:
         one.advance(self.unit)
         taken = STEP * self.components * one.steps / len(self.state)
         blocks = [b for b in BLOCKS if b <= max(4.0, periods / BATCHES)] if self.scene.forced else FREE_BLOCKS
-        for block, nodes, parts in _choices(blocks, taken, len(self.strengths) * self.components**2):
+        grid = 2 if self.strengths.ndim == 2 else 1
+        for block, nodes, parts in _choices(blocks, taken, len(self.strengths) * self.components**2, grid):
             chosen = strength_interpolation(self.strengths, nodes, parts)
             if chosen.is_exact or self._misfit(chosen, block) < limit:
                 break
@@ -280,8 +287,9 @@ class Orbits:
 
 
 def _rows(strengths: np.ndarray) -> np.ndarray:
-    """The real numbers (1 or 2, modes) of real or complex strengths."""
-    return np.stack([strengths.real, strengths.imag]) if np.iscomplexobj(strengths) else strengths[None]
+    """The real numbers (rows, modes) of real or complex strengths: one or two rows for each layer."""
+    rows = strengths.reshape(len(strengths), -1).T
+    return np.concatenate([rows.real, rows.imag]) if np.iscomplexobj(strengths) else rows
 
 
 def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:
@@ -323,14 +331,15 @@ def unit_of_time(scene: Scene) -> float:
     return scene.period or 2.0 * math.pi
 
 
-def _choices(blocks: Sequence[float], taken: float, numbers: int) -> list[tuple[float, int, int]]:
+def _choices(blocks: Sequence[float], taken: float, numbers: int, sides: int) -> list[tuple[float, int, int]]:
     """Blocks, nodes of a panel and panels on each side, the cheapest first.
 
-    `taken`: multiplications that integrate a node over a unit of time; `numbers`: those of all propagators.
+    `taken`: multiplications that integrate a node over a unit of time; `numbers`: those of all propagators; `sides`: 2 if
+    nodes and panels are those of each side of a rectangle.
     """
 
     def cost(block: float, nodes: int, parts: int) -> float:
-        return nodes * parts * taken + (numbers * (nodes + BESIDE) + BLOCK) / block
+        return (nodes * parts) ** sides * taken + (numbers * (nodes**sides + BESIDE) + BLOCK) / block
 
     choices = [(block, nodes, parts) for block in blocks for nodes in NODES for parts in PARTS]
     return sorted(choices, key=lambda choice: cost(*choice))

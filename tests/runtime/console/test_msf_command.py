@@ -48,7 +48,7 @@ def function(scene: Scene, low: float = LOW, high: float = HIGH, end: float = 1.
 def disc(scene: Scene, alpha: np.ndarray, beta: np.ndarray) -> Plane:
     """Negative inside a circle round 0.35 of radius 0.25."""
     value = np.add.outer((alpha - LOW) * (alpha - HIGH), beta**2)
-    return Plane(scene, alpha, beta, value, np.full(value.shape, 1e-3), ("aperiodic",), 500.0)
+    return Plane(scene, alpha, beta, value, np.full(value.shape, 1e-3), np.array([[["aperiodic"]]]), 500.0)
 
 
 @pytest.fixture

@@ -1,0 +1,147 @@
+"""Joint eigenvalues of several graphs on the same nodes, whose matrices commute.
+
+Matrices that commute are triangular in one basis, so that A + t B has the eigenvalues a + t b of the pairs (a, b) of
+their common modes (R. A. Horn, C. R. Johnson, Matrix Analysis, Cambridge University Press, 2013, theorem 2.3.3).  With a t
+for which no two sums a + t b of eigenvalues of A and B are equal, the exact spectrum of A + t B names the pairs and their
+multiplicities: no eigenvector is computed and nothing is rounded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from typing import TypeAlias
+
+from flint import acb, fmpq, fmpq_poly
+
+from ..algebra.balls import disjoint, precision
+from ..spectra.eigenvalue import Eigenvalue, ProofError
+from ..spectra.jordan import value_at
+from ..spectra.solve import spectrum
+from .topology import Topology
+
+__all__ = ["JointEigenvalue", "joint_spectrum"]
+
+BITS = 256
+"""Precision at which sums of eigenvalues are told apart."""
+
+PRIME, TRIED = 97, 1000
+"""Factors t = k/PRIME of a further matrix are tried, k = 1, 2, …; few of them make two sums equal."""
+
+Modes: TypeAlias = "tuple[tuple[tuple[Eigenvalue, ...], Eigenvalue], ...]"
+"""The eigenvalues of each graph on a common mode, and that of a combination of the graphs."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointEigenvalue:
+    """The eigenvalues of several graphs on one common mode.
+
+    Parameters
+    ----------
+    parts : tuple of Eigenvalue
+        The eigenvalue of each graph, with its own multiplicity there.
+    multiplicity : int
+        How often these eigenvalues occur together.
+    """
+
+    parts: tuple[Eigenvalue, ...]
+    multiplicity: int
+
+    @property
+    def values(self) -> tuple[float | complex, ...]:
+        """The eigenvalue of each graph as the nearest float."""
+        return tuple(part.value for part in self.parts)
+
+    def __str__(self) -> str:
+        return f"({', '.join(map(str, self.parts))})"
+
+
+@lru_cache(maxsize=32)
+def joint_spectrum(graphs: tuple[Topology, ...]) -> tuple[JointEigenvalue, ...]:
+    """Return the distinct joint eigenvalues of the connectivity matrices of graphs, exactly.
+
+    Parameters
+    ----------
+    graphs : tuple of Topology
+        Graphs on the same nodes; of a single one this is its spectrum.
+
+    Returns
+    -------
+    tuple of JointEigenvalue
+        With positive weights downwards; one of them is that of equal states, all zeros.
+
+    Raises
+    ------
+    ValueError
+        If the graphs have different numbers of nodes, or if two of their matrices do not commute.
+    ProofError
+        If the eigenvalues of the sum are no sums of eigenvalues, a mistake of the program.
+
+    Examples
+    --------
+    >>> from synchain.models import complete, joint_spectrum, ring
+    >>> [str(mode) for mode in joint_spectrum((ring(4), complete(4)))]
+    ['(0, 0)', '(-2, -4)', '(-4, -4)']
+    """
+    _check(graphs)
+    modes: Modes = tuple(((e,), e) for e in spectrum(graphs[0]))
+    combined = graphs[0]
+    for graph in graphs[1:]:
+        modes, combined = _joined(modes, combined, graph)
+    return tuple(JointEigenvalue(parts, number.multiplicity) for parts, number in modes)
+
+
+def _check(graphs: Sequence[Topology]) -> None:
+    """Raise ValueError unless the graphs have the same nodes and their matrices commute."""
+    sizes = sorted({graph.n for graph in graphs})
+    if len(sizes) != 1:
+        found = " and ".join(map(str, sizes)) or "no"
+        raise ValueError(f"joint spectrum: found graphs of {found} nodes; expected graphs on the same nodes")
+    itself = fmpq_poly([0, 1])
+    whole = [value_at(graph, itself) for graph in graphs if len(graphs) > 1]
+    for i, first in enumerate(whole):
+        for j in range(i):
+            if whole[j] * first != first * whole[j]:
+                raise ValueError(
+                    f"joint spectrum of {graphs[j].name}({first.nrows()}) and {graphs[i].name}({first.nrows()}): found matrices that do not "
+                    "commute; expected graphs with common modes, such as any undirected graph and a complete one"
+                )
+
+
+def _joined(modes: Modes, combined: Topology, graph: Topology) -> tuple[Modes, Topology]:
+    """The modes with their eigenvalues on one more graph, and the combination whose eigenvalues are theirs."""
+    own = spectrum(graph)
+    pairs = [(parts, number, e) for parts, number in modes for e in own]
+    for factor in (Fraction(k, PRIME) for k in range(1, TRIED)):
+        with precision(2 * BITS):
+            share = fmpq(factor.numerator, factor.denominator)
+            sums = [acb(number.enclosure(BITS) + share * e.enclosure(BITS)) for _, number, e in pairs]
+            if disjoint(sums):
+                break
+    else:
+        raise ProofError(
+            f"joint spectrum of {graph.name}({graph.n}): found equal sums for {TRIED} factors; expected one"
+        )
+    combined = _combined(combined, graph, factor)
+    found = []
+    for number in spectrum(combined):
+        with precision(2 * BITS):
+            at = [k for k, ball in enumerate(sums) if ball.overlaps(number.enclosure(BITS))]
+        if len(at) != 1:
+            raise ProofError(
+                f"joint spectrum of {graph.name}({graph.n}): found {len(at)} pairs for {number}; expected one"
+            )
+        parts, _, e = pairs[at[0]]
+        found.append(((*parts, e), number))
+    return tuple(found), combined
+
+
+def _combined(first: Topology, second: Topology, factor: Fraction) -> Topology:
+    """The graph of the matrix A + t B."""
+    weights = {link[:2]: link[2] for link in first.links}
+    for target, source, weight in second.links:
+        weights[target, source] = weights.get((target, source), Fraction(0)) + factor * weight
+    links = tuple((*at, weight) for at, weight in sorted(weights.items()) if weight)
+    return Topology(f"{first.name} and {second.name}", first.n, links)
