@@ -86,7 +86,7 @@ class Given:
                 f"{self.function.__name__}: found draws of {', '.join(scene.draws)}; expected a scene without them; "
                 "write scene.replace(realisations=0, draws=None)"
             )
-        return with_numbers(scene, self._checked(a_scene(scene)), **settings)
+        return with_numbers(scene, self.checked(a_scene(scene)), **settings)
 
     def sweep(self, scene: Scene, **settings: object) -> Scene:
         """Return a scene with parameters and initial states fixed, by a number, or swept, by a
@@ -103,7 +103,7 @@ class Given:
         fixed: dict[str, object] = {}
         swept: dict[str, object] = {axis.name: axis.values for axis in a_scene(scene).axes}
         start = {name: list(values) for name, values in scene.initial.items()}
-        given = self._checked(scene, states=True)
+        given = self.checked(scene, states=True)
         for name, value in given.items():
             if _is_row(value):
                 swept[name] = value
@@ -124,8 +124,8 @@ class Given:
         numbers = {name: value for name, value in self.values.items() if name not in rows}
         return rows, replace(self, table=numbers, keywords={})
 
-    def _checked(self, scene: Scene, states: bool = False) -> dict[str, object]:
-        """The values; ValueError for an unknown name; with `states`, initial states are known too."""
+    def checked(self, scene: Scene, states: bool = False) -> dict[str, object]:
+        """Return the values; ValueError for an unknown name; with `states`, initial states are known too."""
         values = self.values
         for name in values:
             if not (scene.takes(name) or (states and _state(scene, name))):

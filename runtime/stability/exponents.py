@@ -26,6 +26,7 @@ from synchain.models.scenes.scene import Scene, a_scene
 from ..cells.keywords import ONE_CELL, ORBITS, Given
 from ..prediction.intervals import Interval
 from ..results.labelled import Labelled, dataset, ends_of, words_of
+from ..support.arrays import numbers
 from ..support.arrays import row as row_of
 from ..support.execution import Execution
 from ..support.progress import Hook, Reporter
@@ -44,6 +45,7 @@ __all__ = [
     "orbits_of",
     "single_cell",
     "transversal",
+    "with_partner",
 ]
 
 
@@ -244,9 +246,12 @@ def exponents(
     """
     given = Given(exponents, parameters, more, ORBITS)
     averaging = Averaging(precision, periods, transient, seed, Execution(workers, None, show_progress, progress))
-    several = np.ndim(alpha) == 2 and np.shape(alpha)[0] > 0
-    flat = row_of("alpha", np.ravel(alpha) if several else alpha, complex_too=True)
-    return transversal(given, scene, flat.reshape(np.shape(alpha)) if several else flat, starts, rtol, averaging)
+    asked = numbers("alpha", alpha, complex_too=True)
+    of_layers = asked.ndim == 2 and len(a_scene(scene).model.linked) > 1
+    strengths = row_of("alpha", asked.ravel() if of_layers else asked, complex_too=True)
+    return transversal(
+        given, scene, strengths.reshape(asked.shape) if of_layers else strengths, starts, rtol, averaging
+    )
 
 
 def transversal(
@@ -333,12 +338,16 @@ def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
     rtol : float
         Relative tolerance.
     """
+    return single_cell(given, with_partner(scene), rtol)
+
+
+def with_partner(scene: Scene) -> Scene:
+    """Return a network that sweeps nothing: a lone oscillator gets a partner; ValueError if the link moves them both."""
     if a_scene(scene).model.linked:
-        coupled = scene.replace(**ONE_CELL)
-    else:
-        coupled = scene.replace(topology=topology("chain", 2), **ONE_CELL)
-        expect_vanishing("a lone oscillator gets a partner", coupled.equations)
-    return single_cell(given, coupled, rtol)
+        return scene.replace(**ONE_CELL)
+    coupled = scene.replace(topology=topology("chain", 2), **ONE_CELL)
+    expect_vanishing("a lone oscillator gets a partner", coupled.equations)
+    return coupled
 
 
 def single_cell(given: Given, scene: Scene, rtol: float) -> Scene:

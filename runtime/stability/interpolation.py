@@ -2,7 +2,8 @@
 
 The propagator of a mode over a stretch of time is an entire function of its strength, so a short
 polynomial in the strength gives it for all modes. The strengths are divided into panels, pieces of
-the real line, squares of the complex plane, or rectangles of two real strengths. On each panel the propagators of some nodes are integrated,
+the real line or squares of the plane; those of several layers into lines along which that of a
+single layer changes, and these into panels. On each panel the propagators of some nodes are integrated,
 and the others are interpolated from them. Every panel has further strengths that are integrated
 for comparison only.
 
@@ -13,12 +14,20 @@ on a circle, Austin, Kravanja & Trefethen, SIAM J. Numer. Anal. 52, 1795 (2014).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-__all__ = ["Interpolation", "Panel", "Registers", "exact_interpolation", "on_a_cache_line", "strength_interpolation"]
+__all__ = [
+    "Interpolation",
+    "Panel",
+    "Registers",
+    "exact_interpolation",
+    "lines_of",
+    "on_a_cache_line",
+    "strength_interpolation",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +38,9 @@ class Panel:
     ----------
     rows : ndarray, shape (m,)
         Indices of the strengths.
-    points : ndarray, shape (k,) or (k, 2)
+    points : ndarray, shape (k,) or (k, layers)
         Strengths of the nodes.
-    extras : ndarray, shape (c,) or (c, 2)
+    extras : ndarray, shape (c,) or (c, layers)
         Strengths that are integrated for comparison only.
     weights : ndarray, shape (m, k)
         Propagators of the strengths = weights @ propagators of the nodes.
@@ -148,16 +157,14 @@ def strength_interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) ->
     strengths : ndarray, shape (m,) or (m, layers)
         Real or complex strengths, one for each layer.
     nodes : int
-        Chebyshev points on each piece of the real line and on each side of a rectangle; a square has twice as many on a
-        circle.
+        Chebyshev points on each piece of the real line; a square has twice as many on a circle.
     parts : int
         Panels on each side of the range.
 
     Returns
     -------
     Interpolation
-        `exact_interpolation(strengths)` if the panels need as many nodes as there are strengths, for two complex strengths,
-        and for more than two.
+        `exact_interpolation(strengths)` if the panels need as many nodes as there are strengths.
 
     Raises
     ------
@@ -166,20 +173,51 @@ def strength_interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) ->
     """
     if len(strengths) == 0:
         raise ValueError("found no strength of a mode; expected at least one")
-    way = _way(strengths)
-    if way is None:
-        return exact_interpolation(strengths)
-    panels = tuple(way(strengths, parts, nodes))
+    panels = tuple((_on_a_line if strengths.ndim == 1 else _along_lines)(strengths, parts, nodes))
     if sum(len(panel.points) + len(panel.extras) for panel in panels) >= len(strengths):
         return exact_interpolation(strengths)
     return Interpolation(strengths, panels)
 
 
-def _way(strengths: np.ndarray) -> Callable[[np.ndarray, int, int], Iterator[Panel]] | None:
-    """What divides strengths into panels; None if every one is integrated."""
-    if strengths.ndim == 1:
-        return _squares if np.iscomplexobj(strengths) else _pieces
-    return _rectangles if strengths.shape[1] == 2 and not np.iscomplexobj(strengths) else None
+def lines_of(strengths: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
+    """Return the lines on which strengths (m, layers) lie that differ in a single layer.
+
+    Returns
+    -------
+    moving : int
+        The layer for which they are fewest.
+    fixed : ndarray, shape (lines, layers - 1)
+        The strengths of the other layers on each line.
+    line : ndarray of int, shape (m,)
+        The line of each mode.
+    """
+    found = []
+    for moving in range(strengths.shape[1]):
+        fixed, line = np.unique(np.delete(strengths, moving, axis=1), axis=0, return_inverse=True)
+        found.append((moving, fixed, line.reshape(-1)))
+    return min(found, key=lambda lines: len(lines[1]))
+
+
+def _along_lines(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
+    """Yield the panels of every line; those of few strengths have these as their nodes."""
+    moving, fixed, line = lines_of(strengths)
+    for k, others in enumerate(fixed):
+        rows = np.flatnonzero(line == k)
+        own = strengths[rows, moving]
+        if len(rows) <= nodes:
+            parts: Iterable[Panel] = (Panel(np.arange(len(own)), own, own[:0], np.eye(len(own)), np.eye(len(own))[:0]),)
+        else:
+            parts = _on_a_line(own, count, nodes)
+        for part in parts:
+            points, extras = (
+                np.insert(np.tile(others, (len(x), 1)), moving, x, axis=1) for x in (part.points, part.extras)
+            )
+            yield replace(part, rows=rows[part.rows], points=points, extras=extras)
+
+
+def _on_a_line(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
+    """Yield the panels of strengths of a single layer."""
+    return (_squares if np.iscomplexobj(strengths) else _pieces)(strengths, count, nodes)
 
 
 def on_a_cache_line(values: np.ndarray) -> np.ndarray:
@@ -200,53 +238,16 @@ def _pieces(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
 
     The strengths for comparison lie between the outer points, and in the middle.
     """
-    edges, which = _parted(strengths, count)
-    unit, signs, between = _chebyshev(nodes)
+    edges = np.linspace(strengths.min(), strengths.max(), count + 1)
+    which = np.clip(np.searchsorted(edges, strengths, side="right") - 1, 0, count - 1)
+    unit = np.cos(np.arange(nodes) * math.pi / (nodes - 1))
+    signs = (-1.0) ** np.arange(nodes)
+    signs[[0, -1]] *= 0.5
+    between = (unit[:-1] + unit[1:])[[0, nodes // 2 - 1, -1]] / 2
     for k in np.unique(which):
         centre, half = (edges[k] + edges[k + 1]) / 2, (edges[k + 1] - edges[k]) / 2
         rows = np.flatnonzero(which == k)
         yield Panel.of(strengths, rows, centre + half * unit, signs, centre + half * between)
-
-
-def _parted(strengths: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The ends of equal pieces of the real line that cover the strengths, and the piece of each strength."""
-    edges = np.linspace(strengths.min(), strengths.max(), count + 1)
-    return edges, np.clip(np.searchsorted(edges, strengths, side="right") - 1, 0, count - 1)
-
-
-def _chebyshev(nodes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Chebyshev points of the second kind, their barycentric weights, and three points between them."""
-    unit = np.cos(np.arange(nodes) * math.pi / (nodes - 1))
-    signs = (-1.0) ** np.arange(nodes)
-    signs[[0, -1]] *= 0.5
-    return unit, signs, (unit[:-1] + unit[1:])[[0, nodes // 2 - 1, -1]] / 2
-
-
-def _rectangles(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
-    """Yield rectangles that cover pairs of real strengths; their nodes are those of the pieces of both sides.
-
-    A side without length has a single node.
-    """
-    edges, which = zip(*(_parted(side, count) for side in strengths.T), strict=True)
-    places = np.stack(which, axis=1)
-    for cell in np.unique(places, axis=0):
-        rows = np.flatnonzero((places == cell).all(axis=1))
-        sides, extras = [], []
-        for k, (ends, turn) in enumerate(zip(edges, (0, 1), strict=True)):
-            centre, half = (ends[cell[k]] + ends[cell[k] + 1]) / 2, (ends[cell[k] + 1] - ends[cell[k]]) / 2
-            unit, signs, between = _chebyshev(nodes) if half > 0.0 else (np.zeros(1), np.ones(1), np.zeros(3))
-            sides.append((centre + half * unit, signs))
-            extras.append(centre + half * np.roll(between, turn))
-        points = np.stack(np.meshgrid(*(side for side, _ in sides), indexing="ij"), axis=-1).reshape(-1, 2)
-        compared = np.stack(extras, axis=1)
-        weights, checks = (_of_sides(x, sides) for x in (strengths[rows], compared))
-        yield Panel(rows, points, compared, weights, checks)
-
-
-def _of_sides(x: np.ndarray, sides: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """Interpolating polynomial of two variables (len(x), nodes of both sides)."""
-    first, second = (_barycentric(column, *side) for column, side in zip(x.T, sides, strict=True))
-    return (first[:, :, None] * second[:, None, :]).reshape(len(x), -1)
 
 
 def _squares(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:

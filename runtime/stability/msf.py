@@ -28,7 +28,7 @@ from ..support.arrays import row
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .averages import Averaging
-from .exponents import Exponents, along, coupled_cell, orbits_of, transversal
+from .exponents import Exponents, along, coupled_cell, orbits_of, transversal, with_partner
 from .network import SharedOrbit, shared_orbits, still_strengths, transversal_modes
 
 __all__ = ["MSF", "Plane", "StabilityClass", "classify", "msf", "plane"]
@@ -402,7 +402,9 @@ def plane(
     Hasler, Phys. Rev. Lett. 94, 188101 (2005).
     """
     averaging = Averaging(precision, periods, transient, seed, Execution(workers, None, show_progress, progress))
-    rows, given = Given(plane, parameters, more, ORBITS).parted()
+    whole = Given(plane, parameters, more, ORBITS)
+    whole.checked(with_partner(scene))
+    rows, given = whole.parted()
     strengths = {name: values for name, values in zip(STRENGTHS, (alpha, beta), strict=True) if values is not None}
     if len(strengths) + len(rows) != 2 or list(strengths) == ["beta"] or rows.keys() & set(STRENGTHS):
         raise ValueError(

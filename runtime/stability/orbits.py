@@ -19,7 +19,7 @@ from synchain.models.scenes.scene import Scene
 from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
 from .averages import BATCHES
-from .interpolation import Interpolation, exact_interpolation, strength_interpolation
+from .interpolation import Interpolation, exact_interpolation, lines_of, strength_interpolation
 from .variational_integrator import Travellers, VariationalIntegrator
 
 __all__ = ["Orbits", "unit_of_time"]
@@ -186,8 +186,8 @@ class Orbits:
         one.advance(self.unit)
         taken = STEP * self.components * one.steps / len(self.state)
         blocks = [b for b in BLOCKS if b <= max(4.0, periods / BATCHES)] if self.scene.forced else FREE_BLOCKS
-        grid = 2 if self.strengths.ndim == 2 else 1
-        for block, nodes, parts in _choices(blocks, taken, len(self.strengths) * self.components**2, grid):
+        lines = 1 if self.strengths.ndim == 1 else len(lines_of(self.strengths)[1])
+        for block, nodes, parts in _choices(blocks, lines * taken, len(self.strengths) * self.components**2):
             chosen = strength_interpolation(self.strengths, nodes, parts)
             if chosen.is_exact or self._misfit(chosen, block) < limit:
                 break
@@ -331,15 +331,14 @@ def unit_of_time(scene: Scene) -> float:
     return scene.period or 2.0 * math.pi
 
 
-def _choices(blocks: Sequence[float], taken: float, numbers: int, sides: int) -> list[tuple[float, int, int]]:
+def _choices(blocks: Sequence[float], taken: float, numbers: int) -> list[tuple[float, int, int]]:
     """Blocks, nodes of a panel and panels on each side, the cheapest first.
 
-    `taken`: multiplications that integrate a node over a unit of time; `numbers`: those of all propagators; `sides`: 2 if
-    nodes and panels are those of each side of a rectangle.
+    `taken`: multiplications that integrate a node of each line over a unit of time; `numbers`: those of all propagators.
     """
 
     def cost(block: float, nodes: int, parts: int) -> float:
-        return (nodes * parts) ** sides * taken + (numbers * (nodes**sides + BESIDE) + BLOCK) / block
+        return nodes * parts * taken + (numbers * (nodes + BESIDE) + BLOCK) / block
 
     choices = [(block, nodes, parts) for block in blocks for nodes in NODES for parts in PARTS]
     return sorted(choices, key=lambda choice: cost(*choice))

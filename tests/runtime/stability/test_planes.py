@@ -160,14 +160,14 @@ def rossler(strengths: np.ndarray) -> Orbits:
 
 
 def test_propagators_of_two_strengths_by_scipy_and_by_interpolation() -> None:
-    """A chaotic orbit with a link between equal states; a rectangle gives all strengths from a few."""
-    side = np.linspace(0.0, 1.5, 16)
-    strengths = np.stack(np.meshgrid(side, side - 0.3, indexing="ij"), axis=-1).reshape(-1, 2)
+    """A chaotic orbit with a link between equal states; on each line a few give all strengths."""
+    sides = np.linspace(0.0, 1.5, 60), np.linspace(-0.3, 1.2, 5)
+    strengths = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2)
     orbits = rossler(strengths)
     orbits.start(exact_interpolation(strengths), 0.5, 1.0)
     state = orbits.integrator.state.copy()
     exact, _ = orbits.propagators()
-    for which in (0, 37, 255):
+    for which in (0, 37, 299):
 
         def rates(_: float, y: np.ndarray, which: int = which) -> np.ndarray:
             (x, v, z), columns = y[:3], y[3:].reshape(3, 3)
@@ -185,18 +185,23 @@ def test_propagators_of_two_strengths_by_scipy_and_by_interpolation() -> None:
         again = rossler(strengths)
         again.start(interpolation, 0.5, 1.0)
         growths.append(again.growths(np.array([10])))
-    assert len(interpolation.nodes) == 13 * 13 + 3
+    assert len(interpolation.nodes) == 5 * (13 + 3)
     np.testing.assert_allclose(growths[1], growths[0], atol=1e-7)
     assert 0.0 < again.travellers.error < 1e-7
 
 
-def test_a_side_without_length_has_one_node() -> None:
-    strengths = np.stack([np.linspace(0.0, 1.0, 60), np.full(60, 0.4)], axis=1)
+@pytest.mark.parametrize("turn", [1.0, 1.0 + 0.5j])
+def test_strengths_of_layers_are_interpolated_along_lines(turn: complex) -> None:
+    """Lines are those of the layer with the most values; one of few strengths has these as its nodes."""
+    sides = np.linspace(0.0, 1.0, 90), np.linspace(0.2, 0.4, 3), np.linspace(1.0, 2.0, 2)
+    strengths = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3) * turn
+    strengths = np.concatenate([strengths, [[0.5, 7.0, 7.0]]])
     made = strength_interpolation(strengths, 13)
-    assert made.nodes.shape == (16, 2)
-    (panel,) = made.panels
-    np.testing.assert_allclose(panel.weights @ panel.points, strengths, atol=1e-14)
-    np.testing.assert_allclose(panel.weights @ np.exp(panel.points), np.exp(strengths), atol=1e-13)
+    assert sorted({len(panel.points) for panel in made.panels}) == ([1, 13] if turn == 1.0 else [1, 26])
+    assert sorted(np.concatenate([panel.rows for panel in made.panels])) == list(range(len(strengths)))
+    for panel in made.panels:
+        for x, weights in ((strengths[panel.rows], panel.weights), (panel.extras, panel.checks)):
+            np.testing.assert_allclose(weights @ np.exp(panel.points.sum(axis=1)), np.exp(x.sum(axis=1)), rtol=1e-9)
 
 
 def test_files_figures_and_threads(tmp_path: Path) -> None:
@@ -237,7 +242,7 @@ ALONE = Scene("duffing", SPRING, ring(4))
         (lambda: plane(SCENE, [0, 1], [0, 1]), "found 2 layers of links, so that a mode has as many strengths"),
         (lambda: plane(SCENE, [0, 1], k=[0, 1]), "found 2 layers of links"),
         (lambda: exponents(SCENE, [0, 1]), "found 2 layers of links"),
-        (lambda: exponents(ALONE, [[0.1, 0.2]]), "found 1 layer of links"),
+        (lambda: exponents(ALONE, [[0.1, 0.2]]), "array of shape (1, 2)"),
         (lambda: msf(SCENE, [0, 1]), "found 2 layers of links"),
         (lambda: plane(ALONE, [0, 1], k=[0, 1]), "expected another parameter: alpha = -k gamma"),
         (lambda: plane(Scene("duffing"), delta=[0, 1], omega=[1, 2]), "a scene without links"),
