@@ -10,7 +10,7 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from synchain.models import Rates, Scene, Topology, chain, circulant, complete, ends, ring, star, topology
+from synchain.models import Rates, Scene, Topology, chain, circulant, complete, ends, from_matrix, ring, star, topology
 from synchain.models.definitions.loader import load_oscillator
 from synchain.runtime import exponents, msf, open_result, plane, run
 from synchain.runtime.stability.interpolation import exact_interpolation, strength_interpolation
@@ -55,13 +55,13 @@ def test_two_layers_in_closed_form(second: Topology, modes: list[tuple[int, int]
 
 @pytest.mark.parametrize("name", ["duffing", "harmonic"])
 def test_complex_strengths_of_two_layers_in_closed_form(name: str) -> None:
-    """One-way rings have complex joint eigenvalues; harmonic oscillators are not integrated."""
+    """Rings that run opposite ways have conjugate eigenvalues; harmonic oscillators are not integrated."""
     one_way, given = topology("one_way_ring", 5), ALMOST_LINEAR if name == "duffing" else {}
-    scene = Scene(name, links=[(SPRING, one_way), (DAMPER, ring(5))], parameters=given)
+    scene = Scene(name, links=[(SPRING, one_way), (DAMPER, from_matrix(one_way.matrix.T))], parameters=given)
     k, c = np.array([0.1, 0.4]), np.array([0.0, 0.3])
     found = plane(scene, k=k, c=c, rtol=1e-9, starts=1, transient=200)
     turn = np.exp(2j * np.pi * np.arange(1, 5) / 5)
-    pairs, delta = np.stack([turn - 1, 2 * turn.real - 2], axis=1), 0.2 if name == "duffing" else 0.0
+    pairs, delta = np.stack([turn - 1, turn.conj() - 1], axis=1), 0.2 if name == "duffing" else 0.0
 
     def exponent(x: float, y: float) -> float:
         matrices = [[[0.0, 1.0], [-1.0 + x * a, -delta + y * b]] for a, b in pairs]
@@ -190,18 +190,19 @@ def test_propagators_of_two_strengths_by_scipy_and_by_interpolation() -> None:
     assert 0.0 < again.travellers.error < 1e-7
 
 
-@pytest.mark.parametrize("turn", [1.0, 1.0 + 0.5j])
-def test_strengths_of_layers_are_interpolated_along_lines(turn: complex) -> None:
+@pytest.mark.parametrize(("turn", "moving"), [(1.0, 0), (1.0 + 0.5j, 2)])
+def test_strengths_of_layers_are_interpolated_along_lines(turn: complex, moving: int) -> None:
     """Lines are those of the layer with the most values; one of few strengths has these as its nodes."""
     sides = np.linspace(0.0, 1.0, 90), np.linspace(0.2, 0.4, 3), np.linspace(1.0, 2.0, 2)
     strengths = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 3) * turn
-    strengths = np.concatenate([strengths, [[0.5, 7.0, 7.0]]])
+    strengths = np.roll(np.concatenate([strengths, [[0.5, 7.0, 7.0]]]), moving, axis=1)
     made = strength_interpolation(strengths, 13)
     assert sorted({len(panel.points) for panel in made.panels}) == ([1, 13] if turn == 1.0 else [1, 26])
     assert sorted(np.concatenate([panel.rows for panel in made.panels])) == list(range(len(strengths)))
     for panel in made.panels:
         for x, weights in ((strengths[panel.rows], panel.weights), (panel.extras, panel.checks)):
-            np.testing.assert_allclose(weights @ np.exp(panel.points.sum(axis=1)), np.exp(x.sum(axis=1)), rtol=1e-9)
+            values = (np.exp(each @ np.array([1.0, 0.3, -0.5])) for each in (panel.points, x))
+            np.testing.assert_allclose(weights @ next(values), next(values), rtol=1e-9)
 
 
 def test_files_figures_and_threads(tmp_path: Path) -> None:
