@@ -125,7 +125,7 @@ class Scene(Drawn, Written):
     draws : mapping, optional
         What is drawn, by the names of parameters and initial states, or "W", the weights of links: `normal`, `uniform`,
         `lorentzian` (of each node or edge by itself), or a list with one entry for each realisation; by the name
-        "topology" a list of graphs.
+        "topology" a list of graphs, or a random one as text, "erdos_renyi(20, p=0.3)".
     rng : int
         Seed of what is drawn.
 
