@@ -96,7 +96,8 @@ def scene_on(network: Topology, scene: Scene | None, arguments: Namespace) -> Sc
     Raises
     ------
     WrongUse
-        If the scene has no single frequency of the drive that fits `omega`; see `at_frequency`.
+        If the scene has draws, several layers of links, or no single frequency of the drive that
+        fits `omega`; see `at_frequency`.
     """
     from synchain.models.scenes.scene import Scene
 
@@ -104,6 +105,11 @@ def scene_on(network: Topology, scene: Scene | None, arguments: Namespace) -> Sc
         scene = Scene(topology=network)
     if scene.draws:
         raise WrongUse(f"found draws of {', '.join(scene.draws)} in the scene; expected none; only run takes them")
+    if scene.links is not None:
+        raise WrongUse(
+            f"found {len(scene.links)} layers of links in the scene; expected one; in Python, `plane` takes the "
+            "strengths of several"
+        )
     frequency = at_frequency(scene, arguments.omega, arguments.scene)
     return scene.replace(topology=network, axes=(), zipped=False, continuation="none", record=None, **frequency)
 

@@ -383,6 +383,7 @@ WRONG = [
     ("--omega 1.4 --matrix {own}.missing", "missing"),
     ("figure_8 --out {own}", "the name of a file; expected a folder"),
     ("{alone}", "the scene has no coupling, by which modes differ"),
+    ("{layers}", "found 2 layers of links in the scene; expected one"),
 ]
 
 
@@ -395,7 +396,12 @@ def test_wrong_use_is_said_before_anything_is_computed(
     (tmp_path / "alone.toml").write_text(
         'coupling = "none"\ntopology = {name = "chain", n = 1}\nparameters = {omega = 1.4}\n'
     )
-    places = {"own": own, "laplacian": tmp_path / "laplacian.txt", "alone": tmp_path / "alone.toml"}
+    (tmp_path / "layers.toml").write_text(
+        'links = [{coupling = "spring", topology = {name = "ring", n = 4}}, '
+        '{coupling = {rates = {v = "g*W*v_j"}, parameters = {g = 1}}, topology = {name = "star", n = 4}}]\n'
+    )
+    places = {name: tmp_path / f"{name}.toml" for name in ("alone", "layers")}
+    places |= {"own": own, "laplacian": tmp_path / "laplacian.txt"}
     assert main(["msf", *words.format(**places).split()]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
