@@ -18,6 +18,7 @@ import xarray as xr
 
 from synchain.models.dynamics.synchrony import expect_vanishing
 from synchain.models.dynamics.variational import mode
+from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import ORBITS, Given, with_numbers
@@ -434,7 +435,7 @@ def plane(
 def _check_parameters(cell: Scene, axes: Mapping[str, np.ndarray]) -> None:
     """Raise ValueError for values out of range, and for parameters that exponents do not depend on."""
     orbit, still = mode(cell.equations).orbit, still_strengths(cell)
-    for name in axes.keys() - set(STRENGTHS):
+    for name in (name for name in axes if name not in STRENGTHS):
         with_numbers(cell, {name: axes[name][-1]})
         if "alpha" in axes and name in still and len(cell.strengths) == 1:
             raise ValueError(
@@ -454,7 +455,7 @@ def _over_parameters(
     modes = () if first == "alpha" else tuple(map(str, transversal_modes(cell)))
     orbits = list(shared_orbits(cell, _columns(axes)) if modes else _orbits_of_line(axes[first], second, axes[second]))
     exponent, stderr, worst = np.empty(shape), np.empty(shape), np.empty(shape, dtype=int)
-    kinds, longest = np.empty((*shape, starts), dtype=object), 0.0
+    kinds, longest = np.empty((*shape, check_integer("starts", starts, 1)), dtype=object), 0.0
     with averaging.reporter(len(orbits)) as reporter:
         for done, orbit in enumerate(orbits, start=1):
             scene, at = with_numbers(cell, orbit.numbers), np.unravel_index(orbit.cells, shape)

@@ -236,6 +236,7 @@ ALONE = Scene("duffing", SPRING, ring(4))
         (lambda: plane(SCENE, k=[0, 1]), "found the axes k; expected alpha and beta"),
         (lambda: plane(SCENE, k=[0, 1], c=[0, 1], omega=[1, 2]), "found the axes k, c, omega"),
         (lambda: plane(ALONE, beta=[0, 1], parameters={"delta": [0.1, 0.2]}), "found the axes beta, delta"),
+        (lambda: plane(SCENE, k=[0, 1], c=[0, 1], starts=-1), "starts = -1"),
         (lambda: plane(SCENE, k=[0, 1], c=[1, 0]), "c: found numbers that do not increase"),
         (lambda: plane(SCENE, k=[0, 1], c=[1]), "expected a row of at least 2 numbers"),
         (lambda: plane(SCENE, k=[0, 1], d=[0, 1]), "unknown parameter or keyword 'd' of plane"),
@@ -265,5 +266,9 @@ def test_exponents_take_the_strengths_of_layers() -> None:
     np.testing.assert_allclose(found.exponent, [roots(0.0, 0.3), roots(2.0, 0.1)], atol=1e-8)
     assert found.data.alpha.dims == ("mode", "layer")
     assert "negative for alpha" not in repr(found)
+    drawn = found.plot()
+    assert (drawn.get_xlabel(), drawn.get_ylabel()) == (r"$\alpha_1$", r"$\alpha_2$")
+    turned = exponents(layered(ring(6), ring(6), **ALMOST_LINEAR), [[0.0, 0.3j], [2.0, 0.1]], rtol=1e-9, starts=1)
+    assert turned.plot().get_xlabel() == "number of the mode"
     with pytest.raises(ValueError, match="those of 2 layers"):
         found.intervals  # noqa: B018
