@@ -77,7 +77,7 @@ def _(value: Plane, axes: Axes) -> Axes:
 
 @_draw.register
 def _(value: Exponents, axes: Axes) -> Axes:
-    """Exponents over a strength as a line, over two numbers of a mode as dots, over more in order."""
+    """Exponents over a strength as a line, over two numbers of a mode as dots, else in order."""
     label, numbers = r"exponent $\Lambda$ per unit of $\tau$", value.alpha.reshape(len(value.alpha), -1)
     columns = np.concatenate([numbers.real, numbers.imag], axis=1).T if np.iscomplexobj(numbers) else numbers.T
     if len(columns) == 2:
