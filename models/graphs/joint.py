@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
+from itertools import product
 from typing import TypeAlias
 
 from flint import acb, fmpq, fmpq_poly
@@ -19,7 +20,7 @@ from flint import acb, fmpq, fmpq_poly
 from ..algebra.balls import disjoint, precision
 from ..spectra.eigenvalue import Eigenvalue, ProofError
 from ..spectra.jordan import value_at
-from ..spectra.solve import spectrum
+from ..spectra.solve import DENSE_LIMIT, spectrum
 from .topology import Topology
 
 __all__ = ["JointEigenvalue", "joint_spectrum"]
@@ -75,7 +76,8 @@ def joint_spectrum(graphs: tuple[Topology, ...]) -> tuple[JointEigenvalue, ...]:
     Raises
     ------
     ValueError
-        If the graphs have different numbers of nodes, or if two of their matrices do not commute.
+        If the graphs have different numbers of nodes, or several of them more than DENSE_LIMIT, and if two of their matrices
+        do not commute.
     ProofError
         If the eigenvalues of the sum are no sums of eigenvalues, a mistake of the program.
 
@@ -99,8 +101,12 @@ def _check(graphs: Sequence[Topology]) -> None:
     if len(sizes) != 1:
         found = " and ".join(map(str, sizes)) or "no"
         raise ValueError(f"joint spectrum: found graphs of {found} nodes; expected graphs on the same nodes")
+    if len(graphs) == 1:
+        return
+    if sizes[0] > DENSE_LIMIT:
+        raise ValueError(f"joint spectrum: found {sizes[0]} nodes; expected at most {DENSE_LIMIT} for several graphs")
     itself = fmpq_poly([0, 1])
-    whole = [value_at(graph, itself) for graph in graphs if len(graphs) > 1]
+    whole = [value_at(graph, itself) for graph in graphs]
     for i, first in enumerate(whole):
         for j in range(i):
             if whole[j] * first != first * whole[j]:
@@ -113,11 +119,12 @@ def _check(graphs: Sequence[Topology]) -> None:
 def _joined(modes: Modes, combined: Topology, graph: Topology) -> tuple[Modes, Topology]:
     """The modes with their eigenvalues on one more graph, and the combination whose eigenvalues are theirs."""
     own = spectrum(graph)
-    pairs = [(parts, number, e) for parts, number in modes for e in own]
+    pairs = [(parts, e) for parts, _ in modes for e in own]
+    balls = [number.enclosure(BITS) for _, number in modes], [e.enclosure(BITS) for e in own]
     for factor in (Fraction(k, PRIME) for k in range(1, TRIED)):
         with precision(2 * BITS):
             share = fmpq(factor.numerator, factor.denominator)
-            sums = [acb(number.enclosure(BITS) + share * e.enclosure(BITS)) for _, number, e in pairs]
+            sums = [acb(a + share * b) for a, b in product(*balls)]
             if disjoint(sums):
                 break
     else:
@@ -128,13 +135,13 @@ def _joined(modes: Modes, combined: Topology, graph: Topology) -> tuple[Modes, T
     found = []
     for number in spectrum(combined):
         with precision(2 * BITS):
-            at = [k for k, ball in enumerate(sums) if ball.overlaps(number.enclosure(BITS))]
+            ball = acb(number.enclosure(BITS))
+            at = [pair for pair, own_sum in zip(pairs, sums, strict=True) if ball.overlaps(own_sum)]
         if len(at) != 1:
             raise ProofError(
                 f"joint spectrum of {graph.name}({graph.n}): found {len(at)} pairs for {number}; expected one"
             )
-        parts, _, e = pairs[at[0]]
-        found.append(((*parts, e), number))
+        found.append(((*at[0][0], at[0][1]), number))
     return tuple(found), combined
 
 

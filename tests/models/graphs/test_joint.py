@@ -60,5 +60,8 @@ def test_matrices_that_do_not_commute_are_refused() -> None:
         joint_spectrum((ring(4), star(4)))
     with pytest.raises(ValueError, match="graphs of 4 and 5 nodes"):
         joint_spectrum((ring(4), star(5)))
+    with pytest.raises(ValueError, match="found 2000 nodes; expected at most 1000"):
+        joint_spectrum((ring(2000), complete(2000)))
+    assert len(joint_spectrum((ring(2000),))) == 1001
     with pytest.raises(ValueError, match="graphs of no nodes"):
         joint_spectrum(())
