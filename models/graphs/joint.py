@@ -25,10 +25,10 @@ from .topology import Topology
 
 __all__ = ["JointEigenvalue", "joint_spectrum"]
 
-BITS = 256
-"""Precision at which sums of eigenvalues are told apart."""
+BITS = (64, 256, 1024)
+"""Precisions at which sums of eigenvalues are told apart."""
 
-PRIME, TRIED = 97, 1000
+PRIME, TRIED = 97, 100
 """Factors t = k/PRIME of a further matrix are tried, k = 1, 2, …; few of them make two sums equal."""
 
 Modes: TypeAlias = "tuple[tuple[tuple[Eigenvalue, ...], Eigenvalue], ...]"
@@ -111,20 +111,19 @@ def _check(graphs: Sequence[Topology]) -> None:
         for j in range(i):
             if whole[j] * first != first * whole[j]:
                 raise ValueError(
-                    f"joint spectrum of {graphs[j].name}({first.nrows()}) and {graphs[i].name}({first.nrows()}): found matrices that do not "
-                    "commute; expected graphs with common modes, such as any undirected graph and a complete one"
+                    f"joint spectrum of {graphs[j].name}({sizes[0]}) and {graphs[i].name}({sizes[0]}): found matrices that do "
+                    "not commute; expected graphs with common modes, such as any undirected graph and a complete one"
                 )
 
 
 def _joined(modes: Modes, combined: Topology, graph: Topology) -> tuple[Modes, Topology]:
     """The modes with their eigenvalues on one more graph, and the combination whose eigenvalues are theirs."""
-    own = spectrum(graph)
+    own = tuple(spectrum(graph))
     pairs = [(parts, e) for parts, _ in modes for e in own]
-    balls = [number.enclosure(BITS) for _, number in modes], [e.enclosure(BITS) for e in own]
-    for factor in (Fraction(k, PRIME) for k in range(1, TRIED)):
-        with precision(2 * BITS):
-            share = fmpq(factor.numerator, factor.denominator)
-            sums = [acb(a + share * b) for a, b in product(*balls)]
+    for bits, k in product(BITS, range(1, TRIED)):
+        factor = Fraction(k, PRIME)
+        sums = _sums([number for _, number in modes], own, factor, bits)
+        with precision(2 * bits):
             if disjoint(sums):
                 break
     else:
@@ -134,8 +133,8 @@ def _joined(modes: Modes, combined: Topology, graph: Topology) -> tuple[Modes, T
     combined = _combined(combined, graph, factor)
     found = []
     for number in spectrum(combined):
-        with precision(2 * BITS):
-            ball = acb(number.enclosure(BITS))
+        with precision(2 * bits):
+            ball = acb(number.enclosure(bits))
             at = [pair for pair, own_sum in zip(pairs, sums, strict=True) if ball.overlaps(own_sum)]
         if len(at) != 1:
             raise ProofError(
@@ -143,6 +142,14 @@ def _joined(modes: Modes, combined: Topology, graph: Topology) -> tuple[Modes, T
             )
         found.append(((*at[0][0], at[0][1]), number))
     return tuple(found), combined
+
+
+def _sums(first: Sequence[Eigenvalue], second: Sequence[Eigenvalue], factor: Fraction, bits: int) -> list[acb]:
+    """Balls that hold the sums a + t b of all pairs."""
+    with precision(2 * bits):
+        share = fmpq(factor.numerator, factor.denominator)
+        pairs = product((a.enclosure(bits) for a in first), [b.enclosure(bits) for b in second])
+        return [acb(a + share * b) for a, b in pairs]
 
 
 def _combined(first: Topology, second: Topology, factor: Fraction) -> Topology:
