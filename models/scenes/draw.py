@@ -340,7 +340,12 @@ def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Itera
 def _weights(model: Model, graphs: tuple[Topology, ...]) -> Iterable[tuple[str, Sequence[float]]]:
     """The names and the values of the weights of graphs; 0 where a graph has no link."""
     links = model.link_names(WEIGHTS)
-    rows = [{at[:2]: float(at[2]) for at in graph.links} for graph in graphs]
+    try:
+        rows = [{at[:2]: float(at[2]) for at in graph.links} for graph in graphs]
+    except OverflowError:
+        raise ValueError(
+            f"draw {GRAPH}: found a weight beyond the range of numbers; expected at most 1.8e308"
+        ) from None
     found = [by_name("draw topology", links, {at: row.get(at, 0.0) for at in links}) for row in rows]
     return [(str(own), [row[own] for row in found]) for own in found[0]]
 

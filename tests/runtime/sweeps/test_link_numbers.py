@@ -341,6 +341,10 @@ def test_scenes_with_drawn_graphs_can_be_changed(graphs: Any) -> None:
         ({"realisations": 1, "draws": {"W": [[*range(1, 21)]]}}, "draw W: found 1.0 and 3.0 at nodes 1 and 2"),
         ({"realisations": 4, "draws": {"topology": "ring"}}, "draw topology: unreadable graph 'ring'"),
         (
+            {"realisations": 4, "draws": {"topology": "weighted(erdos_renyi(10), 1e999)"}},
+            "found a weight beyond the range of numbers",
+        ),
+        (
             {"realisations": 4, "draws": {"topology": "ring(10)"}},
             "found 'ring(10)', the same graph in every realisation",
         ),
