@@ -14,6 +14,7 @@ from .dynamics.observable import minimum as minimum
 from .dynamics.observable import nodes as nodes
 from .dynamics.observable import rate as rate
 from .dynamics.observable import variance as variance
+from .graphs.joint import joint_spectrum as joint_spectrum
 from .graphs.products import cartesian as cartesian
 from .graphs.products import complement as complement
 from .graphs.products import kronecker as kronecker

@@ -110,7 +110,7 @@ class Simulation:
         omega = scene.parameters["omega"]
         self.functions.append(("plane", omega, len(alpha) * len(beta)))
         table = parabola(omega, alpha).exponent[:, None] + beta**2
-        return Plane(scene, alpha, beta, table, np.full(table.shape, 1e-3), ("aperiodic",), 500.0)
+        return Plane(scene, alpha, beta, table, np.full(table.shape, 1e-3), np.array([[["aperiodic"]]]), 500.0)
 
 
 def parabola(omega: float, alpha: np.ndarray) -> Exponents:

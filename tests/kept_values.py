@@ -77,7 +77,15 @@ def every_kind() -> dict[str, Labelled]:
     values = (
         exponents_on(alpha + 0.1j),
         MSF(PAIR, alpha, exponents_on(np.linspace(0.0, 1.0, 21))),
-        Plane(PAIR, alpha, np.array([-0.1, 0.1]), np.outer(alpha, [1.0, -1.0]), np.ones((5, 2)), ("periodic",), 9.0),
+        Plane(
+            PAIR,
+            alpha,
+            np.array([-0.1, 0.1]),
+            np.outer(alpha, [1.0, -1.0]),
+            np.ones((5, 2)),
+            np.array([[["periodic"]]]),
+            9.0,
+        ),
         Lyapunov(np.array([0.1, -np.inf]), np.array([0.01, 0.0]), np.array([True, False]), -3.0, 0.1, 50.0, 0.5, 2),
         ClusterExponents(
             state, np.array([-0.1]), np.array([0.01]), 0.0, 0.01, np.array([[0.0, 0.5], [0.5, 0.0]]), 20.0

@@ -626,7 +626,7 @@ def _() -> Quantities:
     found = plane(
         Scene(oscillator="duffing", topology=chain(2)), [0.0, 0.5, 1.0], [-0.5, 0.0, 0.5], starts=1, **AVERAGED
     )
-    return _seen(found, "exponent", "stderr", "time") | {"attractors": ", ".join(found.attractors)}
+    return _seen(found, "exponent", "stderr", "time") | {"attractors": ", ".join(found.motion)}
 
 
 def orbit_of(found: Any) -> Quantities:

@@ -6,7 +6,7 @@ import sympy as sp
 
 from synchain.models.dynamics.equations import Equations
 from synchain.models.dynamics.mode_inertia import inertia_of_modes
-from synchain.models.dynamics.variational import source_slope
+from synchain.models.dynamics.variational import source_slopes
 from synchain.models.mechanics.calculus import derivative
 from synchain.models.mechanics.components import Node
 
@@ -37,7 +37,7 @@ def transversal_equations(equations: Equations) -> Equations:
     Raises ValueError where there is no coupling, where a link does not vanish between equal states (the synchronous state
     is no solution), or where links are not proportional to sigma.
     """
-    slope = source_slope(equations)
+    (slope,) = source_slopes(equations)
     strength = ALPHA / (1 + inertia_of_modes(equations)[1] * ALPHA)
     return Equations.of_equal_nodes(_extend(equations.node, -strength * slope, (ALPHA,)), None, 1)
 

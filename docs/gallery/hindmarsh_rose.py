@@ -12,7 +12,8 @@ receive pulses through chemical synapses,
 :math:`-g(x_i - V_s)\sum_j W_{ij}/(1 + e^{-\lambda(x_j - \Theta_s)})`.  Belykh, de Lange & Hasler,
 Phys. Rev. Lett. 94, 188101 (2005), found that the stability of their synchrony depends on the
 number k of signals that each neuron receives and on nothing else of the graph: the threshold of
-g k is one number.
+g k is one number.  Six neurons with both kinds of synapses, electrical ones on a ring and chemical
+ones between all pairs, are synchronous in a region of the plane of both strengths.
 """
 
 # %%
@@ -40,12 +41,15 @@ result = sc.run(both)
 pair = sc.Scene(cell, chemical, sc.chain(2), time_unit="time")
 modes = np.linspace(0.25, 2, 8)  # -γ/k of the modes of undirected graphs lies between 0 and 2
 exponents = {gk: sc.exponents(pair, gk * modes, g=gk, starts=1, periods=10000) for gk in (1, 1.2, 1.3, 1.5)}
+six = both.replace(links=[(electrical, sc.ring(6)), (chemical, sc.complete(6))], initial=None)
+region = sc.plane(six, k=np.linspace(0, 1, 21), g=np.linspace(0, 0.3, 16), starts=1)
 
 # %%
 # Check
 # -----
 # The five neurons of two layers against SciPy; and the sign of the exponent, which changes between
-# g k = 1.2 and 1.3 for the modes of all graphs together.
+# g k = 1.2 and 1.3 for the modes of all graphs together, and without electrical synapses (k = 0) in
+# the plane too, where each neuron receives five signals.
 from scipy.integrate import solve_ivp
 
 star, path = (np.array(graph.matrix, dtype=float) for graph in (sc.star(5), sc.chain(5)))
@@ -66,13 +70,15 @@ assert difference < 1e-7
 for gk, found in exponents.items():
     print(f"g k = {gk}: exponents from {found.exponent.min():.4f} to {found.exponent.max():.4f}")
     assert np.all(np.sign(found.exponent) == (1 if gk < 1.25 else -1))
+chemical_alone = region.data.exponent.sel(k=0).sel(g=[0.24, 0.26], method="nearest").values
+assert chemical_alone[0] > 0 > chemical_alone[1]
 
 # %%
 # Figure
 # ------
 import matplotlib.pyplot as plt
 
-_, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
+_, (left, right, last) = plt.subplots(1, 3, figsize=(12, 3.4), layout="constrained")
 left.plot(result.time, result.trajectory.sel(component="x"), linewidth=0.5)
 left.set(xlabel="time", ylabel="x", title="five neurons, two layers of links")
 for gk, found in exponents.items():
@@ -80,4 +86,5 @@ for gk, found in exponents.items():
 right.axhline(0, color="black", linewidth=0.5)
 right.set(xlabel="−γ/k", ylabel="exponent", title="modes of all graphs")
 right.legend()
+region.plot(last).set(xlabel="electrical k", ylabel="chemical g", title="largest exponent of six neurons")
 plt.show()

@@ -37,9 +37,10 @@ def inertia_of_modes(equations: Equations) -> tuple[sp.Matrix, sp.Expr]:
         If modes have no single strength: the inertia does not vanish between nodes that move alike,
         is not proportional to sigma, or joins coordinates by different masses.
     """
-    node, edge = equations.node, equations.edge
+    node = equations.node
     size = len(node.state)
-    if edge is None or not edge.inertia:
+    edge = equations.edge if equations.inertial_links else None
+    if edge is None:
         return sp.zeros(size, size), sp.S.Zero
     here, there = (sp.Matrix(block) for block in edge.inertia)
     if (here + there).applyfunc(sp.simplify) != sp.zeros(size, size):

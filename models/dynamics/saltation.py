@@ -122,7 +122,7 @@ def _check_release(edges: Iterable[Edge]) -> None:
 
 
 def _force_slope(slope: sp.Matrix) -> sp.Expr:
-    """The derivative of the force of a link by a position in slip, of H of `source_slope`."""
+    """The derivative of the force of a link by a position in slip, of H of `source_slopes`."""
     return slope[1, 0].xreplace({SLIP: sp.S.One})
 
 

@@ -61,7 +61,7 @@ def expect_vanishing(what: str, equations: Equations) -> None:
     if not all(edge.diffusive for edge in equations.edges):
         raise ValueError(
             f"{what}: a link acts between equal states, so that the synchronous motion changes with its strength; expected "
-            "links that vanish there; `exponents` takes one strength of the links at a time"
+            "links that vanish there; `plane` takes the strength as an axis, `exponents` one at a time"
         )
     for edge in equations.edges:
         unit = {edge.weight: sp.S.One}

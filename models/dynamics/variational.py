@@ -34,12 +34,12 @@ __all__ = [
     "mode",
     "network_variation",
     "phase_shifted",
-    "source_slope",
+    "source_slopes",
     "with_volume",
 ]
 
 MODE = (sp.Symbol("mode_alpha", real=True), sp.Symbol("mode_beta", real=True))
-"""Real and imaginary part of the strength of a mode, alpha + i beta = -sigma gamma."""
+"""Real and imaginary part of the strength of a mode, alpha + i beta = -sigma gamma; of layer l, mode_alpha_l, mode_beta_l."""
 
 STRENGTH = sp.Symbol("mode_sigma", real=True)
 """Coupling strength sigma in the variational equation of a cluster state."""
@@ -103,7 +103,8 @@ def mode(equations: Equations, plane: bool = False) -> Variation:
     """Return the variational equation of one transversal mode along the synchronous orbit.
 
     A deviation along an eigenvector of G with eigenvalue gamma obeys d' = (J - alpha H) d, alpha = -sigma gamma; J is
-    the Jacobian of one node and H is `source_slope`.  For links with inertia the strength is tau = alpha/(1 + b alpha)
+    the Jacobian of one node and H is that of `source_slopes`.  Several layers with a common eigenvector have a strength
+    each, d' = (J - sum of alpha_l H_l) d.  For links with inertia the strength is tau = alpha/(1 + b alpha)
     (`synchain.models.dynamics.mode_inertia`).  Links h(s, s) that act between equal states move the synchronous orbit,
     s' = F(s) + sigma k h(s, s) with k the sum of weights at every node, and J is the Jacobian of that: the deviation obeys
     d' = (DF + sigma k D1h + sigma lambda D2h) d with the eigenvalue lambda = gamma + k of the matrix of weights.
@@ -113,42 +114,53 @@ def mode(equations: Equations, plane: bool = False) -> Variation:
     equations : Equations
         Equations of a network of equal nodes.
     plane : bool
-        Let the strength be complex, alpha + i beta; the deviation has its real parts first.
+        Let the strengths be complex, alpha + i beta; the deviation has its real parts first.
 
     Returns
     -------
     Variation
-        The variational equation, its orbit one node.
+        The variational equation, its orbit one node.  Its parameters are the real parts of the strengths, one for each layer,
+        and then their imaginary parts.
 
     Raises
     ------
     ValueError
-        As `source_slope` and `synchronous_node`, and for links that act between equal states and have inertia, or join
+        As `source_slopes` and `synchronous_node`, and for links that act between equal states and have inertia, or join
         nodes with set-valued friction.
 
     References
     ----------
-    Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998).
+    Pecora & Carroll, Phys. Rev. Lett. 80, 2109 (1998); several layers: Sorrentino, New J. Phys. 14, 033035 (2012).
     """
     node = synchronous_node(equations)
-    slope = source_slope(equations)
+    slopes = source_slopes(equations)
     if node is not equations.node and (equations.inertial or equations.sticks):
         raise ValueError(
             "a link acts between equal states; expected links without inertia between nodes without set-valued friction"
         )
-    more = {s for e in slope for s in e.free_symbols} - {*node.state, *node.parameters}
+    more = {s for slope in slopes for e in slope for s in e.free_symbols} - {*node.state, *node.parameters}
     node = replace(node, parameters=(*node.parameters, *sorted(more, key=lambda s: s.name)))
     orbit = Equations.of_equal_nodes(node, None, 1)
     here = orbit.at_node(0)
     size = len(node.continuous)
     own = sp.Matrix(node.jacobian())[:size, :size].xreplace(here)
-    push = slope[:size, :size].xreplace(here)
-    alpha, beta = MODE
-    real, aside = own - alpha * push, beta * push
+    pushes = [slope[:size, :size].xreplace(here) for slope in slopes]
+    alphas, betas = zip(*_strengths(len(slopes)), strict=True)
+    events = of_mode(equations, orbit, slopes[0], MODE, plane)
+    real = own - sum((s * push for s, push in zip(alphas, pushes, strict=True)), sp.zeros(size, size))
     if not plane:
-        return Variation(orbit, size, _entries(real), (alpha,), of_mode(equations, orbit, slope, MODE, plane))
+        return Variation(orbit, size, _entries(real), alphas, events)
+    aside = sum((s * push for s, push in zip(betas, pushes, strict=True)), sp.zeros(size, size))
     both = sp.Matrix(sp.BlockMatrix([[real, aside], [-aside, real]]))
-    return Variation(orbit, 2 * size, _entries(both), (alpha, beta), of_mode(equations, orbit, slope, MODE, plane))
+    return Variation(orbit, 2 * size, _entries(both), (*alphas, *betas), events)
+
+
+def _strengths(layers: int) -> tuple[tuple[sp.Symbol, sp.Symbol], ...]:
+    """Real and imaginary part of the strength of each layer, `MODE` of a single one."""
+    if layers == 1:
+        return (MODE,)
+    named = ([sp.Symbol(f"{s.name}_{k + 1}", real=True) for s in MODE] for k in range(layers))
+    return tuple((alpha, beta) for alpha, beta in named)
 
 
 def network_variation(equations: Equations) -> Variation:
@@ -197,7 +209,7 @@ def clustered(equations: Equations, found: Clusters) -> Variation:
     Raises
     ------
     ValueError
-        As `source_slope`, for links that act between equal states, for a link whose derivative depends on the state, and for a partition
+        As `source_slopes`, for links that act between equal states, for a link whose derivative depends on the state, and for a partition
         that is not balanced.
 
     References
@@ -239,9 +251,9 @@ def _constant_slope(equations: Equations) -> sp.Matrix:
         raise ValueError(
             "a link acts between equal states, which cluster states do not allow yet; expected links that vanish there"
         )
-    slope = source_slope(equations)
     if edge is None:
         raise ValueError("these equations have no coupling; differences within clusters need links")
+    (slope,) = source_slopes(equations)
     size = len(equations.node.continuous)
     slips = dict.fromkeys(edge.here[size:], sp.S.One)
     here, there = (
@@ -310,8 +322,8 @@ def _entries(matrix: sp.Matrix) -> tuple[Entry, ...]:
     return tuple(((r, c), matrix[r, c]) for r in range(rows) for c in range(columns) if matrix[r, c] != 0)
 
 
-def source_slope(equations: Equations) -> sp.Matrix:
-    """Return H, the derivative of a link of weight 1 by the state at its source, over the strength of the links.
+def source_slopes(equations: Equations) -> tuple[sp.Matrix, ...]:
+    """Return H of each layer, the derivative of a link of weight 1 by the state at its source, over the strength of the links.
 
     The strength is sigma, or the one parameter that is a factor of the whole link.
 
@@ -322,18 +334,25 @@ def source_slope(equations: Equations) -> sp.Matrix:
 
     Returns
     -------
-    Matrix
-        H at equal states, (components, components); H + B J for links with inertia.
+    tuple of Matrix
+        H at equal states, (components, components), layer by layer; H + B J for links with inertia.
 
     Raises
     ------
     ValueError
-        If nodes differ, there is no coupling, or links are not proportional to their weight and to one strength.
+        If nodes differ, there is no coupling, several layers have inertia, or links are not proportional to their weight and
+        to one strength.
     """
-    equations.expect_alike("transversal modes of complete synchronisation", inertia_too=True)
-    edge, node = equations.edge, equations.node
-    if edge is None:
+    several = len(equations.layers) > 1
+    equations.expect_alike("transversal modes of complete synchronisation", inertia_too=not several, layers_too=True)
+    if not equations.layers:
         raise ValueError("these equations have no coupling; a transversal mode needs links")
+    slopes = tuple(_source_slope(edge, equations.node) for layer in equations.layers for _, edge in layer.edge_of)
+    return slopes if several else (effective_slope(equations, slopes[0]),)
+
+
+def _source_slope(edge: Edge, node: Node) -> sp.Matrix:
+    """H of one layer, without inertia."""
     sigma = strength(edge, node.parameters)
     equal = {**dict(zip((*edge.here, *edge.there), node.state * 2, strict=True)), **dict(edge.theirs)}
     weighted = sp.Matrix(edge.jacobian_there()).xreplace(equal)
@@ -348,4 +367,4 @@ def source_slope(equations: Equations) -> sp.Matrix:
         raise ValueError(f"links are not proportional to {sigma}; a mode has no single strength alpha")
     if slope.has(TIME):
         raise ValueError("between equal states links depend on time; expected on states and parameters alone")
-    return effective_slope(equations, slope)
+    return slope

@@ -6,14 +6,14 @@ Such texts are the names that `products` gives its graphs.
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NoReturn
 
 from ..inputs.checks import short_repr
 from ..inputs.reader import Algebra, Expression, NoMeaning, parse
 from . import products
-from .families import topology
+from .families import family, topology
 from .topology import Topology
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def is_composed(text: str) -> bool:
     return "(" in text
 
 
-def read_graph(text: str, largest: int | None = None) -> Topology:
+def read_graph(text: str, largest: int | None = None, seeds: Iterator[int] | None = None) -> Topology:
     """Return the graph of a text; families have their size as first argument, then their options by name.
 
     Parameters
@@ -40,6 +40,8 @@ def read_graph(text: str, largest: int | None = None) -> Topology:
         cartesian, kronecker and union of two graphs, complement, weighted(graph, number), or a family with its size.
     largest : int, optional
         Most nodes of a graph; larger ones are refused before their links are made.
+    seeds : iterator of int, optional
+        Seeds of the random families in the text, from left to right; the text has none then.
 
     Returns
     -------
@@ -49,9 +51,9 @@ def read_graph(text: str, largest: int | None = None) -> Topology:
     Raises
     ------
     ValueError
-        On anything else, and on a graph of more than `largest` nodes.
+        On anything else, on a graph of more than `largest` nodes, and on a seed beside `seeds`.
     """
-    expression, graphs = _parsed(text), _Graphs(text, largest)
+    expression, graphs = _parsed(text), _Graphs(text, largest, seeds)
     if expression is None:
         raise graphs.unreadable
     return expression.evaluate(graphs)
@@ -81,6 +83,7 @@ class _Graphs(Algebra[Topology]):
 
     text: str
     largest: int | None
+    seeds: Iterator[int] | None = None
     deepest = DEPTH
 
     def refuse(self, node: ast.expr, reason: str) -> NoReturn:
@@ -128,8 +131,16 @@ class _Graphs(Algebra[Topology]):
                 except ValueError:
                     raise NoMeaning from None
                 self._check_size(n)
-                return topology(function, n, **options)
+                return topology(function, n, **options, **self._seed(function, options))
         raise NoMeaning
+
+    def _seed(self, function: str, options: Mapping[str, str]) -> dict[str, int]:
+        """The next seed for a random family, if there are seeds."""
+        if self.seeds is None or "seed" not in family(function).options:
+            return {}
+        if "seed" in options:
+            raise ValueError(f"{self.text[:60]}: found a seed; expected none where seeds are drawn")
+        return {"seed": next(self.seeds)}
 
     def _check_size(self, n: int) -> None:
         if self.largest is not None and n > self.largest:

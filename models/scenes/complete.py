@@ -81,10 +81,10 @@ def complete(given: Mapping[str, Any]) -> dict[str, Any]:
     values["title"] = check_text("title", given["title"])
     values["seed"] = check_integer("seed", given["seed"], *LIMITS["seed"])
     values["draws"] = draws(given["draws"], given["realisations"])
-    values |= _model(given, drawn_graph(values["draws"]))
+    values["rng"] = check_integer("rng", given["rng"], *LIMITS["rng"])
+    values |= _model(given, drawn_graph(values["draws"], given["realisations"], values["rng"]))
     model: Model = values["model"]
     values["axes"] = axes = read_axes(given["axes"], given["zipped"])
-    values["rng"] = check_integer("rng", given["rng"], *LIMITS["rng"])
     drawn = drawn_axes(model, values["draws"], given["realisations"], values["rng"])
     values["parameters"] = numbers = parameters(model, given["parameters"], (*axes, *drawn))
     own = varied(numbers, model.parameters)

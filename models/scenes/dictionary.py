@@ -13,7 +13,7 @@ from ..graphs.topology import Topology, from_matrix, read_matrix
 from ..inputs.checks import check_integer, check_keys, check_table, check_text, short_repr
 from ..inputs.plugins import part
 from ..interactions.coupling import Coupling, Potential, Rates, split
-from .draw import GRAPH, Draw, Draws, Graphs
+from .draw import GRAPH, Draw, Draws, Graphs, RandomGraph
 from .parameters import collected
 
 __all__ = ["arguments", "as_dict", "graph_of", "graph_table"]
@@ -176,8 +176,8 @@ def as_dict(values: Mapping[str, Any], varied: Iterable[str]) -> dict[str, Any]:
 
 
 def _draw(drawn: Draws) -> object:
-    """A distribution as text, or numbers or graphs by realisation."""
-    if isinstance(drawn, Draw):
+    """A distribution or a random graph as text, or numbers or graphs by realisation."""
+    if isinstance(drawn, Draw | RandomGraph):
         return str(drawn)
     return [*map(graph_table, drawn.graphs)] if isinstance(drawn, Graphs) else [*map(list, drawn)]
 

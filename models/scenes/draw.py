@@ -11,6 +11,7 @@ from functools import lru_cache
 from statistics import NormalDist
 from typing import NoReturn, TypeGuard
 
+from ..graphs.graph_text import read_graph
 from ..graphs.readers import as_topology, is_graph
 from ..graphs.topology import Topology
 from ..inputs.arithmetic import constant
@@ -20,7 +21,7 @@ from ..inputs.node_name import LinkName, NodeName
 from ..inputs.reader import Algebra, NoMeaning, parse
 from ..inputs.words import Word
 from .axis import LIMIT, Axis
-from .model import WEIGHTS, Model, union_of
+from .model import MOST_NUMBERED, WEIGHTS, Model, union_of
 from .parameters import by_name, in_order
 
 __all__ = [
@@ -117,8 +118,31 @@ class Graphs:
         return union_of(self.graphs, f"union of {len(self.graphs)} graphs")
 
 
-Draws = Draw | tuple[tuple[float, ...], ...] | Graphs
-"""A distribution, or numbers by realisation, one, or one for each node or link; or graphs by realisation."""
+@dataclass(frozen=True, slots=True)
+class RandomGraph:
+    """A random graph, drawn anew for each realisation: a family or an operation as text, "erdos_renyi(20, p=0.3)".
+
+    The text is one of `read_graph`, without seeds.
+    """
+
+    text: str
+
+    def graphs(self, count: int, rng: int) -> Graphs:
+        """Return the graphs of `count` realisations, whose seeds are drawn by `rng`; more of them begin with the same ones.
+
+        Raises
+        ------
+        ValueError
+            For a text that names no graph, or no random family, and for more than LIMIT weights.
+        """
+        return _random_graphs(self.text, count, rng)
+
+    def __str__(self) -> str:
+        return self.text
+
+
+Draws = Draw | tuple[tuple[float, ...], ...] | Graphs | RandomGraph
+"""A distribution, or numbers by realisation, one, or one for each node or link; or graphs by realisation, or a random one."""
 
 GRAPH = "topology"
 """The name of the graph among what is drawn."""
@@ -152,21 +176,66 @@ def draws(given: object, realisations: object) -> Frozen[Draws]:
     )
 
 
-def drawn_graph(drawn: Mapping[str, Draws]) -> Topology | None:
-    """Return the union of the graphs of all realisations, None if no graphs are listed."""
+def drawn_graph(drawn: Mapping[str, Draws], count: int, rng: int) -> Topology | None:
+    """Return the union of the graphs of all realisations, None if no graphs are drawn or listed."""
     graphs = drawn.get(GRAPH)
+    graphs = graphs.graphs(count, rng) if isinstance(graphs, RandomGraph) else graphs
     return graphs.union if isinstance(graphs, Graphs) else None
 
 
-def _graphs(what: str, value: object, count: int) -> Graphs:
-    """Graphs by realisation."""
-    value = value.graphs if isinstance(value, Graphs) else value
-    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
-        raise TypeError(f"{what}: found {short_repr(value)}; expected a list of {count} graphs")
-    found, number = first_of(value, count)
+def _graphs(what: str, value: object, count: int) -> Graphs | RandomGraph:
+    """Graphs by realisation, or a random one."""
+    if isinstance(value, str):
+        return RandomGraph(check_text(what, value))
+    if isinstance(value, RandomGraph):
+        return value
+    listed = value.graphs if isinstance(value, Graphs) else value
+    if isinstance(listed, bytes | Mapping) or not isinstance(listed, Iterable):
+        raise TypeError(
+            f"{what}: found {short_repr(value)}; expected a list of {count} graphs, or a random one as text, such as "
+            "'erdos_renyi(20, p=0.3)'"
+        )
+    found, number = first_of(listed, count)
     if len(found) != count:
         raise ValueError(f"{what}: found {number} graphs; expected {count}, one for each realisation")
-    return Graphs(tuple(as_topology(what, graph) for graph in found))
+    return Graphs(_bounded((as_topology(what, graph) for graph in found), count))
+
+
+@lru_cache(maxsize=8)
+def _random_graphs(text: str, count: int, rng: int) -> Graphs:
+    """The graphs of a text whose seeds are a stream of their own, which depends on `rng` alone."""
+    stream = random.Random(f"{rng} {GRAPH}")
+    seeds, begin = iter(lambda: stream.getrandbits(52), None), stream.getstate()
+    try:
+        found = _bounded((read_graph(text, MOST_NUMBERED, seeds) for _ in range(count)), count)
+    except ValueError as error:
+        words = str(error)
+        raise ValueError(words if words.startswith(f"draw {GRAPH}") else f"draw {GRAPH}: {words}") from None
+    if stream.getstate() == begin:
+        raise ValueError(
+            f"draw {GRAPH}: found {short_repr(text)}, the same graph in every realisation; expected a random family, such as "
+            "erdos_renyi(20, p=0.3)"
+        )
+    return Graphs(found)
+
+
+def _bounded(graphs: Iterable[Topology], count: int) -> tuple[Topology, ...]:
+    """The graphs, of which the run has a weight for each link of their union in each of `count` realisations.
+
+    Raises ValueError for more than LIMIT of these, as soon as they are so many.
+    """
+    found, union = [], set[tuple[int, int]]()
+    for graph in graphs:
+        found.append(graph)
+        if graph.link_count * count <= LIMIT:
+            union.update(link[:2] for link in graph.links)
+        links = max(len(union), graph.link_count)
+        if links * count > LIMIT:
+            raise ValueError(
+                f"draw {GRAPH}: found {links} links in the union of the first {len(found)} graphs, each with a weight in each of "
+                f"{count} realisations; expected at most {LIMIT} weights; take fewer realisations, or run the graphs one by one"
+            )
+    return tuple(found)
 
 
 def _drawn(what: str, value: object, count: int) -> Draws:
@@ -255,8 +324,8 @@ def drawn_axes(model: Model, drawn: Frozen[Draws], count: int, rng: int) -> tupl
 
 def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Iterable[tuple[str, Sequence[float]]]:
     """The names and the values of one draw."""
-    if isinstance(how, Graphs):
-        return _weights(model, how.graphs)
+    if isinstance(how, Graphs | RandomGraph):
+        return _weights(model, (how.graphs(count, rng) if isinstance(how, RandomGraph) else how).graphs)
     holders = model.unlinked.holders(name)
     links = {} if holders else model.link_names(name)
     if links:
@@ -283,7 +352,12 @@ def _columns(model: Model, name: str, how: Draws, count: int, rng: int) -> Itera
 def _weights(model: Model, graphs: tuple[Topology, ...]) -> Iterable[tuple[str, Sequence[float]]]:
     """The names and the values of the weights of graphs; 0 where a graph has no link."""
     links = model.link_names(WEIGHTS)
-    rows = [{at[:2]: float(at[2]) for at in graph.links} for graph in graphs]
+    try:
+        rows = [{at[:2]: float(at[2]) for at in graph.links} for graph in graphs]
+    except OverflowError:
+        raise ValueError(
+            f"draw {GRAPH}: found a weight beyond the range of numbers; expected at most 1.8e308"
+        ) from None
     found = [by_name("draw topology", links, {at: row.get(at, 0.0) for at in links}) for row in rows]
     return [(str(own), [row[own] for row in found]) for own in found[0]]
 

@@ -108,7 +108,7 @@ class Scene(Drawn, Written):
     draws : mapping, optional
         What is drawn, by the names of parameters and initial states, or "W", the weights of links: `normal`, `uniform`,
         `lorentzian` (of each node or edge by itself), or a list with one entry for each realisation; by the name
-        "topology" a list of graphs.
+        "topology" a list of graphs, or a random one as text, "erdos_renyi(20, p=0.3)".
     rng : int
         Seed of what is drawn.
 
@@ -235,12 +235,20 @@ class Scene(Drawn, Written):
         """
         if len(self.model.linked) != 1:
             raise ValueError(f"strength of the links: found {len(self.model.linked)} layers of links; expected one")
-        equations = self.equations
+        return self.strengths[0]
+
+    @property
+    def strengths(self) -> tuple[str, ...]:
+        """The strength of each layer that has links; ValueError if no parameter of one, or more than one, is a factor."""
+        equations, found = self.equations, []
         numbered = tuple(s for edge in equations.edges for s in edge.parameters if s.name in equations.numbered)
-        names = {strength(edge, (*equations.nodes[a].parameters, *numbered)).name for (a, _), edge in equations.edge_of}
-        if len(names) > 1:
-            raise ValueError(f"strength of the links: found {', '.join(sorted(names))}; expected one for all links")
-        return names.pop()
+        for layer in equations.layers:
+            of_ends = (((*equations.nodes[a].parameters, *numbered), edge) for (a, _), edge in layer.edge_of)
+            names = {strength(edge, others).name for others, edge in of_ends}
+            if len(names) > 1:
+                raise ValueError(f"strength of the links: found {', '.join(sorted(names))}; expected one for all links")
+            found.append(names.pop())
+        return tuple(found)
 
     @property
     def forced(self) -> bool:

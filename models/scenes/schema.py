@@ -20,6 +20,7 @@ from ..mechanics.parameter import Parameter
 from .axis import LIMIT as AXIS_LIMIT
 from .complete import LIMITS, integrators
 from .dictionary import NODES
+from .draw import GRAPH
 from .scene import KEYWORDS, Scene
 from .section import Direction
 
@@ -112,7 +113,11 @@ def _rows() -> dict[str, Table]:
         "observe": {"type": "object", "additionalProperties": TEXT},
         "sections": {"type": "object", "additionalProperties": _table(section, "function")},
         "stop": TEXT,
-        "draws": {"type": "object", "additionalProperties": {"anyOf": [TEXT, {"type": "array", "minItems": 1}]}},
+        "draws": {
+            "type": "object",
+            "properties": {GRAPH: {"anyOf": [TEXT, {"type": "array", "minItems": 1, "items": graph}]}},
+            "additionalProperties": {"anyOf": [TEXT, {"type": "array", "minItems": 1}]},
+        },
         "section": {**TEXT, "pattern": rf"^\s*\S+\s+({'|'.join(Direction)})(\s|$)"},
         "integrator": {"enum": ["auto", *integrators()]},
         "axes": {

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from synchain.models.inputs.checks import check_number, check_table, check_text, suggestion
@@ -81,7 +81,7 @@ class Given:
             If a name is no parameter of the scene, or is given twice; as `expect_one_cell`.
         """
         self.expect_one_cell(scene)
-        return with_numbers(scene, self._checked(scene), **{**ONE_CELL, **settings})
+        return with_numbers(scene, self.checked(scene), **{**ONE_CELL, **settings})
 
     def expect_one_cell(self, scene: Scene) -> None:
         """Raise ValueError for a scene with draws, or with axes that no parameter fixes: one cell would stand for all."""
@@ -108,9 +108,9 @@ class Given:
         fixed: dict[str, object] = {}
         swept: dict[str, object] = {axis.name: axis.values for axis in a_scene(scene).axes}
         start = {name: list(values) for name, values in scene.initial.items()}
-        given = self._checked(scene, states=True)
+        given = self.checked(scene, states=True)
         for name, value in given.items():
-            if isinstance(value, Iterable) and not isinstance(value, str | bytes) and getattr(value, "ndim", 1) > 0:
+            if _is_row(value):
                 swept[name] = value
                 continue
             if state := _state(scene, name):
@@ -123,8 +123,14 @@ class Given:
             settings |= {"axes": swept, "initial": start}
         return with_numbers(scene, fixed, **settings)
 
-    def _checked(self, scene: Scene, states: bool = False) -> dict[str, object]:
-        """The values; ValueError for an unknown name; with `states`, initial states are known too."""
+    def parted(self) -> tuple[dict[str, Any], Given]:
+        """Return the rows of values by name, and the same call with the numbers alone."""
+        rows = {name: value for name, value in self.values.items() if _is_row(value)}
+        numbers = {name: value for name, value in self.values.items() if name not in rows}
+        return rows, replace(self, table=numbers, keywords={})
+
+    def checked(self, scene: Scene, states: bool = False) -> dict[str, object]:
+        """Return the values; ValueError for an unknown name; with `states`, initial states are known too."""
         values = self.values
         for name in values:
             if not (scene.takes(name) or (states and _state(scene, name))):
@@ -158,6 +164,11 @@ def with_numbers(scene: Scene, values: Mapping[str, object], **settings: object)
         numbers.update(values.items())
         settings["parameters"] = numbers
     return scene.replace(**settings) if settings else scene
+
+
+def _is_row(value: object) -> bool:
+    """True for a sequence of values in place of one."""
+    return isinstance(value, Iterable) and not isinstance(value, str | bytes) and getattr(value, "ndim", 1) > 0
 
 
 def _state(scene: Scene, name: str) -> NodeName | None:

@@ -96,8 +96,8 @@ def scene_on(network: Topology, scene: Scene | None, arguments: Namespace) -> Sc
     Raises
     ------
     WrongUse
-        If the scene has no single frequency of the drive that fits `omega`, see `at_frequency`,
-        or if it sweeps more than this frequency and the strength.
+        If the scene has draws, several layers of links, or no single frequency of the drive that
+        fits `omega`, see `at_frequency`, or if it sweeps more than this frequency and the strength.
     """
     from synchain.models.scenes.scene import Scene
 
@@ -105,8 +105,13 @@ def scene_on(network: Topology, scene: Scene | None, arguments: Namespace) -> Sc
         scene = Scene(topology=network)
     if scene.draws:
         raise WrongUse(f"found draws of {', '.join(scene.draws)} in the scene; expected none; only run takes them")
+    if scene.links is not None:
+        raise WrongUse(
+            f"found {len(scene.links)} layers of links in the scene; expected one; in Python, `plane` takes the "
+            "strengths of several"
+        )
     frequency = at_frequency(scene, arguments.omega, arguments.scene)
-    chosen = {*frequency, *([scene.strength] if len(scene.model.linked) == 1 else [])}
+    chosen = {*frequency, *scene.strengths}
     moved = [axis.name for axis in scene.axes if axis.name not in chosen]
     if moved:
         raise WrongUse(f"{arguments.scene} sweeps {', '.join(moved)}; expected a scene without these axes")

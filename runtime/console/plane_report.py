@@ -51,7 +51,7 @@ class PlaneReport:
     def text(self) -> str:
         """Return the report as lines of text."""
         plane = self.plane
-        alpha, beta = plane.alpha, plane.beta
+        alpha, beta = plane.across, plane.up
         contours = [
             ", ".join(
                 f"{name} {part.min():.4f} … {part.max():.4f}"
@@ -64,7 +64,7 @@ class PlaneReport:
             *[("zero contour", words) for words in contours or ["none"]],
             ("negative", f"at {np.count_nonzero(plane.exponent < 0)} of {plane.exponent.size} strengths"),
             ("smallest, largest", f"{np.min(plane.exponent):.4f}, {np.max(plane.exponent):.4f}"),
-            *how(plane.scene, plane.attractors, plane.time, plane.stderr),
+            *how(plane.scene, plane.motion.tolist(), plane.time, plane.stderr),
         ]
         lines = [f"{headline(plane.scene)}, alpha + i beta = -sigma gamma", *rows_of(rows)]
         if self.network:
@@ -110,7 +110,7 @@ def plane_windows(plane: Plane) -> tuple[Window, ...]:
 
     size = np.max(np.abs(plane.exponent[np.isfinite(plane.exponent)]), initial=1e-300)
     value = np.nan_to_num(plane.exponent, nan=size, posinf=size, neginf=-size)
-    at = RegularGridInterpolator((plane.alpha, plane.beta), value, bounds_error=False, fill_value=math.inf)
+    at = RegularGridInterpolator((plane.across, plane.up), value, bounds_error=False, fill_value=math.inf)
     graph = plane.scene.topology
     top = min((_leaves(plane, -complex(mode.eigenvalue.value)) for mode in transversal_modes(graph)), default=0.0)
     if not 0 < top < math.inf:
@@ -125,8 +125,9 @@ def plane_windows(plane: Plane) -> tuple[Window, ...]:
 
 def _leaves(plane: Plane, unit: complex) -> float:
     """The sigma at which a mode leaves the plane, reduced by a rounding error."""
-    reach = max(-plane.beta[0], plane.beta[-1]) if plane.beta[0] < 0 else plane.beta[-1]
-    edge = plane.alpha[-1] if unit.real > 0 else -plane.alpha[0]
+    across, up = plane.across, plane.up
+    reach = max(-up[0], up[-1]) if up[0] < 0 else up[-1]
+    edge = across[-1] if unit.real > 0 else -across[0]
     limits = [edge / abs(unit.real)] if unit.real else []
     if unit.imag:
         limits.append(reach / abs(unit.imag))

@@ -22,7 +22,7 @@ from ..prediction.modes import transversal_modes
 from ..stability.msf import Plane, plane
 from .exponent import HIGHEST, effort, finite
 from .figure_runs import FigureRuns
-from .style import BLACK, COLUMN
+from .style import BLACK, COLUMN, symbol
 from .tables import Table
 
 __all__ = ["NAMES", "SIZE", "Rays", "compute", "draw", "draw_plane", "ranges", "table", "uneven_ring"]
@@ -36,6 +36,8 @@ FINE = 161
 """Real parts of the full grid."""
 FAR = 100.0
 """Largest coupling of the rays, beyond every plane of interest."""
+AXES = {"alpha": r"$\alpha=-\sigma\,\mathrm{Re}\,\gamma$", "beta": r"$\beta=-\sigma\,\mathrm{Im}\,\gamma$"}
+"""Labels of axes that are strengths of a mode."""
 RAY: dict[str, Any] = {"color": BLACK, "linestyle": "--", "linewidth": 0.8}
 DOT: dict[str, Any] = {
     "color": BLACK,
@@ -96,10 +98,10 @@ def table(data: Rays | Plane) -> Table:
     found = data.found if isinstance(data, Rays) else data
     rows = [
         (a, b, found.exponent[i, j], found.stderr[i, j])
-        for i, a in enumerate(found.alpha)
-        for j, b in enumerate(found.beta)
+        for i, a in enumerate(found.across)
+        for j, b in enumerate(found.up)
     ]
-    return Table(("alpha", "beta", "exponent", "stderr"), tuple(rows))
+    return Table((*found.names, "exponent", "stderr"), tuple(rows))
 
 
 def ranges(data: Rays) -> Table:
@@ -131,15 +133,15 @@ def draw_plane(axes: Axes, found: Plane) -> Axes:
     value = finite(found.exponent)
     norm = TwoSlopeNorm(0.0, *_reach(value))
     painted = axes.pcolormesh(
-        found.alpha, found.beta, value.T, norm=norm, cmap="RdBu_r", shading="nearest", rasterized=True
+        found.across, found.up, value.T, norm=norm, cmap="RdBu_r", shading="nearest", rasterized=True
     )
     for k, line in enumerate(found.contours):
         axes.plot(line[:, 0], line[:, 1], color=BLACK, linewidth=1.1, label="" if k else r"$\Lambda=0$")
     axes.set(
-        xlim=(found.alpha[0], found.alpha[-1]),
-        ylim=(found.beta[0], found.beta[-1]),
-        xlabel=r"$\alpha=-\sigma\,\mathrm{Re}\,\gamma$",
-        ylabel=r"$\beta=-\sigma\,\mathrm{Im}\,\gamma$",
+        xlim=(found.across[0], found.across[-1]),
+        ylim=(found.up[0], found.up[-1]),
+        xlabel=AXES.get(found.names[0]) or symbol(found.names[0]),
+        ylabel=AXES.get(found.names[1]) or symbol(found.names[1]),
     )
     bar = axes.figure.colorbar(painted, ax=axes, aspect=30, pad=0.02)
     bar.set_label(r"exponent $\Lambda$ per unit of $\tau$")
@@ -195,5 +197,5 @@ def draw_rays(axes: Axes, found: Plane, sigma: float | None = None) -> Axes:
 
 def _within(found: Plane, point: complex) -> bool:
     """True if a point lies in the drawn part of the plane."""
-    across, up = (row[0] <= value <= row[-1] for row, value in ((found.alpha, point.real), (found.beta, point.imag)))
+    across, up = (row[0] <= value <= row[-1] for row, value in ((found.across, point.real), (found.up, point.imag)))
     return bool(across and up)

@@ -45,6 +45,7 @@ from synchain.models import hypercube as hypercube
 from synchain.models import integer_option as integer_option
 from synchain.models import integers_option as integers_option
 from synchain.models import johnson as johnson
+from synchain.models import joint_spectrum as joint_spectrum
 from synchain.models import kneser as kneser
 from synchain.models import kronecker as kronecker
 from synchain.models import ladder as ladder

@@ -77,18 +77,22 @@ def _(value: Plane, axes: Axes) -> Axes:
 
 @_draw.register
 def _(value: Exponents, axes: Axes) -> Axes:
-    """Exponents over real strengths as a line, over complex ones as coloured dots."""
-    if not np.iscomplexobj(value.alpha):
-        axes.axhline(0.0, color=BLACK, linewidth=0.6)
-        axes.errorbar(value.alpha, finite(value.exponent), 2 * finite(value.stderr), color=BLUE)
-        axes.set(xlabel=r"strength of a mode $\alpha$", ylabel=r"exponent $\Lambda$ per unit of $\tau$")
+    """Exponents over a strength as a line, over two numbers of a mode as dots, else in order."""
+    label, numbers = r"exponent $\Lambda$ per unit of $\tau$", value.alpha.reshape(len(value.alpha), -1)
+    columns = np.concatenate([numbers.real, numbers.imag], axis=1).T if np.iscomplexobj(numbers) else numbers.T
+    if len(columns) == 2:
+        names = (r"$\alpha$", r"$\beta$") if value.alpha.ndim == 1 else (r"$\alpha_1$", r"$\alpha_2$")
+        colour = finite(value.exponent)
+        top = float(np.nanmax(np.abs(colour), initial=0.0)) or 1.0
+        look: dict[str, Any] = {"cmap": "RdBu_r", "s": 14.0, "edgecolors": BLACK, "linewidths": 0.3}
+        dots = axes.scatter(columns[0], columns[1], c=colour, vmin=-top, vmax=top, **look)
+        axes.set(xlabel=names[0], ylabel=names[1])
+        axes.figure.colorbar(dots, ax=axes, label=label)
         return axes
-    colour = finite(value.exponent)
-    top = float(np.nanmax(np.abs(colour), initial=0.0)) or 1.0
-    places = value.alpha.real, value.alpha.imag
-    dots = axes.scatter(*places, c=colour, cmap="RdBu_r", vmin=-top, vmax=top, s=14.0, edgecolors=BLACK, linewidths=0.3)
-    axes.set(xlabel=r"$\alpha$", ylabel=r"$\beta$")
-    axes.figure.colorbar(dots, ax=axes, label=r"exponent $\Lambda$ per unit of $\tau$")
+    axes.axhline(0.0, color=BLACK, linewidth=0.6)
+    places = value.alpha if value.on_a_line else np.arange(len(value.alpha))
+    axes.errorbar(places, finite(value.exponent), 2 * finite(value.stderr), color=BLUE)
+    axes.set(xlabel=r"strength of a mode $\alpha$" if value.on_a_line else "number of the mode", ylabel=label)
     return axes
 
 

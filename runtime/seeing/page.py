@@ -21,7 +21,7 @@ from synchain.models.presentation.equations import latex as latex_of
 from synchain.models.presentation.equations import lines
 from synchain.models.presentation.mathml import formula
 from synchain.models.presentation.writer import Latex, Text, Writer
-from synchain.models.scenes.draw import Draw
+from synchain.models.scenes.draw import Draw, RandomGraph
 from synchain.models.scenes.scene import Scene
 from synchain.models.spectra.eigenvalue import Eigenvalue, decimal
 from synchain.models.spectra.spectrum import Spectrum
@@ -157,7 +157,10 @@ def provenance_rows(scene: Scene) -> list[tuple[str, str]]:
     start = [f"{name} = {_numbers(values)}" for name, values in scene.initial.items()]
     axes = [f"{axis.name} from {min(axis.values):g} to {max(axis.values):g}, {len(axis)} values" for axis in scene.axes]
     observed = [f"{name} = {value}" for name, value in scene.observe.items()]
-    drawn = [f"{name} = {value if isinstance(value, Draw) else 'a list'}" for name, value in scene.draws.items()]
+    drawn = [
+        f"{name} = {value if isinstance(value, Draw | RandomGraph) else 'a list'}"
+        for name, value in scene.draws.items()
+    ]
     count = f", {scene.realisations} realisations" if drawn else ""
     more = [("sweep", "; ".join(axes)), ("drawn", "; ".join(drawn) + count), ("observed", "; ".join(observed))]
     return [

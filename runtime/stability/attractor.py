@@ -12,7 +12,7 @@ from enum import StrEnum
 import numpy as np
 import sympy as sp
 
-from synchain.models.dynamics.variational import MODE, Variation
+from synchain.models.dynamics.variational import Variation
 
 from .orbits import FAR, Orbits
 
@@ -199,11 +199,14 @@ def _values(orbit: Orbits) -> list[float]:
 
 def _matrix(variation: Variation, symbols: list[sp.Symbol], values: list[float], strengths: np.ndarray) -> np.ndarray:
     """Evaluate the matrices (m, p, p) of the variational equation at a state, for each strength."""
-    p = variation.size // len(variation.parameters)
+    p, columns = len(variation.orbit.node.continuous), strengths.reshape(len(strengths), -1).T
+    alphas = variation.parameters[: len(columns)]
     matrices = np.zeros((len(strengths), p, p), dtype=strengths.dtype)
     for (r, c), e in variation.matrix:
         if r < p and c < p:
-            at = sp.lambdify([*symbols, *MODE[:1]], e, "numpy")
-            base, slope = at(*values, 0.0), at(*values, 1.0) - at(*values, 0.0)
-            matrices[:, r, c] = base + slope * strengths
+            at = sp.lambdify([*symbols, *alphas], e, "numpy")
+            base = at(*values, *np.zeros(len(alphas)))
+            matrices[:, r, c] = base
+            for unit, column in zip(np.eye(len(alphas)), columns, strict=True):
+                matrices[:, r, c] += (at(*values, *unit) - base) * column
     return matrices

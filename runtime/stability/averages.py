@@ -52,9 +52,9 @@ class Averaging:
         object.__setattr__(self, "transient", check_number("transient", self.transient, 0.0))
         object.__setattr__(self, "seed", check_integer("seed", self.seed, 0))
 
-    def reporter(self) -> Reporter:
-        """Return the reporter of the transient and the longest average; its time begins now."""
-        return self.execution.reporter(round(self.transient) + math.ceil(self.periods), "period")
+    def reporter(self, orbits: int = 1) -> Reporter:
+        """Return the reporter of the transients and the longest averages along orbits in turn; its time begins now."""
+        return self.execution.reporter(orbits * (round(self.transient) + math.ceil(self.periods)), "period")
 
     def rounds(
         self, batches: Batches, step: float, error: Callable[[], np.ndarray | float], reporter: Reporter

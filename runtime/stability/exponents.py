@@ -26,6 +26,7 @@ from synchain.models.scenes.scene import Scene, a_scene
 from ..cells.keywords import ONE_CELL, ORBITS, Given
 from ..prediction.intervals import Interval
 from ..results.labelled import Labelled, dataset, ends_of, words_of
+from ..support.arrays import numbers
 from ..support.arrays import row as row_of
 from ..support.execution import Execution
 from ..support.progress import Hook, Reporter
@@ -35,13 +36,16 @@ from .orbits import Orbits
 
 __all__ = [
     "Exponents",
+    "along",
     "average",
     "coupled_cell",
     "exponents",
     "group_by_attractor",
     "initial_states",
+    "orbits_of",
     "single_cell",
     "transversal",
+    "with_partner",
 ]
 
 
@@ -53,8 +57,8 @@ class Exponents(Labelled):
 
     Parameters
     ----------
-    alpha : ndarray, shape (m,)
-        Strengths, real or complex.
+    alpha : ndarray, shape (m,) or (m, layers)
+        Strengths, real or complex; of several layers of links one each.
     exponent : ndarray, shape (m,)
         Exponents per unit of non-dimensional time.
     stderr : ndarray, shape (m,)
@@ -81,9 +85,10 @@ class Exponents(Labelled):
     @property
     def data(self) -> xr.Dataset:
         """Exponents and their errors over the modes, with alpha and beta as coordinates."""
-        modes = {"alpha": ("mode", self.alpha.real)}
+        dims = ("mode", "layer")[: self.alpha.ndim]
+        modes = {"alpha": (dims, self.alpha.real)}
         if np.iscomplexobj(self.alpha):
-            modes["beta"] = ("mode", self.alpha.imag)
+            modes["beta"] = (dims, self.alpha.imag)
         return dataset(
             {
                 "exponent": (("mode",), self.exponent, "largest transversal exponent per unit of time"),
@@ -97,7 +102,7 @@ class Exponents(Labelled):
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Strengths, stable ranges, motion and the length of the average."""
-        stable = () if np.iscomplexobj(self.alpha) else (("negative for alpha", words_of(self.intervals)),)
+        stable = (("negative for alpha", words_of(self.intervals)),) if self.on_a_line else ()
         return (
             ("strengths", f"{len(self.alpha)}, {ends_of(self.alpha)}"),
             *stable,
@@ -105,6 +110,11 @@ class Exponents(Labelled):
             ("motion", ", ".join(dict.fromkeys(a.kind for a in self.attractors))),
             ("average", f"{self.time:.6g} units of time for each of {self.starts} starts"),
         )
+
+    @property
+    def on_a_line(self) -> bool:
+        """True if the strengths are real, one for each mode."""
+        return self.alpha.ndim == 1 and not np.iscomplexobj(self.alpha)
 
     @property
     def averaged(self) -> int:
@@ -131,11 +141,12 @@ class Exponents(Labelled):
         Raises
         ------
         ValueError
-            If the strengths are complex.
+            If the strengths are complex, or those of several layers.
         """
         x, y, error = self.alpha, self.exponent, self.stderr
-        if np.iscomplexobj(x):
-            raise ValueError("strengths are complex; ranges need real ones")
+        if not self.on_a_line:
+            kind = "complex" if np.iscomplexobj(x) else f"those of {x.shape[1]} layers"
+            raise ValueError(f"strengths are {kind}; ranges need real ones of a single layer")
         ends: list[Interval] = [(float(x[0]), 0.0)] if y[0] < 0 else []
         for i in map(int, np.flatnonzero((y[1:] < 0) != (y[:-1] < 0))):
             a, b = max(i - 2, 0), min(i + 3, len(x) - 1)
@@ -194,8 +205,9 @@ def exponents(
     ----------
     scene : Scene
         Source of the oscillator and the coupling; a lone oscillator gets a partner.
-    alpha : array_like, shape (m,)
-        Strengths alpha + i beta = -sigma gamma, real or complex.
+    alpha : array_like, shape (m,) or (m, layers)
+        Strengths alpha + i beta = -sigma gamma, real or complex; of several layers of links one each, with the eigenvalues
+        of the layers on a common mode.
     precision : float
         Averaging stops if the standard error of every exponent is below this value.
     periods : float
@@ -235,7 +247,12 @@ def exponents(
     """
     given = Given(exponents, parameters, more, ORBITS)
     averaging = Averaging(precision, periods, transient, seed, Execution(workers, None, show_progress, progress))
-    return transversal(given, scene, row_of("alpha", alpha, complex_too=True), starts, rtol, averaging)
+    asked = numbers("alpha", alpha, complex_too=True)
+    of_layers = asked.ndim == 2 and len(a_scene(scene).model.linked) > 1
+    strengths = row_of("alpha", asked.ravel() if of_layers else asked, complex_too=True)
+    return transversal(
+        given, scene, strengths.reshape(asked.shape) if of_layers else strengths, starts, rtol, averaging
+    )
 
 
 def transversal(
@@ -249,7 +266,7 @@ def transversal(
         Parameters of the scene to set.
     scene : Scene
         Source of the oscillator and the coupling.
-    strengths : ndarray, shape (m,)
+    strengths : ndarray, shape (m,) or (m, layers)
         Strengths, real or complex.
     starts : int
         Number of initial states.
@@ -258,14 +275,36 @@ def transversal(
     averaging : Averaging
         How long to average, and who does it.
     """
-    scene = coupled_cell(given, scene, rtol)
     reporter = averaging.reporter()
-    orbits = Orbits.make(scene, strengths, initial_states(scene, starts, averaging.seed), averaging.execution.size)
+    orbits = orbits_of(coupled_cell(given, scene, rtol), strengths, starts, averaging)
     with reporter:
-        if not orbits.linear:
-            orbits.settle(averaging.transient, reporter.advance)
-        attractors = tuple(find_attractor(orbits, row, averaging.transient) for row in range(starts))
-        by_start, error, length = _by_start(orbits, attractors, averaging, reporter)
+        return along(orbits, strengths, averaging, reporter)
+
+
+def orbits_of(scene: Scene, strengths: np.ndarray, starts: int, averaging: Averaging) -> Orbits:
+    """Return the synchronous orbits of a scene that sweeps nothing, with modes; parameters as for `transversal`."""
+    return Orbits.make(scene, strengths, initial_states(scene, starts, averaging.seed), averaging.execution.size)
+
+
+def along(orbits: Orbits, strengths: np.ndarray, averaging: Averaging, reporter: Reporter) -> Exponents:
+    """Compute the exponents of all modes along orbits from their start.
+
+    Parameters
+    ----------
+    orbits : Orbits
+        Orbits at the start of their transient.
+    strengths : ndarray, shape (m,) or (m, layers)
+        The strengths of their modes, alpha + i beta.
+    averaging : Averaging
+        How long to average.
+    reporter : Reporter
+        Counts the periods.
+    """
+    starts = len(orbits.state)
+    if not orbits.linear:
+        orbits.settle(averaging.transient, reporter.advance)
+    attractors = tuple(find_attractor(orbits, row, averaging.transient) for row in range(starts))
+    by_start, error, length = _by_start(orbits, attractors, averaging, reporter)
     largest = max(group_by_attractor(attractors, by_start), key=len)
     mean, spread = by_start[largest].mean(axis=0), np.sqrt((error[largest] ** 2).sum(axis=0)) / len(largest)
     return Exponents(strengths, mean, spread, length, starts, by_start, attractors)
@@ -301,11 +340,17 @@ def coupled_cell(given: Given, scene: Scene, rtol: float) -> Scene:
     rtol : float
         Relative tolerance.
     """
-    if not a_scene(scene).model.linked:
-        given.expect_one_cell(scene)
-        scene = scene.replace(topology=topology("chain", 2), **ONE_CELL)
-        expect_vanishing("a lone oscillator gets a partner", scene.equations)
-    return single_cell(given, scene, rtol)
+    given.expect_one_cell(scene)
+    return single_cell(given, with_partner(scene), rtol)
+
+
+def with_partner(scene: Scene) -> Scene:
+    """Return a network that sweeps nothing: a lone oscillator gets a partner; ValueError if the link moves them both."""
+    if a_scene(scene).model.linked:
+        return scene.replace(**ONE_CELL)
+    coupled = scene.replace(topology=topology("chain", 2), **ONE_CELL)
+    expect_vanishing("a lone oscillator gets a partner", coupled.equations)
+    return coupled
 
 
 def single_cell(given: Given, scene: Scene, rtol: float) -> Scene:

@@ -2,7 +2,8 @@
 
 The propagator of a mode over a stretch of time is an entire function of its strength, so a short
 polynomial in the strength gives it for all modes. The strengths are divided into panels, pieces of
-the real line or squares of the plane. On each panel the propagators of some nodes are integrated,
+the real line or squares of the plane; those of several layers into lines along which that of a
+single layer changes, and these into panels. On each panel the propagators of some nodes are integrated,
 and the others are interpolated from them. Every panel has further strengths that are integrated
 for comparison only.
 
@@ -13,12 +14,20 @@ on a circle, Austin, Kravanja & Trefethen, SIAM J. Numer. Anal. 52, 1795 (2014).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-__all__ = ["Interpolation", "Panel", "Registers", "exact_interpolation", "on_a_cache_line", "strength_interpolation"]
+__all__ = [
+    "Interpolation",
+    "Panel",
+    "Registers",
+    "exact_interpolation",
+    "lines_of",
+    "on_a_cache_line",
+    "strength_interpolation",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +38,9 @@ class Panel:
     ----------
     rows : ndarray, shape (m,)
         Indices of the strengths.
-    points : ndarray, shape (k,)
+    points : ndarray, shape (k,) or (k, layers)
         Strengths of the nodes.
-    extras : ndarray, shape (c,)
+    extras : ndarray, shape (c,) or (c, layers)
         Strengths that are integrated for comparison only.
     weights : ndarray, shape (m, k)
         Propagators of the strengths = weights @ propagators of the nodes.
@@ -60,7 +69,7 @@ class Interpolation:
 
     Parameters
     ----------
-    strengths : ndarray, shape (m,)
+    strengths : ndarray, shape (m,) or (m, layers)
         All strengths, real or complex.
     panels : tuple of Panel
         Parts of the strengths with their nodes; none if every strength is integrated.
@@ -76,7 +85,7 @@ class Interpolation:
 
     @property
     def nodes(self) -> np.ndarray:
-        """Strengths (k,) that are integrated."""
+        """Strengths (k,) or (k, layers) that are integrated."""
         if self.is_exact:
             return self.strengths
         return np.concatenate([part for panel in self.panels for part in (panel.points, panel.extras)])
@@ -145,8 +154,8 @@ def strength_interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) ->
 
     Parameters
     ----------
-    strengths : ndarray, shape (m,)
-        Real or complex strengths.
+    strengths : ndarray, shape (m,) or (m, layers)
+        Real or complex strengths, one for each layer.
     nodes : int
         Chebyshev points on each piece of the real line; a square has twice as many on a circle.
     parts : int
@@ -164,10 +173,51 @@ def strength_interpolation(strengths: np.ndarray, nodes: int, parts: int = 1) ->
     """
     if len(strengths) == 0:
         raise ValueError("found no strength of a mode; expected at least one")
-    panels = tuple((_squares if np.iscomplexobj(strengths) else _pieces)(strengths, parts, nodes))
+    panels = tuple((_on_a_line if strengths.ndim == 1 else _along_lines)(strengths, parts, nodes))
     if sum(len(panel.points) + len(panel.extras) for panel in panels) >= len(strengths):
         return exact_interpolation(strengths)
     return Interpolation(strengths, panels)
+
+
+def lines_of(strengths: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
+    """Return the lines on which strengths (m, layers) lie that differ in a single layer.
+
+    Returns
+    -------
+    moving : int
+        The layer for which they are fewest.
+    fixed : ndarray, shape (lines, layers - 1)
+        The strengths of the other layers on each line.
+    line : ndarray of int, shape (m,)
+        The line of each mode.
+    """
+    found = []
+    for moving in range(strengths.shape[1]):
+        fixed, line = np.unique(np.delete(strengths, moving, axis=1), axis=0, return_inverse=True)
+        found.append((moving, fixed, line.reshape(-1)))
+    return min(found, key=lambda lines: len(lines[1]))
+
+
+def _along_lines(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
+    """Yield the panels of every line; those of few strengths have these as their nodes."""
+    moving, fixed, line = lines_of(strengths)
+    for k, others in enumerate(fixed):
+        rows = np.flatnonzero(line == k)
+        own = strengths[rows, moving]
+        if len(rows) <= nodes:
+            parts: Iterable[Panel] = (Panel(np.arange(len(own)), own, own[:0], np.eye(len(own)), np.eye(len(own))[:0]),)
+        else:
+            parts = _on_a_line(own, count, nodes)
+        for part in parts:
+            points, extras = (
+                np.insert(np.tile(others, (len(x), 1)), moving, x, axis=1) for x in (part.points, part.extras)
+            )
+            yield replace(part, rows=rows[part.rows], points=points, extras=extras)
+
+
+def _on_a_line(strengths: np.ndarray, count: int, nodes: int) -> Iterator[Panel]:
+    """Yield the panels of strengths of a single layer."""
+    return (_squares if np.iscomplexobj(strengths) else _pieces)(strengths, count, nodes)
 
 
 def on_a_cache_line(values: np.ndarray) -> np.ndarray:

@@ -8,14 +8,17 @@ Sources: classes by the zeros of the function on alpha > 0, Huang, Chen, Lai & P
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from synchain.models.dynamics.synchrony import expect_vanishing
+from synchain.models.dynamics.variational import mode
+from synchain.models.inputs.checks import check_integer
 from synchain.models.scenes.scene import Scene, a_scene
 
 from ..cells.keywords import ORBITS, Given, with_numbers
@@ -26,9 +29,13 @@ from ..support.arrays import row
 from ..support.execution import Execution
 from ..support.progress import Hook
 from .averages import Averaging
-from .exponents import Exponents, transversal
+from .exponents import Exponents, along, coupled_cell, orbits_of, transversal, with_partner
+from .network import SharedOrbit, shared_orbits, still_strengths, transversal_modes
 
 __all__ = ["MSF", "Plane", "StabilityClass", "classify", "msf", "plane"]
+
+STRENGTHS = ("alpha", "beta")
+"""The axes of a plane that are strengths of a mode; all others are parameters."""
 
 FINE = 1001
 """Least number of strengths at which the function is computed; ends of ranges are interpolated."""
@@ -196,81 +203,96 @@ class MSF(Labelled):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Plane(Labelled):
-    """The function on a rectangle of complex strengths alpha + i beta.
+    """Exponents over two axes: strengths of a mode, parameters of the scene, or one of each.
 
     Parameters
     ----------
     scene : Scene
         Scene with the oscillator, the coupling and a network.
-    alpha : ndarray, shape (a,)
-        Real parts.
-    beta : ndarray, shape (b,)
-        Imaginary parts.
+    across, up : ndarray, shapes (a,) and (b,)
+        The values of the axes.
     exponent : ndarray, shape (a, b)
-        Exponents per unit of non-dimensional time.
+        Exponents per unit of non-dimensional time; over two parameters the largest one of all transversal modes.
     stderr : ndarray, shape (a, b)
         Standard errors.
-    attractors : tuple of str
-        Kind of motion of each start.
+    attractors : ndarray of str, shape (a or 1, b or 1, starts)
+        Kind of motion of each start; 1 for an axis that does not move the synchronous orbit.
     time : float
-        Time averaged over.
+        Time averaged over, the longest one.
+    names : (str, str)
+        What the axes are: "alpha", "beta", or parameters.
+    modes : tuple of str
+        Over two parameters, the exact eigenvalues of each transversal mode, those of all layers together.
+    mode : ndarray of int, shape (a, b), optional
+        The mode with the largest exponent, by its place in `modes`.
     """
 
     scene: Scene
-    alpha: np.ndarray
-    beta: np.ndarray
+    across: np.ndarray
+    up: np.ndarray
     exponent: np.ndarray
     stderr: np.ndarray
-    attractors: tuple[str, ...]
+    attractors: np.ndarray
     time: float
+    names: tuple[str, str] = STRENGTHS
+    modes: tuple[str, ...] = ()
+    mode: np.ndarray | None = None
 
     @property
     def data(self) -> xr.Dataset:
-        """The function over alpha and beta."""
-        return dataset(
-            {
-                "exponent": (("alpha", "beta"), self.exponent, "largest transversal exponent per unit of time"),
-                "stderr": (("alpha", "beta"), self.stderr, "standard error of the exponent"),
-                "attractor": (("start",), list(self.attractors), "motion of each start"),
-            },
-            {"alpha": self.alpha, "beta": self.beta},
-            self.scene,
-        )
+        """The exponents over both axes."""
+        moving = [name for name, size in zip(self.names, self.attractors.shape, strict=False) if size > 1]
+        variables: dict[str, tuple[Sequence[str], Any, str]] = {
+            "exponent": (self.names, self.exponent, "largest transversal exponent per unit of time"),
+            "stderr": (self.names, self.stderr, "standard error of the exponent"),
+            "attractor": ((*moving, "start"), self.motion, "motion of each start"),
+        }
+        if self.mode is not None:
+            variables["mode"] = (self.names, self.mode, "the mode with the largest exponent, by its place in modes")
+            variables["modes"] = (("number",), list(self.modes), "eigenvalues of each transversal mode")
+        return dataset(variables, dict(zip(self.names, (self.across, self.up), strict=True)), self.scene)
 
     @property
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Scene, grid, share of stable strengths, motion."""
+        axes = zip(self.names, (self.across, self.up), strict=True)
         return (
             ("scene", repr(self.scene)),
-            ("grid", f"{len(self.alpha)} alpha {ends_of(self.alpha)}, {len(self.beta)} beta {ends_of(self.beta)}"),
+            ("grid", ", ".join(f"{len(values)} {name} {ends_of(values)}" for name, values in axes)),
             ("negative", f"{float((self.exponent < 0).mean()):.1%} of the grid"),
-            ("motion", ", ".join(dict.fromkeys(self.attractors))),
+            ("motion", ", ".join(dict.fromkeys(map(str, self.attractors.flat)))),
             ("average", f"{self.time:.6g} units of time for each start"),
         )
 
     @property
+    def motion(self) -> np.ndarray:
+        """Kind of motion of each start, along the axes that move the synchronous orbit and then the starts."""
+        along = [size for size in self.attractors.shape[:2] if size > 1]
+        return self.attractors.reshape([*along, self.attractors.shape[2]])
+
+    @property
     def contours(self) -> tuple[np.ndarray, ...]:
-        """The zero contour as lines, each of shape (points, 2), of alpha and beta."""
+        """The zero contour as lines, each of shape (points, 2), of both axes."""
         from contourpy import contour_generator
 
-        lines = contour_generator(self.alpha, self.beta, self.exponent.T).lines(0.0)
+        lines = contour_generator(self.across, self.up, self.exponent.T).lines(0.0)
         return tuple(np.asarray(line) for line in lines)
 
     def as_dict(self) -> dict[str, object]:
-        """Return the function for JSON.
+        """Return the exponents for JSON.
 
         Returns
         -------
         dict
-            alpha, beta, exponent and stderr (rows of alpha), contours, attractors and time.
+            Both axes by their names, exponent and stderr (rows of the first), contours, attractors and time.
         """
         return {
-            "alpha": self.alpha.tolist(),
-            "beta": self.beta.tolist(),
+            self.names[0]: self.across.tolist(),
+            self.names[1]: self.up.tolist(),
             "exponent": self.exponent.tolist(),
             "stderr": self.stderr.tolist(),
             "contours": [line.tolist() for line in self.contours],
-            "attractors": list(self.attractors),
+            "attractors": self.motion.tolist(),
             "time": self.time,
         }
 
@@ -325,8 +347,8 @@ def msf(
 
 def plane(
     scene: Scene,
-    alpha: Sequence[float] | np.ndarray,
-    beta: Sequence[float] | np.ndarray,
+    alpha: Sequence[float] | np.ndarray | None = None,
+    beta: Sequence[float] | np.ndarray | None = None,
     *,
     precision: float = 1e-3,
     periods: float = 5000,
@@ -337,24 +359,31 @@ def plane(
     workers: int | None = None,
     show_progress: bool | None = None,
     progress: Hook | None = None,
-    parameters: Mapping[str, float] | None = None,
-    **more: float,
+    parameters: Mapping[str, float | Sequence[float] | np.ndarray] | None = None,
+    **more: float | Sequence[float] | np.ndarray,
 ) -> Plane:
-    """Compute the master stability function on the rectangle alpha + i beta = -sigma gamma.
+    """Compute transversal exponents over two axes: strengths of a mode, parameters of the scene, or one of each.
+
+    ``plane(scene, alpha, beta)`` is the master stability function over alpha + i beta = -sigma gamma.
+    ``plane(scene, alpha, g=values)`` is that over alpha and a parameter, such as the strength of links that act between equal
+    states, which moves the synchronous orbit.  ``plane(scene, k=values, g=values)`` is the largest exponent of all
+    transversal modes of the scene's network over two parameters, such as the strengths of two layers of links.
 
     Parameters
     ----------
     scene : Scene
-        Source of the oscillator and the coupling.
-    alpha : array_like, shape (a,)
+        Source of the oscillator and the coupling; over two parameters, a network whose layers have matrices that commute.
+    alpha : array_like, shape (a,), optional
         Increasing real parts.
-    beta : array_like, shape (b,)
+    beta : array_like, shape (b,), optional
         Increasing imaginary parts. Conjugate strengths have the same exponent, so that only abs(beta)
         is integrated.
     precision, periods, transient, starts, rtol, seed
+        See `synchain.runtime.exponents`; the average is that along each synchronous orbit.
+    workers, show_progress, progress
         See `synchain.runtime.exponents`.
-    workers, show_progress, progress, parameters, **more
-        See `synchain.runtime.exponents`.
+    parameters, **more
+        Parameters of the scene to set, by a number, or axes, by an increasing row of values.
 
     Returns
     -------
@@ -363,20 +392,101 @@ def plane(
     Raises
     ------
     ValueError
-        If a row does not increase, and as in `exponents`.
+        If there are not two axes, if the values of one do not increase or do not matter, if matrices of layers do not
+        commute, and as in `exponents`.
     FloatingPointError
         If an integration fails.
+
+    References
+    ----------
+    Several layers: Sorrentino, New J. Phys. 14, 033035 (2012); links that act between equal states: Belykh, de Lange &
+    Hasler, Phys. Rev. Lett. 94, 188101 (2005).
     """
-    expect_vanishing("plane", a_scene(scene).equations)
-    across, up = row("alpha", alpha, 2, rising=True), row("beta", beta, 2, rising=True)
-    heights, place = np.unique(np.abs(up), return_inverse=True)
-    given = Given(plane, parameters, more, ORBITS)
     averaging = Averaging(precision, periods, transient, seed, Execution(workers, None, show_progress, progress))
-    strengths = (across[:, None] + 1j * heights).reshape(-1)
-    half_plane = transversal(given, scene, strengths, starts, rtol, averaging)
+    whole = Given(plane, parameters, more, ORBITS)
+    whole.expect_one_cell(scene)
+    whole.checked(with_partner(scene))
+    rows, given = whole.parted()
+    strengths = {name: values for name, values in zip(STRENGTHS, (alpha, beta), strict=True) if values is not None}
+    if len(strengths) + len(rows) != 2 or list(strengths) == ["beta"] or rows.keys() & set(STRENGTHS):
+        raise ValueError(
+            f"plane: found the axes {', '.join((*strengths, *rows)) or 'none'}; expected alpha and beta, alpha and a "
+            "parameter, or two parameters, each with a row of values"
+        )
+    axes = {name: row(name, values, 2, rising=True) for name, values in (*strengths.items(), *rows.items())}
+    known = _known(given, scene)
+    if len(rows) == 2 and not a_scene(scene).model.linked:
+        raise ValueError(
+            "plane: found two parameters and a scene without links; expected a network, or alpha and a parameter"
+        )
+    if rows:
+        cell = coupled_cell(
+            replace(given, table={**given.values, **{name: axes[name][0] for name in rows}}), scene, rtol
+        )
+        _check_parameters(cell, axes)
+        return _over_parameters(known, cell, axes, starts, averaging)
+    expect_vanishing("plane", a_scene(scene).equations)
+    across, up = axes.values()
+    heights, place = np.unique(np.abs(up), return_inverse=True)
+    half_plane = transversal(given, scene, (across[:, None] + 1j * heights).reshape(-1), starts, rtol, averaging)
     table, error = (row.reshape(len(across), -1)[:, place] for row in (half_plane.exponent, half_plane.stderr))
-    kinds = tuple(a.kind for a in half_plane.attractors)
-    return Plane(_known(given, scene), across, up, table, error, kinds, half_plane.time)
+    return Plane(known, across, up, table, error, _kinds(half_plane)[None, None], half_plane.time)
+
+
+def _check_parameters(cell: Scene, axes: Mapping[str, np.ndarray]) -> None:
+    """Raise ValueError for values out of range, and for parameters that exponents do not depend on."""
+    orbit, still = mode(cell.equations).orbit, still_strengths(cell)
+    for name in (name for name in axes if name not in STRENGTHS):
+        with_numbers(cell, {name: axes[name][-1]})
+        if "alpha" in axes and name in still and len(cell.strengths) == 1:
+            raise ValueError(
+                f"plane: found the axes alpha and {name}; expected another parameter: alpha = -{name} gamma"
+            )
+        if name not in still and name not in orbit.parameters:
+            known = ", ".join((*orbit.parameters, *sorted(still)))
+            raise ValueError(f"plane: no exponent depends on {name!r}; expected one of {known}")
+
+
+def _over_parameters(
+    known: Scene, cell: Scene, axes: Mapping[str, np.ndarray], starts: int, averaging: Averaging
+) -> Plane:
+    """Exponents over two axes, one synchronous orbit after the other."""
+    first, second = axes
+    shape = (len(axes[first]), len(axes[second]))
+    modes = () if first == "alpha" else tuple(map(str, transversal_modes(cell)))
+    orbits = list(shared_orbits(cell, _columns(axes)) if modes else _orbits_of_line(axes[first], second, axes[second]))
+    exponent, stderr, worst = np.empty(shape), np.empty(shape), np.empty(shape, dtype=int)
+    kinds, longest = np.empty((*shape, check_integer("starts", starts, 1)), dtype=object), 0.0
+    with averaging.reporter(len(orbits)) as reporter:
+        for done, orbit in enumerate(orbits, start=1):
+            scene, at = with_numbers(cell, orbit.numbers), np.unravel_index(orbit.cells, shape)
+            found = along(orbits_of(scene, orbit.strengths, starts, averaging), orbit.strengths, averaging, reporter)
+            table, rows = found.exponent[orbit.place], np.arange(len(orbit.cells))
+            worst[at] = largest = table.argmax(axis=1)
+            exponent[at], stderr[at] = table[rows, largest], found.stderr[orbit.place][rows, largest]
+            kinds[at], longest = _kinds(found), max(longest, found.time)
+            reporter.advance(reporter.total * done / len(orbits) - reporter.done)
+    still = still_strengths(cell) if modes else {"alpha"}
+    attractors = kinds[tuple(slice(1) if name in still else slice(None) for name in axes)].astype(str)
+    of_modes = (modes, worst) if modes else ()
+    return Plane(known, axes[first], axes[second], exponent, stderr, attractors, longest, (first, second), *of_modes)
+
+
+def _columns(axes: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The value of each axis at every point of their grid."""
+    return {name: values.ravel() for name, values in zip(axes, np.meshgrid(*axes.values(), indexing="ij"), strict=True)}
+
+
+def _orbits_of_line(alpha: np.ndarray, name: str, values: np.ndarray) -> Iterator[SharedOrbit]:
+    """One orbit for each value of a parameter, with the strengths alpha of a single mode."""
+    for k, value in enumerate(values):
+        cells = np.arange(len(alpha)) * len(values) + k
+        yield SharedOrbit(cells, {name: float(value)}, alpha, np.arange(len(alpha))[:, None])
+
+
+def _kinds(found: Exponents) -> np.ndarray:
+    """The kind of motion (starts,) of each start."""
+    return np.array([attractor.kind for attractor in found.attractors])
 
 
 def _known(given: Given, scene: Scene) -> Scene:

@@ -19,7 +19,7 @@ from synchain.models.scenes.scene import Scene
 from ..cells.choice import chosen_for_modes
 from ..cells.initial_modes import with_modes
 from .averages import BATCHES
-from .interpolation import Interpolation, exact_interpolation, strength_interpolation
+from .interpolation import Interpolation, exact_interpolation, lines_of, strength_interpolation
 from .variational_integrator import Travellers, VariationalIntegrator
 
 __all__ = ["Orbits", "unit_of_time"]
@@ -60,8 +60,8 @@ class Orbits:
         Oscillator, coupling and numerical settings.
     variation : Variation
         Variational equation of a mode.
-    strengths : ndarray, shape (m,)
-        Strengths in the variational equation: alpha + i beta unless links have inertia.
+    strengths : ndarray, shape (m,) or (m, layers)
+        Strengths in the variational equation: alpha + i beta unless links have inertia; of several layers one each.
     state : ndarray, shape (starts, components)
         Current states.
     workers : int or None
@@ -100,7 +100,7 @@ class Orbits:
         ----------
         scene : Scene
             Scene with coupling.
-        strengths : ndarray, shape (m,)
+        strengths : ndarray, shape (m,) or (m, layers)
             Strengths alpha + i beta of the modes.
         state : ndarray, shape (starts, components)
             Initial states.
@@ -110,10 +110,16 @@ class Orbits:
         Raises
         ------
         ValueError
-            If time enters without a known period, or if a mode has no positive mass at its
-            strength.
+            If time enters without a known period, if a mode has no positive mass at its strength, or if modes have another
+            number of strengths than there are layers of links.
         """
         variation = _variation(scene.equations, bool(np.iscomplexobj(strengths)))
+        layers = len(scene.equations.layers)
+        if strengths.size != len(strengths) * layers:
+            raise ValueError(
+                f"transversal modes: found {layers} layer{'s' * (layers > 1)} of links, so that a mode has as many strengths; expected "
+                "one for each; `plane` takes the strengths of layers as axes, e.g. plane(scene, k=[0, 1], g=[0, 1])"
+            )
         unit = unit_of_time(scene)
         row = np.array([[scene.parameters[name] for name in variation.orbit.parameters]])
         numbers = np.repeat(row, len(state), axis=0)
@@ -124,7 +130,7 @@ class Orbits:
     @property
     def components(self) -> int:
         """State variables of one deviation, real or complex."""
-        return self.variation.size // len(self.variation.parameters)
+        return len(self.variation.orbit.node.continuous)
 
     @property
     def linear(self) -> bool:
@@ -148,7 +154,7 @@ class Orbits:
         looseness : float
             Ratio of the tolerance of the deviations to that of the orbit.
         """
-        repeated = np.repeat(strengths, self.components)
+        repeated = np.repeat(strengths, self.components, axis=0)
         rows = _rows(repeated.astype(self.strengths.dtype))
         names = self.variation.orbit.parameters
         numbers = np.tile([self.scene.parameters[name] for name in names], (len(self.state), 1))
@@ -186,7 +192,8 @@ class Orbits:
         one.advance(self.unit)
         taken = STEP * self.components * one.steps / len(self.state)
         blocks = [b for b in BLOCKS if b <= max(4.0, periods / BATCHES)] if self.scene.forced else FREE_BLOCKS
-        for block, nodes, parts in _choices(blocks, taken, len(self.strengths) * self.components**2):
+        lines = 1 if self.strengths.ndim == 1 else len(lines_of(self.strengths)[1])
+        for block, nodes, parts in _choices(blocks, lines * taken, len(self.strengths) * self.components**2):
             chosen = strength_interpolation(self.strengths, nodes, parts)
             if chosen.is_exact or self._misfit(chosen, block) < limit:
                 break
@@ -286,8 +293,9 @@ class Orbits:
 
 
 def _rows(strengths: np.ndarray) -> np.ndarray:
-    """The real numbers (1 or 2, modes) of real or complex strengths."""
-    return np.stack([strengths.real, strengths.imag]) if np.iscomplexobj(strengths) else strengths[None]
+    """The real numbers (rows, modes) of real or complex strengths: one or two rows for each layer."""
+    rows = strengths.reshape(len(strengths), -1).T
+    return np.concatenate([rows.real, rows.imag]) if np.iscomplexobj(strengths) else rows
 
 
 def _of_modes(scene: Scene, alpha: np.ndarray) -> np.ndarray:
@@ -332,7 +340,7 @@ def unit_of_time(scene: Scene) -> float:
 def _choices(blocks: Sequence[float], taken: float, numbers: int) -> list[tuple[float, int, int]]:
     """Blocks, nodes of a panel and panels on each side, the cheapest first.
 
-    `taken`: multiplications that integrate a node over a unit of time; `numbers`: those of all propagators.
+    `taken`: multiplications that integrate a node of each line over a unit of time; `numbers`: those of all propagators.
     """
 
     def cost(block: float, nodes: int, parts: int) -> float:

@@ -9,8 +9,6 @@ cases apart, and let a cell that is certain to stay synchronous end early.
 
 from __future__ import annotations
 
-from collections import defaultdict
-
 import numpy as np
 
 from synchain.models.dynamics.variational import mode
@@ -21,6 +19,7 @@ from ..cells.keywords import with_numbers
 from ..cells.plan import Planner
 from ..results.certificate import Certificate
 from ..stability.exponents import Exponents, exponents
+from ..stability.network import shared_orbits, transversal_modes
 from ..stability.orbits import unit_of_time
 
 __all__ = ["certify", "check_certifiable"]
@@ -32,8 +31,8 @@ MOST = 10**7
 def certify(scene: Scene, *, precision: float = 2e-3, periods: float = 2000, workers: int | None = None) -> Certificate:
     """Return the exponents of every cell's synchronous state.
 
-    Cells that differ only in the strength of their links and starts share one orbit, if links vanish between equal states.  Of several kinds of attractor found
-    by four starts the least stable counts.
+    Cells that differ only in their starts and in the strength of links that vanish between equal states share one orbit.  Of
+    several kinds of attractor found by four starts the least stable counts.
 
     Parameters
     ----------
@@ -48,27 +47,18 @@ def certify(scene: Scene, *, precision: float = 2e-3, periods: float = 2000, wor
         If the synchronous state has no transversal exponents; as `exponents` does.
     """
     check_certifiable(scene)
-    gamma = _transversal_eigenvalues(scene)
-    columns = Planner(scene).columns(np.arange(scene.cells))
-    strength, vanishing = scene.strength, all(edge.diffusive for edge in scene.equations.edges)
-    own = [name for name in columns if name in scene.parameters and not (vanishing and name == strength)]
-    sigma = np.broadcast_to(columns.get(strength, np.array(scene.parameters[strength])), (scene.cells,))
-    groups: dict[tuple[float, ...], list[int]] = defaultdict(list)
-    for cell in range(scene.cells):
-        groups[tuple(float(columns[name][cell]) for name in own)].append(cell)
     exponent, stderr, diffusion = (np.empty(scene.cells) for _ in range(3))
-    for values, cells in groups.items():
-        asked = -sigma[cells][:, None] * gamma
-        strengths, place = np.unique(asked, return_inverse=True)
-        numbers = dict(zip(own, values, strict=True))
-        single = with_numbers(scene, numbers, axes=(), zipped=False, continuation="none")
-        found = exponents(single, strengths, precision=precision, periods=periods, workers=workers, show_progress=False)
+    for group in shared_orbits(scene, Planner(scene).columns(np.arange(scene.cells))):
+        single = with_numbers(scene, group.numbers, axes=(), zipped=False, continuation="none")
+        found = exponents(
+            single, group.strengths, precision=precision, periods=periods, workers=workers, show_progress=False
+        )
         worst, error = _least_stable(found)
-        table = worst[place].reshape(asked.shape)
-        rows, worst_mode = np.arange(len(cells)), table.argmax(axis=1)
-        exponent[cells] = table[rows, worst_mode]
-        stderr[cells] = error[place].reshape(asked.shape)[rows, worst_mode]
-        diffusion[cells] = stderr[cells] ** 2 * found.time * found.averaged
+        table = worst[group.place]
+        rows, worst_mode = np.arange(len(group.cells)), table.argmax(axis=1)
+        exponent[group.cells] = table[rows, worst_mode]
+        stderr[group.cells] = error[group.place][rows, worst_mode]
+        diffusion[group.cells] = stderr[group.cells] ** 2 * found.time * found.averaged
     return Certificate(exponent, stderr, diffusion)
 
 
@@ -81,19 +71,12 @@ def check_certifiable(scene: Scene) -> None:
     if scene.realisations:
         raise ValueError(f"a certificate is for a sweep; found {scene.realisations} realisations, expected axes alone")
     mode(scene.equations)
+    transversal_modes(scene)
     unit_of_time(scene)
     frequency = scene.drive.frequency
     rest = None if frequency is None else rest_in_sweep(frequency, scene.parameters, scene.axes, scene.zipped)
     if rest is not None:
         raise ValueError(f"a certificate needs a drive with a period; found {rest[0]} = {rest[1]:g} in the sweep")
-
-
-def _transversal_eigenvalues(scene: Scene) -> np.ndarray:
-    """The transversal eigenvalues: all but one zero."""
-    spectrum = scene.topology.spectrum
-    values = [complex(v) for v, m in zip(spectrum.values, spectrum.multiplicities, strict=True) if v != 0.0 or m > 1]
-    found = np.array(values)
-    return found.real if np.all(found.imag == 0.0) else found
 
 
 def _least_stable(found: Exponents) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from synchain.models import chain, ring, star
 from synchain.models.definitions.definition import OSCILLATOR
 from synchain.models.dynamics.network import oriented_links
-from synchain.models.dynamics.variational import source_slope
+from synchain.models.dynamics.variational import source_slopes
 from synchain.models.graphs.topology import from_matrix
 from synchain.models.inputs.frozen import Frozen
 from synchain.models.inputs.plugins import names
@@ -234,7 +234,7 @@ def test_a_coupling_on_one_coordinate_leaves_the_others_alone() -> None:
 def test_a_full_mass_matrix_reaches_the_master_stability_function() -> None:
     """H of a spring between double pendulums is the inverse mass matrix at the synchronous state."""
     made = Scene(oscillator="double_pendulum", topology=chain(2)).equations
-    slope = source_slope(made)
+    (slope,) = source_slopes(made)
     ratio, rod, phi, psi = sp.symbols("mass_ratio length_ratio phi psi", real=True)
     off = ratio * rod * sp.cos(phi - psi)
     masses = sp.Matrix([[1 + ratio, off], [off, ratio * rod**2]])
@@ -245,7 +245,7 @@ def test_a_full_mass_matrix_reaches_the_master_stability_function() -> None:
 def test_non_linear_couplings_are_linear_between_equal_states(coupling: str) -> None:
     made = Scene(oscillator="duffing", coupling=coupling, topology=chain(2)).equations
     plain = Scene(oscillator="duffing", coupling="damper" if "damper" in coupling else "spring", topology=chain(2))
-    assert source_slope(made) == source_slope(plain.equations)
+    assert source_slopes(made) == source_slopes(plain.equations)
 
 
 @pytest.mark.long

@@ -48,7 +48,7 @@ def function(scene: Scene, low: float = LOW, high: float = HIGH, end: float = 1.
 def disc(scene: Scene, alpha: np.ndarray, beta: np.ndarray) -> Plane:
     """Negative inside a circle round 0.35 of radius 0.25."""
     value = np.add.outer((alpha - LOW) * (alpha - HIGH), beta**2)
-    return Plane(scene, alpha, beta, value, np.full(value.shape, 1e-3), ("aperiodic",), 500.0)
+    return Plane(scene, alpha, beta, value, np.full(value.shape, 1e-3), np.array([[["aperiodic"]]]), 500.0)
 
 
 @pytest.fixture
@@ -385,6 +385,7 @@ WRONG = [
     ("figure_8 --out {own}", "the name of a file; expected a folder"),
     ("{alone}", "the scene has no coupling, by which modes differ"),
     ("{swept}", "sweeps kappa, x_1; expected a scene without these axes"),
+    ("{layers}", "found 2 layers of links in the scene; expected one"),
 ]
 
 
@@ -400,7 +401,11 @@ def test_wrong_use_is_said_before_anything_is_computed(
     (tmp_path / "swept.toml").write_text(
         "topology.name = 'chain'\ntopology.n = 2\nsweep = {kappa = [1e4, 1e5], x_1 = [0, 1]}\n"
     )
-    places = {name: tmp_path / f"{name}.toml" for name in ("alone", "swept")}
+    (tmp_path / "layers.toml").write_text(
+        'links = [{coupling = "spring", topology = {name = "ring", n = 4}}, '
+        '{coupling = {rates = {v = "g*W*v_j"}, parameters = {g = 1}}, topology = {name = "star", n = 4}}]\n'
+    )
+    places = {name: tmp_path / f"{name}.toml" for name in ("alone", "swept", "layers")}
     places |= {"own": own, "laplacian": tmp_path / "laplacian.txt"}
     assert main(["msf", *words.format(**places).split()]) == 2
     captured = capsys.readouterr()

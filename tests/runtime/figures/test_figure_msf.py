@@ -123,7 +123,8 @@ def test_colours_of_the_plane_meet_at_zero() -> None:
     value[0, 0] = -math.inf
     with style.context():
         axes = plane.draw_plane(
-            style.new_figure((3, 2)).add_subplot(), Plane(Scene(), grid, grid, value, value, (), 1.0)
+            style.new_figure((3, 2)).add_subplot(),
+            Plane(Scene(), grid, grid, value, value, np.array([[["periodic"]]]), 1.0),
         )
     (mesh,) = axes.collections
     assert (mesh.norm.vmin, mesh.norm.vcenter, mesh.norm.vmax) == (-1.5, 0.0, 1.5)

@@ -153,8 +153,8 @@ def test_damage_is_seen(ending: str, tmp_path: Path) -> None:
     ("change", "words"),
     [
         (lambda tree: tree["root"].update(value="Popen"), "Popen"),
-        (lambda tree: tree["root"]["fields"].pop("alpha"), "alpha"),
-        (lambda tree: tree["root"]["fields"].update(alpha={"array": "nothing", "dtype": "<f8"}), "nothing"),
+        (lambda tree: tree["root"]["fields"].pop("across"), "across"),
+        (lambda tree: tree["root"]["fields"].update(across={"array": "nothing", "dtype": "<f8"}), "nothing"),
         (lambda tree: tree.update(root={"value": "Criterion", "fields": {}}), "expected a result"),
         (lambda tree: tree["root"]["fields"].update(scene={"scene": 7}), "index"),
     ],

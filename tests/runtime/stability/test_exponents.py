@@ -306,8 +306,9 @@ def test_a_line_of_strengths_that_is_none_is_named(strengths: object, words: str
 
 @pytest.mark.parametrize("function", [msf, plane])
 def test_functions_of_strength_take_the_keywords_of_exponents(function: Callable[..., object]) -> None:
-    def keywords(of: Callable[..., object]) -> list[inspect.Parameter]:
-        return [p for p in inspect.signature(of).parameters.values() if p.kind in (p.KEYWORD_ONLY, p.VAR_KEYWORD)]
+    def keywords(of: Callable[..., object]) -> list[tuple[str, object]]:
+        own = inspect.signature(of).parameters.values()
+        return [(p.name, p.default) for p in own if p.kind in (p.KEYWORD_ONLY, p.VAR_KEYWORD)]
 
     assert keywords(function) == keywords(exponents)
 

@@ -29,6 +29,7 @@ from synchain.models import (
     uniform,
 )
 from synchain.models.definitions.loader import load_oscillator
+from synchain.models.inputs.node_name import LinkName
 from synchain.models.scenes.file import load_scene
 from synchain.runtime import cluster_exponents, exponents, lyapunov_spectrum, msf, plane, thresholds, universal_probe
 from synchain.runtime.opening.open import open_result
@@ -244,6 +245,80 @@ def test_graphs_are_realisations(oscillator: str, coupling: str, tmp_path: Path)
     assert open_result(tmp_path / "graphs.nc").scene == found.scene
 
 
+RANDOM = Scene(
+    "duffing", "spring", ring(10), parameters={"sigma": 0.4}, **{**EXACT, "window": 3, "integrator": "dop853"}
+)
+"""A scene on whose nodes graphs are drawn."""
+
+
+def drawn(text: str, count: int = 4, rng: int = 3, **given: Any) -> Scene:
+    return RANDOM.replace(realisations=count, rng=rng, draws={"topology": text, **given})
+
+
+def members(scene: Scene) -> list[dict[tuple[int, int], float]]:
+    """The weights of the links of each realisation, without zeros."""
+    columns = {LinkName.parse(axis.name): axis.values for axis in scene.drawn if axis.name.startswith("W_")}
+    return [
+        {(name.target, name.source): values[k] for name, values in columns.items() if values[k]}
+        for k in range(scene.realisations)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "edges"),
+    [
+        ("erdos_renyi(10, p=0.3)", None),
+        ("random_regular(10, degree=3)", 15),
+        ("small_world(10, neighbours=4)", 20),
+        ("weighted(random_regular(10, degree=3), 1/4)", 15),
+        ("cartesian(erdos_renyi(5), erdos_renyi(2, p=1/2))", None),
+    ],
+)
+def test_members_of_random_families_are_drawn(text: str, edges: int | None) -> None:
+    """Each realisation has a member of its own, which `rng` and its number alone decide."""
+    scene = drawn(text)
+    found = members(scene)
+    assert len({tuple(sorted(links)) for links in found}) > 1
+    assert {len(links) for links in found} == {edges} or edges is None
+    assert set().union(*(links.values() for links in found)) == ({0.25} if text.startswith("weighted") else {1.0})
+    assert members(drawn(text, 6, x=normal(0, 1)))[:4] == found
+    assert members(drawn(text, rng=4)) != found
+    graphs = scene.draws["topology"].graphs(4, 3).graphs
+    assert [{(i, j) for i, j, _ in graph.links if i < j} for graph in graphs] == [set(links) for links in found]
+
+
+def test_the_number_of_edges_is_that_of_the_family() -> None:
+    """Mean over 500 members of 45 pairs with p = 0.3, within four standard errors; no two members are alike."""
+    found = members(drawn("erdos_renyi(10, p=0.3)", 500))
+    assert np.mean([len(links) for links in found]) == pytest.approx(13.5, abs=4 * (45 * 0.21 / 500) ** 0.5)
+    assert len({tuple(sorted(links)) for links in found}) == 500
+
+
+def test_runs_on_random_graphs_are_those_on_their_members(tmp_path: Path) -> None:
+    scene = drawn("erdos_renyi(10, p=0.3)")
+    found = run(scene, show_progress=False)
+    graphs = scene.draws["topology"].graphs(4, 3).graphs
+    listed = run(RANDOM, realisations=4, draws={"topology": graphs}, show_progress=False)
+    np.testing.assert_array_equal(found.end.values, listed.end.values)
+    one = run(RANDOM.replace(topology=graphs[2]), show_progress=False)
+    np.testing.assert_array_equal(one.end.values, found.end.values[2])
+    assert found.scene.as_dict()["draws"] == {"topology": "erdos_renyi(10, p=0.3)"}
+    assert Scene.from_dict(found.scene.as_dict()) == found.scene
+    found.scene.save(tmp_path / "random.toml")
+    assert load_scene(tmp_path / "random.toml") == found.scene
+    found.save(tmp_path / "random.nc")
+    opened = open_result(tmp_path / "random.nc")
+    assert opened.scene == found.scene
+    np.testing.assert_array_equal(opened.data.W.values, found.data.W.values)
+
+
+@pytest.mark.parametrize("graphs", [GRAPHS, "erdos_renyi(10, p=0.3)"])
+def test_scenes_with_drawn_graphs_can_be_changed(graphs: Any) -> None:
+    scene = RANDOM.replace(realisations=4, draws={"topology": graphs})
+    other = scene.replace(rtol=1e-5)
+    assert (other.rtol, other.drawn, other.topology) == (1e-5, scene.drawn, scene.topology)
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -272,7 +347,35 @@ def test_graphs_are_realisations(oscillator: str, coupling: str, tmp_path: Path)
             {"realisations": 1, "draws": {"W": [[*range(1, 21)]]}},
             "draw W on ring(10): found 1.0 and 3.0 at nodes 1 and 2",
         ),
-        ({"realisations": 4, "draws": {"topology": "ring"}}, "found 'ring'; expected a list of 4 graphs"),
+        ({"realisations": 4, "draws": {"topology": "ring"}}, "draw topology: unreadable graph 'ring'"),
+        (
+            {"realisations": 4, "draws": {"topology": "weighted(erdos_renyi(10), 1e999)"}},
+            "found a weight beyond the range of numbers",
+        ),
+        (
+            {"realisations": 4, "draws": {"topology": "ring(10)"}},
+            "found 'ring(10)', the same graph in every realisation",
+        ),
+        ({"realisations": 4, "draws": {"topology": "erdos_renyi(10, seed=3)"}}, "found a seed; expected none"),
+        (
+            {"realisations": 4, "draws": {"topology": "erdos_renyi(10, q=3)"}},
+            "draw topology: topology erdos_renyi: unknown",
+        ),
+        (
+            {"realisations": 4, "draws": {"topology": "erdos_renyi(9)"}},
+            "found graphs of 9 nodes; expected graphs of 10",
+        ),
+        ({"realisations": 4, "draws": {"topology": "__import__('os')"}}, "draw topology: unreadable graph"),
+        ({"realisations": 4, "draws": {"topology": "erdos_renyi(2000000)"}}, "2000000 nodes; expected at most 1000000"),
+        ({"realisations": 4, "draws": {"topology": {"name": "ring", "n": 10}}}, "or a random one as text"),
+        (
+            {"realisations": 5000, "draws": {"topology": "erdos_renyi(200, p=0.9)"}},
+            "in the union of the first 1 graphs, each with a weight in each of 5000 realisations; expected at most 10000000",
+        ),
+        (
+            {"realisations": 300, "draws": {"topology": [erdos_renyi(300, p=0.3, seed=k) for k in range(3)] * 100}},
+            "in the union of the first 2 graphs",
+        ),
         (
             {"realisations": 4, "draws": {"topology": GRAPHS}, "coupling": Rates({i.v: sp.cos(W + j.x - i.x)})},
             "found a link that adds",

@@ -1,0 +1,161 @@
+"""Joint eigenvalues of several graphs on the same nodes, whose matrices commute.
+
+Matrices that commute are triangular in one basis, so that A + t B has the eigenvalues a + t b of the pairs (a, b) of
+their common modes (R. A. Horn, C. R. Johnson, Matrix Analysis, Cambridge University Press, 2013, theorem 2.3.3).  With a t
+for which no two sums a + t b of eigenvalues of A and B are equal, the exact spectrum of A + t B names the pairs and their
+multiplicities: no eigenvector is computed and nothing is rounded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from itertools import product
+from typing import TypeAlias
+
+from flint import acb, fmpq, fmpq_poly
+
+from ..algebra.balls import disjoint, precision
+from ..spectra.eigenvalue import Eigenvalue, ProofError
+from ..spectra.jordan import value_at
+from ..spectra.solve import DENSE_LIMIT, spectrum
+from .topology import Topology
+
+__all__ = ["JointEigenvalue", "joint_spectrum"]
+
+BITS = (64, 256, 1024)
+"""Precisions at which sums of eigenvalues are told apart."""
+
+PRIME, TRIED = 97, 100
+"""Factors t = k/PRIME of a further matrix are tried, k = 1, 2, …; few of them make two sums equal."""
+
+Modes: TypeAlias = "tuple[tuple[tuple[Eigenvalue, ...], Eigenvalue], ...]"
+"""The eigenvalues of each graph on a common mode, and that of a combination of the graphs."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointEigenvalue:
+    """The eigenvalues of several graphs on one common mode.
+
+    Parameters
+    ----------
+    parts : tuple of Eigenvalue
+        The eigenvalue of each graph, with its own multiplicity there.
+    multiplicity : int
+        How often these eigenvalues occur together.
+    """
+
+    parts: tuple[Eigenvalue, ...]
+    multiplicity: int
+
+    @property
+    def values(self) -> tuple[float | complex, ...]:
+        """The eigenvalue of each graph as the nearest float."""
+        return tuple(part.value for part in self.parts)
+
+    def __str__(self) -> str:
+        return f"({', '.join(map(str, self.parts))})"
+
+
+@lru_cache(maxsize=32)
+def joint_spectrum(graphs: tuple[Topology, ...]) -> tuple[JointEigenvalue, ...]:
+    """Return the distinct joint eigenvalues of the connectivity matrices of graphs, exactly.
+
+    Parameters
+    ----------
+    graphs : tuple of Topology
+        Graphs on the same nodes; of a single one this is its spectrum.
+
+    Returns
+    -------
+    tuple of JointEigenvalue
+        With positive weights downwards; one of them is that of equal states, all zeros.
+
+    Raises
+    ------
+    ValueError
+        If the graphs have different numbers of nodes, or several of them more than DENSE_LIMIT, and if two of their matrices
+        do not commute.
+    ProofError
+        If the eigenvalues of the sum are no sums of eigenvalues, a mistake of the program.
+
+    Examples
+    --------
+    >>> from synchain.models import complete, joint_spectrum, ring
+    >>> [str(mode) for mode in joint_spectrum((ring(4), complete(4)))]
+    ['(0, 0)', '(-2, -4)', '(-4, -4)']
+    """
+    _check(graphs)
+    modes: Modes = tuple(((e,), e) for e in spectrum(graphs[0]))
+    combined = graphs[0]
+    for graph in graphs[1:]:
+        modes, combined = _joined(modes, combined, graph)
+    return tuple(JointEigenvalue(parts, number.multiplicity) for parts, number in modes)
+
+
+def _check(graphs: Sequence[Topology]) -> None:
+    """Raise ValueError unless the graphs have the same nodes and their matrices commute."""
+    sizes = sorted({graph.n for graph in graphs})
+    if len(sizes) != 1:
+        found = " and ".join(map(str, sizes)) or "no"
+        raise ValueError(f"joint spectrum: found graphs of {found} nodes; expected graphs on the same nodes")
+    if len(graphs) == 1:
+        return
+    if sizes[0] > DENSE_LIMIT:
+        raise ValueError(f"joint spectrum: found {sizes[0]} nodes; expected at most {DENSE_LIMIT} for several graphs")
+    itself = fmpq_poly([0, 1])
+    whole = [value_at(graph, itself) for graph in graphs]
+    for i, first in enumerate(whole):
+        for j in range(i):
+            if whole[j] * first != first * whole[j]:
+                raise ValueError(
+                    f"joint spectrum of {graphs[j].name}({sizes[0]}) and {graphs[i].name}({sizes[0]}): found matrices that do "
+                    "not commute; expected graphs with common modes, such as any undirected graph and a complete one"
+                )
+
+
+def _joined(modes: Modes, combined: Topology, graph: Topology) -> tuple[Modes, Topology]:
+    """The modes with their eigenvalues on one more graph, and the combination whose eigenvalues are theirs."""
+    own = tuple(spectrum(graph))
+    pairs = [(parts, e) for parts, _ in modes for e in own]
+    for bits, k in product(BITS, range(1, TRIED)):
+        factor = Fraction(k, PRIME)
+        sums = _sums([number for _, number in modes], own, factor, bits)
+        with precision(2 * bits):
+            if disjoint(sums):
+                break
+    else:
+        raise ProofError(
+            f"joint spectrum of {graph.name}({graph.n}): found equal sums for {TRIED} factors; expected one"
+        )
+    combined = _combined(combined, graph, factor)
+    found = []
+    for number in spectrum(combined):
+        with precision(2 * bits):
+            ball = acb(number.enclosure(bits))
+            at = [pair for pair, own_sum in zip(pairs, sums, strict=True) if ball.overlaps(own_sum)]
+        if len(at) != 1:
+            raise ProofError(
+                f"joint spectrum of {graph.name}({graph.n}): found {len(at)} pairs for {number}; expected one"
+            )
+        found.append(((*at[0][0], at[0][1]), number))
+    return tuple(found), combined
+
+
+def _sums(first: Sequence[Eigenvalue], second: Sequence[Eigenvalue], factor: Fraction, bits: int) -> list[acb]:
+    """Balls that hold the sums a + t b of all pairs."""
+    with precision(2 * bits):
+        share = fmpq(factor.numerator, factor.denominator)
+        pairs = product((a.enclosure(bits) for a in first), [b.enclosure(bits) for b in second])
+        return [acb(a + share * b) for a, b in pairs]
+
+
+def _combined(first: Topology, second: Topology, factor: Fraction) -> Topology:
+    """The graph of the matrix A + t B."""
+    weights = {link[:2]: link[2] for link in first.links}
+    for target, source, weight in second.links:
+        weights[target, source] = weights.get((target, source), Fraction(0)) + factor * weight
+    links = tuple((*at, weight) for at, weight in sorted(weights.items()) if weight)
+    return Topology(f"{first.name} and {second.name}", first.n, links)

@@ -1,0 +1,86 @@
+"""The transversal modes of a network over the cells of a sweep: which cells share a synchronous orbit, and their strengths."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from synchain.models.graphs.joint import JointEigenvalue, joint_spectrum
+from synchain.models.scenes.scene import Scene
+
+__all__ = ["SharedOrbit", "shared_orbits", "still_strengths", "transversal_modes"]
+
+
+@dataclass(frozen=True, slots=True)
+class SharedOrbit:
+    """Cells that differ only in what does not move their synchronous orbit.
+
+    Parameters
+    ----------
+    cells : ndarray of int, shape (c,)
+        The cells.
+    numbers : dict
+        Parameters of all of them that the orbit depends on.
+    strengths : ndarray, shape (m,) or (m, layers)
+        The strengths -sigma gamma of all modes of all cells, each once.
+    place : ndarray of int, shape (c, modes)
+        Where in `strengths` the modes of each cell are.
+    """
+
+    cells: np.ndarray
+    numbers: dict[str, float]
+    strengths: np.ndarray
+    place: np.ndarray
+
+
+def transversal_modes(scene: Scene) -> tuple[JointEigenvalue, ...]:
+    """Return the distinct joint eigenvalues of the layers of a network, without one mode of equal states.
+
+    Raises
+    ------
+    ValueError
+        If the matrices of two layers do not commute.
+    """
+    modes = joint_spectrum(tuple(graph for _, graph in scene.model.linked))
+    return tuple(mode for mode in modes if any(mode.values) or mode.multiplicity > 1)
+
+
+def still_strengths(scene: Scene) -> set[str]:
+    """Return the strengths that do not move the synchronous orbit: those of layers whose links vanish between equal states."""
+    pairs = zip(scene.strengths, scene.equations.layers, strict=True)
+    return {name for name, layer in pairs if all(edge.diffusive for _, edge in layer.edge_of)}
+
+
+def shared_orbits(scene: Scene, columns: Mapping[str, np.ndarray]) -> Iterator[SharedOrbit]:
+    """Yield the cells of a sweep by their synchronous orbits.
+
+    Parameters
+    ----------
+    scene : Scene
+        A network, with the numbers of what is not swept.
+    columns : mapping of str to ndarray, shape (cells,)
+        The values of what is swept.
+
+    Raises
+    ------
+    ValueError
+        As `transversal_modes`, and if a layer has no strength.
+    """
+    (count,) = {len(column) for column in columns.values()} or {1}
+    gamma = np.array([mode.values for mode in transversal_modes(scene)])
+    names, still = scene.strengths, still_strengths(scene)
+    gamma = gamma if len(names) > 1 else gamma[:, 0]
+    sigma = [np.broadcast_to(columns.get(name, np.array(scene.parameters[name])), (count,)) for name in names]
+    each = np.stack(sigma, axis=-1)[:, None, :] if len(names) > 1 else sigma[0][:, None]
+    own = [name for name in columns if name in scene.parameters and name not in still]
+    groups: dict[tuple[float, ...], list[int]] = defaultdict(list)
+    for cell in range(count):
+        groups[tuple(float(columns[name][cell]) for name in own)].append(cell)
+    for values, cells in groups.items():
+        asked = -each[cells] * gamma
+        strengths, place = np.unique(asked.reshape(-1, *asked.shape[2:]), axis=0, return_inverse=True)
+        numbers = dict(zip(own, values, strict=True))
+        yield SharedOrbit(np.array(cells), numbers, strengths, place.reshape(asked.shape[:2]))
