@@ -404,7 +404,6 @@ def plane(
     """
     averaging = Averaging(precision, periods, transient, seed, Execution(workers, None, show_progress, progress))
     whole = Given(plane, parameters, more, ORBITS)
-    whole.expect_one_cell(scene)
     whole.checked(with_partner(scene))
     rows, given = whole.parted()
     strengths = {name: values for name, values in zip(STRENGTHS, (alpha, beta), strict=True) if values is not None}
