@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.special import ndtr, stdtrit
 
 from synchain.models.inputs.checks import check_integer, check_number, check_positive
 
@@ -19,6 +20,8 @@ BATCHES = 64
 """Most batches that are kept."""
 CHECKED = 8
 """Batches between two checks of the error."""
+FEWEST, MOST = 3, 16
+"""Fewest degrees of freedom of an error that is known, and most that are used."""
 ALL = slice(None)
 
 
@@ -31,13 +34,18 @@ class Averaging:
     precision : float
         The average ends if every standard error is below this value.
     periods : float
-        Longest average, in periods of the drive, or in units of 2 pi if there is none.
+        Longest average, in periods of the drive, or in units of 2 pi if there is none; a whole number.
     transient : float
-        Transient before the average, in the same units.
+        Transient before the average, in the same units; a whole number.
     seed : int
         Seed of what is drawn at random before the orbit begins.
     execution : Execution
         Who does the work, and who hears how many periods are done.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a number is none, too small, or not whole.
     """
 
     precision: float
@@ -50,46 +58,55 @@ class Averaging:
         object.__setattr__(self, "precision", check_number("precision", self.precision, 0.0))
         object.__setattr__(self, "periods", check_positive("periods", self.periods))
         object.__setattr__(self, "transient", check_number("transient", self.transient, 0.0))
+        for name in ("periods", "transient"):
+            if not getattr(self, name).is_integer():
+                raise ValueError(f"{name}: found {getattr(self, name):g}; expected a whole number of periods")
         object.__setattr__(self, "seed", check_integer("seed", self.seed, 0))
 
     def reporter(self) -> Reporter:
         """Return the reporter of the transient and the longest average; its time begins now."""
-        return self.execution.reporter(round(self.transient) + math.ceil(self.periods), "period")
+        return self.execution.reporter(round(self.transient + self.periods), "period")
 
-    def rounds(
-        self, batches: Batches, step: float, error: Callable[[], np.ndarray | float], reporter: Reporter
-    ) -> Iterator[int]:
+    def rounds(self, batches: Batches, error: Callable[[], np.ndarray | float], reporter: Reporter) -> Iterator[int]:
         """Yield how many blocks are left until the average is long or precise enough; one of them at least must be added.
 
         Parameters
         ----------
         batches : Batches
             The average.
-        step : float
-            Length of a block in periods.
         error : callable
             Returns the standard errors that must become small, or the largest.
         reporter : Reporter
             Counts the periods.
         """
-        while batches.blocks * step < self.periods:
+        while batches.periods < self.periods:
             before = batches.blocks
-            yield max(1, math.ceil(self.periods / step) - before)
-            reporter.advance(step * (batches.blocks - before))
+            yield round(self.periods / batches.block) - before
+            reporter.advance(batches.block * (batches.blocks - before))
             if batches.due and np.all(error() <= self.precision):
                 return
 
 
 @dataclass(slots=True)
 class Batches:
-    """Means of growth rates over batches of blocks.
+    """Means of growth rates over batches of blocks, and their standard errors.
 
     When BATCHES batches are full, they are joined in pairs, so that memory does not grow.
 
+    The error of a mean over a time T is sqrt(S/T), where S is the spectral density of the rate at frequency 0. The
+    cosine transform of the batch means has one value for each of the frequencies 1/(2T), 2/(2T) …; the mean of the
+    lowest few squares estimates S, with one degree of freedom for each. Their number is 0.4 n^(2/3) after n periods:
+    the band narrows with growing n, as correlations of any finite length demand, and is so narrow at first that those
+    over a few periods are seen. Few degrees of freedom make a small error by chance; Student's quantile makes up
+    for it, so that the mean lies within two errors of the truth as often as a normal variable, in 95 of 100 runs. An
+    error of fewer than three has no variance and is called unknown.
+
     Parameters
     ----------
-    length : float
-        Length of one block in units of non-dimensional time.
+    unit : float
+        Length of a period in units of non-dimensional time.
+    block : float
+        Number of periods of one block.
     blocks : int
         Number of blocks so far.
     per_batch : int
@@ -105,16 +122,34 @@ class Batches:
 
     References
     ----------
-    Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989).
+    Batches joined in pairs: Flyvbjerg & Petersen, J. Chem. Phys. 91, 461 (1989). Cosine transform and Student's
+    distribution: Müller, J. Econometrics 141, 1331 (2007). Number of frequencies: Lazarus, Lewis, Stock & Watson, J.
+    Bus. Econ. Stat. 36, 541 (2018).
     """
 
-    length: float
+    unit: float
+    block: float = 1.0
     blocks: int = 0
     per_batch: int = 1
     sums: np.ndarray = field(default_factory=lambda: np.zeros((BATCHES, 0, 0)))
     count: int = 0
     due: bool = False
     worst: int = 0
+
+    @property
+    def periods(self) -> float:
+        """Number of periods averaged over."""
+        return self.blocks * self.block
+
+    @property
+    def time(self) -> float:
+        """Non-dimensional time averaged over."""
+        return self.blocks * (self.block * self.unit)
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom of the standard errors: 0.4 n^(2/3) after n periods, within what the batches allow."""
+        return min(round(0.4 * self.periods ** (2.0 / 3.0)), MOST, self.blocks // self.per_batch - 1)
 
     def ahead(self, most: int) -> np.ndarray:
         """Return the blocks of the batches until the error is due.
@@ -160,10 +195,10 @@ class Batches:
 
     def mean(self) -> np.ndarray:
         """Return the growth per unit of time, an ndarray of shape (starts, m)."""
-        return np.asarray(np.sum(self.sums[: self.count], axis=0) / (self.blocks * self.length))
+        return np.asarray(np.sum(self.sums[: self.count], axis=0) / self.time)
 
     def error_by_start(self, strengths: slice = ALL) -> np.ndarray:
-        """Estimate the standard error of each start.
+        """Estimate the standard error of each start: half of what the mean is within in 95 of 100 runs.
 
         Parameters
         ----------
@@ -173,19 +208,15 @@ class Batches:
         Returns
         -------
         ndarray, shape (starts, strengths)
-            The largest estimate from the batches alone, joined in twos and joined in fours; inf if
-            there is a single batch.
+            The estimates; inf if the average has fewer than FEWEST degrees of freedom, which 16 periods have.
         """
-        rates = self.sums[: self.blocks // self.per_batch, :, strengths] / (self.per_batch * self.length)
-        estimates = []
-        for join in (1, 2, 4):
-            count = len(rates) // join
-            if count >= 8 or join == 1:
-                means = rates[: count * join].reshape(count, join, *rates.shape[1:]).mean(axis=1)
-                estimates.append(
-                    means.std(axis=0, ddof=1) / math.sqrt(count) if count > 1 else np.full(means[0].shape, np.inf)
-                )
-        return np.asarray(np.max(estimates, axis=0))
+        whole, freedom = self.blocks // self.per_batch, self.freedom
+        rates = self.sums[:whole, :, strengths] / (self.per_batch * self.block * self.unit)
+        if freedom < FEWEST:
+            return np.full(rates.shape[1:], np.inf)
+        phases = np.outer(np.arange(1, freedom + 1), np.arange(0.5, whole)) * (math.pi / whole)
+        parts = np.tensordot(math.sqrt(2.0 / whole) * np.cos(phases), rates, axes=1)
+        return np.asarray(stdtrit(freedom, ndtr(2.0)) / 2.0 * np.sqrt((parts**2).mean(axis=0) / whole))
 
     def error(self, strengths: slice = ALL) -> np.ndarray:
         """Return the standard errors (strengths,) of the mean over the starts, as `error_by_start`."""

@@ -219,10 +219,10 @@ def cluster_exponents(
         for _ in range(round(averaging.transient)):
             integrator.advance(unit)
             reporter.advance(1)
-        for _ in averaging.rounds(batches, 1.0, batches.error, reporter):
+        for _ in averaging.rounds(batches, batches.error, reporter):
             batches.add(integrator.advance(unit))
             apart = np.maximum(apart, _differences(integrator.state[0], partition.quotient.n, _deviating(variation)))
-    mean, error, time = batches.mean()[0], batches.error_by_start()[0], batches.blocks * unit
+    mean, error, time = batches.mean()[0], batches.error_by_start()[0], batches.time
     return ClusterExponents(partition, mean[1:], error[1:], float(mean[0]), float(error[0]), apart, time)
 
 

@@ -402,10 +402,9 @@ def average(orbits: Orbits, averaging: Averaging, reporter: Reporter) -> tuple[n
     length : float
         Time averaged over.
     """
-    batches = Batches(orbits.unit * orbits.block)
-    for left in averaging.rounds(batches, orbits.block, lambda: batches.largest_error(averaging.precision), reporter):
+    batches = Batches(orbits.unit, orbits.block)
+    for left in averaging.rounds(batches, lambda: batches.largest_error(averaging.precision), reporter):
         parts = batches.ahead(left)
         for growth, blocks in zip(orbits.growths(parts), parts, strict=True):
             batches.add(growth, int(blocks))
-    mean, error = batches.mean(), batches.error_by_start()
-    return mean, error, batches.blocks * batches.length
+    return batches.mean(), batches.error_by_start(), batches.time
