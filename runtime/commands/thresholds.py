@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from synchain.models.scenes.scene import Scene
 
     from ..prediction.intervals import Interval
+    from ..synchronisation.hidden_modes import hidden_modes
     from ..synchronisation.threshold import Criterion, Thresholds
 
 SUMMARY = (
@@ -70,7 +71,7 @@ def execute(arguments: Namespace) -> int:
         criterion = Criterion(**_effort(arguments))
         sigma = arguments.sigma or default_grid(scene.topology.spectrum, 0.005 if arguments.quick else 0.0025)
         scene.replace(axes={scene.strength: sigma})
-    warn(scene.warnings)
+    warn((*scene.warnings, *hidden_modes(scene)))
     result = thresholds(
         scene,
         sigma=sigma,

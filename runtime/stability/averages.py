@@ -14,7 +14,7 @@ from synchain.models.inputs.checks import check_integer, check_number, check_pos
 from ..support.execution import Execution
 from ..support.progress import Reporter
 
-__all__ = ["Averaging", "Batches"]
+__all__ = ["Averaging", "Batches", "check_whole"]
 
 BATCHES = 64
 """Most batches that are kept."""
@@ -22,6 +22,11 @@ CHECKED = 8
 """Batches between two checks of the error."""
 FEWEST, MOST = 3, 16
 """Fewest degrees of freedom of an error that is known, and most that are used."""
+NARROW = 0.2
+"""Degrees of freedom are NARROW n^(2/3) after n periods.
+
+Lazarus et al. take 0.4 for noise that is correlated over a few samples; chaos is over several periods.
+"""
 ALL = slice(None)
 
 
@@ -56,11 +61,8 @@ class Averaging:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "precision", check_number("precision", self.precision, 0.0))
-        object.__setattr__(self, "periods", check_positive("periods", self.periods))
-        object.__setattr__(self, "transient", check_number("transient", self.transient, 0.0))
-        for name in ("periods", "transient"):
-            if not getattr(self, name).is_integer():
-                raise ValueError(f"{name}: found {getattr(self, name):g}; expected a whole number of periods")
+        object.__setattr__(self, "periods", check_whole("periods", check_positive("periods", self.periods)))
+        object.__setattr__(self, "transient", check_whole("transient", check_number("transient", self.transient, 0.0)))
         object.__setattr__(self, "seed", check_integer("seed", self.seed, 0))
 
     def reporter(self) -> Reporter:
@@ -87,6 +89,13 @@ class Averaging:
                 return
 
 
+def check_whole(what: str, periods: float) -> float:
+    """Return a number of periods; ValueError if it is not whole."""
+    if not periods.is_integer():
+        raise ValueError(f"{what}: found {periods:g}; expected a whole number of periods")
+    return periods
+
+
 @dataclass(slots=True)
 class Batches:
     """Means of growth rates over batches of blocks, and their standard errors.
@@ -95,11 +104,10 @@ class Batches:
 
     The error of a mean over a time T is sqrt(S/T), where S is the spectral density of the rate at frequency 0. The
     cosine transform of the batch means has one value for each of the frequencies 1/(2T), 2/(2T) …; the mean of the
-    lowest few squares estimates S, with one degree of freedom for each. Their number is 0.4 n^(2/3) after n periods:
-    the band narrows with growing n, as correlations of any finite length demand, and is so narrow at first that those
-    over a few periods are seen. Few degrees of freedom make a small error by chance; Student's quantile makes up
-    for it, so that the mean lies within two errors of the truth as often as a normal variable, in 95 of 100 runs. An
-    error of fewer than three has no variance and is called unknown.
+    lowest few squares estimates S, with one degree of freedom for each. Their number grows as n^(2/3) with n periods, so
+    that the band narrows and correlations of any finite length are seen in the end. Few squares may be small together by
+    chance; Student's quantile makes up for it, so that the mean lies within two errors of the truth as often as a
+    normal variable, in 95 of 100 runs. An error of fewer than FEWEST squares is unknown: it has no variance.
 
     Parameters
     ----------
@@ -148,8 +156,8 @@ class Batches:
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom of the standard errors: 0.4 n^(2/3) after n periods, within what the batches allow."""
-        return min(round(0.4 * self.periods ** (2.0 / 3.0)), MOST, self.blocks // self.per_batch - 1)
+        """Degrees of freedom of the standard errors: NARROW n^(2/3) after n periods, within what the batches allow."""
+        return min(round(NARROW * self.periods ** (2.0 / 3.0)), MOST, self.blocks // self.per_batch - 1)
 
     def ahead(self, most: int) -> np.ndarray:
         """Return the blocks of the batches until the error is due.
@@ -208,7 +216,7 @@ class Batches:
         Returns
         -------
         ndarray, shape (starts, strengths)
-            The estimates; inf if the average has fewer than FEWEST degrees of freedom, which 16 periods have.
+            The estimates; inf if the average has fewer than FEWEST degrees of freedom; 45 periods have them.
         """
         whole, freedom = self.blocks // self.per_batch, self.freedom
         rates = self.sums[:whole, :, strengths] / (self.per_batch * self.block * self.unit)
