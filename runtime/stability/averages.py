@@ -83,7 +83,7 @@ class Averaging:
         """
         while batches.periods < self.periods:
             before = batches.blocks
-            yield round(self.periods / batches.block) - before
+            yield math.ceil(self.periods / batches.block) - before
             reporter.advance(batches.block * (batches.blocks - before))
             if batches.due and np.all(error() <= self.precision):
                 return

@@ -177,7 +177,7 @@ def lyapunov_spectrum(
     precision : float
         Averaging stops if every standard error is below this value.
     periods : float
-        Longest average, in periods of the drive, or in units of 2 pi if there is none.
+        Longest average, in periods of the drive, or in units of 2 pi if there is none; a whole number.
     transient : float
         Transient before the average, in the same units.
     rtol : float
