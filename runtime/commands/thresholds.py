@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from synchain.models.scenes.scene import Scene
 
     from ..prediction.intervals import Interval
-    from ..synchronisation.hidden_modes import hidden_modes
     from ..synchronisation.threshold import Criterion, Thresholds
 
 SUMMARY = (
@@ -60,6 +59,7 @@ def configure(parser: ArgumentParser) -> None:
 def execute(arguments: Namespace) -> int:
     """Print the synchronous ranges as a table or as JSON."""
     from ..cells.kernels import kernel_source
+    from ..synchronisation.hidden_modes import hidden_modes
     from ..synchronisation.threshold import Criterion, check_probe, default_grid, thresholds
 
     with wrong_use():

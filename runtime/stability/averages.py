@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from scipy.special import ndtr, stdtrit
@@ -222,8 +223,9 @@ class Batches:
         rates = self.sums[:whole, :, strengths] / (self.per_batch * self.block * self.unit)
         if freedom < FEWEST:
             return np.full(rates.shape[1:], np.inf)
-        phases = np.outer(np.arange(1, freedom + 1), np.arange(0.5, whole)) * (math.pi / whole)
-        parts = np.tensordot(math.sqrt(2.0 / whole) * np.cos(phases), rates, axes=1)
+        parts = np.zeros((freedom, *rates.shape[1:]))
+        for wave, rate in zip(_waves(freedom, whole), rates, strict=True):
+            parts += wave[:, None, None] * rate
         return np.asarray(stdtrit(freedom, ndtr(2.0)) / 2.0 * np.sqrt((parts**2).mean(axis=0) / whole))
 
     def error(self, strengths: slice = ALL) -> np.ndarray:
@@ -243,3 +245,10 @@ class Batches:
         error = self.error()
         self.worst = int(np.argmax(error))
         return float(error[self.worst])
+
+
+@lru_cache(maxsize=8)
+def _waves(count: int, batches: int) -> np.ndarray:
+    """The lowest terms (batches, count) of the orthonormal cosine transform of some batches, but the mean."""
+    angles = [[math.pi * j * (k + 0.5) / batches for j in range(1, count + 1)] for k in range(batches)]
+    return math.sqrt(2.0 / batches) * np.array([[math.cos(angle) for angle in row] for row in angles])
